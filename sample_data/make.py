@@ -32,24 +32,22 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import root
 
 from analysis.locked import slip_of
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.present.progress import Mute
+from levilab.reproduce.synthetic import NOISE_HZ, READINGS, solve
 from levilab.simulator import preset
+from levilab.stability.published.printed import several
 
 HERE = Path(__file__).parent
-NOISE_HZ, STEP_S, DIGIT_HZ = 0.03, 10.0, 0.01
 #: (C₁ [1/s], |C₂| [1/rad], readings): the thesis's four runs, C₁ printed to six decimals, C₂ to eight.
-PUBLISHED = (
-    (0.003199, 1.760e-5, 20),
-    (0.003134, 1.707e-5, 20),
-    (0.003133, 1.669e-5, 19),
-    (0.003261, 1.772e-5, 19),
+PUBLISHED = tuple(
+    (c1.value, c2.value, n)
+    for c1, c2, n in zip(several("thesis", "spindown.c1"), several("thesis", "spindown.c2"), READINGS, strict=True)
 )
-LOWER_LIMITS_HZ = (21.7, 21.4, 21.7, 21.9, 21.8, 22.3, 21.8, 22.0, 22.1, 21.9)
+LOWER_LIMITS_HZ = tuple(one.value for one in several("thesis", "measured.limits"))
 
 Array = NDArray[np.float64]
 
@@ -63,44 +61,6 @@ HOW = (
     "N(0, 0.03 Hz) of seed {seed}, both solved for so that unweighted straight lines return the published "
     "C1 = {c1} 1/s and C2 = {c2} 1/rad; rounded to 0.01 Hz; made by sample_data/make.py"
 )
-
-
-def disc(t: Array, start_hz: float, c32: float) -> Array:
-    """Spin of a laminar disc [Hz]."""
-    return start_hz * (1 + c32 * np.sqrt(2 * np.pi * start_hz) * t / 2) ** -2.0
-
-
-def straight_lines(t: Array, nu: Array) -> tuple[float, float]:
-    """C₁ [1/s] and C₂ [1/rad] of unweighted straight lines through ln ω and 1/ω."""
-    omega = 2 * np.pi * nu
-    return -float(np.polyfit(t, np.log(omega), 1)[0]), float(np.polyfit(t, 1 / omega, 1)[0])
-
-
-def as_printed(c1: float, c2: float) -> tuple[str, str]:
-    """The two constants with the digits of the thesis."""
-    return f"{c1:.6f}", f"{c2:.3e}"
-
-
-def solve(c1: float, c2: float, n: int) -> tuple[Array, Array, dict[str, float]]:
-    """Readings that give the published constants to every printed digit, after rounding, and how they were made.
-
-    The first seed is taken for which rounding does not move a digit and the start lies within 0.25 Hz of 40.
-    """
-    t = STEP_S * np.arange(n)
-    for seed in range(1000):
-        noise = np.random.default_rng((n, round(c1 * 1e6), seed)).normal(0, NOISE_HZ, n)
-
-        def miss(x: Array, noise: Array = noise) -> list[float]:
-            got = straight_lines(t, disc(t, 40 * x[0], 2.3e-4 * x[1]) + noise)
-            return [got[0] / c1 - 1, got[1] / c2 - 1]
-
-        found = root(miss, [1.0, 1.0], tol=1e-12)
-        start, c32 = 40 * found.x[0], 2.3e-4 * found.x[1]
-        nu = np.round(disc(t, start, c32) + noise, 2)
-        kept = as_printed(*straight_lines(t, nu)) == as_printed(c1, c2)
-        if found.success and kept and abs(start - 40) < 0.25:
-            return t, nu, {"start": start, "c32": c32, "seed": seed}
-    raise RuntimeError(f"no seed gives C1 = {c1}, C2 = {c2}")
 
 
 #: Upper limits: mean and scatter of the simulated bench (sine of 0.4 mT, creep of 0.1 Hz/s), tops, creep and how often
@@ -453,11 +413,12 @@ def main() -> None:
     """Write the run folders and the files of scopes."""
     write_scope_files(HERE / "scope-files")
     for number, (c1, c2, n) in enumerate(PUBLISHED, start=1):
-        t, nu, how = solve(c1, c2, n)
+        made = solve(c1, c2, n)
+        how = {"start": made.start, "c32": made.c32, "seed": made.seed}
         write(
             HERE / f"spin-down-{number}",
             ",".join(channel["name"] for channel in CHANNELS),
-            [f"{x:g},{y:.2f},{NOISE_HZ}" for x, y in zip(t, nu, strict=True)],
+            [f"{x:g},{y:.2f},{NOISE_HZ}" for x, y in zip(made.time, made.spin, strict=True)],
             {
                 "experiment": "spin",
                 "started_utc": None,

@@ -13,12 +13,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numbers_of import THESIS_KG, TOP, TRAP_HZ, load, slow_resonance, swing_hz
 from PIL import Image
-from plans import STARTS, WAVES
+from plans import WAVES
 from thesis import THESIS
 
 from levilab.present.style import STYLE, save_png
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import with_settings
+from levilab.stability.thesis import STARTS
 from levilab.sweeps.figure import map_figure
 from levilab.sweeps.store import Store
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from plans import CHANGES, NUDGES, RESONANT, STARTS, WAVES
+from plans import CHANGES, NUDGES, RESONANT, WAVES
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from thesis import THESIS
@@ -16,6 +16,8 @@ from analysis.stability import sleeping_limit, wobble_resonance
 from levilab.simulator.equilibrium import modes_at, stability_of
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
+from levilab.stability.scan import intervals, lower_limit
+from levilab.stability.thesis import STARTS
 from levilab.sweeps.store import Store
 
 if TYPE_CHECKING:
@@ -61,19 +63,6 @@ def load(folder: Path, name: str) -> Found:
     """Open a store of the study."""
     found = Store.open(folder / f"{name}.zarr").load()
     return Found(tuple(axis.values for axis in found.plan.axes), found.values, found.plan.scene)
-
-
-def intervals(flags: Flags) -> list[tuple[int, int]]:
-    """First and last index of every run of flags that are set."""
-    change = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(int), [0]))))
-    return [(int(a), int(b) - 1) for a, b in zip(change[::2], change[1::2], strict=True)]
-
-
-def lower_limit(spins: Array, up: Flags) -> float:
-    """The spin from which on every top of a scan is up [Hz]; NaN if the last one is not."""
-    lost = np.flatnonzero(~up)
-    first = lost[-1] + 1 if lost.size else 0
-    return float(spins[first]) if first < spins.size else math.nan
 
 
 def hole(spins: Array, up: Flags, least: float = 0.2) -> tuple[float, float] | None:

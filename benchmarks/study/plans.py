@@ -6,19 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from levilab.simulator.scene import preset, with_settings
+from levilab.stability.thesis import STARTS
 from levilab.sweeps.axes import parse_axis
 from levilab.sweeps.plan import Plan
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
 
-#: The thesis's four starts, as settings of the scene undriven, which is the first.  The third's x is printed as 5 mm.
-STARTS: dict[str, tuple[str, ...]] = {
-    "IC1": (),
-    "IC2": ("start.position_m=[0.0001,0,0.073]", "start.velocity_m_s=[0,0,0]"),
-    "IC3": ("start.position_m=[0.003,0,0.0725]", "start.velocity_m_s=[-0.002,0,0.0005]"),
-    "IC4": ("start.tilt_rad=0.1",),
-}
 #: What `levilab sweep` takes without other options.
 TOLERANCE, DURATION_S, OBSERVED = 1e-6, 30.0, "survived,lifetime_s"
 #: Wanted error of the sweeps that try whether the step matters.

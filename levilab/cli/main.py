@@ -163,6 +163,18 @@ def crosscheck() -> Callable[..., None]:
     return crosscheck
 
 
+@app.command(cls=Later, epilog="Example: levilab reproduce --only limits,errata -o reproduce.html")
+def reproduce() -> Callable[..., None]:
+    """Make the tables and figures of the Levitron thesis and of two papers anew: published value beside ours.
+
+    Prints published, ours and agreement, and writes all with figures as a report.  A minute on two cores.  Ends with 1
+    where a value neither agrees nor differs for the reason that is shown.
+    """
+    from levilab.cli.reproduce import reproduce
+
+    return reproduce
+
+
 @app.command(cls=Later, epilog="Example: levilab top sample_data/device.toml")
 def top() -> Callable[..., None]:
     """Mass and moments of inertia of a top from its parts, taken as cylinders, with uncertainties."""

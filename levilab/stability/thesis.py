@@ -4,15 +4,30 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from levilab.stability.published.printed import published
+
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
 
+_THESIS = published("thesis")
+
+#: Its four starts, as settings of the scene undriven, which has the first.  The third's x is printed as 5 mm.
+STARTS: dict[str, tuple[str, ...]] = {
+    "IC1": (),
+    "IC2": ("start.position_m=[0.0001,0,0.073]", "start.velocity_m_s=[0,0,0]"),
+    "IC3": ("start.position_m=[0.003,0,0.0725]", "start.velocity_m_s=[-0.002,0,0.0005]"),
+    "IC4": ("start.tilt_rad=0.1",),
+}
 #: Simulated, without drag, 30 s: start → lower and upper limit [Hz].
-SIMULATED_HZ = {"IC1": (22.06, 70.90), "IC2": (21.78, 81.73), "IC3": (22.27, 70.50), "IC4": (23.02, 65.01)}
-#: Measured ten times: the lower limit and its standard error [Hz].
-MEASURED_HZ, MEASURED_U_HZ = 21.86, 0.08
+SIMULATED_HZ = {name: (_THESIS[f"limits.lower.{name}"].value, _THESIS[f"limits.upper.{name}"].value) for name in STARTS}
+#: Simulated, with drag from 30 Hz: start → spin at the fall [Hz].
+WITH_DRAG_HZ = {name: _THESIS[f"limits.drag.{name}"].value for name in STARTS}
+#: Measured ten times: the lower limit, its standard error, and the scatter of one [Hz].
+MEASURED_HZ, MEASURED_U_HZ, SCATTER_HZ = (
+    _THESIS[f"measured.{key}"].value for key in ("mean", "standard_error", "scatter")
+)
 #: About the highest spin that the drive could hold [Hz].
-HIGHEST_HZ = 61.0
+HIGHEST_HZ = _THESIS["measured.highest"].value
 
 
 def is_thesis_device(scene: Scene) -> bool:

@@ -1,0 +1,63 @@
+"""The thesis's tables and figures, made anew.  Heavy imports happen inside the command."""
+
+import contextlib
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from levilab.cli import exit_codes
+from levilab.cli.options import Json
+from levilab.cli.output import interruptible, print_json, result
+
+
+def reproduce(
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE.html|FILE.pdf",
+            help=r"The report; its ending chooses the format.  PDF needs levilab\[pdf].",
+            show_default="reproduce.html, and none with --json",
+        ),
+    ] = None,
+    only: Annotated[
+        str,
+        typer.Option(
+            metavar="CHAPTER,…",
+            help="These chapters alone: stability, limits, paths, driven, spindown, statistics, dipole, errata, "
+            "beyond, simon, gans.",
+        ),
+    ] = "",
+    as_json: Json = False,
+) -> None:
+    """Make the chapters, print them, write the report, and end with 1 where something is unexpected."""
+    from levilab.reproduce.run import chosen
+
+    wanted = chosen(only)  # a wrong name is refused before anything is computed
+
+    from levilab.present.progress import ShareBar
+    from levilab.reproduce.report import format_of, write
+    from levilab.reproduce.run import document, reproduce
+
+    report = output or (None if as_json else Path("reproduce.html"))
+    if report is not None:
+        format_of(report)
+    with interruptible("no report is written"):
+        with contextlib.closing(ShareBar("reproducing")) as progress:
+            found = reproduce(wanted, progress)
+        if report is not None:
+            write(found, report)
+    if as_json:
+        print_json(document(found))
+    else:
+        from levilab.present.terminal import draw, terminal
+        from levilab.reproduce.table import findings_table, in_words
+
+        for chapter, of_chapter in found.chapters:
+            terminal().print(draw(findings_table(chapter.title, of_chapter.findings)))
+        result(in_words(found))
+        result(f"the report is in {report}")
+    if not found.as_expected:
+        raise typer.Exit(exit_codes.FAILED)

@@ -1,0 +1,178 @@
+"""The driven top: its spin swings about the drive's frequency, and its φ̇ looks chaotic though the motion is not."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.uncertainty import Estimate
+from levilab.motion.lines import lines_of, rate_for
+from levilab.motion.lock import is_locked
+from levilab.present.document.blocks import Note, Picture
+from levilab.reproduce.chapter import Found
+from levilab.reproduce.check import Check, Statement, Within
+from levilab.reproduce.figure import Azimuth, azimuth_figure, driven_figure
+from levilab.reproduce.tops import THESIS, TOLERANCE
+from levilab.simulator.scene import preset
+from levilab.simulator.single import simulate
+
+if TYPE_CHECKING:
+    from levilab.motion.lines import AxisLines
+    from levilab.reproduce.check import Finding
+    from levilab.simulator.trajectory import Trajectory
+
+#: The run is as long as the thesis's [s]; its first part, for a spectrum with two digits, is shorter.
+RUN_S, WINDOW_S = THESIS["driven.duration"].value, 30.0
+
+
+def azimuth(motion: Trajectory, fastest: float) -> Azimuth:
+    """φ̇ from the state itself: φ̇ = (n × ṅ)_z/sin²θ with ṅ = L × n/I₁, which no sampling falsifies.
+
+    Args:
+        motion: of the top.
+        fastest: the highest frequency in the motion of the axis [Hz].
+    """
+    n, momentum = motion.axis, motion.angular_momentum
+    turning = np.cross(momentum, n) / motion.scene.top.inertia_transverse_kg_m2
+    across = n[:, 0] ** 2 + n[:, 1] ** 2
+    rate = (n[:, 0] * turning[:, 1] - n[:, 1] * turning[:, 0]) / across / (2 * math.pi)
+    near = (rate > fastest) | (rate < 0)
+    return Azimuth(
+        rate, motion.tilt, near, float(near.mean()), float(np.median(motion.tilt[near])), float(np.median(motion.tilt))
+    )
+
+
+def wave(lines: AxisLines, name: str) -> float:
+    """The frequency of the line with a name [Hz], NaN without one."""
+    return next((line.frequency for line in lines.lines if line.name == name), math.nan)
+
+
+def sideband(lines: AxisLines) -> float:
+    """The distance of the sidebands next to the drive's line [Hz]: the spin's swing about the drive."""
+    drive = wave(lines, "drive")
+    return min(
+        (abs(line.frequency - drive) for line in lines.lines if line.name.startswith("drive ")), default=math.nan
+    )
+
+
+def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
+    """What the run says of the spin."""
+    spin, drive = motion.spin_hz, THESIS["driven.drive"]
+    turns = float(np.trapezoid(spin, motion.time)) / float(motion.time[-1])
+    locked = is_locked(motion.scene, motion.states, survived=motion.survived)
+    early = lines_of(
+        simulate(motion.scene, WINDOW_S, tolerance=TOLERANCE, rate=float(math.ceil(rate_for(motion.scene))))
+    )
+    precession = wave(early, "precession")
+    return [
+        Statement(
+            "the top is locked",
+            THESIS["driven.duration"].place,
+            f"the spin oscillates about ν_d for {RUN_S:g} s and more",
+            f"up after {motion.time[-1]:g} s, {'locked' if locked else 'not locked'}; spin from {spin.min():.2f} to "
+            f"{spin.max():.2f} Hz",
+            holds=motion.survived and bool(locked),
+        ),
+        Check(
+            "mean of the spin ω₃/2π",
+            drive,
+            Estimate(turns, None, "Hz"),
+            Within(
+                0.1,
+                "the body turns about the vertical as the drive does; ω₃ is that rate times cos θ, here lower by "
+                f"{1e3 * (drive.value - turns):.0f} mHz on the average",
+            ),
+        ),
+        Check(
+            "line of n_x + i n_y at the drive, which a laser beside the stem counts",
+            drive,
+            Estimate(wave(lines, "drive"), lines.resolution / 2, "Hz"),
+        ),
+        Check(
+            f"free precession, in the first {WINDOW_S:g} s",
+            THESIS["driven.precession"],
+            Estimate(precession, early.resolution / 2, "Hz"),
+        ),
+        Check(
+            "distance of the sidebands, the spin's swing about the drive",
+            THESIS["driven.sideband"],
+            Estimate(sideband(lines), None, "Hz"),
+            Within(
+                1 / WINDOW_S,
+                f"a bin of a record of {WINDOW_S:g} s is {1e3 / WINDOW_S:.0f} mHz wide; the place of a line between "
+                "bins is found here",
+            ),
+        ),
+    ]
+
+
+def of_azimuth(found: Azimuth, lines: AxisLines) -> list[Finding]:
+    """Why φ̇ looks chaotic, and the spectrum does not."""
+    named = [line for line in lines.lines if line.name]
+    power = sum(line.amplitude**2 for line in named)
+    all_power = float(np.mean(np.abs(lines.signal[0]) ** 2)) if lines.signal else math.nan
+    return [
+        Statement(
+            "φ̇ of the driven top",
+            "figure of the driven precession",
+            "φ̇ looks chaotic",
+            f"φ̇/2π from {found.rate.min():.0f} to {found.rate.max():.0f} Hz, far beyond any frequency of the axis",
+            holds=bool(found.rate.max() > 100 and found.rate.min() < -20),
+        ),
+        Statement(
+            "its irregularity comes from passages near θ = 0",
+            "figure of the driven precession",
+            "",
+            f"φ̇ is beyond the nutation or backwards {100 * found.share:.0f} % of the time; the median tilt is then "
+            f"{1e3 * found.tilt_then:.0f} mrad, and {1e3 * found.tilt_ever:.0f} mrad at all times",
+            holds=found.tilt_then < 0.7 * found.tilt_ever,
+        ),
+        Statement(
+            "n_x + i n_y of the same run is regular",
+            "figure of the driven precession",
+            "",
+            f"{len(named)} lines, each with a name, hold {100 * power / all_power:.0f} % of its power",
+            holds=power > 0.8 * all_power,
+        ),
+    ]
+
+
+def make() -> Found:
+    """Make the chapter."""
+    scene = preset("driven")
+    motion = simulate(scene, RUN_S, tolerance=TOLERANCE, rate=float(math.ceil(rate_for(scene))))
+    lines = lines_of(motion)
+    nutation = max(line.frequency for line in lines.lines if line.name)
+    rates = azimuth(motion, nutation)
+    pictures = (
+        Picture(
+            "driven",
+            "The spin of a locked top swings about its drive.",
+            "Spin ω₃/2π of the thesis's driven top (ν₀ = 30.03 Hz, ν_d = 30 Hz, 24.45 g, 0.4 mT), as the band "
+            "between its "
+            "least and greatest values over the whole run, and its first 20 s below; dashed: the drive.",
+            "Spin of the driven top over 300 s",
+            partial(driven_figure, motion),
+        ),
+        Picture(
+            "azimuth",
+            "The azimuth's rate is wild, the axis is not.",
+            "Above: φ̇/2π over five seconds, cut at ±120 Hz, and its values over the tilt θ at the same time: large "
+            "where θ "
+            "is small, since the azimuth turns by half a turn when the axis passes the vertical. Below: the spectrum "
+            "of "
+            "n_x + i n_y of the whole run, with the names of its lines.",
+            "Rate of the azimuth over time and tilt, and the spectrum of the axis",
+            partial(azimuth_figure, motion, rates, lines),
+            raster=True,
+        ),
+    )
+    note = Note(
+        "The azimuth φ is undefined at θ = 0, where the top lives; n_x + i n_y is smooth there. A rate of φ is a "
+        "property of the coordinate, not of the motion."
+    )
+    said = "The thesis's driven run, 300 s without drag, with the moment tilted by 1.77°."
+    return Found((*of_spin(motion, lines), *of_azimuth(rates, lines)), (*pictures, note), said)

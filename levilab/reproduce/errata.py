@@ -1,0 +1,424 @@
+"""The slips of the thesis, each tried on a number that neither the printed nor the corrected equation decides."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.field.ring import Ring
+from analysis.field.ring import on_axis as ring_on_axis
+from analysis.stability import reduced_mass
+from levilab.present.document.blocks import Note
+from levilab.reproduce.chapter import Found
+from levilab.reproduce.check import Erratum
+from levilab.reproduce.tops import MASS_KG, THESIS, many, scan, started
+from levilab.simulator.energy import magnetic_energy
+from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.field import field_of, flux_density, flux_gradient, on_axis
+from levilab.simulator.kernels.motion import N, R, V
+from levilab.simulator.model import base_field
+from levilab.simulator.scene import preset
+from levilab.simulator.single import simulate
+from levilab.simulator.start import start_of
+from levilab.stability.scan import lower_limit
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from levilab.reproduce.tops import Array
+    from levilab.simulator.scene import Scene
+    from levilab.simulator.trajectory import Trajectory
+
+#: Rates of change are taken from the motion this long before and after the start [s]: its error is 1e-7 of them.
+_H_S = 2e-5
+#: A top on the axis, at the measured height, at rest but for its spin.
+ON_AXIS = {"start.position_m": [0.0, 0.0, 0.073], "start.velocity_m_s": [0.0, 0.0, 0.0]}
+
+
+def rate(scene: Scene, value: Callable[[Trajectory], Array]) -> float:
+    """The rate of change of a quantity of the motion at its start, from the simulated motion alone."""
+    ends = [
+        float(value(simulate(scene, sign * _H_S, tolerance=1e-14, rate=None, step=_H_S / 4))[-1]) for sign in (1, -1)
+    ]
+    return (ends[0] - ends[1]) / (2 * _H_S)
+
+
+def bend(scene: Scene, value: Callable[[Trajectory], Array], h: float = 5e-5) -> float:
+    """The second rate of change at the start."""
+    motions = [simulate(scene, sign * h, tolerance=1e-14, rate=None, step=h / 8) for sign in (1, -1)]
+    after, before = (float(value(one)[-1]) for one in motions)
+    return (after - 2 * float(value(motions[0])[0]) + before) / h**2
+
+
+def acceleration() -> Erratum:
+    """Of a top at the start IC1."""
+    scene = started("IC1")
+    state = start_of(scene)
+    moment = scene.top.moment_a_m2 * state[N]
+    force = float(flux_gradient(base_field(scene), state[R])[2] @ moment)
+    return Erratum(
+        "(2.8)",
+        "lacks 1/m",
+        "m v̇ = ∇(μ·B) − mg e_z",
+        "acceleration upward at the start IC1",
+        rate(scene, lambda motion: motion.velocity[:, 2]),
+        force - scene.gravity_m_s2,
+        force / MASS_KG - scene.gravity_m_s2,
+        1e-5,
+        "m/s²",
+    )
+
+
+def half() -> Erratum:
+    """The kinetic energy that is gained is the potential energy that is lost."""
+    scene = started("IC1")
+    motion = simulate(scene, 0.3, tolerance=1e-10, rate=10.0)
+    ends = motion.states[[0, -1]]
+    weight = scene.top.mass_kg * scene.gravity_m_s2 * ends[:, R][:, 2]
+    potential = magnetic_energy(motion.model, ends) + weight
+    along = np.einsum("ij,ij->i", motion.angular_momentum[[0, -1]], motion.axis[[0, -1]])
+    across = np.einsum("ij,ij->i", motion.angular_momentum[[0, -1]], motion.angular_momentum[[0, -1]]) - along**2
+    twice = (
+        scene.top.mass_kg * np.sum(ends[:, V] ** 2, axis=1)
+        + across / scene.top.inertia_transverse_kg_m2
+        + along**2 / scene.top.inertia_axial_kg_m2
+    )
+    return Erratum(
+        "(2.26)",
+        "lacks ½",
+        "with ½",
+        "kinetic energy gained in 0.3 s; true: potential energy lost",
+        float(potential[0] - potential[1]) * 1e6,
+        float(twice[1] - twice[0]) * 1e6,
+        float(twice[1] - twice[0]) / 2 * 1e6,
+        1e-6,
+        "µJ",
+        "read as the ½ of a kinetic energy",
+    )
+
+
+def fourth_power() -> Erratum:
+    """The coefficient of r⁴ in the potential's series, from the exact field beside the axis."""
+    z, base = 0.073, preset("undriven").base
+    ring = Ring(base.strength_t_m, 0.0, 0.0, base.inner_radius_m, base.outer_radius_m)
+    b, _, second, _, fourth = ring_on_axis(ring, np.array([z]), 5)[:, 0]
+    exact = field_of(base.inner_radius_m, base.outer_radius_m, base.strength_t_m, "exact")
+    coefficients = []
+    for r in (6e-3, 3e-3):
+        flux = float(flux_density(exact, [r, 0.0, z])[2])
+        coefficients.append((flux - b + second * r**2 / 4) / (fourth * r**4))
+    return Erratum(
+        "(2.42)",
+        "coefficient of r⁴ is 3/16",
+        "it is 1/64",
+        "coefficient of φ₄ r⁴; true: from elliptic integrals, at r → 0",
+        (4 * coefficients[1] - coefficients[0]) / 3,
+        3 / 16,
+        1 / 64,
+        1e-3,
+    )
+
+
+def thickness() -> Erratum:
+    """The field of a base of one material, twice as thick: two bases on each other."""
+    a, b, z, h = 0.030, 0.055, np.array([0.073]), 0.002
+
+    def flux(strength: float, thick: float, origin: float) -> float:
+        return float(on_axis(field_of(a, b, strength, "exact", thickness=thick, origin=origin), z)[0, 0])
+
+    one = flux(1e-3, h, 0.0)
+    return Erratum(
+        "(2.48)",
+        "the factor is 1/h",
+        "it is h",
+        "field of a base twice as thick, over that of the thin one; true: two thin ones on each other",
+        (flux(1e-3, h, h / 2) + flux(1e-3, h, -h / 2)) / one,
+        flux(0.5e-3, 2 * h, 0.0) / one,
+        flux(2e-3, 2 * h, 0.0) / one,
+        1e-9,
+        reading="read as the factor from magnetisation to the strength of a thin sheet",
+    )
+
+
+def bracket() -> Erratum:
+    """The effective mass has no dimension: it is the same in SI and in the thesis's units."""
+    scene = preset("undriven")
+    found, base = stability_of(scene), scene.base
+    a, rho = THESIS["device.inner_radius"].value, THESIS["device.strength"].value
+    mu, g, mass = THESIS["device.moment"].value, THESIS["device.gravity"].value, 1e3 * scene.top.mass_kg
+    without = scene.top.mass_kg * scene.gravity_m_s2 / (2 * math.pi * abs(scene.top.moment_a_m2) * base.strength_t_m)
+    return Erratum(
+        "(2.54)",
+        "the bracket has no a²",
+        "M = m g a²/(2π|μ|ρ)",
+        "effective mass of 25.26 g in SI; true: in cm, g, s, mT",
+        mass * g * a**2 / (2 * math.pi * mu * rho),
+        without,
+        reduced_mass(scene.top.mass_kg, found.top, base.inner_radius_m, base.strength_t_m),
+        1e-9,
+    )
+
+
+def least_spin() -> Erratum:
+    """The spin at which the two fast roots of a top on a fixed point become real, found by looking at the roots."""
+    found = stability_of(preset("undriven").changed({"top.mass_kg": 0.0253}))
+    top = found.top
+    assert found.floating is not None
+    p = -top.moment * float(found.field(np.array([found.floating.height]))[0, 0])
+    low, high = 10.0, 40.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        roots = np.roots([top.transverse, -top.axial * 2 * math.pi * middle, p])
+        low, high = (middle, high) if abs(roots[0].imag) > 0 else (low, middle)
+    return Erratum(
+        "(2.57)",
+        "lacks the factor 2√(I₁/I₃) = 1.55",
+        "2√(I₁P)/I₃",
+        "least spin of a sleeping top, 25.30 g; true: where its roots become real",
+        high,
+        found.thesis_estimate,
+        found.thesis_estimate * 2 * math.sqrt(top.transverse / top.axial),
+        1e-9,
+        "Hz",
+    )
+
+
+def drive() -> list[Erratum]:
+    """The torque of the drive on an upright top at the start."""
+    scene = preset("driven").changed({**ON_AXIS, "start.tilt_rad": 0.0})
+    top = scene.top
+    torque = top.moment_a_m2 * top.moment_tilt[0] * scene.drive.amplitude_t
+    truth = rate(scene, lambda motion: 2 * math.pi * motion.spin_hz)
+    return [
+        Erratum(
+            "(2.58)",
+            "the drive is a sine along x",
+            "a cosine along y, as in its program",
+            "ω̇₃ of the upright top at the start",
+            truth,
+            0.0,
+            torque / top.inertia_axial_kg_m2,
+            1e-5,
+            "rad/s²",
+            "at ψ = 0 the moment leans to x: a field along x exerts no torque about the axis",
+        ),
+        Erratum(
+            "(2.59)",
+            "lacks 1/I₃",
+            "I₃ω̇₃ is the torque",
+            "ω̇₃ of the upright top at the start",
+            truth,
+            torque,
+            torque / top.inertia_axial_kg_m2,
+            1e-5,
+            "rad/s²",
+        ),
+    ]
+
+
+def drag() -> list[Erratum]:
+    """What drag does to the spin: backwards, by Newton's law, and as a torque."""
+    from scipy.integrate import solve_ivp
+
+    backwards = preset("friction").changed({**ON_AXIS, "start.spin_hz": -30.0})
+    forwards = preset("friction").changed(ON_AXIS)
+    c, spin = forwards.drag.constants[0], 2 * math.pi * 30.0
+    c2, top = several_mean("spindown.c2"), forwards.top
+    newton = solve_ivp(lambda _, w: -c2 * w**2, (0.0, 100.0), [spin], rtol=1e-12, atol=1e-12)
+    torque = rate(forwards, lambda motion: np.einsum("ij,ij->i", motion.angular_momentum, motion.axis))
+    return [
+        Erratum(
+            "(2.61)",
+            "−Cω₃ⁿ sgn ω₃, for odd n",
+            "−C|ω₃|ⁿ sgn ω₃",
+            "change of |ω₃| of a top that spins backwards, n = 1",
+            rate(backwards, lambda motion: 2 * math.pi * np.abs(motion.spin_hz)),
+            c * spin,
+            -c * spin,
+            1e-5,
+            "rad/s²",
+        ),
+        Erratum(
+            "(2.63)",
+            "1/(A − Ct), hence the negative C₂ in its figure",
+            "1/(A + Ct)",
+            "spin after 100 s under n = 2, from 30 Hz; true: integrated",
+            float(newton.y[0, -1]) / (2 * math.pi),
+            1 / (1 / spin - c2 * 100.0) / (2 * math.pi),
+            1 / (1 / spin + c2 * 100.0) / (2 * math.pi),
+            1e-9,
+            "Hz",
+        ),
+        Erratum(
+            "(2.66)",
+            "torque C ω₃",
+            "C I₃ ω₃, as in its program",
+            "torque of drag about the axis at 30 Hz",
+            torque,
+            -c * spin,
+            -c * top.inertia_axial_kg_m2 * spin,
+            1e-5,
+            "N m",
+        ),
+        Erratum(
+            "(2.67)",
+            "torque (C/I₃) ω₃",
+            "C I₃ ω₃",
+            "torque of drag about the axis at 30 Hz",
+            torque,
+            -c / top.inertia_axial_kg_m2 * spin,
+            -c * top.inertia_axial_kg_m2 * spin,
+            1e-5,
+            "N m",
+        ),
+    ]
+
+
+def several_mean(name: str) -> float:
+    """The mean of a printed list."""
+    return float(np.mean([THESIS[f"{name}.{k}"].value for k in range(4)]))
+
+
+def tilting() -> Erratum:
+    """The equation of θ at the start, on the axis."""
+    scene = started("IC1").changed({**ON_AXIS, "start.tilt_rad": 0.1})
+    top, spin = scene.top, 2 * math.pi * scene.start.spin_hz
+    theta = scene.start.tilt_rad
+    sin, cos = math.sin(theta), math.cos(theta)
+    phi = spin / (1 + cos)
+    righting = -top.moment_a_m2 * float(flux_density(base_field(scene), [0.0, 0.0, 0.073])[2]) * sin
+    gyro = top.inertia_transverse_kg_m2 * phi**2 * sin * cos - top.inertia_axial_kg_m2 * spin * phi * sin
+    i1 = top.inertia_transverse_kg_m2
+    return Erratum(
+        "(2.67), θ",
+        "a stray I₁",
+        "I₁θ̈ = I₁φ̇² sin θ cos θ − I₃ω₃φ̇ sin θ + |μ|B sin θ",
+        "θ̈ of a top tilted by 0.1 rad on the axis",
+        bend(scene, lambda motion: motion.tilt),
+        (gyro + i1 * righting) / i1,
+        (gyro + righting) / i1,
+        1e-4,
+        "rad/s²",
+        "read as a factor of the field's torque",
+    )
+
+
+def moment() -> Erratum:
+    """The moment from the height at which the top floats."""
+    found = stability_of(preset("undriven"))
+    assert found.floating is not None
+    slope = float(found.field(np.array([found.floating.height]))[1, 0])
+    return Erratum(
+        "(3.1)",
+        "the sign",
+        "mg = μB′ with B′ < 0",
+        "moment along the axis of a top that floats; true: of the scene",
+        found.top.moment,
+        -found.top.mass * found.top.gravity / slope,
+        found.top.mass * found.top.gravity / slope,
+        1e-9,
+        "A m²",
+        "read as that of the moment",
+    )
+
+
+def table_of_parameters() -> list[Erratum]:
+    """Units and mass of Table 3.1."""
+    scene = preset("undriven")
+    rho, mu = THESIS["device.strength"].value, THESIS["device.moment"].value
+    a, b, g = (THESIS[f"device.{key}"].value for key in ("inner_radius", "outer_radius", "gravity"))
+    z = THESIS["device.height"].value
+    # B′ of the sheet in mT/cm, in the thesis's units throughout
+    slope = 2 * math.pi * rho * 3 * z * (a**2 / (a**2 + z**2) ** 2.5 - b**2 / (b**2 + z**2) ** 2.5)
+    lifted = mu * abs(slope) / g
+    true = 1e3 * abs(scene.top.moment_a_m2 * float(on_axis(base_field(scene), z / 100)[1, 0])) / scene.gravity_m_s2
+    return [
+        Erratum(
+            "Table 3.1, units",
+            "units of ρ and μ",
+            "ρ in mT cm, μ in g cm² s⁻² mT⁻¹",
+            "mass that floats at 7.3 cm; true: in SI",
+            true,
+            None,
+            lifted,
+            1e-9,
+            "g",
+        ),
+        Erratum(
+            "Table 3.1, m",
+            "m = 25.5 g, more than the 25.485 g that this field can lift",
+            "25.26 g",
+            "mass that floats at 7.3 cm",
+            true,
+            THESIS["device.mass"].value,
+            1e3 * scene.top.mass_kg,
+            2e-4,
+            "g",
+        ),
+    ]
+
+
+def tilt_of_moment() -> Erratum:
+    """How far the moment of (4.4) leans: from the torque of a field along the axis."""
+    across, along = preset("driven").top.moment_tilt
+    moment = np.array([across, 0.0, along])
+    torque = np.cross(moment, [0.0, 0.0, 1.0])
+    return Erratum(
+        "(4.4)",
+        "leans by 1.5°",
+        "leans by 1.77° and shortens μ by 3 %",
+        "angle of the moment; true: from the torque of a field along the axis",
+        math.degrees(math.asin(float(np.linalg.norm(torque)) / float(np.linalg.norm(moment)))),
+        THESIS["device.tilt"].value,
+        math.degrees(math.atan2(across, along)),
+        1e-9,
+        "°",
+    )
+
+
+def third_start() -> Erratum:
+    """The lower limit from x = 0.50 and 0.30 cm."""
+    printed, step = THESIS["limits.lower.IC3"], 0.05
+    spins = scan(21.8, 25.3, step)
+    aside = np.array([0.005, 0.003])
+    up = many(started("IC3"), {"start.spin_hz": spins[None, :], "start.position_m.0": aside[:, None]}).survived
+    wrong, right = (lower_limit(spins, row) for row in up)
+    return Erratum(
+        "Table 4.1, third column",
+        "x(0) = 0.50 cm",
+        "0.30 cm",
+        f"lower limit from there, in steps of {step:g} Hz; true: as Table 4.2 prints it",
+        printed.value,
+        wrong,
+        right,
+        step / printed.value,
+        "Hz",
+    )
+
+
+def make() -> Found:
+    """Make the chapter."""
+    findings = (
+        acceleration(),
+        half(),
+        fourth_power(),
+        thickness(),
+        bracket(),
+        least_spin(),
+        *drive(),
+        *drag(),
+        tilting(),
+        moment(),
+        *table_of_parameters(),
+        tilt_of_moment(),
+        third_start(),
+    )
+    note = Note(
+        "Each row: what the printed equation gives for a number, what the corrected one gives, and what is true by a "
+        "third way (a simulated motion, an exact field, a dimension). Where a slip is known by the number of its "
+        "equation "
+        "and a few words alone, the row says how it was read."
+    )
+    return Found(findings, (note,), "Slips in equations and tables of the thesis, each with a numeric test.")

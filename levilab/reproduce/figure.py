@@ -1,0 +1,510 @@
+"""The figures of the chapters."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from levilab.present.looks import BLACK, BLUE, GREEN, GREY, LOOKS, ORANGE, SERIES, VERMILION
+from levilab.present.style import STYLE, WIDE
+from levilab.reproduce.tops import MASS_KG
+from levilab.stability.thesis import SIMULATED_HZ, WITH_DRAG_HZ
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from analysis.limits import Statistics
+    from analysis.spindown.fit import SpinDown
+    from levilab.motion.lines import AxisLines
+    from levilab.simulator.equilibrium import MassWindows
+    from levilab.simulator.trajectory import Trajectory
+
+    Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+#: A curve of more points is drawn as the band between its least and greatest values in so many pieces.
+PIECES = 900
+#: Lost tops and tops that are up.
+FATES = ListedColormap([LOOKS["lost"].colour, LOOKS["up"].colour])
+_UP = Patch(color=LOOKS["up"].colour, label="up after 30 s")
+_LOST = Patch(color=LOOKS["lost"].colour, label="lost")
+_THESIS: dict[str, Any] = {
+    "marker": "v",
+    "color": "white",
+    "markeredgecolor": BLACK,
+    "linestyle": "none",
+    "markersize": 6,
+}
+#: Axes in parts of the figure: left, bottom, width, height.
+Box = tuple[float, float, float, float]
+
+
+def _figure(height: float, *boxes: Box) -> tuple[Figure, list[Axes]]:
+    """A wide figure and its panels; placed by hand, since automatic layouts differ in the last bit."""
+    figure = Figure(figsize=(WIDE, height))
+    return figure, [figure.add_axes(box) for box in boxes]
+
+
+def _styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
+    """The function with the house's style about it."""
+
+    def styled(*given: Any) -> Figure:
+        with mpl.rc_context(STYLE):
+            return draw(*given)
+
+    return styled
+
+
+def _band(axes: Axes, time: Array, values: Array, colour: str) -> None:
+    """A curve, or the band between its least and greatest values where it has too many points."""
+    if time.size <= 2 * PIECES:
+        axes.plot(time, values, color=colour, linewidth=0.8)
+        return
+    first = np.linspace(0, time.size, PIECES, endpoint=False).astype(int)
+    least, greatest = (function.reduceat(values, first) for function in (np.minimum, np.maximum))
+    axes.fill_between(time[first], least, greatest, color=colour, linewidth=0.4)
+
+
+# --- where tops float ---
+
+
+@dataclass(frozen=True)
+class Contours:
+    """A potential.
+
+    Attributes:
+        r, z: [cm], shape (n,) and (m,).
+        energy: above that of the place where the top rests, shape (m, n) [µJ].
+        height: of that place [cm].
+    """
+
+    r: Array
+    z: Array
+    energy: Array
+    height: float
+
+
+def rim(shown: Contours) -> float:
+    """The energy of the lowest pass out of the trap [µJ]: up to there its basin does not reach the picture's edge."""
+    from scipy.ndimage import label
+
+    centre = (int(np.argmin(np.abs(shown.z - shown.height))), int(np.argmin(np.abs(shown.r))))
+    low, high = 0.0, 200.0
+    for _ in range(40):
+        middle = (low + high) / 2
+        basins, _ = label(shown.energy <= middle)
+        own = basins == basins[centre] if basins[centre] else np.zeros(basins.shape, dtype=np.bool_)
+        out = own[0].any() or own[-1].any() or own[:, 0].any() or own[:, -1].any()
+        low, high = (low, middle) if out else (middle, high)
+    return low
+
+
+@_styled
+def contour_figure(shown: Sequence[Contours], names: Sequence[str]) -> Figure:
+    """The potential of tops of several masses."""
+    width = 0.27
+    figure, panels = _figure(2.9, *[(0.075 + k * 0.315, 0.16, width, 0.74) for k in range(len(shown))])
+    for axes, one, name in zip(panels, shown, names, strict=True):
+        top = rim(one)
+        levels = np.arange(-40.0, 41.0, 2.0)
+        axes.contour(one.r, one.z, one.energy, levels=levels, colors=GREY, linewidths=0.5, negative_linestyles="solid")
+        axes.contour(one.r, one.z, one.energy, levels=[top], colors=LOOKS["up"].colour, linewidths=1.6)
+        axes.plot(0.0, one.height, "+", color=VERMILION, markersize=7)
+        axes.set_title(f"{name}: rim {top:.1f} µJ")
+        axes.set(xlabel="distance r  [cm]", ylim=(one.z[0], one.z[-1]))
+    panels[0].set_ylabel("height z  [cm]")
+    return figure
+
+
+@_styled
+def window_figure(over: MassWindows, estimate: float) -> Figure:
+    """The window of spin over mass."""
+    figure, (axes,) = _figure(3.2, (0.085, 0.15, 0.57, 0.79))
+    masses = 1e3 * over.masses
+    up = LOOKS["up"].colour
+    axes.fill_between(
+        masses, over.slowest, over.fastest, color=up, alpha=0.25, linewidth=0, label="small motions stay small"
+    )
+    axes.plot(masses, over.slowest, color=up)
+    axes.plot(masses, over.fastest, color=up)
+    limits = np.array(list(SIMULATED_HZ.values()))
+    axes.plot(np.full(limits.size, 1e3 * MASS_KG), limits.ravel(), **_THESIS, label="thesis, four starts, simulated")
+    axes.axhline(estimate, **LOOKS["theory"].as_line, label="its estimate of the lower limit")
+    axes.set(xlabel="mass  [g]", ylabel="spin  [Hz]", ylim=(0, 100), xlim=(masses[0], masses[-1]))
+    figure.legend(loc="center left", bbox_to_anchor=(0.66, 0.5))
+    return figure
+
+
+# --- limits ---
+
+
+@dataclass(frozen=True)
+class Scans:
+    """What the chapter of the limits simulated.
+
+    Attributes:
+        spins: of the upper scans, shape (n,) [Hz].
+        up: by start, shape (n,).
+        masses: shape (m,) [g].
+        lower: lower limits by start, shape (m,) [Hz].
+        falling: spins at the fall with drag, by start [Hz].
+        aside: places of the third start beside the axis [cm].
+        lower_aside: its lower limits [Hz].
+    """
+
+    spins: Array
+    up: Mapping[str, Flags]
+    masses: Array
+    lower: Mapping[str, Array]
+    falling: Mapping[str, Array]
+    aside: Array
+    lower_aside: Array
+
+
+@_styled
+def limits_figure(shown: Scans) -> Figure:
+    """Scans of the upper limit, and what the lower ones depend on."""
+    figure, panels = _figure(
+        5.2, (0.085, 0.63, 0.9, 0.26), (0.085, 0.1, 0.28, 0.37), (0.475, 0.1, 0.22, 0.37), (0.785, 0.1, 0.2, 0.37)
+    )
+    _draw_scans(panels[0], shown)
+    figure.legend(handles=[_UP, _LOST, Line2D([], [], **_THESIS, label="thesis")], loc="upper right", ncols=3)
+    _draw_lower(panels[1], shown)
+    _draw_falls(panels[2], shown)
+    _draw_aside(panels[3], shown)
+    return figure
+
+
+def _draw_scans(axes: Axes, shown: Scans) -> None:
+
+    half = (shown.spins[1] - shown.spins[0]) / 2
+    extent = (shown.spins[0] - half, shown.spins[-1] + half)
+    for k, (name, up) in enumerate(shown.up.items()):
+        axes.imshow(
+            up[None, :].astype(float), cmap=FATES, vmin=0, vmax=1, aspect="auto", interpolation="nearest",
+            extent=(*extent, k + 0.32, k - 0.32),
+        )  # fmt: skip
+        axes.plot(SIMULATED_HZ[name][1], k - 0.42, **_THESIS)
+    axes.set_yticks(range(len(shown.up)), list(shown.up))
+    axes.tick_params(axis="y", which="both", length=0)
+    axes.set(xlim=extent, ylim=(len(shown.up) - 0.5, -0.75), xlabel="spin at the start  [Hz]")
+    axes.spines["left"].set_visible(False)
+    axes.set_title("The upper edge, scanned")
+
+
+def _draw_lower(axes: Axes, shown: Scans) -> None:
+
+    for (name, values), colour in zip(shown.lower.items(), SERIES, strict=False):
+        axes.plot(shown.masses, values, color=colour)
+        axes.axhline(SIMULATED_HZ[name][0], color=colour, linestyle=(0, (4, 2)), linewidth=0.8)
+        axes.annotate(
+            name, (shown.masses[-1], SIMULATED_HZ[name][0]), (4, 0), textcoords="offset points", color=colour,
+            fontsize=8, va="center", annotation_clip=False,
+        )  # fmt: skip
+    axes.set(
+        xlabel="mass  [g]", ylabel="lower limit  [Hz]", ylim=(21.6, 23.3), xlim=(shown.masses[0], shown.masses[-1])
+    )
+    axes.set_title("Lower limit over mass")
+
+
+def _draw_falls(axes: Axes, shown: Scans) -> None:
+
+    for k, ((name, values), colour) in enumerate(zip(shown.falling.items(), SERIES, strict=False)):
+        spread = 0.5 * (np.arange(values.size) / (values.size - 1) - 0.5)
+        axes.plot(k + spread, values, ".", color=colour, markersize=3)
+        axes.plot([k - 0.4, k + 0.4], [WITH_DRAG_HZ[name]] * 2, color=colour, linestyle=(0, (4, 2)))
+    axes.set_xticks(range(len(shown.falling)), list(shown.falling))
+    axes.tick_params(axis="x", which="minor", bottom=False)
+    axes.set_ylabel("spin at the fall  [Hz]")
+    axes.set_title("With drag")
+
+
+def _draw_aside(axes: Axes, shown: Scans) -> None:
+
+    axes.plot(shown.aside, shown.lower_aside, "o-", color=SERIES[2], markersize=3)
+    axes.axhline(SIMULATED_HZ["IC3"][0], color=SERIES[2], linestyle=(0, (4, 2)))
+    for x in (0.3, 0.5):
+        axes.axvline(x, color=GREY, linewidth=0.6, linestyle=":")
+    axes.set(xlabel="x(0) of IC3  [cm]", ylabel="lower limit  [Hz]")
+    axes.set_title("The misprint")
+
+
+# --- motions ---
+
+
+@_styled
+def paths_figure(shown: Mapping[str, Trajectory]) -> Figure:
+    """Paths over x and z."""
+    figure, panels = _figure(
+        4.6, *[(0.085 + 0.48 * (k % 2), 0.59 - 0.48 * (k // 2), 0.41, 0.35) for k in range(len(shown))]
+    )
+    for axes, (name, motion) in zip(panels, shown.items(), strict=True):
+        place = 100 * motion.position
+        axes.plot(place[:, 0], place[:, 2], color=LOOKS["path"].colour, linewidth=0.4)
+        axes.plot(place[0, 0], place[0, 2], "o", color=BLACK, markerfacecolor="white", markersize=4)
+        axes.set_title(name)
+        axes.set(xlabel="x  [cm]", ylabel="z  [cm]")
+    return figure
+
+
+@_styled
+def fall_figure(motion: Trajectory) -> Figure:
+    """Tilt, height and spin up to the fall."""
+    boxes = [(0.085, 0.68 - 0.285 * k, 0.43, 0.25) for k in range(3)]
+    boxes += [(0.585, 0.68 - 0.285 * k, 0.4, 0.25) for k in range(3)]
+    figure, panels = _figure(4.6, *boxes)
+    end = float(motion.time[-1])
+    rows: tuple[tuple[Array, str, str], ...] = (
+        (np.degrees(motion.tilt), LOOKS["tilt"].colour, "tilt  [°]"),
+        (100 * motion.position[:, 2], LOOKS["height"].colour, "height z  [cm]"),
+        (motion.spin_hz, LOOKS["top"].colour, "spin ω₃/2π  [Hz]"),
+    )
+    late = motion.time >= end - 1.0
+    for k, (values, colour, label) in enumerate(rows):
+        _band(panels[k], motion.time, values, colour)
+        panels[k].set_xlim(0, end)
+        panels[k].set_ylabel(label)
+        panels[k + 3].plot(motion.time[late], values[late], color=colour)
+        panels[k + 3].set_xlim(end - 1.0, end)
+        for axes in (panels[k], panels[k + 3]):
+            axes.tick_params(labelbottom=k == 2)
+    panels[0].set_title("From 30 Hz to the fall")
+    panels[3].set_title("The last second")
+    panels[2].set_xlabel("time  [s]")
+    panels[5].set_xlabel("time  [s]")
+    return figure
+
+
+@_styled
+def tilted_figure(motions: tuple[Trajectory, Trajectory]) -> Figure:
+    """The axis from above, with a tilted and an aligned moment."""
+    figure, panels = _figure(3.3, (0.1, 0.14, 0.37, 0.78), (0.6, 0.14, 0.37, 0.78))
+    most = max(float(np.abs(motion.axis[:, :2]).max()) for motion in motions) * 1.05e3
+    for axes, motion, name in zip(panels, motions, ("moment tilted by 1.77°", "moment along the axis"), strict=True):
+        axes.plot(1e3 * motion.axis[:, 0], 1e3 * motion.axis[:, 1], color=LOOKS["path"].colour, linewidth=0.4)
+        axes.set_aspect("equal")
+        axes.set(xlim=(-most, most), ylim=(-most, most), xlabel="$n_x$  [10⁻³]", ylabel="$n_y$  [10⁻³]")
+        axes.set_title(name)
+    return figure
+
+
+@_styled
+def driven_figure(motion: Trajectory) -> Figure:
+    """The spin of the driven top."""
+    figure, panels = _figure(4.2, (0.085, 0.62, 0.89, 0.31), (0.085, 0.11, 0.89, 0.31))
+    drive = motion.scene.drive.frequency_hz
+    early = motion.time <= 20.0
+    _band(panels[0], motion.time, motion.spin_hz, LOOKS["top"].colour)
+    panels[1].plot(motion.time[early], motion.spin_hz[early], color=LOOKS["top"].colour, linewidth=0.8)
+    for axes in panels:
+        axes.axhline(drive, **LOOKS["drive"].as_line, linewidth=0.9)
+        axes.set_ylabel("spin ω₃/2π  [Hz]")
+        axes.set_xlabel("time  [s]")
+    panels[0].set_xlim(0, motion.time[-1])
+    panels[1].set_xlim(0, 20)
+    panels[0].set_title("300 s: between the least and the greatest value")
+    panels[1].set_title("The first 20 s")
+    return figure
+
+
+@dataclass(frozen=True)
+class Azimuth:
+    """The rate of the azimuth φ of the axis.
+
+    Attributes:
+        rate: φ̇/2π, shape (n,) [Hz].
+        tilt: θ, shape (n,) [rad].
+        near: φ̇/2π is beyond the axis's own frequencies, shape (n,).
+        share: part of the time with such a rate.
+        tilt_then: median of θ then [rad].
+        tilt_ever: median of θ [rad].
+    """
+
+    rate: Array
+    tilt: Array
+    near: Flags
+    share: float
+    tilt_then: float
+    tilt_ever: float
+
+
+#: Rates of the azimuth are cut here for the figure [Hz].
+_CUT_HZ = 120.0
+#: Lines that are slower have one name together: they stand too near to each other.
+_SLOW_HZ = 2.0
+
+
+@_styled
+def azimuth_figure(motion: Trajectory, found: Azimuth, lines: AxisLines) -> Figure:
+    """The azimuth's rate, and the spectrum of the axis."""
+    figure, panels = _figure(5.2, (0.085, 0.62, 0.5, 0.31), (0.68, 0.62, 0.305, 0.31), (0.085, 0.1, 0.9, 0.36))
+    early = motion.time <= 5.0
+    rate = np.where(np.abs(found.rate) > _CUT_HZ, np.nan, found.rate)
+    panels[0].plot(motion.time[early], rate[early], color=LOOKS["precession"].colour, linewidth=0.7)
+    panels[0].set(xlabel="time  [s]", ylabel="φ̇/2π  [Hz]", xlim=(0, 5), ylim=(-_CUT_HZ, _CUT_HZ))
+    panels[0].set_title("The rate of the azimuth")
+    some = slice(None, None, 7)
+    panels[1].plot(1e3 * found.tilt[some], found.rate[some], ",", color=LOOKS["precession"].colour)
+    panels[1].set(xlabel="tilt θ  [mrad]", xlim=(0, 1e3 * found.tilt.max()), ylim=(-_CUT_HZ, _CUT_HZ))
+    panels[1].set_title("... is large near θ = 0")
+    assert lines.spectrum is not None
+    frequency, amplitude = lines.spectrum
+    near = (frequency > -13) & (frequency < 60)
+    axes = panels[2]
+    axes.semilogy(frequency[near], 1e3 * amplitude[near], color=BLUE, linewidth=0.5)
+    highest = 1e3 * max(line.amplitude for line in lines.lines)
+    named = [line for line in lines.lines if line.name and not line.sideband]
+    for line in named:
+        if abs(line.frequency) > _SLOW_HZ:
+            axes.annotate(
+                f"{line.name}\n{line.frequency:.2f}", (line.frequency, 1e3 * line.amplitude), (0, 5),
+                textcoords="offset points", ha="center", fontsize=7,
+            )  # fmt: skip
+    slow = sorted(line.frequency for line in named if abs(line.frequency) <= _SLOW_HZ)
+    axes.text(-2.6, 0.2 * highest, "swings sideways\n" + ", ".join(f"{f:.2f}" for f in slow), ha="right", fontsize=7)
+    axes.set(
+        xlim=(-13, 60), ylim=(1e-4 * highest, 8 * highest), xlabel="frequency  [Hz]", ylabel="|n_x + i n_y|  [mrad]"
+    )
+    axes.set_title("The axis itself: lines")
+    return figure
+
+
+# --- spin-downs and limits ---
+
+
+@_styled
+def spindown_figure(runs: Sequence[tuple[Array, SpinDown]]) -> Figure:
+    """What three laws leave over of the runs."""
+    laws = (("stokes", "n = 1"), ("disc", "n = 3/2"), ("newton", "n = 2"))
+    figure, panels = _figure(3.0, *[(0.085 + k * 0.305, 0.15, 0.285, 0.75) for k in range(3)])
+    most = 1050 * max(float(np.abs(fit.fit(law).residuals).max()) for _, fit in runs for law, _ in laws)
+    for axes, (law, name) in zip(panels, laws, strict=True):
+        for number, ((time, fit), marker) in enumerate(zip(runs, "osD^", strict=False), start=1):
+            axes.plot(
+                time, 1e3 * fit.fit(law).residuals, color=LOOKS[law].colour, marker=marker, linewidth=0.4,
+                markerfacecolor="white", markersize=3.5, label=f"run {number}",
+            )  # fmt: skip
+        axes.axhline(0, color=BLACK, linewidth=0.6)
+        axes.set(xlabel="time  [s]", ylim=(-most, most))
+        axes.set_title(f"{name} ({law})")
+        axes.tick_params(labelleft=axes is panels[0])
+    panels[0].set_ylabel("reading − fit  [mHz]")
+    panels[1].legend(loc="upper center", ncols=2)
+    return figure
+
+
+@_styled
+def statistics_figure(values: Array, found: Statistics, edge: float) -> Figure:
+    """The ten limits, and their normal quantiles."""
+    from scipy.special import ndtri
+
+    assert found.mean.value is not None
+    assert found.mean.u is not None
+    assert found.scatter is not None
+    assert found.scatter.value is not None
+    figure, panels = _figure(2.9, (0.085, 0.16, 0.5, 0.75), (0.67, 0.16, 0.315, 0.75))
+    mean, u, scatter = found.mean.value, found.mean.u, found.scatter.value
+    left, right = panels
+    left.axhspan(mean - u, mean + u, color=LOOKS["fit"].colour, alpha=0.25, linewidth=0)
+    left.axhline(mean, color=LOOKS["fit"].colour)
+    for sign in (-1, 1):
+        left.axhline(mean + sign * scatter, color=LOOKS["fit"].colour, linestyle=(0, (4, 2)), linewidth=0.8)
+    left.axhline(edge, color=ORANGE, linestyle=":")
+    left.plot(np.arange(1, values.size + 1), values, **LOOKS["readings"].as_points)
+    left.set(xlabel="top", ylabel="spin at the fall  [Hz]", xlim=(0.5, values.size + 0.5))
+    left.tick_params(axis="x", which="minor", bottom=False)
+    quantiles = ndtri((np.arange(values.size) + 0.625) / (values.size + 0.25))
+    right.plot(quantiles, mean + scatter * quantiles, color=LOOKS["fit"].colour)
+    right.plot(quantiles, np.sort(values), **LOOKS["readings"].as_points)
+    right.set(xlabel="normal quantile", ylabel="in order  [Hz]")
+    return figure
+
+
+@_styled
+def counter_figure(spin: Array, count: Array, cosine: Array) -> Figure:
+    """The count less the spin."""
+    figure, (axes,) = _figure(2.9, (0.1, 0.16, 0.885, 0.78))
+    order = np.argsort(spin)
+    axes.plot(spin[order], 1e3 * (cosine - spin)[order], color=LOOKS["tilt"].colour, label="ω₃(1/cos θ − 1)/2π")
+    axes.plot(spin, 1e3 * (count - spin), **LOOKS["readings"].as_points, label="count − ω₃/2π")
+    axes.set(xlabel="spin ω₃/2π  [Hz]", ylabel="count − spin  [mHz]", ylim=(0, None))
+    axes.legend(loc="upper right")
+    return figure
+
+
+# --- the magnet, and the papers ---
+
+
+@_styled
+def dipole_figure(z: Array, fields: tuple[Array, Array], height: float) -> Figure:
+    """What a disc feels over what a point feels, and the curvature of the field of both."""
+    figure, panels = _figure(2.9, (0.085, 0.17, 0.4, 0.74), (0.575, 0.17, 0.41, 0.74))
+    left, right = panels
+    for k, name, colour, line in ((0, "energy, B", BLUE, "-"), (1, "force, B′", VERMILION, (0, (4, 2)))):
+        left.plot(z, 100 * (fields[1][k] / fields[0][k] - 1), color=colour, linestyle=line, label=name)
+    left.set_title("disc over point, less 1")
+    left.set_ylabel("[%]")
+    # 1 T/m² is 0.1 mT/cm²
+    for field, name, colour, line in ((fields[0], "a point", BLACK, (0, (4, 2))), (fields[1], "the disc", GREEN, "-")):
+        right.plot(z, 0.1 * field[2], color=colour, linestyle=line, label=name)
+    right.set_title("second derivative: above 0 it is stable")
+    right.set_ylabel("B″  [mT/cm²]")
+    for axes in panels:
+        axes.axhline(0, color=BLACK, linewidth=0.6)
+        axes.axvline(height, color=GREY, linewidth=0.8, linestyle=":")
+        axes.set(xlabel="height z  [cm]", xlim=(z[0], z[-1]))
+        axes.legend(loc="upper right" if axes is left else "lower right")
+    return figure
+
+
+@_styled
+def simon_figure(
+    scans: Sequence[tuple[str, Array, Flags, tuple[float, float], tuple[float, float]]],
+) -> Figure:
+    """Survival of the three tops over spin."""
+    figure, panels = _figure(2.9, *[(0.14, 0.67 - 0.265 * k, 0.845, 0.14) for k in range(len(scans))])
+    for axes, (name, spins, up, window, printed) in zip(panels, scans, strict=True):
+        extent = (spins[0] - 0.5, spins[-1] + 0.5, 0.0, 1.0)
+        axes.imshow(
+            up[None, :].astype(float), cmap=FATES, vmin=0, vmax=1, aspect="auto", interpolation="nearest", extent=extent
+        )
+        for edge in window:
+            axes.axvline(edge, **LOOKS["theory"].as_line)
+        axes.plot(printed, [1.18, 1.18], **_THESIS, clip_on=False)
+        axes.set_yticks([])
+        axes.set(xlim=(spins[0], spins[-1]), ylim=(0, 1))
+        axes.set_ylabel(name.replace("base and ", ""), rotation=0, ha="right", va="center")
+        axes.spines["left"].set_visible(False)
+    panels[-1].set_xlabel("spin  [rad/s]")
+    edge_line = Line2D([], [], **LOOKS["theory"].as_line, label="quartic")
+    figure.legend(
+        handles=[_UP, _LOST, edge_line, Line2D([], [], **_THESIS, label="Table I")],
+        loc="upper right", bbox_to_anchor=(0.975, 1.0), ncols=4,
+    )  # fmt: skip
+    return figure
+
+
+@_styled
+def gans_figure(spins: Array, tilts: Array, up: Flags, window: tuple[float, float]) -> Figure:
+    """Survival over spin and tilt."""
+    figure, (axes,) = _figure(3.0, (0.085, 0.15, 0.66, 0.8))
+    axes.pcolormesh(spins, tilts, up.T.astype(float), cmap=FATES, vmin=0, vmax=1, shading="nearest", rasterized=True)
+    axes.set_yscale("log")
+    for edge in window:
+        if math.isfinite(edge):
+            axes.axvline(edge, **LOOKS["theory"].as_line)
+    axes.set(xlabel="spin  [√(g/R)]", ylabel="tilt of the start  [rad]", xlim=(spins[0], spins[-1]))
+    line = Line2D([], [], **LOOKS["theory"].as_line, label="small motions")
+    figure.legend(handles=[_UP, _LOST, line], loc="center left", bbox_to_anchor=(0.76, 0.5))
+    return figure

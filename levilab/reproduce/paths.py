@@ -1,0 +1,170 @@
+"""Motions that the thesis shows as figures: paths, the tilt at the fall, a tilted moment beside an aligned one."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.uncertainty import Estimate
+from levilab.motion.lines import lines_of, rate_for
+from levilab.present.document.blocks import Picture
+from levilab.reproduce.chapter import Found
+from levilab.reproduce.check import Because, Check, Statement
+from levilab.reproduce.figure import fall_figure, paths_figure, tilted_figure
+from levilab.reproduce.tops import DURATION_S, FALL_M, THESIS, started
+from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.scene import preset
+from levilab.simulator.single import simulate
+from levilab.stability.thesis import STARTS
+
+if TYPE_CHECKING:
+    from levilab.reproduce.check import Finding
+    from levilab.simulator.trajectory import Trajectory
+
+#: How long a path is shown [s], and samples per second.
+PATH_S, PATH_HZ = 10.0, 400.0
+#: How long a fall with drag takes at most, how much of it is shown [s], and samples per second.
+FALL_S, SHOWN_S, FALL_HZ = 150.0, 6.0, 400.0
+#: A line is that of theory within this part of its frequency: the swings are not small.
+NEAR = 0.06
+
+
+def paths() -> tuple[list[Finding], dict[str, Trajectory]]:
+    """The four paths, and whether their constants of motion are constant and their lines those of theory."""
+    shown = {name: simulate(started(name), PATH_S, tolerance=1e-8, rate=PATH_HZ) for name in STARTS}
+    found: list[Finding] = []
+    for name, motion in shown.items():
+        drift = float(np.abs(motion.energies / motion.energies[0] - 1).max())
+        place = 100 * motion.position
+        x, z = (float(np.abs(place[:, 0]).max()), (float(place[:, 2].min()), float(place[:, 2].max())))
+        found.append(
+            Statement(
+                f"{name}: path over x and z at 30 Hz",
+                "figures of the paths",
+                "the top stays in the trap",
+                f"|x| up to {x:.2f} cm, z from {z[0]:.2f} to {z[1]:.2f} cm in {PATH_S:g} s; energy constant to "
+                f"{drift:.0e}",
+                holds=motion.survived and drift < 1e-9,
+            )
+        )
+    return found, shown
+
+
+def modes() -> list[Finding]:
+    """The lines of the calm start IC2 beside the roots of the quartic."""
+    scene = started("IC2")
+    found = stability_of(scene)
+    motion = simulate(scene, DURATION_S, tolerance=1e-8, rate=float(math.ceil(rate_for(scene))))
+    lines = {line.name: line.frequency for line in lines_of(motion).lines if line.name and not line.sideband}
+    theory = dict(zip(("nutation", "precession"), sorted(found.modes.real, key=abs)[:1:-1], strict=True))
+    off = {name: lines.get(name, math.nan) / frequency - 1 for name, frequency in theory.items()}
+    return [
+        Statement(
+            f"IC2: {name} in the spectrum of n_x + i n_y",
+            "theory of small motions",
+            "",
+            f"{lines.get(name, math.nan):.3f} Hz (line of the simulated motion), {frequency:.3f} Hz (root of the "
+            "quartic)",
+            holds=abs(off[name]) < NEAR,
+        )
+        for name, frequency in theory.items()
+    ]
+
+
+def fall() -> tuple[Finding, Trajectory]:
+    """A top with drag from 30 Hz: how its tilt grows at the end."""
+    scene = started("IC1", "friction", f"escape.height_m={FALL_M}")
+    motion = simulate(scene, FALL_S, tolerance=1e-6, rate=FALL_HZ)
+    early = motion.time < motion.time[-1] - SHOWN_S
+    before, last = float(motion.tilt[early].max()), float(motion.tilt[-1])
+    limit = stability_of(scene).sleeping
+    return (
+        Statement(
+            "tilt at the fall, IC1 with drag from 30 Hz",
+            "figure of the tilt",
+            "the tilt stays small until the spin is too slow, and grows within a second",
+            f"up to {math.degrees(before):.1f}° until {SHOWN_S:g} s before the fall, {math.degrees(last):.0f}° when "
+            "z is 6 "
+            f"cm, at {motion.spin_hz[-1]:.2f} Hz; the sleeping top's limit is {limit:.2f} Hz",
+            holds=not motion.survived and last > 3 * before and abs(float(motion.spin_hz[-1]) - limit) < 0.5,
+        ),
+        motion,
+    )
+
+
+def tilted() -> tuple[list[Finding], tuple[Trajectory, Trajectory]]:
+    """A moment that is tilted in the top beside one that is as strong along the axis, but aligned."""
+    scene = preset("tilted")
+    across, along = scene.top.moment_tilt
+    aligned = scene.changed({"top.moment_tilt": [0.0, along]})
+    motions = tuple(simulate(one, 4.0, tolerance=1e-8, rate=1000.0) for one in (scene, aligned))
+    angle, norm = math.degrees(math.atan2(across, along)), math.hypot(across, along)
+    printed = THESIS["device.tilt"]
+    lines = [
+        lines_of(simulate(one, 20.0, tolerance=1e-7, rate=float(math.ceil(rate_for(one))))) for one in (scene, aligned)
+    ]
+    spin = scene.start.spin_hz
+    wobble = [max((x.amplitude for x in one.lines if abs(x.frequency - spin) < 0.05), default=0.0) for one in lines]
+    found: list[Finding] = [
+        Check(
+            "angle between moment and axis",
+            printed,
+            Estimate(angle, None, "°"),
+            Because(
+                f"μ·(0.03, 0, 0.97) leans by arctan(0.03/0.97) = {angle:.4f}°, and it has {norm:.6f} of the length "
+                "of μ, "
+                f"{100 * (1 - norm):.0f} % less, so that a lighter top floats; 1.5° would be "
+                f"({along * math.tan(math.radians(printed.value)):.4f}, 0, 0.97)",
+                abs(angle - 1.7715) < 1e-3 and abs(norm - 0.970464) < 1e-6,
+            ),
+        ),
+        Statement(
+            "a tilted moment makes the top wobble once a turn",
+            "figures of the tilted and the aligned dipole",
+            "the tilted one wobbles, the aligned one does not",
+            f"line of n_x + i n_y at {spin:g} Hz: {1e3 * wobble[0]:.2f} mrad (tilted), {1e3 * wobble[1]:.2f} mrad "
+            "(aligned)",
+            holds=wobble[0] > 10 * wobble[1] and wobble[0] > 0.01,
+        ),
+    ]
+    return found, (motions[0], motions[1])
+
+
+def make() -> Found:
+    """Make the chapter."""
+    about_paths, shown = paths()
+    about_fall, falling = fall()
+    about_tilt, both = tilted()
+    pictures = (
+        Picture(
+            "paths",
+            "Four starts, four paths.",
+            f"Path of the centre of mass over x and z, the first {PATH_S:g} s at 30 Hz without drag; the ring marks "
+            "the start.",
+            "Paths over x and z from the four starts",
+            partial(paths_figure, shown),
+        ),
+        Picture(
+            "fall",
+            "A top that slows down tilts at the very end.",
+            "Tilt (band between its least and greatest value, and on the right the last second), height and spin of "
+            "a top "
+            "with the thesis's drag, from 30 Hz, up to its fall.",
+            "Tilt, height and spin up to the fall",
+            partial(fall_figure, falling),
+        ),
+        Picture(
+            "tilted",
+            "A tilted moment wobbles with the spin.",
+            "The axis seen from above, n_x and n_y, in the first 4 s at 30 Hz: with the moment tilted by 1.77° and "
+            "with one "
+            "that is as strong along the axis, but not tilted.",
+            "The axis seen from above with a tilted and with an aligned moment",
+            partial(tilted_figure, both),
+        ),
+    )
+    said = "Figures without numbers: what they show is said in a sentence and tried; the motions are simulated anew."
+    return Found((*about_paths, *modes(), about_fall, *about_tilt), pictures, said)

@@ -1,0 +1,101 @@
+"""The report of a reproduction: a document of blocks, written as HTML or PDF."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from levilab.files import replace_atomically, writing
+from levilab.present.document.blocks import (
+    Banner,
+    Code,
+    Document,
+    Fact,
+    Facts,
+    Paragraph,
+    Section,
+    Tabular,
+    Verdict,
+    Warnings,
+)
+from levilab.report.page import FORMATS, UnknownFormat
+from levilab.reproduce.table import findings_table, in_words, overview
+from levilab.software import software_versions
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from levilab.present.document.blocks import Block
+    from levilab.report.page import Format
+    from levilab.reproduce.chapter import Chapter, Found
+    from levilab.reproduce.run import Reproduction
+
+HOW_TO_READ = (
+    "A published number has the precision of its print: it agrees if ours lies within half a unit of its last digit, "
+    "or "
+    "within a tolerance that its row gives with the reason. Where it differs, the reason is computed, too, and shown: "
+    "what it makes of our number must give the published one. Some of the thesis's figures have no numbers; what "
+    "stands for these was computed apart from levilab, with other code, and is marked: recomputed apart."
+)
+
+
+def format_of(output: Path) -> Format:
+    """The format that a file's name asks for.  Raises UnknownFormat, or what the format itself lacks."""
+    found = FORMATS.get(output.suffix.lower())
+    if found is None:
+        raise UnknownFormat("output", "a name that ends in .html or .pdf is expected", value=output)
+    found.check()
+    return found
+
+
+def write(found: Reproduction, output: Path) -> Path:
+    """Write the report; returns the file.
+
+    Raises:
+        UnknownFormat: of the file's name.
+        CannotWrite: of the file.
+    """
+    content = format_of(output).content(document_of(found))
+    with writing(f"{output}: could not be written", "choose another place with `output`"):
+        output.parent.mkdir(parents=True, exist_ok=True)
+        replace_atomically(output, content)
+    return output
+
+
+def document_of(found: Reproduction) -> Document:
+    """The report; the same findings always make the same."""
+    unexpected = tuple(f"{chapter.title}: {finding.name}: {finding.why}" for chapter, finding in found.unexpected)
+    summary: list[Block] = [Verdict(in_words(found)), Tabular("overview", overview(found)), Paragraph(HOW_TO_READ)]
+    if unexpected:
+        summary.insert(1, Warnings((unexpected,)))
+    return Document(
+        title="The Levitron thesis, reproduced",
+        lead="Tables and figures of the master's thesis, and of two papers, made anew with levilab: the published "
+        "value beside ours",
+        blocks=(
+            Section("Summary", tuple(summary), anchor="summary"),
+            *(_section(chapter, of_chapter) for chapter, of_chapter in found.chapters),
+            _how(found),
+        ),
+        banner=Banner("SYNTHETIC.", "Motions are simulated, and readings made up; nothing here was measured anew."),
+        contents=True,
+    )
+
+
+def _section(chapter: Chapter, found: Found) -> Section:
+    marks = (Banner("SYNTHETIC.", found.synthetic),) if found.synthetic else ()
+    findings = Tabular(chapter.name, findings_table("", found.findings, broken=True))
+    return Section(chapter.title, (*marks, Paragraph(found.said), *found.blocks, findings), anchor=chapter.name)
+
+
+def _how(found: Reproduction) -> Section:
+    only = ",".join(chapter.name for chapter, _ in found.chapters)
+    versions = ", ".join(f"{name} {version}" for name, version in software_versions().items())
+    return Section(
+        "How to reproduce this",
+        (
+            Paragraph("The same versions on the same kind of processor give the same numbers."),
+            Code(f"levilab reproduce --only {only}"),
+            Facts((Fact("Versions here", (versions,)),)),
+        ),
+        anchor="reproduce",
+    )

@@ -1,0 +1,101 @@
+"""The chapters, one after the other: which are wanted, what each found, and all of it as one JSON document."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import UsageError
+from levilab.reproduce.catalogue import CHAPTERS
+from levilab.reproduce.check import Verdict, as_document, counts
+from levilab.software import software_versions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from levilab.reproduce.chapter import Chapter, Found
+    from levilab.reproduce.check import Finding
+
+SCHEMA = "levilab-reproduction/1"
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """What was made anew.
+
+    Attributes:
+        chapters: each with what it found, in their order.
+    """
+
+    chapters: tuple[tuple[Chapter, Found], ...]
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Of all chapters."""
+        return tuple(finding for _, found in self.chapters for finding in found.findings)
+
+    @property
+    def counts(self) -> dict[Verdict, int]:
+        """How many of each verdict."""
+        return counts(self.findings)
+
+    @property
+    def unexpected(self) -> tuple[tuple[Chapter, Finding], ...]:
+        """What neither agrees nor differs for a reason that was found to hold."""
+        return tuple(
+            (chapter, finding)
+            for chapter, found in self.chapters
+            for finding in found.findings
+            if finding.verdict is Verdict.UNEXPECTED
+        )
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether all agree, or differ for a reason that holds."""
+        return not self.unexpected
+
+
+def chosen(only: str) -> list[Chapter]:
+    """The chapters of a list with commas, in the order of the report; all for an empty one.
+
+    Raises:
+        UsageError: there is no such chapter.
+
+    >>> [chapter.name for chapter in chosen("errata, limits")]
+    ['limits', 'errata']
+    """
+    names = [name.strip() for name in only.split(",") if name.strip()]
+    for name in names:
+        if name not in CHAPTERS:
+            raise UsageError("only", f"chapters are {', '.join(CHAPTERS)}", value=name)
+    return [chapter for chapter in CHAPTERS.values() if not names or chapter.name in names]
+
+
+def reproduce(chapters: Iterable[Chapter], progress: Callable[[float, str], None] | None = None) -> Reproduction:
+    """Make chapters anew.  progress: called with the share that is done, and with what is next."""
+    wanted, done = list(chapters), []
+    for k, chapter in enumerate(wanted):
+        if progress is not None:
+            progress(k / len(wanted), f"reproducing: {chapter.name}")
+        done.append((chapter, chapter.make()))
+    return Reproduction(tuple(done))
+
+
+def document(found: Reproduction) -> dict[str, Any]:
+    """All of it for JSON."""
+    return {
+        "schema": SCHEMA,
+        "synthetic": True,
+        "software": software_versions(),
+        "counts": {verdict.name.lower(): count for verdict, count in found.counts.items()},
+        "as_expected": found.as_expected,
+        "chapters": [
+            {
+                "name": chapter.name,
+                "title": chapter.title,
+                "synthetic_how": of_chapter.synthetic,
+                "findings": [as_document(finding) for finding in of_chapter.findings],
+            }
+            for chapter, of_chapter in found.chapters
+        ],
+    }

@@ -1,0 +1,214 @@
+"""Simon, Heflinger & Ridgway 1997, Table I: the quartic's window, and simulated limits, of three tops and bases."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.stability import SymmetricTop, sleeping_limit, spin_windows
+from analysis.uncertainty import Estimate
+from levilab.present.document.blocks import Note, Picture
+from levilab.reproduce.chapter import Found
+from levilab.reproduce.check import Because, Check, Statement, Within
+from levilab.reproduce.figure import simon_figure
+from levilab.reproduce.tops import Array, Flags, many, scan
+from levilab.simulator.field import field_of, on_axis
+from levilab.simulator.scene import preset
+from levilab.stability.published.printed import published
+from levilab.stability.scan import all_up_until, lower_limit
+
+if TYPE_CHECKING:
+    from levilab.reproduce.check import Finding
+    from levilab.simulator.scene import Scene
+
+SIMON = published("simon-1997")
+TOPS = ("1", "2", "3")
+#: The paper's spins are in rad/s.
+TURN = 2 * math.pi
+#: Starts of the scans, a calm one and another: distance from the place where the top floats [m], and tilt [rad].  The
+#: paper does not give its own.
+STARTS = ((1e-5, 1e-4), (5e-4, 5e-3))
+STEP_RAD_S, DURATION_S = 1.0, 30.0
+#: Ratio of the radii of a ring that has the paper's B, B′ and B″ where the top floats; 1.5 and 3 give the same limits.
+RATIO = 2.0
+
+
+@dataclass(frozen=True)
+class Simon:
+    """A top of Table I.
+
+    Attributes:
+        top: mass, inertias, moment.
+        flux: B, B′, B″ where it floats [T, T/m, T/m²].
+    """
+
+    top: SymmetricTop
+    flux: tuple[float, float, float]
+
+    @property
+    def gravity(self) -> float:
+        """The gravity that balances the force [m/s²]: the table's numbers are rounded."""
+        return abs(self.top.moment * self.flux[1]) / self.top.mass
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """The window of the quartic [rad/s]."""
+        low, high = spin_windows(lambda z: np.array(self.flux)[:, None] * np.ones_like(z), self.top, 0.0)[0]
+        return TURN * low, TURN * high
+
+    @property
+    def sleeping(self) -> float:
+        """The sleeping top's limit, their equation 11 [rad/s]."""
+        return TURN * sleeping_limit(lambda z: np.array(self.flux)[:, None] * np.ones_like(z), self.top, 0.0)
+
+
+def row(number: str) -> Simon:
+    """A row of the table."""
+    get = {key: SIMON[f"top.{number}.{key}"].value for key in ("mass", "moment", "axial", "transverse")}
+    flux = tuple(SIMON[f"top.{number}.{key}"].value for key in ("field", "slope", "half_bend"))
+    top = SymmetricTop(get["mass"], get["transverse"], get["axial"], -get["moment"])
+    return Simon(top, (flux[0], flux[1], 2 * flux[2]))
+
+
+def base_like(simon: Simon, ratio: float = RATIO) -> tuple[float, float, float]:
+    """A thin ring whose field has these B, B′, B″ at some height: inner radius [m], strength [T m], height [m].
+
+    With lengths in parts of the inner radius, B B″/B′² is a function of the height alone; there the radius follows
+    from B/B′, and the strength from B.
+
+    Raises:
+        ValueError: no ring has them.
+    """
+    from scipy.optimize import brentq
+
+    b, slope, second = simon.flux
+    unit = field_of(1.0, ratio, 1.0, "exact")
+    wanted = b * second / slope**2
+
+    def off(z: float) -> float:
+        f, s, c = on_axis(unit, z)[:3, 0]
+        return float(f * c / s**2) - wanted
+
+    heights = np.linspace(1.2 * ratio**0.5, 4.0 * ratio, 400)
+    values = np.array([off(z) for z in heights])
+    for k in np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1]))[::-1]:
+        z = float(brentq(off, heights[k], heights[k + 1]))
+        f, s = (float(value) for value in on_axis(unit, z)[:2, 0])
+        a = b / slope * s / f
+        if a > 0:
+            return a, b / f * a, z * a
+    raise ValueError(f"no ring with b = {ratio} a has B, B', B'' = {simon.flux}")
+
+
+def scene_of(simon: Simon, start: tuple[float, float], ratio: float = RATIO) -> Scene:
+    """The top over a ring with the paper's field where it floats, to r² in the potential, as the paper has it."""
+    a, strength, height = base_like(simon, ratio)
+    return preset("undriven").changed(
+        {
+            "gravity_m_s2": simon.gravity,
+            "base.inner_radius_m": a,
+            "base.outer_radius_m": ratio * a,
+            "base.strength_t_m": strength,
+            "top.mass_kg": simon.top.mass,
+            "top.inertia_transverse_kg_m2": simon.top.transverse,
+            "top.inertia_axial_kg_m2": simon.top.axial,
+            "top.moment_a_m2": simon.top.moment,
+            "start.position_m": [start[0], 0.0, height + start[0]],
+            "start.velocity_m_s": [0.0, 0.0, 0.0],
+            "start.tilt_rad": start[1],
+            "start.precession": "steady",
+        }
+    )
+
+
+def limits(scene: Scene, simon: Simon) -> tuple[float, float, Array, Flags]:
+    """Simulated lower and upper limit [rad/s], the spins of the scan [rad/s], and which tops are up."""
+    low, high = simon.window
+    spins = scan(math.floor(0.9 * low), math.ceil(1.12 * high), STEP_RAD_S)
+    up = many(scene, {"start.spin_hz": spins / TURN}, DURATION_S).survived
+    middle = int(np.searchsorted(spins, math.sqrt(low * high)))
+    if not up[middle]:
+        return math.nan, math.nan, spins, up
+    return lower_limit(spins[: middle + 1], up[: middle + 1]), all_up_until(spins[middle:], up[middle:]), spins, up
+
+
+def lasting(simon: Simon, spin: float) -> float:
+    """How long a calm top lasts at a spin [rad/s], up to the duration of the scans [s]."""
+    return float(many(scene_of(simon, STARTS[0]), {"start.spin_hz": [spin / TURN]}, DURATION_S).time[0])
+
+
+def make() -> Found:
+    """Make the chapter."""
+    findings: list[Finding] = []
+    scans: list[tuple[str, Array, Flags, tuple[float, float], tuple[float, float]]] = []
+    for number in TOPS:
+        simon = row(number)
+        low, high = simon.window
+        printed = {key: SIMON[f"top.{number}.{key}"] for key in ("lower", "upper", "lower_quartic", "upper_quartic")}
+        name = f"base and top {number}"
+        calm, other = (limits(scene_of(simon, start), simon) for start in STARTS)
+        last = printed["upper"].value
+        scans.append((name, calm[2], calm[3], (low, high), (printed["lower"].value, last)))
+        lasts = lasting(simon, last)
+        beyond = Because(
+            f"over a ring with its B, B′, B″ every calm top is up to {calm[1]:.0f} rad/s and all others to "
+            f"{other[1]:.0f}; the "
+            f"quartic ends at {high:.0f}. At {printed['upper'].text} rad/s a calm top takes {lasts:.1f} s to be "
+            "lost: a shorter "
+            "simulation has it up",
+            1.0 < lasts < DURATION_S,
+        )
+        spread = sorted((calm[1], other[1]))
+        near = Within(
+            STEP_RAD_S + spread[1] - spread[0],
+            f"a step of {STEP_RAD_S:g} rad/s; another start gives {other[1]:.0f}",
+        )
+        upper = near if spread[0] - STEP_RAD_S <= last <= spread[1] + STEP_RAD_S else beyond
+        findings += [
+            Check(f"{name}: lower edge of the quartic", printed["lower_quartic"], Estimate(low, None, "rad/s")),
+            Check(f"{name}: upper edge of the quartic", printed["upper_quartic"], Estimate(high, None, "rad/s")),
+            Check(
+                f"{name}: lower limit, simulated",
+                printed["lower"],
+                Estimate(calm[0], None, "rad/s"),
+                Within(
+                    2 * STEP_RAD_S,
+                    f"two steps of {STEP_RAD_S:g} rad/s; the paper's start is not known, another one gives "
+                    f"{other[0]:.0f}",
+                ),
+            ),
+            Check(f"{name}: upper limit, simulated", printed["upper"], Estimate(calm[1], None, "rad/s"), upper),
+        ]
+    three = row("3")
+    rpm = {key: SIMON[f"abstract.{key}"].value * TURN / 60 for key in ("upper_simulated", "upper_measured")}
+    findings.append(
+        Statement(
+            "the upper limits of the abstract beside Table I",
+            SIMON["abstract.upper_simulated"].place,
+            f"{SIMON['abstract.upper_simulated'].text} rpm = {rpm['upper_simulated']:.0f} rad/s simulated, "
+            f"{SIMON['abstract.upper_measured'].text} rpm = {rpm['upper_measured']:.0f} rad/s measured",
+            f"the quartic ends at {three.window[1]:.0f} rad/s: "
+            f"{100 * (three.window[1] / rpm['upper_simulated'] - 1):+.0f} % of "
+            f"the simulated, {100 * (three.window[1] / rpm['upper_measured'] - 1):+.0f} % of the measured one",
+            holds=abs(three.window[1] / rpm["upper_simulated"] - 1) < 0.05,
+        )
+    )
+    picture = Picture(
+        "simon",
+        "Three tops of Simon, Heflinger and Ridgway.",
+        f"Which tops are up after {DURATION_S:g} s (filled) over a ring that has the paper's B, B′ and B″ where the "
+        "top "
+        f"floats, in steps of {STEP_RAD_S:g} rad/s; lines: the window of the quartic; triangles: Table I.",
+        "Survival of three tops over their spin",
+        partial(simon_figure, tuple(scans)),
+    )
+    note = Note(
+        "The second derivative in Table I is half of B″. The weight is taken as the force of the table's own "
+        "numbers, which "
+        f"are rounded: gravity comes out as {', '.join(f'{row(k).gravity:.2f}' for k in TOPS)} m/s²."
+    )
+    return Found(tuple(findings), (picture, note), "The first simulated limits of a Levitron, of three tops and bases.")

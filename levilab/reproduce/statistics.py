@@ -1,0 +1,101 @@
+"""The ten lower limits that the thesis measured: their mean, what their rounding does, and whether they are normal."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.limits import Sample, compare, summarize
+from analysis.uncertainty import Estimate
+from levilab.present.document.blocks import Picture
+from levilab.reproduce.chapter import Found
+from levilab.reproduce.check import Check, Statement
+from levilab.reproduce.figure import statistics_figure
+from levilab.reproduce.tops import THESIS
+from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.scene import preset
+from levilab.stability.published.printed import several
+
+if TYPE_CHECKING:
+    from levilab.reproduce.check import Finding
+    from levilab.reproduce.tops import Array
+
+#: The limits are printed in steps of this [Hz].
+STEP_HZ = 0.1
+
+
+def normality(values: Array) -> tuple[float, float]:
+    """Shapiro and Wilk's W of the values, and the probability of a smaller one."""
+    from scipy.stats import shapiro
+
+    found = shapiro(values)
+    return float(found.statistic), float(found.pvalue)
+
+
+def make() -> Found:
+    """Make the chapter."""
+    values = np.array([one.value for one in several("thesis", "measured.limits")])
+    found = summarize(Sample(values))
+    assert found.scatter is not None
+    assert found.scatter.value is not None
+    assert found.scatter.u is not None
+    assert found.mean.value is not None
+    assert found.mean.u is not None
+    w, p = normality(values)
+    step = STEP_HZ / math.sqrt(12)
+    floating = stability_of(preset("undriven")).floating
+    assert floating is not None
+    edge = compare(found, "edge", floating.spins[0][0])
+    assert edge.difference.value is not None
+    assert edge.p is not None
+    assert found.trend is not None
+    assert found.trend.value is not None
+    assert found.trend_p is not None
+    findings: list[Finding] = [
+        Check("mean of ten", THESIS["measured.mean"], Estimate(found.mean.value, None, "Hz")),
+        Check("scatter of one", THESIS["measured.scatter"], Estimate(found.scatter.value, None, "Hz")),
+        Check("standard error of the mean", THESIS["measured.standard_error"], Estimate(found.mean.u, None, "Hz")),
+        Statement(
+            "rounding to 0.1 Hz",
+            THESIS["measured.limits.0"].place,
+            "",
+            f"adds {1e3 * step:.0f} mHz to the scatter, "
+            f"{100 * (1 - math.sqrt(1 - (step / found.scatter.value) ** 2)):.1f} % "
+            f"of it, and {1e3 * step / math.sqrt(10):.0f} mHz to the mean: nothing to correct",
+            holds=step < 0.2 * found.scatter.value,
+        ),
+        Statement(
+            "are the ten normal?",
+            THESIS["measured.limits.0"].place,
+            "",
+            f"Shapiro and Wilk: W = {w:.3f}, p = {p:.2f}; no outlier, no trend ({1e3 * found.trend.value:+.0f} mHz a "
+            "top, "
+            f"p = {found.trend_p:.2f}); ten values leave the scatter ± {found.scatter.u:.2f} Hz",
+            holds=p > 0.05 and not found.outliers,
+        ),
+        Statement(
+            "against the exact edge of small motions",
+            THESIS["measured.mean"].place,
+            "21.86(8) Hz measured; 14.005 Hz by its own estimate",
+            f"{edge.difference.value:+.2f} Hz above the edge at {edge.expected:.2f} Hz (p = {edge.p:.2f}), "
+            f"{found.mean.value - THESIS['stability.estimate'].value:.1f} Hz above the estimate",
+            holds=0 < edge.difference.value < 0.5,
+        ),
+    ]
+    picture = Picture(
+        "ten",
+        "Ten falls beside what theory and simulation say.",
+        "The ten limits in their order; band: the mean with its standard error, dashed: the scatter of one; dotted: "
+        "the "
+        "lower edge of the window of small motions. On the right, the values in order over normal quantiles: on a "
+        "line, "
+        "as normal ones are.",
+        "Ten lower limits and their normal quantiles",
+        partial(statistics_figure, values, found, edge.expected),
+    )
+    return Found(
+        tuple(findings), (picture,), "The only readings that the thesis prints: ten spins at which a top fell."
+    )

@@ -1,0 +1,58 @@
+"""The thesis's tops as scenes, many of them at once, and the facts about its device that several chapters need."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from levilab.simulator.ensemble import simulate_many
+from levilab.simulator.scene import preset, with_settings
+from levilab.stability.published.printed import published
+from levilab.stability.thesis import STARTS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from levilab.simulator.ensemble import Ensemble
+    from levilab.simulator.scene import Scene
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+THESIS = published("thesis")
+#: How long a top must stay up [s], and the wanted error of place [m] and axis [rad] of those that do.
+DURATION_S, TOLERANCE = 30.0, 1e-6
+#: Mass of the thesis's simulations [kg], which it prints as 25.5 g: found by the chapter of the limits.
+MASS_KG = 0.025285
+#: With drag a top counts as fallen at this height [m].
+FALL_M = 0.06
+
+
+def started(name: str, scene: str = "undriven", *settings: str) -> Scene:
+    """A preset from a start of the thesis, with the mass of its simulations.
+
+    >>> started("IC3").start.position_m, started("IC4").top.mass_kg
+    ((0.003, 0.0, 0.0725), 0.025285)
+    """
+    return with_settings(preset(scene), [f"top.mass_kg={MASS_KG}", *STARTS[name], *settings])
+
+
+def many(scene: Scene, over: Mapping[str, ArrayLike], duration: float = DURATION_S, **given: Any) -> Ensemble:
+    """Simulate many tops, without estimates of their errors."""
+    return simulate_many(scene, over, duration, tolerance=TOLERANCE, errors=False, **given)
+
+
+def scan(low: float, high: float, step: float) -> Array:
+    """Spins from low to high [Hz], both included.
+
+    >>> scan(21.9, 22.0, 0.05).tolist()
+    [21.9, 21.95, 22.0]
+    """
+    return np.asarray(np.round(low + step * np.arange(round((high - low) / step) + 1), 9))
+
+
+def survivors(scene: Scene, spins: Array, duration: float = DURATION_S) -> Flags:
+    """Which tops are still up after a time [s]."""
+    return many(scene, {"start.spin_hz": spins}, duration).survived

@@ -1,0 +1,1 @@
+"""What others published about Levitrons, as printed, with its place in the source."""

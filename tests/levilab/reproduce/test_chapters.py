@@ -1,0 +1,151 @@
+"""Quick chapters as a whole, slow ones in part: verdicts as expected, and wrong numbers noticed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from levilab.present.document.blocks import Picture
+from levilab.present.style import as_svg
+from levilab.reproduce import beyond, dipole, errata, gans, limits, simon, spindown, statistics, windows
+from levilab.reproduce.check import Because, Check, Statement, Verdict, counts
+from levilab.reproduce.tops import THESIS, scan, started, survivors
+from levilab.stability.scan import all_up_until, last_up, lower_limit, upper_edges
+
+#: Chapters that take less than a second together, and how many findings have each verdict.
+QUICK = {
+    "stability": (windows, {Verdict.AGREES: 14, Verdict.DIFFERS: 2}),
+    "statistics": (statistics, {Verdict.AGREES: 4, Verdict.ADDED: 2}),
+    "dipole": (dipole, {Verdict.AGREES: 4, Verdict.DIFFERS: 2, Verdict.ADDED: 1}),
+    "spindown": (spindown, {Verdict.AGREES: 16}),
+}
+
+
+@pytest.fixture(scope="module")
+def quick():
+    return {name: module.make() for name, (module, _) in QUICK.items()}
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_quick_chapter_has_the_verdicts_that_are_expected(quick, name):
+    found = quick[name]
+    assert {verdict: n for verdict, n in counts(found.findings).items() if n} == QUICK[name][1]
+    assert found.said
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_wrong_published_number_is_unexpected(quick, name):
+    checks = [one for one in quick[name].findings if isinstance(one, Check)]
+    for one in checks:
+        value = one.published.value + 30 * one.published.rounding + 30 * (one.ours.u or 0) + 2 * abs(one.difference)
+        digits = len(one.published.text.lower().partition("e")[0].partition(".")[2])
+        text = f"{value:.{digits + 2}e}" if "e" in one.published.text else f"{value:.{digits}f}"
+        wrong = replace(one, published=replace(one.published, text=text))
+        explained = isinstance(one.way, Because) and isinstance(one.way.explained, bool)
+        assert explained or wrong.verdict is Verdict.UNEXPECTED, one.name
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_the_figures_of_a_chapter_are_drawn_and_explained(quick, name):
+    pictures = [block for block in quick[name].blocks if isinstance(block, Picture)]
+    assert pictures
+    for picture in pictures:
+        assert picture.alt
+        assert picture.caption
+        assert as_svg(picture.draw(), picture.name).startswith("<svg")
+
+
+def test_made_up_readings_are_marked_in_the_chapter_and_its_figure(quick):
+    found = quick["spindown"]
+    assert "made up" in found.synthetic
+    (picture,) = (block for block in found.blocks if isinstance(block, Picture))
+    assert "SYNTHETIC" in picture.caption
+    assert not quick["statistics"].synthetic
+
+
+def test_the_errata_are_true_by_a_third_way():
+    found = [errata.fourth_power(), errata.thickness(), errata.bracket(), errata.least_spin(), errata.moment()]
+    found += [*errata.table_of_parameters(), errata.tilt_of_moment()]
+    assert {one.verdict for one in found} == {Verdict.DIFFERS}
+    assert found[0].truth == pytest.approx(1 / 64, rel=1e-3)
+    assert replace(found[0], by_corrected=1 / 32).verdict is Verdict.UNEXPECTED
+    assert replace(found[0], by_printed=1 / 64).verdict is Verdict.UNEXPECTED
+
+
+def test_errata_of_motion_are_tried_on_simulated_motions():
+    found = [errata.acceleration(), errata.half(), errata.tilting()]
+    assert {one.verdict for one in found} == {Verdict.DIFFERS}
+    assert found[0].truth == pytest.approx(found[0].by_corrected, rel=1e-5)
+
+
+def test_simons_quartic_is_the_recomputed_one_for_all_three():
+    for number in simon.TOPS:
+        low, high = simon.row(number).window
+        for edge, value in (("lower", low), ("upper", high)):
+            printed = simon.SIMON[f"top.{number}.{edge}_quartic"]
+            assert value == pytest.approx(printed.value, abs=printed.rounding)
+
+
+def test_a_ring_has_the_field_of_simons_table_where_the_top_floats():
+    from levilab.simulator.field import on_axis
+    from levilab.simulator.model import base_field
+
+    for number in simon.TOPS:
+        top = simon.row(number)
+        scene = simon.scene_of(top, simon.STARTS[0])
+        flux = on_axis(base_field(scene), scene.start.position_m[2] - simon.STARTS[0][0])[:3, 0]
+        assert flux == pytest.approx(top.flux, rel=1e-6)
+
+
+def test_the_edges_over_a_ring_of_dipoles_are_zeros_of_polynomials():
+    low, high = gans.edges_by_hand()
+    assert (low, high) == pytest.approx((1.69390, 1.82532), abs=1e-5)
+    # up and down: B″ = −ψ‴ changes its sign at the lower edge
+    assert abs(8 * low**4 - 24 * low**2 + 3) < 1e-9
+
+
+def test_the_third_start_gives_its_limit_from_three_millimetres_and_not_from_five():
+    spins = scan(22.0, 22.6, 0.05)
+    three = lower_limit(spins, survivors(started("IC3"), spins))
+    assert three == pytest.approx(THESIS["limits.lower.IC3"].value, abs=0.05)
+    five = survivors(started("IC3", "undriven", "start.position_m=[0.005,0,0.0725]"), spins)
+    assert not five.any()
+
+
+def test_an_upper_limit_that_is_torn_differs_for_that_reason_alone():
+    torn = limits.Upper(70.46, 80.9, np.array([70.47, 79.1]), np.ones(3, dtype=np.bool_), 9.9)
+    (found,) = limits.upper_checks({"IC1": torn})
+    assert found.verdict is Verdict.DIFFERS
+    assert "1 islands" in found.why
+    (found,) = limits.upper_checks({"IC1": replace(torn, until=60.0, last=60.0, edges=np.array([60.01]))})
+    assert found.verdict is Verdict.UNEXPECTED
+
+
+def test_the_mass_is_that_of_the_least_rms_difference():
+    lower = {name: np.full(limits.MASSES_KG.size, one[0] + 0.1) for name, one in limits.SIMULATED_HZ.items()}
+    for values in lower.values():
+        values[3] -= 0.09
+    mass, rms = limits.best_mass(lower)
+    assert mass == limits.MASSES_KG[3]
+    assert rms[3] == pytest.approx(0.01)
+
+
+def test_the_lock_is_tested_jointly_and_the_printed_slope_is_not():
+    (found,) = beyond.about_lock()
+    assert isinstance(found, Check)
+    assert found.verdict is Verdict.DIFFERS
+    assert found.ours.value == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_scan_has_limits_edges_and_gaps():
+    spins, up = np.arange(5.0), np.array([False, True, True, False, True])
+    assert lower_limit(spins, up) == 4.0
+    assert last_up(spins, up) == 4.0
+    assert upper_edges(spins, up).tolist() == [2.5]
+    assert math.isnan(all_up_until(spins, up))
+    assert all_up_until(spins, ~up) == 0.0
+    assert math.isnan(lower_limit(spins, ~up & False))
+    assert all(isinstance(one, Statement) for one in beyond.about_window())

@@ -1,0 +1,80 @@
+"""The command: chapters by name, table, JSON, report, exit status."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from levilab.report.html.page import page_of
+from levilab.reproduce import catalogue, run
+from levilab.reproduce.chapter import Chapter, Found
+from levilab.reproduce.check import Statement, Verdict
+from levilab.reproduce.report import document_of
+from support.commands import command
+
+
+def chapter(name: str, *, holds: bool) -> Chapter:
+    found = Found((Statement("<b>one</b>", "there", "it is", "we see", holds=holds),), (), "Said.", "made up")
+    return Chapter(name, f"The {name}", lambda: found)
+
+
+def test_chapters_come_in_their_order_and_a_wrong_name_is_refused(tmp_path):
+    assert [one.name for one in run.chosen("")] == list(catalogue.CHAPTERS)
+    assert [one.name for one in run.chosen("gans,limits")] == ["limits", "gans"]
+    ended = command("reproduce", "--only", "limit", cwd=tmp_path)
+    assert ended.status == 2
+    assert "--only limit: chapters are stability, limits" in ended.err
+
+
+def test_a_report_has_its_verdicts_and_is_the_same_each_time_and_never_markup():
+    found = run.reproduce([chapter("first", holds=True), chapter("second", holds=False)])
+    assert found.counts == {Verdict.AGREES: 1, Verdict.DIFFERS: 0, Verdict.ADDED: 0, Verdict.UNEXPECTED: 1}
+    assert not found.as_expected
+    page = page_of(document_of(found))
+    assert page == page_of(document_of(found))
+    assert "<b>one</b>" not in page
+    assert page.count("SYNTHETIC.") >= 3
+    assert "1 are UNEXPECTED" in page
+
+
+def test_the_command_prints_a_table_and_writes_a_report(tmp_path):
+    ended = command("reproduce", "--only", "statistics", "-o", str(tmp_path / "deep" / "ten.html"), cwd=tmp_path)
+    assert ended.status == 0, ended.err
+    for text in ("published", "here", "agreement", "21.86 Hz", "none is unexpected"):
+        assert text in ended.out
+    page = (tmp_path / "deep" / "ten.html").read_text(encoding="utf-8")
+    assert "Ten measured limits" in page
+    assert "Gans" not in page
+
+
+def test_json_is_one_document_and_writes_no_report(tmp_path):
+    ended = command("reproduce", "--only", "stability", "--json", cwd=tmp_path)
+    assert ended.status == 0, ended.err
+    document = json.loads(ended.out)
+    assert document["schema"] == "levilab-reproduction/1"
+    assert document["as_expected"] is True
+    (one,) = document["chapters"]
+    assert one["findings"][0]["values"]["published"] == 0.45802428
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_wrong_number_ends_the_command_with_one(monkeypatch, tmp_path):
+    monkeypatch.setitem(catalogue.CHAPTERS, "statistics", chapter("statistics", holds=False))
+    ended = command("reproduce", "--only", "statistics", "-o", str(tmp_path / "ten.html"), cwd=tmp_path)
+    assert ended.status == 1
+    assert "UNEXPECTED" in ended.out
+    assert (tmp_path / "ten.html").exists()
+
+
+def test_a_name_of_another_format_is_refused_before_anything_is_computed(tmp_path):
+    ended = command("reproduce", "-o", str(tmp_path / "report.docx"), cwd=tmp_path)
+    assert ended.status == 2
+    assert ".html" in ended.err
+
+
+@pytest.mark.slow
+def test_chapters_of_motion_have_nothing_unexpected():
+    found = run.reproduce(run.chosen("paths,driven,gans,beyond"))
+    assert found.unexpected == ()
+    assert found.counts[Verdict.AGREES] > 10
