@@ -1,0 +1,1 @@
+"""What a bench publishes while it works, for views in other processes: messages, their publisher, their subscriber."""
