@@ -1,0 +1,1 @@
+"""The top in motion: its parts, its poses, and films of them."""

@@ -1,0 +1,294 @@
+// The top over its base in three dimensions, from the description that parts.py makes of a scene.
+//
+// Used by the page of an animation and by the live view.  It imports nothing: three.js is handed over, so that it may
+// come from anywhere.  Lengths come in metres and are drawn in centimetres; z is up, as in the simulator.
+//
+//     const view = buildScene(THREE, parts, "light");          // parts: what parts_of(scene) made; or "dark"
+//     const camera = buildCamera(THREE, parts, width / height);
+//     view.setPose([x, y, z], [qx, qy, qz, qw], {washers: 0.1, drive: 0.5});
+//     renderer.render(view.scene, camera);
+
+const CM = 100;             // drawn units in a metre
+const TURN = 2 * Math.PI;
+const AROUND = 96;          // facets around a part
+
+/**
+ * Build everything that is drawn.
+ *
+ * @param THREE the library.
+ * @param parts the description of a scene, as parts_of makes it.
+ * @param {"light"|"dark"} theme which of its colours.
+ * @returns {object} scene (to render), top, washers, base (groups), and functions:
+ *   setPose(position [m], quaternion [x, y, z, w], {washers, drive}): place the top; `washers` is how far they have
+ *     turned on it [rad], `drive` the drive's field as a part of its amplitude, −1 to 1;
+ *   setPath(points, count): the line that the axis' end has drawn, a Float32Array of x, y, z [m];
+ *   setSpin(sense): which way the arrow turns, 1, −1 or 0;
+ *   setTheme(theme); show({path, axis, spin, drive}): what is seen, each true or false;
+ *   axisEnd(position, quaternion): where the end of the drawn axis is then [m]; dispose(): free the graphics' memory.
+ */
+export function buildScene(THREE, parts, theme = "light") {
+  const scene = new THREE.Scene();
+  const paints = [];        // [material, key of the colours]
+  const paint = (key, options = {}) => {
+    const material = new THREE.MeshStandardMaterial({roughness: 0.55, metalness: 0.05, ...options});
+    paints.push([material, key]);
+    return material;
+  };
+  const plain = (key, options = {}) => {
+    const material = new THREE.MeshBasicMaterial(options);
+    paints.push([material, key]);
+    return material;
+  };
+
+  // light from above left, a soft one from everywhere, and a little from behind, which draws the edges
+  const sky = new THREE.HemisphereLight("#ffffff", "#8d8a86", 1.5);
+  sky.position.set(0, 0, 1);
+  const key = new THREE.DirectionalLight("#fff6e8", 2.2);
+  key.position.set(-6, -8, 14);
+  const behind = new THREE.DirectionalLight("#dfeaff", 0.9);
+  behind.position.set(8, 10, 6);
+  scene.add(sky, key, behind);
+
+  // the ground, the base on it, and the top's shadow between them
+  const {inner, outer, bottom, top: upper, edge} = parts.base;
+  const ground = new THREE.Mesh(new THREE.CircleGeometry(2.1 * outer * CM, AROUND), plain("ground"));
+  ground.position.z = bottom * CM - 0.02;
+  const base = new THREE.Group();
+  base.add(new THREE.Mesh(revolve(THREE, [
+    [inner + edge, bottom], [outer - edge, bottom], [outer, bottom + edge], [outer, upper - edge],
+    [outer - edge, upper], [inner + edge, upper], [inner, upper - edge], [inner, bottom + edge], [inner + edge, bottom],
+  ]), paint("base", {roughness: 0.42, metalness: 0.25})));
+  const shade = shadowTexture(THREE);
+  const shadow = new THREE.Mesh(
+    new THREE.CircleGeometry(1, 48), new THREE.MeshBasicMaterial({map: shade, transparent: true, depthWrite: false}));
+  shadow.position.z = bottom * CM + 0.04;
+  paints.push([shadow.material, "shadow"]);
+  scene.add(ground, base, shadow);
+
+  // the top, and what turns on it
+  const top = new THREE.Group(), washers = new THREE.Group();
+  top.add(washers);
+  const groups = {top, washers};
+  for (const part of parts.parts) {
+    const shiny = part.colour === "washers" ? {roughness: 0.3, metalness: 0.55} : {};
+    groups[part.turns].add(new THREE.Mesh(revolve(THREE, part.outline), paint(part.colour, shiny)));
+  }
+  for (const mark of parts.marks) {
+    const geometry = revolve(THREE, mark.outline, mark.azimuth - mark.width / 2, mark.width, 0.00012);
+    groups[mark.turns].add(new THREE.Mesh(geometry, paint(mark.colour, {side: THREE.DoubleSide, roughness: 0.8})));
+  }
+  scene.add(top);
+
+  // the axis, a line through it all; the arrow of the spin, which leans with the axis and does not turn with the top
+  const leaning = new THREE.Group();
+  const {up, down} = parts.axis;
+  const axis = new THREE.Mesh(new THREE.CylinderGeometry(0.022, 0.022, (up + down) * CM, 8), plain("axis"));
+  axis.rotation.x = Math.PI / 2;
+  axis.position.z = (up - down) / 2 * CM;
+  const end = new THREE.Mesh(new THREE.SphereGeometry(0.075, 16, 12), plain("path"));
+  end.position.z = up * CM;
+  const spin = spinArrow(THREE, parts.spin.radius * CM, plain("spin"));
+  spin.position.z = parts.spin.height * CM;
+  leaning.add(axis, end, spin);
+  scene.add(leaning);
+
+  // the line from the top straight down
+  const plumb = new THREE.Mesh(new THREE.CylinderGeometry(0.012, 0.012, 1, 6), plain("faint"));
+  plumb.rotation.x = Math.PI / 2;
+  scene.add(plumb);
+  const points = parts.parts.flatMap((part) => part.outline);
+  const widest = Math.max(...points.map((point) => point[0])), lowest = Math.min(...points.map((point) => point[1]));
+
+  // the path of the axis' end
+  const path = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({transparent: true, opacity: 0.9}));
+  path.frustumCulled = false;
+  paints.push([path.material, "path"]);
+  scene.add(path);
+
+  // the drive's field: an arrow under the top that grows and shrinks
+  const drive = parts.drive ? driveArrow(THREE, parts.drive, plain("drive")) : null;
+  if (drive) {
+    drive.position.z = (upper + 0.004) * CM;
+    scene.add(drive);
+  }
+
+  const turned = new THREE.Quaternion(), axisNow = new THREE.Vector3(), upright = new THREE.Vector3(0, 0, 1);
+  const along = (quaternion) => axisNow.set(0, 0, 1).applyQuaternion(turned.set(...quaternion));
+
+  const view = {
+    scene, top, washers, base,
+
+    axisEnd(position, quaternion) {
+      const n = along(quaternion);
+      return [position[0] + up * n.x, position[1] + up * n.y, position[2] + up * n.z];
+    },
+
+    setPose(position, quaternion, {washers: slipped = 0, drive: share = 0} = {}) {
+      top.position.set(position[0] * CM, position[1] * CM, position[2] * CM);
+      top.quaternion.set(...quaternion);
+      washers.rotation.z = slipped;
+      leaning.position.copy(top.position);
+      leaning.quaternion.setFromUnitVectors(upright, along(quaternion));
+      const from = bottom * CM, height = Math.max(top.position.z + lowest * CM - from, 0.01);
+      plumb.position.set(top.position.x, top.position.y, from + height / 2);
+      plumb.scale.y = height;
+      const radius = widest * CM * (1.2 + 0.04 * height);  // the higher, the softer
+      shadow.position.x = top.position.x;
+      shadow.position.y = top.position.y;
+      shadow.scale.set(radius, radius, 1);
+      if (drive) drive.setShare(share);
+    },
+
+    setPath(points, count = points.length / 3) {
+      let attribute = path.geometry.getAttribute("position");
+      if (!attribute || attribute.count < count) {
+        attribute = new THREE.BufferAttribute(new Float32Array(3 * Math.max(2 * count, 64)), 3);
+        attribute.setUsage(THREE.DynamicDrawUsage);
+        path.geometry.setAttribute("position", attribute);
+      }
+      for (let k = 0; k < 3 * count; k += 1) attribute.array[k] = points[k] * CM;
+      attribute.needsUpdate = true;
+      path.geometry.setDrawRange(0, count);
+    },
+
+    setSpin(sense) {
+      spin.userData.there = sense !== 0;
+      spin.visible = spin.userData.there && spin.userData.wanted;
+      spin.scale.y = sense < 0 ? -1 : 1;
+    },
+
+    show(wanted) {
+      if ("path" in wanted) path.visible = end.visible = wanted.path;
+      if ("axis" in wanted) axis.visible = wanted.axis;
+      if ("spin" in wanted) spin.visible = (spin.userData.wanted = wanted.spin) && spin.userData.there;
+      if ("drive" in wanted && drive) drive.visible = wanted.drive;
+    },
+
+    setTheme(name) {
+      const colours = parts.colours[name];
+      scene.background = new THREE.Color(colours.background);
+      for (const [material, colour] of paints) material.color.set(colours[colour]);
+      sky.intensity = name === "dark" ? 1.1 : 1.5;
+      shadow.material.opacity = name === "dark" ? 0.75 : 0.45;
+    },
+
+    dispose() {
+      scene.traverse((object) => {
+        if (object.geometry) object.geometry.dispose();
+        if (object.material) object.material.dispose();
+      });
+      shade.dispose();
+    },
+  };
+  spin.userData.wanted = true;
+  view.setSpin(1);
+  view.setTheme(theme);
+  view.setPose(parts.view.floats, [0, 0, 0, 1]);
+  return view;
+}
+
+/**
+ * A camera from which the base and the whole axis are seen, and where it looks at, for OrbitControls' target.
+ *
+ * @param {number} aspect width over height of the picture.
+ * @returns the camera, with its `userData.target` set to where it looks.
+ */
+export function buildCamera(THREE, parts, aspect) {
+  const camera = new THREE.PerspectiveCamera(26, aspect, 1, 400);
+  camera.up.set(0, 0, 1);
+  placeCamera(THREE, camera, parts, aspect);
+  return camera;
+}
+
+/** Put a camera back to where buildCamera has it, for a picture of this shape. */
+export function placeCamera(THREE, camera, parts, aspect) {
+  const {reach, top} = parts.view, bottom = parts.base.bottom;
+  const target = new THREE.Vector3(0, 0, (0.5 * (top + bottom)) * CM);
+  const half = Math.tan(camera.fov / 2 * TURN / 360);
+  const distance = Math.max((0.62 * (top - bottom) + 0.12 * reach) / half, 1.12 * reach / (half * aspect) + reach) * CM;
+  const elevation = 0.33, azimuth = -1.25;
+  camera.aspect = aspect;
+  camera.position.set(
+    target.x + distance * Math.cos(elevation) * Math.cos(azimuth),
+    target.y + distance * Math.cos(elevation) * Math.sin(azimuth),
+    target.z + distance * Math.sin(elevation));
+  camera.lookAt(target);
+  camera.userData.target = target;
+  camera.updateProjectionMatrix();
+}
+
+/**
+ * The surface that an outline of points (radius, height) [m] sweeps as it turns about z: smooth around, with its edges.
+ *
+ * @param {number} from, width the piece of a turn [rad]; by how much it stands `out` of the outline [m].
+ */
+function revolve(THREE, outline, from = 0, width = TURN, out = 0) {
+  const places = [], normals = [], faces = [];
+  const steps = Math.max(2, Math.ceil(AROUND * width / TURN));
+  for (let k = 0; k + 1 < outline.length; k += 1) {
+    const [[r0, z0], [r1, z1]] = [outline[k], outline[k + 1]];
+    const length = Math.hypot(r1 - r0, z1 - z0);
+    if (length === 0) continue;
+    const across = (z1 - z0) / length, along = -(r1 - r0) / length;  // outline runs upwards outside: outwards is right
+    const first = places.length / 3;
+    for (let step = 0; step <= steps; step += 1) {
+      const angle = from + width * step / steps, x = Math.cos(angle), y = Math.sin(angle);
+      for (const [r, z] of [[r0, z0], [r1, z1]]) {
+        const radius = (r + out * across) * CM;
+        places.push(radius * x, radius * y, (z + out * along) * CM);
+        normals.push(across * x, across * y, along);
+      }
+      const here = first + 2 * step;
+      if (step < steps) faces.push(here, here + 2, here + 1, here + 1, here + 2, here + 3);
+    }
+  }
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(places, 3));
+  geometry.setAttribute("normal", new THREE.Float32BufferAttribute(normals, 3));
+  geometry.setIndex(faces);
+  return geometry;
+}
+
+/** Three quarters of a circle with a head, in the plane across the axis, counterclockwise seen from above. */
+function spinArrow(THREE, radius, material) {
+  const arrow = new THREE.Group();
+  const length = 0.72 * TURN, thick = 0.05 * radius;
+  arrow.add(new THREE.Mesh(new THREE.TorusGeometry(radius, thick, 10, 64, length), material));
+  const head = new THREE.Mesh(new THREE.ConeGeometry(3.4 * thick, 9 * thick, 20), material);
+  head.position.set(radius * Math.cos(length), radius * Math.sin(length), 0);
+  head.rotation.z = length;  // a cone points along y, which is the sense at angle 0
+  arrow.add(head);
+  return arrow;
+}
+
+/** A double line of an arrow through the base's axis, along the drive's direction. */
+function driveArrow(THREE, direction, material) {
+  const arrow = new THREE.Group();
+  const shaft = new THREE.Mesh(new THREE.CylinderGeometry(0.06, 0.06, 1, 12), material);
+  const head = new THREE.Mesh(new THREE.ConeGeometry(0.2, 0.5, 20), material);
+  arrow.add(shaft, head);
+  arrow.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), new THREE.Vector3(...direction));
+  arrow.setShare = (share) => {
+    const length = 2.4 * share;
+    shaft.scale.y = Math.max(Math.abs(length), 0.01);
+    shaft.position.y = length / 2;
+    head.position.y = length + 0.25 * Math.sign(share);
+    head.rotation.z = share < 0 ? Math.PI : 0;
+    head.scale.setScalar(Math.min(1, 0.15 + 1.2 * Math.abs(share)));
+  };
+  arrow.setShare(0);
+  return arrow;
+}
+
+/** A dark spot that fades to its edge. */
+function shadowTexture(THREE) {
+  const size = 128, data = new Uint8Array(4 * size * size);
+  for (let k = 0; k < size * size; k += 1) {
+    const x = (k % size + 0.5) / size * 2 - 1, y = (Math.floor(k / size) + 0.5) / size * 2 - 1;
+    const inside = Math.min(Math.max((1 - Math.hypot(x, y)) / 0.55, 0), 1);
+    data.set([255, 255, 255, Math.round(255 * inside * inside * (3 - 2 * inside))], 4 * k);
+  }
+  const texture = new THREE.DataTexture(data, size, size);
+  texture.needsUpdate = true;
+  return texture;
+}
