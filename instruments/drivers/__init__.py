@@ -17,12 +17,14 @@ class Instrument(Protocol):
     """What every driver offers.
 
     MODELS: what the model field of ``*IDN?`` matches, whole (regular expression); SERIAL: how the instrument's serial
-    line is set when it leaves the factory, empty for one without.
+    line is set when it leaves the factory, empty for one without; last_set: the last value of each setting that was set
+    since the last reset, unit at the end of the name.
     """
 
     MODELS: ClassVar[str]
     SERIAL: ClassVar[Mapping[str, Any]]
     transport: Transport
+    last_set: dict[str, Value]
 
     def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
         """Drive the instrument at this link.  clock: of the bench, for what is waited for; by default the wall's."""

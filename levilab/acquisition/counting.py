@@ -72,6 +72,7 @@ def spin_now(session: Session[S]) -> float | None:
         except InstrumentError as error:
             session.reconnect("counter", error, lambda: prepare_counter(session))
         else:
+            session.saw("spin_frequency_hz", spin)
             return spin
 
 
@@ -181,6 +182,7 @@ class FreeTop(Generic[S]):
         """What the counter counts; its time is the middle of the gate."""
         session = self.session
         spin = session.bench.counter.frequency()
+        session.saw("spin_frequency_hz", spin)
         if spin is None:
             return None
         end = session.now()

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from instruments.errors import InstrumentError
+from levilab.acquisition.onlooker import publishing
 from levilab.acquisition.session import Earlier, Session
 from levilab.acquisition.table import EXPERIMENTS, settings_of
 from levilab.bench.bench import open_bench
@@ -23,9 +24,10 @@ from levilab.runs.writer import RunWriter
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from levilab.acquisition.experiment import Experiment
+    from levilab.acquisition.onlooker import Watch
     from levilab.bench.config import BenchConfig
     from levilab.bench.wiring import Wiring
     from levilab.interruption import Stop
@@ -62,15 +64,20 @@ class AcquisitionRequest:
     resume: Run | None = None
 
 
-def acquire(request: AcquisitionRequest, show: Display) -> Run:
+def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishing) -> Run:
     """Run an experiment.  Returns the run, finished or interrupted; other ends raise, and the run is kept, too.
 
     A bench that could not be opened leaves no new run, unless it was to be logged.
+
+    Args:
+        request: what is to be acquired.
+        show: the terminal.
+        watch: what others see of it; by default it is published for views.
     """
     experiment = EXPERIMENTS[request.experiment]
     with watching_for_interruption() as stop, _writer(request, show) as writer, contextlib.closing(show):
         try:
-            _at_the_bench(experiment, request, writer, show, stop)
+            _at_the_bench(experiment, request, writer, show, stop, watch=watch)
             status: Status = "finished"
         except Interrupted as interruption:
             text = f"interrupted by {interruption.by}, outputs are off"
@@ -96,7 +103,13 @@ def _writer(request: AcquisitionRequest, show: Display) -> RunWriter:
 
 
 def _at_the_bench(
-    experiment: Experiment[Any], request: AcquisitionRequest, writer: RunWriter, show: Display, stop: Stop
+    experiment: Experiment[Any],
+    request: AcquisitionRequest,
+    writer: RunWriter,
+    show: Display,
+    stop: Stop,
+    *,
+    watch: Watch,
 ) -> None:
     """The steps of the experiment, between opening the bench and leaving it."""
     settings = settings_of(request.config, experiment.name)
@@ -118,12 +131,26 @@ def _at_the_bench(
         )
         try:
             _note_instruments(session, "start")
-            experiment.run(session)
+            with watch(session, wiring) as look, _called_meanwhile(look, session):
+                experiment.run(session)
         finally:
             stop.shield()
             bench.outputs_off()
             with contextlib.suppress(CannotWrite):  # if the disk is full, what failed first counts
                 _note_instruments(session, "end")
+
+
+@contextlib.contextmanager
+def _called_meanwhile(look: Callable[[], None], session: Session[Any]) -> Iterator[None]:
+    """Let an onlooker see whatever happens, and how time passes."""
+    clock = session.bench.clock
+    before = clock.meanwhile
+    clock.meanwhile = session.look = look
+    try:
+        yield
+    finally:
+        clock.meanwhile = before
+        session.look = lambda: None
 
 
 def _earlier(request: AcquisitionRequest) -> Earlier | None:

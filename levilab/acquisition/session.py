@@ -56,6 +56,27 @@ class Earlier:
 
 
 @dataclass
+class Doing:
+    """What an acquisition does at present, for the person at the bench and for views.
+
+    Attributes:
+        text: what it does; empty while readings come.
+        share: of the way to the first reading; None once readings come.
+        end: bench time at which it is expected to end [s]; None where that is not known.
+        seen: channel → what an instrument answered last, in a reading or outside of one.
+        records: channel → the oscilloscope's latest record, with its number and the bench time [s].
+        lost: kinds of instruments that do not answer.
+    """
+
+    text: str = "connected"
+    share: float | None = 0.0
+    end: float | None = None
+    seen: dict[str, float] = field(default_factory=dict)
+    records: dict[str, tuple[int, float, Trace]] = field(default_factory=dict)
+    lost: set[str] = field(default_factory=set)
+
+
+@dataclass
 class Session(Generic[S]):
     """An acquisition under way.
 
@@ -73,6 +94,8 @@ class Session(Generic[S]):
         last_request_time: when the last reading was asked for [s].
         called: what one reading of this experiment is called.
         began: when this session began to measure: at time zero, or when it resumed the run, maybe days later [s].
+        doing: what it does at present.
+        look: called whenever that changes; while bench time passes the clock calls it.
     """
 
     bench: Bench
@@ -88,6 +111,8 @@ class Session(Generic[S]):
     last_request_time: float = 0.0
     began: float = 0.0
     called: str = "reading"
+    doing: Doing = field(default_factory=Doing)
+    look: Callable[[], None] = lambda: None
     _replaying: bool = False
     _losses: int = 0  # since the last reading
     _lost: bool = False  # since the last reading was asked for
@@ -171,7 +196,9 @@ class Session(Generic[S]):
         """Write down and show what happened."""
         if not self._replaying:
             self._write_event(kind, text, **data)
+            self.doing.text = text
             self.show.message(text)
+            self.look()
 
     def _write_event(self, kind: str, text: str, **data: Any) -> None:
         self.writer.event(None if self.zero is None else self.now(), kind, text, **data)
@@ -188,7 +215,21 @@ class Session(Generic[S]):
             share: of the way, from 0 to 1.
         """
         if not self._replaying:
+            self.doing.text, self.doing.share = text, share
             self.show.preparing(text, share)
+            self.look()
+
+    def saw(self, channel: str, value: float | None) -> None:
+        """Note what an instrument answered, whether or not it becomes part of a reading; None: nothing to count.
+
+        Args:
+            channel: as in readings.csv.
+            value: in the unit of the channel.
+        """
+        if value is None:
+            self.doing.seen.pop(channel, None)
+        else:
+            self.doing.seen[channel] = value
 
     def ask(self, task: Task) -> str:
         """Let the person at the bench do or answer something.  Both stand in the events.
@@ -218,10 +259,14 @@ class Session(Generic[S]):
         self.writer.reading(row)
         self.rows.append(row)
         self._losses = 0
+        self.doing.seen |= row
+        self.doing.text, self.doing.share = "", None
+        self.doing.end = self.bench.clock.now() + time_left_s
         if not self._headed:
             self._headed = True
             self.show.message("  ".join(f"{_head(one):>{_width(one)}}" for one in self._shown))
         self.show.reading(self._in_words(row), row["time_s"], time_left_s)
+        self.look()
 
     def keep_trace(self, input_: int, channel: str, time_s: float) -> Trace:
         """Fetch a record from the oscilloscope and write it down, raw, while it comes.
@@ -249,7 +294,8 @@ class Session(Generic[S]):
             if cut_short := self.writer.keep_what_arrived():
                 self.event("cut short", cut_short)
             raise
-        self.writer.trace(time_s, trace, channel)
+        number = self.writer.trace(time_s, trace, channel)
+        self.doing.records[channel] = number, time_s + (self.zero or 0.0), trace
         return trace
 
     def _in_words(self, row: Row) -> str:
@@ -275,6 +321,7 @@ class Session(Generic[S]):
         Raises the error that began it after the last of the tries in REOPENING_S, or where it is lost again and again.
         """
         self._losses, self._lost = self._losses + 1, True
+        self.doing.lost.add(kind)
         self.event("instrument lost", f"{kind}: {error}")
         if self._losses > MOST_LOSSES:
             raise error
@@ -286,6 +333,7 @@ class Session(Generic[S]):
             except InstrumentError as again:
                 self.event("not reached", f"{kind}, try {tries} of {len(REOPENING_S)}: {again}")
             else:
+                self.doing.lost.discard(kind)
                 self.event("found again", f"{kind} answers again and is set up as before")
                 return
         raise error

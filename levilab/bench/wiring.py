@@ -11,9 +11,10 @@ from levilab.bench.kinds import KINDS
 from levilab.bench.person import Person, ask_no_person
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from levilab.bench.config import BenchConfig
+    from levilab.telemetry.messages import Poses
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,8 @@ class Wiring:
     """Where the instruments are and what leads to them.
 
     instruments: kind → model and address, for those that the bench has; limits: what the coil stands; library:
-    PyVISA's, or a virtual one; clock: of the bench; person: who stands at it.
+    PyVISA's, or a virtual one; clock: of the bench; person: who stands at it; poses: of a virtual bench: first time
+    [s], step [s], number → where its top is, for a view.
     """
 
     instruments: Mapping[str, InstrumentSettings]
@@ -29,6 +31,7 @@ class Wiring:
     library: Any
     clock: Clock
     person: Person = ask_no_person
+    poses: Callable[[float, float, int], Poses] | None = None
 
     def described(self, kind: str) -> InstrumentSettings:
         """What is known of an instrument.  Raises ConfigError where nothing is, or its model has no driver."""

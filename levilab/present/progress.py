@@ -12,6 +12,8 @@ from levilab.present.characters import printable
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
+    from levilab.telemetry.messages import State
+
 
 class Display(Protocol):
     """What an acquisition reports to."""
@@ -24,6 +26,12 @@ class Display(Protocol):
 
     def message(self, text: str) -> None:
         """Show a line of its own."""
+
+    def is_due(self) -> bool:
+        """Whether it wants to show the state of the bench now."""
+
+    def state(self, state: State) -> None:
+        """Show the state of the bench."""
 
     def close(self) -> None:
         """End the display."""
@@ -39,6 +47,13 @@ class Mute:
         """Nothing."""
 
     def message(self, text: str) -> None:
+        """Nothing."""
+
+    def is_due(self) -> bool:
+        """Never."""
+        return False
+
+    def state(self, state: State) -> None:
         """Nothing."""
 
     def close(self) -> None:
@@ -70,6 +85,13 @@ class LineDisplay:
             print(printable(text), file=sys.stderr, flush=True)  # noqa: T201 - this is where it is shown
         except OSError:
             self._gone = True
+
+    def is_due(self) -> bool:
+        """Never."""
+        return False
+
+    def state(self, state: State) -> None:
+        """Nothing: a log has the readings and the events."""
 
     def close(self) -> None:
         """Nothing is open."""
@@ -105,6 +127,13 @@ class BarDisplay:
     def message(self, text: str) -> None:
         """A line above the bar."""
         self._progress.console.print(printable(text), markup=False, highlight=False)
+
+    def is_due(self) -> bool:
+        """Never yet."""
+        return False
+
+    def state(self, state: State) -> None:
+        """Nothing yet."""
 
     def close(self) -> None:
         """Take the bar away; the lines stay."""

@@ -62,6 +62,7 @@ class RunWriter:
     Attributes:
         folder: where the run is written.
         record: what run.json says.
+        events: how many were written by this process.
         tell: called with a sentence for the person at the bench.
     """
 
@@ -70,6 +71,7 @@ class RunWriter:
         self._files: dict[str, _GrowingFile] = {}
         self._kept: dict[str, list[bytes]] = {}  # what was appended line by line, to be written anew
         self._created = False
+        self.events = 0
         self._records = 0  # of the oscilloscope
         self._arriving: tuple[Path, int] | None = None  # the record on its way: its folder, and points that are there
         self._lock = lock_of(folder)
@@ -293,6 +295,7 @@ class RunWriter:
         event = {"utc": utc_now(), "time_s": time_s, "kind": kind, "text": text} | data
         with _told(f"write the event {text!r}", self.folder):
             self._append(EVENTS, json.dumps(event, ensure_ascii=False, allow_nan=False))
+            self.events += 1
             self._rescue_if_lost()
 
     def wire(self, address: str, direction: str, data: bytes) -> None:

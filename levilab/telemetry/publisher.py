@@ -60,7 +60,7 @@ class Publisher:
 
     def announce(self, folder: Path) -> None:
         """Say in a run folder where it publishes; in no other one any longer."""
-        if folder == self._folder or self.address is None:
+        if folder is self._folder or self.address is None:
             return
         self._withdraw()
         self._folder = folder

@@ -123,7 +123,9 @@ def virtual_wiring(world: World, limits: Limits | None = None) -> Wiring:
         world: that its instruments measure.
         limits: by default those of a bench file without a table of limits.
     """
-    return Wiring(VIRTUAL, limits or Limits(), library_for(virtual_bus(world)), world.clock, VirtualPerson(world))
+    return Wiring(
+        VIRTUAL, limits or Limits(), library_for(virtual_bus(world)), world.clock, VirtualPerson(world), world.poses
+    )
 
 
 def plug_in_serial(bus: VirtualBench | None = None) -> VirtualBench:

@@ -19,6 +19,7 @@ from levilab.simulator.model import base_field
 from levilab.world.coil import Coil
 from levilab.world.flight import Flight
 from levilab.world.light import Laser, Tape
+from levilab.world.pose import poses_of
 from levilab.world.spin_world import KEPT_S
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from instruments.virtual.counter.edges import Thresholds
     from instruments.virtual.generator.channel import Output
     from levilab.simulator.scene import Scene
+    from levilab.telemetry.messages import Poses
 
 Array = NDArray[np.float64]
 
@@ -175,6 +177,11 @@ class MotionWorld:
     def flux_density(self, time: float) -> float:
         """The base's field at the probe; the coil's lies across it, and the top's is left out."""
         return self._probe_t
+
+    def poses(self, start: float, step: float, n: int) -> Poses:
+        """The top's place and attitude; see World."""
+        times = start + step * np.arange(n, dtype=np.float64)
+        return poses_of(*self._flight.attitude(times), start=start, step=step)
 
     def place_probe(self, height_m: float | None) -> None:
         """Put the probe at a height, exactly; see World."""

@@ -19,12 +19,14 @@ from levilab.simulator.spin import DECAYS
 from levilab.world.base import Base, Stand, random_base
 from levilab.world.coil import Coil
 from levilab.world.light import Laser, Tape
+from levilab.world.pose import FLOATS_M, poses_of
 from levilab.world.timeline import Timeline
 
 if TYPE_CHECKING:
     from instruments.clock import Clock
     from instruments.virtual.counter.edges import Thresholds
     from instruments.virtual.generator.channel import Output
+    from levilab.telemetry.messages import Poses
 
 Array = NDArray[np.float64]
 
@@ -80,6 +82,9 @@ class World(Protocol):
 
     def place_probe(self, height_m: float | None) -> None:
         """Put the magnetometer's probe on the axis, at a height above the base [m]; None: into its chamber."""
+
+    def poses(self, start: float, step: float, n: int) -> Poses:
+        """The top's place and attitude at start + step·k, for a view."""
 
 
 @dataclass(frozen=True)
@@ -359,6 +364,15 @@ class SpinWorld:
     def flux_density(self, time: float) -> float:
         """The base's field along the axis; the coil's lies across it, so the probe does not measure that."""
         return self._probe_t
+
+    def poses(self, start: float, step: float, n: int) -> Poses:
+        """A top upright and at rest, which turns; see :class:`World`."""
+        times = start + step * np.arange(n, dtype=np.float64)
+        spin, angle = self.motion(times)
+        up, zero = spin > 0, np.zeros_like(times)
+        upright = np.stack([zero, zero, zero + 1], axis=1)
+        arm = np.stack([np.cos(angle), np.sin(angle), zero], axis=1)
+        return poses_of(FLOATS_M * upright, upright, arm, up, start=start, step=step)
 
     def place_probe(self, height_m: float | None) -> None:
         """Put the probe at a height; see :class:`World`."""

@@ -173,6 +173,7 @@ class DriveGenerator(ScpiInstrument):
             self.transport.write(f"{other} OFF")
         if self.output:
             raise CommandRefused(self.transport.address, f"{self.OUTPUT} OFF", ("the output is still on",))
+        self.last_set[type(self).output.name_with_unit] = False
         for other in outputs[1:]:
             if self._is_on(other):
                 raise CommandRefused(self.transport.address, f"{other} OFF", ("the output is still on",))

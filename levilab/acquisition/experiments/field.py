@@ -216,6 +216,7 @@ def _read(session: Session[FieldSettings], height: float) -> float:
             f"the flux density at {1e3 * height:.1f} mm is {seen}: choose a larger one (field.range_t in the bench "
             "file), or begin higher up (field.lowest_m)"
         )
+    session.saw("flux_density_t", flux_density)
     return flux_density
 
 

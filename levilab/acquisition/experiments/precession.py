@@ -202,12 +202,13 @@ def _wait_for_lock(session: Session[PrecessionSettings], drive: float) -> None:
 def _measure(session: Session[PrecessionSettings], drive: float) -> tuple[Row, dict[str, Any]]:
     """Spin and precession of a locked top, and the gates that they are from.  Raises as `_point`."""
     settings = session.settings
-    spins = _counted(session, drive, settings.trigger_level_v, 1)
+    spins = _counted(session, drive, "spin_frequency_hz", settings.trigger_level_v, 1)
     _still_held(session, drive, spins.frequency)
     _calm(session, drive, swing_of(spins))
     if settings.laser_input == 1:
         session.ask(Task("Connect the laser's phototransistor to the counter's input 1, in place of the tape's."))
-    laser = _counted(session, drive, settings.laser_trigger_level_v, settings.laser_input)
+    level_v, channel = settings.laser_trigger_level_v, settings.laser_input
+    laser = _counted(session, drive, "precession_frequency_hz", level_v, channel)
     if settings.laser_input == 1:
         session.ask(Task("Connect the tape's phototransistor to the counter's input 1 again."))
     _count_the_tape_again(session)
@@ -269,7 +270,7 @@ def _count_the_tape_again(session: Session[PrecessionSettings]) -> None:
         session.reconnect("counter", error, lambda: prepare_counter(session))
 
 
-def _counted(session: Session[PrecessionSettings], drive: float, level_v: float, channel: int) -> Gates:
+def _counted(session: Session[PrecessionSettings], drive: float, what: str, level_v: float, channel: int) -> Gates:
     """The gates of an input of the counter.
 
     A gate begins and ends with a pulse.  Pulses come early and late where a nutation goes on beside the wobble in step,
@@ -301,6 +302,7 @@ def _counted(session: Session[PrecessionSettings], drive: float, level_v: float,
                 raise
             session.reconnect("counter", error, prepare)
         else:
+            session.saw(what, count)
             found.append(_gate(session.now(), gate_s, count))
     begin, end, frequency = np.array(found).T
     return Gates(begin, end, frequency)
