@@ -58,38 +58,36 @@ class Running:
         lines: what was found, each a line of plain text.
         curve: None where none can be drawn yet.
         end_s: when the run is expected to end, on its own clock; None where that is not known [s].
-        readings: how many it is of.
+        look: name of its colour, that of a law or "fit".
     """
 
     head: str
     lines: tuple[str, ...] = ()
     curve: Curve | None = None
     end_s: float | None = None
-    readings: int = 0
+    look: str = "fit"
 
 
 Columns = dict[str, "Array"]
 
 
-def fit_so_far(experiment: str, columns: tuple[str, ...], groups: Groups, count: int) -> Running | None:
+def fit_so_far(experiment: str, columns: tuple[str, ...], groups: Groups) -> Running | None:
     """Fit the readings of a run so far; None for an experiment without a running fit.
 
     Args:
         experiment: its name.
         columns: names of the readings' channels.
         groups: the readings.
-        count: how many they are.
     """
     method = METHODS.get(experiment)
     if method is None:
         return None
     by_name = {name: groups.mean[k] for k, name in enumerate(columns)}
     try:
-        found = method(by_name, groups.size)
+        return method(by_name, groups.size)
     except (AnalysisError, KeyError) as error:
         text = str(error) if isinstance(error, AnalysisError) else f"there is no column {error}"
-        return Running("no fit yet", (text,), readings=count)
-    return Running(found.head, found.lines, found.curve, found.end_s, count)
+        return Running("no fit yet", (text,))
 
 
 def spin_down(columns: Mapping[str, Array], size: int) -> Running:
@@ -115,6 +113,7 @@ def spin_down(columns: Mapping[str, Array], size: int) -> Running:
         tuple(filter(None, lines)),
         Curve(x, best.spin_frequency(x), solid_to=float(time[-1])),
         until,
+        found.best,
     )
 
 

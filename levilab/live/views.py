@@ -15,22 +15,20 @@ class View:
     Attributes:
         x, y: names of the columns.
         x_label, y_label: in words.
-        colour: of the readings, a name that the page's style sheet has.
     """
 
     x: str
     y: str
     x_label: str = "time"
     y_label: str = "spin"
-    colour: str = "spin"
 
 
 VIEWS = {
     "spin": View("time_s", "spin_frequency_hz"),
     "limit": View("time_s", "spin_frequency_hz", y_label="limit of the spin"),
-    "precession": View("drive_frequency_hz", "precession_frequency_hz", "drive", "precession", "precession"),
-    "field": View("height_m", "flux_density_t", "height", "flux density", "field"),
-    "trace": View("time_s", "highest_v", y_label="highest value of a record", colour="scope"),
+    "precession": View("drive_frequency_hz", "precession_frequency_hz", "drive", "precession"),
+    "field": View("height_m", "flux_density_t", "height", "flux density"),
+    "trace": View("time_s", "highest_v", y_label="highest value of a record"),
 }
 
 

@@ -142,10 +142,10 @@ class Watch:
             return None
         self._fitted = followed.version
         experiment, columns, readings = followed.record.experiment, followed.columns, followed.readings
-        groups, count = readings.groups(), readings.count
+        groups = readings.groups()
 
         def compute() -> Running | None:
-            return fit_so_far(experiment, columns, groups, count)
+            return fit_so_far(experiment, columns, groups)
 
         return compute
 
@@ -191,7 +191,7 @@ class Watch:
         fit = self.fit
         if fit is None:
             return {"version": self.fit_version}
-        about = {"head": fit.head, "lines": fit.lines, "end_s": fit.end_s, "readings": fit.readings}
+        about = {"head": fit.head, "lines": fit.lines, "end_s": fit.end_s, "look": fit.look}
         if fit.curve:
             arrays |= {"fit_x": fit.curve.x, "fit_y": fit.curve.y, "fit_band": fit.curve.band}
             about["solid_to"] = fit.curve.solid_to
@@ -281,7 +281,6 @@ def _readings(followed: Followed, ask: dict[str, Any], arrays: dict[str, Any]) -
         "single": single,
         "x": [view.x_label, *unit_of(view.x)],
         "y": [view.y_label, *unit_of(view.y)],
-        "colour": view.colour,
         "trend": _trend(groups, place),
     }
 
