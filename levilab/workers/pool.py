@@ -56,6 +56,18 @@ class _Worker(SpawnProcess):
             super().start()
 
 
+class Apart(SpawnProcess):
+    """A process for one piece of work beside the pools: it does not run the main script again, and leaves Ctrl-C here.
+
+    On Windows it receives Ctrl-C, too.
+    """
+
+    def start(self) -> None:
+        """Start it."""
+        with _without_main(), interruption_blocked():
+            super().start()
+
+
 class _Context(SpawnContext):
     Process = _Worker
 

@@ -1,0 +1,118 @@
+"""The bench for practice, as the process that shows it holds it."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+from levilab.errors import LevilabError
+from levilab.live.practice.commands import PracticeEvent, event_from_bytes, to_bytes
+from levilab.live.practice.process import PracticeOptions, work
+from levilab.telemetry.address import Address
+from levilab.workers.pool import Apart
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
+    from levilab.live.practice.commands import Command
+
+#: How long the process is waited for at the end [s]: a run under way ends with its reading.  Then it is asked by a
+#: signal, and at last killed: its outputs are virtual.
+_PATIENCE_S, _MORE_S = 20.0, 5.0
+
+
+class BenchGone(LevilabError):
+    """The process of the bench has ended."""
+
+
+class PracticeBench:
+    """A virtual bench in a process of its own.  It ends with `close`, or when the process that holds it dies.
+
+    No call waits but `close`; call `events` some ten times a second::
+
+        with PracticeBench(Path("runs")) as bench:
+            number = bench.command(SwitchDrive(on=True))
+            for event in bench.events():  # "ready" with the scene, then "done" or "refused" with that number
+                ...
+
+    Attributes:
+        address: where it publishes; None until the event "ready" has come.
+        is_over: whether the event "ended" has come.
+
+    Args:
+        out: where run folders are made.
+        scene: name or file of the scene of the top.
+        seed: of the light's noise.
+    """
+
+    def __init__(self, out: Path = Path("runs"), *, scene: str = "practice", seed: int = 0) -> None:
+        self._options = PracticeOptions(str(out), scene, seed)
+        self._process: Apart | None = None
+        self._pipe: Connection | None = None
+        self._number = 0
+        self.address: Address | None = None
+        self.is_over = False
+
+    def start(self) -> Self:
+        """Start the process.  Returns at once; the event "ready" comes once the instruments answer."""
+        context = multiprocessing.get_context("spawn")
+        self._pipe, far_end = context.Pipe()
+        self._process = Apart(target=work, args=(self._options, far_end), name="levilab practice")
+        self._process.start()
+        far_end.close()  # now the process alone has it, and its end is noticed here
+        return self
+
+    def command(self, command: Command) -> int:
+        """Ask for something.  Returns the number of the command, which its event "done" or "refused" has.
+
+        Raises:
+            BenchGone: the process has ended.
+        """
+        self._number += 1
+        try:
+            if self._pipe is None:
+                raise OSError("not started, or closed")
+            self._pipe.send_bytes(to_bytes(self._number, command))
+        except (OSError, ValueError) as error:
+            raise BenchGone(f"the bench for practice has ended ({error}): start it anew") from error
+        return self._number
+
+    def events(self) -> list[PracticeEvent]:
+        """Return what the bench has reported since the last call; "ended" is the last of all."""
+        found: list[PracticeEvent] = []
+        while not self.is_over and self._pipe is not None:
+            try:
+                if not self._pipe.poll():
+                    break
+                event = event_from_bytes(self._pipe.recv_bytes())
+            except (EOFError, OSError):
+                event = PracticeEvent("ended", "the process of the bench is gone")
+            if event.kind == "ready":
+                self.address = Address(event.port, bytes.fromhex(event.token))
+            self.is_over = event.kind == "ended"
+            found.append(event)
+        return found
+
+    def close(self) -> None:
+        """End the process: a run under way is kept, the outputs go off."""
+        if self._pipe is not None:
+            self._pipe.close()
+        self._pipe = None
+        process, self._process = self._process, None
+        if process is None:
+            return
+        process.join(_PATIENCE_S)
+        for end in (process.terminate, process.kill):
+            if process.is_alive():
+                end()
+                process.join(_MORE_S)
+        with contextlib.suppress(ValueError):  # it does not even die
+            process.close()
+
+    def __enter__(self) -> Self:
+        return self.start()
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,177 @@
+"""What a person can do at the bench for practice: a table of commands, and what the bench answers.
+
+A command is checked twice: its form here, and what the bench allows by the bench itself, whose limits are those of a
+bench file.  A refusal says what was seen, what is expected and what to do.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, TypeAdapter, ValidationError
+
+from levilab.errors import LevilabError
+from levilab.files import finite, parse_json
+from levilab.settings import Settings, in_one_line
+
+#: The speeds of the bench: seconds of it in one of the wall.
+SLOWEST, FASTEST = 0.1, 10.0
+#: The heights at which the magnetometer's probe can stand [m].
+LOWEST_PROBE_M, HIGHEST_PROBE_M = 0.0, 0.5
+#: The slowest and the fastest change of the drive's frequency [Hz/s].
+SLOWEST_RAMP, FASTEST_RAMP = 0.001, 10.0
+
+
+class CommandRefused(LevilabError):
+    """A command that the bench does not carry out."""
+
+
+class SwitchDrive(Settings):
+    """Switch the generator's output on or off.  It goes on at the frequency and amplitude that are set."""
+
+    do: Literal["switch the drive"] = "switch the drive"
+    on: bool
+
+
+class TuneDrive(Settings):
+    """Change the drive; what is None stays.
+
+    Attributes:
+        frequency_hz: where the frequency goes [Hz]; at once while the output is off, else by the ramp.
+        amplitude_vpp: peak to peak [V].
+        waveform: SIN, SQU or TRI; the output goes off for a moment.
+        ramp_hz_per_s: how fast the frequency goes there while the output is on [Hz/s of bench time].
+    """
+
+    do: Literal["tune the drive"] = "tune the drive"
+    frequency_hz: Annotated[float, Field(gt=0)] | None = None
+    amplitude_vpp: Annotated[float, Field(gt=0)] | None = None
+    waveform: Literal["SIN", "SQU", "TRI"] | None = None
+    ramp_hz_per_s: Annotated[float, Field(ge=SLOWEST_RAMP, le=FASTEST_RAMP)] | None = None
+
+
+class MatchDrive(Settings):
+    """Set the drive to the spin that the counter counted last, where it can take hold of the top."""
+
+    do: Literal["match the drive"] = "match the drive"
+
+
+class PutBack(Settings):
+    """Spin the top by hand and let it float again, if it has fallen."""
+
+    do: Literal["put the top back"] = "put the top back"
+
+
+class SetSpeed(Settings):
+    """Change how fast the bench's time passes.  speed: seconds of the bench in one of the wall."""
+
+    do: Literal["set the speed"] = "set the speed"
+    speed: Annotated[float, Field(ge=SLOWEST, le=FASTEST)]
+
+
+class Pause(Settings):
+    """Stop the bench's time, or let it go on."""
+
+    do: Literal["pause"] = "pause"
+    on: bool
+
+
+class PlaceProbe(Settings):
+    """Put the magnetometer's probe on the axis.  height_m: above the base [m]; None: into its chamber."""
+
+    do: Literal["place the probe"] = "place the probe"
+    height_m: Annotated[float, Field(ge=LOWEST_PROBE_M, le=HIGHEST_PROBE_M)] | None
+
+
+class RecordRun(Settings):
+    """Carry out an experiment on this bench, and write a run folder.
+
+    Attributes:
+        experiment: its name: spin, trace, field, limit or precession.
+        settings: as for the command line, such as "spin.interval_s=5".
+        note: kept with the run.
+    """
+
+    do: Literal["record a run"] = "record a run"
+    experiment: str
+    settings: tuple[Annotated[str, Field(max_length=200)], ...] = Field(default=(), max_length=50)
+    note: str = Field(default="", max_length=1000)
+
+
+class StopRun(Settings):
+    """End the run that is being recorded after the reading under way, as Ctrl-C does: outputs go off, it is kept."""
+
+    do: Literal["stop the run"] = "stop the run"
+
+
+Command = SwitchDrive | TuneDrive | MatchDrive | PutBack | SetSpeed | Pause | PlaceProbe | RecordRun | StopRun
+_COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="do")])
+
+
+def command_of(table: Any) -> Command:
+    """Return the command that a table of plain values is, such as {"do": "pause", "on": True}.
+
+    Raises:
+        CommandRefused: it is none.
+    """
+    try:
+        return _COMMANDS.validate_python(table)
+    except ValidationError as error:
+        raise CommandRefused(f"not carried out: {in_one_line(error)}") from error
+
+
+EventKind = Literal["ready", "done", "refused", "message", "recording", "recorded", "ended"]
+
+
+@dataclass(frozen=True)
+class PracticeEvent:
+    """What the bench reports, in order, and loses none of.
+
+    Attributes:
+        kind: "ready" once the instruments answer; "done" or "refused" for each command; "message", a line for the
+            person at the bench; "recording" and "recorded", a run; "ended", the process is over.
+        text: in words; data, as everything that a run contains.
+        number: of the command that it answers; None where it answers none.
+        folder: of the run.
+        status: of the run that ended: finished, interrupted or failed.
+        scene: of the simulated top, with "ready".
+        port, token: where the bench publishes, with "ready"; `PracticeBench.address` has them.
+    """
+
+    kind: EventKind
+    text: str = ""
+    number: int | None = None
+    folder: str = ""
+    status: str = ""
+    scene: dict[str, Any] = field(default_factory=dict)
+    port: int = 0
+    token: str = ""
+
+
+def to_bytes(number: int, command: Command) -> bytes:
+    """Return the bytes of a command on its way to the bench."""
+    return json.dumps({"number": number, "command": command.model_dump(mode="json")}).encode()
+
+
+def from_bytes(data: bytes) -> tuple[int, Command]:
+    """Return number and command.  Raises CommandRefused."""
+    try:
+        table = parse_json(data.decode())
+        number, command = table["number"], table["command"]
+    except (ValueError, KeyError, TypeError) as error:
+        raise CommandRefused(f"not a command: {error}") from error
+    if type(number) is not int:
+        raise CommandRefused(f"number = {number!r}: a whole number is expected")
+    return number, command_of(command)
+
+
+def event_to_bytes(event: PracticeEvent) -> bytes:
+    """Return the bytes of an event on its way to the views."""
+    return json.dumps(finite(asdict(event))).encode()
+
+
+def event_from_bytes(data: bytes) -> PracticeEvent:
+    """Return an event of the bench, which is of this program."""
+    return PracticeEvent(**json.loads(data))
