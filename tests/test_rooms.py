@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 #: What takes so long to load that it is imported where it is used: at least 10 ms, or not everywhere installed.
 HEAVY = {
     "RigolWFM", "dask", "distributed", "filelock", "grp", "heyoka", "jinja2", "llvmlite", "lmfit", "matplotlib",
-    "nicegui", "numba", "pandas", "playwright", "pyarrow", "pyvisa", "rich", "scipy", "serial", "typst",
-    "uncertainties", "zarr",
+    "nicegui", "numba", "pandas", "playwright", "pyarrow", "pyvisa", "rich", "scipy", "serial", "starlette",
+    "typst", "uncertainties", "uvicorn", "zarr",
 }  # fmt: skip
 
 

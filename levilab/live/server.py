@@ -18,12 +18,13 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import LevilabError
 from levilab.live.analyzed import FIGURES, REPORT, Analyses
 from levilab.live.choice import choices, newest
+from levilab.live.desk import parts_for, scene_of_run
 from levilab.live.doors import REPORT_POLICY, Doors, Guard
 from levilab.live.watch import Watch
 from levilab.runs.run import RECORD
 
 if TYPE_CHECKING:
-    from levilab.live.practice import Practice
+    from levilab.live.desk import Desk
 
 #: Frames a second, at most; and so long a page waits for a frame in which nothing is new [s].
 FRAMES_PER_S, PATIENCE_S = 20, 1.0
@@ -56,13 +57,13 @@ class Hall:
         root: the folder with the runs.
         shown: name of the run that a page shows at first; empty: the newest.
         doors: who may come in.
-        practice: the bench for practice; None where runs are only looked at.
+        desk: the bench for practice; None where runs are only looked at.
     """
 
     root: Path
     shown: str
     doors: Doors
-    practice: Practice | None = None
+    desk: Desk | None = None
     watches: dict[str, Watch] = field(default_factory=dict)
     pages: dict[str, int] = field(default_factory=dict)  # name of a run → how many look at it
     new: asyncio.Event = field(default_factory=asyncio.Event)
@@ -80,7 +81,8 @@ class Hall:
     def watching(self, name: str) -> Any:
         """The watch of a run, shared by all pages that look at it; "" is the bench for practice."""
         if name not in self.watches:
-            self.watches[name] = Watch(self.root / name if name else None, None if name else self._bench())
+            bench = self.desk.address if self.desk and not name else None
+            self.watches[name] = Watch(self.root / name if name else None, bench)
         self.pages[name] = self.pages.get(name, 0) + 1
         try:
             yield self.watches[name]
@@ -90,24 +92,26 @@ class Hall:
                 del self.pages[name]
                 self.watches.pop(name).close()
 
-    def _bench(self) -> Any:
-        return self.practice.address if self.practice else None
-
     async def read_on(self) -> None:
         """Read what is new for all pages, for ever."""
         fitting: set[asyncio.Task[None]] = set()
         while True:
             begin = time.monotonic()
-            before = [watch.tick for watch in self.watches.values()]
+            before = self._ticks()
+            if self.desk:
+                self.desk.step()
             for watch in [*self.watches.values()]:
                 watch.step()
                 if not fitting and (task := watch.fit_task()):
                     job = asyncio.create_task(self._fit(watch, task))
                     fitting.add(job)
                     job.add_done_callback(fitting.discard)
-            if before != [watch.tick for watch in self.watches.values()]:
+            if before != self._ticks():
                 self._announce()
             await asyncio.sleep(max(0.005, 1 / FRAMES_PER_S - (time.monotonic() - begin)))
+
+    def _ticks(self) -> list[int]:
+        return [*(watch.tick for watch in self.watches.values()), self.desk.count if self.desk else 0]
 
     async def _fit(self, watch: Watch, task: Any) -> None:
         begin = time.process_time()
@@ -121,7 +125,8 @@ class Hall:
     async def wait_for_news(self, watch: Watch, tick: object) -> None:
         """Return when there is something newer than a page has, or it has waited long enough."""
         end = time.monotonic() + PATIENCE_S
-        while watch.tick == tick and (left := end - time.monotonic()) > 0:
+        before = self.desk.count if self.desk else 0
+        while watch.tick == tick and (not self.desk or self.desk.count == before) and (left := end - time.monotonic()) > 0:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self.new.wait(), left)
 
@@ -150,7 +155,7 @@ def application(hall: Hall) -> Any:
     async def runs(_: Any) -> Response:
         found = await asyncio.to_thread(choices, hall.root)
         about = {"runs": [asdict(one) for one in found], "first": hall.first(), "folder": str(hall.root)}
-        about["practice"] = hall.practice.about if hall.practice else None
+        about["practice"] = hall.desk.about if hall.desk else None
         return JSONResponse(about, headers=hall.doors.headers())
 
     async def of_run(request: Any) -> Response:
@@ -178,12 +183,20 @@ def application(hall: Hall) -> Any:
                 if len(text) > _LONGEST_ASK:
                     await socket.close(1009)
                     return
-                question = _table(text)
-                if "do" in question:
-                    await socket.send_text(json.dumps(await _carry_out(hall, question)))
-                    continue
-                await hall.wait_for_news(watch, question.get("tick"))
-                await socket.send_bytes(watch.frame(question))
+                ask = _table(text)
+                await hall.wait_for_news(watch, ask.get("tick"))
+                said = hall.desk.said_after(ask.get("said")) if hall.desk and not name else []
+                await socket.send_bytes(watch.frame(ask, said))
+
+    async def do(request: Any) -> Response:
+        body = await request.body()
+        answer, status = _carry_out(hall, request.headers.get("x-levilab-token"), body[: _LONGEST_ASK + 1])
+        return JSONResponse(answer, status, headers=hall.doors.headers())
+
+    async def parts(request: Any) -> Response:
+        name = request.query_params.get("run", "")
+        scene = hall.desk.scene if hall.desk else scene_of_run(hall.root / name) if hall.is_run(name) else None
+        return JSONResponse(await asyncio.to_thread(parts_for, scene), headers=hall.doors.headers())
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Any) -> Any:
@@ -196,6 +209,8 @@ def application(hall: Hall) -> Any:
     routes = [
         Route("/", page),
         Route("/runs", runs),
+        Route("/parts", parts),
+        Route("/do", do, methods=["POST"]),
         Route("/page/{name}", part),
         Route("/run/{run}/analysis", analysis),
         Route("/run/{run}/{name}", of_run),
@@ -213,22 +228,20 @@ def _table(text: str) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-async def _carry_out(hall: Hall, question: dict[str, Any]) -> dict[str, Any]:
-    """Carry out a command for the bench for practice, and answer it."""
-    answer = {"done": question.get("do")}
-    if not hall.doors.knows(question.get("token")):
-        return answer | {"error": "this page may only look: open the address that the terminal shows"}
-    if hall.practice is None:
-        return answer | {"error": "there is no bench for practice: levilab live --mock brings one"}
+def _carry_out(hall: Hall, token: str | None, body: bytes) -> tuple[dict[str, Any], int]:
+    """Carry out what a page with the token asks for; the answer, and the status of the request."""
+    if not hall.doors.knows(token):
+        return {"error": "this page may only look: open the address that the terminal shows"}, 403
+    if hall.desk is None:
+        return {"error": "there is no bench for practice: levilab live --mock brings one"}, 404
+    wanted = _table(body.decode("utf-8", "replace")) if len(body) <= _LONGEST_ASK else {}
     try:
-        if question["do"] == "analyze":
-            name = str(question.get("run"))
+        if wanted.get("do") == "analyze":
+            name = str(wanted.get("run"))
             if not hall.is_run(name):
-                return answer | {"error": "there is no such run"}
+                return {"error": "there is no such run"}, 404
             hall.analyses.begin(hall.root / name)
-            return answer
-        values = question.get("with")
-        await asyncio.to_thread(hall.practice.command, str(question["do"]), values if isinstance(values, dict) else {})
+            return {}, 200
+        return {"number": hall.desk.carry_out(wanted)}, 200
     except LevilabError as error:
-        return answer | {"error": str(error)}
-    return answer
+        return {"error": str(error)}, 400

@@ -20,7 +20,7 @@ from levilab.telemetry.messages import Poses, Record, State
 from levilab.telemetry.subscriber import Subscriber
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from levilab.telemetry.address import Address
     from levilab.telemetry.messages import Message
@@ -41,7 +41,8 @@ _INSTRUMENT = {"identity", "driver", "address"}
 class Watch:
     """What is known of a run and of its bench now.
 
-    Pages change nothing here, and nothing is kept for any of them.
+    Pages change nothing here, and nothing is kept for any of them.  Without a folder it follows what a bench for practice
+    records; `bench` returns where that publishes.
 
     Attributes:
         followed: the run folder; None while a bench for practice has recorded none.
@@ -50,7 +51,10 @@ class Watch:
     """
 
     def __init__(
-        self, folder: Path | None, bench: Address | None = None, clock: Callable[[], float] = time.monotonic
+        self,
+        folder: Path | None,
+        bench: Callable[[], Address | None] | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.clock = clock
         self.followed = Followed(folder, clock) if folder else None
@@ -92,7 +96,8 @@ class Watch:
 
     def _subscribe(self) -> None:
         """Listen to the bench: the one for practice, or the one that the run folder names."""
-        address = self._bench or (read_address(self.followed.folder) if self.followed else None)
+        folder = self.followed.folder if self.followed else None
+        address = self._bench() if self._bench else read_address(folder) if folder else None
         if self._subscriber and address == self._subscriber.address:
             return
         if self._subscriber and address is None:
@@ -158,17 +163,18 @@ class Watch:
 
     # --- what the page asks for ---
 
-    def frame(self, ask: dict[str, Any]) -> bytes:
+    def frame(self, ask: dict[str, Any], said: Sequence[Mapping[str, Any]] = ()) -> bytes:
         """Return what a page does not have yet.
 
         Args:
             ask: what it has: "run" (name), "readings", "events", "fit", "poses" (numbers), "records" (channel →
                 number); and what it wants: "columns" of its picture, and whether the "latest" readings alone.
+            said: what the bench for practice has said.
         """
         followed = self.followed
         name = followed.folder.name if followed else ""
         ask = ask if ask.get("run") == name else {key: ask.get(key) for key in ("columns", "latest", "poses")}
-        head: dict[str, Any] = {"tick": self.tick, "run": name, "bench": self._about_bench()}
+        head: dict[str, Any] = {"tick": self.tick, "run": name, "bench": self._about_bench(), "said": said}
         arrays: dict[str, Any] = {}
         if followed:
             head["about"] = _about(followed)

@@ -17,9 +17,8 @@ export function unpack(buffer) {
  * @param {() => object} ask what the page has, and what it wants.
  * @param {(head, arrays) => void} show draws a frame.
  * @param {(open: boolean) => void} changed whether the server is there.
- * @param {(answer: object) => void} answered of a command.
  */
-export function connect({run, ask, show, changed, answered}) {
+export function connect({run, ask, show, changed}) {
   let socket, closed = false, pause = 250, waiting = false;
 
   function next() {
@@ -39,7 +38,6 @@ export function connect({run, ask, show, changed, answered}) {
       next();
     };
     socket.onmessage = ({data}) => {
-      if (typeof data === "string") return answered(JSON.parse(data));
       waiting = false;
       const {head, arrays} = unpack(data);
       show(head, arrays);
@@ -57,15 +55,20 @@ export function connect({run, ask, show, changed, answered}) {
 
   open();
   document.addEventListener("visibilitychange", () => next());
-  return {
-    command: (what, values = {}, token = "", more = {}) => {
-      if (socket.readyState !== WebSocket.OPEN) return false;
-      socket.send(JSON.stringify({do: what, with: values, token, ...more}));
-      return true;
-    },
-    close: () => {
-      closed = true;
-      socket.close();
-    },
+  return () => {
+    closed = true;
+    socket.close();
   };
+}
+
+/** Send a command to the bench for practice. Returns what is wrong with it, or "". */
+export async function command(wanted, token) {
+  try {
+    const answer = await fetch("do", {
+      method: "POST", body: JSON.stringify(wanted), headers: {"Content-Type": "application/json", "X-Levilab-Token": token},
+    });
+    return (await answer.json()).error || "";
+  } catch {
+    return "the server is gone: start levilab live again";
+  }
 }

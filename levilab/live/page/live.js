@@ -1,6 +1,6 @@
 // The live view: asks for frames and shows them. A view only: it may be closed and opened again at any time.
 
-import {connect} from "./connection.js";
+import {command, connect} from "./connection.js";
 import {drawReadings, drawRecords, saidOf, sheet} from "./plot.js";
 import {openPractice} from "./practice.js";
 import {by, fixed, lapse, make, short, typeset, write} from "./words.js";
@@ -15,11 +15,11 @@ const STATES = {
 };
 const SLIP_HZ = 0.05;  // a top that follows is counted this near to its drive
 
-const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, records: {}};
+const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, records: {}};
 const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
 let paused = false, drawn = null, pointed = -1, space = null, wanted = "", practice = null, reachable = true;
-let spoken = 0, link = null, dirty = {plot: true, trace: true};
+let spoken = 0, close = null, dirty = {plot: true, trace: true};
 window.levilab = {frames: 0, drawn: 0, seen, data};  // what tests and benchmarks read
 
 // --- the address: a token after #, which never leaves the page, and stays for a reload ---
@@ -39,6 +39,10 @@ function take(head, arrays) {
   seen.tick = head.tick;
   if (head.run !== seen.run) turnTo(head.run);
   data.bench = head.bench;
+  for (const one of head.said) {
+    seen.said = one.n;
+    practice?.hear(one);
+  }
   if (head.about) data.about = head.about;
   if (head.readings) takeReadings(head.readings, arrays);
   if (head.events) takeEvents(head.events);
@@ -328,7 +332,7 @@ const KEYS = {
     select.selectedIndex = (select.selectedIndex + 1) % select.options.length;
     select.dispatchEvent(new Event("change"));
   },
-  d: () => practice?.act("drive"), b: () => practice?.act("back"), p: () => practice?.act("hold"), r: () => practice?.act("record"),
+  d: () => practice?.act("drive"), f: () => practice?.act("match"), b: () => practice?.act("back"), p: () => practice?.act("hold"), r: () => practice?.act("record"),
   ".": () => practice?.step(0.05), ",": () => practice?.step(-0.05), ":": () => practice?.step(0.5), ">": () => practice?.step(0.5),
   ";": () => practice?.step(-0.5), "<": () => practice?.step(-0.5),
 };
@@ -345,22 +349,21 @@ document.addEventListener("keydown", (event) => {
 function ask() {
   const columns = Math.max(1, Math.round(by("plot").clientWidth - 70));
   const about = {...seen, columns, latest: by("latest").checked};
-  return paused ? {run: seen.run, tick: seen.tick, readings: seen.readings, events: seen.events, fit: seen.fit, poses: 1e15} : about;
+  return paused ? {run: seen.run, tick: seen.tick, readings: seen.readings, events: seen.events, fit: seen.fit, poses: seen.poses, said: seen.said} : about;
 }
 
 function open(run) {
-  link?.close();
+  close?.();
   Object.assign(seen, {run: null, tick: -1, poses: 0, records: {}});
   data.records.clear();
   data.bench = null;
-  link = connect({
+  close = connect({
     run, ask, show: take,
     changed: (is) => {
       reachable = is;
       if (is) Object.assign(seen, {tick: -1, poses: 0});
       else show();
     },
-    answered: (answer) => write("said", answer.error || ""),
   });
 }
 
@@ -387,10 +390,7 @@ async function begin() {
   document.body.classList.add("no-top");
   if (bench) {
     document.body.classList.remove("no-top");
-    practice = openPractice(
-      bench, (what, values, more) => {
-        if (!link.command(what, values, token, more)) write("said", "the server is gone");
-      }, () => seen.run);
+    practice = openPractice(bench, (wanted) => command(wanted, token), () => seen.run, Boolean(token));
   }
   by("keys").classList.toggle("for-practice", Boolean(bench));
   for (const row of document.querySelectorAll(".practice-key")) row.hidden = !bench;

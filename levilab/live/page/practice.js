@@ -2,54 +2,67 @@
 
 import {by, make, write} from "./words.js";
 
-/** A top counts as locked when the counter is so near to the drive [Hz]. */
-const LOCKED_HZ = 0.05;
 /** A slider that is moved sends at most so often [ms]. */
 const SENDS_EVERY_MS = 120;
 
 /**
  * @param about what the server says of the bench: experiments, limits.
- * @param {(what: string, values: object) => void} command sends one.
+ * @param {(wanted: object) => Promise<string>} command sends one; what is wrong with it, or "".
  * @param {() => string} run name of the run that is shown.
+ * @param {boolean} allowed whether this page may give commands.
  */
-export function openPractice(about, command, run) {
+export function openPractice(about, command, run, allowed) {
   document.body.classList.add("practice");
   by("practice").hidden = false;
   for (const experiment of about.experiments) by("experiment").append(make("option", experiment));
   const now = {drive: false, busy: false, paused: false, hz: 30, seen: "", analyzed: "", tuned: false, driven: false};
+
+  by("controls").disabled = !allowed;
+  if (!allowed) write("said", "This page may only look: open the address that the terminal shows.");
+
+  async function send(what, values = {}) {
+    const wrong = await command({do: what, ...values});
+    if (allowed) write("said", wrong);
+  }
+
+  /** What the bench says: a refusal, or a line for the person at it. */
+  function hear({kind, text}) {
+    if (kind === "refused" || kind === "ended") write("said", text);
+  }
 
   let timer = 0, latest = null;
   function tune(values) {
     latest = {...latest, ...values};
     timer ||= setTimeout(() => {
       timer = 0;
-      command("tune", latest);
+      send("tune the drive", latest);
       latest = null;
     }, SENDS_EVERY_MS);
   }
   const pair = (number, slider, key) => {
-    const send = (source, other) => {
+    const pass = (source, other) => {
       const value = Number(source.value);
       if (source.value === "" || !source.checkValidity()) return;
       other.value = source.value;
       tune({[key]: value});
       if (key === "frequency_hz") now.tuned ||= now.drive;
     };
-    by(number).addEventListener("change", () => send(by(number), by(slider)));
-    by(slider).addEventListener("input", () => send(by(slider), by(number)));
+    by(number).addEventListener("change", () => pass(by(number), by(slider)));
+    by(slider).addEventListener("input", () => pass(by(slider), by(number)));
   };
   pair("frequency", "frequency-slider", "frequency_hz");
   pair("amplitude", "amplitude-slider", "amplitude_vpp");
 
   const does = {
-    drive: () => command("drive", {on: !now.drive}),
-    back: () => command("put_back"),
-    hold: () => command("pause", {on: !now.paused}),
-    record: () => now.busy ? command("stop") : command("record", {experiment: by("experiment").value}),
-    analyze: () => openResult(run(), command),
+    drive: () => send("switch the drive", {on: !now.drive}),
+    match: () => send("match the drive"),
+    back: () => send("put the top back"),
+    hold: () => send("pause", {on: !now.paused}),
+    record: () => now.busy ? send("stop the run") : send("record a run", {experiment: by("experiment").value}),
+    analyze: () => openResult(run()),
   };
   for (const [id, act] of Object.entries(does)) by(id).addEventListener("click", act);
-  by("speed").addEventListener("change", () => command("speed", {factor: Number(by("speed").value)}));
+  by("speed").addEventListener("change", () => send("set the speed", {speed: Number(by("speed").value)}));
 
   /** Tune by a step, as with the keys. */
   function step(hz) {
@@ -72,7 +85,7 @@ export function openPractice(about, command, run) {
     press("drive", now.drive, now.drive ? "Drive off" : "Drive on");
     press("hold", now.paused, now.paused ? "Let time go on" : "Stop time");
     write("record", now.busy ? "End the run" : "Record");
-    for (const id of ["drive", "back", "frequency", "frequency-slider", "amplitude", "amplitude-slider", "experiment"]) {
+    for (const id of ["drive", "match", "back", "frequency", "frequency-slider", "amplitude", "amplitude-slider", "experiment"]) {
       by(id).disabled = now.busy;
     }
     by("analyze").disabled = now.busy || !readings || about_run?.status === "running";
@@ -113,7 +126,7 @@ export function openPractice(about, command, run) {
     by("figures").replaceChildren();
     by("report").hidden = true;
     by("result").showModal();
-    command("analyze", {}, {run: name});
+    await send("analyze", {run: name});
     for (;;) {
       await new Promise((go) => { setTimeout(go, 400); });
       const found = await (await fetch(`run/${encodeURIComponent(name)}/analysis`)).json();
@@ -138,9 +151,8 @@ export function openPractice(about, command, run) {
   }
 
   return {
-    show, step,
+    show, step, hear,
     act: (id) => !by(id).disabled && does[id](),
-    locked: (spin, drive) => Number.isFinite(spin) && drive?.output && Math.abs(spin - drive.frequency_hz) < LOCKED_HZ,
   };
 }
 
