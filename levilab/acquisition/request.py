@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from levilab.bench.person import Person
+    from levilab.bench.wiring import Wiring
     from levilab.simulator.scene import Scene
 
 HOW = (
@@ -240,6 +241,37 @@ def _on_the_virtual_bench(request: AcquisitionRequest, options: AcquisitionOptio
         wiring=lambda: virtual_wiring(scene_world(scene, clock, options.tell, seed=seed), config.limits),
         synthetic_how=HOW.format(what=_IN_MOTION.format(name=scene.name)),
         scene=scene.as_table(),
+    )
+
+
+def request_at(wiring: Wiring, scene: Scene, experiment: str, options: AcquisitionOptions) -> AcquisitionRequest:
+    """What is to be acquired at a virtual bench that is there already, and goes on afterwards.
+
+    Args:
+        wiring: of the bench.
+        scene: of its top.
+        experiment: the name of the experiment.
+        options: `out`, `seed`, `note` and `settings` count.
+
+    Raises:
+        ConfigError: its limits forbid a setting.
+        UsageError: there is no such experiment, or no such setting.
+    """
+    if experiment not in EXPERIMENTS:
+        raise UsageError("experiment", f"one of {', '.join(EXPERIMENTS)} is expected", value=experiment)
+    config = _configuration(experiment, options, None, virtual=True)
+    config = config.model_copy(update={"visa_library": "@levilab", "limits": wiring.limits, **VIRTUAL})
+    settings = settings_of(config, experiment).for_scene(scene)
+    settings.check(experiment, wiring.limits)
+    return AcquisitionRequest(
+        experiment,
+        with_settings(config, experiment, settings),
+        lambda: wiring,
+        out=options.out,
+        note=options.note,
+        synthetic_how=HOW.format(what=_IN_MOTION.format(name=scene.name)),
+        scene=scene.as_table(),
+        seed=options.seed,
     )
 
 

@@ -72,6 +72,11 @@ class Publisher:
             remove_address(self._folder, self.address)
         self._folder = None
 
+    @property
+    def is_watched(self) -> bool:
+        """Whether a view listened when it was last looked."""
+        return bool(self._views)
+
     def is_due(self) -> bool:
         """Whether a view listens, and the last round of messages is long enough ago; then a new round begins."""
         if self._socket is None or (now := self.clock()) < self._next:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -72,11 +73,11 @@ class PracticeBench:
         """
         self._number += 1
         try:
-            if self._pipe is None:
-                raise OSError("not started, or closed")
-            self._pipe.send_bytes(to_bytes(self._number, command))
-        except (OSError, ValueError) as error:
-            raise BenchGone(f"the bench for practice has ended ({error}): start it anew") from error
+            sent = self._pipe and (self._pipe.send_bytes(to_bytes(self._number, command)), True)
+        except (OSError, ValueError):
+            sent = None
+        if not sent:
+            raise BenchGone("the bench for practice has ended, or was not started: start it anew")
         return self._number
 
     def events(self) -> list[PracticeEvent]:
@@ -91,6 +92,7 @@ class PracticeBench:
                 event = PracticeEvent("ended", "the process of the bench is gone")
             if event.kind == "ready":
                 self.address = Address(event.port, bytes.fromhex(event.token))
+                event = replace(event, port=0, token="")  # a secret of this program
             self.is_over = event.kind == "ended"
             found.append(event)
         return found

@@ -137,7 +137,7 @@ class PracticeEvent:
         folder: of the run.
         status: of the run that ended: finished, interrupted or failed.
         scene: of the simulated top, with "ready".
-        port, token: where the bench publishes, with "ready"; `PracticeBench.address` has them.
+        port, token: where the bench publishes, on the way to `PracticeBench.address` alone.
     """
 
     kind: EventKind

@@ -1,12 +1,70 @@
-"""The process of the bench for practice."""
+"""The process of the bench for practice: one thread, one clock, the real drivers on virtual instruments.
+
+Whatever waits, waits by the clock, and the clock calls `PracticeProcess.look` every 50 ms of the wall: there commands
+are carried out, the drive's frequency moves on, and views are served, also in the middle of a count.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import contextlib
+import math
+from dataclasses import dataclass, field, replace
+from functools import singledispatchmethod
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from instruments.clock import PacedClock
+from instruments.errors import InstrumentError
+from levilab.acquisition.loop import acquire
+from levilab.acquisition.onlooker import Sent, counting_of, drive_of, state_of
+from levilab.acquisition.request import AcquisitionOptions, request_at
+from levilab.bench.bench import open_bench
+from levilab.bench.config import Limits
+from levilab.errors import LevilabError, unquoted
+from levilab.interruption import watching_for_end
+from levilab.live.practice.commands import (
+    CommandRefused,
+    MatchDrive,
+    Pause,
+    PlaceProbe,
+    PracticeEvent,
+    PutBack,
+    RecordRun,
+    SetSpeed,
+    StopRun,
+    SwitchDrive,
+    TuneDrive,
+    event_to_bytes,
+    from_bytes,
+)
+from levilab.present.progress import Mute
+from levilab.simulator.scene import read_scene
+from levilab.telemetry.messages import State
+from levilab.telemetry.publisher import Publisher
+from levilab.world.bench import scene_world, virtual_wiring
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
     from multiprocessing.connection import Connection
+
+    from instruments.drivers.oscilloscope import Trace
+    from levilab.acquisition.session import Session
+    from levilab.bench.bench import Bench
+    from levilab.bench.wiring import Wiring
+    from levilab.interruption import End
+    from levilab.live.practice.commands import Command
+    from levilab.world.spin_world import World
+
+#: Between runs the counter counts for so long [s], as the light of the tape passes this level [V].
+GATE_S, TRIGGER_V = 0.5, 0.6
+#: Between runs the oscilloscope's records: what its channels show, duration [s], samples, volts of a division, and
+#: least time of the wall between two [s].
+CHANNELS = {1: "tape", 2: "drive", 3: "laser"}
+RECORD_S, SAMPLES, VOLTS_PER_DIVISION = 0.2, 1000, 2.0
+#: The drive's frequency moves in steps of at least this time [s]: even steps of less than a second, as a hand cannot.
+RAMP_STEP_S = 0.25
+#: The drive before a person has changed it.
+FIRST_HZ, FIRST_VPP, FIRST_RAMP = 30.0, 10.0, 0.1
 
 
 @dataclass(frozen=True)
@@ -17,13 +75,404 @@ class PracticeOptions:
         out: where run folders are made.
         scene: name or file of the scene of the top.
         seed: of the light's noise.
+        speed: seconds of the bench in one of the wall; infinite: it does not wait, for tests.
     """
 
     out: str
     scene: str
     seed: int
+    speed: float = 1.0
+
+
+@dataclass
+class Knobs:
+    """The drive as a person set it.
+
+    Attributes:
+        frequency_hz: where the frequency is, or is going [Hz].
+        amplitude_vpp: peak to peak [V].
+        waveform: SIN, SQU or TRI.
+        ramp_hz_per_s: how fast the frequency goes there while the output is on [Hz/s].
+        on: whether the output is on.
+    """
+
+    frequency_hz: float = FIRST_HZ
+    amplitude_vpp: float = FIRST_VPP
+    waveform: str = "SIN"
+    ramp_hz_per_s: float = FIRST_RAMP
+    on: bool = False
+
+
+@dataclass
+class Seen:
+    """What the instruments answered last, between runs.
+
+    Attributes:
+        values: channel → value.
+        records: of the oscilloscope, as `Doing` has them.
+    """
+
+    values: dict[str, float] = field(default_factory=dict)
+    records: dict[str, tuple[int, float, Trace]] = field(default_factory=dict)
 
 
 def work(options: PracticeOptions, pipe: Connection) -> None:
-    """Be the bench until the far end of the pipe is closed."""
-    raise NotImplementedError
+    """Be the bench until the far end of the pipe is closed, or a signal asks for the end."""
+    with watching_for_end() as end:
+        report = Reporter(pipe)
+        try:
+            scene = read_scene(options.scene)
+            clock = PacedClock(options.speed)
+            world = scene_world(scene, lambda: clock, lambda text: report(PracticeEvent("message", text)))
+            with Publisher() as publisher:
+                PracticeProcess(options, world, pipe, publisher, end).run()
+        except (LevilabError, InstrumentError) as error:
+            report(PracticeEvent("ended", unquoted(str(error))))
+        else:
+            report(PracticeEvent("ended", "the bench is switched off"))
+
+
+class Reporter:
+    """Sends events to the process that holds the bench; where that is gone, to nowhere."""
+
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe = pipe
+
+    def __call__(self, event: PracticeEvent) -> None:
+        """Send an event."""
+        with contextlib.suppress(OSError, ValueError):
+            self._pipe.send_bytes(event_to_bytes(event))
+
+
+class LinesToReport(Mute):
+    """The display of a run that is recorded: what it says goes to the person at the bench."""
+
+    def __init__(self, report: Reporter) -> None:
+        self._report = report
+
+    def message(self, text: str) -> None:
+        """Report a line."""
+        self._report(PracticeEvent("message", text))
+
+
+class PracticeProcess:
+    """The bench, its top, and what a person asks for.
+
+    Args:
+        options: how it begins.
+        world: with the top, on a clock that is paced.
+        pipe: to the process that holds the bench.
+        publisher: to the views.
+        end: whether a signal asked for the end.
+    """
+
+    def __init__(
+        self, options: PracticeOptions, world: World, pipe: Connection, publisher: Publisher, end: End
+    ) -> None:
+        assert isinstance(world.clock, PacedClock)
+        self.world, self.clock = world, world.clock
+        self.scene = read_scene(options.scene)
+        self._options, self._pipe, self._publisher, self._end = options, pipe, publisher, end
+        self._report = Reporter(pipe)
+        self._wiring: Wiring = virtual_wiring(world, Limits())
+        self._knobs, self._seen, self._sent = Knobs(), Seen(), Sent()
+        self._bench: Bench | None = None  # open between runs
+        self._session: Session[Any] | None = None  # of the run that is recorded
+        self._wanted: RecordRun | None = None
+        self._stopped = ""  # why the run that is recorded is to end
+        self._over = False
+        self._looking = False  # whether `look` is under way: what it does may wait, too
+        self._moved = 0.0  # bench time of the last step of the drive's frequency [s]
+        self._tops = 0
+        self._probe_m: float | None = None
+        self._next_record = -math.inf  # by the publisher's clock
+
+    # --- the bench ---
+
+    def run(self) -> None:
+        """Be the bench until the end."""
+        address = self._publisher.address
+        said = {"port": address.port, "token": address.token.hex()} if address else {}
+        ready = PracticeEvent("ready", f"the top of the scene {self.scene.name}", scene=self.scene.as_table(), **said)
+        self._place_probe(0.072)
+        while not self._over:
+            with open_bench(self._wiring, tuple(self._wiring.instruments)) as bench, self._looking_at(bench):
+                self._set_up(bench)
+                if ready:
+                    self._report(ready)
+                    ready = None
+                while not (self._over or self._wanted):
+                    self._measure(bench)
+            if self._wanted and not self._over:
+                self._record(self._wanted)
+            self._wanted = None
+
+    @contextlib.contextmanager
+    def _looking_at(self, bench: Bench) -> Iterator[None]:
+        self._bench, self.clock.meanwhile = bench, self.look
+        try:
+            yield
+        finally:
+            self._bench, self.clock.meanwhile = None, None
+            self._knobs.on = False
+
+    def _set_up(self, bench: Bench) -> None:
+        bench.counter.prepare(gate_s=GATE_S, trigger_level_v=TRIGGER_V)
+        bench.magnetometer.prepare(range_t=None)
+        bench.oscilloscope.prepare(
+            channels=tuple(CHANNELS),
+            duration_s=RECORD_S,
+            points=SAMPLES,
+            volts_per_division=VOLTS_PER_DIVISION,
+            trigger_level_v=TRIGGER_V,
+            trigger_source=1,
+            sweep="auto",
+        )
+
+    def _measure(self, bench: Bench) -> None:
+        """Read each instrument once."""
+        spin = bench.counter.frequency()
+        flux_density = bench.magnetometer.flux_density()
+        for channel, value in (("spin_frequency_hz", spin), ("flux_density_t", flux_density)):
+            if value is None:
+                self._seen.values.pop(channel, None)
+            else:
+                self._seen.values[channel] = value
+        now = self._publisher.clock()
+        if self._publisher.is_watched and now >= self._next_record:
+            self._next_record = now + 0.5
+            bench.oscilloscope.acquire(timeout_s=1.0)
+            for input_, channel in CHANNELS.items():
+                number = self._seen.records[channel][0] + 1 if channel in self._seen.records else 1
+                self._seen.records[channel] = number, self.clock.now(), bench.oscilloscope.trace(input_)
+
+    # --- what goes on meanwhile ---
+
+    def look(self) -> None:
+        """Carry out commands, move the drive, serve the views; the clock calls this while time passes."""
+        if self._looking:
+            return
+        self._looking = True
+        try:
+            self._read_commands()
+            self._move_drive()
+            self._publish()
+        finally:
+            self._looking = False
+
+    def _read_commands(self) -> None:
+        if self._end.by:
+            self._finish(f"the signal {self._end.by}")
+        try:
+            while not self._over and self._pipe.poll():
+                self._answer(self._pipe.recv_bytes())
+        except (EOFError, OSError):
+            self._finish("the end of the program")
+
+    def _finish(self, why: str) -> None:
+        """End all: a run is kept, and time passes at once."""
+        self._over, self._stopped = True, self._stopped or why
+        self.clock.speed, self.clock.paused = math.inf, False
+        if self._session is not None:
+            self._session.stop.by = self._session.stop.by or self._stopped
+
+    def _answer(self, data: bytes) -> None:
+        number = None
+        try:
+            number, command = from_bytes(data)
+            text = self._carry_out(command)
+        except (LevilabError, InstrumentError) as error:
+            self._report(PracticeEvent("refused", unquoted(str(error)), number))
+        else:
+            self._report(PracticeEvent("done", text, number))
+
+    def _publish(self) -> None:
+        if not self._publisher.is_due():
+            return
+        self._publisher.send(self._state())
+        records = self._seen.records if self._session is None else self._session.doing.records
+        self._sent.send_new_records(self._publisher, records)
+        self._sent.send_poses(self._publisher, self._wiring.poses, self.clock.now())
+
+    def _state(self) -> State:
+        speed = self.clock.speed if math.isfinite(self.clock.speed) else None
+        here = {"virtual": True, "speed": speed, "paused": self.clock.paused, "probe_m": self._probe_m}
+        if self._session is not None:
+            return replace(state_of(self._session, virtual=True), busy=True, **here)
+        drive = drive_of(self._bench) if self._bench else None
+        counting = counting_of(self._bench) if self._bench else None
+        if drive and not drive.output:  # what comes when it is switched on
+            knobs = self._knobs
+            drive = replace(
+                drive, waveform=knobs.waveform, frequency_hz=knobs.frequency_hz, amplitude_vpp=knobs.amplitude_vpp
+            )
+        return State(self.clock.now(), last=dict(self._seen.values), drive=drive, counting=counting, **here)
+
+    # --- commands ---
+
+    @singledispatchmethod
+    def _carry_out(self, command: Command) -> str:
+        """Carry out a command.  Returns what was done; raises CommandRefused and what instruments raise."""
+        raise CommandRefused(f"{command!r}: this bench cannot do that")
+
+    @_carry_out.register
+    def _(self, command: SetSpeed) -> str:
+        self.clock.speed = command.speed
+        return f"{command.speed:g} seconds of the bench in a second"
+
+    @_carry_out.register
+    def _(self, command: Pause) -> str:
+        self.clock.paused = command.on
+        return "the bench's time stands still" if command.on else "the bench's time goes on"
+
+    @_carry_out.register
+    def _(self, command: StopRun) -> str:
+        if self._session is None and self._wanted is None:
+            raise CommandRefused("no run is being recorded: nothing to stop")
+        self._stopped = "the stop button"
+        if self._session is not None:
+            self._session.stop.by = self._stopped
+        return "the run ends after the reading under way"
+
+    @_carry_out.register
+    def _(self, command: RecordRun) -> str:
+        self._free_bench()
+        self._request(command)  # raises where it is not possible
+        self._wanted, self._stopped = command, ""
+        return f"the run begins: {command.experiment}"
+
+    @_carry_out.register
+    def _(self, command: PutBack) -> str:
+        self._free_bench()
+        if "spin_frequency_hz" in self._seen.values:
+            raise CommandRefused("the counter sees a top that floats: it can be put back once it has fallen")
+        self._tops += 1
+        self.world.float_top(self._tops)
+        return "the top floats again"
+
+    @_carry_out.register
+    def _(self, command: PlaceProbe) -> str:
+        self._free_bench()
+        self._place_probe(command.height_m)
+        if command.height_m is None:
+            return "the probe lies in its chamber"
+        return f"the probe stands {1e3 * command.height_m:.1f} mm above the base"
+
+    def _place_probe(self, height_m: float | None) -> None:
+        self.world.place_probe(height_m)
+        self._probe_m = height_m
+
+    @_carry_out.register
+    def _(self, command: MatchDrive) -> str:
+        spin = self._seen.values.get("spin_frequency_hz")
+        if spin is None:
+            raise CommandRefused("the counter sees no top whose spin the drive could be set to: put the top back first")
+        if self._knobs.on:
+            raise CommandRefused("the drive is on, and its frequency goes by the ramp: switch it off first")
+        return self._carry_out(TuneDrive(frequency_hz=round(spin, 2)))
+
+    @_carry_out.register
+    def _(self, command: TuneDrive) -> str:
+        bench, knobs = self._free_bench(), self._knobs
+        changes = {name: value for name, value in command.model_dump(exclude={"do"}).items() if value is not None}
+        wanted = replace(knobs, **changes)
+        self._check(wanted)
+        self._knobs = wanted
+        if wanted.on and command.waveform is not None and command.waveform != knobs.waveform:
+            self._switch_on(bench, self._frequency(bench))
+        elif wanted.on and command.amplitude_vpp is not None:
+            bench.generator.amplitude = wanted.amplitude_vpp
+        return f"{wanted.frequency_hz:g} Hz, {wanted.amplitude_vpp:g} Vpp, {wanted.waveform}"
+
+    @_carry_out.register
+    def _(self, command: SwitchDrive) -> str:
+        bench = self._free_bench()
+        if command.on and not self._knobs.on:
+            self._check(self._knobs)
+            self._switch_on(bench, self._knobs.frequency_hz)
+        elif not command.on:
+            bench.outputs_off()
+        self._knobs.on = command.on
+        return f"the drive is on at {self._knobs.frequency_hz:g} Hz" if command.on else "the drive is off"
+
+    def _free_bench(self) -> Bench:
+        """The open bench.  Raises CommandRefused while a run is recorded."""
+        if self._session is not None or self._wanted is not None or self._bench is None:
+            raise CommandRefused("a run is being recorded, and the bench is its own: stop the run first, or wait")
+        return self._bench
+
+    def _check(self, knobs: Knobs) -> None:
+        """Raise CommandRefused beyond the limits of the bench."""
+        found = self._wiring.limits.of_the_drive().beyond(
+            frequency_hz=knobs.frequency_hz, amplitude_vpp=knobs.amplitude_vpp
+        )
+        if found:
+            unit = "Vpp" if found.name == "drive_amplitude_vpp" else "Hz"
+            allowed = "at most" if found.is_highest else "at least"
+            raise CommandRefused(
+                f"{found.value:g} {unit}: the coil of this bench stands {allowed} {found.limit:g} {unit}"
+            )
+
+    # --- the drive ---
+
+    def _switch_on(self, bench: Bench, frequency: float) -> None:
+        knobs = self._knobs
+        bench.generator.prepare(waveform=knobs.waveform, frequency_hz=frequency, amplitude_vpp=knobs.amplitude_vpp)
+        bench.generator.output = True
+        self._moved = self.clock.now()
+
+    @staticmethod
+    def _frequency(bench: Bench) -> float:
+        """The drive's frequency as it was commanded last [Hz]."""
+        return float(bench.generator.last_set.get("frequency_hz", 0.0))
+
+    def _move_drive(self) -> None:
+        """Move the drive's frequency on towards where it is going, as far as the ramp comes in the time since."""
+        since = self.clock.now() - self._moved
+        if self._bench is None or not self._knobs.on or since < RAMP_STEP_S:
+            return
+        self._moved += since
+        here = self._frequency(self._bench)
+        way = self._knobs.frequency_hz - here
+        if not way:
+            return
+        step = math.copysign(min(abs(way), self._knobs.ramp_hz_per_s * since), way)
+        with contextlib.suppress(InstrumentError):  # the virtual one is always there; the next step comes
+            self._bench.generator.frequency = round(here + step, 6)
+
+    # --- runs ---
+
+    def _request(self, command: RecordRun) -> Any:
+        options = AcquisitionOptions(
+            mock=True,
+            out=Path(self._options.out),
+            seed=self._options.seed,
+            note=command.note,
+            settings=command.settings,
+        )
+        return request_at(self._wiring, self.scene, command.experiment, options)
+
+    def _record(self, command: RecordRun) -> None:
+        """Carry out an experiment; whatever ends it, the bench goes on."""
+        self._seen.values.clear()
+        try:
+            run = acquire(self._request(command), LinesToReport(self._report), self._watching)
+        except (LevilabError, InstrumentError) as error:
+            self._report(PracticeEvent("recorded", unquoted(str(error)), status="failed", folder=self._folder))
+        else:
+            text = f"{run.status}: {run.count()} readings"
+            self._report(PracticeEvent("recorded", text, status=run.status, folder=str(run.folder)))
+
+    @contextlib.contextmanager
+    def _watching(self, session: Session[Any], wiring: Wiring) -> Iterator[Callable[[], None]]:
+        """Yield what the session and the clock call while a run is recorded."""
+        self._session, self._folder = session, str(session.writer.folder)
+        if self._stopped:
+            session.stop.by = self._stopped
+        self._report(PracticeEvent("recording", self._session.writer.record.experiment, folder=self._folder))
+        try:
+            yield self.look
+        finally:
+            if session.stop.by and session.stop.by.startswith("SIG"):
+                self._over = True
+            self._session = None
