@@ -1,6 +1,7 @@
 """The commands of the simulator: simulate, stability, benchmark.  Heavy imports happen where they are needed."""
 
 import contextlib
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,10 +9,15 @@ import typer
 
 from levilab.cli.options import Json, Presets, Settings
 from levilab.cli.output import interruptible, message, print_json
+from levilab.cli.quantities import with_options
 from levilab.errors import UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from levilab.motion.animation.request import AnimationRequest
     from levilab.motion.effects import Effect
+    from levilab.motion.summary import Summary
     from levilab.simulator.scene import Scene
     from levilab.sweeps.spin_mass import Span
 
@@ -30,6 +36,7 @@ def chosen_scene(name: str, settings: list[str] | None) -> "Scene":
 
 
 def simulate(
+    context: typer.Context,
     scene: Presets,
     duration: Annotated[float, typer.Option(metavar="S", help="How many seconds are simulated.")] = 30.0,
     tolerance: Annotated[
@@ -48,10 +55,31 @@ def simulate(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Make a run folder there: states.csv, run.json, motion.png.")
     ] = None,
+    animate: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Show the top in slow motion: a page to turn and to scrub (.html), or a film (.gif, .mp4).",
+        ),
+    ] = None,
+    animate_from: Annotated[
+        float | None, typer.Option(metavar="S", help="When the animation begins; a fall is shown unless you say.")
+    ] = None,
+    animate_to: Annotated[
+        float | None, typer.Option(metavar="S", help="When it ends; usually 10 s later, 1 s for a film.")
+    ] = None,
+    animate_speed: Annotated[
+        float | None, typer.Option(metavar="X", help="Part of the real speed; 0.1, for a film 0.05 unless you say.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Simulate a scene, and print what the motion is like."""
     chosen = chosen_scene(scene, settings)
+    film = _animation_request(animate, animate_from, animate_to, animate_speed)
+    if film:
+        from levilab.motion.animation.request import check_request
+
+        check_request(film, chosen, duration)
 
     from levilab.files import finite
     from levilab.motion.simulation import SimulationRequest, run_simulation
@@ -67,18 +95,43 @@ def simulate(
         from levilab.motion.table import print_motion
 
         print_motion(done.summary)
+    if film:
+        _animate(film, done.summary, partial(with_options, app=context.find_root().command))
     with interruptible("the effects are not known"):
         effects = _explained(chosen, duration) if explain else ()
     if as_json:
         from dataclasses import asdict
 
         document = as_document(done.summary) | {"run": str(done.folder) if done.folder else None}
+        document |= {"animation": str(film.path)} if film else {}
         document |= {"effects": [finite(asdict(effect)) for effect in effects]} if explain else {}
         print_json(document)
     elif explain:
         from levilab.motion.table import print_effects
 
         print_effects(effects)
+
+
+def _animation_request(
+    path: Path | None, start: float | None, stop: float | None, speed: float | None
+) -> "AnimationRequest | None":
+    if path is None:
+        given = {"animate_from": start, "animate_to": stop, "animate_speed": speed}
+        if without := [name for name, value in given.items() if value is not None]:
+            raise UsageError(without[0], "it is of an animation: give `animate`, too")
+        return None
+    from levilab.motion.animation.request import AnimationRequest
+
+    return AnimationRequest(path, start, stop, speed)
+
+
+def _animate(request: "AnimationRequest", summary: "Summary", in_words: "Callable[[str], str]") -> None:
+    from levilab.motion.animation.request import animate
+    from levilab.present.progress import ShareBar
+
+    with interruptible("no animation was written"), contextlib.closing(ShareBar("drawing")) as share:
+        path = animate(request, summary, lambda text: message(in_words(text)), share)
+    message(f"wrote {path}")
 
 
 def _explained(scene: "Scene", duration: float) -> "tuple[Effect, ...]":

@@ -36,7 +36,7 @@ COLOURS: dict[str, dict[str, str]] = {
 #: A base without a thickness is drawn with this one, as a part of its outer radius.
 _USUAL_THICKNESS = 0.2
 #: The axis is drawn so far beyond the centre of mass, in radii of the magnet: up, and down.
-_AXIS_UP, _AXIS_DOWN = 3.4, 0.9
+_AXIS_UP, _AXIS_DOWN = 3.2, 0.9
 #: Widths of the tape and of the mark on the disc [rad].
 _TAPE_RAD, _MARK_RAD = 0.42, 0.20
 

@@ -10,6 +10,7 @@
 
 const CM = 100;             // drawn units in a metre
 const TURN = 2 * Math.PI;
+const RIBBON = 0.028;       // half of the path's width
 const AROUND = 96;          // facets around a part
 
 /**
@@ -70,7 +71,7 @@ export function buildScene(THREE, parts, theme = "light") {
   top.add(washers);
   const groups = {top, washers};
   for (const part of parts.parts) {
-    const shiny = part.colour === "washers" ? {roughness: 0.3, metalness: 0.55} : {};
+    const shiny = part.colour === "washers" ? {roughness: 0.35, metalness: 0.15} : {};
     groups[part.turns].add(new THREE.Mesh(revolve(THREE, part.outline), paint(part.colour, shiny)));
   }
   for (const mark of parts.marks) {
@@ -99,8 +100,9 @@ export function buildScene(THREE, parts, theme = "light") {
   const points = parts.parts.flatMap((part) => part.outline);
   const widest = Math.max(...points.map((point) => point[0])), lowest = Math.min(...points.map((point) => point[1]));
 
-  // the path of the axis' end
-  const path = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({transparent: true, opacity: 0.9}));
+  // the path of the axis' end: a ribbon on its edge, since lines are one pixel wide, which fades towards its beginning
+  const path = new THREE.Mesh(
+    new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({side: THREE.DoubleSide, transparent: true, vertexColors: true}));
   path.frustumCulled = false;
   paints.push([path.material, "path"]);
   scene.add(path);
@@ -140,15 +142,18 @@ export function buildScene(THREE, parts, theme = "light") {
     },
 
     setPath(points, count = points.length / 3) {
-      let attribute = path.geometry.getAttribute("position");
-      if (!attribute || attribute.count < count) {
-        attribute = new THREE.BufferAttribute(new Float32Array(3 * Math.max(2 * count, 64)), 3);
-        attribute.setUsage(THREE.DynamicDrawUsage);
-        path.geometry.setAttribute("position", attribute);
+      const geometry = path.geometry;
+      if (!geometry.index || geometry.getAttribute("position").count < 2 * count) makeRibbon(THREE, geometry, 2 * count);
+      const places = geometry.getAttribute("position"), colours = geometry.getAttribute("color");
+      for (let k = 0; k < count; k += 1) {
+        const x = points[3 * k] * CM, y = points[3 * k + 1] * CM, z = points[3 * k + 2] * CM, share = (k + 1) / count;
+        places.setXYZ(2 * k, x, y, z - RIBBON);
+        places.setXYZ(2 * k + 1, x, y, z + RIBBON);
+        colours.setW(2 * k, share);
+        colours.setW(2 * k + 1, share);
       }
-      for (let k = 0; k < 3 * count; k += 1) attribute.array[k] = points[k] * CM;
-      attribute.needsUpdate = true;
-      path.geometry.setDrawRange(0, count);
+      places.needsUpdate = colours.needsUpdate = true;
+      geometry.setDrawRange(0, 6 * Math.max(count - 1, 0));
     },
 
     setSpin(sense) {
@@ -203,9 +208,9 @@ export function buildCamera(THREE, parts, aspect) {
 /** Put a camera back to where buildCamera has it, for a picture of this shape. */
 export function placeCamera(THREE, camera, parts, aspect) {
   const {reach, top} = parts.view, bottom = parts.base.bottom;
-  const target = new THREE.Vector3(0, 0, (0.5 * (top + bottom)) * CM);
+  const target = new THREE.Vector3(0, 0, (0.48 * top + 0.52 * bottom) * CM);
   const half = Math.tan(camera.fov / 2 * TURN / 360);
-  const distance = Math.max((0.62 * (top - bottom) + 0.12 * reach) / half, 1.12 * reach / (half * aspect) + reach) * CM;
+  const distance = Math.max((0.62 * (top - bottom) + 0.16 * reach) / half, 1.1 * reach / (half * aspect) + reach) * CM;
   const elevation = 0.33, azimuth = -1.25;
   camera.aspect = aspect;
   camera.position.set(
@@ -247,6 +252,15 @@ function revolve(THREE, outline, from = 0, width = TURN, out = 0) {
   geometry.setAttribute("normal", new THREE.Float32BufferAttribute(normals, 3));
   geometry.setIndex(faces);
   return geometry;
+}
+
+/** Room for a ribbon through so many points: two corners each, and two triangles from each to the next. */
+function makeRibbon(THREE, geometry, points) {
+  const faces = [];
+  for (let k = 0; k + 1 < points; k += 1) faces.push(2 * k, 2 * k + 1, 2 * k + 2, 2 * k + 1, 2 * k + 3, 2 * k + 2);
+  geometry.setIndex(faces);
+  geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(6 * points), 3));
+  geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(8 * points).fill(1), 4));
 }
 
 /** Three quarters of a circle with a head, in the plane across the axis, counterclockwise seen from above. */

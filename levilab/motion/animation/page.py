@@ -1,0 +1,286 @@
+"""Poses → one HTML file that plays them: interactive, self-contained, at most 1.5 MB.
+
+three.js comes out of the installed nicegui (extra ``live``), compressed, since a browser unpacks it: 0.27 instead of
+1.1 MB.  The scripts and styles are allowed by their hashes, and nothing else is: a page that a scene's name or
+description tries to break stays text.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import io
+import json
+import math
+import re
+from dataclasses import dataclass
+from importlib import resources
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.errors import LevilabError, UsageError
+from levilab.motion.animation.film import Film, in_mm, nice_length, still
+from levilab.motion.animation.parts import COLOURS, parts_of
+from levilab.motion.animation.words import short_speed, speed_in_words
+from levilab.software import software_versions
+
+if TYPE_CHECKING:
+    from levilab.motion.animation.poses import Poses
+    from levilab.motion.summary import Summary
+
+#: The largest page [bytes].
+LARGEST = 1_500_000
+#: What a page holds beside its poses, at most [bytes].
+_REST = 470_000
+#: Bytes that a pose takes in the page: float32 as base64.
+_BYTES_PER_NUMBER = 4 * 4 / 3
+#: Speeds to choose from.
+_SPEEDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
+#: Poses a turn: so many make a slerp between two of them as good as the motion, and no fewer than FEWEST.
+POSES_A_TURN, FEWEST_A_TURN = 16, 12
+#: So much of the path of the axis is drawn [s of the motion].
+_TRAIL_S = 0.5
+
+
+class MissingThree(LevilabError):
+    """three.js is not there."""
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a page shows.
+
+    Attributes:
+        poses: to be played.
+        summary: of the motion that they are a span of.
+        speed: at which it plays at first, as a part of the real one.
+    """
+
+    poses: Poses
+    summary: Summary
+    speed: float
+
+
+def most_poses(columns: int) -> int:
+    """Return how many poses of so many numbers a page holds."""
+    return int((LARGEST - _REST) / (columns * _BYTES_PER_NUMBER))
+
+
+def columns_of(poses_or_scene: Any) -> list[str]:
+    """Return the names of the numbers of a pose: of a scene without washers or drive these are left out."""
+    scene = getattr(poses_or_scene, "scene", poses_or_scene)
+    slips = ["slip"] if scene.washers.inertia_kg_m2 > 0 else []
+    drive = ["drive"] if parts_of(scene)["drive"] else []
+    return ["x", "y", "z", "qx", "qy", "qz", "qw", "spin", *slips, *drive]
+
+
+def read_three() -> bytes:
+    """Read three.js out of nicegui.  Raises MissingThree."""
+    found = find_spec("nicegui")
+    for place in (found.submodule_search_locations or ()) if found else ():
+        path = Path(place, "elements/scene/dist/index.js")
+        if path.is_file():
+            return path.read_bytes()
+    seen = "which is not installed" if found is None else "which is installed in a version that does not hold it"
+    raise MissingThree(
+        f"an animation as .html needs three.js out of nicegui, {seen}: pip install 'levilab[live]', "
+        "or name a file that ends in .gif"
+    )
+
+
+def as_page(page: Page) -> bytes:
+    """Make the page.
+
+    Raises:
+        MissingThree: three.js is not there.
+        UsageError: the page would be larger than LARGEST.
+    """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    three = read_three()
+    files = {name: _text(name) for name in ("page.css", "player.js", "top.js")}
+    poses = page.poses
+    folder = str(resources.files("levilab.motion.animation"))
+    environment = Environment(
+        loader=FileSystemLoader(folder), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    title = poses.scene.name or "A scene without a name"
+    alt = _alt(page)
+    middle = len(poses.times) // 2
+    stills = {
+        theme: still(Film(poses, None, 20.0, (800, 550), trail_s=_TRAIL_S, theme=theme), middle)
+        for theme in ("light", "dark")
+    }
+    readings = _readings(poses)
+    text = environment.get_template("page.html.j2").render(
+        title=title,
+        lead=f"A Levitron as computed by levilab, {_span(poses)}, at first at {speed_in_words(page.speed)}.",
+        alt=alt,
+        still_light=_data_address(stills["light"]),
+        still_dark=_data_address(stills["dark"]),
+        readings=readings,
+        speeds=[(short_speed(speed), speed) for speed in sorted({*_SPEEDS, page.speed}, reverse=True)],
+        speed=page.speed,
+        legend=_legend(poses),
+        numbers=_numbers(page),
+        version=software_versions().get("levilab", ""),
+        licence=_licence(three),
+        style=Markup(files["page.css"] + _swatches(poses)),
+        style_hash=_hash(files["page.css"] + _swatches(poses)),
+        script=Markup(files["player.js"]),
+        script_hash=_hash(files["player.js"]),
+        data=Markup(_json(_data(page, alt, readings))),
+        poses=Markup(_numbers_as_text(poses)),
+        three=Markup(base64.b64encode(gzip.compress(three, 9, mtime=0)).decode("ascii")),
+        top=Markup(files["top.js"]),
+    )
+    content = text.encode("utf-8")
+    if len(content) > LARGEST:
+        raise UsageError(
+            "animate",
+            f"the page would have {len(content) / 1e6:.2f} MB, at most {LARGEST / 1e6:g} are written: choose a shorter "
+            "span with `animate_from` and `animate_to`",
+        )
+    return content
+
+
+def _text(name: str) -> str:
+    return resources.files("levilab.motion.animation").joinpath(name).read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
+
+
+def _json(document: Any) -> str:
+    """JSON that no text in it can end as a script of the page."""
+    return json.dumps(document, sort_keys=True, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _numbers_as_text(poses: Poses) -> str:
+    table = {
+        "x": poses.positions[:, 0], "y": poses.positions[:, 1], "z": poses.positions[:, 2],
+        "qx": poses.quaternions[:, 0], "qy": poses.quaternions[:, 1], "qz": poses.quaternions[:, 2],
+        "qw": poses.quaternions[:, 3], "spin": poses.spins, "slip": poses.slips, "drive": poses.drive,
+    }  # fmt: skip
+    numbers = np.stack([table[name] for name in columns_of(poses)], axis=1).astype("<f4")
+    return base64.b64encode(numbers.tobytes()).decode("ascii")
+
+
+def _data(page: Page, alt: str, readings: list[tuple[str, str, int]]) -> dict[str, Any]:
+    poses = page.poses
+    span = max(float(np.ptp(poses.positions[:, :2], axis=0).max()), 1e-6)
+    bar = nice_length(0.45 * span)
+    return {
+        "alt": alt,
+        "bar": {"length": bar, "text": in_mm(bar)},
+        "columns": columns_of(poses),
+        "count": len(poses.times),
+        "drive_mt": 1000 * poses.scene.drive.amplitude_t,
+        "parts": parts_of(poses.scene),
+        "readings": [(name, digits) for name, _, digits in readings],
+        "start": float(poses.times[0]),
+        "step": float(poses.times[1] - poses.times[0]),
+        "trail_s": _TRAIL_S,
+    }
+
+
+def _readings(poses: Poses) -> list[tuple[str, str, int]]:
+    """Name, unit and digits after the point of what is read."""
+    found = [("time", " s", 3), ("height", " cm", 2), ("tilt", "°", 1), ("spin", " Hz", 2)]
+    columns = columns_of(poses)
+    if "slip" in columns:
+        found.append(("slip", " turns", 2))
+    if "drive" in columns:
+        found.append(("drive", " mT", 2))
+    return found
+
+
+def _span(poses: Poses) -> str:
+    last = ", where it is lost" if poses.fell else ""
+    return f"from {poses.times[0]:.4g} s to {poses.times[-1]:.4g} s{last}"
+
+
+def _alt(page: Page) -> str:
+    poses = page.poses
+    return (
+        f"A spinning top with a magnet, a disc and a stem floats {100 * poses.positions[:, 2].mean():.1f} cm above a ring "
+        f"magnet, {_span(poses)}; its axis wobbles by up to {math.degrees(poses.tilts.max()):.1f} degrees"
+    )
+
+
+def _legend(poses: Poses) -> list[tuple[str, str]]:
+    """Colours, by their names in `parts.COLOURS`, and what they are."""
+    found = [
+        ("magnet", "the top's magnet"),
+        ("disc", "its disc, with a mark"),
+        ("washers", "washers, " + ("loose: they turn at their own rate" if poses.slips.any() else "held by an O-ring")),
+        ("stem", "the stem"),
+        ("tape", "white tape, once a turn before the lamp"),
+        ("path", f"path of the axis' end over the last {_TRAIL_S:g} s"),
+        ("axis", "the axis of the top"),
+        ("spin", "sense of the spin"),
+        ("base", "the base, a ring magnet"),
+        ("faint", "straight down to the top's shadow"),
+    ]
+    return (
+        [*found, ("drive", "the drive's field, as an arrow over the base")] if "drive" in columns_of(poses) else found
+    )
+
+
+def _swatches(poses: Poses) -> str:
+    """The colours of the legend, by day and by night."""
+    names = [name for name, _ in _legend(poses)]
+    rules = {
+        theme: "".join(f".colour-{name} span{{background:{COLOURS[theme][name]}}}" for name in names)
+        for theme in COLOURS
+    }
+    return f"{rules['light']}\n@media (prefers-color-scheme: dark){{{rules['dark']}}}\n"
+
+
+def _numbers(page: Page) -> list[tuple[str, str]]:
+    """The table of numbers."""
+    poses, motion = page.poses, page.summary.motion
+    scene, accuracy = poses.scene, page.summary.motion.accuracy
+    tilts, heights = np.degrees(poses.tilts), 100 * poses.positions[:, 2]
+    found = [
+        ("scene", scene.description or "no description"),
+        ("shown", f"{_span(poses)}, of {float(motion.time[-1]):.4g} s that were simulated"),
+        ("end", page.summary.ending),
+        ("height", f"{heights.min():.2f} to {heights.max():.2f} cm above the base's centre"),
+        ("tilt", f"{tilts.min():.1f} to {tilts.max():.1f}° of the axis against the base's"),
+        ("spin", f"{poses.spins.min():.2f} to {poses.spins.max():.2f} Hz"),
+        ("mass", f"{1000 * scene.top.mass_kg:.4g} g"),
+        ("moment", f"{scene.top.moment_a_m2:.4g} A m²".replace("-", "−")),
+        ("base", f"{100 * scene.base.inner_radius_m:.3g} to {100 * scene.base.outer_radius_m:.3g} cm radius"),
+    ]
+    if "drive" in columns_of(poses):
+        drive = scene.drive
+        found.append(("drive", f"{drive.waveform}, {1000 * drive.amplitude_t:.3g} mT, {drive.frequency_hz:.6g} Hz"))
+    error = max(accuracy.position, accuracy.axis)
+    return [
+        *found,
+        ("error", f"estimated at most {error:.1g} (place in m, axis in rad) at the end of the simulation"),
+        ("poses", f"{len(poses.times)}, {1 / (poses.times[1] - poses.times[0]):.0f} a second"),
+        ("sizes", "magnet and base as in the scene; the other parts in the proportions of such a top"),
+    ]
+
+
+def _licence(three: bytes) -> str:
+    """The licence's lines at the head of three.js."""
+    head = re.match(rb"/\*\*?(.*?)\*/", three, re.DOTALL)
+    if head is None:
+        raise MissingThree("three.js out of nicegui has no licence at its head: install nicegui 3.18 or a later one")
+    lines = [line.strip(" *") for line in head[1].decode("utf-8", "replace").splitlines()]
+    return ". ".join(line for line in lines if line and not line.startswith("@")) + "."
+
+
+def _data_address(picture: Any) -> str:
+    buffer = io.BytesIO()
+    picture.quantize(128).save(buffer, "PNG", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

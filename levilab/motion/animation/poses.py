@@ -1,0 +1,212 @@
+"""A simulated motion → the poses of a span of it, close enough to each other that every turn is seen.
+
+A trajectory has some states a second and, where the moment is aligned, no turn about the axis: the physics does not
+depend on it.  So the span is simulated again from the trajectory's state where it begins, with the attitude and as many
+states as pictures need.  An aligned moment gets a transverse part of 1e-17, less than the rounding of its axial one:
+the motion stays the same and the simulator integrates the turn by its exact flows, so nothing is lost in twisting
+frames along the axis' path.  How far both motions agree is the simulator's own error, 1e-7 in place [m] and axis [rad]
+(`tests/levilab/motion/test_animation.py`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from levilab.simulator.kernels.motion import ARM, TIME, N
+from levilab.simulator.model import has_attitude
+from levilab.simulator.single import simulate
+from levilab.simulator.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from levilab.simulator.scene import Drive, Scene
+
+Array = NDArray[np.float64]
+
+#: The transverse part that makes the simulator integrate the turn of an aligned moment.
+_NEGLIGIBLE_TILT = 1e-17
+#: Error of the end of the span, of place [m] and axis [rad].
+TOLERANCE = 1e-7
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Where the top is at equal intervals of time.
+
+    Attributes:
+        scene: what was simulated.
+        times: shape (n,) [s].
+        positions: of the centre of mass, shape (n, 3) [m].
+        quaternions: x, y, z, w of the turn that takes the top's frame (z its axis, x the transverse part of its moment)
+            to the base's, shape (n, 4); neighbours have the same sign.
+        spins: turns about the axis per second, shape (n,) [Hz].
+        slips: how far loose washers have turned on the top since the first pose, shape (n,) [rad].
+        drive: the drive's field as a part of its amplitude, shape (n,).
+        fell: whether the last pose is that of the fall.
+    """
+
+    scene: Scene
+    times: Array
+    positions: Array
+    quaternions: Array
+    spins: Array
+    slips: Array
+    drive: Array
+    fell: bool
+
+    @property
+    def axes(self) -> Array:
+        """The top's axis, shape (n, 3)."""
+        x, y, z, w = self.quaternions.T
+        return np.stack([2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)], axis=1)
+
+    @property
+    def tilts(self) -> Array:
+        """Angle between the top's axis and the base's, shape (n,) [rad]."""
+        axes = self.axes
+        return np.asarray(np.arctan2(np.hypot(axes[:, 0], axes[:, 1]), axes[:, 2]))
+
+
+def poses_of(
+    motion: Trajectory, start: float, stop: float, count: int, progress: Callable[[float], None] | None = None
+) -> Poses:
+    """Simulate a span of a motion again.
+
+    Args:
+        motion: the whole of it.
+        start: where the span begins [s], from the motion's start on.
+        stop: where it ends [s], at most the motion's end.
+        count: intervals between poses.
+        progress: called with the share that is done.
+
+    Returns:
+        One pose more than intervals; fewer if the top falls a moment earlier in the second simulation.
+
+    Raises:
+        SimulationError: for what cannot be simulated.
+    """
+    scene, state = _with_attitude(motion.scene), _state_at(motion, start)
+    found = simulate(
+        scene, stop - start, tolerance=TOLERANCE, rate=count / (stop - start), start=state, progress=progress
+    )
+    times = start + (stop - start) * np.arange(count + 1) / count
+    whole = min(len(found.time), count + 1)
+    if whole > 1 and abs(found.time[whole - 1] - times[whole - 1]) > 1e-6 * (stop - start):
+        whole -= 1  # the fall, between two poses
+    found = Trajectory(scene, found.states[:whole], found.model, found.accuracy)
+    return Poses(
+        motion.scene,
+        times[:whole],
+        found.position,
+        quaternions_of(found.states[:, ARM], found.axis),
+        found.spin_hz,
+        _slips(found),
+        drive_share(scene.drive, times[:whole]),
+        fell=motion.fell is not None and stop >= motion.time[-1],
+    )
+
+
+def _with_attitude(scene: Scene) -> Scene:
+    if has_attitude(scene):
+        return scene
+    return scene.changed({"top.moment_tilt": [_NEGLIGIBLE_TILT, scene.top.moment_tilt[1]]})
+
+
+def _state_at(motion: Trajectory, time: float) -> Array:
+    """The state at a time between the trajectory's samples, with an arm at right angles to the axis, shape (18,)."""
+    scene = _with_attitude(motion.scene)
+    k = max(int(np.searchsorted(motion.time, time, side="right")) - 1, 0)
+    state = motion.states[k].copy()
+    if not has_attitude(motion.scene):  # no arm was carried along: any one will do
+        state[ARM] = _across(state[ARM], state[N])
+    late = time - float(state[TIME])
+    if late > 1e-9:
+        state = simulate(scene, late, tolerance=TOLERANCE, rate=None, start=state).states[-1].copy()
+    state[TIME] = time
+    return state
+
+
+def _across(arm: Array, axis: Array) -> Array:
+    """The unit vector at right angles to the axis that is nearest to the arm."""
+    for other in (arm, np.array([0.0, 1.0, 0.0])):
+        across = other - (other @ axis) * axis
+        if (length := float(np.linalg.norm(across))) > 0.1:
+            break
+    return np.asarray(across / length)
+
+
+def quaternions_of(arms: Array, axes: Array) -> Array:
+    """Return the quaternions (x, y, z, w) of bodies whose x and z axes are these, neighbours of the same sign.
+
+    Args:
+        arms: the body's x axis, shape (n, 3).
+        axes: its z axis, at right angles to it, shape (n, 3).
+
+    >>> quaternions_of(np.array([[0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 1.0]])).round(4).tolist()
+    [[0.0, 0.0, 0.7071, 0.7071]]
+    """
+    third = np.cross(axes, arms)
+    m = np.stack([arms, third, axes], axis=-1)  # columns: what the body's x, y, z become
+    xx, yy, zz = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
+    # four times the products of the quaternion's parts; the row of the largest square is divided by without loss
+    squares = np.stack([1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz], axis=1)
+    xy, xz, yz = m[:, 0, 1] + m[:, 1, 0], m[:, 0, 2] + m[:, 2, 0], m[:, 1, 2] + m[:, 2, 1]
+    xw, yw, zw = m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]
+    rows = np.stack([
+        np.stack([squares[:, 0], xy, xz, xw], axis=1),
+        np.stack([xy, squares[:, 1], yz, yw], axis=1),
+        np.stack([xz, yz, squares[:, 2], zw], axis=1),
+        np.stack([xw, yw, zw, squares[:, 3]], axis=1),
+    ], axis=1)  # fmt: skip
+    chosen = rows[np.arange(len(m)), np.argmax(squares, axis=1)]
+    found = chosen / np.linalg.norm(chosen, axis=1, keepdims=True)
+    turns_over = np.sum(found[1:] * found[:-1], axis=1) < 0
+    signs = np.concatenate([[1.0], np.where(np.cumsum(turns_over) % 2, -1.0, 1.0)])
+    return np.asarray(found * signs[:, None])
+
+
+def _slips(motion: Trajectory) -> Array:
+    """How far loose washers have turned on the top since the first state, shape (n,) [rad]; the slip changes slowly."""
+    rates = 2 * np.pi * (motion.washer_spin_hz - motion.spin_hz)
+    return np.concatenate([[0.0], np.cumsum(np.diff(motion.time) * (rates[1:] + rates[:-1]) / 2)])
+
+
+#: The drive's waveforms at a phase [rad].
+_WAVES: dict[str, Callable[[Array], Array]] = {
+    "off": np.zeros_like,
+    "sine": np.sin,
+    "triangle": lambda phase: 2 / np.pi * np.arcsin(np.sin(phase)),
+    "square": lambda phase: np.where(np.sin(phase) >= 0, 1.0, -1.0),
+    "unipolar": lambda phase: np.where(np.sin(phase) >= 0, 1.0, 0.0),
+}
+
+
+def drive_share(drive: Drive, times: Array) -> Array:
+    """Return the drive's field at times [s] as a part of its amplitude, shape (n,)."""
+    share = _WAVES[drive.waveform](2 * np.pi * drive.frequency_hz * times + drive.phase_rad)
+    return np.where(times < (math.inf if drive.off_s is None else drive.off_s), share, 0.0)
+
+
+def turn_rate(motion: Trajectory) -> float:
+    """Return the fastest that a part of the top turns during a motion [Hz]."""
+    return float(max(np.abs(motion.spin_hz).max(), np.abs(motion.washer_spin_hz).max()))
+
+
+def matrices(quaternions: Array) -> Array:
+    """Return the turns as matrices, shape (n, 3, 3)."""
+    x, y, z, w = quaternions.T
+    rows: list[list[Any]] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+__all__ = ["Poses", "drive_share", "matrices", "poses_of", "quaternions_of", "turn_rate"]

@@ -1,0 +1,216 @@
+"""What is to be animated → the file, in one of three formats."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from levilab.errors import UsageError
+from levilab.files import replace_atomically, writing
+from levilab.motion.animation.film import Film, as_gif, as_mp4, check_encoder
+from levilab.motion.animation.page import FEWEST_A_TURN, POSES_A_TURN, Page, as_page, columns_of, most_poses, read_three
+from levilab.motion.animation.poses import poses_of, turn_rate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from levilab.motion.summary import Summary
+    from levilab.simulator.scene import Scene
+    from levilab.simulator.trajectory import Trajectory
+
+    Progress = Callable[[float], None]
+
+#: Speeds that a film may have, as parts of the real one.
+_SLOWEST, _FASTEST = 1e-4, 10.0
+#: Pictures of a film at most: 3000 of a GIF need some minutes and 0.7 GB of memory.
+_MOST_PICTURES = 3000
+#: Poses for each picture of a film, for its path.
+_POSES_A_PICTURE = 3
+#: A page has at least so many poses a second: the wobble is faster than the spin of a slow top.
+_LEAST_RATE_HZ = 240.0
+#: With fewer pictures in a turn the eye loses which way the top turns.
+_PICTURES_A_TURN = 4
+
+
+@dataclass(frozen=True)
+class _Format:
+    """A kind of file.
+
+    Attributes:
+        span_s: how much of the motion is shown unless a span is given [s].
+        speed: at which, as a part of the real one.
+        pictures_per_s: of a film; 0 of a page, whose pictures the browser makes.
+        size: of a film [pixels].
+        encode: makes the file's bytes of a film.
+        check: raises what is missing.
+    """
+
+    span_s: float
+    speed: float
+    pictures_per_s: float = 0.0
+    size: tuple[int, int] = (0, 0)
+    encode: Callable[[Film, Progress], bytes] | None = None
+    check: Callable[[], object] = lambda: None
+
+
+FORMATS: dict[str, _Format] = {
+    ".html": _Format(10.0, 0.1, check=read_three),
+    ".gif": _Format(1.0, 0.05, 20.0, (480, 480), as_gif),
+    ".mp4": _Format(1.0, 0.05, 30.0, (640, 640), as_mp4, check_encoder),
+}
+
+
+@dataclass(frozen=True)
+class AnimationRequest:
+    """What is to be animated.
+
+    Attributes:
+        path: of the file, which ends in .html, .gif or .mp4.
+        start, stop: the span [s]; None: the format's usual one, from the start, or up to the fall of a top that falls.
+        speed: as a part of the real one; None: the format's usual one.
+    """
+
+    path: Path
+    start: float | None = None
+    stop: float | None = None
+    speed: float | None = None
+
+    @property
+    def format(self) -> _Format:
+        """That of the file's name.  Raises UsageError."""
+        try:
+            return FORMATS[self.path.suffix.lower()]
+        except KeyError:
+            raise UsageError(
+                "animate",
+                "the name of an animation ends in .html (a page to turn and to scrub), .gif or .mp4",
+                value=self.path,
+            ) from None
+
+
+def check_request(request: AnimationRequest, scene: Scene, duration: float) -> None:
+    """Raise what is wrong with a request before anything is simulated.
+
+    Args:
+        request: what is to be animated.
+        scene: what will be simulated.
+        duration: for how long [s].
+
+    Raises:
+        UsageError: a value that makes no sense.
+        MissingThree, MissingEncoder: a library is missing.
+    """
+    chosen = request.format
+    if scene.observed == "spin":
+        raise UsageError(
+            "animate", "the scene has no motion: observed = spin; take observed = motion", value=request.path
+        )
+    start, stop = request.start or 0.0, duration if request.stop is None else request.stop
+    if not 0 <= start < duration:
+        raise UsageError(
+            "animate_from", f"a time from 0 and below the duration of {duration:g} s is expected", value=start
+        )
+    if not start < stop <= duration:
+        raise UsageError(
+            "animate_to", f"a time above {start:g} s and up to the duration of {duration:g} s is expected", value=stop
+        )
+    speed = chosen.speed if request.speed is None else request.speed
+    if not _SLOWEST <= speed <= _FASTEST:
+        raise UsageError(
+            "animate_speed",
+            f"a number from {_SLOWEST:g} to {_FASTEST:g} is expected, as 0.05 for a twentieth of the real speed",
+            value=speed,
+        )
+    if chosen.encode and request.stop is not None:
+        _check_pictures(chosen, stop - start, speed)
+    chosen.check()
+
+
+def _check_pictures(chosen: _Format, span: float, speed: float) -> None:
+    pictures = span / speed * chosen.pictures_per_s
+    if pictures > _MOST_PICTURES:
+        longest = _MOST_PICTURES / chosen.pictures_per_s * speed
+        raise UsageError(
+            "animate_to",
+            f"{span:.4g} s at speed {speed:g} are {pictures:.0f} pictures, at most {_MOST_PICTURES} are drawn: choose a "
+            f"span of at most {longest:.3g} s, or a higher `animate_speed`",
+        )
+
+
+def animate(
+    request: AnimationRequest, summary: Summary, message: Callable[[str], None], progress: Progress | None = None
+) -> Path:
+    """Animate a span of a simulated motion; what does not come to its end leaves nothing behind.
+
+    Args:
+        request: checked by `check_request`.
+        summary: of the motion.
+        message: called with what a viewer should know.
+        progress: called with the share that is done.
+
+    Returns:
+        The file.
+
+    Raises:
+        UsageError: the top was lost before the span, or the file would become too large.
+        CannotWrite: the file cannot be written.
+    """
+    chosen = request.format
+    start, stop = _span(request, summary.motion)
+    speed = chosen.speed if request.speed is None else request.speed
+    progress = progress or (lambda _: None)
+    if chosen.encode is None:
+        poses = poses_of(summary.motion, start, stop, _count_for_page(summary.motion, start, stop))
+        content = as_page(Page(poses, summary, speed))
+    else:
+        _check_pictures(chosen, stop - start, speed)
+        count = max(round((stop - start) / speed * chosen.pictures_per_s), 1)
+        poses = poses_of(summary.motion, start, stop, _POSES_A_PICTURE * count)
+        if note := _stroboscopic(turn_rate(summary.motion), speed, chosen.pictures_per_s):
+            message(note)
+        content = chosen.encode(Film(poses, speed, chosen.pictures_per_s, chosen.size, _POSES_A_PICTURE), progress)
+    with writing(f"{request.path}: could not be written", "choose another place with `animate`"):
+        request.path.parent.mkdir(parents=True, exist_ok=True)
+        replace_atomically(request.path, content)
+    return request.path
+
+
+def _span(request: AnimationRequest, motion: Trajectory) -> tuple[float, float]:
+    """From where to where [s]: what is asked for, up to the fall."""
+    end, usual = float(motion.time[-1]), request.format.span_s
+    if request.start is not None and request.start >= end:
+        raise UsageError("animate_from", f"the top was lost after {end:.4g} s already", value=request.start)
+    stop = end if request.stop is None else min(request.stop, end)
+    if request.start is not None:
+        return request.start, stop if request.stop is not None else min(request.start + usual, end)
+    if request.stop is not None or motion.fell is not None:
+        return max(stop - usual, 0.0), stop
+    return 0.0, min(usual, end)
+
+
+def _count_for_page(motion: Trajectory, start: float, stop: float) -> int:
+    """Intervals between the poses of a page: enough for each turn, and as many as fit."""
+    span, most = stop - start, most_poses(len(columns_of(motion.scene))) - 1
+    turning = max(turn_rate(motion), _LEAST_RATE_HZ / POSES_A_TURN)
+    wanted, least = math.ceil(span * turning * POSES_A_TURN), math.ceil(span * turning * FEWEST_A_TURN)
+    if least > most:
+        raise UsageError(
+            "animate_to",
+            f"{span:.4g} s at {turning:.3g} turns a second are {least} poses, a page of at most 1.5 MB holds {most}: "
+            f"choose a span of at most {most / (turning * FEWEST_A_TURN):.3g} s with `animate_from` and `animate_to`",
+        )
+    return max(min(wanted, most), 1)
+
+
+def _stroboscopic(turns: float, speed: float, pictures_per_s: float) -> str:
+    """What to know of a film that shows too few pictures of a turn; empty for others."""
+    if turns * speed * _PICTURES_A_TURN <= pictures_per_s:
+        return ""
+    slower = pictures_per_s / turns / _PICTURES_A_TURN
+    digits = 10.0 ** math.floor(math.log10(slower))
+    return (
+        f"note: the film has {pictures_per_s / turns / speed:.1f} pictures of each turn, so the top seems to turn slowly, "
+        f"to stand or to turn backwards; with `animate_speed` = {math.floor(slower / digits) * digits:.1g} it does not"
+    )
