@@ -36,6 +36,7 @@ _FEWEST_COLUMNS, _MOST_COLUMNS = 50, 2000
 #: The latest readings alone, where the page asks for them.
 LATEST = 200
 _INSTRUMENT = {"identity", "driver", "address"}
+_SETTINGS = {"frequency_hz", "amplitude_vpp", "waveform", "offset_v", "gate_s", "trigger_level_v"}
 
 
 class Watch:
@@ -255,7 +256,15 @@ def _about(followed: Followed) -> dict[str, Any]:
             kind: {key: str(value)[:120] for key, value in one.items() if key in _INSTRUMENT}
             for kind, one in record.instruments.items()
         },
+        "settings": {kind: _settings(one) for kind, one in record.instruments.items()},
     }
+
+
+def _settings(instrument: dict[str, Any]) -> dict[str, Any]:
+    """What an instrument was set to at the start of a run, as far as the page shows it without the bench."""
+    found = instrument.get("settings_start")
+    found = found if isinstance(found, dict) else {}
+    return {key: value for key, value in found.items() if key in _SETTINGS and isinstance(value, str | float | int)}
 
 
 def _readings(followed: Followed, ask: dict[str, Any], arrays: dict[str, Any]) -> dict[str, Any]:

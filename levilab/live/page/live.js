@@ -92,7 +92,7 @@ function takeEvents(events) {
     if (event.n <= seen.events) continue;
     seen.events = event.n;
     const item = make("li", "", /warning|damaged/.test(event.kind) ? "warning" : /lost|failed|not reached/.test(event.kind) ? "lost" : "");
-    item.append(make("time", event.time_s === null ? "" : lapse(event.time_s)), make("span", event.text));
+    item.append(make("time", event.time_s === null ? "" : lapse(event.time_s).replace(" min", "")), make("span", event.text));
     list.prepend(item);
   }
   while (list.children.length > MOST_EVENTS) list.lastChild.remove();
@@ -148,6 +148,7 @@ function show() {
   showGenerator(bench, last);
   showMagnetometer(bench, last);
   showFacts(about);
+  document.body.classList.toggle("no-scope", !data.records.size && !practice && Boolean(about) && about.status !== "running");
   write("count", data.count ? `${data.count.toLocaleString("en").replaceAll(",", "\u202f")}${data.readings?.single === false ? ", each stroke from the lowest to the highest of many" : ""}` : "");
   by("empty").hidden = data.count > 0;
   write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: "No run yet: the guide says how to record one."}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
@@ -176,15 +177,16 @@ function showCounter(bench, last) {
   const trend = data.trend;
   const much = Math.abs(trend) >= 0.0005;
   write("trend", Number.isFinite(trend) ? `${much ? (trend < 0 ? "↓ " : "↑ ") : "→ "}${fixed(trend, 4)} Hz/s` : "–");
-  write("gate", bench?.counting ? `${short(bench.counting.gate_s)} s` : "–");
-  write("trigger", bench?.counting ? `${short(bench.counting.trigger_level_v)} V, input ${bench.counting.input}` : "–");
+  const counting = bench?.counting ?? data.about?.settings?.counter;
+  write("gate", Number.isFinite(counting?.gate_s) ? `${short(counting.gate_s)} s` : "–");
+  write("trigger", Number.isFinite(counting?.trigger_level_v) ? `${short(counting.trigger_level_v)} V${counting.input ? `, input ${counting.input}` : ""}` : "–");
   write("counter-model", modelOf("counter"));
 }
 
 function showGenerator(bench, last) {
-  const drive = bench?.drive;
+  const drive = bench?.drive ?? data.about?.settings?.generator;
   write("drive-value", drive?.frequency_hz ? drive.frequency_hz.toFixed(4) : Number.isFinite(last.drive_frequency_hz) ? last.drive_frequency_hz.toFixed(4) : "––.––––");
-  stale("drive-value", !drive?.output || bench.silent);
+  stale("drive-value", !drive?.output || !bench || bench.silent);
   write("drive-on", drive?.output ? "on" : "off");
   by("drive-on").classList.toggle("on", Boolean(drive?.output));
   write("signal", drive?.waveform ? `${drive.waveform}, ${short(drive.amplitude_vpp)} Vpp${drive.offset_v ? `, offset ${short(drive.offset_v)} V` : ""}` : "–");

@@ -122,10 +122,11 @@ export function drawReadings(paper, data, pointed) {
     c.strokeStyle = paint.soft;
     line(c, [[LEFT, middle, width - RIGHT, middle]]);
     c.textAlign = "right";
-    const one = ticks(0, reach * fy / 1.15, 1.4).at(-1) || reach * fy / 1.15;
+    const power = 10 ** Math.floor(Math.log10(0.8 * reach * fy));
+    const one = [5, 2, 1].map((k) => k * power).find((k) => k <= 0.8 * reach * fy);
     for (const mark of [-one, 0, one]) c.fillText(short(mark, 2), LEFT - 7, toLeft(mark / fy));
     c.textAlign = "left";
-    c.fillText("readings − fit", LEFT + 6, bottom - below + 5);
+    c.fillText("readings − fit", LEFT + 6, bottom - below + 10);
     c.strokeStyle = paint.line;
     c.strokeRect(LEFT + 0.5, bottom - below + 0.5, width - LEFT - RIGHT - 1, below - 1);
   }

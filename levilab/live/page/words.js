@@ -16,7 +16,7 @@ export const fixed = (value, decimals) =>
 export const short = (value, digits = 4) =>
   Number.isFinite(value) ? String(Number(value.toPrecision(digits))).replace("-", "−") : "–";
 
-/** Seconds as 34 s, 2:05 or 1:02:05. */
+/** Seconds as 34 s, 2:05 min or 1:02:05. */
 export function lapse(seconds) {
   if (!Number.isFinite(seconds)) return "";
   const whole = Math.round(Math.abs(seconds)), sign = seconds < -0.5 ? "−" : "";
