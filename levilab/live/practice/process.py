@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from levilab.bench.wiring import Wiring
     from levilab.interruption import End
     from levilab.live.practice.commands import Command
+    from levilab.simulator.scene import Scene
     from levilab.world.spin_world import World
 
 #: Between runs the counter counts for so long [s], as the light of the tape passes this level [V].
@@ -61,10 +62,10 @@ GATE_S, TRIGGER_V = 0.5, 0.6
 #: least time of the wall between two [s].
 CHANNELS = {1: "tape", 2: "drive", 3: "laser"}
 RECORD_S, SAMPLES, VOLTS_PER_DIVISION = 0.2, 1000, 2.0
-#: The drive's frequency moves in steps of at least this time [s]: even steps of less than a second, as a hand cannot.
-RAMP_STEP_S = 0.25
+#: The drive's frequency moves in even steps of about this time [s]; with uneven ones the top swings about the drive.
+RAMP_STEP_S = 0.5
 #: The drive before a person has changed it.
-FIRST_HZ, FIRST_VPP, FIRST_RAMP = 30.0, 10.0, 0.1
+FIRST_HZ, FIRST_VPP, FIRST_WAVEFORM, FIRST_RAMP = 30.0, 10.0, "SQU", 0.1
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ class Knobs:
 
     frequency_hz: float = FIRST_HZ
     amplitude_vpp: float = FIRST_VPP
-    waveform: str = "SIN"
+    waveform: str = FIRST_WAVEFORM
     ramp_hz_per_s: float = FIRST_RAMP
     on: bool = False
 
@@ -125,9 +126,12 @@ def work(options: PracticeOptions, pipe: Connection) -> None:
             clock = PacedClock(options.speed)
             world = scene_world(scene, lambda: clock, lambda text: report(PracticeEvent("message", text)))
             with Publisher() as publisher:
-                PracticeProcess(options, world, pipe, publisher, end).run()
+                PracticeProcess(options, scene, world, pipe, publisher=publisher, end=end).run()
         except (LevilabError, InstrumentError) as error:
             report(PracticeEvent("ended", unquoted(str(error))))
+        except Exception as error:
+            report(PracticeEvent("ended", f"{type(error).__name__}: {error}"))
+            raise
         else:
             report(PracticeEvent("ended", "the bench is switched off"))
 
@@ -160,6 +164,7 @@ class PracticeProcess:
 
     Args:
         options: how it begins.
+        scene: of the top.
         world: with the top, on a clock that is paced.
         pipe: to the process that holds the bench.
         publisher: to the views.
@@ -167,11 +172,18 @@ class PracticeProcess:
     """
 
     def __init__(
-        self, options: PracticeOptions, world: World, pipe: Connection, publisher: Publisher, end: End
+        self,
+        options: PracticeOptions,
+        scene: Scene,
+        world: World,
+        pipe: Connection,
+        *,
+        publisher: Publisher,
+        end: End,
     ) -> None:
         assert isinstance(world.clock, PacedClock)
         self.world, self.clock = world, world.clock
-        self.scene = read_scene(options.scene)
+        self.scene = scene
         self._options, self._pipe, self._publisher, self._end = options, pipe, publisher, end
         self._report = Reporter(pipe)
         self._wiring: Wiring = virtual_wiring(world, Limits())
@@ -289,12 +301,13 @@ class PracticeProcess:
     def _publish(self) -> None:
         if not self._publisher.is_due():
             return
-        self._publisher.send(self._state())
+        self._publisher.send(self.state())
         records = self._seen.records if self._session is None else self._session.doing.records
         self._sent.send_new_records(self._publisher, records)
         self._sent.send_poses(self._publisher, self._wiring.poses, self.clock.now())
 
-    def _state(self) -> State:
+    def state(self) -> State:
+        """Return what views are shown."""
         speed = self.clock.speed if math.isfinite(self.clock.speed) else None
         here = {"virtual": True, "speed": speed, "paused": self.clock.paused, "probe_m": self._probe_m}
         if self._session is not None:
