@@ -39,6 +39,9 @@ class Analyses:
             return
         self.running.add(folder.name)
         self.failed.pop(folder.name, None)
+        for name in (RESULT, REPORT):  # those of an earlier analysis are not shown for this one
+            with contextlib.suppress(OSError):
+                (folder / name).unlink(missing_ok=True)
         threading.Thread(target=self._carry_out, args=(folder,), daemon=True).start()
 
     def _carry_out(self, folder: Path) -> None:

@@ -114,9 +114,9 @@ class Hall:
         return [*(watch.tick for watch in self.watches.values()), self.desk.count if self.desk else 0]
 
     async def _fit(self, watch: Watch, task: Any) -> None:
-        begin = time.process_time()
+        begin = time.monotonic()
         found = await asyncio.to_thread(task)
-        watch.fitted(found, time.process_time() - begin)
+        watch.fitted(found, time.monotonic() - begin)
 
     def _announce(self) -> None:
         self.new.set()

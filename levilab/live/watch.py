@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 SILENT_AFTER_S = 4.0
 #: Messages with poses that are kept for pages that ask late: a second of them.
 _MOST_POSES = 24
-#: Between two fits at least [s]; and a fit takes this share of the time at most.
-_FIT_EVERY_S, _FIT_SHARE = 2.0, 0.05
+#: Between two fits at least, and at most, though a fit is to take no more than this share of the time [s].
+_FIT_EVERY_S, _FIT_PAUSE_S, _FIT_SHARE = 1.5, 10.0, 0.05
 #: Columns of a picture, at most and at least, whatever a page asks for.
 _FEWEST_COLUMNS, _MOST_COLUMNS = 50, 2000
 #: The latest readings alone, where the page asks for them.
@@ -157,7 +157,7 @@ class Watch:
 
     def fitted(self, found: Running | None, took_s: float) -> None:
         """Take in what was computed, and how long it took."""
-        self._fit_again = self.clock() + max(_FIT_EVERY_S, took_s / _FIT_SHARE)
+        self._fit_again = self.clock() + min(max(_FIT_EVERY_S, took_s / _FIT_SHARE), _FIT_PAUSE_S)
         self.fit = found
         self.fit_version += 1
         self.tick += 1

@@ -42,6 +42,7 @@ function take(head, arrays) {
   for (const one of head.said) {
     seen.said = one.n;
     practice?.hear(one);
+    if (/message|refused|ended/.test(one.kind) && data.about?.status !== "running") listEvent("", one.text, one.kind === "message" ? "" : "warning");
   }
   if (head.about) data.about = head.about;
   if (head.readings) takeReadings(head.readings, arrays);
@@ -87,32 +88,43 @@ function takeFit(about, arrays) {
 }
 
 function takeEvents(events) {
-  const list = by("event-list");
   for (const event of events) {
     if (event.n <= seen.events) continue;
     seen.events = event.n;
-    const item = make("li", "", /warning|damaged/.test(event.kind) ? "warning" : /lost|failed|not reached/.test(event.kind) ? "lost" : "");
-    item.append(make("time", event.time_s === null ? "" : lapse(event.time_s).replace(" min", "")), make("span", event.text));
-    list.prepend(item);
+    const loud = /warning|damaged/.test(event.kind) ? "warning" : /lost|failed|not reached/.test(event.kind) ? "lost" : "";
+    listEvent(event.time_s === null ? "" : lapse(event.time_s).replace(" min", ""), event.text, loud);
   }
+}
+
+function listEvent(when, text, loud) {
+  const list = by("event-list"), item = make("li", "", loud);
+  item.append(make("time", when), make("span", text));
+  list.prepend(item);
   while (list.children.length > MOST_EVENTS) list.lastChild.remove();
 }
 
-async function takePoses(pieces, arrays) {
+function takePoses(pieces, arrays) {
+  if (!space) openTop();
   for (const [k, piece] of pieces.entries()) {
     seen.poses = piece.number;
-    space?.add?.(piece.start_s, piece.step_s, arrays[`position_${k}`], arrays[`quaternion_${k}`], arrays[`up_${k}`]);
+    space.add(piece.start_s, piece.step_s, arrays[`position_${k}`], arrays[`quaternion_${k}`], arrays[`up_${k}`]);
   }
-  if (space) return;
-  space = {};  // while it is loaded
+}
+
+/** Load what draws three dimensions when the first poses have come, and not before. */
+async function openTop() {
+  const early = [];
+  space = {add: (...pieces) => early.length < 50 && early.push(pieces)};
   document.body.classList.remove("no-top");
   try {
     const parts = await (await fetch(`parts?run=${encodeURIComponent(seen.run)}`)).json();
     const {openSpace} = await import("./motion.js");
     space = await openSpace(by("space"), parts);
+    for (const pieces of early) space.add(...pieces);
     window.levilab.space = space;
     space.setRate(Number(by("motion").value));
   } catch (error) {
+    space = {add: () => {}};
     by("no-space").hidden = false;
     write("no-space", `This browser draws no three dimensions: ${error.message}`);
   }
@@ -232,7 +244,7 @@ function showFacts(about) {
 function showTop(bench) {
   const pose = space?.state;
   if (!pose) return;
-  const height = `${fixed(pose.place[2] * 1000, 1)} mm above the base`;
+  const height = `at ${fixed(pose.place[2] * 1000, 1)} mm`;
   write("top-text", pose.up ? `floats ${height}` : "does not float");
   by("space").setAttribute("aria-label", `the top over its base in three dimensions: it ${pose.up ? `floats ${height}` : "does not float"}`);
 }

@@ -12,11 +12,14 @@ const KEPT = 8000;
 /** A picture at most so often without a graphics card [ms]. */
 const LEAST_MS = SOFTWARE ? 48 : 0;
 
+/** Pixels without a graphics card, as a part of those that are shown: half would do, but is coarse to look at. */
+const SOFTWARE_RATIO = 0.75;
+
 export async function openSpace(canvas, parts) {
   const {THREE, OrbitControls} = await import("./three.js");
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const renderer = new THREE.WebGLRenderer({canvas, antialias: !SOFTWARE, powerPreference: "low-power"});
-  renderer.setPixelRatio(SOFTWARE ? 0.5 : Math.min(devicePixelRatio || 1, 2));
+  renderer.setPixelRatio(SOFTWARE ? SOFTWARE_RATIO : Math.min(devicePixelRatio || 1, 2));
   const view = buildScene(THREE, parts, dark.matches ? "dark" : "light");
   view.show({drive: false});
   const camera = buildCamera(THREE, parts, 1);

@@ -126,17 +126,18 @@ export function openPractice(about, command, run, allowed) {
     by("figures").replaceChildren();
     by("report").hidden = true;
     by("result").showModal();
-    await send("analyze", {run: name});
-    for (;;) {
+    const wrong = await command({do: "analyze", run: name});
+    if (wrong) by("verdict").replaceChildren(make("p", wrong));
+    while (!wrong) {
       await new Promise((go) => { setTimeout(go, 400); });
       const found = await (await fetch(`run/${encodeURIComponent(name)}/analysis`)).json();
       if (!by("result").open) return;
-      if (found.running) continue;
+      if (found.running && !found.verdict?.length) continue;
       now.analyzed = found.failed ? "" : name;
       const texts = found.failed ? [found.failed] : found.verdict || [];
       by("verdict").replaceChildren(
         ...texts.map((text) => make("p", text)), ...(found.warnings || []).map((text) => make("p", `Note: ${text}`, "note")));
-      by("figures").replaceChildren(...found.figures.map((figure) => {
+      if (!by("figures").children.length) by("figures").replaceChildren(...found.figures.map((figure) => {
         const image = make("img");
         image.src = `run/${encodeURIComponent(name)}/${figure}?${Date.now()}`;
         image.alt = `figure of the ${found.analysis} analysis`;
@@ -146,7 +147,8 @@ export function openPractice(about, command, run, allowed) {
         by("report").href = `run/${encodeURIComponent(name)}/${found.report}`;
         by("report").hidden = false;
       }
-      return;
+      write("writing", found.running ? "The report is being written…" : "");
+      if (!found.running) return;
     }
   }
 
