@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ class Tail:
         No failure to read raises: a file that is gone or cannot be opened has no new lines now.
         """
         try:
+            if not stat.S_ISREG(self.path.stat().st_mode):  # a pipe would be waited for
+                return []
             with self.path.open("rb") as file:
                 about = os.fstat(file.fileno())
                 self._begin_anew_if_replaced((about.st_dev, about.st_ino), about.st_size)

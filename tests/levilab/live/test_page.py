@@ -129,66 +129,70 @@ def test_a_phone_scrolls_down_and_not_sideways(watched: Callable[..., Page], hal
     assert page.evaluate("[document.documentElement.scrollWidth, innerWidth]") == [PHONE["width"], PHONE["width"]]
 
 
-def test_a_run_grows_is_torn_reloaded_and_ends(page: Page, tmp_path: Path) -> None:
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[Hall]:
+    """A server of its own.  Before `page` among a test's fixtures, so that the page is closed first."""
     with serving(tmp_path) as hall:
-        page.goto(address(hall))
-        until(page, "document.body.dataset.state === 'none'")
-        run = GrowingRun(tmp_path)
-        with run.running():
-            run.readings(spin_down(3))
-            run.add("30.0,37.")
-            until(page, "levilab.data.count === 3")
-            assert page.inner_text("#state-word") == "running"
-            run.add("1,0.03\n")
-            until(page, "levilab.data.count === 4")
-            page.reload()
-            until(page, "levilab.data.count === 4")
-            run.event("the lamp was moved", "warning", 31.0)
-            until(page, "document.querySelector('#event-list .warning')")
-        run.say(status="finished")
-        until(page, "document.body.dataset.state === 'finished'")
+        yield hall
 
 
-def test_what_the_bench_publishes_is_drawn(page: Page, tmp_path: Path) -> None:
+def test_a_run_grows_is_torn_reloaded_and_ends(served: Hall, page: Page, tmp_path: Path) -> None:
+    page.goto(address(served))
+    until(page, "document.body.dataset.state === 'none'")
     run = GrowingRun(tmp_path)
-    with serving(tmp_path) as hall:
-        page.goto(address(hall, run.folder.name))
-        until(page, "levilab.frames > 0")
-        n, wave = 400, np.sin(np.linspace(0, 20, 1000)).astype("f4")
-        turn = np.arange(n) * 2 * np.pi * 30 / 400
-        quaternion = np.stack([0 * turn, 0 * turn, np.sin(turn / 2), np.cos(turn / 2)], axis=1)
-        position = np.tile([0.0, 0.0, 0.075], (n, 1))
-        messages_of(
-            hall.watches[run.folder.name],
-            [
-                State(1.0, drive=Drive("SIN", 31.25, 10.0, 0.0, output=True), counting=Counting(0.5, 0.6),
-                      last={"spin_frequency_hz": 31.25, "flux_density_t": 0.0191}, virtual=True, speed=1.0),
-                Record(1, "tape", 1.0, -0.1, 2e-4, wave, wave),
-                Poses(0.0, 1 / 400, position, quaternion, np.ones(n, dtype=bool)),
-            ],
-        )  # fmt: skip
-        until(page, "levilab.space?.frames > 1")
-        assert page.inner_text("#drive-value") == "31.2500"
-        assert page.inner_text("#lock").startswith("follows")
-        assert page.inner_text("#field-value") == "19.100"
-        assert until(page, "document.getElementById('top-text').textContent") == "floats at 75.0 mm"
-        assert "tape from -1 to 1 volts" in page.get_attribute("#trace", "aria-label").replace("−", "-")
+    with run.running():
+        run.readings(spin_down(3))
+        run.add("30.0,37.")
+        until(page, "levilab.data.count === 3")
+        assert page.inner_text("#state-word") == "running"
+        run.add("1,0.03\n")
+        until(page, "levilab.data.count === 4")
+        page.reload()
+        until(page, "levilab.data.count === 4")
+        run.event("the lamp was moved", "warning", 31.0)
+        until(page, "document.querySelector('#event-list .warning')")
+    run.say(status="finished")
+    until(page, "document.body.dataset.state === 'finished'")
 
 
-def test_a_million_readings_are_drawn_from_a_few_thousand_numbers(page: Page, tmp_path: Path) -> None:
+def test_what_the_bench_publishes_is_drawn(served: Hall, page: Page, tmp_path: Path) -> None:
+    run = GrowingRun(tmp_path)
+    page.goto(address(served, run.folder.name))
+    until(page, "levilab.frames > 0")
+    n, wave = 400, np.sin(np.linspace(0, 20, 1000)).astype("f4")
+    turn = np.arange(n) * 2 * np.pi * 30 / 400
+    quaternion = np.stack([0 * turn, 0 * turn, np.sin(turn / 2), np.cos(turn / 2)], axis=1)
+    position = np.tile([0.0, 0.0, 0.075], (n, 1))
+    messages_of(
+        served.watches[run.folder.name],
+        [
+            State(1.0, drive=Drive("SIN", 31.25, 10.0, 0.0, output=True), counting=Counting(0.5, 0.6),
+                  last={"spin_frequency_hz": 31.25, "flux_density_t": 0.0191}, virtual=True, speed=1.0),
+            Record(1, "tape", 1.0, -0.1, 2e-4, wave, wave),
+            Poses(0.0, 1 / 400, position, quaternion, np.ones(n, dtype=bool)),
+        ],
+    )  # fmt: skip
+    until(page, "levilab.space?.frames > 1")
+    assert page.inner_text("#drive-value") == "31.2500"
+    assert page.inner_text("#lock").startswith("follows")
+    assert page.inner_text("#field-value") == "19.100"
+    assert until(page, "document.getElementById('top-text').textContent") == "floats at 75.0 mm"
+    assert "tape from -1 to 1 volts" in page.get_attribute("#trace", "aria-label").replace("−", "-")
+
+
+def test_a_million_readings_are_drawn_from_a_few_thousand_numbers(served: Hall, page: Page, tmp_path: Path) -> None:
     run = GrowingRun(tmp_path)
     n = 1_000_000
     rows = np.stack([np.arange(n) * 0.04, 30 + np.sin(np.arange(n) / 1e5), np.full(n, 0.03)], axis=1)
-    with serving(tmp_path) as hall:
-        page.goto(address(hall, run.folder.name))
-        until(page, "levilab.frames > 0")
-        followed = hall.watches[run.folder.name].followed
-        assert followed is not None
-        followed.readings.add(rows)
-        run.readings([(1e5, 30.0, 0.03)])
-        until(page, f"levilab.data.count === {n + 1}")
-        assert page.evaluate("[levilab.data.readings.x.length < 2000, levilab.data.readings.single]") == [True, False]
-        assert len(followed.readings.groups()) <= 8192
+    page.goto(address(served, run.folder.name))
+    until(page, "levilab.frames > 0")
+    followed = served.watches[run.folder.name].followed
+    assert followed is not None
+    followed.readings.add(rows)
+    run.readings([(1e5, 30.0, 0.03)])
+    until(page, f"levilab.data.count === {n + 1}")
+    assert page.evaluate("[levilab.data.readings.x.length < 2000, levilab.data.readings.single]") == [True, False]
+    assert len(followed.readings.groups()) <= 8192
 
 
 def test_three_js_and_its_controls_come_out_of_nicegui(page: Page, hall: Hall) -> None:
