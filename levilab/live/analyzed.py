@@ -1,4 +1,4 @@
-"""A run's analysis, as the command line makes it, in a process of its own: the server stays small, and frames do not wait."""
+"""A run's analysis, as the command line makes it, in a process of its own: the server stays small, no frame waits."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Analyses:
 
 def _result(folder: Path) -> dict[str, Any]:
     """What result.json beside a run says, in words."""
-    found: dict[str, Any] = {}
+    found: Any = {}
     with contextlib.suppress(OSError, ValueError):
         found = json.loads((folder / RESULT).read_text(encoding="utf-8"))
     if not isinstance(found, dict):

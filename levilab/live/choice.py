@@ -5,7 +5,6 @@ from __future__ import annotations
 import heapq
 import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from levilab.errors import DataError
@@ -13,6 +12,7 @@ from levilab.runs.run import RECORD, Run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
 #: Runs to choose from.
 MOST_RUNS = 50

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError
-from levilab.live.practice.bench import PracticeBench
 from levilab.live.practice.commands import command_of
 from levilab.motion.animation.parts import parts_of
 from levilab.runs.run import read_record
@@ -16,6 +15,7 @@ from levilab.simulator.scene import read_scene, scene_of
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from levilab.live.practice.bench import PracticeBench
     from levilab.telemetry.address import Address
 
 #: What is kept of what the bench says.

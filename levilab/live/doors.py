@@ -80,6 +80,7 @@ class Guard:
         self.app, self.doors = app, doors
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        """Pass a request on, or turn it away."""
         kind = scope["type"]
         if kind not in {"http", "websocket"} or self.doors.lets_in(scope["headers"], is_socket=kind == "websocket"):
             await self.app(scope, receive, send)

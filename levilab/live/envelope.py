@@ -1,4 +1,4 @@
-"""Any number of readings in a bounded memory: exact while they are few, by lowest, highest and mean when they are many."""
+"""Any number of readings in a bounded memory: exact while they are few, else by lowest, highest and mean."""
 
 from __future__ import annotations
 
@@ -81,9 +81,7 @@ class Envelope:
 
     def groups(self) -> Groups:
         """Return all readings so far, the incomplete group too."""
-        low, high, total, known = (
-            array[:, : self._full] for array in (self._low, self._high, self._sum, self._known)
-        )
+        low, high, total, known = (array[:, : self._full] for array in (self._low, self._high, self._sum, self._known))
         if len(self._rest):
             last = _of_groups(self._rest[None])
             low, high, total, known = (
@@ -99,7 +97,7 @@ class Envelope:
 
 
 def _of_groups(rows: Array) -> tuple[Array, Array, Array, Array]:
-    """Lowest, highest, sum and number of the known values; rows: shape (groups, size, channels), of each (channels, groups)."""
+    """Lowest, highest, sum and number of the known values, (channels, groups), of rows (groups, size, channels)."""
     known = ~np.isnan(rows)
     return (
         np.fmin.reduce(rows, axis=1).T,
@@ -114,7 +112,8 @@ def by_columns(x: Array, low: Array, high: Array, columns: int) -> tuple[Array, 
 
     Args:
         x: where the values stand, shape (n,), not decreasing.
-        low, high: shape (n,).
+        low: their lowest values, shape (n,).
+        high: their highest values, shape (n,).
         columns: across the picture.
 
     Returns:

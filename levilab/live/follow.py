@@ -39,7 +39,7 @@ class Followed:
     Attributes:
         folder: where it is.
         record: what run.json says; None while it cannot be read.
-        status: as of `levilab.runs.run.Run`: running, finished, interrupted, failed; "missing" while there is no record.
+        status: as of `levilab.runs.run.Run`; "missing" while there is no record.
         problem: why the record cannot be read, empty where it can.
         columns: names in the head of readings.csv.
         readings: all so far.

@@ -47,6 +47,4 @@ def unpack(frame: bytes) -> tuple[dict[str, Any], dict[str, NDArray[np.float32]]
     length = int.from_bytes(frame[:4], "little")
     head = json.loads(frame[4 : 4 + length])
     body = frame[4 + length :]
-    return head, {
-        name: np.frombuffer(body, "<f4", count, first) for name, (first, count) in head.pop("arrays").items()
-    }
+    return head, {name: np.frombuffer(body, "<f4", count, first) for name, (first, count) in head.pop("arrays").items()}

@@ -142,7 +142,7 @@ def locked_line(columns: Mapping[str, Array], size: int) -> Running:
     )
 
 
-def mean_limit(columns: Mapping[str, Array], size: int) -> Running:
+def mean_limit(columns: Mapping[str, Array], size: int) -> Running:  # noqa: ARG001 - as the others
     """The mean of the limits so far."""
     spin, time = columns["spin_frequency_hz"], columns["time_s"]
     spin, time = spin[np.isfinite(spin)], time[np.isfinite(spin)]

@@ -14,7 +14,7 @@ from levilab.errors import LevilabError, UsageError
 from levilab.live.desk import Desk
 from levilab.live.doors import Doors
 from levilab.live.practice.bench import PracticeBench
-from levilab.live.server import Hall, application, three_js
+from levilab.live.server import Hall, application
 from levilab.runs.run import RECORD, find_run
 
 if TYPE_CHECKING:
@@ -64,7 +64,6 @@ def serve_live(options: LiveOptions, announce: Callable[[str], None]) -> None:
         DataError: there is no such run.
         CannotShow: the port is taken.
     """
-    three_js()
     import uvicorn
 
     root, shown = _where(options)
@@ -92,7 +91,7 @@ def _where(options: LiveOptions) -> tuple[Path, str]:
     if options.run is None:
         return options.out.absolute(), ""
     if options.mock:
-        raise UsageError("a run and `mock` exclude each other: a bench for practice records runs of its own")
+        raise UsageError("mock", "a run and a bench for practice exclude each other: it records runs of its own")
     run = find_run(options.run, options.out).absolute()
     if not (run / RECORD).exists():
         return run, ""  # a folder with runs

@@ -1,7 +1,7 @@
 """The server of the live view: a page, its modules, and frames over a WebSocket.
 
-One task reads what is new 20 times a second while a page is open.  A page asks for each frame, and gets it when there is
-something that it does not have: a slow page gets fewer frames, and nothing queues.
+One task reads what is new 20 times a second while a page is open.  A page asks for each frame, and gets it when there
+is something that it does not have: a slow page gets fewer frames, and nothing queues.
 """
 
 from __future__ import annotations
@@ -11,20 +11,31 @@ import contextlib
 import json
 import time
 from dataclasses import asdict, dataclass, field
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from starlette.applications import Starlette
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocketDisconnect
 
 from levilab.errors import LevilabError
 from levilab.live.analyzed import FIGURES, REPORT, Analyses
 from levilab.live.choice import choices, newest
 from levilab.live.desk import parts_for, scene_of_run
-from levilab.live.doors import REPORT_POLICY, Doors, Guard
+from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
+from levilab.live.graphics import three_js
 from levilab.live.watch import Watch
 from levilab.runs.run import RECORD
 
 if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Callable, Iterator
+
+    from starlette.requests import Request
+    from starlette.websockets import WebSocket
+
     from levilab.live.desk import Desk
+    from levilab.live.running import Running
 
 #: Frames a second, at most; and so long a page waits for a frame in which nothing is new [s].
 FRAMES_PER_S, PATIENCE_S = 20, 1.0
@@ -33,20 +44,6 @@ _LONGEST_ASK = 4096
 PAGE = Path(__file__).parent / "page"
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".png": "image/png",
           ".svg": "image/svg+xml"}  # fmt: skip
-
-
-class NoThree(LevilabError):
-    """The graphics library of the page is not installed."""
-
-
-def three_js() -> Path:
-    """Return the module with three.js, which comes inside of nicegui.  Raises NoThree.  It imports nothing."""
-    found = find_spec("nicegui")
-    for folder in (found.submodule_search_locations or ()) if found else ():
-        path = Path(folder, "elements", "scene", "dist", "index.js")
-        if path.is_file():
-            return path
-    raise NoThree('the live view needs nicegui 3.18 or newer: pip install "levilab[live]"')
 
 
 @dataclass
@@ -71,14 +68,11 @@ class Hall:
 
     def is_run(self, name: str) -> bool:
         """Whether a run of this name lies in the folder; a name with a way to elsewhere does not."""
-        return bool(name) and name == Path(name).name and (self.root / name / RECORD).exists()
-
-    def first(self) -> str:
-        """The run that a page shows if it names none."""
-        return self.shown or newest(choices(self.root)) or ""
+        plain = bool(name) and name == Path(name).name and name not in {".", ".."}
+        return plain and (self.root / name / RECORD).exists()
 
     @contextlib.contextmanager
-    def watching(self, name: str) -> Any:
+    def watching(self, name: str) -> Iterator[Watch]:
         """The watch of a run, shared by all pages that look at it; "" is the bench for practice."""
         if name not in self.watches:
             bench = self.desk.address if self.desk and not name else None
@@ -113,7 +107,7 @@ class Hall:
     def _ticks(self) -> list[int]:
         return [*(watch.tick for watch in self.watches.values()), self.desk.count if self.desk else 0]
 
-    async def _fit(self, watch: Watch, task: Any) -> None:
+    async def _fit(self, watch: Watch, task: Callable[[], Running | None]) -> None:
         begin = time.monotonic()
         found = await asyncio.to_thread(task)
         watch.fitted(found, time.monotonic() - begin)
@@ -126,80 +120,100 @@ class Hall:
         """Return when there is something newer than a page has, or it has waited long enough."""
         end = time.monotonic() + PATIENCE_S
         before = self.desk.count if self.desk else 0
-        while watch.tick == tick and (not self.desk or self.desk.count == before) and (left := end - time.monotonic()) > 0:
+        while (
+            watch.tick == tick and (not self.desk or self.desk.count == before) and (left := end - time.monotonic()) > 0
+        ):
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self.new.wait(), left)
 
 
-def application(hall: Hall) -> Any:
-    """Return the ASGI application."""
-    from starlette.applications import Starlette
-    from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
-    from starlette.routing import Route, WebSocketRoute
-    from starlette.websockets import WebSocketDisconnect
+class Pages:
+    """What is sent for each request.
 
-    three, top = three_js(), Path(__file__).parents[1] / "motion" / "animation" / "top.js"
-    files = {path.name: path for path in PAGE.iterdir()} | {"three.js": three, "top.js": top}
+    Args:
+        hall: what the server knows.
+    """
 
-    def file(path: Path, policy: str | None = None) -> Response:
-        headers = hall.doors.headers(policy) if policy else hall.doors.headers()
-        return FileResponse(path, media_type=_TYPES.get(path.suffix, "text/plain"), headers=headers)
+    def __init__(self, hall: Hall) -> None:
+        self.hall = hall
+        top = Path(__file__).parents[1] / "motion" / "animation" / "top.js"
+        self.files = {path.name: path for path in PAGE.iterdir()} | {"three.js": three_js(), "top.js": top}
 
-    async def page(_: Any) -> Response:
-        return file(files["live.html"])
+    def _file(self, path: Path, policy: str = PAGE_POLICY) -> Response:
+        return FileResponse(
+            path, media_type=_TYPES.get(path.suffix, "text/plain"), headers=self.hall.doors.headers(policy)
+        )
 
-    async def part(request: Any) -> Response:
-        found = files.get(request.path_params["name"])
-        return file(found) if found else PlainTextResponse("there is no such file", 404)
+    def _json(self, document: Any, status: int = 200) -> Response:
+        return JSONResponse(document, status, headers=self.hall.doors.headers())
 
-    async def runs(_: Any) -> Response:
+    async def page(self, _: Request) -> Response:
+        """The page."""
+        return self._file(self.files["live.html"])
+
+    async def part(self, request: Request) -> Response:
+        """A module or the style sheet of the page."""
+        found = self.files.get(request.path_params["name"])
+        return self._file(found) if found else _nothing()
+
+    async def runs(self, _: Request) -> Response:
+        """The runs to choose from, and what the page has to know at first."""
+        hall = self.hall
         found = await asyncio.to_thread(choices, hall.root)
-        about = {"runs": [asdict(one) for one in found], "first": hall.first(), "folder": str(hall.root)}
-        about["practice"] = hall.desk.about if hall.desk else None
-        return JSONResponse(about, headers=hall.doors.headers())
+        first = hall.shown or newest(found) or ""
+        practice = hall.desk.about if hall.desk else None
+        return self._json({"runs": [asdict(one) for one in found], "first": first, "practice": practice})
 
-    async def of_run(request: Any) -> Response:
+    async def parts(self, request: Request) -> Response:
+        """What is drawn of the top."""
+        hall, name = self.hall, request.query_params.get("run", "")
+        scene = hall.desk.scene if hall.desk else scene_of_run(hall.root / name) if hall.is_run(name) else None
+        return self._json(await asyncio.to_thread(parts_for, scene))
+
+    async def of_run(self, request: Request) -> Response:
+        """A figure or the report of a run."""
         name, wanted = request.path_params["run"], request.path_params["name"]
-        path = hall.root / name / wanted
-        if not hall.is_run(name) or not (wanted == REPORT or FIGURES.fullmatch(wanted)) or not path.is_file():
-            return PlainTextResponse("there is no such file", 404)
-        return file(path, REPORT_POLICY)
+        path = self.hall.root / name / wanted
+        known = self.hall.is_run(name) and (wanted == REPORT or FIGURES.fullmatch(wanted))
+        return self._file(path, REPORT_POLICY) if known and path.is_file() else _nothing()
 
-    async def analysis(request: Any) -> Response:
+    async def analysis(self, request: Request) -> Response:
+        """How far a run's analysis is, and what it says."""
         name = request.path_params["run"]
-        about = hall.analyses.about(hall.root / name) if hall.is_run(name) else {}
-        return JSONResponse(about, headers=hall.doors.headers())
+        return self._json(self.hall.analyses.about(self.hall.root / name) if self.hall.is_run(name) else {})
 
-    async def frames(socket: Any) -> None:
+    async def do(self, request: Request) -> Response:
+        """Carry out a command."""
+        body = b""
+        async for piece in request.stream():
+            body += piece
+            if len(body) > _LONGEST_ASK:
+                return self._json({"error": "the command is too long"}, 413)
+        return self._json(*_carry_out(self.hall, request.headers.get("x-levilab-token"), body))
+
+    async def frames(self, socket: WebSocket) -> None:
+        """Send a frame for each question, until the page goes."""
+        hall, name = self.hall, socket.query_params.get("run", "")
         await socket.accept()
-        name = socket.query_params.get("run", "")
         if name and not hall.is_run(name):
             await socket.close(4404)
             return
         with hall.watching(name) as watch, contextlib.suppress(WebSocketDisconnect, RuntimeError):
             watch.step()
-            while True:
-                text = await socket.receive_text()
-                if len(text) > _LONGEST_ASK:
-                    await socket.close(1009)
-                    return
+            while len(text := await socket.receive_text()) <= _LONGEST_ASK:
                 ask = _table(text)
                 await hall.wait_for_news(watch, ask.get("tick"))
                 said = hall.desk.said_after(ask.get("said")) if hall.desk and not name else []
                 await socket.send_bytes(watch.frame(ask, said))
+            await socket.close(1009)
 
-    async def do(request: Any) -> Response:
-        body = await request.body()
-        answer, status = _carry_out(hall, request.headers.get("x-levilab-token"), body[: _LONGEST_ASK + 1])
-        return JSONResponse(answer, status, headers=hall.doors.headers())
 
-    async def parts(request: Any) -> Response:
-        name = request.query_params.get("run", "")
-        scene = hall.desk.scene if hall.desk else scene_of_run(hall.root / name) if hall.is_run(name) else None
-        return JSONResponse(await asyncio.to_thread(parts_for, scene), headers=hall.doors.headers())
+def application(hall: Hall) -> Guard:
+    """Return the ASGI application.  Raises NoThree."""
+    pages = Pages(hall)
 
     @contextlib.asynccontextmanager
-    async def lifespan(_: Any) -> Any:
+    async def lifespan(_: Starlette) -> AsyncIterator[None]:
         reading = asyncio.create_task(hall.read_on())
         try:
             yield
@@ -207,16 +221,20 @@ def application(hall: Hall) -> Any:
             reading.cancel()
 
     routes = [
-        Route("/", page),
-        Route("/runs", runs),
-        Route("/parts", parts),
-        Route("/do", do, methods=["POST"]),
-        Route("/page/{name}", part),
-        Route("/run/{run}/analysis", analysis),
-        Route("/run/{run}/{name}", of_run),
-        WebSocketRoute("/frames", frames),
+        Route("/", pages.page),
+        Route("/runs", pages.runs),
+        Route("/parts", pages.parts),
+        Route("/do", pages.do, methods=["POST"]),
+        Route("/page/{name}", pages.part),
+        Route("/run/{run}/analysis", pages.analysis),
+        Route("/run/{run}/{name}", pages.of_run),
+        WebSocketRoute("/frames", pages.frames),
     ]
     return Guard(Starlette(routes=routes, lifespan=lifespan), hall.doors)
+
+
+def _nothing() -> Response:
+    return PlainTextResponse("there is no such file", 404)
 
 
 def _table(text: str) -> dict[str, Any]:

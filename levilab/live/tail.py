@@ -18,9 +18,9 @@ _LONGEST = 1 << 20
 class Tail:
     """The lines that a file has gained since the last look.
 
-    The last line is left until its end is on the disk.  A file that was replaced or cut is read from its beginning, and
-    `generation` grows by one, so that what was read before can be dropped.  It is opened for each look and closed again:
-    nothing is locked, and the writer may move it at any time.
+    The last line is left until its end is on the disk.  A file that was replaced or cut is read from its start, and
+    `generation` grows by one, so that what was read before can be dropped.  It is opened for each look and closed
+    again: nothing is locked, and the writer may move it at any time.
     """
 
     def __init__(self, path: Path) -> None:
@@ -42,13 +42,17 @@ class Tail:
             with self.path.open("rb") as file:
                 about = os.fstat(file.fileno())
                 self._begin_anew_if_replaced((about.st_dev, about.st_ino), about.st_size)
-                if about.st_size == self._at:
-                    return []
                 file.seek(self._at)
-                piece = file.read(PIECE_BYTES)
+                while piece := file.read(PIECE_BYTES):
+                    self._at += len(piece)
+                    if found := self._complete(piece):
+                        return found
         except OSError:
-            return []
-        self._at += len(piece)
+            pass
+        return []
+
+    def _complete(self, piece: bytes) -> list[bytes]:
+        """The lines that end in a piece; what is left begins the next one."""
         complete, end, torn = piece.rpartition(b"\n")
         if not end:
             self._keep_torn(self._torn + torn)

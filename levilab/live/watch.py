@@ -42,8 +42,8 @@ _SETTINGS = {"frequency_hz", "amplitude_vpp", "waveform", "offset_v", "gate_s", 
 class Watch:
     """What is known of a run and of its bench now.
 
-    Pages change nothing here, and nothing is kept for any of them.  Without a folder it follows what a bench for practice
-    records; `bench` returns where that publishes.
+    Pages change nothing here, and nothing is kept for any of them.  Without a folder it follows what a bench for
+    practice records; `bench` returns where that publishes.
 
     Attributes:
         followed: the run folder; None while a bench for practice has recorded none.
@@ -313,4 +313,4 @@ def _trend(groups: Any, place: dict[str, int]) -> float | None:
 def messages_of(watch: Watch, messages: Iterable[Message]) -> None:
     """Let a watch take in messages without a bench, as tests and pictures do."""
     for message in messages:
-        watch._take(message)  # noqa: SLF001 - of this module
+        watch._take(message)

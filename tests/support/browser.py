@@ -4,7 +4,7 @@
         page.goto(path.as_uri())
         assert page.get_by_role("heading", name="Readings").is_visible()
 
-``page`` is 1280 × 800 in light colours; ``watched(viewport=PHONE, color_scheme="dark")`` opens others of any kind.  Each
+``page`` is 1280 × 800 in light colours; ``watched(viewport=PHONE, color_scheme="dark")`` opens others.  Each
 fails the test at its end if the page has written an error to the console, raised one, or asked for anything that is not
 on this machine.  A module may share a page in a fixture of its own:
 

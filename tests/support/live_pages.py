@@ -51,7 +51,7 @@ def address(hall: Hall, run: str = "", *, token: bool = False) -> str:
 
 
 def until(page: Page, expression: str) -> Any:
-    """Wait for something in a page; what it is.  The page's policy forbids Playwright's own way, which evaluates text."""
+    """Wait for something in a page.  The page's policy forbids Playwright's own way, which evaluates text."""
     end = time.monotonic() + PATIENCE_S
     while not (found := page.evaluate(expression)):
         assert time.monotonic() < end, f"still not: {expression}; {page.evaluate('document.body.innerText')[:600]}"
@@ -74,7 +74,7 @@ class GrowingRun:
             "channels": [{"name": name, "unit": unit, "source": ""} for name, unit in CHANNELS],
             "synthetic": True,
         } | record
-        self.say(**{})
+        self.say()
         self.add(",".join(name for name, _ in CHANNELS) + "\n")
 
     def say(self, **changes: Any) -> None:
@@ -110,5 +110,3 @@ def spin_down(count: int, step_s: float = 10.0, first: int = 0) -> list[tuple[fl
     """Readings of a top under the drag of a disc, from 40 Hz."""
     times = [step_s * k for k in range(first, first + count)]
     return [(t, (40.0**-0.5 + 2.93e-4 * t) ** -2 + 0.01 * (-1) ** k, 0.03) for k, t in enumerate(times)]
-
-

@@ -12,8 +12,6 @@ from support.live_pages import GrowingRun, address, serving
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
-
     from levilab.live.server import Hall
 
 HERE = b"127.0.0.1:8765"
@@ -120,7 +118,9 @@ def test_a_command_needs_the_token(hall: Hall, bench: Bench) -> None:
     assert [(one.do, one.on) for one in bench.commands] == [("pause", True)]
 
 
-@pytest.mark.parametrize("wanted", [{}, [], "x", {"do": "explode"}, {"do": "pause", "on": "maybe"}, {"do": "analyze", "run": ".."}])
+@pytest.mark.parametrize(
+    "wanted", [{}, [], "x", {"do": "explode"}, {"do": "pause", "on": "maybe"}, {"do": "analyze", "run": ".."}]
+)
 def test_what_is_no_command_is_refused_in_words(hall: Hall, wanted: object) -> None:
     status, text = request(hall, "/do", wanted, **{"X-Levilab-Token": hall.doors.token})
     assert status in {400, 404}

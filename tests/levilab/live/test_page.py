@@ -58,9 +58,8 @@ def test_a_finished_run_stands_there_with_its_fit(shown: Page) -> None:
 
 
 def test_nothing_that_a_run_contains_becomes_markup(shown: Page) -> None:
-    assert shown.evaluate("[window.hacked, document.images.length, document.querySelectorAll('main script').length]") == [
-        None, 0, 0,
-    ]  # fmt: skip
+    made = "[window.hacked, document.images.length, document.querySelectorAll('main script').length]"
+    assert shown.evaluate(made) == [None, 0, 0]
     assert HOSTILE in shown.inner_text("#event-list")
     assert HOSTILE in shown.inner_text("#facts")
     assert HOSTILE in shown.text_content("#counter-model")
@@ -72,17 +71,18 @@ def test_on_a_desk_nothing_scrolls(shown: Page) -> None:
 
 
 def test_every_control_has_a_name_and_every_part_a_heading(shown: Page) -> None:
-    nameless = shown.evaluate(
-        """[...document.querySelectorAll("button, select, input, a[href], canvas, [tabindex='0'], output")]
-        .filter((one) => !(one.getAttribute("aria-label") || one.textContent.trim() || one.labels?.[0]?.textContent.trim()))
+    nameless = """[...document.querySelectorAll("button, select, input, a[href], canvas, [tabindex='0'], output")]
+        .filter((one) => !(one.getAttribute("aria-label") || one.textContent.trim()
+                           || one.labels?.[0]?.textContent.trim()))
         .map((one) => one.id || one.outerHTML)"""
-    )
-    assert nameless == []
-    headed = shown.evaluate(
-        "[...document.querySelectorAll('section')].every((one) => document.getElementById(one.getAttribute('aria-labelledby')))"
-    )
-    assert headed
-    assert shown.evaluate("[document.querySelectorAll('main').length, document.querySelectorAll('header').length]") == [1, 1]
+    assert shown.evaluate(nameless) == []
+    headed = """[...document.querySelectorAll("section")]
+        .every((one) => document.getElementById(one.getAttribute("aria-labelledby")))"""
+    assert shown.evaluate(headed)
+    assert [shown.locator(name).count() for name in ("main", "header", "h1")] == [1, 1, 1]
+        1,
+        1,
+    ]
     ids = shown.evaluate("[...document.querySelectorAll('[id]')].map((one) => one.id)")
     assert len(ids) == len(set(ids))
 

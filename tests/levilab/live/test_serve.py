@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from levilab.live.server import NoThree, three_js
+from levilab.live.graphics import NoThree, three_js
 from support.commands import command
 from support.live_pages import GrowingRun
 
@@ -35,7 +35,7 @@ def test_a_run_and_a_bench_for_practice_exclude_each_other(tmp_path: Path) -> No
 
 
 def test_without_the_extra_the_message_names_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("levilab.live.server.find_spec", lambda _: None)
+    monkeypatch.setattr("levilab.live.graphics.find_spec", lambda _: None)
     with pytest.raises(NoThree, match=r'pip install "levilab\[live\]"'):
         three_js()
     ended = command("live", "--no-open", cwd=tmp_path)
