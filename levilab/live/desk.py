@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError
-from levilab.live.practice.commands import command_of
+from levilab.live.practice.commands import RecordRun, command_of
 from levilab.motion.animation.parts import parts_of
 from levilab.runs.run import read_record
 from levilab.simulator.scene import read_scene, scene_of
@@ -21,8 +21,15 @@ if TYPE_CHECKING:
 #: What is kept of what the bench says.
 _MOST_SAID = 100
 _LONGEST_TEXT = 600
-#: What a student can record, the experiment of the guide first.
-EXPERIMENTS = ("spin", "precession", "limit", "trace", "field")
+#: What a student can record, the experiment of the guide first, and settings that take some minutes of the bench at
+#: most: the usual ones are those of a laboratory, which has the time.
+EXPERIMENTS = {
+    "spin": ("spin.drive_frequency_hz=34", "spin.ramp_hz_per_s=0.1", "spin.hold_s=5", "spin.interval_s=2"),
+    "precession": ("precession.first_hz=32", "precession.last_hz=29", "precession.step_hz=1", "precession.hold_s=5"),
+    "limit": ("limit.repetitions=2",),
+    "trace": (),
+    "field": (),
+}
 
 
 @dataclass
@@ -44,7 +51,7 @@ class Desk:
     @property
     def about(self) -> dict[str, Any]:
         """What the page has to know at first."""
-        return {"experiments": EXPERIMENTS}
+        return {"experiments": [*EXPERIMENTS]}
 
     def address(self) -> Address | None:
         """Where it publishes; None until it is ready."""
@@ -65,7 +72,10 @@ class Desk:
 
     def carry_out(self, wanted: dict[str, Any]) -> int:
         """Send a command.  Returns its number.  Raises CommandRefused, BenchGone."""
-        return self.bench.command(command_of(wanted))
+        command = command_of(wanted)
+        if isinstance(command, RecordRun) and not command.settings:
+            command = command.model_copy(update={"settings": EXPERIMENTS.get(command.experiment, ())})
+        return self.bench.command(command)
 
 
 def scene_of_run(folder: Path) -> dict[str, Any] | None:
