@@ -32,9 +32,9 @@ def main() -> None:
             until(page, "levilab.data.bench?.last.spin_frequency_hz && levilab.space?.frames")
             page.select_option("#speed", "10")
             page.click("#record")
-            until(page, "levilab.data.count >= 9 && levilab.data.fit?.x.length")
+            until(page, "levilab.data.count >= 1")
             page.select_option("#speed", "1")
-            page.wait_for_timeout(3000)
+            until(page, "levilab.data.count >= 20 && levilab.data.fit?.solid_to > 25")
             page.screenshot(path=str(Path(__file__).with_suffix(".png")))
             browser.close()
         finally:

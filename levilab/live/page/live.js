@@ -44,7 +44,10 @@ function take(head, arrays) {
     practice?.hear(one);
     if (/message|refused|ended/.test(one.kind) && data.about?.status !== "running") listEvent("", one.text, one.kind === "message" ? "" : "warning");
   }
-  if (head.about) data.about = head.about;
+  if (head.about) {
+    if (data.about && data.about.status !== head.about.status) listRuns(seen.run);
+    data.about = head.about;
+  }
   if (head.readings) takeReadings(head.readings, arrays);
   if (head.events) takeEvents(head.events);
   if (head.fit) takeFit(head.fit, arrays);
