@@ -43,7 +43,7 @@ def processes(root: int) -> dict[str, float]:
     return found
 
 
-def measure(page, seconds: float, server) -> dict[str, float]:  # noqa: ANN001
+def measure(page, seconds: float, server) -> dict[str, float]:
     """Frames and CPU time over some seconds."""
     begin, cpu, own = time.monotonic(), processes(os.getpid()), server()
     frames, drawn = page.evaluate("[levilab.frames, levilab.space?.frames ?? levilab.drawn]")
@@ -86,7 +86,7 @@ def main() -> None:
         page.write_text(f"{before}{BEGIN}\n{table}\n{END}{rest.partition(END)[2]}", encoding="utf-8")
 
 
-def practice(browser, out: Path, seconds: float) -> dict[str, float]:  # noqa: ANN001
+def practice(browser, out: Path, seconds: float) -> dict[str, float]:
     """The top in motion, records twice a second."""
     import subprocess
 
@@ -108,7 +108,7 @@ def practice(browser, out: Path, seconds: float) -> dict[str, float]:  # noqa: A
         process.wait()
 
 
-def million(browser, out: Path, seconds: float) -> dict[str, float]:  # noqa: ANN001
+def million(browser, out: Path, seconds: float) -> dict[str, float]:
     """Readings that grow while they are looked at; the server is a thread of this process here."""
     run = GrowingRun(out)
     n, over = 1_000_000, threading.Event()

@@ -1,6 +1,6 @@
 """Make docs/pictures/live.png: the bench for practice while it records a spin-down, at 1280 × 800.
 
-    python docs/pictures/live.py
+python docs/pictures/live.py
 """
 
 from __future__ import annotations

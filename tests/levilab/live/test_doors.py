@@ -12,6 +12,7 @@ from support.live_pages import GrowingRun, address, serving
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
     from levilab.live.server import Hall
 
 HERE = b"127.0.0.1:8765"
