@@ -26,7 +26,7 @@ SLOW = """
     levilab/acquisition/experiments/test_trace.py  levilab/acquisition/test_loop.py
     levilab/acquisition/test_losses.py
     levilab/benchmark  levilab/cli/test_main.py  levilab/cli/test_sweep.py  levilab/crosscheck
-    levilab/formats/waveforms/test_memory.py  levilab/motion  levilab/notebook
+    levilab/formats/waveforms/test_memory.py  levilab/live  levilab/motion  levilab/notebook
     levilab/pipelines/spindown  levilab/pipelines/test_result.py
     levilab/report/test_page.py
     levilab/runs/test_hostile.py  levilab/runs/test_kill.py

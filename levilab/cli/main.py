@@ -207,6 +207,18 @@ def bench() -> typer.Typer:
     return bench_app
 
 
+@app.command(cls=Later, epilog="Example: levilab live --mock")
+def live() -> Callable[..., None]:
+    """The bench in a web browser: a run as it grows, a finished one, or with --mock a bench to play with.
+
+    A view only, in a process of its own: a run goes on when it is closed, and it can be opened again at any time.  No
+    program of another machine reaches it.  Needs the extra live: pip install "levilab[live]".
+    """
+    from levilab.cli.live import live
+
+    return live
+
+
 @app.command(cls=Later)
 def benchmark() -> typer.Typer:
     """Speed against error, with other programs beside."""

@@ -4,7 +4,7 @@
         page.goto(path.as_uri())
         assert page.get_by_role("heading", name="Readings").is_visible()
 
-``page`` is 1280 × 800 in light colours; ``watched(viewport=PHONE, color_scheme="dark")`` opens others of any kind.  Each
+``page`` is 1280 × 800 in light colours; ``watched(viewport=PHONE, color_scheme="dark")`` opens others.  Each
 fails the test at its end if the page has written an error to the console, raised one, or asked for anything that is not
 on this machine.  A module may share a page in a fixture of its own:
 
@@ -87,6 +87,12 @@ def executable() -> str | None:
 _loops: list[asyncio.AbstractEventLoop] = []
 
 
+def _enter_loop() -> None:
+    """Mark Playwright's loop as the running one: what is closed late is closed after another's test, or after all."""
+    if _loops:
+        asyncio._set_running_loop(_loops[0])
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, bool | None, bool | None]:
     """A test that has the browser among its fixtures runs in Playwright's event loop, other tests in their own.
@@ -114,9 +120,9 @@ def browser() -> Iterator[Browser]:
     try:
         with playwright.chromium.launch(executable_path=path, args=list(FLAGS), timeout=PATIENCE_MS) as chromium:
             yield chromium
-            asyncio._set_running_loop(_loops[0])  # the last test of the worker may have been another's
+            _enter_loop()
     finally:
-        asyncio._set_running_loop(_loops[0])
+        _enter_loop()
         playwright.stop()
         _loops.clear()
         asyncio._set_running_loop(None)
@@ -160,6 +166,7 @@ def watch(browser: Browser, **options: Any) -> Iterator[Page]:
     try:
         yield page
     finally:
+        _enter_loop()
         context.close()
     assert problems == []
 

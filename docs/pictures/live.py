@@ -1,0 +1,46 @@
+"""Make docs/pictures/live.png: the bench for practice while it records a spin-down, at 1280 × 800.
+
+python docs/pictures/live.py
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT)]
+
+from support.browser import DESK, FLAGS, executable  # noqa: E402
+from support.live_pages import until  # noqa: E402
+
+
+def main() -> None:
+    """Start the bench, record, and take the picture once there is a fit."""
+    from playwright.sync_api import sync_playwright
+
+    with tempfile.TemporaryDirectory() as out, sync_playwright() as playwright:
+        words = [sys.executable, "-m", "levilab", "live", "--mock", "--no-open", "--port", "0", "--out", out]
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, cwd=ROOT)  # noqa: S603
+        assert process.stdout is not None
+        try:
+            browser = playwright.chromium.launch(executable_path=executable(), args=list(FLAGS))
+            page = browser.new_page(viewport=DESK)
+            page.goto(process.stdout.readline().strip())
+            until(page, "levilab.data.bench?.last.spin_frequency_hz && levilab.space?.frames")
+            page.select_option("#speed", "10")
+            page.click("#record")
+            until(page, "levilab.data.count >= 1")
+            page.select_option("#speed", "1")
+            until(page, "levilab.data.count >= 20 && levilab.data.fit?.solid_to > 25")
+            page.screenshot(path=str(Path(__file__).with_suffix(".png")))
+            browser.close()
+        finally:
+            process.terminate()
+            process.wait()
+
+
+if __name__ == "__main__":
+    main()

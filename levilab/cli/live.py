@@ -1,0 +1,44 @@
+"""The live view.  Heavy imports happen inside the command."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from levilab.cli import exit_codes
+from levilab.cli.output import message, result
+
+
+def live(
+    run: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[RUN]", readable=False, help="A run folder.", show_default="the newest, one that is running first"
+        ),
+    ] = None,
+    mock: Annotated[bool, typer.Option("--mock", help="A virtual bench to play with, and to record runs on.")] = False,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="The folder with the runs.")] = Path("runs"),
+    port: Annotated[
+        int, typer.Option(metavar="N", min=0, max=65535, help="Of the loopback address; 0: any that is free.")
+    ] = 8765,
+    no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser: print the address only.")] = False,
+) -> None:
+    """Serve the view until Ctrl-C."""
+    from levilab.live.graphics import three_js
+
+    three_js()  # raises where the extra is not installed
+    from levilab.live.serve import LiveOptions, serve_live
+
+    def announce(address: str) -> None:
+        result(address)
+        message("Ctrl-C ends the view" + (" and the bench for practice" if mock else "; a run goes on without it"))
+        if not no_open:
+            import webbrowser
+
+            webbrowser.open(address)
+
+    try:
+        serve_live(LiveOptions(run, out, mock, port), announce)
+    except KeyboardInterrupt:
+        message("levilab: the view is closed")
+        raise typer.Exit(exit_codes.INTERRUPTED) from None

@@ -1,0 +1,72 @@
+"""Which run is shown: the one that is named, else the newest that is running, else the newest."""
+
+from __future__ import annotations
+
+import heapq
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from levilab.errors import DataError
+from levilab.runs.run import RECORD, Run
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+#: Runs to choose from.
+MOST_RUNS = 50
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A run to choose.
+
+    Attributes:
+        name: of its folder.
+        status: as of the run; "unreadable" where its record cannot be read.
+    """
+
+    name: str
+    status: str
+    experiment: str = ""
+    started_utc: str = ""
+    note: str = ""
+
+
+def run_names(root: Path) -> list[str]:
+    """Names of the newest runs in a folder, newest first: names begin with the time.  None where there is no folder."""
+    return heapq.nlargest(MOST_RUNS, _names(root))
+
+
+def _names(root: Path) -> Iterator[str]:
+    try:
+        with os.scandir(root) as entries:
+            for entry in entries:
+                if not entry.name.startswith(".") and os.path.isfile(os.path.join(root, entry.name, RECORD)):  # noqa: PTH113, PTH118 - of ten thousand folders
+                    yield entry.name
+    except OSError:
+        return
+
+
+def choices(root: Path) -> list[Choice]:
+    """The newest runs, newest first."""
+    return [_choice(root / name) for name in run_names(root)]
+
+
+def _choice(folder: Path) -> Choice:
+    try:
+        run = Run.load(folder)
+    except DataError:
+        return Choice(folder.name, "unreadable")
+    record = run.record
+    return Choice(folder.name, run.status, record.experiment, record.started_utc or "", record.note[:200])
+
+
+def newest(found: list[Choice]) -> str | None:
+    """The name of the newest run that is running, else of the newest that can be read."""
+    for wanted in ("running", None):
+        for one in found:
+            if one.status == wanted or (wanted is None and one.status != "unreadable"):
+                return one.name
+    return found[0].name if found else None

@@ -1,0 +1,96 @@
+"""The bench for practice as the server holds it: commands go to it, and what it says is kept for the pages."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import LevilabError
+from levilab.live.practice.commands import RecordRun, command_of
+from levilab.motion.animation.parts import parts_of
+from levilab.runs.run import read_record
+from levilab.simulator.scene import read_scene, scene_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from levilab.live.practice.bench import PracticeBench
+    from levilab.telemetry.address import Address
+
+#: What is kept of what the bench says.
+_MOST_SAID = 100
+_LONGEST_TEXT = 600
+#: What a student can record, the experiment of the guide first, and settings that take some minutes of the bench at
+#: most: the usual ones are those of a laboratory, which has the time.
+EXPERIMENTS = {
+    "spin": ("spin.drive_frequency_hz=34", "spin.ramp_hz_per_s=0.1", "spin.hold_s=5", "spin.interval_s=2"),
+    "precession": ("precession.first_hz=32", "precession.last_hz=29", "precession.step_hz=1", "precession.hold_s=5"),
+    "limit": ("limit.repetitions=2",),
+    "trace": (),
+    "field": (),
+}
+
+
+@dataclass
+class Desk:
+    """A bench for practice, and what it has said.
+
+    Attributes:
+        bench: which the command starts and ends.
+        count: of what it has said.
+        said: the latest of that.
+        scene: of its top, None until it is ready.
+    """
+
+    bench: PracticeBench
+    count: int = 0
+    said: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=_MOST_SAID))
+    scene: dict[str, Any] | None = None
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What the page has to know at first."""
+        return {"experiments": [*EXPERIMENTS]}
+
+    def address(self) -> Address | None:
+        """Where it publishes; None until it is ready."""
+        return self.bench.address
+
+    def step(self) -> None:
+        """Hear what is new."""
+        for event in self.bench.events():
+            self.count += 1
+            if event.kind == "ready":
+                self.scene = event.scene
+            self.said.append({"n": self.count, "kind": event.kind, "text": event.text[:_LONGEST_TEXT]})
+
+    def said_after(self, number: object) -> list[dict[str, Any]]:
+        """Return what was said after that of a number."""
+        after = number if type(number) is int and number <= self.count else 0
+        return [one for one in self.said if one["n"] > after]
+
+    def carry_out(self, wanted: dict[str, Any]) -> int:
+        """Send a command.  Returns its number.  Raises CommandRefused, BenchGone."""
+        command = command_of(wanted)
+        if isinstance(command, RecordRun) and not command.settings:
+            command = command.model_copy(update={"settings": EXPERIMENTS.get(command.experiment, ())})
+        return self.bench.command(command)
+
+
+def scene_of_run(folder: Path) -> dict[str, Any] | None:
+    """The scene in a run's record; None where there is none."""
+    try:
+        scene = read_record(folder).configuration.get("scene")
+    except LevilabError:
+        return None
+    return scene if isinstance(scene, dict) else None
+
+
+def parts_for(scene: dict[str, Any] | None) -> dict[str, Any]:
+    """What is drawn of a scene; where none is known, of the one for practice."""
+    try:
+        known = scene_of(scene) if scene else read_scene("practice")
+    except LevilabError:
+        known = read_scene("practice")
+    return parts_of(known)

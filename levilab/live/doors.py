@@ -1,0 +1,92 @@
+"""Who may come in: pages that this server sent, opened at the loopback address, and nothing else.
+
+A page of another origin that a browser has open could otherwise read a run (DNS rebinding: its name is made to point to
+127.0.0.1) or give commands to the bench for practice.  So the head of each request must name this server as its host,
+a socket must be opened by a page of this server, and a command must carry the token that stands in the address which
+the terminal shows.
+"""
+
+from __future__ import annotations
+
+import hmac
+import secrets
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+#: Names of this machine for itself.
+HERE = ("127.0.0.1", "localhost")
+#: What a page may load, by the name of the page.  Nothing in it is inline, and nothing comes from elsewhere.
+PAGE_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; font-src 'none'; "
+    "connect-src 'self' {sockets}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+#: A report has its style and script inside; as a page of no origin it can ask this server for nothing.
+REPORT_POLICY = (
+    "sandbox allow-scripts allow-popups; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src data:; font-src data:; base-uri 'none'; form-action 'none'"
+)
+_ALWAYS = {
+    "cache-control": "no-store",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "referrer-policy": "no-referrer",
+    "x-content-type-options": "nosniff",
+}
+
+
+@dataclass(frozen=True)
+class Doors:
+    """Where this server is, and the token of its commands.
+
+    Attributes:
+        port: at the loopback address.
+        token: of commands.
+    """
+
+    port: int
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(18))
+
+    @property
+    def hosts(self) -> frozenset[str]:
+        """What the head of a request may name as its host."""
+        named = {f"{host}:{self.port}" for host in HERE}
+        return frozenset(named | set(HERE) if self.port == 80 else named)
+
+    def lets_in(self, headers: Iterable[tuple[bytes, bytes]], *, is_socket: bool) -> bool:
+        """Whether a request comes from where it should.  A program that is no browser sends no origin."""
+        found = {name.lower(): value.decode("latin-1").lower() for name, value in headers}
+        if found.get(b"host") not in self.hosts:
+            return False
+        origin = found.get(b"origin")
+        return not is_socket or origin is None or origin in {f"http://{host}" for host in self.hosts}
+
+    def knows(self, token: object) -> bool:
+        """Whether a command carries the token."""
+        return isinstance(token, str) and hmac.compare_digest(token.encode(), self.token.encode())
+
+    def headers(self, policy: str = PAGE_POLICY) -> dict[str, str]:
+        """What goes with each answer."""
+        sockets = " ".join(f"ws://{host}" for host in sorted(self.hosts))
+        return _ALWAYS | {"content-security-policy": policy.replace("{sockets}", sockets)}
+
+
+class Guard:
+    """ASGI: turns away what may not come in, before anything else sees it."""
+
+    def __init__(self, app: Any, doors: Doors) -> None:
+        self.app, self.doors = app, doors
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        """Pass a request on, or turn it away."""
+        kind = scope["type"]
+        if kind not in {"http", "websocket"} or self.doors.lets_in(scope["headers"], is_socket=kind == "websocket"):
+            await self.app(scope, receive, send)
+        elif kind == "websocket":
+            await receive()
+            await send({"type": "websocket.close", "code": 1008})
+        else:
+            await send({"type": "http.response.start", "status": 421, "headers": [(b"content-type", b"text/plain")]})
+            await send({"type": "http.response.body", "body": b"open the address that levilab live has printed\n"})

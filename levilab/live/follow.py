@@ -1,0 +1,181 @@
+"""A run folder as it grows: its record, readings and events, read beside the process that writes them."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import time
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.errors import DataError
+from levilab.formats.table import NO_READING
+from levilab.live.envelope import Envelope
+from levilab.live.tail import Tail
+from levilab.runs.run import EVENTS, READINGS, RECORD, Run, RunRecord
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+#: Events that are kept: of more, the first and the last ones matter, and the file has all.
+MOST_EVENTS = 400
+#: Longest text of an event that is shown.
+_MOST_CHARACTERS = 600
+#: Whether the process that writes is alive is looked up so often, since that takes its lock for a moment [s].
+_ALIVE_EVERY_S = 2.0
+#: One look reads for so long at most, so that frames do not wait; a long file takes several [s].
+LOOK_S = 0.025
+
+
+class Followed:
+    """A run folder, read as it grows.
+
+    Attributes:
+        folder: where it is.
+        record: what run.json says; None while it cannot be read.
+        status: as of `levilab.runs.run.Run`; "missing" while there is no record.
+        problem: why the record cannot be read, empty where it can.
+        columns: names in the head of readings.csv.
+        readings: all so far.
+        events: the latest, each with its number among all of them as ``n``.
+        event_count: of all.
+        version: grows when readings are there that were not before, or none any more.
+        behind: whether the last look ended before the end of the files.
+    """
+
+    def __init__(self, folder: Path, clock: Callable[[], float] = time.monotonic) -> None:
+        self.folder, self.clock = folder, clock
+        self.record: RunRecord | None = None
+        self.status, self.problem = "missing", ""
+        self.columns: tuple[str, ...] = ()
+        self.readings = Envelope(0)
+        self.events: deque[dict[str, Any]] = deque(maxlen=MOST_EVENTS)
+        self.event_count, self.version, self.behind = 0, 0, False
+        self._rows, self._lines = Tail(folder / READINGS), Tail(folder / EVENTS)
+        self._generations = (0, 0)
+        self._seen: tuple[int, int, int] | None = None
+        self._alive_again = -1.0
+
+    def look(self) -> None:
+        """Read what is new."""
+        end = self.clock() + LOOK_S
+        self._read_record()
+        self.behind = self._read_all(self._rows, self._take_rows, end) | self._read_all(
+            self._lines, self._take_events, end
+        )
+
+    def _read_all(self, tail: Tail, take: Callable[[list[bytes]], None], end: float) -> bool:
+        """Whether more is left when the time is over."""
+        while lines := tail.lines():
+            take(lines)
+            if self.clock() > end:
+                return True
+        return False
+
+    # --- run.json ---
+
+    def _read_record(self) -> None:
+        try:
+            about = os.stat(self.folder / RECORD)  # noqa: PTH116 - 20 times a second
+        except OSError:
+            self.status, self.problem = "missing", f"{self.folder}: there is no run.json"
+            self._seen = None
+            return
+        seen = (about.st_mtime_ns, about.st_size, about.st_ino)
+        now = self.clock()
+        if seen == self._seen and (self.status != "running" or now < self._alive_again):
+            return
+        self._seen, self._alive_again = seen, now + _ALIVE_EVERY_S
+        try:
+            run = Run.load(self.folder)
+        except DataError as error:
+            self.problem = str(error)
+            return
+        self.record, self.status, self.problem = run.record, run.status, ""
+
+    @property
+    def continued_in(self) -> Path | None:
+        """The folder in which this run went on, where this one was damaged under way."""
+        return Run(self.folder, self.record, "running").continued_in if self.record else None
+
+    # --- readings.csv ---
+
+    def _take_rows(self, lines: list[bytes]) -> None:
+        if self._rows.generation != self._generations[0]:
+            self._generations = (self._rows.generation, self._generations[1])
+            self.columns, self.readings = (), Envelope(0)
+            self.version += 1
+        if not self.columns:
+            self.columns = tuple(name.strip() for name in lines[0].decode("utf-8", "replace").split(","))
+            self.readings = Envelope(len(self.columns))
+            lines = lines[1:]
+        rows = numbers(lines, len(self.columns))
+        if len(rows):
+            self.readings.add(rows)
+            self.version += 1
+
+    # --- events.jsonl ---
+
+    def _take_events(self, lines: list[bytes]) -> None:
+        if self._lines.generation != self._generations[1]:
+            self._generations = (self._generations[0], self._lines.generation)
+            self.events.clear()
+            self.event_count = 0
+        for line in lines:
+            if line.strip():
+                self.event_count += 1
+                self.events.append(_event(line, self.event_count))
+
+    def texts_after(self, number: int) -> list[dict[str, Any]]:
+        """Return the events after one, of those that are kept."""
+        first = self.events[0]["n"] if self.events else 1
+        return list(itertools.islice(self.events, max(0, number + 1 - first), None))
+
+
+def numbers(lines: list[bytes], columns: int) -> NDArray[np.float64]:
+    """The values in lines of readings.csv, shape (n, columns); an empty field is NaN, a damaged line is left out.
+
+    >>> numbers([b"1,2.5", b"2,", b"3,x", b"4,5,6", b""], 2).tolist()
+    [[1.0, 2.5], [2.0, nan]]
+    """
+    try:
+        if all(line.count(b",") == columns - 1 for line in lines):
+            flat = [*map(float, b",".join(lines).split(b","))]
+            return _known(np.array(flat, dtype=np.float64).reshape(-1, columns))
+    except ValueError:  # an empty field, or a damaged line
+        pass
+    rows = []
+    for line in lines:
+        fields = line.split(b",")
+        try:
+            row = [float(field) if field.strip() else np.nan for field in fields]
+        except ValueError:
+            continue
+        if len(row) == columns and fields != [b""]:
+            rows.append(row)
+    return _known(np.array(rows, dtype=np.float64).reshape(-1, columns))
+
+
+def _known(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Numbers with which instruments say that they have no value are none; a row without a first value is left out."""
+    rows[~(np.abs(rows) < NO_READING)] = np.nan
+    return rows[~np.isnan(rows[:, 0])] if rows.shape[1] else rows
+
+
+def _event(line: bytes, number: int) -> dict[str, Any]:
+    """An event as the page shows it; what is damaged is shown as a damaged line."""
+    try:
+        event = json.loads(line)
+        time_s, kind, text = event["time_s"], str(event["kind"]), str(event["text"])
+        time_s = float(time_s) if time_s is not None else None
+    except (ValueError, KeyError, TypeError, RecursionError):
+        time_s, kind, text = None, "damaged", "a line of events.jsonl is damaged"
+    if time_s is not None and not np.isfinite(time_s):
+        time_s = None
+    return {"n": number, "time_s": time_s, "kind": kind[:60], "text": text[:_MOST_CHARACTERS]}

@@ -1,0 +1,74 @@
+// The connection to the server: the page asks for a frame, draws it, and asks for the next. Nothing queues.
+
+/** Head and arrays of a frame, as frame.py packs them. */
+export function unpack(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  const arrays = {};
+  for (const [name, [first, count]] of Object.entries(head.arrays)) {
+    arrays[name] = new Float32Array(buffer, 4 + length + first, count);
+  }
+  return {head, arrays};
+}
+
+/**
+ * Ask for frames until closed; after a break it tries again, at most every 5 s.
+ *
+ * @param {() => object} ask what the page has, and what it wants.
+ * @param {(head, arrays) => void} show draws a frame.
+ * @param {(open: boolean) => void} changed whether the server is there.
+ */
+export function connect({run, ask, show, changed}) {
+  let socket, closed = false, pause = 250, waiting = false;
+
+  function next() {
+    if (waiting || closed || socket.readyState !== WebSocket.OPEN) return;
+    waiting = true;
+    socket.send(JSON.stringify(ask()));
+  }
+
+  function open() {
+    if (closed) return;
+    socket = new WebSocket(`ws://${location.host}/frames?run=${encodeURIComponent(run)}`);
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => {
+      pause = 250;
+      waiting = false;
+      changed(true);
+      next();
+    };
+    socket.onmessage = ({data}) => {
+      waiting = false;
+      const {head, arrays} = unpack(data);
+      show(head, arrays);
+      // the browser draws first: a page in the background, which is not drawn, asks once a second
+      if (document.hidden) setTimeout(next, 1000);
+      else requestAnimationFrame(next);
+    };
+    socket.onclose = () => {
+      if (closed) return;
+      changed(false);
+      pause = Math.min(2 * pause, 5000);
+      setTimeout(open, pause);
+    };
+  }
+
+  open();
+  document.addEventListener("visibilitychange", () => next());
+  return () => {
+    closed = true;
+    socket.close();
+  };
+}
+
+/** Send a command to the bench for practice. Returns what is wrong with it, or "". */
+export async function command(wanted, token) {
+  try {
+    const answer = await fetch("do", {
+      method: "POST", body: JSON.stringify(wanted), headers: {"Content-Type": "application/json", "X-Levilab-Token": token},
+    });
+    return (await answer.json()).error || "";
+  } catch {
+    return "the server is gone: start levilab live again";
+  }
+}

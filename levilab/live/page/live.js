@@ -1,0 +1,436 @@
+// The live view: asks for frames and shows them. A view only: it may be closed and opened again at any time.
+
+import {command, connect} from "./connection.js";
+import {drawReadings, drawRecords, saidOf, sheet} from "./plot.js";
+import {openPractice} from "./practice.js";
+import {by, fixed, lapse, make, short, typeset, write} from "./words.js";
+
+/** Spoken news come at most so often [ms]. */
+const NEWS_EVERY_MS = 6000;
+/** Events in the list. */
+const MOST_EVENTS = 200;
+const STATES = {
+  none: "no run yet", running: "running", finished: "finished", interrupted: "interrupted", failed: "failed",
+  silent: "bench silent", lost: "instrument lost", missing: "no run", unreachable: "server gone", idle: "ready",
+};
+const SLIP_HZ = 0.05;  // a top that follows is counted this near to its drive
+
+const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, records: {}};
+const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, last: {}, count: 0, trend: NaN};
+const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
+let paused = false, drawn = null, pointed = -1, space = null, wanted = "", practice = null, reachable = true;
+let spoken = 0, close = null, dirty = {plot: true, trace: true};
+window.levilab = {frames: 0, drawn: 0, seen, data};  // what tests and benchmarks read
+
+// --- the address: a token after #, which never leaves the page, and stays for a reload ---
+
+const token = location.hash.slice(1) || sessionStorage.getItem("token") || "";
+if (token) sessionStorage.setItem("token", token);
+history.replaceState(null, "", location.pathname + location.search);
+
+// --- frames ---
+
+function take(head, arrays) {
+  window.levilab.frames += 1;
+  if (paused) {  // what comes meanwhile is not kept: the next frame after the pause has it all
+    seen.tick = head.tick;
+    return;
+  }
+  seen.tick = head.tick;
+  if (head.run !== seen.run) turnTo(head.run);
+  data.bench = head.bench;
+  for (const one of head.said) {
+    seen.said = one.n;
+    practice?.hear(one);
+    if (/message|refused|ended/.test(one.kind) && data.about?.status !== "running") listEvent("", one.text, one.kind === "message" ? "" : "warning");
+  }
+  if (head.about) {
+    if (data.about && data.about.status !== head.about.status) listRuns(seen.run);
+    data.about = head.about;
+  }
+  if (head.readings) takeReadings(head.readings, arrays);
+  if (head.events) takeEvents(head.events);
+  if (head.fit) takeFit(head.fit, arrays);
+  head.records.forEach((one, k) => {
+    seen.records[one.channel] = one.number;
+    data.records.set(one.channel, {...one, low: arrays[`low_${k}`], high: arrays[`high_${k}`]});
+    dirty.trace = true;
+  });
+  if (head.poses.length) takePoses(head.poses, arrays);
+  show();
+}
+
+function turnTo(run) {
+  Object.assign(seen, {run, readings: -1, events: 0, fit: -1});
+  Object.assign(data, {readings: null, fit: null, about: null, last: {}, count: 0, trend: NaN});
+  by("event-list").replaceChildren();
+  pointed = -1;
+  dirty = {plot: true, trace: true};
+  if (by("run").value !== run && run) listRuns(run);
+}
+
+function takeReadings(about, arrays) {
+  seen.readings = about.version;
+  Object.assign(data, {last: about.last, count: about.count, trend: about.trend});
+  data.readings = about.x ? {
+    x: arrays.reading_x, low: arrays.reading_low, high: arrays.reading_high, u: arrays.reading_u || null,
+    single: about.single, xAxis: about.x, yAxis: about.y,
+  } : null;
+  if (pointed >= (data.readings?.x.length ?? 0)) pointed = -1;
+  dirty.plot = true;
+}
+
+function takeFit(about, arrays) {
+  seen.fit = about.version;
+  data.fit = arrays.fit_x
+    ? {...about, x: arrays.fit_x, y: arrays.fit_y, band: arrays.fit_band, solid_to: about.solid_to ?? Infinity} : null;
+  typeset(by("fit-head"), about.head || "");
+  typeset(by("fit-lines"), (about.lines || []).join(" · "));
+  data.end = about.end_s ?? NaN;
+  dirty.plot = true;
+}
+
+function takeEvents(events) {
+  for (const event of events) {
+    if (event.n <= seen.events) continue;
+    seen.events = event.n;
+    const loud = /warning|damaged/.test(event.kind) ? "warning" : /lost|failed|not reached/.test(event.kind) ? "lost" : "";
+    listEvent(event.time_s === null ? "" : lapse(event.time_s).replace(" min", ""), event.text, loud);
+  }
+}
+
+function listEvent(when, text, loud) {
+  const list = by("event-list"), item = make("li", "", loud);
+  item.append(make("time", when), make("span", text));
+  list.prepend(item);
+  while (list.children.length > MOST_EVENTS) list.lastChild.remove();
+}
+
+function takePoses(pieces, arrays) {
+  if (!space) openTop();
+  for (const [k, piece] of pieces.entries()) {
+    seen.poses = piece.number;
+    space.add(piece.start_s, piece.step_s, arrays[`position_${k}`], arrays[`quaternion_${k}`], arrays[`up_${k}`]);
+  }
+}
+
+/** Load what draws three dimensions when the first poses have come, and not before. */
+async function openTop() {
+  const early = [];
+  space = {add: (...pieces) => early.length < 50 && early.push(pieces)};
+  document.body.classList.remove("no-top");
+  try {
+    const parts = await (await fetch(`parts?run=${encodeURIComponent(seen.run)}`)).json();
+    const {openSpace} = await import("./motion.js");
+    space = await openSpace(by("space"), parts);
+    for (const pieces of early) space.add(...pieces);
+    window.levilab.space = space;
+    space.setRate(Number(by("motion").value));
+  } catch (error) {
+    space = {add: () => {}};
+    by("no-space").hidden = false;
+    write("no-space", `This browser draws no three dimensions: ${error.message}`);
+  }
+  dirty = {plot: true, trace: true};
+}
+
+// --- what is shown ---
+
+function stateOf() {
+  const {about, bench} = data;
+  if (!reachable) return "unreachable";
+  if (bench?.lost?.length && !bench.silent) return "lost";
+  if (about?.status === "running" && bench?.silent) return "silent";
+  if (practice && !bench?.busy && (!about || about.status === "missing")) return bench && !bench.silent ? "idle" : "silent";
+  return about ? about.status : "none";
+}
+
+function show() {
+  const {about, bench, last} = data;
+  const state = stateOf();
+  document.body.dataset.state = state;
+  write("state-word", STATES[state] || state);
+  const lost = bench?.lost?.length ? `the ${bench.lost.join(" and the ")} does not answer` : "";
+  const running = about?.status === "running" || practice;
+  write("state-text", lost || (state === "unreachable" ? "it is tried again" : about?.problem || (running && !bench?.silent && bench?.text) || ""));
+  by("synthetic").hidden = !(about?.synthetic || (!about && bench?.virtual));
+  const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
+  write("elapsed", Number.isFinite(elapsed) ? lapse(elapsed) : "");
+  const left = about?.status !== "running" ? NaN : bench?.time_left_s ?? (Number.isFinite(data.end) ? data.end - last.time_s : NaN);
+  write("left", Number.isFinite(left) && left >= 0 ? `about ${lapse(left)} left` : "");
+  showBar(about, bench);
+  showCounter(bench, last);
+  showGenerator(bench, last);
+  showMagnetometer(bench, last);
+  showFacts(about);
+  document.body.classList.toggle("no-scope", !data.records.size && !practice && Boolean(about) && about.status !== "running");
+  write("count", data.count ? `${data.count.toLocaleString("en").replaceAll(",", "\u202f")}${data.readings?.single === false ? ", each stroke from the lowest to the highest of many" : ""}` : "");
+  by("empty").hidden = data.count > 0;
+  write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: "No run yet: the guide says how to record one."}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
+  document.title = `${state === "running" && data.count ? `${data.count} readings · ` : ""}levilab live`;
+  practice?.show(bench, about, data.count);
+  space?.setSpeed?.(bench?.speed, bench?.paused || bench?.silent);
+  showTop(bench);
+  speak(state, left);
+}
+
+function showBar(about, bench) {
+  const share = about?.status === "running" || practice ? bench?.share : null;
+  by("bar").hidden = !Number.isFinite(share);
+  if (!Number.isFinite(share)) return;
+  by("bar").firstElementChild.style.width = `${100 * share}%`;
+  by("bar").setAttribute("aria-valuenow", String(Math.round(100 * share)));
+}
+
+const stale = (id, is) => by(id).closest(".display").classList.toggle("stale", is);
+
+function showCounter(bench, last) {
+  const live = bench && !bench.silent ? bench.last : {};
+  const spin = live.spin_frequency_hz ?? last.spin_frequency_hz ?? live.spin_seen_hz ?? last.spin_seen_hz;
+  write("spin-value", Number.isFinite(spin) ? spin.toFixed(4) : "––.––––");
+  stale("spin-value", !bench || bench.silent);
+  const trend = data.trend;
+  const much = Math.abs(trend) >= 0.0005;
+  write("trend", Number.isFinite(trend) ? `${much ? (trend < 0 ? "↓ " : "↑ ") : "→ "}${fixed(trend, 4)} Hz/s` : "–");
+  const counting = bench?.counting ?? data.about?.settings?.counter;
+  write("gate", Number.isFinite(counting?.gate_s) ? `${short(counting.gate_s)} s` : "–");
+  write("trigger", Number.isFinite(counting?.trigger_level_v) ? `${short(counting.trigger_level_v)} V${counting.input ? `, input ${counting.input}` : ""}` : "–");
+  write("counter-model", modelOf("counter"));
+}
+
+function showGenerator(bench, last) {
+  const drive = bench?.drive ?? data.about?.settings?.generator;
+  write("drive-value", drive?.frequency_hz ? drive.frequency_hz.toFixed(4) : Number.isFinite(last.drive_frequency_hz) ? last.drive_frequency_hz.toFixed(4) : "––.––––");
+  stale("drive-value", !drive?.output || !bench || bench.silent);
+  write("drive-on", drive?.output ? "on" : "off");
+  by("drive-on").classList.toggle("on", Boolean(drive?.output));
+  write("signal", drive?.waveform ? `${drive.waveform}, ${short(drive.amplitude_vpp)} Vpp${drive.offset_v ? `, offset ${short(drive.offset_v)} V` : ""}` : "–");
+  const spin = bench?.last?.spin_frequency_hz;
+  const off = Number.isFinite(spin) && drive?.output ? spin - drive.frequency_hz : NaN;
+  write("lock", Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? "follows" : "beside it"}, ${off >= 0 ? "+" : ""}${fixed(off, 4)} Hz` : "–");
+  write("generator-model", modelOf("generator"));
+}
+
+function showMagnetometer(bench, last) {
+  const field = bench?.last?.flux_density_t ?? last.flux_density_t;
+  write("field-value", Number.isFinite(field) ? fixed(field * 1000, 3) : "–");
+  stale("field-value", !bench || bench.silent);
+  write("probe", Number.isFinite(bench?.probe_m) ? `${short(bench.probe_m * 100)} cm above the base` : Number.isFinite(last.height_m) ? `${short(last.height_m * 100)} cm above the base` : "–");
+  write("magnetometer-model", modelOf("magnetometer"));
+  write("scope-model", modelOf("oscilloscope"));
+}
+
+/** The model of an instrument: the second word of what it answers to *IDN?. */
+function modelOf(kind) {
+  const about = data.about?.instruments?.[kind];
+  return about ? (about.identity || "").split(",")[1]?.trim() || about.driver || "" : "";
+}
+
+let facts = "";
+function showFacts(about) {
+  const rows = about ? [
+    ["experiment", about.experiment], ["started", (about.started_utc || "").replace("T", " ").replace(/\..*/, " UTC")],
+    ["ended", (about.ended_utc || "").replace("T", " ").replace(/\..*/, " UTC")], ["note", about.note],
+    ...Object.entries(about.instruments || {}).map(([kind, one]) => [kind, one.identity || one.driver]),
+    ["folder", seen.run],
+  ].filter(([, text]) => text) : [];
+  const now = JSON.stringify(rows);
+  if (now === facts) return;
+  facts = now;
+  by("facts").replaceChildren(...rows.map(([what, text]) => {
+    const row = make("div");
+    row.append(make("dt", what), make("dd", text));
+    return row;
+  }));
+}
+
+function showTop(bench) {
+  const pose = space?.state;
+  if (!pose) return;
+  const height = `at ${fixed(pose.place[2] * 1000, 1)} mm`;
+  write("top-text", pose.up ? `floats ${height}` : "does not float");
+  by("space").setAttribute("aria-label", `the top over its base in three dimensions: it ${pose.up ? `floats ${height}` : "does not float"}`);
+}
+
+/** Say the last reading to those who listen, at most every few seconds. */
+function speak(state, left) {
+  const now = performance.now();
+  if (now - spoken < NEWS_EVERY_MS) return;
+  const spin = data.last.spin_frequency_hz;
+  const text = data.count ? `${STATES[state] || state}: reading ${data.count}${Number.isFinite(spin) ? `, ${spin.toFixed(2)} hertz` : ""}${Number.isFinite(left) ? `, about ${lapse(left)} left` : ""}` : STATES[state] || state;
+  if (by("news").textContent !== text) {
+    spoken = now;
+    write("news", text);
+  }
+}
+
+function draw() {
+  requestAnimationFrame(draw);
+  if (document.hidden) return;
+  if (dirty.plot) {
+    dirty.plot = false;
+    if (data.readings) {
+      drawn = drawReadings(papers.plot, {...data.readings, fit: data.fit}, pointed);
+      const said = `${data.count} readings of the ${data.readings.yAxis[0]} against ${data.readings.xAxis[0]}`;
+      by("plot").setAttribute("aria-label", pointed >= 0 ? `${said}: ${saidOf({...data.readings, fit: data.fit}, drawn, pointed)}` : `${said}; the arrow keys go from one to the next`);
+      window.levilab.drawn += 1;
+    } else papers.plot.fit();
+    showPointer();
+  }
+  if (dirty.trace) {
+    dirty.trace = false;
+    by("trace").setAttribute("aria-label", drawRecords(papers.trace, [...data.records.values()]));
+  }
+}
+
+// --- the pointer in the readings ---
+
+function point(k, aloud = false) {
+  if (k === pointed) return;
+  pointed = k;
+  dirty.plot = true;
+  if (aloud && drawn && k >= 0) write("news", saidOf({...data.readings, fit: data.fit}, drawn, k));
+}
+
+function showPointer() {
+  const label = by("pointer");
+  if (pointed < 0 || !drawn || !data.readings) {
+    label.style.visibility = "hidden";
+    return;
+  }
+  write("pointer", saidOf({...data.readings, fit: data.fit}, drawn, pointed));
+  const [x, y] = drawn.place(pointed);
+  const wide = label.offsetWidth;
+  label.style.left = `${Math.min(Math.max(x + 14, 4), by("plot").offsetLeft + drawn.width - wide - 8)}px`;
+  label.style.top = `${by("plot").offsetTop + Math.max(y - 34, 2)}px`;
+  label.style.visibility = "visible";
+}
+
+by("plot").addEventListener("pointermove", (event) => drawn && point(drawn.nearest(event.offsetX)));
+by("plot").addEventListener("pointerleave", () => point(-1));
+by("plot").addEventListener("keydown", (event) => {
+  const steps = {ArrowLeft: -1, ArrowRight: 1, PageUp: -10, PageDown: 10, Home: -1e9, End: 1e9}[event.key];
+  const n = data.readings?.x.length ?? 0;
+  if (!steps || !n) return;
+  event.preventDefault();
+  point(Math.min(Math.max((pointed < 0 ? (steps < 0 ? n : -1) : pointed) + steps, 0), n - 1), true);
+});
+by("space").addEventListener("keydown", (event) => {
+  const angle = {ArrowLeft: -0.15, ArrowRight: 0.15}[event.key];
+  if (angle) {
+    event.preventDefault();
+    space?.turn?.(angle);
+  }
+});
+
+// --- controls ---
+
+function pause() {
+  paused = !paused;
+  by("pause").setAttribute("aria-pressed", String(paused));
+  write("pause", paused ? "Go on" : "Pause view");
+  space?.pause?.(paused);
+}
+by("pause").addEventListener("click", pause);
+by("help").addEventListener("click", () => by("keys").showModal());
+by("latest").addEventListener("change", () => { seen.readings = seen.tick = -1; });
+by("motion").addEventListener("change", () => space?.setRate?.(Number(by("motion").value)));
+by("run").addEventListener("change", () => {
+  wanted = by("run").value;
+  history.replaceState(null, "", wanted && !practice ? `?run=${encodeURIComponent(wanted)}` : location.pathname);
+  open(wanted);
+});
+
+const KEYS = {
+  " ": pause,
+  "?": () => by("keys").showModal(),
+  m: () => {
+    const select = by("motion");
+    select.selectedIndex = (select.selectedIndex + 1) % select.options.length;
+    select.dispatchEvent(new Event("change"));
+  },
+  d: () => practice?.act("drive"), f: () => practice?.act("match"), b: () => practice?.act("back"), p: () => practice?.act("hold"), r: () => practice?.act("record"),
+  ".": () => practice?.step(0.05), ",": () => practice?.step(-0.05), ":": () => practice?.step(0.5), ">": () => practice?.step(0.5),
+  ";": () => practice?.step(-0.5), "<": () => practice?.step(-0.5),
+};
+document.addEventListener("keydown", (event) => {
+  const typing = event.target.closest?.("input:not([type=checkbox]):not([type=range]), select, textarea, dialog[open]");
+  const pressing = event.key === " " && event.target.closest?.("button, a, input, [role=button]");
+  if (typing || pressing || event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.key]) return;
+  event.preventDefault();
+  KEYS[event.key]();
+});
+
+// --- the server ---
+
+function ask() {
+  const columns = Math.max(1, Math.round(by("plot").clientWidth - 70));
+  const about = {...seen, columns, latest: by("latest").checked};
+  return paused ? {run: seen.run, tick: seen.tick, readings: seen.readings, events: seen.events, fit: seen.fit, poses: seen.poses, said: seen.said} : about;
+}
+
+function open(run) {
+  close?.();
+  Object.assign(seen, {run: null, tick: -1, poses: 0, records: {}});
+  data.records.clear();
+  data.bench = null;
+  close = connect({
+    run, ask, show: take,
+    changed: (is) => {
+      reachable = is;
+      if (is) Object.assign(seen, {tick: -1, poses: 0});
+      else show();
+    },
+  });
+}
+
+let listed = null;
+async function listRuns(chosen) {
+  const response = await fetch("runs");
+  listed = await response.json();
+  const select = by("run");
+  select.replaceChildren(...listed.runs.map((run) => {
+    const when = run.started_utc.slice(0, 16).replace("T", " ");
+    const option = make("option", `${when} ${run.experiment || run.name}${run.status === "finished" ? "" : `, ${run.status}`}`);
+    option.value = run.name;
+    return option;
+  }));
+  if (!listed.runs.length) select.append(make("option", "none yet"));
+  select.value = chosen || select.value;
+  return listed;
+}
+by("run").addEventListener("focus", () => listRuns(by("run").value));
+
+async function begin() {
+  const asked = new URLSearchParams(location.search).get("run");
+  const {practice: bench, first} = await listRuns(asked || "");
+  document.body.classList.add("no-top");
+  if (bench) {
+    document.body.classList.remove("no-top");
+    practice = openPractice(bench, (wanted) => command(wanted, token), () => seen.run, Boolean(token));
+  }
+  by("keys").classList.toggle("for-practice", Boolean(bench));
+  for (const row of document.querySelectorAll(".practice-key")) row.hidden = !bench;
+  wanted = bench ? "" : asked || first;
+  if (wanted) by("run").value = wanted;
+  open(wanted);
+  if (!wanted && !bench) waitForRun();
+}
+
+/** While there is no run: look for one every two seconds. */
+function waitForRun() {
+  show();
+  const timer = setInterval(async () => {
+    const {first} = await listRuns("").catch(() => ({first: ""}));
+    if (!first) return;
+    clearInterval(timer);
+    by("run").value = first;
+    open(first);
+  }, 2000);
+}
+
+new ResizeObserver(() => { dirty = {plot: true, trace: true}; }).observe(by("plot"));
+new ResizeObserver(() => { dirty.trace = true; }).observe(by("trace"));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { dirty = {plot: true, trace: true}; });
+requestAnimationFrame(draw);
+begin();

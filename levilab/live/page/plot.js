@@ -1,0 +1,286 @@
+// Pictures of readings and of records on a canvas. They are drawn when there is something new, and not otherwise.
+
+import {colours, fixed, short} from "./words.js";
+
+/** Without a graphics card an accelerated canvas costs four times as much as one in memory. */
+export const SOFTWARE = (() => {
+  const gl = document.createElement("canvas").getContext("webgl");
+  if (!gl) return true;
+  const about = gl.getExtension("WEBGL_debug_renderer_info");
+  const renderer = about ? String(gl.getParameter(about.UNMASKED_RENDERER_WEBGL)) : "";
+  gl.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer);
+})();
+
+const FONT = '12px system-ui, "Segoe UI", Roboto, "Helvetica Neue", "DejaVu Sans", sans-serif';
+
+/** A canvas that has as many pixels as it is shown with. */
+export function sheet(canvas) {
+  const context = canvas.getContext("2d", {willReadFrequently: SOFTWARE});
+  return {
+    canvas, context,
+    fit() {
+      const ratio = SOFTWARE ? 1 : Math.min(devicePixelRatio || 1, 2);
+      const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+      const [w, h] = [Math.max(1, Math.round(width * ratio)), Math.max(1, Math.round(height * ratio))];
+      if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
+      context.setTransform(ratio, 0, 0, ratio, 0, 0);
+      context.clearRect(0, 0, width, height);
+      context.font = FONT;
+      return [width, height];
+    },
+  };
+}
+
+/** Round numbers from low to high, about so many. */
+export function ticks(low, high, count) {
+  if (!(high > low)) return [low];
+  const raw = (high - low) / Math.max(count, 1), power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= raw * 0.999);
+  const found = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k += 1) found.push(k * step);
+  return found;
+}
+
+const decimals = (marks) => marks.length < 2 ? 2 : Math.max(0, Math.min(6, -Math.floor(Math.log10(marks[1] - marks[0]) + 1e-9)));
+
+function extent(arrays, share) {
+  let low = Infinity, high = -Infinity;
+  for (const array of arrays) {
+    for (const value of array) {
+      if (value < low) low = value;
+      if (value > high) high = value;
+    }
+  }
+  if (!(high >= low)) return [0, 1];
+  const more = share * (high - low) || Math.abs(high) * 1e-3 || 1;
+  return [low - more, high + more];
+}
+
+/** The value of a curve at x, between its points; NaN beside it. */
+export function at(xs, ys, x) {
+  let low = 0, high = xs.length - 1;
+  if (!(xs.length && x >= xs[0] && x <= xs[high])) return NaN;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (xs[middle] <= x) low = middle;
+    else high = middle;
+  }
+  const share = xs[high] > xs[low] ? (x - xs[low]) / (xs[high] - xs[low]) : 0;
+  return ys[low] + share * (ys[high] - ys[low]);
+}
+
+const LEFT = 58, RIGHT = 12, TOP = 8, BOTTOM = 34, GAP = 10;
+
+/**
+ * Draw readings with their running fit, and below them what the fit leaves over.
+ *
+ * @param data x, low, high (arrays in SI), u (or null), single, xAxis and yAxis ([label, unit, factor]), colour, and the
+ *   fit: {x, y, band, solid_to}, or null.
+ * @param {number} pointed which reading is pointed at, −1 for none.
+ * @returns where things are: {place(k): [x, y], nearest(px): k, width}.
+ */
+export function drawReadings(paper, data, pointed) {
+  const paint = colours(), {context: c} = paper;
+  const [width, height] = paper.fit();
+  const {x, low, high, u, fit} = data, n = x.length;
+  const [fx, fy] = [data.xAxis[2], data.yAxis[2]];
+  const below = fit ? Math.max(54, 0.22 * (height - TOP - BOTTOM)) : 0;
+  const bottom = height - BOTTOM, split = bottom - (fit ? below + GAP : 0);
+
+  const xs = extent(fit ? [x, fit.x] : [x], 0.02), ys = extent(fit ? [low, high, fit.y] : [low, high], 0.06);
+  const toX = (value) => LEFT + (value - xs[0]) / (xs[1] - xs[0]) * (width - LEFT - RIGHT);
+  const toY = (value) => split - (value - ys[0]) / (ys[1] - ys[0]) * (split - TOP);
+
+  const left = new Float32Array(n), leftLow = new Float32Array(n), leftHigh = new Float32Array(n);
+  if (fit) {
+    for (let k = 0; k < n; k += 1) {
+      const there = at(fit.x, fit.y, x[k]);
+      left[k] = (low[k] + high[k]) / 2 - there;
+      leftLow[k] = low[k] - there - (u ? u[k] : 0);
+      leftHigh[k] = high[k] - there + (u ? u[k] : 0);
+    }
+  }
+  const reach = fit ? 1.15 * Math.max(...extent([leftLow.filter(Number.isFinite), leftHigh.filter(Number.isFinite)], 0).map(Math.abs), 1e-9) : 1;
+  const middle = bottom - below / 2, toLeft = (value) => middle - value / reach * below / 2;
+
+  // axes
+  c.lineWidth = 1;
+  c.fillStyle = paint.soft;
+  c.strokeStyle = paint.grid;
+  c.textBaseline = "middle";
+  const xMarks = ticks(xs[0] * fx, xs[1] * fx, width / 90), yMarks = ticks(ys[0] * fy, ys[1] * fy, split / 46);
+  line(c, xMarks.flatMap((mark) => [[toX(mark / fx), TOP, toX(mark / fx), bottom]]));
+  line(c, yMarks.flatMap((mark) => [[LEFT, toY(mark / fy), width - RIGHT, toY(mark / fy)]]));
+  c.textAlign = "right";
+  for (const mark of yMarks) c.fillText(fixed(mark, decimals(yMarks)), LEFT - 7, toY(mark / fy));
+  c.textAlign = "center";
+  for (const mark of xMarks) c.fillText(fixed(mark, decimals(xMarks)), toX(mark / fx), bottom + 11);
+  c.fillText(named(data.xAxis), (LEFT + width - RIGHT) / 2, height - 8);
+  upright(c, named(data.yAxis), 11, (TOP + split) / 2);
+  if (fit) {
+    c.strokeStyle = paint.soft;
+    line(c, [[LEFT, middle, width - RIGHT, middle]]);
+    c.textAlign = "right";
+    const power = 10 ** Math.floor(Math.log10(0.8 * reach * fy));
+    const one = [5, 2, 1].map((k) => k * power).find((k) => k <= 0.8 * reach * fy);
+    for (const mark of [-one, 0, one]) c.fillText(short(mark, 2), LEFT - 7, toLeft(mark / fy));
+    c.textAlign = "left";
+    c.fillText("readings − fit", LEFT + 6, bottom - below + 10);
+    c.strokeStyle = paint.line;
+    c.strokeRect(LEFT + 0.5, bottom - below + 0.5, width - LEFT - RIGHT - 1, below - 1);
+  }
+  c.strokeStyle = paint.line;
+  c.strokeRect(LEFT + 0.5, TOP + 0.5, width - LEFT - RIGHT - 1, split - TOP - 1);
+
+  // the fit: its band, the line, and dashed what it expects
+  if (fit) {
+    if (fit.band.length) {
+      c.fillStyle = paint.band;
+      c.beginPath();
+      fit.x.forEach((value, k) => c.lineTo(toX(value), toY(fit.y[k] + fit.band[k])));
+      for (let k = fit.x.length - 1; k >= 0; k -= 1) c.lineTo(toX(fit.x[k]), toY(fit.y[k] - fit.band[k]));
+      c.fill();
+    }
+    c.strokeStyle = paint[fit.look] || paint.fit;
+    c.lineWidth = 1.6;
+    const until = Number.isFinite(fit.solid_to) ? fit.solid_to : Infinity;
+    curve(c, fit, toX, toY, (value) => value <= until);
+    c.setLineDash([4, 4]);
+    curve(c, fit, toX, toY, (value) => value >= until);
+    c.setLineDash([]);
+  }
+
+  // the readings: each by itself, or from the lowest to the highest of a column
+  c.strokeStyle = paint.reading;
+  c.lineWidth = 1.2;
+  if (data.single) {
+    const size = n > 400 ? 1.6 : n > 100 ? 2.2 : 3.2;
+    const paints = n > 100 ? paint.reading : paint.panel;  // open circles while there is room for them
+    if (u) line(c, Array.from(x, (value, k) => [toX(value), toY(low[k] - u[k]), toX(value), toY(low[k] + u[k])]));
+    dots(c, x, low, toX, toY, size, paints);
+    if (fit) {
+      if (u) line(c, Array.from(x, (value, k) => [toX(value), toLeft(leftLow[k]), toX(value), toLeft(leftHigh[k])]));
+      dots(c, x, left, toX, toLeft, size, paints);
+    }
+  } else {
+    line(c, Array.from(x, (value, k) => [toX(value), toY(low[k]) + 0.6, toX(value), toY(high[k]) - 0.6]));
+    if (fit) line(c, Array.from(x, (value, k) => [toX(value), toLeft(leftLow[k]) + 0.6, toX(value), toLeft(leftHigh[k]) - 0.6]));
+  }
+
+  const place = (k) => [toX(x[k]), toY((low[k] + high[k]) / 2)];
+  if (pointed >= 0 && pointed < n) {
+    c.strokeStyle = paint.ink;
+    c.lineWidth = 1.5;
+    c.beginPath();
+    c.arc(...place(pointed), 6.5, 0, 7);
+    if (fit) {
+      c.moveTo(toX(x[pointed]) + 6.5, toLeft(left[pointed]));
+      c.arc(toX(x[pointed]), toLeft(left[pointed]), 6.5, 0, 7);
+    }
+    c.stroke();
+  }
+  return {place, left, width, nearest: (px) => nearest(x, toX, px)};
+}
+
+/** A reading in words, for the pointer and for those who hear it. */
+export function saidOf(data, drawn, k) {
+  const [fx, fy] = [data.xAxis[2], data.yAxis[2]];
+  const unit = data.yAxis[1], digits = unit === "Hz" ? 4 : 3;
+  const x = `${short(data.x[k] * fx, 6)} ${data.xAxis[1]}`;
+  const value = data.single ? fixed(data.low[k] * fy, digits) : `${fixed(data.low[k] * fy, digits)} to ${fixed(data.high[k] * fy, digits)}`;
+  const u = data.single && data.u ? ` ± ${short(data.u[k] * fy, 2)}` : "";
+  const left = data.fit && Number.isFinite(drawn.left[k]) ? `, ${drawn.left[k] >= 0 ? "+" : ""}${short(drawn.left[k] * fy, 2)} from the fit` : "";
+  return `${value}${u} ${unit} at ${x}${left}`;
+}
+
+function nearest(x, toX, px) {
+  let best = -1, least = 40;
+  for (let k = 0; k < x.length; k += 1) {
+    const off = Math.abs(toX(x[k]) - px);
+    if (off < least) [best, least] = [k, off];
+  }
+  return best;
+}
+
+const named = ([label, unit]) => unit ? `${label} [${unit}]` : label;
+
+function upright(c, text, x, y) {
+  c.save();
+  c.translate(x, y);
+  c.rotate(-Math.PI / 2);
+  c.textAlign = "center";
+  c.fillText(text, 0, 0);
+  c.restore();
+}
+
+function line(c, pieces) {
+  c.beginPath();
+  for (const [x0, y0, x1, y1] of pieces) {
+    c.moveTo(x0, y0);
+    c.lineTo(x1, y1);
+  }
+  c.stroke();
+}
+
+function dots(c, x, y, toX, toY, size, inside) {
+  c.fillStyle = inside;
+  c.beginPath();
+  for (let k = 0; k < x.length; k += 1) {
+    c.moveTo(toX(x[k]) + size, toY(y[k]));
+    c.arc(toX(x[k]), toY(y[k]), size, 0, 7);
+  }
+  c.fill();
+  c.stroke();
+}
+
+function curve(c, fit, toX, toY, wanted) {
+  c.beginPath();
+  fit.x.forEach((value, k) => wanted(value) && c.lineTo(toX(value), toY(fit.y[k])));
+  c.stroke();
+}
+
+/** Draw the oscilloscope's screen: each channel's latest record, on one scale of time. */
+export function drawRecords(paper, records) {
+  const paint = colours(), {context: c} = paper;
+  const [width, height] = paper.fit();
+  c.strokeStyle = paint.graticule;
+  c.lineWidth = 1;
+  const across = Array.from({length: 9}, (_, k) => Math.round((k + 1) * width / 10) + 0.5);
+  const up = Array.from({length: 5}, (_, k) => Math.round((k + 1) * height / 6) + 0.5);
+  line(c, [...across.map((x) => [x, 0, x, height]), ...up.map((y) => [0, y, width, y])]);
+  if (!records.length) {
+    c.fillStyle = paint.dim;
+    c.textAlign = "center";
+    c.textBaseline = "middle";
+    c.fillText("no record yet", width / 2, height / 2);
+    return "no record yet";
+  }
+  const begin = Math.min(...records.map((one) => one.start_s));
+  const end = Math.max(...records.map((one) => one.start_s + one.step_s * one.low.length));
+  const said = [];
+  records.forEach((one, channel) => {
+    const [lowest, highest] = extent([one.low, one.high], 0.12);
+    const toX = (k) => (one.start_s + (k + 0.5) * one.step_s - begin) / (end - begin) * width;
+    const toY = (value) => height - (value - lowest) / (highest - lowest) * height;
+    c.strokeStyle = paint[`trace-${channel % 4 + 1}`];
+    c.lineWidth = 1.2;
+    c.beginPath();
+    for (let k = 0; k < one.low.length; k += 1) {
+      c.lineTo(toX(k), toY(one.low[k]));
+      if (one.high[k] !== one.low[k]) c.lineTo(toX(k), toY(one.high[k]));
+    }
+    c.stroke();
+    c.fillStyle = c.strokeStyle;
+    c.textAlign = "left";
+    c.textBaseline = "top";
+    const [from, to] = extent([one.low, one.high], 0);
+    c.fillText(`${one.channel}  ${short(from, 3)} … ${short(to, 3)} V`, 8 + channel * 190, 7);
+    said.push(`${one.channel} from ${short(from, 3)} to ${short(to, 3)} volts`);
+  });
+  c.fillStyle = paint.dim;
+  c.textAlign = "right";
+  c.textBaseline = "bottom";
+  c.fillText(`${short((end - begin) * 100, 3)} ms a division`, width - 8, height - 5);
+  return `${said.join(", ")}, over ${short((end - begin) * 1000, 3)} milliseconds`;
+}

@@ -1,0 +1,170 @@
+// The bench for practice: controls that send commands, and the guide that shows how far one is.
+
+import {by, make, write} from "./words.js";
+
+/** A slider that is moved sends at most so often [ms]. */
+const SENDS_EVERY_MS = 120;
+
+/**
+ * @param about what the server says of the bench: experiments, limits.
+ * @param {(wanted: object) => Promise<string>} command sends one; what is wrong with it, or "".
+ * @param {() => string} run name of the run that is shown.
+ * @param {boolean} allowed whether this page may give commands.
+ */
+export function openPractice(about, command, run, allowed) {
+  document.body.classList.add("practice");
+  by("practice").hidden = false;
+  for (const experiment of about.experiments) by("experiment").append(make("option", experiment));
+  const now = {drive: false, busy: false, paused: false, hz: 30, seen: "", analyzed: "", tuned: false, driven: false};
+
+  by("controls").disabled = !allowed;
+  if (!allowed) write("said", "This page may only look: open the address that the terminal shows.");
+
+  async function send(what, values = {}) {
+    const wrong = await command({do: what, ...values});
+    if (allowed) write("said", wrong);
+  }
+
+  /** What the bench says: a refusal, or a line for the person at it. */
+  function hear({kind, text}) {
+    if (kind === "refused" || kind === "ended") write("said", text);
+  }
+
+  let timer = 0, latest = null;
+  function tune(values) {
+    latest = {...latest, ...values};
+    timer ||= setTimeout(() => {
+      timer = 0;
+      send("tune the drive", latest);
+      latest = null;
+    }, SENDS_EVERY_MS);
+  }
+  const pair = (number, slider, key) => {
+    const pass = (source, other) => {
+      const value = Number(source.value);
+      if (source.value === "" || !source.checkValidity()) return;
+      other.value = source.value;
+      tune({[key]: value});
+      if (key === "frequency_hz") now.tuned ||= now.drive;
+    };
+    by(number).addEventListener("change", () => pass(by(number), by(slider)));
+    by(slider).addEventListener("input", () => pass(by(slider), by(number)));
+  };
+  pair("frequency", "frequency-slider", "frequency_hz");
+  pair("amplitude", "amplitude-slider", "amplitude_vpp");
+
+  const does = {
+    drive: () => send("switch the drive", {on: !now.drive}),
+    match: () => send("match the drive"),
+    back: () => send("put the top back"),
+    hold: () => send("pause", {on: !now.paused}),
+    record: () => now.busy ? send("stop the run") : send("record a run", {experiment: by("experiment").value}),
+    analyze: () => openResult(run()),
+  };
+  for (const [id, act] of Object.entries(does)) by(id).addEventListener("click", act);
+  by("speed").addEventListener("change", () => send("set the speed", {speed: Number(by("speed").value)}));
+
+  /** Tune by a step, as with the keys. */
+  function step(hz) {
+    const field = by("frequency");
+    const value = Math.min(Math.max(Number(field.value) + hz, Number(field.min)), Number(field.max));
+    field.value = value.toFixed(2);
+    field.dispatchEvent(new Event("change"));
+  }
+
+  function press(id, on, text) {
+    by(id).setAttribute("aria-pressed", String(on));
+    write(id, text);
+  }
+
+  function show(bench, about_run, readings) {
+    if (!bench) return;
+    const {drive} = bench;
+    Object.assign(now, {drive: Boolean(drive?.output), busy: bench.busy, paused: bench.paused});
+    now.driven ||= now.drive;
+    press("drive", now.drive, now.drive ? "Drive off" : "Drive on");
+    press("hold", now.paused, now.paused ? "Let time go on" : "Stop time");
+    write("record", now.busy ? "End the run" : "Record");
+    for (const id of ["drive", "match", "back", "frequency", "frequency-slider", "amplitude", "amplitude-slider", "experiment"]) {
+      by(id).disabled = now.busy;
+    }
+    by("analyze").disabled = now.busy || !readings || about_run?.status === "running";
+    if (drive && !timer && document.activeElement !== by("frequency") && document.activeElement !== by("frequency-slider")) {
+      follow("frequency", drive.frequency_hz, 2);
+    }
+    if (drive && !timer && !/^amplitude/.test(document.activeElement?.id)) follow("amplitude", drive.amplitude_vpp, 1);
+    if (bench.speed && document.activeElement !== by("speed")) choose(by("speed"), bench.speed);
+    guide(bench, about_run, readings);
+  }
+
+  function follow(id, value, decimals) {
+    if (!(value > 0)) return;
+    const text = String(Number(value.toFixed(decimals)));
+    if (by(id).value !== text) by(id).value = by(`${id}-slider`).value = text;
+  }
+
+  function guide(bench, run_now, readings) {
+    const ended = run_now && run_now.status !== "running" && readings > 0;
+    const done = {
+      drive: now.driven, tune: now.tuned || now.busy || ended, record: Boolean(ended), analyze: now.analyzed === run() && ended,
+      report: false,
+    };
+    if (done.record) done.drive = done.tune = true;
+    let current = true;
+    for (const item of by("guide").children) {
+      const is = done[item.dataset.step];
+      item.className = is ? "done" : current ? "now" : "";
+      if (item.className === "now") item.setAttribute("aria-current", "step");
+      else item.removeAttribute("aria-current");
+      current &&= is;
+    }
+  }
+
+  async function openResult(name) {
+    if (!name) return;
+    by("verdict").replaceChildren(make("p", "Analyzing…"));
+    by("figures").replaceChildren();
+    by("report").hidden = true;
+    by("result").showModal();
+    const wrong = await command({do: "analyze", run: name});
+    if (wrong) by("verdict").replaceChildren(make("p", wrong));
+    while (!wrong) {
+      await new Promise((go) => { setTimeout(go, 400); });
+      const found = await (await fetch(`run/${encodeURIComponent(name)}/analysis`)).json();
+      if (!by("result").open) return;
+      if (found.running && !found.verdict?.length) continue;
+      now.analyzed = found.failed ? "" : name;
+      const texts = found.failed ? [found.failed] : found.verdict || [];
+      by("verdict").replaceChildren(
+        ...texts.map((text) => make("p", text)), ...(found.warnings || []).map((text) => make("p", `Note: ${text}`, "note")));
+      if (!by("figures").children.length) by("figures").replaceChildren(...found.figures.map((figure) => {
+        const image = make("img");
+        image.src = `run/${encodeURIComponent(name)}/${figure}?${Date.now()}`;
+        image.alt = `figure of the ${found.analysis} analysis`;
+        return image;
+      }));
+      if (found.report) {
+        by("report").href = `run/${encodeURIComponent(name)}/${found.report}`;
+        by("report").hidden = false;
+      }
+      write("writing", found.running ? "The report is being written…" : "");
+      if (!found.running) return;
+    }
+  }
+
+  return {
+    show, step, hear,
+    act: (id) => !by(id).disabled && does[id](),
+  };
+}
+
+/** Choose the option nearest to a value; one that is not there is added. */
+function choose(select, value) {
+  const text = String(value);
+  if (![...select.options].some((option) => option.value === text)) {
+    const option = make("option", `${text} ×`);
+    option.value = text;
+    select.append(option);
+  }
+  select.value = text;
+}

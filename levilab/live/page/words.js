@@ -1,0 +1,51 @@
+// Numbers and small texts for people. Whatever comes from a run goes into the page as text, never as markup.
+
+export const by = (id) => document.getElementById(id);
+
+/** Write a text into an element, and touch the page only where it changes. */
+export function write(id, text) {
+  const element = by(id);
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** A number with so many decimals; a dash where there is none. */
+export const fixed = (value, decimals) =>
+  Number.isFinite(value) ? value.toFixed(decimals).replace("-", "−") : "–";
+
+/** A number to so many digits, without zeros at the end. */
+export const short = (value, digits = 4) =>
+  Number.isFinite(value) ? String(Number(value.toPrecision(digits))).replace("-", "−") : "–";
+
+/** Seconds as 34 s, 2:05 min or 1:02:05. */
+export function lapse(seconds) {
+  if (!Number.isFinite(seconds)) return "";
+  const whole = Math.round(Math.abs(seconds)), sign = seconds < -0.5 ? "−" : "";
+  if (whole < 100) return `${sign}${whole} s`;
+  const two = (n) => String(n).padStart(2, "0");
+  const [h, m, s] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
+  return sign + (h ? `${h}:${two(m)}:${two(s)}` : `${m}:${two(s)} min`);
+}
+
+/** Write plain notation: what follows ^ in brackets, or as a number, is raised. */
+export function typeset(element, text) {
+  element.replaceChildren(...text.split(/(\^\([^()]*\)|\^[−-]?[\d½]+)/).filter(Boolean).map((piece) => {
+    if (!piece.startsWith("^")) return document.createTextNode(piece);
+    const raised = document.createElement("sup");
+    raised.textContent = piece.replace(/^\^\(?|\)$/g, "");
+    return raised;
+  }));
+}
+
+/** An element with a class and a text. */
+export function make(tag, text = "", className = "") {
+  const element = document.createElement(tag);
+  element.textContent = text;
+  if (className) element.className = className;
+  return element;
+}
+
+/** The colours of the style sheet, by their names; read anew when the day turns to night. */
+export function colours() {
+  const style = getComputedStyle(document.documentElement);
+  return new Proxy({}, {get: (_, name) => style.getPropertyValue(`--${name}`).trim()});
+}

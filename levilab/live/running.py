@@ -1,0 +1,165 @@
+"""What the readings so far say: the running fit, from the analyses themselves, at a low rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.errors import AnalysisError
+from analysis.uncertainty import Estimate
+from levilab.present.numbers import plain, with_uncertainty
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from analysis.spindown.fit import SpinDown
+    from levilab.live.envelope import Array, Groups
+
+#: Spin at which a top falls: mean of the ten published limits [Hz], thesis §4.2.
+FALL_HZ = 21.86
+#: Points of a curve.
+_POINTS = 400
+#: A curve goes on beyond the readings, but for no longer than this many times their duration.
+_BEYOND = 4.0
+#: Equations as the page sets them: what follows ^ in brackets is raised.
+EQUATIONS = {
+    "stokes": "ω̇ = −C₁ ω",
+    "newton": "ω̇ = −C₂ ω^(2)",
+    "disc": "ω̇ = −C ω^(3/2)",
+    "mixed": "ω̇ = −C₁ ω − C₂ ω^(2)",
+    "power": "ω̇ = −c ω^(n)",
+}
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line through the readings.
+
+    Attributes:
+        x, y: shape (n,), in SI.
+        band: half the width of its 95 % band, shape (n,), empty where it is not known.
+        solid_to: beyond this x it is a forecast.
+    """
+
+    x: Array
+    y: Array
+    band: Array = field(default_factory=lambda: np.empty(0))
+    solid_to: float = np.inf
+
+
+@dataclass(frozen=True)
+class Running:
+    """The running fit.
+
+    Attributes:
+        head: the law or the quantity, in a few words, with an equation.
+        lines: what was found, each a line of plain text.
+        curve: None where none can be drawn yet.
+        end_s: when the run is expected to end, on its own clock; None where that is not known [s].
+        look: name of its colour, that of a law or "fit".
+    """
+
+    head: str
+    lines: tuple[str, ...] = ()
+    curve: Curve | None = None
+    end_s: float | None = None
+    look: str = "fit"
+
+
+Columns = dict[str, "Array"]
+
+
+def fit_so_far(experiment: str, columns: tuple[str, ...], groups: Groups) -> Running | None:
+    """Fit the readings of a run so far; None for an experiment without a running fit.
+
+    Args:
+        experiment: its name.
+        columns: names of the readings' channels.
+        groups: the readings.
+    """
+    method = METHODS.get(experiment)
+    if method is None:
+        return None
+    by_name = {name: groups.mean[k] for k, name in enumerate(columns)}
+    try:
+        return method(by_name, groups.size)
+    except (AnalysisError, KeyError) as error:
+        text = str(error) if isinstance(error, AnalysisError) else f"there is no column {error}"
+        return Running("no fit yet", (text,))
+
+
+def spin_down(columns: Mapping[str, Array], size: int) -> Running:
+    """The drag laws through a spin-down, the best of them drawn on to the fall."""
+    from analysis.spindown.fit import fit_spin_down
+
+    time, spin, u = columns["time_s"], columns["spin_frequency_hz"], columns.get("spin_frequency_u_hz")
+    used = np.isfinite(spin) & (np.isfinite(u) if u is not None else True)
+    time, spin = time[used], spin[used]
+    found = fit_spin_down(time, spin, None if u is None else u[used] / np.sqrt(size), driven=True)
+    best = found.fit(found.best)
+    until = _time_of_fall(found, float(time[-1]), float(time[-1] - time[0]))
+    x = np.linspace(time[0], until if until is not None else time[-1], _POINTS)
+    constants = [with_uncertainty(value) for name, value in best.parameters.items() if name != "start_frequency"]
+    others = [name for name in found.verdict.indistinguishable if name != found.best]
+    lines = [
+        ", ".join(constants),
+        f"as good: {', '.join(others)}" if others else "",
+        f"excluded: {', '.join(name for name, _ in found.verdict.excluded)}" if found.verdict.excluded else "",
+    ]
+    return Running(
+        f"{found.best} law so far   {EQUATIONS[found.best]}",
+        tuple(filter(None, lines)),
+        Curve(x, best.spin_frequency(x), solid_to=float(time[-1])),
+        until,
+        found.best,
+    )
+
+
+def _time_of_fall(found: SpinDown, last: float, duration: float) -> float | None:
+    """When the best law reaches the spin of a usual fall; None where that is far off [s]."""
+    times = np.linspace(last, last + _BEYOND * duration, 4 * _POINTS)
+    below = np.flatnonzero(found.fit(found.best).spin_frequency(times) <= FALL_HZ)
+    return float(times[below[0]]) if len(below) else None
+
+
+def locked_line(columns: Mapping[str, Array], size: int) -> Running:
+    """The line through precession against drive, and the joint test of slope 1 and intercept 0."""
+    from analysis.precession.sweep import Sweep, fit_sweep
+
+    drive, precession = columns["drive_frequency_hz"], columns["precession_frequency_hz"]
+    u = columns.get("precession_frequency_u_hz")
+    used = np.isfinite(drive) & np.isfinite(precession) & (np.isfinite(u) if u is not None else True)
+    fit = fit_sweep(Sweep(drive[used], precession[used], None if u is None else u[used] / np.sqrt(size)))
+    line = fit.line
+    x = np.linspace(drive[used].min(), drive[used].max(), _POINTS)
+    p = "" if fit.p_locked is None else f"p = {plain(fit.p_locked, 2)} for b = 1, a = 0"
+    return Running(
+        "line so far   ν_p = a + b ν_d",
+        (f"b = {_value(line.slope, line.u_slope)}, a = {_value(line.intercept, line.u_intercept, 'Hz')}", p),
+        Curve(x, line.at(x), np.nan_to_num(line.confidence_band(x))),
+    )
+
+
+def mean_limit(columns: Mapping[str, Array], size: int) -> Running:  # noqa: ARG001 - as the others
+    """The mean of the limits so far."""
+    spin, time = columns["spin_frequency_hz"], columns["time_s"]
+    spin, time = spin[np.isfinite(spin)], time[np.isfinite(spin)]
+    if not len(spin):
+        return Running("no limit yet")
+    u = float(np.std(spin, ddof=1) / np.sqrt(len(spin))) if len(spin) > 1 else None
+    x = np.array([time[0], time[-1]])
+    band = np.full(2, 2 * u) if u is not None else np.empty(0)
+    return Running("mean so far", (_value(float(spin.mean()), u, "Hz"),), Curve(x, np.full(2, spin.mean()), band))
+
+
+def _value(value: float, u: float | None, unit: str = "") -> str:
+    return with_uncertainty(Estimate(value, u, unit))
+
+
+METHODS: dict[str, Callable[[Mapping[str, Array], int], Running]] = {
+    "spin": spin_down,
+    "precession": locked_line,
+    "limit": mean_limit,
+}

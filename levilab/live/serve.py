@@ -1,0 +1,136 @@
+"""`levilab live`: serve the view until a signal ends it."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import socket
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from levilab.errors import LevilabError, UsageError
+from levilab.live.desk import Desk
+from levilab.live.doors import Doors
+from levilab.live.practice.bench import PracticeBench
+from levilab.live.server import Hall, application
+from levilab.runs.run import RECORD, find_run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from uvicorn import Server
+
+#: Only programs of this machine reach it.
+HOST = "127.0.0.1"
+#: Pages that are open are given so long to close [s].
+_GOODBYE_S = 1
+
+
+class CannotShow(LevilabError):
+    """The view cannot be served."""
+
+
+@dataclass(frozen=True)
+class LiveOptions:
+    """What to show, and where.
+
+    Attributes:
+        run: a run folder; None: the newest that is running in `out`, else the newest.
+        out: the folder with the runs.
+        mock: a bench for practice, which records into `out`.
+        port: of the loopback address; 0: any that is free.
+        seed: of the light's noise on the bench for practice.
+    """
+
+    run: Path | None = None
+    out: Path = Path("runs")
+    mock: bool = False
+    port: int = 8765
+    seed: int = 0
+
+
+def serve_live(options: LiveOptions, announce: Callable[[str], None]) -> None:
+    """Serve until Ctrl-C or SIGTERM.
+
+    Args:
+        options: what to show, and where.
+        announce: is called with the address, once pages can be opened.
+
+    Raises:
+        UsageError: a run and a bench for practice at once.
+        NoThree: the extra is not installed.
+        DataError: there is no such run.
+        CannotShow: the port is taken.
+    """
+    import uvicorn
+
+    root, shown = _where(options)
+    with contextlib.closing(_listening(options.port)) as listening, contextlib.ExitStack() as at_end:
+        doors = Doors(listening.getsockname()[1])
+        bench = at_end.enter_context(PracticeBench(root, seed=options.seed)) if options.mock else None
+        hall = Hall(root, shown, doors, Desk(bench) if bench else None)
+        config = uvicorn.Config(
+            application(hall),
+            log_config=None,
+            access_log=False,
+            lifespan="on",
+            ws="websockets-sansio",
+            ws_max_size=1 << 16,
+            server_header=False,
+            timeout_graceful_shutdown=_GOODBYE_S,
+        )
+        server = uvicorn.Server(config)
+        with _announcing(server, doors, announce, commands=options.mock):
+            server.run(sockets=[listening])
+
+
+def _where(options: LiveOptions) -> tuple[Path, str]:
+    """The folder with the runs, and the name of the run to show at first."""
+    if options.run is None:
+        return options.out.absolute(), ""
+    if options.mock:
+        raise UsageError("mock", "a run and a bench for practice exclude each other: it records runs of its own")
+    run = find_run(options.run, options.out).absolute()
+    if not (run / RECORD).exists():
+        return run, ""  # a folder with runs
+    return run.parent, run.name
+
+
+def _listening(port: int) -> socket.socket:
+    """A socket at the port.  Raises CannotShow."""
+    opened = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        if hasattr(socket, "SO_EXCLUSIVEADDRUSE"):  # Windows: else two servers could share a port
+            opened.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
+        else:
+            opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        opened.bind((HOST, port))
+        opened.listen(128)
+    except OSError as error:
+        opened.close()
+        taken = error.errno in {errno.EADDRINUSE, errno.EACCES}
+        why = "is in use, perhaps by another live view" if taken else f"cannot be listened at ({error.strerror})"
+        raise CannotShow(f"port {port} {why}: close that, or choose another `port`, as 0 for any") from error
+    return opened
+
+
+@contextlib.contextmanager
+def _announcing(server: Server, doors: Doors, announce: Callable[[str], None], *, commands: bool) -> Iterator[None]:
+    """Say the address once the server has started; a thread waits for that, since the server takes the main one."""
+    over = threading.Event()
+
+    def wait() -> None:
+        while not server.started and not over.wait(0.02):
+            pass
+        if server.started:
+            announce(f"http://{HOST}:{doors.port}/" + (f"#{doors.token}" if commands else ""))
+
+    waiting = threading.Thread(target=wait, daemon=True)
+    waiting.start()
+    try:
+        yield
+    finally:
+        over.set()
+        waiting.join()

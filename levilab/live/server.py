@@ -1,0 +1,265 @@
+"""The server of the live view: a page, its modules, and frames over a WebSocket.
+
+One task reads what is new 20 times a second while a page is open.  A page asks for each frame, and gets it when there
+is something that it does not have: a slow page gets fewer frames, and nothing queues.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import time
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from starlette.applications import Starlette
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocketDisconnect
+
+from levilab.errors import LevilabError
+from levilab.live.analyzed import FIGURES, REPORT, Analyses
+from levilab.live.choice import choices, newest
+from levilab.live.desk import parts_for, scene_of_run
+from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
+from levilab.live.graphics import three_js
+from levilab.live.watch import Watch
+from levilab.runs.run import RECORD
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Callable, Iterator
+
+    from starlette.requests import Request
+    from starlette.websockets import WebSocket
+
+    from levilab.live.desk import Desk
+    from levilab.live.running import Running
+
+#: Frames a second, at most; and so long a page waits for a frame in which nothing is new [s].
+FRAMES_PER_S, PATIENCE_S = 20, 1.0
+#: The longest question of a page [bytes].
+_LONGEST_ASK = 4096
+PAGE = Path(__file__).parent / "page"
+_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".png": "image/png",
+          ".svg": "image/svg+xml"}  # fmt: skip
+
+
+@dataclass
+class Hall:
+    """What the server knows: the runs in a folder, the bench for practice, and what pages look at.
+
+    Attributes:
+        root: the folder with the runs.
+        shown: name of the run that a page shows at first; empty: the newest.
+        doors: who may come in.
+        desk: the bench for practice; None where runs are only looked at.
+    """
+
+    root: Path
+    shown: str
+    doors: Doors
+    desk: Desk | None = None
+    watches: dict[str, Watch] = field(default_factory=dict)
+    pages: dict[str, int] = field(default_factory=dict)  # name of a run → how many look at it
+    new: asyncio.Event = field(default_factory=asyncio.Event)
+    analyses: Analyses = field(default_factory=Analyses)
+
+    def is_run(self, name: str) -> bool:
+        """Whether a run of this name lies in the folder; a name with a way to elsewhere does not."""
+        plain = bool(name) and name == Path(name).name and name not in {".", ".."}
+        return plain and (self.root / name / RECORD).exists()
+
+    @contextlib.contextmanager
+    def watching(self, name: str) -> Iterator[Watch]:
+        """The watch of a run, shared by all pages that look at it; "" is the bench for practice."""
+        if name not in self.watches:
+            bench = self.desk.address if self.desk and not name else None
+            self.watches[name] = Watch(self.root / name if name else None, bench)
+        self.pages[name] = self.pages.get(name, 0) + 1
+        try:
+            yield self.watches[name]
+        finally:
+            self.pages[name] -= 1
+            if not self.pages[name]:
+                del self.pages[name]
+                self.watches.pop(name).close()
+
+    async def read_on(self) -> None:
+        """Read what is new for all pages, for ever."""
+        fitting: set[asyncio.Task[None]] = set()
+        while True:
+            begin = time.monotonic()
+            before = self._ticks()
+            if self.desk:
+                self.desk.step()
+            for watch in [*self.watches.values()]:
+                watch.step()
+                if not fitting and (task := watch.fit_task()):
+                    job = asyncio.create_task(self._fit(watch, task))
+                    fitting.add(job)
+                    job.add_done_callback(fitting.discard)
+            if before != self._ticks():
+                self._announce()
+            await asyncio.sleep(max(0.005, 1 / FRAMES_PER_S - (time.monotonic() - begin)))
+
+    def _ticks(self) -> list[int]:
+        return [*(watch.tick for watch in self.watches.values()), self.desk.count if self.desk else 0]
+
+    async def _fit(self, watch: Watch, task: Callable[[], Running | None]) -> None:
+        begin = time.monotonic()
+        found = await asyncio.to_thread(task)
+        watch.fitted(found, time.monotonic() - begin)
+
+    def _announce(self) -> None:
+        self.new.set()
+        self.new = asyncio.Event()
+
+    async def wait_for_news(self, watch: Watch, tick: object) -> None:
+        """Return when there is something newer than a page has, or it has waited long enough."""
+        end = time.monotonic() + PATIENCE_S
+        before = self.desk.count if self.desk else 0
+        while (
+            watch.tick == tick and (not self.desk or self.desk.count == before) and (left := end - time.monotonic()) > 0
+        ):
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self.new.wait(), left)
+
+
+class Pages:
+    """What is sent for each request.
+
+    Args:
+        hall: what the server knows.
+    """
+
+    def __init__(self, hall: Hall) -> None:
+        self.hall = hall
+        top = Path(__file__).parents[1] / "motion" / "animation" / "top.js"
+        self.files = {path.name: path for path in PAGE.iterdir()} | {"three.js": three_js(), "top.js": top}
+
+    def _file(self, path: Path, policy: str = PAGE_POLICY) -> Response:
+        return FileResponse(
+            path, media_type=_TYPES.get(path.suffix, "text/plain"), headers=self.hall.doors.headers(policy)
+        )
+
+    def _json(self, document: Any, status: int = 200) -> Response:
+        return JSONResponse(document, status, headers=self.hall.doors.headers())
+
+    async def page(self, _: Request) -> Response:
+        """The page."""
+        return self._file(self.files["live.html"])
+
+    async def part(self, request: Request) -> Response:
+        """A module or the style sheet of the page."""
+        found = self.files.get(request.path_params["name"])
+        return self._file(found) if found else _nothing()
+
+    async def runs(self, _: Request) -> Response:
+        """The runs to choose from, and what the page has to know at first."""
+        hall = self.hall
+        found = await asyncio.to_thread(choices, hall.root)
+        first = hall.shown or newest(found) or ""
+        practice = hall.desk.about if hall.desk else None
+        return self._json({"runs": [asdict(one) for one in found], "first": first, "practice": practice})
+
+    async def parts(self, request: Request) -> Response:
+        """What is drawn of the top."""
+        hall, name = self.hall, request.query_params.get("run", "")
+        scene = hall.desk.scene if hall.desk else scene_of_run(hall.root / name) if hall.is_run(name) else None
+        return self._json(await asyncio.to_thread(parts_for, scene))
+
+    async def of_run(self, request: Request) -> Response:
+        """A figure or the report of a run."""
+        name, wanted = request.path_params["run"], request.path_params["name"]
+        path = self.hall.root / name / wanted
+        known = self.hall.is_run(name) and (wanted == REPORT or FIGURES.fullmatch(wanted))
+        return self._file(path, REPORT_POLICY) if known and path.is_file() else _nothing()
+
+    async def analysis(self, request: Request) -> Response:
+        """How far a run's analysis is, and what it says."""
+        name = request.path_params["run"]
+        return self._json(self.hall.analyses.about(self.hall.root / name) if self.hall.is_run(name) else {})
+
+    async def do(self, request: Request) -> Response:
+        """Carry out a command."""
+        body = b""
+        async for piece in request.stream():
+            body += piece
+            if len(body) > _LONGEST_ASK:
+                return self._json({"error": "the command is too long"}, 413)
+        return self._json(*_carry_out(self.hall, request.headers.get("x-levilab-token"), body))
+
+    async def frames(self, socket: WebSocket) -> None:
+        """Send a frame for each question, until the page goes."""
+        hall, name = self.hall, socket.query_params.get("run", "")
+        await socket.accept()
+        if name and not hall.is_run(name):
+            await socket.close(4404)
+            return
+        with hall.watching(name) as watch, contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            watch.step()
+            while len(text := await socket.receive_text()) <= _LONGEST_ASK:
+                ask = _table(text)
+                await hall.wait_for_news(watch, ask.get("tick"))
+                said = hall.desk.said_after(ask.get("said")) if hall.desk and not name else []
+                await socket.send_bytes(watch.frame(ask, said))
+            await socket.close(1009)
+
+
+def application(hall: Hall) -> Guard:
+    """Return the ASGI application.  Raises NoThree."""
+    pages = Pages(hall)
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncIterator[None]:
+        reading = asyncio.create_task(hall.read_on())
+        try:
+            yield
+        finally:
+            reading.cancel()
+
+    routes = [
+        Route("/", pages.page),
+        Route("/runs", pages.runs),
+        Route("/parts", pages.parts),
+        Route("/do", pages.do, methods=["POST"]),
+        Route("/page/{name}", pages.part),
+        Route("/run/{run}/analysis", pages.analysis),
+        Route("/run/{run}/{name}", pages.of_run),
+        WebSocketRoute("/frames", pages.frames),
+    ]
+    return Guard(Starlette(routes=routes, lifespan=lifespan), hall.doors)
+
+
+def _nothing() -> Response:
+    return PlainTextResponse("there is no such file", 404)
+
+
+def _table(text: str) -> dict[str, Any]:
+    """A page's question; anything else than a table asks for everything."""
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _carry_out(hall: Hall, token: str | None, body: bytes) -> tuple[dict[str, Any], int]:
+    """Carry out what a page with the token asks for; the answer, and the status of the request."""
+    if not hall.doors.knows(token):
+        return {"error": "this page may only look: open the address that the terminal shows"}, 403
+    if hall.desk is None:
+        return {"error": "there is no bench for practice: levilab live --mock brings one"}, 404
+    wanted = _table(body.decode("utf-8", "replace")) if len(body) <= _LONGEST_ASK else {}
+    try:
+        if wanted.get("do") == "analyze":
+            name = str(wanted.get("run"))
+            if not hall.is_run(name):
+                return {"error": "there is no such run"}, 404
+            hall.analyses.begin(hall.root / name)
+            return {}, 200
+        return {"number": hall.desk.carry_out(wanted)}, 200
+    except LevilabError as error:
+        return {"error": str(error)}, 400

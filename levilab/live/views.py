@@ -1,0 +1,61 @@
+"""What the page draws of each experiment's readings: one row an experiment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+#: Unit in the files → unit in this laboratory, and how many of it are one of the former.
+LAB_UNITS = {"m": ("cm", 100.0), "T": ("mT", 1000.0)}
+
+
+@dataclass(frozen=True)
+class View:
+    """Two columns of readings.csv, one against the other.
+
+    Attributes:
+        x, y: names of the columns.
+        x_label, y_label: in words.
+    """
+
+    x: str
+    y: str
+    x_label: str = "time"
+    y_label: str = "spin"
+
+
+VIEWS = {
+    "spin": View("time_s", "spin_frequency_hz"),
+    "limit": View("time_s", "spin_frequency_hz", y_label="limit of the spin"),
+    "precession": View("drive_frequency_hz", "precession_frequency_hz", "drive", "precession"),
+    "field": View("height_m", "flux_density_t", "height", "flux density"),
+    "trace": View("time_s", "highest_v", y_label="highest value of a record"),
+}
+
+
+def view_of(experiment: str, columns: tuple[str, ...]) -> View | None:
+    """The row of an experiment, if its columns are there; else the first two columns, as those of a simulation."""
+    view = VIEWS.get(experiment)
+    if view and view.x in columns and view.y in columns:
+        return view
+    values = [name for name in columns[1:] if "_u_" not in name]
+    return View(columns[0], values[0], columns[0], values[0]) if values else None
+
+
+def u_of(column: str) -> str:
+    """The name of the column with a column's standard uncertainty.
+
+    >>> u_of("spin_frequency_hz")
+    'spin_frequency_u_hz'
+    """
+    quantity, _, unit = column.rpartition("_")
+    return f"{quantity}_u_{unit}"
+
+
+def unit_of(column: str) -> tuple[str, float]:
+    """The unit in which a column is shown, and how many of it are one of the column's.
+
+    >>> unit_of("height_m"), unit_of("spin_frequency_hz"), unit_of("record")
+    (('cm', 100.0), ('Hz', 1.0), ('', 1.0))
+    """
+    unit = {"hz": "Hz", "s": "s", "v": "V", "t": "T", "m": "m"}.get(column.rpartition("_")[2] if "_" in column else "")
+    return LAB_UNITS.get(unit or "", (unit or "", 1.0))

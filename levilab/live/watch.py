@@ -1,0 +1,316 @@
+"""One run, or one bench, as the page sees it: the run folder, what the bench publishes, and the running fit."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.live.envelope import by_columns
+from levilab.live.follow import Followed
+from levilab.live.frame import pack
+from levilab.live.running import Running, fit_so_far
+from levilab.live.views import u_of, unit_of, view_of
+from levilab.telemetry.address import read_address
+from levilab.telemetry.messages import Poses, Record, State
+from levilab.telemetry.subscriber import Subscriber
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    from levilab.telemetry.address import Address
+    from levilab.telemetry.messages import Message
+
+#: A bench that has published nothing for so long is silent [s].
+SILENT_AFTER_S = 4.0
+#: Messages with poses that are kept for pages that ask late: a second of them.
+_MOST_POSES = 24
+#: Between two fits at least, and at most, though a fit is to take no more than this share of the time [s].
+_FIT_EVERY_S, _FIT_PAUSE_S, _FIT_SHARE = 1.5, 10.0, 0.05
+#: Columns of a picture, at most and at least, whatever a page asks for.
+_FEWEST_COLUMNS, _MOST_COLUMNS = 50, 2000
+#: The latest readings alone, where the page asks for them.
+LATEST = 200
+_INSTRUMENT = {"identity", "driver", "address"}
+_SETTINGS = {"frequency_hz", "amplitude_vpp", "waveform", "offset_v", "gate_s", "trigger_level_v"}
+
+
+class Watch:
+    """What is known of a run and of its bench now.
+
+    Pages change nothing here, and nothing is kept for any of them.  Without a folder it follows what a bench for
+    practice records; `bench` returns where that publishes.
+
+    Attributes:
+        followed: the run folder; None while a bench for practice has recorded none.
+        state: what the bench said last; None while it has said nothing.
+        tick: grows with each change.
+    """
+
+    def __init__(
+        self,
+        folder: Path | None,
+        bench: Callable[[], Address | None] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.clock = clock
+        self.followed = Followed(folder, clock) if folder else None
+        self.state: State | None = None
+        self.tick = 0
+        self.fit: Running | None = None
+        self.fit_version = 0
+        self._bench = bench
+        self._fitted = -1  # version of the readings
+        self._fit_again = 0.0
+        self._heard = -np.inf
+        self._records: dict[str, Record] = {}
+        self._poses: deque[tuple[int, Poses]] = deque(maxlen=_MOST_POSES)
+        self._pose_number = 0
+        self._subscriber: Subscriber | None = None
+        self._silent = True
+
+    # --- what is new ---
+
+    def step(self) -> None:
+        """Read what is new; `tick` says whether there was anything."""
+        self._subscribe()
+        for message in self._subscriber.receive() if self._subscriber else ():
+            self._take(message)
+        silent = self.clock() - self._heard > SILENT_AFTER_S
+        if silent != self._silent:
+            self._silent = silent
+            self.tick += 1
+        if self.followed:
+            self._look(self.followed)
+
+    def _look(self, followed: Followed) -> None:
+        before = (followed.version, followed.event_count, followed.status, followed.record, followed.problem)
+        followed.look()
+        if before != (followed.version, followed.event_count, followed.status, followed.record, followed.problem):
+            self.tick += 1
+        if folder := followed.continued_in:
+            self._turn_to(folder)
+
+    def _subscribe(self) -> None:
+        """Listen to the bench: the one for practice, or the one that the run folder names."""
+        folder = self.followed.folder if self.followed else None
+        address = self._bench() if self._bench else read_address(folder) if folder else None
+        if self._subscriber and address == self._subscriber.address:
+            return
+        if self._subscriber and address is None:
+            return  # the run is over; what was said last remains
+        if self._subscriber:
+            self._subscriber.close()
+            self._subscriber = None
+        if address:
+            try:
+                self._subscriber = Subscriber(address, self.clock)
+            except OSError:
+                self._subscriber = None
+
+    def _take(self, message: Message) -> None:
+        self._heard = self.clock()
+        self.tick += 1
+        if isinstance(message, State):
+            self.state = message
+            if self._bench and message.folder:
+                self._turn_to(Path(message.folder))
+        elif isinstance(message, Record):
+            self._records[message.channel] = message
+        else:
+            self._pose_number += 1
+            self._poses.append((self._pose_number, message))
+
+    def _turn_to(self, folder: Path) -> None:
+        """Follow another run folder from now on."""
+        if self.followed is None or folder != self.followed.folder:
+            self.followed = Followed(folder, self.clock)
+            self.fit, self._fitted = None, -1
+            self.fit_version += 1
+            self.tick += 1
+
+    # --- the running fit, which the server computes beside the frames ---
+
+    def fit_task(self) -> Callable[[], Running | None] | None:
+        """Return what to compute in a thread, if it is time; `fitted` takes the result."""
+        followed = self.followed
+        if (
+            followed is None
+            or followed.record is None
+            or followed.version == self._fitted
+            or followed.behind
+            or self.clock() < self._fit_again
+        ):
+            return None
+        self._fitted = followed.version
+        experiment, columns, readings = followed.record.experiment, followed.columns, followed.readings
+        groups = readings.groups()
+
+        def compute() -> Running | None:
+            return fit_so_far(experiment, columns, groups)
+
+        return compute
+
+    def fitted(self, found: Running | None, took_s: float) -> None:
+        """Take in what was computed, and how long it took."""
+        self._fit_again = self.clock() + min(max(_FIT_EVERY_S, took_s / _FIT_SHARE), _FIT_PAUSE_S)
+        self.fit = found
+        self.fit_version += 1
+        self.tick += 1
+
+    # --- what the page asks for ---
+
+    def frame(self, ask: dict[str, Any], said: Sequence[Mapping[str, Any]] = ()) -> bytes:
+        """Return what a page does not have yet.
+
+        Args:
+            ask: what it has: "run" (name), "readings", "events", "fit", "poses" (numbers), "records" (channel →
+                number); and what it wants: "columns" of its picture, and whether the "latest" readings alone.
+            said: what the bench for practice has said.
+        """
+        followed = self.followed
+        name = followed.folder.name if followed else ""
+        ask = ask if ask.get("run") == name else {key: ask.get(key) for key in ("columns", "latest", "poses")}
+        head: dict[str, Any] = {"tick": self.tick, "run": name, "bench": self._about_bench(), "said": said}
+        arrays: dict[str, Any] = {}
+        if followed:
+            head["about"] = _about(followed)
+            if ask.get("readings") != followed.version or ask.get("changed"):
+                head["readings"] = _readings(followed, ask, arrays)
+            seen = _whole(ask.get("events"))
+            head["events"] = followed.texts_after(seen if seen <= followed.event_count else 0)
+        if ask.get("fit") != self.fit_version:
+            head["fit"] = self._about_fit(arrays)
+        head["records"] = self._new_records(ask.get("records"), arrays)
+        head["poses"] = self._new_poses(_whole(ask.get("poses")), arrays)
+        return pack(head, arrays)
+
+    def _about_bench(self) -> dict[str, Any] | None:
+        if self.state is None:
+            return None
+        return asdict(self.state) | {"silent": self._silent}
+
+    def _about_fit(self, arrays: dict[str, Any]) -> dict[str, Any]:
+        fit = self.fit
+        if fit is None:
+            return {"version": self.fit_version}
+        about = {"head": fit.head, "lines": fit.lines, "end_s": fit.end_s, "look": fit.look}
+        if fit.curve:
+            arrays |= {"fit_x": fit.curve.x, "fit_y": fit.curve.y, "fit_band": fit.curve.band}
+            about["solid_to"] = fit.curve.solid_to
+        return about | {"version": self.fit_version}
+
+    def _new_records(self, seen: Any, arrays: dict[str, Any]) -> list[dict[str, Any]]:
+        seen = seen if isinstance(seen, dict) else {}
+        found = []
+        for channel, record in self._records.items():
+            if seen.get(channel) != record.number:
+                k = len(found)
+                arrays |= {f"low_{k}": record.low, f"high_{k}": record.high}
+                about = {"number": record.number, "start_s": record.start_s, "step_s": record.step_s}
+                found.append({"channel": channel, "time_s": record.time_s} | about)
+        return found
+
+    def _new_poses(self, seen: int, arrays: dict[str, Any]) -> list[dict[str, Any]]:
+        if seen > self._pose_number:  # of another server
+            seen = 0
+        found = []
+        for number, poses in self._poses:
+            if number > seen:
+                k = len(found)
+                arrays |= {f"position_{k}": poses.position.ravel(), f"quaternion_{k}": poses.quaternion.ravel()}
+                arrays[f"up_{k}"] = poses.up
+                found.append({"number": number, "start_s": poses.start_s, "step_s": poses.step_s})
+        return found
+
+    def close(self) -> None:
+        """Listen no longer."""
+        if self._subscriber:
+            self._subscriber.close()
+            self._subscriber = None
+
+
+def _whole(value: Any) -> int:
+    return value if type(value) is int and value >= 0 else 0
+
+
+def _about(followed: Followed) -> dict[str, Any]:
+    """The run's record, in the few words that the page shows."""
+    about: dict[str, Any] = {
+        "status": followed.status, "problem": followed.problem, "event_count": followed.event_count
+    }  # fmt: skip
+    record = followed.record
+    if record is None:
+        return about
+    return about | {
+        "experiment": record.experiment,
+        "started_utc": record.started_utc,
+        "ended_utc": record.ended_utc,
+        "note": record.note[:500],
+        "synthetic": record.synthetic,
+        "instruments": {
+            kind: {key: str(value)[:120] for key, value in one.items() if key in _INSTRUMENT}
+            for kind, one in record.instruments.items()
+        },
+        "settings": {kind: _settings(one) for kind, one in record.instruments.items()},
+    }
+
+
+def _settings(instrument: dict[str, Any]) -> dict[str, Any]:
+    """What an instrument was set to at the start of a run, as far as the page shows it without the bench."""
+    found = instrument.get("settings_start")
+    found = found if isinstance(found, dict) else {}
+    return {key: value for key, value in found.items() if key in _SETTINGS and isinstance(value, str | float | int)}
+
+
+def _readings(followed: Followed, ask: dict[str, Any], arrays: dict[str, Any]) -> dict[str, Any]:
+    """The readings as the page draws them, and the last one in full."""
+    columns, readings = followed.columns, followed.readings
+    last = readings.latest(1)
+    about: dict[str, Any] = {
+        "version": followed.version,
+        "count": readings.count,
+        "last": {name: float(last.mean[k, 0]) for k, name in enumerate(columns)} if len(last) else {},
+    }
+    view = view_of(followed.record.experiment if followed.record else "", columns)
+    if view is None or not readings.count:
+        return about
+    groups = readings.latest(LATEST) if ask.get("latest") else readings.groups()
+    place = {name: k for k, name in enumerate(columns)}
+    x, low, high = groups.mean[place[view.x]], groups.low[place[view.y]], groups.high[place[view.y]]
+    kept = np.isfinite(x) & np.isfinite(low)
+    x, low, high = x[kept], low[kept], high[kept]
+    width = min(max(_whole(ask.get("columns")), _FEWEST_COLUMNS), _MOST_COLUMNS)
+    single = groups.size == 1 and len(x) <= 2 * width
+    if not single:
+        order = np.argsort(x, kind="stable")
+        x, low, high = by_columns(x[order], low[order], high[order], width)
+    elif u_of(view.y) in place:
+        arrays["reading_u"] = groups.mean[place[u_of(view.y)]][kept]
+    arrays |= {"reading_x": x, "reading_low": low, "reading_high": high}
+    return about | {
+        "single": single,
+        "x": [view.x_label, *unit_of(view.x)],
+        "y": [view.y_label, *unit_of(view.y)],
+        "trend": _trend(groups, place),
+    }
+
+
+def _trend(groups: Any, place: dict[str, int]) -> float | None:
+    """How fast the spin changes by the last readings [Hz/s]; None where it cannot be said."""
+    if "time_s" not in place or "spin_frequency_hz" not in place:
+        return None
+    t, f = (groups.mean[place[name]][-4:] for name in ("time_s", "spin_frequency_hz"))
+    known = np.isfinite(t) & np.isfinite(f)
+    t, f = t[known], f[known]
+    return float((f[-1] - f[0]) / (t[-1] - t[0])) if len(t) > 1 and t[-1] > t[0] else None
+
+
+def messages_of(watch: Watch, messages: Iterable[Message]) -> None:
+    """Let a watch take in messages without a bench, as tests and pictures do."""
+    for message in messages:
+        watch._take(message)

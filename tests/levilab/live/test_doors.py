@@ -1,0 +1,128 @@
+"""Who may look, and who may give commands."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from levilab.live.doors import Doors
+from support.live_pages import GrowingRun, address, serving
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from levilab.live.server import Hall
+
+HERE = b"127.0.0.1:8765"
+
+
+@pytest.mark.parametrize(
+    ("host", "origin", "socket", "inside"),
+    [
+        (HERE, None, False, True),
+        (b"localhost:8765", b"http://localhost:8765", True, True),
+        (HERE, b"http://127.0.0.1:8765", True, True),
+        (b"127.0.0.1", None, False, False),
+        (b"evil.example:8765", b"http://evil.example:8765", True, False),
+        (HERE, b"http://evil.example", True, False),
+        (HERE, b"http://127.0.0.1:9999", True, False),
+        (HERE, b"null", True, False),
+    ],
+)
+def test_only_pages_of_this_server_come_in(host: bytes, origin: bytes | None, socket: bool, inside: bool) -> None:
+    headers = [(b"Host", host), *([(b"Origin", origin)] if origin else [])]
+    assert Doors(8765).lets_in(headers, is_socket=socket) is inside
+
+
+def test_a_request_without_a_host_stays_outside() -> None:
+    assert not Doors(8765).lets_in([], is_socket=False)
+
+
+class Bench:
+    """Stands for the bench for practice: keeps the commands."""
+
+    def __init__(self) -> None:
+        self.commands: list[Any] = []
+
+    address = None
+
+    def command(self, command: Any) -> int:
+        self.commands.append(command)
+        return len(self.commands)
+
+    def events(self) -> list[Any]:
+        return []
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    return Bench()
+
+
+@pytest.fixture(scope="module")
+def hall(tmp_path_factory: pytest.TempPathFactory, bench: Bench) -> Iterator[Hall]:
+    from levilab.live.desk import Desk
+
+    root = tmp_path_factory.mktemp("runs")
+    GrowingRun(root, "one")
+    (root / "one" / "report.html").write_text("<h1>report</h1>", encoding="utf-8")
+    (root / "one" / "secret.txt").write_text("secret", encoding="utf-8")
+    (root.parent / "run.json").write_text("{}", encoding="utf-8")
+    with serving(root, desk=Desk(bench)) as hall:  # type: ignore[arg-type]
+        yield hall
+
+
+def request(hall: Hall, path: str, body: object = None, **headers: str) -> tuple[int, str]:
+    import http.client
+
+    connection = http.client.HTTPConnection("127.0.0.1", hall.doors.port, timeout=60)
+    try:
+        method = "GET" if body is None else "POST"
+        connection.request(method, path, None if body is None else json.dumps(body), headers)
+        answer = connection.getresponse()
+        return answer.status, answer.read().decode("utf-8", "replace")
+    finally:
+        connection.close()
+
+
+def test_another_name_for_this_machine_is_turned_away(hall: Hall) -> None:
+    assert request(hall, "/runs", Host="evil.example")[0] == 421
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/run/one/secret.txt", "/run/one/run.json", "/run/../run.json", "/run/..%2f/run.json", "/run/one%2f../report.html",
+     "/page/..%2fserver.py", "/page/none.js", "/run/two/report.html"],
+)  # fmt: skip
+def test_nothing_but_figures_and_the_report_is_served(hall: Hall, path: str) -> None:
+    status, text = request(hall, path)
+    assert (status, "secret" in text) == (404, False)
+
+
+def test_a_report_is_a_page_of_no_origin(hall: Hall) -> None:
+    import urllib.request
+
+    with urllib.request.urlopen(address(hall) + "run/one/report.html") as answer:
+        policy = answer.headers["content-security-policy"]
+    assert policy.startswith("sandbox allow-scripts")
+    assert "allow-same-origin" not in policy
+
+
+def test_a_command_needs_the_token(hall: Hall, bench: Bench) -> None:
+    wanted = {"do": "pause", "on": True}
+    assert request(hall, "/do", wanted)[0] == 403
+    assert request(hall, "/do", wanted, **{"X-Levilab-Token": "guess"})[0] == 403
+    assert bench.commands == []
+    assert request(hall, "/do", wanted, **{"X-Levilab-Token": hall.doors.token}) == (200, '{"number":1}')
+    assert [(one.do, one.on) for one in bench.commands] == [("pause", True)]
+
+
+@pytest.mark.parametrize(
+    "wanted", [{}, [], "x", {"do": "explode"}, {"do": "pause", "on": "maybe"}, {"do": "analyze", "run": ".."}]
+)
+def test_what_is_no_command_is_refused_in_words(hall: Hall, wanted: object) -> None:
+    status, text = request(hall, "/do", wanted, **{"X-Levilab-Token": hall.doors.token})
+    assert status in {400, 404}
+    assert json.loads(text)["error"]

@@ -1,0 +1,201 @@
+"""The live view in a browser: it loads, updates, survives, and takes what a run contains for text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from levilab.live.watch import messages_of
+from levilab.telemetry.messages import Counting, Drive, Poses, Record, State
+from support.browser import DESK, PHONE, watch
+from support.live_pages import GrowingRun, address, serving, spin_down, until
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from playwright.sync_api import Browser, Page
+
+    from levilab.live.server import Hall
+
+HOSTILE = '<img src=x onerror="window.hacked=1"><script>window.hacked=1</script>&lt;b&gt;'
+NAME = "20261122T090000Z-spin-0bad"
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root: Path = tmp_path_factory.mktemp("runs")
+    hostile = GrowingRun(
+        root, NAME, note=HOSTILE, instruments={"counter": {"identity": f"Maker,{HOSTILE},1,2", "driver": HOSTILE}}
+    )
+    hostile.readings(spin_down(19))
+    hostile.event(HOSTILE, kind=HOSTILE)
+    return root
+
+
+@pytest.fixture(scope="module")
+def hall(runs: Path) -> Iterator[Hall]:
+    with serving(runs) as hall:
+        yield hall
+
+
+@pytest.fixture(scope="module")
+def shown(browser: Browser, hall: Hall) -> Iterator[Page]:
+    """A page that shows a finished run whose texts are hostile."""
+    with watch(browser) as page:
+        page.goto(address(hall, NAME))
+        until(page, "levilab.drawn > 0 && levilab.data.fit")
+        yield page
+
+
+def test_a_finished_run_stands_there_with_its_fit(shown: Page) -> None:
+    assert shown.inner_text("#state-word") == "finished"
+    assert shown.inner_text("#count") == "19"
+    assert "disc law so far" in shown.inner_text("#fit-head")
+    assert shown.inner_text("#spin-value") == f"{spin_down(19)[-1][1]:.4f}"
+
+
+def test_nothing_that_a_run_contains_becomes_markup(shown: Page) -> None:
+    made = "[window.hacked, document.images.length, document.querySelectorAll('main script').length]"
+    assert shown.evaluate(made) == [None, 0, 0]
+    assert HOSTILE in shown.inner_text("#event-list")
+    assert HOSTILE in shown.inner_text("#facts")
+    assert HOSTILE in shown.text_content("#counter-model")
+
+
+def test_on_a_desk_nothing_scrolls(shown: Page) -> None:
+    root = "document.documentElement"
+    assert shown.evaluate(f"[{root}.scrollWidth, {root}.scrollHeight]") == [DESK["width"], DESK["height"]]
+
+
+def test_every_control_has_a_name_and_every_part_a_heading(shown: Page) -> None:
+    nameless = """[...document.querySelectorAll("button, select, input, a[href], canvas, [tabindex='0'], output")]
+        .filter((one) => !(one.getAttribute("aria-label") || one.textContent.trim()
+                           || one.labels?.[0]?.textContent.trim()))
+        .map((one) => one.id || one.outerHTML)"""
+    assert shown.evaluate(nameless) == []
+    headed = """[...document.querySelectorAll("section")]
+        .every((one) => document.getElementById(one.getAttribute("aria-labelledby")))"""
+    assert shown.evaluate(headed)
+    assert [shown.locator(name).count() for name in ("main", "header", "h1")] == [1, 1, 1]
+    ids = shown.evaluate("[...document.querySelectorAll('[id]')].map((one) => one.id)")
+    assert len(ids) == len(set(ids))
+
+
+def test_texts_stand_out_from_their_ground_by_day_and_by_night(shown: Page) -> None:
+    contrasts = """() => {
+        const parts = (colour) => colour.match(/[\\d.]+/g).slice(0, 3).map((v) => v / 255)
+            .map((v) => v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+        const light = (colour) => { const [r, g, b] = parts(colour); return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
+        const ground = (one) => { for (; one; one = one.parentElement) {
+            const colour = getComputedStyle(one).backgroundColor; if (!/, 0\\)$/.test(colour)) return colour; }
+            return getComputedStyle(document.body).backgroundColor; };
+        return [...document.querySelectorAll("p, dt, dd, h2, small, li span, time, b, output, em, label")]
+            .filter((one) => one.offsetParent
+                && [...one.childNodes].some((n) => n.nodeType === 3 && n.data.trim()))
+            .map((one) => {
+                const [a, b] = [light(getComputedStyle(one).color), light(ground(one))].sort((x, y) => y - x);
+                return [(a + 0.05) / (b + 0.05), one.id || one.textContent.slice(0, 30)]; })
+            .filter(([contrast]) => contrast < 4.5); }"""
+    for scheme in ("dark", "light"):
+        shown.emulate_media(color_scheme=scheme)
+        assert shown.evaluate(contrasts) == []
+
+
+def test_the_keys_go_from_reading_to_reading_and_pause(shown: Page) -> None:
+    shown.focus("#plot")
+    shown.keyboard.press("End")
+    until(shown, "document.getElementById('pointer').textContent.includes('180 s')")
+    shown.keyboard.press("ArrowLeft")
+    said = until(shown, "document.getElementById('pointer').textContent.includes('170 s') && pointer.textContent")
+    assert "± 0.03 Hz" in said
+    assert "from the fit" in said
+    assert shown.evaluate("document.getElementById('news').textContent") == said
+    for pressed in ("true", "false"):
+        shown.keyboard.press("Space")
+        assert shown.get_attribute("#pause", "aria-pressed") == pressed
+    shown.keyboard.press("?")
+    assert shown.locator("#keys").is_visible()
+    shown.keyboard.press("Escape")
+
+
+def test_a_phone_scrolls_down_and_not_sideways(watched: Callable[..., Page], hall: Hall) -> None:
+    page = watched(viewport=PHONE, color_scheme="dark", reduced_motion="reduce")
+    page.goto(address(hall, NAME))
+    until(page, "levilab.drawn > 0")
+    assert page.evaluate("[document.documentElement.scrollWidth, innerWidth]") == [PHONE["width"], PHONE["width"]]
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[Hall]:
+    """A server of its own.  Before `page` among a test's fixtures, so that the page is closed first."""
+    with serving(tmp_path) as hall:
+        yield hall
+
+
+def test_a_run_grows_is_torn_reloaded_and_ends(served: Hall, page: Page, tmp_path: Path) -> None:
+    page.goto(address(served))
+    until(page, "document.body.dataset.state === 'none'")
+    run = GrowingRun(tmp_path)
+    with run.running():
+        run.readings(spin_down(3))
+        run.add("30.0,37.")
+        until(page, "levilab.data.count === 3")
+        assert page.inner_text("#state-word") == "running"
+        run.add("1,0.03\n")
+        until(page, "levilab.data.count === 4")
+        page.reload()
+        until(page, "levilab.data.count === 4")
+        run.event("the lamp was moved", "warning", 31.0)
+        until(page, "document.querySelector('#event-list .warning')")
+    run.say(status="finished")
+    until(page, "document.body.dataset.state === 'finished'")
+
+
+def test_what_the_bench_publishes_is_drawn(served: Hall, page: Page, tmp_path: Path) -> None:
+    run = GrowingRun(tmp_path)
+    page.goto(address(served, run.folder.name))
+    until(page, "levilab.frames > 0")
+    n, wave = 400, np.sin(np.linspace(0, 20, 1000)).astype("f4")
+    turn = np.arange(n) * 2 * np.pi * 30 / 400
+    quaternion = np.stack([0 * turn, 0 * turn, np.sin(turn / 2), np.cos(turn / 2)], axis=1)
+    position = np.tile([0.0, 0.0, 0.075], (n, 1))
+    messages_of(
+        served.watches[run.folder.name],
+        [
+            State(1.0, drive=Drive("SIN", 31.25, 10.0, 0.0, output=True), counting=Counting(0.5, 0.6),
+                  last={"spin_frequency_hz": 31.25, "flux_density_t": 0.0191}, virtual=True, speed=1.0),
+            Record(1, "tape", 1.0, -0.1, 2e-4, wave, wave),
+            Poses(0.0, 1 / 400, position, quaternion, np.ones(n, dtype=bool)),
+        ],
+    )  # fmt: skip
+    until(page, "levilab.space?.frames > 1")
+    assert page.inner_text("#drive-value") == "31.2500"
+    assert page.inner_text("#lock").startswith("follows")
+    assert page.inner_text("#field-value") == "19.100"
+    assert until(page, "document.getElementById('top-text').textContent") == "floats at 75.0 mm"
+    assert "tape from -1 to 1 volts" in page.get_attribute("#trace", "aria-label").replace("−", "-")
+
+
+def test_a_million_readings_are_drawn_from_a_few_thousand_numbers(served: Hall, page: Page, tmp_path: Path) -> None:
+    run = GrowingRun(tmp_path)
+    n = 1_000_000
+    rows = np.stack([np.arange(n) * 0.04, 30 + np.sin(np.arange(n) / 1e5), np.full(n, 0.03)], axis=1)
+    page.goto(address(served, run.folder.name))
+    until(page, "levilab.frames > 0")
+    followed = served.watches[run.folder.name].followed
+    assert followed is not None
+    followed.readings.add(rows)
+    run.readings([(1e5, 30.0, 0.03)])
+    until(page, f"levilab.data.count === {n + 1}")
+    assert page.evaluate("[levilab.data.readings.x.length < 2000, levilab.data.readings.single]") == [True, False]
+    assert len(followed.readings.groups()) <= 8192
+
+
+def test_three_js_and_its_controls_come_out_of_nicegui(page: Page, hall: Hall) -> None:
+    page.goto(address(hall))
+    found = page.evaluate("import('/page/three.js').then((m) => [m.THREE.REVISION, typeof m.OrbitControls])")
+    assert int(found[0]) >= 160
+    assert found[1] == "function"

@@ -1,0 +1,53 @@
+"""The whole experiment in the browser, as a student without an instrument does it, at the bench's fastest speed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from levilab.live.desk import Desk
+from levilab.live.practice.bench import PracticeBench
+from support.live_pages import address, serving, until
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from playwright.sync_api import Page
+
+    from levilab.live.server import Hall
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[Hall]:
+    with PracticeBench(tmp_path) as bench, serving(tmp_path, desk=Desk(bench)) as hall:
+        yield hall
+
+
+def test_a_student_drives_records_and_analyzes(served: Hall, page: Page, tmp_path: Path) -> None:
+    page.goto(address(served, token=True))
+    until(page, "levilab.data.bench?.last.spin_frequency_hz && levilab.space?.frames")
+    page.select_option("#speed", "10")
+    page.select_option("#experiment", "spin")
+    page.click("#match")
+    page.keyboard.press("d")
+    until(page, "levilab.data.bench.drive.output")
+    assert page.get_attribute("#drive", "aria-pressed") == "true"
+    page.click("#back")
+    page.click("#record")
+    until(page, "levilab.data.bench.busy && levilab.data.count >= 3")
+    until(page, "levilab.data.fit")
+    page.click("#record")
+    until(page, "document.body.dataset.state === 'interrupted'")
+    page.click("#analyze")
+    until(page, "document.querySelectorAll('#figures img').length && document.getElementById('verdict').innerText")
+    assert page.locator("#guide .done").count() >= 3
+    (run,) = tmp_path.iterdir()
+    assert (run / "result.json").exists()
+
+
+def test_a_page_without_the_token_may_only_look(served: Hall, page: Page) -> None:
+    page.goto(address(served))
+    until(page, "document.getElementById('controls').disabled")
+    assert "only look" in page.inner_text("#said")

@@ -1,0 +1,70 @@
+"""The command: its port, its ends, and what it needs."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+
+from levilab.live.graphics import NoThree, three_js
+from support.commands import command
+from support.live_pages import GrowingRun
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_a_port_that_is_taken_is_named(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        ended = command("live", "--no-open", "--port", str(port), cwd=tmp_path)
+    assert ended.status == 1
+    assert f"port {port} is in use" in ended.err
+    assert "--port" in ended.err
+
+
+def test_a_run_and_a_bench_for_practice_exclude_each_other(tmp_path: Path) -> None:
+    GrowingRun(tmp_path, "one")
+    ended = command("live", "one", "--mock", "--no-open", "--port", "0", cwd=tmp_path)
+    assert (ended.status, "--mock" in ended.err) == (2, True)
+
+
+def test_without_the_extra_the_message_names_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("levilab.live.graphics.find_spec", lambda _: None)
+    with pytest.raises(NoThree, match=r'pip install "levilab\[live\]"'):
+        three_js()
+    ended = command("live", "--no-open", cwd=tmp_path)
+    assert (ended.status, "levilab[live]" in ended.err) == (1, True)
+
+
+def test_the_help_loads_no_server() -> None:
+    code = (
+        "import sys\nfrom levilab.cli.main import app\n"
+        "try: app(['live', '--help'])\nexcept SystemExit: pass\n"
+        "assert not {'nicegui', 'starlette', 'uvicorn'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signal to one process alone")
+def test_ctrl_c_ends_the_view_in_one_line(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "levilab", "live", "--no-open", "--port", "0"]
+    process = subprocess.Popen(
+        words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
+    )
+    assert process.stdout is not None
+    try:
+        assert process.stdout.readline().startswith("http://127.0.0.1:")
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+        process.wait()
+    assert process.returncode == 130
+    assert err.splitlines()[-1] == "levilab: the view is closed"
+    assert "Traceback" not in err

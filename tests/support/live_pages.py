@@ -1,0 +1,112 @@
+"""The live view for tests: a server in a thread, and run folders that grow as a bench writes them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import socket
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+from levilab.live.doors import Doors
+from levilab.live.server import Hall, application
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from playwright.sync_api import Page
+
+    from levilab.live.desk import Desk
+
+#: A page is waited for so long; one that works is not waited for [s].
+PATIENCE_S = 90.0
+CHANNELS = (("time_s", "s"), ("spin_frequency_hz", "Hz"), ("spin_frequency_u_hz", "Hz"))
+
+
+@contextlib.contextmanager
+def serving(root: Path, shown: str = "", desk: Desk | None = None) -> Iterator[Hall]:
+    """A server of the runs in a folder, at a free port, in a thread of its own."""
+    import uvicorn
+
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        hall = Hall(root, shown, Doors(listening.getsockname()[1]), desk)
+        server = uvicorn.Server(
+            uvicorn.Config(application(hall), log_config=None, ws="websockets-sansio", timeout_graceful_shutdown=1)
+        )
+        thread = threading.Thread(target=lambda: asyncio.run(server.serve(sockets=[listening])), daemon=True)
+        thread.start()
+        try:
+            yield hall
+        finally:
+            server.should_exit = True
+            thread.join(PATIENCE_S)
+
+
+def address(hall: Hall, run: str = "", *, token: bool = False) -> str:
+    """Where a page of the server is."""
+    return f"http://127.0.0.1:{hall.doors.port}/" + (f"?run={run}" if run else "") + (f"#{hall.doors.token}" * token)
+
+
+def until(page: Page, expression: str) -> Any:
+    """Wait for something in a page.  The page's policy forbids Playwright's own way, which evaluates text."""
+    end = time.monotonic() + PATIENCE_S
+    while not (found := page.evaluate(expression)):
+        assert time.monotonic() < end, f"still not: {expression}; {page.evaluate('document.body.innerText')[:600]}"
+        page.wait_for_timeout(30)
+    return found
+
+
+class GrowingRun:
+    """A run folder as a bench writes it, without a bench."""
+
+    def __init__(self, root: Path, name: str = "20261122T100000Z-spin-0000", **record: Any) -> None:
+        self.folder = root / name
+        self.folder.mkdir(parents=True)
+        self.record: dict[str, Any] = {
+            "schema": "levilab-run/1",
+            "experiment": "spin",
+            "status": "finished",
+            "started_utc": "2026-11-22T10:00:00.000000Z",
+            "time_zero_utc": "2026-11-22T10:01:00.000000Z",
+            "channels": [{"name": name, "unit": unit, "source": ""} for name, unit in CHANNELS],
+            "synthetic": True,
+        } | record
+        self.say()
+        self.add(",".join(name for name, _ in CHANNELS) + "\n")
+
+    def say(self, **changes: Any) -> None:
+        """Change the record."""
+        self.record |= changes
+        (self.folder / "run.json").write_text(json.dumps(self.record), encoding="utf-8")
+
+    def add(self, text: str) -> None:
+        """Append to readings.csv."""
+        with (self.folder / "readings.csv").open("a", encoding="utf-8", newline="") as file:
+            file.write(text)
+
+    def readings(self, rows: Sequence[Sequence[float]]) -> None:
+        """Append readings."""
+        self.add("".join(",".join(map(repr, row)) + "\n" for row in rows))
+
+    def event(self, text: str, kind: str = "said", time_s: float | None = None) -> None:
+        """Append an event."""
+        with (self.folder / "events.jsonl").open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"utc": "", "time_s": time_s, "kind": kind, "text": text}) + "\n")
+
+    @contextlib.contextmanager
+    def running(self) -> Iterator[None]:
+        """Hold the lock of a process that writes."""
+        from levilab.runs.run import lock_of
+
+        with lock_of(self.folder):
+            self.say(status="running")
+            yield
+
+
+def spin_down(count: int, step_s: float = 10.0, first: int = 0) -> list[tuple[float, float, float]]:
+    """Readings of a top under the drag of a disc, from 40 Hz."""
+    times = [step_s * k for k in range(first, first + count)]
+    return [(t, (40.0**-0.5 + 2.93e-4 * t) ** -2 + 0.01 * (-1) ** k, 0.03) for k, t in enumerate(times)]
