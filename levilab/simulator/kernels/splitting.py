@@ -117,6 +117,10 @@ def mean_squares(states: Array, every: int, others: Array) -> tuple[float, float
         for j in range(3):
             sums[part, 1] += (a[j] - b[j]) * (a[j] - b[j])
             sums[part, 2] += (a[j + 6] - b[j + 6]) * (a[j + 6] - b[j + 6])
-    sums[0] /= half
-    sums[1] /= n - half
-    return sums[0, 0], sums[0, 1], sums[0, 2], sums[1, 0], sums[1, 1], sums[1, 2]
+    # one by one: a row divided in place would bring numba's texts of shapes that differ into the kernel, which takes
+    # four times as long to compile as all the rest of it
+    first, second = float(half), float(n - half)
+    return (
+        sums[0, 0] / first, sums[0, 1] / first, sums[0, 2] / first,
+        sums[1, 0] / second, sums[1, 1] / second, sums[1, 2] / second,
+    )  # fmt: skip

@@ -1,6 +1,7 @@
 """The base's field against magpylib, against derivatives of higher precision, and against itself."""
 
 import math
+from itertools import pairwise
 
 import magpylib
 import mpmath
@@ -198,10 +199,11 @@ def test_the_series_converges_to_the_exact_field_by_the_distance_from_the_edges(
     at = np.array([0.01, 0.0, 0.073])
     exact = flux_density(field_of(A, B, RHO, "exact", thickness=thickness, origin=-thickness / 2), at)
     ring = {"thickness": thickness, "origin": -thickness / 2}
-    cut = [flux_density(field_of(A, B, RHO, f"paraxial-{n}", **ring), at) for n in range(2, 22, 2)]
+    # each order is compiled for itself, for a second; those between take the same way through the same code
+    cut = [flux_density(field_of(A, B, RHO, f"paraxial-{n}", **ring), at) for n in (4, 8, 12, 16, 20)]
     errors = [relative(series, exact) for series in cut]
     # a term is smaller than the one before by r²/(a² + z²) = 1/62, but for polynomials of the height that pass zero
-    assert all(later < earlier / 100 for earlier, later in zip(errors, errors[2:], strict=False) if later > 1e-14)
+    assert all(later < earlier / 100 for earlier, later in pairwise(errors) if later > 1e-14)
     assert errors[-1] < 1e-14
 
 
