@@ -31,9 +31,16 @@ class Later(typer.core.TyperCommand):
             made, function = typer.Typer(add_completion=False), made
             made.command(self.name)(function)
         command = typer.main.get_command(made)
-        command.help, command.epilog = self.help, self.epilog
+        command.help, command.epilog = _rewrapped(self.help), self.epilog
         return command
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
         """What is called, asked for help or completed is the command itself."""
         return self.command.make_context(info_name, args, parent, **extra)
+
+
+def _rewrapped(text: str | None) -> str | None:
+    """A help text whose paragraphs are one line each: typer keeps the line breaks of a docstring and adds its own."""
+    if text is None:
+        return None
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))

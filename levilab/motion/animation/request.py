@@ -108,6 +108,8 @@ def check_request(request: AnimationRequest, scene: Scene, duration: float) -> N
         raise UsageError(
             "animate", "the scene has no motion: observed = spin; take observed = motion", value=request.path
         )
+    if not duration > 0:
+        raise UsageError("duration", "an animation needs a duration above 0 s", value=duration)
     first = request.start or 0.0
     if not 0 <= first < duration:
         raise UsageError(

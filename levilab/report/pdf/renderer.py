@@ -81,7 +81,13 @@ def as_pdf(document: Document) -> bytes:
         NoTypst: the extra `pdf` is not installed.
     """
     check_typst()
-    import typst
+    try:
+        import typst
+    except ImportError as error:  # installed, but not for this Python or machine
+        raise NoTypst(
+            f"a PDF is set by typst, which is installed but cannot be loaded ({error}): "
+            "pip install --force-reinstall typst, or name the report report.html"
+        ) from error
 
     files: Any = files_of(document)  # a dictionary of files is missing in the types that typst declares
     return typst.compile(files, format="pdf", font_paths=fonts(), ignore_system_fonts=True)
