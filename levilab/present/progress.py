@@ -11,6 +11,8 @@ from levilab.present.characters import for_encoding, printable
 from levilab.present.panel import Trend, bench_lines
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rich.console import Console
     from rich.progress import Progress
     from rich.text import Text
@@ -108,7 +110,8 @@ class LineDisplay:
 class BarDisplay:
     """The readings as lines, and below them the bench as it is: last value, trend, instruments, time left.
 
-    It has no thread: it is drawn anew when the bench has something to show, at most four times a second.
+    It has no thread: it is drawn anew when the bench has something to show, at most four times a second.  A terminal that
+    is gone, as with a window that was closed, ends no measurement.
 
     Args:
         console: by default one on standard error.
@@ -131,7 +134,17 @@ class BarDisplay:
             redirect_stderr=False,
             get_renderable=self._panel,
         )
-        self._live.start()
+        self._gone = False
+        self._draw(self._live.start)
+
+    def _draw(self, action: Callable[[], object]) -> None:
+        """Write to the terminal, as long as it is there."""
+        if self._gone:
+            return
+        try:
+            action()
+        except OSError:
+            self._gone = True
 
     def _panel(self) -> Text:
         from rich.text import Text
@@ -159,7 +172,7 @@ class BarDisplay:
 
     def message(self, text: str) -> None:
         """A line above."""
-        self._console.print(printable(text), markup=False, highlight=False)
+        self._draw(lambda: self._console.print(printable(text), markup=False, highlight=False))
 
     def is_due(self) -> bool:
         """Whether the last drawing is long enough ago, or a reading came since."""
@@ -170,11 +183,11 @@ class BarDisplay:
         self._next = time.monotonic() + _DRAWN_EVERY_S
         self._shown = state
         self._trend.take(state)
-        self._live.refresh()
+        self._draw(self._live.refresh)
 
     def close(self) -> None:
         """Take the lines of the bench away; the readings stay."""
-        self._live.stop()
+        self._draw(self._live.stop)
 
 
 def to_stderr() -> Display:

@@ -89,3 +89,17 @@ def test_the_bench_is_drawn_in_the_characters_of_the_stream(encoding: str, expec
     assert "0.10 Hz/s" in shown
     assert expected in shown
     assert not re.search("\x1b\\[[0-9;]*m", shown)  # no colour was asked for
+
+
+def test_a_terminal_that_is_gone_ends_no_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys, "stderr", screen := Screen())
+    display = BarDisplay()
+
+    def gone(_: str) -> int:
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(screen, "write", gone)
+    display.reading("40.123 Hz", 1.0, 3.0)
+    display.state(State(5.0, elapsed_s=1.0, time_left_s=3.0, readings=1))
+    display.close()
