@@ -33,7 +33,7 @@ def _sentences(analysis: FieldAnalysis) -> Iterator[str]:
     b, slope = (float(each[0]) for each in on_axis(scan.ring, np.array([_HEIGHT_M]))[:2])
     yield (
         f"The base is as strong as ρ = {with_uncertainty(SHOWN['strength'].of(strength))}, known to "
-        f"{digits(100 * strength.u / abs(strength.value))} %; {1e3 * _HEIGHT_M:g} mm up that is "
+        f"{digits(100 * strength.u / abs(strength.value))} %; {1e2 * _HEIGHT_M:g} cm up that is "
         f"{plain(abs(1e3 * b))} mT, "
         f"and {plain(abs(10 * slope))} mT less for each centimetre higher."
     )
