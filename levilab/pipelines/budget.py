@@ -225,18 +225,20 @@ def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, s
         for source, origin in zip(found.sources, found.origins, strict=True)
         if len(found.sources) > 1 and origin.budget
     ]
+    printed = len(of_each) if len(of_each) < _MANY else 0 if found.budget else 1
     each = [
-        Details(
-            f"{name} by itself", budget_blocks(budget, shown, name), on_paper="whole" if len(of_each) < _MANY else "out"
-        )
-        for name, budget in of_each[:_MOST_RUNS]
+        Details(f"{name} by itself", budget_blocks(budget, shown, name), on_paper="whole" if k < printed else "out")
+        for k, (name, budget) in enumerate(of_each[:_MOST_RUNS])
     ]
+    if printed < len(each) and not found.budget:
+        each.append(Note("Only the first of them is printed; all are in the report as HTML, and in result.json."))
     if not found.budget and not each:
         return (Paragraph("The result was written before budgets were kept with it: levilab analyze makes them."),)
     return (*budget_blocks(found.budget, shown), *each)
 
 
-#: From so many runs on their budgets are not printed on paper; and so many are in a report.
+#: From so many runs on their budgets are not printed on paper, but for the first one where no mean has one; and so many
+#: are in a report.
 _MANY, _MOST_RUNS = 3, 12
 
 
@@ -262,10 +264,9 @@ def budget_blocks(budgets: Sequence[Budget], shown: Mapping[str, str] | None = N
 
 #: What the columns and rows of a budget mean.
 EXPLAINED = (
-    "Type A is evaluated from a scatter that was seen, type B from anything else (GUM). The sensitivity "
-    "is the change of "
-    "the result with the input, and what a row adds to u is the sensitivity times the u of the input; squares add up "
-    "to u². What is not in u is common to all readings and runs, so that no repetition shows it."
+    "Type A is evaluated from a scatter that was seen, type B from anything else (GUM). The sensitivity is the change "
+    "of the result with the input, and what a row adds to u is the sensitivity times the u of the input; squares add "
+    "up to u². What is not in u is common to all readings and runs, so that no repetition shows it."
 )
 
 

@@ -73,7 +73,7 @@ def spin_figure(analysis: SpinAnalysis) -> Figure:
 def _finding(analysis: SpinAnalysis) -> str:
     if len(analysis.runs) == 1:
         spin = analysis.runs[0].spin
-        return f"Spin {with_uncertainty(spin.frequency)} at {spin.reference_time:.4g} s"
+        return f"Spin {with_uncertainty(spin.frequency)} at {_reference(spin)}"
     return f"Spin of {len(analysis.runs)} inputs"
 
 
@@ -81,7 +81,11 @@ def _title(source: Source[Records], run: SpinRun) -> str:
     spin = run.spin
     made_up = "  (SYNTHETIC)" if source.synthetic else ""
     name = _drawable(short_name(source.name))
-    return f"{name}: spin {with_uncertainty(spin.frequency)} at {spin.reference_time:.4g} s{made_up}"
+    return f"{name}: spin {with_uncertainty(spin.frequency)} at {_reference(spin)}{made_up}"
+
+
+def _reference(spin: SpinFrequency) -> str:
+    return f"{spin.reference_time:.4g} s".replace("-", "−")
 
 
 def _drawable(name: str) -> str:

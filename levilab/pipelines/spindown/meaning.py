@@ -121,9 +121,8 @@ def _tilt(analysis: SpinDownAnalysis) -> Iterator[str]:
     tilt = analysis.combined.tilt
     if tilt and tilt.value:
         yield (
-            f"The magnet's moment points {digits(math.degrees(tilt.value))}° off the axis of the top: it "
-            "wobbles with its "
-            "spin, more and more towards the fall, and the counter counts a little more than the spin."
+            f"The magnet's moment points {digits(math.degrees(tilt.value))}° off the axis of the top: it wobbles with "
+            "its spin, more and more towards the fall, and the counter counts a little more than the spin."
         )
 
 
