@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from analysis.numbers import digits
 from levilab.motion.summary import changing_energy
 from levilab.present.drawing import SMALL, curve, headline, panel
 from levilab.present.looks import GREY, LOOKS
@@ -226,7 +227,7 @@ def _energy_title(summary: Summary) -> str:
 
 
 def _exactly(change: float) -> str:
-    return f"to {change:.1g}" if change else "exactly"
+    return f"to {digits(change, 1)}" if change else "exactly"
 
 
 def _draw_quantity(axes: Axes, quantity: _Quantity, time: Array) -> None:
