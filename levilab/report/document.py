@@ -183,7 +183,7 @@ def _document_banner(results: Results, sources: Sequence[Source[Any]], others: S
     mark = _banner(sources, mixed=mixed)
     if mark is None and others:
         return Banner(
-            "SYNTHETIC IN PART.", "Some chapters are of simulations on a computer; they say so at their head."
+            "SYNTHETIC IN PART.", "Chapters that say so are of simulations on a computer."
         )
     return mark
 
