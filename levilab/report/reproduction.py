@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _MOST_NAMED = 12
 #: Options of analyses that the command line gives as they are.
 SAME_IN_COMMANDS = (
-    "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "method", "orthogonal"
+    "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "method", "orthogonal", "clock_u"
 )  # fmt: skip
 
 
