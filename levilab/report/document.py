@@ -182,9 +182,7 @@ def _document_banner(results: Results, sources: Sequence[Source[Any]], others: S
     mixed = _mixes(results[0][1]) if len(results) == 1 else False
     mark = _banner(sources, mixed=mixed)
     if mark is None and others:
-        return Banner(
-            "SYNTHETIC IN PART.", "Chapters that say so are of simulations on a computer."
-        )
+        return Banner("SYNTHETIC IN PART.", "Chapters that say so are of simulations on a computer.")
     return mark
 
 
