@@ -25,7 +25,7 @@ def page(tmp_path: Path, undrawn_figures: None) -> str:
     """Of sixteen runs, two of which are broken."""
     make_runs(tmp_path / "runs", COUNT, broken=8)
     said: list[str] = []
-    output = write_report([tmp_path / "runs"], tmp_path / "report.html", {"tilt": "none"}, said.append)
+    output = write_report([tmp_path / "runs"], tmp_path / "report.html", tell=said.append)
     assert len(said) == 1, "the broken runs are named once, not once by each analysis"
     assert re.search(r"spin-0003 and 10 more: analyzed for the page", said[0])
     return output.read_text(encoding="utf-8")
