@@ -226,7 +226,7 @@ def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, s
         if len(found.sources) > 1 and origin.budget
     ]
     printed = len(of_each) if len(of_each) < _MANY else 0 if found.budget else 1
-    each = [
+    each: list[Block] = [
         Details(f"{name} by itself", budget_blocks(budget, shown, name), on_paper="whole" if k < printed else "out")
         for k, (name, budget) in enumerate(of_each[:_MOST_RUNS])
     ]
