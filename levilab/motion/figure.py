@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from analysis.numbers import digits
 from levilab.motion.summary import changing_energy
 from levilab.present.drawing import SMALL, curve, headline, panel
 from levilab.present.looks import GREY, LOOKS
@@ -151,7 +152,7 @@ def _draw_paths(figure: Figure, summary: Summary) -> None:
     panels[1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, handlelength=1, columnspacing=1)
     bar = figure.colorbar(path, cax=panel(figure, _LEFT + 2 * wide + 0.75, 0.62, 0.1, _PATH))
     bar.set_label("time  [s]")
-    bar.outline.set_linewidth(0.5)  # type: ignore[operator]
+    bar.outline.set_linewidth(0.5)
 
 
 # --- in time ---
@@ -226,7 +227,7 @@ def _energy_title(summary: Summary) -> str:
 
 
 def _exactly(change: float) -> str:
-    return f"to {change:.1g}" if change else "exactly"
+    return f"to {digits(change, 1)}" if change else "exactly"
 
 
 def _draw_quantity(axes: Axes, quantity: _Quantity, time: Array) -> None:

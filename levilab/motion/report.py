@@ -152,7 +152,7 @@ _QUANTITIES = (
     ("mean height", "cm", 1e2, "height_mean_m"),
     ("least height", "cm", 1e2, "height_min_m"),
     ("greatest height", "cm", 1e2, "height_max_m"),
-    ("greatest distance from the axis", "mm", 1e3, "distance_from_axis_max_m"),
+    ("greatest distance from the axis", "cm", 1e2, "distance_from_axis_max_m"),
     ("greatest tilt of the axis", "°", 180 / math.pi, "tilt_max_rad"),
     ("spin at the start", "Hz", 1.0, "spin_start_hz"),
     ("spin at the end", "Hz", 1.0, "spin_end_hz"),

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from analysis.budget import Component, u_of_limit
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from instruments.time_bases import TIME_BASES
 from levilab.present.document.blocks import Bullets, Details, Note, Paragraph, Tabular
-from levilab.present.numbers import in_words, with_uncertainty
+from levilab.present.numbers import enumeration, in_words, with_uncertainty
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -55,9 +55,9 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
             f"each year ({known.source})"
         )
     elif about:
-        u, note = None, f"not known for {driver or 'this instrument'}: give it with `clock_u`, from its manual"
+        u, note = None, f"not known for {driver or 'this instrument'}: the option clock_u gives it, from its manual"
     else:
-        u, note = None, "no instrument is recorded: give it with `clock_u`, from the manual"
+        u, note = None, "no instrument is recorded: the option clock_u gives it, from the manual"
     return Component("time_base", what, "B", u, "1", sensitivity, included=False, note=note, remedy=remedy)
 
 
@@ -74,6 +74,21 @@ def bench_clock(sensitivity: float) -> Component:
         note="that of the computer, whose rate is not known; one that is set by the network is right to 10⁻⁶ or so",
         remedy="a computer whose clock is set by the network",
     )
+
+
+def direct_row(  # noqa: PLR0917 - the fields of a row
+    name: str,
+    what: str,
+    part: float,
+    unit: str,
+    note: str,
+    remedy: str,
+    kind: Literal["A", "B"] = "B",
+    *,
+    included: bool = True,
+) -> Component:
+    """A row whose size is known in the result's own unit alone [`unit`]; see `Component`."""
+    return Component(name, what, kind, part, unit, 1.0, included, note, remedy)
 
 
 def gate_of(source: Source[Any], experiment: str) -> float | None:
@@ -185,15 +200,15 @@ def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str
     known = [one for one in budget.left_out if one.contribution]
     if known and not budget.misses_nothing:
         whole = _number(budget.u_with_all, in_words(budget.unit))
-        texts.append(f"Not in u: {_and([one.source for one in known])}; with all of it u is {whole}.")
+        texts.append(f"Not in u: {enumeration([one.source for one in known])}; with all of it u is {whole}.")
     elif known:
-        texts.append(f"Not in u, and negligible: {_and([one.source for one in known])}.")
+        texts.append(f"Not in u, and negligible: {enumeration([one.source for one in known])}.")
     unknown = [one for one in budget.left_out if one.u is None and one.sensitivity]
     clocks = [one for one in unknown if one.unit == _NO_UNIT]
     if clocks:
         most = max(abs(one.sensitivity) for one in clocks) * _TEN_PPM
         size = "less than 1 % of u" if most < 0.01 * budget.u else _number(most, in_words(budget.unit))
-        texts.append(f"Not known: {_and([one.source for one in clocks])}; an error of 10⁻⁵ would add {size}.")
+        texts.append(f"Not known: {enumeration([one.source for one in clocks])}; an error of 10⁻⁵ would add {size}.")
     texts += [f"Not known: {one.source}; it takes {one.remedy}." for one in unknown if one not in clocks]
     return " ".join(texts)
 
@@ -210,18 +225,20 @@ def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, s
         for source, origin in zip(found.sources, found.origins, strict=True)
         if len(found.sources) > 1 and origin.budget
     ]
-    each = [
-        Details(
-            f"{name} by itself", budget_blocks(budget, shown, name), on_paper="whole" if len(of_each) < _MANY else "out"
-        )
-        for name, budget in of_each[:_MOST_RUNS]
+    printed = len(of_each) if len(of_each) < _MANY else 0 if found.budget else 1
+    each: list[Block] = [
+        Details(f"{name} by itself", budget_blocks(budget, shown, name), on_paper="whole" if k < printed else "out")
+        for k, (name, budget) in enumerate(of_each[:_MOST_RUNS])
     ]
+    if printed < len(each) and not found.budget:
+        each.append(Note("Only the first of them is printed; all are in the report as HTML, and in result.json."))
     if not found.budget and not each:
         return (Paragraph("The result was written before budgets were kept with it: levilab analyze makes them."),)
     return (*budget_blocks(found.budget, shown), *each)
 
 
-#: From so many runs on their budgets are not printed on paper; and so many are in a report.
+#: From so many runs on their budgets are not printed on paper, but for the first one where no mean has one; and so many
+#: are in a report.
 _MANY, _MOST_RUNS = 3, 12
 
 
@@ -247,10 +264,9 @@ def budget_blocks(budgets: Sequence[Budget], shown: Mapping[str, str] | None = N
 
 #: What the columns and rows of a budget mean.
 EXPLAINED = (
-    "Type A is evaluated from a scatter that was seen, type B from anything else (GUM). The sensitivity "
-    "is the change of "
-    "the result with the input, and what a row adds to u is the sensitivity times the u of the input; squares add up "
-    "to u². What is not in u is common to all readings and runs, so that no repetition shows it."
+    "Type A is evaluated from a scatter that was seen, type B from anything else (GUM). The sensitivity is the change "
+    "of the result with the input, and what a row adds to u is the sensitivity times the u of the input; squares add "
+    "up to u². What is not in u is common to all readings and runs, so that no repetition shows it."
 )
 
 
@@ -258,7 +274,3 @@ def notes_of(budgets: Sequence[Budget]) -> list[str]:
     """Where the numbers of the rows come from, each once."""
     said = (f"{one.source}: {one.note}" for budget in budgets for one in budget.components if one.note)
     return list(dict.fromkeys(said))
-
-
-def _and(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from analysis.numbers import digits
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from analysis.uncertainty import Estimate
 
@@ -116,6 +116,15 @@ def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> s
         ordinary = 1e-2 <= abs(value) < 1e5 or abs(value) < u < 1e5
     text = f"{ufloat(value, u):SP}" if ordinary else f"{ufloat(value, u):eSP}"
     return re.sub(r"^-(?=0(\.0*)?\()", "", text)
+
+
+def enumeration(names: Sequence[str]) -> str:
+    """The names one after the other, in a sentence.
+
+    >>> enumeration(["disc"]), enumeration(["disc", "stokes", "newton"])
+    ('disc', 'disc, stokes and newton')
+    """
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def signed(value: float, decimals: int) -> str:

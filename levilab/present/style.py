@@ -32,8 +32,10 @@ def _sheet() -> dict[str, Any]:
     own = resources.files("levilab.present") / "levilab.mplstyle"
     with resources.as_file(own) as path:
         sheet = mpl.rc_params_from_file(path, use_default_template=False)
-    defaults = mpl.rcParamsDefault
-    return {key: defaults[key] for key in defaults if key not in _NOT_STYLE} | dict(sheet)
+    style: dict[str, Any] = {}
+    for values in (mpl.rcParamsDefault, sheet):
+        style.update({key: value for key, value in values.items() if key not in _NOT_STYLE})
+    return style
 
 
 #: Parameters of the program, not of its figures.

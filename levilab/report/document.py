@@ -65,7 +65,7 @@ def document_of(
     counts = counted(sources)
     subjects = ", ".join([*(part.subject for part in parts), *(one.title.lower() for one in others)])
     return Document(
-        title=parts[0].heading if alone else f"Report of {counts}" if counts else others[0].title,
+        title=parts[0].heading if alone else _title(counts, others),
         lead=_lead(results[0][1], parts[0]) if alone else subjects[:1].upper() + subjects[1:],
         blocks=tuple(blocks),
         banner=banner,
@@ -137,6 +137,13 @@ def _of_one_analysis(
     )
 
 
+def _title(counts: str, others: Sequence[Section]) -> str:
+    """Of a document of several parts; counts: of the measurements, empty for none."""
+    if not counts:
+        return others[0].title if len(others) == 1 else f"Report of {len(others)} simulations"
+    return f"Report of {counts}{', with simulations' if others else ''}"
+
+
 def _lead(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
     """How much was used."""
     warnings = "" if found.grouped_warnings else ", no warnings"
@@ -173,7 +180,10 @@ def _document_banner(results: Results, sources: Sequence[Source[Any]], others: S
     if not results:
         return Banner("SYNTHETIC.", "All of it was simulated on a computer; nothing was measured.") if others else None
     mixed = _mixes(results[0][1]) if len(results) == 1 else False
-    return _banner(sources, mixed=mixed)
+    mark = _banner(sources, mixed=mixed)
+    if mark is None and others:
+        return Banner("SYNTHETIC IN PART.", "Chapters that say so are of simulations on a computer.")
+    return mark
 
 
 def _mixes(found: Analyzed[Any, Any, Any, Any]) -> bool:

@@ -211,12 +211,14 @@ def _conditions(record: RunRecord) -> tuple[str, ...]:
 
 
 def _instrument(about: Mapping[str, Any]) -> tuple[str, ...]:
-    """Who answered, where, and the settings of the measurement: those at its end."""
+    """Who answered, where, and the settings of the measurement: those at its end, else those at its start."""
     where = f"{about.get('identity', 'did not answer')} at {about.get('address', 'an unknown address')}"
-    settings = about.get("settings_end")
-    if not isinstance(settings, dict):
-        return where, "settings not recorded"
-    return where, settings_in_words(settings)
+    at_start, at_end = (about.get(when) for when in ("settings_start", "settings_end"))
+    if isinstance(at_end, dict):
+        return where, settings_in_words(at_end)
+    if isinstance(at_start, dict):
+        return where, f"at the start, no later settings are recorded: {settings_in_words(at_start)}"
+    return where, "settings not recorded"
 
 
 def _changes(source: Source[Any]) -> tuple[Block, ...]:

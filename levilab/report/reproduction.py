@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _MOST_NAMED = 12
 #: Options of analyses that the command line gives as they are.
 SAME_IN_COMMANDS = (
-    "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "method", "orthogonal"
+    "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "method", "orthogonal", "clock_u"
 )  # fmt: skip
 
 
@@ -52,11 +52,11 @@ def _commands(results: Sequence[tuple[Analysis[Any], Any]], sources: Sequence[So
             of = [
                 s for s, origin in zip(found.sources, found.origins, strict=True) if _options(origin.options) == given
             ]
-            yield " ".join(["levilab", "analyze", analysis.name, *_paths(of), *given])
-    yield " ".join(["levilab", "report", *_paths(sources), "-o", "report.html"])
+            yield " ".join(["levilab", "analyze", analysis.name, *named_in_commands(of), *given])
+    yield " ".join(["levilab", "report", *named_in_commands(sources), "-o", "report.html"])
 
 
-def _paths(sources: Sequence[Source[Any]]) -> list[str]:
+def named_in_commands(sources: Sequence[Source[Any]]) -> list[str]:
     """As one types them; of many the folder that holds them."""
     paths = [source.path for source in sources]
     if len(paths) > _MOST_NAMED:

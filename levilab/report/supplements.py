@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.crosscheck.own.stored import read_own
 from levilab.crosscheck.own.study import OWN, own_blocks, quick_check
-from levilab.present.document.blocks import Paragraph, Section
+from levilab.present.document.blocks import Code, Paragraph, Section
+from levilab.report.reproduction import named_in_commands
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,8 +39,9 @@ def trials(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
     made = quick_check(analysis.name, found, analysis.settings_of(found))
     if made is not None:
         return (_section(*own_blocks(made, analysis.symbols)),)
-    advice = f"levilab crosscheck {analysis.name} --like"
-    return (_section(Paragraph(f"Not made: it takes longer than a report. `{advice}` with these inputs makes it.")),)
+    named = " ".join(named_in_commands(found.sources))
+    advice = Code(f"levilab crosscheck {analysis.name} --like {named}")
+    return (_section(Paragraph("Not made: it takes longer than a report. This makes and keeps it:"), advice),)
 
 
 def _section(*blocks: Block) -> Section:

@@ -41,6 +41,7 @@ def work_precision_figure(found: Comparison) -> Figure:
         figure = Figure(figsize=(WIDE, 4.1))
         headline(figure, TITLE)
         axes = panel(figure, 0.75, 0.55, 4.2, 3.0)
+        fastest = {}
         for method, (colour, marker, line, name) in LINES.items():
             points = sorted(
                 (100 * p.error, p.speed)
@@ -50,13 +51,14 @@ def work_precision_figure(found: Comparison) -> Figure:
             )  # fmt: skip
             if points:
                 errors, speeds = zip(*points, strict=True)
+                fastest[name] = max(speeds)
                 axes.loglog(errors, speeds, color=colour, marker=marker, linestyle=line, label=name)
         axes.set_xlim(*RANGE)
         axes.set(xlabel="error of the place after 5 s  [cm]; smaller to the right",
                  ylabel="simulated seconds per second of one core")  # fmt: skip
         axes.grid(visible=True, which="major")
         handles, names = axes.get_legend_handles_labels()
-        order = sorted(range(len(names)), key=lambda k: -max(handles[k].get_ydata()))
+        order = sorted(range(len(names)), key=lambda k: -fastest[names[k]])
         axes.legend(
             [handles[k] for k in order], [names[k] for k in order], loc="upper left", bbox_to_anchor=(1.02, 1.0),
             fontsize=SMALL, borderaxespad=0, labelspacing=0.6,

@@ -245,8 +245,8 @@ def own_blocks(found: OwnCheck, shown: Mapping[str, str] | None = None) -> tuple
     """The trials as blocks of a report."""
     note = (
         "A pull is (estimate − truth)/u; wanted are a mean of 0, a standard deviation of 1, and 68 % within 1 u. "
-        "Behind ± stands what chance leaves to so many trials, one standard error; smaller deviations mean that u is "
-        "on the safe side."
+        "Behind ± stands what chance leaves to so many trials, one standard error. As wanted is what misses this by a "
+        "tenth at most and three standard errors; smaller deviations mean that u is on the safe side."
     )
     return (
         Paragraph(in_words(found)),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.numbers import digits
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.header import LONGEST_DOUBTFUL_STEP_S, Header, NoRate, NoWaveform, printed, read_header
 from levilab.formats.waveforms.rows import read_blocks
@@ -235,7 +236,7 @@ def _fitted(path: Path, clock: _Clock, unit: float, *, first: float, mean: float
     if u < _FINE * step or clock.longest[0] - clock.shortest[0] < 1e-6 * clock.resolution:  # all differences alike
         return _Times(first, step)
     lost = f"its printed times have lost digits (one unit of the last is {resolution:g} s, a step {step:.4g} s): the "
-    known = f"{path.name}: {lost}sampling rate, and so any frequency, is known to {u / step:.1g} of it"
+    known = f"{path.name}: {lost}sampling rate, and so any frequency, is known to {digits(u / step, 1)} of it"
     return _Times(first, step, (known,), u)
 
 

@@ -17,7 +17,7 @@ from levilab.pipelines.field.device import FieldOptions, known_of, known_top, us
 from levilab.pipelines.field.quantities import SHOWN
 from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
 from levilab.pipelines.sources import Needs
-from levilab.present.numbers import with_uncertainty
+from levilab.present.numbers import enumeration, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -197,7 +197,7 @@ def _learned_in_words(scan: FieldScan) -> str:
     ]
     said = []
     if of_calliper:
-        said.append(f"The scan does not tell {_and(of_calliper)} better than the calliper.")
+        said.append(f"The scan does not tell {enumeration(of_calliper)} better than the calliper.")
     pairs = [
         (one, other)
         for k, one in enumerate(scan.fitted)
@@ -210,10 +210,6 @@ def _learned_in_words(scan: FieldScan) -> str:
         for one, other in pairs
     ]
     return " ".join(said)
-
-
-def _and(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def _advice(values: Mapping[str, Estimate]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -66,8 +66,8 @@ def _finding(analysis: FieldAnalysis) -> str:
     if "lowest_height" not in values:
         return said
     mass = with_uncertainty(SHOWN["mass_to_set"].of(values["mass_to_set"]))
-    low, high = (1e3 * (values[name].value or 0.0) for name in ("lowest_height", "highest_height"))
-    return f"{said}; tops float from {low:.2f} to {high:.2f} mm, set {mass}"
+    low, high = (1e2 * (values[name].value or 0.0) for name in ("lowest_height", "highest_height"))
+    return f"{said}; tops float from {low:.2f} to {high:.2f} cm, set {mass}"
 
 
 # --- field and residuals -------------------------------------------------------------------------------
@@ -79,14 +79,14 @@ def _draw_field(axes: Axes, analysis: FieldAnalysis) -> None:
     z = np.linspace(low - _BEYOND * (high - low), high + _BEYOND * (high - low), _POINTS)
     for k, run in enumerate(analysis.runs):
         colour, scan = COLOURS[k % len(COLOURS)], run.scan
-        axes.plot(1e3 * z, 1e3 * scan.model(z), color=colour, linewidth=1.3, label=_curve_label(analysis, k))
-        style = {"markersize": 4.0, "markerfacecolor": "white", "zorder": 3, "linestyle": "none", "color": colour}
+        axes.plot(1e2 * z, 1e3 * scan.model(z), color=colour, linewidth=1.3, label=_curve_label(analysis, k))
+        style: Any = {"markersize": 4.0, "markerfacecolor": "white", "zorder": 3, "linestyle": "none", "color": colour}
         axes.plot(
-            1e3 * scan.height, 1e3 * scan.flux_density, marker=_MARKERS[k % len(COLOURS)], gid=f"readings-{k}",
+            1e2 * scan.height, 1e3 * scan.flux_density, marker=_MARKERS[k % len(COLOURS)], gid=f"readings-{k}",
             label=_points_label(analysis, k), **style,
         )  # fmt: skip
     axes.axhline(0, color="black", linewidth=0.6)
-    axes.set_xlim(1e3 * z[0], 1e3 * z[-1])
+    axes.set_xlim(1e2 * z[0], 1e2 * z[-1])
     _mark_window(axes, analysis)
     axes.set(ylabel="B along the axis  [mT]")
     axes.tick_params(labelbottom=False)
@@ -109,9 +109,9 @@ def _mark_window(axes: Axes, analysis: FieldAnalysis) -> None:
     if "lowest_height" not in values:
         return
     low, high, middle = (
-        1e3 * (values[name].value or 0.0) for name in ("lowest_height", "highest_height", "height_at_mass")
+        1e2 * (values[name].value or 0.0) for name in ("lowest_height", "highest_height", "height_at_mass")
     )
-    axes.axvspan(low, high, color=FLOATS, alpha=0.15, linewidth=0, label=f"tops float:\n{low:.2f} to {high:.2f} mm")
+    axes.axvspan(low, high, color=FLOATS, alpha=0.15, linewidth=0, label=f"tops float:\n{low:.2f} to {high:.2f} cm")
     mass = with_uncertainty(SHOWN["mass_to_set"].of(values["mass_to_set"]))
     axes.axvline(middle, linewidth=1.3, label=f"a top of {mass}", **LOOKS["to set"].as_line)
 
@@ -124,10 +124,10 @@ def _draw_residuals(axes: Axes, analysis: FieldAnalysis, limits: tuple[float, fl
         scaled = run.scan.residuals / run.scan.u
         most = max(most, 1.15 * float(np.abs(scaled).max()))
         axes.plot(
-            1e3 * run.scan.height, scaled, linestyle="none", marker=_MARKERS[k % len(COLOURS)], markersize=3.5,
+            1e2 * run.scan.height, scaled, linestyle="none", marker=_MARKERS[k % len(COLOURS)], markersize=3.5,
             color=COLOURS[k % len(COLOURS)], gid=f"residuals-{k}",
         )  # fmt: skip
-    axes.set(xlim=limits, ylim=(-most, most), xlabel="height  [mm]", ylabel="residual  [u]")
+    axes.set(xlim=limits, ylim=(-most, most), xlabel="height  [cm]", ylabel="residual  [u]")
     u = 1e6 * np.concatenate([run.scan.u for run in analysis.runs])
     text = (
         f"reading − fit, in units of its\nu of {u.min():.0f} to {u.max():.0f} µT, that of the\n"
@@ -149,15 +149,15 @@ def _draw_masses(axes: Axes, run: FieldRun) -> None:
     mass = np.abs(moment * axial_field(ring, top.magnet)(z)[1]) / top.gravity
     share = (floating.values["mass_to_set"].u or 0.0) / floating["mass_to_set"]
     inside = (z >= low) & (z <= high)
-    band(axes, 1e3 * z, 1e3 * mass, 1e3 * mass * share, GREY, label="± u")
-    axes.plot(1e3 * z, 1e3 * mass, color=GREY, linewidth=1, label="not stable there")
-    axes.plot(1e3 * z[inside], 1e3 * mass[inside], color=FLOATS, linewidth=2.5, label="floats stably")
+    band(axes, 1e2 * z, 1e3 * mass, 1e3 * mass * share, GREY, label="± u")
+    axes.plot(1e2 * z, 1e3 * mass, color=GREY, linewidth=1, label="not stable there")
+    axes.plot(1e2 * z[inside], 1e3 * mass[inside], color=FLOATS, linewidth=2.5, label="floats stably")
     for name, height in (("heaviest_mass", low), ("lightest_mass", high)):
-        axes.plot(1e3 * height, 1e3 * floating[name], marker="s", color=FLOATS)
-    set_at = 1e3 * floating["height_at_mass"], 1e3 * floating["mass_to_set"]
+        axes.plot(1e2 * height, 1e3 * floating[name], marker="s", color=FLOATS)
+    set_at = 1e2 * floating["height_at_mass"], 1e3 * floating["mass_to_set"]
     mass_to_set = with_uncertainty(SHOWN["mass_to_set"].of(floating.values["mass_to_set"]))
     axes.plot(*set_at, marker="D", color=SET, linestyle="none", markersize=5, zorder=4, label=f"to set: {mass_to_set}")
-    axes.set(xlabel="height at which it floats  [mm]", ylabel="mass of the top  [g]")
+    axes.set(xlabel="height at which it floats  [cm]", ylabel="mass of the top  [g]")
     bottom, top_of = axes.get_ylim()
     axes.set_ylim(bottom, top_of + 0.55 * (top_of - bottom))
     axes.legend(loc="upper left", fontsize=SMALL, ncols=2, columnspacing=1.0, handlelength=1.6, borderaxespad=0)

@@ -33,9 +33,8 @@ def _sentences(analysis: FieldAnalysis) -> Iterator[str]:
     b, slope = (float(each[0]) for each in on_axis(scan.ring, np.array([_HEIGHT_M]))[:2])
     yield (
         f"The base is as strong as ρ = {with_uncertainty(SHOWN['strength'].of(strength))}, known to "
-        f"{digits(100 * strength.u / abs(strength.value))} %; {1e3 * _HEIGHT_M:g} mm up that is "
-        f"{plain(abs(1e3 * b))} mT, "
-        f"and {plain(abs(10 * slope))} mT less for each centimetre higher."
+        f"{digits(100 * strength.u / abs(strength.value))} %; {1e2 * _HEIGHT_M:g} cm up that is "
+        f"{plain(abs(1e3 * b))} mT, and {plain(abs(10 * slope))} mT less for each centimetre higher."
     )
     yield "What the base holds up is in proportion to its strength: 1 % stronger, and the top weighs 1 % more."
     reduced = scan.statistics.reduced_chi_square
@@ -45,7 +44,6 @@ def _sentences(analysis: FieldAnalysis) -> Iterator[str]:
         yield f"A uniform ring describes the readings to their uncertainties (χ²/dof = {digits(reduced)})."
     else:
         yield (
-            f"A uniform ring leaves more than the uncertainties explain (χ²/dof = {digits(reduced)}): "
-            "the magnet is not "
-            "uniform, or the probe was off the axis, or a size is wrong."
+            f"A uniform ring leaves more than the uncertainties explain (χ²/dof = {digits(reduced)}): the magnet is "
+            "not uniform, or the probe was off the axis, or a size is wrong."
         )

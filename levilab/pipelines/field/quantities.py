@@ -32,6 +32,7 @@ class Shown:
         return Estimate(value, u, self.unit)
 
 
+#: Heights in cm; what a calliper measures, and what moves a height, in mm.
 SHOWN: Mapping[str, Shown] = MappingProxyType(
     {
         "strength": Shown("strength ρ", "mT cm", 1e5),
@@ -40,12 +41,12 @@ SHOWN: Mapping[str, Shown] = MappingProxyType(
         "background": Shown("background", "mT", 1e3),
         "inner_radius": Shown("inner radius a", "mm", 1e3),
         "outer_radius": Shown("outer radius b", "mm", 1e3),
-        "lowest_height": Shown("lowest height", "mm", 1e3),
-        "highest_height": Shown("highest height", "mm", 1e3),
+        "lowest_height": Shown("lowest height", "cm", 1e2),
+        "highest_height": Shown("highest height", "cm", 1e2),
         "lightest_mass": Shown("lightest top", "g", 1e3),
         "heaviest_mass": Shown("heaviest top", "g", 1e3),
         "mass_to_set": Shown("mass to set", "g", 1e3),
-        "height_at_mass": Shown("it floats at", "mm", 1e3),
+        "height_at_mass": Shown("it floats at", "cm", 1e2),
         "height_per_mass": Shown("0.1 g more moves it by", "mm", 1e3 * 1e-4),
         "slowest_spin": Shown("slowest spin", "Hz"),
         "fastest_spin": Shown("fastest spin", "Hz"),

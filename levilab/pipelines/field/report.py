@@ -82,22 +82,22 @@ def _bases(analysis: FieldAnalysis) -> tuple[Block, ...]:
 
 def _in_words(run: FieldRun) -> tuple[str, ...]:
     scan = run.scan
-    low, high = 1e3 * scan.height[0], 1e3 * scan.height[-1]
-    text = f"{scan.statistics.n} heights, {low:.1f} mm to {high:.1f} mm"
+    low, high = 1e2 * scan.height[0], 1e2 * scan.height[-1]
+    text = f"{scan.statistics.n} heights, {low:.2f} cm to {high:.2f} cm"
     u = f"u of a reading against the fit: {1e6 * scan.u.min():.0f} µT to {1e6 * scan.u.max():.0f} µT"
     return text, f"{u}, that of its height included"
 
 
 def _readings(run: FieldRun) -> Listing:
-    """The first readings; rows of height [mm], flux density [mT] and residual [u]."""
+    """The first readings; rows of height [cm], flux density [mT] and residual [u]."""
     scan = run.scan
     shown = min(len(scan.height), MOST_READINGS)
     scaled = scan.residuals / scan.u
     rows = [
-        (f"{1e3 * z:.2f}", f"{1e3 * b:.4f}", signed(float(r), 1))
+        (f"{1e2 * z:.3f}", f"{1e3 * b:.4f}", signed(float(r), 1))
         for z, b, r in zip(scan.height[:shown], scan.flux_density[:shown], scaled[:shown], strict=True)
     ]
-    heads = ("z [mm]", "B [mT]", "residual [u]")
+    heads = ("z [cm]", "B [mT]", "residual [u]")
     note = f"Residual: reading − fit, in units of u. {first_of(shown, len(scan.height))}".rstrip()
     return Listing("field-readings", table("Readings", heads, rows, numbers=heads), note)
 
@@ -118,5 +118,5 @@ def _point(name: str, run: FieldRun, i: int) -> str:
     u = 1e3 * float(scan.u[i])
     field = with_uncertainty(Estimate(1e3 * float(scan.flux_density[i]), u, "mT"))
     residual = float(scan.residuals[i])
-    lines = [name, f"z = {1e3 * scan.height[i]:.2f} mm", f"B = {field}", f"B − fit = {off(1e3 * residual, u)} mT"]
+    lines = [name, f"z = {1e2 * scan.height[i]:.3f} cm", f"B = {field}", f"B − fit = {off(1e3 * residual, u)} mT"]
     return "\n".join(filter(None, lines))

@@ -39,14 +39,14 @@ def scans_table(analysis: FieldAnalysis) -> Table:
             (
                 short_name(source.name),
                 str(statistics.n),
-                f"{1e3 * scan.height[0]:.1f} … {1e3 * scan.height[-1]:.1f}",
+                f"{1e2 * scan.height[0]:.2f} … {1e2 * scan.height[-1]:.2f}",
                 f"{1e3 * scan.flux_density[0]:.3f} → {1e3 * scan.flux_density[-1]:.3f}",
                 plain(1e6 * statistics.rms_residual),
                 plain(statistics.reduced_chi_square),
                 plain(statistics.runs_test_p, 2),
             )
         )
-    heads = ("scan", "readings", "heights [mm]", "field [mT]", "rms [µT]", "χ²/dof", "order p")
+    heads = ("scan", "readings", "heights [cm]", "field [mT]", "rms [µT]", "χ²/dof", "order p")
     numbers = ("readings", "rms [µT]", "χ²/dof", "order p")
     return table(f"Field of the base, {total} scan{'s' * (total > 1)}{made_up}", heads, rows, numbers=numbers)
 

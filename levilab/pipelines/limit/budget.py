@@ -38,7 +38,9 @@ def _budgets(sources: Sequence[Source[LimitReadings]], limits: Limits, options: 
     mean = limits.statistics.mean
     if mean.value is None or not mean.u:
         return ()
-    rows = (*_rows(sources, limits), time_base(sources[0], "counter", mean.value, options.clock_u))
+    # an upper limit lies between what was counted and what the generator was set to
+    clocks = "time bases of counter and generator" if limits.which == "upper" else ""
+    rows = (*_rows(sources, limits), time_base(sources[0], "counter", mean.value, options.clock_u, what=clocks))
     return (Budget("mean", mean.value, mean.u, mean.unit, rows, limits.which),)
 
 

@@ -39,9 +39,8 @@ def _sentences(group: Limits) -> Iterator[str]:
         return
     ratio = found.scatter.value / mean.u
     yield (
-        f"One top is lost {digits(found.scatter.value)} Hz from another, so a single one may be off by "
-        "that much; the mean "
-        f"of {found.n} is {digits(ratio)} times as good."
+        f"One top is lost {digits(found.scatter.value)} Hz from another, so a single one may be off by that much; the "
+        f"mean of {found.n} is {digits(ratio)} times as good."
     )
     if group.which == "lower":
         off = mean.value - _THESIS

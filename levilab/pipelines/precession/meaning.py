@@ -33,9 +33,8 @@ def _sentences(fit: SweepFit) -> Iterator[str]:
         return
     if fit.locked:
         yield (
-            f"Each time the drive turns, the stem cuts the beam once: slope {slope} and intercept agree "
-            "with 1 and 0, as "
-            f"of a top that is locked to its drive (p = {plain(fit.p_locked, 2)})."
+            f"Each time the drive turns, the stem cuts the beam once: slope {slope} and intercept agree with 1 and 0, "
+            f"as of a top that is locked to its drive (p = {plain(fit.p_locked, 2)})."
         )
     else:
         yield (
@@ -48,9 +47,8 @@ def _sentences(fit: SweepFit) -> Iterator[str]:
         yield f"The slope of {THESIS_SLOPE:g} that the thesis gives lies {digits(away)} u away from this one."
     else:
         yield (
-            f"The slope of {THESIS_SLOPE:g} that the thesis gives lies within {digits(away)} u: these "
-            "points do not tell "
-            "it from a locked top's."
+            f"The slope of {THESIS_SLOPE:g} that the thesis gives lies within {digits(away)} u: these points cannot "
+            "distinguish it from a locked top's."
         )
     if fit.spin_offset is not None and fit.u_spin_offset:
         off = abs(fit.spin_offset)

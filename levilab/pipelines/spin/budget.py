@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from analysis.budget import Budget, Component, rest
 from analysis.numbers import digits
 from analysis.pulses.result import UNDER_DRAG, UNDER_DRIVE
-from levilab.pipelines.budget import time_base
+from levilab.pipelines.budget import direct_row, time_base
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -49,20 +49,22 @@ def _of_pulses(run: SpinRun, name: str, parts: UParts, estimate: Estimate) -> It
         if spin.scatter > 0:
             yield Component("scatter", what, "A", spin.scatter, "s", whole / spin.scatter, note=note, remedy=longer)
         else:
-            yield _direct("scatter", what, whole, estimate, note, longer)
+            yield direct_row("scatter", what, whole, estimate.unit, note, longer, "A")
         return
     noise = min(bound, whole)
     if run.code is not None and run.code > 0:
         of_codes = noise * min(run.code / math.sqrt(12), 1.0)
         note = f"one step of its numbers is {digits(run.code)} times the noise of a sample, in which it is contained"
-        yield _direct("resolution", "bits of the oscilloscope", of_codes, estimate, note, "a finer vertical scale", "B")
+        yield direct_row(
+            "resolution", "bits of the oscilloscope", of_codes, estimate.unit, note, "a finer vertical scale"
+        )
         noise = rest(noise, of_codes)
     note = "the Cramér–Rao bound of a train of such pulses: no method does better"
-    yield _direct("noise", "noise of the samples", noise, estimate, note, f"more light, or {longer}")
+    yield direct_row("noise", "noise of the samples", noise, estimate.unit, note, f"more light, or {longer}", "A")
     beyond = rest(whole, min(bound, whole))
     if beyond > 0:
         note = "jitter of the pulses, neighbours that are alike, and few pulses to see both by"
-        yield _direct("jitter", "scatter of the pulses beyond the noise", beyond, estimate, note, longer)
+        yield direct_row("jitter", "scatter of the pulses beyond the noise", beyond, estimate.unit, note, longer, "A")
 
 
 def _bound(spin: SpinFrequency, name: str) -> float | None:
@@ -77,15 +79,15 @@ def _of_the_rest(run: SpinRun, name: str, parts: UParts, estimate: Estimate) -> 
     """How the slope changes, and what the file says of its sampling interval."""
     if parts.drag > 0:
         note = "the frequency is taken where a drag in proportion to ω^(1.5 ± 0.5), or an even drive, leaves it"
-        yield _direct("drag", "law by which the slope changes", parts.drag, estimate, note, "a shorter record", "B")
+        yield direct_row("drag", "law by which the slope changes", parts.drag, estimate.unit, note, "a shorter record")
     elif run.series.of == "window" and name == "frequency" and run.spin.bend is None:
         note = "ν″T²/40 of a window; its values are not corrected for it"
-        yield _direct("drag", "change of the slope within a window", abs(_bend(run.spin)), estimate, note,
-                      "shorter windows", "B", included=False)  # fmt: skip
+        yield direct_row("drag", "change of the slope within a window", abs(_bend(run.spin)), estimate.unit, note,
+                      "shorter windows", included=False)  # fmt: skip
     if parts.step > 0:
         note = "from a straight line through times that lost digits when they were printed"
-        yield _direct(
-            "step", "sampling interval", parts.step, estimate, note, "a file with its interval in the header", "B"
+        yield direct_row(
+            "step", "sampling interval", parts.step, estimate.unit, note, "a file with its interval in the header"
         )
 
 
@@ -97,18 +99,3 @@ def _bend(spin: SpinFrequency) -> float:
     span = (spin.pulses + spin.missing - 1) / frequency
     n = UNDER_DRAG if chirp < 0 else UNDER_DRIVE
     return n * chirp**2 / frequency * span**2 / 40
-
-
-def _direct(  # noqa: PLR0917 - the fields of a row
-    row: str,
-    what: str,
-    part: float,
-    estimate: Estimate,
-    note: str,
-    remedy: str,
-    kind: Literal["A", "B"] = "A",
-    *,
-    included: bool = True,
-) -> Component:
-    """A row whose size is known in the result's own unit alone."""
-    return Component(row, what, kind, part, estimate.unit, 1.0, included, note, remedy)

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.numbers import digits
+from levilab.pipelines.spin.analysis import MOST_DRAWN
 from levilab.present.drawing import SMALL, band, headline, panel, synthetic_mark, write
 from levilab.present.looks import LOOKS
 from levilab.present.numbers import short_name, with_uncertainty
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Inputs that are drawn, and points of a panel.
-MOST_INPUTS, MOST_POINTS = 3, 4000
+#: Points of a panel.
+MOST_POINTS = 4000
 #: Turns of the trace that are shown, and the longest part of it that is folded [s].
 TURNS_SHOWN, LONGEST_FOLDED_S = 6, 12.0
 READINGS, PULSES, FIT = LOOKS["readings"].colour, LOOKS["pulses"].colour, LOOKS["fit"].colour
@@ -52,7 +53,7 @@ class _Excerpt:
 
 def spin_figure(analysis: SpinAnalysis) -> Figure:
     """For each input its trace with the turns found in it, all turns laid over each other, residuals, and frequency."""
-    shown = list(zip(analysis.sources, analysis.runs, strict=True))[:MOST_INPUTS]
+    shown = list(zip(analysis.sources, analysis.runs, strict=True))[:MOST_DRAWN]
     with mpl.rc_context(STYLE):
         head = _HEAD if len(analysis.runs) > 1 else _HEAD - 0.2
         figure = Figure(figsize=(WIDE, head + _EACH * len(shown)))
@@ -62,7 +63,7 @@ def spin_figure(analysis: SpinAnalysis) -> Figure:
             panels = [panel(figure, x, top + y, 2.62, 1.35) for y in (0.5, 2.55) for x in (0.72, 4.25)]
             if len(analysis.runs) > 1:
                 write(figure, 0.1, top, _title(source, run), fontsize=9)
-            _draw(panels, source, run)
+            _draw(panels, source, run, k)
         more = len(analysis.runs) - len(shown)
         if more > 0:
             write(figure, WIDE - 0.1, 0.3, f"{more} more inputs are not drawn", ha="right", fontsize=SMALL)
@@ -72,7 +73,7 @@ def spin_figure(analysis: SpinAnalysis) -> Figure:
 def _finding(analysis: SpinAnalysis) -> str:
     if len(analysis.runs) == 1:
         spin = analysis.runs[0].spin
-        return f"Spin {with_uncertainty(spin.frequency)} at {spin.reference_time:.4g} s"
+        return f"Spin {with_uncertainty(spin.frequency)} at {_reference(spin)}"
     return f"Spin of {len(analysis.runs)} inputs"
 
 
@@ -80,7 +81,11 @@ def _title(source: Source[Records], run: SpinRun) -> str:
     spin = run.spin
     made_up = "  (SYNTHETIC)" if source.synthetic else ""
     name = _drawable(short_name(source.name))
-    return f"{name}: spin {with_uncertainty(spin.frequency)} at {spin.reference_time:.4g} s{made_up}"
+    return f"{name}: spin {with_uncertainty(spin.frequency)} at {_reference(spin)}{made_up}"
+
+
+def _reference(spin: SpinFrequency) -> str:
+    return f"{spin.reference_time:.4g} s".replace("-", "−")
 
 
 def _drawable(name: str) -> str:
@@ -88,7 +93,7 @@ def _drawable(name: str) -> str:
     return text.replace("\\", "\\\\").replace("$", r"\$")
 
 
-def _draw(panels: list[Axes], source: Source[Records], run: SpinRun) -> None:
+def _draw(panels: list[Axes], source: Source[Records], run: SpinRun, k: int) -> None:
     excerpt = _excerpt(source.readings, run.spin)
     if source.readings.pulses:
         _draw_intervals(panels[0], excerpt)
@@ -97,7 +102,7 @@ def _draw(panels: list[Axes], source: Source[Records], run: SpinRun) -> None:
         _draw_trace(panels[0], excerpt, run.spin)
         _draw_folded(panels[1], excerpt)
     _draw_residuals(panels[2], excerpt, run.spin)
-    _draw_series(panels[3], run, excerpt)
+    _draw_series(panels[3], run, excerpt, gid=f"readings-{k}")
 
 
 # --- what is drawn -------------------------------------------------------------------------------------
@@ -273,7 +278,7 @@ def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
     values = 1e6 * scale * excerpt.residuals
     inside = np.abs(values) <= limit
     style: Any = {"linestyle": "none", "color": "black", "markersize": 4}
-    axes.plot(excerpt.arrivals[inside], values[inside], marker=".", gid="residuals-pulses", **style)
+    axes.plot(excerpt.arrivals[inside], values[inside], marker=".", **style)
     edges = excerpt.arrivals[~inside], np.clip(values[~inside], -limit, limit)
     axes.plot(*edges, marker="x", **style | {"color": LOOKS["left out"].colour}, label="beyond the panel")
     room = 1.1
@@ -287,7 +292,7 @@ def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
     axes.set_title(f"Residuals of the pulses' times{degree}", loc="left")
 
 
-def _draw_series(axes: Axes, run: SpinRun, excerpt: _Excerpt) -> None:
+def _draw_series(axes: Axes, run: SpinRun, excerpt: _Excerpt, gid: str) -> None:
     """Frequency against time: of windows or records, or by the fit of the only one."""
     series, spin = run.series, run.spin
     if len(series) == 1:
@@ -302,7 +307,7 @@ def _draw_series(axes: Axes, run: SpinRun, excerpt: _Excerpt) -> None:
         axes.set_title(f"Frequency by the fit{degree}, ± u", loc="left")
     else:
         axes.errorbar(series.time, series.frequency, series.u, color=READINGS, fmt="none", elinewidth=0.7)
-        axes.plot(series.time, series.frequency, ".", color=READINGS, markersize=3, gid="readings-series")
+        axes.plot(series.time, series.frequency, ".", color=READINGS, markersize=3, gid=gid)
         for kind, start, end in series.phases:
             if kind in ("coasting", "held", "speeding-up"):
                 known = axes.get_legend_handles_labels()[1]

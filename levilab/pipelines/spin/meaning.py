@@ -25,11 +25,11 @@ _MOST = 4
 def meaning(analysis: SpinAnalysis) -> tuple[str, ...]:
     """The sentences, of each input."""
     several = len(analysis.runs) > 1
-    return tuple(
-        f"{source.name}: {text}" if several else text
+    made = (
+        (source.name, " ".join(_sentences(run)))
         for source, run in zip(analysis.sources[:_MOST], analysis.runs[:_MOST], strict=True)
-        for text in _sentences(run)
     )
+    return tuple(f"{name}: {text}" if several else text for name, text in made if text)
 
 
 def _sentences(run: SpinRun) -> Iterator[str]:
@@ -37,7 +37,7 @@ def _sentences(run: SpinRun) -> Iterator[str]:
     frequency, chirp = spin.frequency, spin.chirp
     if not frequency.value:
         return
-    yield f"The mark passes {with_uncertainty(frequency)}: {60 * frequency.value:.0f} turns a minute."
+    yield f"The top turns with {with_uncertainty(frequency)}, {60 * frequency.value:.0f} times a minute."
     if chirp.value is None or not chirp.u:
         return
     share = chirp.value / frequency.value
@@ -58,7 +58,10 @@ def _sentences(run: SpinRun) -> Iterator[str]:
         yield f"It loses {digits(-100 * share)} % of its spin a second, {why}"
     if spin.bound and frequency.u:
         ratio = frequency.u / spin.bound
-        text = f"The uncertainty is {digits(ratio)} times the least that any method could reach with such noise"
-        yield (
-            f"{text}." if ratio < _AT_BOUND else f"{text}: the pulses themselves scatter, or the samples lie far apart."
-        )
+        if ratio < _AT_BOUND:
+            yield "With such noise no other method would find it much better."
+        else:
+            yield (
+                f"The uncertainty is {digits(ratio)} times the least that any method could reach with such noise: the "
+                "pulses themselves scatter, or the samples lie far apart."
+            )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import FigureText, InputPart, ReportPart
-from levilab.pipelines.spin.analysis import in_a_sentence
+from levilab.pipelines.spin.analysis import MOST_DRAWN, in_a_sentence
 from levilab.pipelines.spin.meaning import meaning
 from levilab.pipelines.spin.table import frequency_table, pulse_table, series_table
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
@@ -80,10 +80,14 @@ def _series(source: Source[Records], run: SpinRun) -> tuple[Block, ...]:
 
 
 def _points(analysis: SpinAnalysis) -> tuple[Points, ...]:
-    """What each value of the frequency against time answers; the figure has it for the first input."""
-    series = analysis.runs[0].series
-    texts = (
-        f"t = {digits(float(t), 6)} s\nν = {with_uncertainty(Estimate(float(nu), float(u), 'Hz'))}"
-        for t, nu, u in zip(series.time, series.frequency, series.u, strict=True)
+    """What each value of the frequency against time answers, of the inputs that are drawn."""
+    return tuple(
+        Points(f"readings-{k}", tuple(map(_point, run.series.time, run.series.frequency, run.series.u)))
+        for k, run in enumerate(analysis.runs[:MOST_DRAWN])
+        if 1 < len(run.series) <= MOST_POINTS
     )
-    return (Points("readings-series", tuple(texts)),) if len(series) <= MOST_POINTS else ()
+
+
+def _point(time: float, frequency: float, u: float) -> str:
+    spin = Estimate(float(frequency), float(u), "Hz")
+    return f"t = {digits(float(time), 6)} s\nν = {with_uncertainty(spin)}"

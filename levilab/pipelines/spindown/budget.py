@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.budget import Budget, Component, printed_step, rest, u_of_step
 from analysis.numbers import digits
-from levilab.pipelines.budget import bench_clock, gate_of, setting_of, time_base
+from levilab.pipelines.budget import bench_clock, direct_row, gate_of, setting_of, time_base
 from levilab.pipelines.spindown.analysis import EXPERIMENT
 
 if TYPE_CHECKING:
@@ -113,11 +113,11 @@ def _of_readings(
     if parts.excess > 0:
         note = f"χ²/dof = {digits(fit.statistics.reduced_chi_square or 0.0)}"
         remedy = "finding what the law, or the stated u, leaves out"
-        yield _direct("excess", "scatter beyond the stated u", parts.excess, unit, note, remedy, kind="A")
+        yield direct_row("excess", "scatter beyond the stated u", parts.excess, unit, note, remedy, kind="A")
     if parts.correlation > 0:
         found = run.correlation
         note = f"ρ = {found.value:.2f} ± {found.u:.2f} between neighbours" if found else ""
-        yield _direct(
+        yield direct_row(
             "correlation", "correlation of neighbouring readings", parts.correlation, unit, note,
             "a calmer top, or more runs", kind="A",
         )  # fmt: skip
@@ -127,13 +127,13 @@ def _of_model(fit: LawFit, parts: Parts, estimate: Estimate) -> Iterator[Compone
     """What the tilt of the top's moment leaves open, fitted or hidden."""
     if parts.beforehand > 0:
         note = "resonance and nutation are known beforehand only so well"
-        yield _direct("beforehand", "what is known of the wobble", parts.beforehand, estimate.unit, note, "")
+        yield direct_row("beforehand", "what is known of the wobble", parts.beforehand, estimate.unit, note, "")
     if parts.tilt > 0:
         what, note = "tilt that noise hides", "what a tilt of the moment would change, by its probability"
         if fit.has_tilt:
             what, note = "model of the tilt", "a twentieth of what the tilt changes, 0.15 of the tilt itself"
         remedy = "less noise in the readings, and readings until the top falls"
-        yield _direct("tilt", what, parts.tilt, estimate.unit, note, remedy)
+        yield direct_row("tilt", what, parts.tilt, estimate.unit, note, remedy)
 
 
 def _by_clocks(fit: LawFit, name: str) -> tuple[float, float]:
@@ -149,13 +149,6 @@ def _by_clocks(fit: LawFit, name: str) -> tuple[float, float]:
     exponent = fit.parameters[_EXPONENT].value if _EXPONENT in constants else None
     order = fit.law.orders[constants.index(name)] if fit.law.orders else (exponent or 1.0) - 1
     return -order, -1.0
-
-
-def _direct(  # noqa: PLR0917 - the fields of a row
-    row: str, what: str, part: float, unit: str, note: str, remedy: str, *, kind: Literal["A", "B"] = "B"
-) -> Component:
-    """A row whose size is known in the result's own unit alone."""
-    return Component(row, what, kind, part, unit, 1.0, note=note, remedy=remedy)
 
 
 def _better_readings(source: Source[Readings]) -> str:
@@ -213,7 +206,9 @@ def _budget_of_mean(analysis: SpinDownAnalysis, law: str, name: str, mean: Mean)
         )  # fmt: skip
     if shared > 0:
         note = "the same in all runs of one top, so that no number of them makes it smaller"
-        rows.append(_direct("tilt", "tilt that all runs share", shared, mean.unit, note, "less noise in the readings"))
+        rows.append(
+            direct_row("tilt", "tilt that all runs share", shared, mean.unit, note, "less noise in the readings")
+        )
     return Budget(name, mean.value, mean.u, mean.unit, (*rows, *_systematic(analysis, law, name, mean)), law)
 
 

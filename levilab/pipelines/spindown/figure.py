@@ -28,7 +28,7 @@ from levilab.present.drawing import (
     write,
 )
 from levilab.present.looks import GREY, LOOKS, MARKERS
-from levilab.present.numbers import in_words, short_name
+from levilab.present.numbers import enumeration, in_words, short_name
 from levilab.present.style import STYLE, WIDE
 
 if TYPE_CHECKING:
@@ -97,15 +97,11 @@ def _finding(analysis: SpinDownAnalysis) -> str:
         return f"Spin-down{together}: no drag law describes these readings; the {best} law comes nearest"
     if not verdict.decided:
         others = [name for name in (*verdict.indistinguishable, *verdict.needless, *verdict.weak) if name != best]
-        also = f"; {_listed(others)} cannot be excluded" if others else ""
+        also = f"; {enumeration(others)} cannot be excluded" if others else ""
         return f"Spin-down{together}: the readings do not single out a drag law, {best} comes first{also}"
     excluded = [name for name in SHOWN_LAWS if name in dict(verdict.excluded)]
-    also = f"; {_listed(excluded)} {'is' if len(excluded) == 1 else 'are'} excluded" if excluded else ""
+    also = f"; {enumeration(excluded)} {'is' if len(excluded) == 1 else 'are'} excluded" if excluded else ""
     return f"Spin-down{together}: the {best} law, {equation}, describes the readings{also}"
-
-
-def _listed(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _unit(analysis: SpinDownAnalysis) -> _Unit:

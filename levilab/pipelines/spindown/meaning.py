@@ -11,7 +11,7 @@ import numpy as np
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
 from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
-from levilab.present.numbers import plain, with_uncertainty
+from levilab.present.numbers import enumeration, plain, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -49,7 +49,7 @@ def _law(analysis: SpinDownAnalysis) -> Iterator[str]:
         yield f"The {best} law describes the readings; {left}. {SHOWN_LAWS[best].meaning}"
         return
     others = [name for name in verdict.indistinguishable if name != best]
-    beside = f" as well as {_and(others)}" if others else ""
+    beside = f" as well as {enumeration(others)}" if others else ""
     yield (
         f"The {best} law describes the readings{beside}; {left}. Which law of drag is right these readings do not "
         "decide; it takes a longer fall of the spin, or less scatter."
@@ -112,8 +112,8 @@ def _exponent(analysis: SpinDownAnalysis) -> Iterator[str]:
     away = {name: abs(exponent.value - n) / exponent.u for name, n in _POWERS.items()}
     near = [f"{name} ({_POWERS[name]:g})" for name, far in away.items() if far < _DIFFERS]
     far = [f"{name} ({_POWERS[name]:g}) by {far:.0f} u" for name, far in away.items() if far >= _DIFFERS]
-    agrees = f"agrees with {_and(near)}" if near else "agrees with none of the laws of one power"
-    misses = f" and misses {_and(far)}" if far else ""
+    agrees = f"agrees with {enumeration(near)}" if near else "agrees with none of the laws of one power"
+    misses = f" and misses {enumeration(far)}" if far else ""
     yield f"With a free exponent the readings choose n = {with_uncertainty(exponent)}: that {agrees}{misses}."
 
 
@@ -121,9 +121,8 @@ def _tilt(analysis: SpinDownAnalysis) -> Iterator[str]:
     tilt = analysis.combined.tilt
     if tilt and tilt.value:
         yield (
-            f"The magnet's moment points {digits(math.degrees(tilt.value))}° off the axis of the top: it "
-            "wobbles with its "
-            "spin, more and more towards the fall, and the counter counts a little more than the spin."
+            f"The magnet's moment points {digits(math.degrees(tilt.value))}° off the axis of the top: it wobbles with "
+            "its spin, more and more towards the fall, and the counter counts a little more than the spin."
         )
 
 
@@ -162,10 +161,6 @@ def _constants(analysis: SpinDownAnalysis) -> Mapping[str, Estimate]:
         return combined.fit(combined.best).constants
     parameters = analysis.runs[0].fit(combined.best).parameters
     return {name: parameters[name] for name in LAWS[combined.best].constants}
-
-
-def _and(words: list[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 _PARTS = (_law, _loss, _constant, _exponent, _tilt, _runs)

@@ -123,7 +123,7 @@ def test_what_a_user_typed_is_escaped_wherever_it_stands(tmp_path: Path, run: Pa
     event = json.dumps({"time_s": 1.0, "kind": "fell", "text": evil}) + "\n"
     (tmp_path / "run <b>bold" / "events.jsonl").write_text(event, encoding="utf-8")
     file = spin_down_csv(tmp_path / "<i>my.csv")
-    parsed = Page(render(analyze_spindowns([tmp_path / "run <b>bold", file], SpinDownOptions())))
+    parsed = Page(render(analyze_spindowns([tmp_path / "run <b>bold", file], SpinDownOptions(tilt="none"))))
     assert parsed.text.count(evil) >= 14
     assert "run <b>bold" in parsed.text
     assert "<i>my.csv" in parsed.text
@@ -208,7 +208,7 @@ def test_intervals_are_shown_where_they_were_asked_for(run: Path) -> None:
 @pytest.mark.usefixtures("undrawn_figures")
 @pytest.mark.parametrize("readings", [3, 20])
 def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, readings: int) -> None:
-    analysis = analyze_spindowns([spin_down_csv(tmp_path / "a.csv", n=readings)], SpinDownOptions())
+    analysis = analyze_spindowns([spin_down_csv(tmp_path / "a.csv", n=readings)], SpinDownOptions(tilt="none"))
     parsed = Page(render(analysis))
     marked = [attributes for tag, attributes in parsed.tags if tag == "tr" and attributes.get("class") == "best"]
     assert bool(marked) == analysis.combined.verdict.decided
@@ -235,10 +235,10 @@ def test_the_report_shows_what_analyze_found_intervals_included(run: Path, tmp_p
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_the_report_does_not_fit_what_has_a_result(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    analysis = analyze_spindowns([run], SpinDownOptions())
+    analysis = analyze_spindowns([run], SpinDownOptions(tilt="none"))
     save(ANALYSES["spindown"], analysis)
     monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", pytest.fail)
-    recalled = render(ANALYSES["spindown"].recall([run], SpinDownOptions()))
+    recalled = render(ANALYSES["spindown"].recall([run], SpinDownOptions(tilt="none")))
     anew = render(analysis)
     differ = [pair for pair in zip(recalled.split("\n"), anew.split("\n"), strict=True) if pair[0] != pair[1]]
     assert all("Analysis" in here for here, _ in differ)
@@ -271,7 +271,7 @@ def test_one_p_value_is_the_same_number_on_the_page_and_the_terminal(page: Page)
 
 
 def test_a_report_of_a_data_file_knows_no_instrument_and_says_so(tmp_path: Path) -> None:
-    parsed = Page(render(analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())))
+    parsed = Page(render(analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))))
     assert "my.csv" in parsed.text
     assert "no instruments recorded" in parsed.text
     assert "SYNTHETIC" not in parsed.text

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 def values() -> dict[str, list[dict[str, str]]]:
     """Name → rows of the tables of two spin-downs, and the result that they are of as `result`."""
     analysis = ANALYSES["spindown"]
-    found = analysis.analyze([SAMPLE_DATA / f"spin-down-{k}" for k in (1, 2)], analysis.options_from({}))
+    options = analysis.options_from({"tilt": "none"})
+    found = analysis.analyze([SAMPLE_DATA / f"spin-down-{k}" for k in (1, 2)], options)
     tables = {
         one.name: [*csv.DictReader(io.StringIO(as_csv(one)))] for one in of_analysis(analysis, found, SAMPLE_DATA)
     }

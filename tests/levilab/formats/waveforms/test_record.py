@@ -81,7 +81,7 @@ def test_a_record_reads_the_same_from_every_makers_scope(name: str, sample_data:
 def test_times_that_lost_digits_give_the_step_by_a_line_and_say_so(sample_data: Path) -> None:
     record = waveform(sample_data / "scope-files" / "rigol-ds1000e.csv")
     assert record.step == pytest.approx(STEP, rel=9e-5)  # what the warning says
-    assert "is known to 9e-05 of it" in record.warnings[0]
+    assert "is known to 9×10⁻⁵ of it" in record.warnings[0]
     ends = (0.25 - -0.25) / (COUNT - 1)
     assert abs(record.step - STEP) < abs(ends - STEP) / 5  # first and last time alone are far off
 

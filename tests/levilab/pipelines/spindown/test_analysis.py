@@ -16,6 +16,7 @@ from levilab.pipelines.catalogue import ANALYSES, save
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
+from levilab.present.document.blocks import Tabular
 from levilab.runs.run import Run
 from support.spin_downs import spin_down_csv
 
@@ -71,7 +72,9 @@ def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data
     combined = analysis.combined
     lines = spindown_tables(analysis)[-1]
     assert [row.kind for row in lines.rows] == ["", "", "", "", "together"]
-    cells = {row.cells[0]: row.cells[2] for row in spindown_part(analysis).context["laws"].rows}
+    tables = [block for block in spindown_part(analysis).result if isinstance(block, Tabular)]
+    (laws,) = (one.table for one in tables if one.name == "spindown-laws")
+    cells = {row.cells[0]: row.cells[2] for row in laws.rows}
     assert re.fullmatch(r"5\.\d\(2\.\d\)×10⁻⁶ .*", cells["disc (best)"]), cells  # as below; u of it: s/√(2·3)
     assert combined.best == "disc"
     assert {name for name, _ in combined.verdict.excluded} == {"stokes", "newton"}
