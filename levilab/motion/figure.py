@@ -151,7 +151,7 @@ def _draw_paths(figure: Figure, summary: Summary) -> None:
     panels[1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, handlelength=1, columnspacing=1)
     bar = figure.colorbar(path, cax=panel(figure, _LEFT + 2 * wide + 0.75, 0.62, 0.1, _PATH))
     bar.set_label("time  [s]")
-    bar.outline.set_linewidth(0.5)  # type: ignore[operator]
+    bar.outline.set_linewidth(0.5)
 
 
 # --- in time ---
