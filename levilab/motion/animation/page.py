@@ -16,7 +16,6 @@ import math
 import re
 from dataclasses import dataclass
 from importlib import resources
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,6 +29,8 @@ from levilab.motion.animation.words import short_speed, speed_in_words
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from PIL.Image import Image
 
     from levilab.motion.animation.poses import Poses
