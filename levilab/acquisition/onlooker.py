@@ -94,7 +94,7 @@ class Onlooker:
     _sent: Sent = field(default_factory=Sent)
 
     def __call__(self) -> None:
-        """Show what there is to see, if it is time."""
+        """Show the state of the acquisition, if it is time."""
         self.publisher.announce(self.session.writer.folder)
         to_views, to_terminal = self.publisher.is_due(), self.session.show.is_due()
         if not (to_views or to_terminal):

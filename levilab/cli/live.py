@@ -24,9 +24,9 @@ def live(
     no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser: print the address only.")] = False,
 ) -> None:
     """Serve the view until Ctrl-C."""
-    from levilab.live.graphics import three_js
+    from levilab.motion.animation.three import three_js
 
-    three_js()  # raises where the extra is not installed
+    three_js("the live view")  # raises where the extra is not installed
     from levilab.live.serve import LiveOptions, serve_live
 
     def announce(address: str) -> None:

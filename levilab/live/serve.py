@@ -60,7 +60,7 @@ def serve_live(options: LiveOptions, announce: Callable[[str], None]) -> None:
 
     Raises:
         UsageError: a run and a bench for practice at once.
-        NoThree: the extra is not installed.
+        MissingThree: the extra is not installed.
         DataError: there is no such run.
         CannotShow: the port is taken.
     """

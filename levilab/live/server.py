@@ -24,8 +24,8 @@ from levilab.live.analyzed import FIGURES, REPORT, Analyses
 from levilab.live.choice import choices, newest
 from levilab.live.desk import parts_for, scene_of_run
 from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
-from levilab.live.graphics import three_js
 from levilab.live.watch import Watch
+from levilab.motion.animation.three import three_js
 from levilab.runs.run import RECORD
 
 if TYPE_CHECKING:
@@ -137,7 +137,10 @@ class Pages:
     def __init__(self, hall: Hall) -> None:
         self.hall = hall
         top = Path(__file__).parents[1] / "motion" / "animation" / "top.js"
-        self.files = {path.name: path for path in PAGE.iterdir()} | {"three.js": three_js(), "top.js": top}
+        self.files = {path.name: path for path in PAGE.iterdir()} | {
+            "three.js": three_js("the live view"),
+            "top.js": top,
+        }
 
     def _file(self, path: Path, policy: str = PAGE_POLICY) -> Response:
         return FileResponse(
@@ -209,7 +212,7 @@ class Pages:
 
 
 def application(hall: Hall) -> Guard:
-    """Return the ASGI application.  Raises NoThree."""
+    """Return the ASGI application.  Raises MissingThree."""
     pages = Pages(hall)
 
     @contextlib.asynccontextmanager

@@ -149,14 +149,14 @@ class Check:
     @property
     def published_text(self) -> str:
         """As printed, with its unit."""
-        return f"{_raised(self.published.text)} {in_words(self.published.unit)}".strip()
+        return _with_unit(_raised(self.published.text), self.published.unit)
 
     @property
     def ours_text(self) -> str:
         """Ours with u, or with one digit more than the print has."""
         if self.ours.value is None or self.ours.u:
             return with_uncertainty(self.ours)
-        return f"{_like(self.ours.value, self.published)} {in_words(self.ours.unit)}".strip()
+        return _with_unit(_like(self.ours.value, self.published), self.ours.unit)
 
     @property
     def why(self) -> str:
@@ -166,6 +166,15 @@ class Check:
         if isinstance(self.way, Within) and abs(self.difference) > self.published.rounding:
             return f"within {digits(self.way.tolerance, 2)}: {self.way.why}"
         return "within our u" if abs(self.difference) > self.published.rounding * (1 + _FLOAT) else ""
+
+
+def _with_unit(number: str, unit: str) -> str:
+    """A number's text with its unit; a degree stands at the number.
+
+    >>> _with_unit("1.5", "°"), _with_unit("0.0032", "1/s"), _with_unit("82", "")
+    ('1.5°', '0.0032 s⁻¹', '82')
+    """
+    return f"{number}{unit}" if unit == "°" else f"{number} {in_words(unit)}".strip()
 
 
 def _like(value: float, published: Printed) -> str:
@@ -235,7 +244,7 @@ class Erratum:
         return f"{self._shown(self.by_corrected)}; true: {self._shown(self.truth)}"
 
     def _shown(self, value: float | None) -> str:
-        return "—" if value is None else f"{digits(value, 5)} {self.unit}".strip()
+        return "—" if value is None else _with_unit(digits(value, 5), self.unit)
 
     def _is_true(self, value: float) -> bool:
         return math.isclose(value, self.truth, rel_tol=self.tolerance, abs_tol=0.0)

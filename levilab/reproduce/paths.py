@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.motion.lines import lines_of, rate_for
 from levilab.present.document.blocks import Picture
@@ -46,7 +47,7 @@ def paths() -> tuple[list[Finding], dict[str, Trajectory]]:
                 "figures of the paths",
                 "the top stays in the trap",
                 f"|x| up to {x:.2f} cm, z from {z[0]:.2f} to {z[1]:.2f} cm in {PATH_S:g} s; energy constant to "
-                f"{drift:.0e}",
+                f"{digits(drift, 1)} of itself",
                 holds=motion.survived and drift < 1e-9,
             )
         )

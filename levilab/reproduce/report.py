@@ -18,7 +18,8 @@ from levilab.present.document.blocks import (
     Warnings,
 )
 from levilab.report.page import FORMATS, UnknownFormat
-from levilab.reproduce.table import findings_table, in_words, overview
+from levilab.reproduce.catalogue import CHAPTERS
+from levilab.reproduce.table import HEADS, findings_table, in_words, overview
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
@@ -31,10 +32,9 @@ if TYPE_CHECKING:
 
 HOW_TO_READ = (
     "A published number has the precision of its print: it agrees if ours lies within half a unit of its last digit, "
-    "or "
-    "within a tolerance that its row gives with the reason. Where it differs, the reason is computed, too, and shown: "
-    "what it makes of our number must give the published one. Some of the thesis's figures have no numbers; what "
-    "stands for these was computed apart from levilab, with other code, and is marked: recomputed apart."
+    "or within a tolerance that its row gives with the reason. Where it differs, the reason is computed, too, and "
+    "shown: what it makes of our number must give the published one. Some of the thesis's figures have no numbers; "
+    "what stands for these was computed apart from levilab, with other code, and is marked: recomputed apart."
 )
 
 
@@ -83,18 +83,19 @@ def document_of(found: Reproduction) -> Document:
 
 def _section(chapter: Chapter, found: Found) -> Section:
     marks = (Banner("SYNTHETIC.", found.synthetic),) if found.synthetic else ()
-    findings = Tabular(chapter.name, findings_table("", found.findings, broken=True))
+    findings = Tabular(chapter.name, findings_table("", found.findings), wraps=HEADS)
     return Section(chapter.title, (*marks, Paragraph(found.said), *found.blocks, findings), anchor=chapter.name)
 
 
 def _how(found: Reproduction) -> Section:
-    only = ",".join(chapter.name for chapter, _ in found.chapters)
+    names = [chapter.name for chapter, _ in found.chapters]
+    chosen = "" if len(names) == len(CHAPTERS) else f" --only {','.join(names)}"
     versions = ", ".join(f"{name} {version}" for name, version in software_versions().items())
     return Section(
         "How to reproduce this",
         (
             Paragraph("The same versions on the same kind of processor give the same numbers."),
-            Code(f"levilab reproduce --only {only}"),
+            Code(f"levilab reproduce{chosen}"),
             Facts((Fact("Versions here", (versions,)),)),
         ),
         anchor="reproduce",

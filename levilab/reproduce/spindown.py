@@ -119,14 +119,15 @@ def make() -> Found:
     runs = readings()
     fits = tuple(fit_spin_down(run.time, run.spin, NOISE_HZ, tilt=False) for run in runs)
     how = "; ".join(
-        f"run {k}: {run.start:.3f} Hz, C = {run.c32:.4e} (rad/s)^−½/s, seed {run.seed}" for k, run in enumerate(runs, 1)
+        f"run {k}: {run.start:.3f} Hz, C = {1e4 * run.c32:.4f}×10⁻⁴ (rad/s)^−½/s, seed {run.seed}"
+        for k, run in enumerate(runs, 1)
     )
     picture = Picture(
         "spindowns",
         "Two straight lines that bend the two ways, and one law between them.",
         "What the laws leave over of the four synthetic runs: readings less the law fitted, over time. Stokes's law "
-        "(n = 1) "
-        "and Newton's (n = 2) leave arcs of opposite sense, the disc's (n = 3/2) the noise. SYNTHETIC readings.",
+        "(n = 1) and Newton's (n = 2) leave arcs of opposite sense, the disc's (n = 3/2) the noise. SYNTHETIC "
+        "readings.",
         "Residuals of four synthetic spin-downs under three laws of drag",
         partial(spindown_figure, tuple((run.time, fit) for run, fit in zip(runs, fits, strict=True))),
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import TYPE_CHECKING
 
 from levilab.present.tables import Row, Table, table
@@ -22,31 +21,18 @@ WORDS = {
     Verdict.UNEXPECTED: "UNEXPECTED",
 }
 HEADS = ("", "published", "here", "agreement")
-#: Characters after which the cells of a report's columns are broken: together they fit the width of a page.
-WIDTHS = (34, 24, 34, 46)
 
 
-def findings_table(title: str, findings: Sequence[Finding], *, broken: bool = False) -> Table:
-    """A row a finding; those that nothing explains are red.  broken: long cells have lines of their own."""
-    kinds = ["outlier" if one.verdict is Verdict.UNEXPECTED else "" for one in findings]
-    cells = [_cells(one) for one in findings]
-    if broken:
-        cells = [tuple(map(_lines, row, WIDTHS)) for row in cells]
-    return table(title, HEADS, [Row(row, kind) for row, kind in zip(cells, kinds, strict=True)])
+def findings_table(title: str, findings: Sequence[Finding]) -> Table:
+    """A row a finding; those that nothing explains are red."""
+    return table(
+        title, HEADS, [Row(_cells(one), "outlier" if one.verdict is Verdict.UNEXPECTED else "") for one in findings]
+    )
 
 
 def _cells(one: Finding) -> tuple[str, ...]:
     agreement = f"{WORDS[one.verdict]}: {one.why}" if one.why else WORDS[one.verdict]
     return f"{one.name}\n{one.place}", one.published_text, one.ours_text, agreement
-
-
-def _lines(cell: str, width: int) -> str:
-    r"""A cell's text in lines of at most so many characters.
-
-    >>> _lines("a long one\n(short)", 6)
-    'a long\none\n(short)'
-    """
-    return "\n".join(textwrap.fill(line, width, break_long_words=False) for line in cell.splitlines())
 
 
 def overview(found: Reproduction) -> Table:

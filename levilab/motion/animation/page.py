@@ -16,20 +16,21 @@ import math
 import re
 from dataclasses import dataclass
 from importlib import resources
-from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levilab.errors import LevilabError, UsageError
+from levilab.errors import UsageError
 from levilab.motion.animation.film import Film, in_mm, nice_length, still, table_of_colours
 from levilab.motion.animation.parts import COLOURS, parts_of
 from levilab.motion.animation.poses import height_for_camera
+from levilab.motion.animation.three import MissingThree, three_js
 from levilab.motion.animation.words import short_speed, speed_in_words
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from PIL.Image import Image
 
     from levilab.motion.animation.poses import Poses
@@ -47,10 +48,6 @@ _SPEEDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 POSES_A_TURN, FEWEST_A_TURN = 16, 12
 #: Length of the axis' path that is drawn [s of the motion].
 _TRAIL_S = 0.5
-
-
-class MissingThree(LevilabError):
-    """three.js is not there."""
 
 
 @dataclass(frozen=True)
@@ -81,18 +78,9 @@ def columns_of(poses_or_scene: Any) -> list[str]:
     return ["x", "y", "z", "qx", "qy", "qz", "qw", "spin", *slips, *drive]
 
 
-def read_three() -> bytes:
-    """Read three.js out of nicegui.  Raises MissingThree."""
-    found = find_spec("nicegui")
-    for place in (found.submodule_search_locations or ()) if found else ():
-        path = Path(place, "elements/scene/dist/index.js")
-        if path.is_file():
-            return path.read_bytes()
-    seen = "which is not installed" if found is None else "which is installed in a version that does not hold it"
-    raise MissingThree(
-        f"an animation as .html needs three.js out of nicegui, {seen}: pip install 'levilab[live]', "
-        "or name a file that ends in .gif"
-    )
+def three_for_page() -> Path:
+    """Return the module that a page holds.  Raises MissingThree."""
+    return three_js("an animation as .html", ", or name a file that ends in .gif")
 
 
 def as_page(page: Page) -> bytes:
@@ -104,7 +92,7 @@ def as_page(page: Page) -> bytes:
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    three = read_three()
+    three = three_for_page().read_bytes()
     files = {name: _text(name) for name in ("page.css", "player.js", "top.js")}
     poses = page.poses
     folder = str(resources.files("levilab.motion.animation"))

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 from levilab.errors import UsageError
 from levilab.files import replace_atomically, writing
 from levilab.motion.animation.film import Film, as_gif, as_mp4, check_encoder
-from levilab.motion.animation.page import FEWEST_A_TURN, POSES_A_TURN, Page, as_page, columns_of, most_poses, read_three
+from levilab.motion.animation.page import (
+    FEWEST_A_TURN,
+    POSES_A_TURN,
+    Page,
+    as_page,
+    columns_of,
+    most_poses,
+    three_for_page,
+)
 from levilab.motion.animation.poses import poses_of, turn_rate
 from levilab.simulator.compilation import announce_compilation
 
@@ -57,7 +65,7 @@ class _Format:
 
 
 FORMATS: dict[str, _Format] = {
-    ".html": _Format(10.0, 0.1, check=read_three),
+    ".html": _Format(10.0, 0.1, check=three_for_page),
     ".gif": _Format(1.0, 0.05, 20.0, (480, 480), as_gif),
     ".mp4": _Format(1.0, 0.05, 30.0, (640, 640), as_mp4, check_encoder),
 }

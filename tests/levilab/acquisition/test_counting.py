@@ -30,6 +30,7 @@ class Bench:
             check_settings=lambda _: None,
             event=lambda kind, text, **_: self.events.append((kind, text)),
             warn=self.warnings.append,
+            saw=lambda *_: None,
         )
         return FreeTop(session, [{"time_s": time, "spin_frequency_hz": spin} for time, spin in before])
 

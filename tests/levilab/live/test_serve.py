@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from levilab.live.graphics import NoThree, three_js
+from levilab.motion.animation.three import MissingThree, three_js
 from support.commands import command
 from support.live_pages import GrowingRun
 
@@ -35,9 +35,9 @@ def test_a_run_and_a_bench_for_practice_exclude_each_other(tmp_path: Path) -> No
 
 
 def test_without_the_extra_the_message_names_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("levilab.live.graphics.find_spec", lambda _: None)
-    with pytest.raises(NoThree, match=r'pip install "levilab\[live\]"'):
-        three_js()
+    monkeypatch.setattr("levilab.motion.animation.three.find_spec", lambda _: None)
+    with pytest.raises(MissingThree, match=r'pip install "levilab\[live\]"'):
+        three_js("the live view")
     ended = command("live", "--no-open", cwd=tmp_path)
     assert (ended.status, "levilab[live]" in ended.err) == (1, True)
 

@@ -1,0 +1,31 @@
+"""Where three.js lies, which draws in a browser: it comes inside of nicegui, of which nothing is imported."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+from levilab.errors import LevilabError
+
+
+class MissingThree(LevilabError):
+    """three.js is not there."""
+
+
+def three_js(what: str, instead: str = "") -> Path:
+    """Return the module with three.js.
+
+    Args:
+        what: needs it, for the message where it is missing.
+        instead: what to do without it.
+
+    Raises:
+        MissingThree: nicegui is not installed, or in a version that does not hold it.
+    """
+    found = find_spec("nicegui")
+    for folder in (found.submodule_search_locations or ()) if found else ():
+        path = Path(folder, "elements", "scene", "dist", "index.js")
+        if path.is_file():
+            return path
+    seen = "which is not installed" if found is None else "which is installed in a version that does not hold it"
+    raise MissingThree(f'{what} needs three.js out of nicegui, {seen}: pip install "levilab[live]"{instead}')
