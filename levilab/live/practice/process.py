@@ -247,7 +247,7 @@ class PracticeProcess:
             self._wanted = None
 
     def _is_called_away(self) -> bool:
-        """Whether a run is to be recorded, or the bench is to end; commands say so while an instrument is waited for."""
+        """Whether a run is to be recorded, or the bench is to end; a command may say so during a count."""
         return self._over or self._wanted is not None
 
     def _next_run(self) -> RecordRun | None:
