@@ -27,8 +27,8 @@ EXPERIMENTS = {
     "spin": (
         "spin.drive_waveform=SQU",
         "spin.drive_frequency_hz=34",
-        "spin.ramp_hz_per_s=0.1",
-        "spin.hold_s=5",
+        "spin.ramp_hz_per_s=0.08",
+        "spin.hold_s=10",
         "spin.interval_s=2",
     ),
     "precession": (
