@@ -206,7 +206,7 @@ class Watch:
 
     def _new_records(self, seen: Any, arrays: dict[str, Any]) -> list[dict[str, Any]]:
         seen = seen if isinstance(seen, dict) else {}
-        found = []
+        found: list[dict[str, Any]] = []
         for channel, record in self._records.items():
             if seen.get(channel) != record.number:
                 k = len(found)
@@ -218,7 +218,7 @@ class Watch:
     def _new_poses(self, seen: int, arrays: dict[str, Any]) -> list[dict[str, Any]]:
         if seen > self._pose_number:  # of another server
             seen = 0
-        found = []
+        found: list[dict[str, Any]] = []
         for number, poses in self._poses:
             if number > seen:
                 k = len(found)

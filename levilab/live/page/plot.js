@@ -44,7 +44,8 @@ export function ticks(low, high, count) {
 
 const decimals = (marks) => marks.length < 2 ? 2 : Math.max(0, Math.min(6, -Math.floor(Math.log10(marks[1] - marks[0]) + 1e-9)));
 
-function extent(arrays, share) {
+/** The least and the greatest of all values, [0, 0] without any. */
+function range(arrays) {
   let low = Infinity, high = -Infinity;
   for (const array of arrays) {
     for (const value of array) {
@@ -52,7 +53,12 @@ function extent(arrays, share) {
       if (value > high) high = value;
     }
   }
-  if (!(high >= low)) return [0, 1];
+  return high >= low ? [low, high] : [0, 0];
+}
+
+/** That range, and beyond it so large a share of it. */
+function extent(arrays, share) {
+  const [low, high] = range(arrays);
   const more = share * (high - low) || Math.abs(high) * 1e-3 || 1;
   return [low - more, high + more];
 }
@@ -70,7 +76,7 @@ export function at(xs, ys, x) {
   return ys[low] + share * (ys[high] - ys[low]);
 }
 
-const LEFT = 58, RIGHT = 12, TOP = 8, BOTTOM = 34, GAP = 10;
+const LEFT = 58, RIGHT = 12, TOP = 8, BOTTOM = 34, GAP = 22;  // in the gap stands what is below it
 
 /**
  * Draw readings with their running fit, and below them what the fit leaves over.
@@ -110,7 +116,9 @@ export function drawReadings(paper, data, pointed) {
   c.strokeStyle = paint.grid;
   c.textBaseline = "middle";
   const xMarks = ticks(xs[0] * fx, xs[1] * fx, width / 90), yMarks = ticks(ys[0] * fy, ys[1] * fy, split / 46);
-  line(c, xMarks.flatMap((mark) => [[toX(mark / fx), TOP, toX(mark / fx), bottom]]));
+  for (const [from, to] of fit ? [[TOP, split], [bottom - below, bottom]] : [[TOP, bottom]]) {
+    line(c, xMarks.map((mark) => [toX(mark / fx), from, toX(mark / fx), to]));
+  }
   line(c, yMarks.flatMap((mark) => [[LEFT, toY(mark / fy), width - RIGHT, toY(mark / fy)]]));
   c.textAlign = "right";
   for (const mark of yMarks) c.fillText(fixed(mark, decimals(yMarks)), LEFT - 7, toY(mark / fy));
@@ -126,7 +134,7 @@ export function drawReadings(paper, data, pointed) {
     const one = [5, 2, 1].map((k) => k * power).find((k) => k <= 0.8 * reach * fy);
     for (const mark of [-one, 0, one]) c.fillText(short(mark, 2), LEFT - 7, toLeft(mark / fy));
     c.textAlign = "left";
-    c.fillText("readings − fit", LEFT + 6, bottom - below + 10);
+    c.fillText("readings − fit", LEFT, bottom - below - 10);
     c.strokeStyle = paint.line;
     c.strokeRect(LEFT + 0.5, bottom - below + 0.5, width - LEFT - RIGHT - 1, below - 1);
   }
@@ -240,14 +248,18 @@ function curve(c, fit, toX, toY, wanted) {
   c.stroke();
 }
 
-/** Draw the oscilloscope's screen: each channel's latest record, on one scale of time. */
+/** The screen of the oscilloscope is at least so high [V]. */
+const LEAST_SPAN_V = 0.8;
+
+/** Draw the oscilloscope's screen: each channel's latest record, one below the other, on one scale of time. */
 export function drawRecords(paper, records) {
   const paint = colours(), {context: c} = paper;
   const [width, height] = paper.fit();
   c.strokeStyle = paint.graticule;
   c.lineWidth = 1;
   const across = Array.from({length: 9}, (_, k) => Math.round((k + 1) * width / 10) + 0.5);
-  const up = Array.from({length: 5}, (_, k) => Math.round((k + 1) * height / 6) + 0.5);
+  const n = Math.max(records.length, 1), band = height / n;  // each channel has a part of the screen to itself
+  const up = Array.from({length: n - 1}, (_, k) => Math.round((k + 1) * band) + 0.5);
   line(c, [...across.map((x) => [x, 0, x, height]), ...up.map((y) => [0, y, width, y])]);
   if (!records.length) {
     c.fillStyle = paint.dim;
@@ -260,9 +272,12 @@ export function drawRecords(paper, records) {
   const end = Math.max(...records.map((one) => one.start_s + one.step_s * one.low.length));
   const said = [];
   records.forEach((one, channel) => {
-    const [lowest, highest] = extent([one.low, one.high], 0.12);
+    const [from, to] = range([one.low, one.high]);
+    const more = Math.max(0, (LEAST_SPAN_V - (to - from)) / 2);  // noise alone does not fill the screen
+    const [lowest, highest] = [from - more, to + more];
+    const floor = (channel + 1) * band - 7, ceiling = channel * band + 24;  // above it stands what it is
     const toX = (k) => (one.start_s + (k + 0.5) * one.step_s - begin) / (end - begin) * width;
-    const toY = (value) => height - (value - lowest) / (highest - lowest) * height;
+    const toY = (value) => floor - (value - lowest) / (highest - lowest) * (floor - ceiling);
     c.strokeStyle = paint[`trace-${channel % 4 + 1}`];
     c.lineWidth = 1.2;
     c.beginPath();
@@ -274,13 +289,12 @@ export function drawRecords(paper, records) {
     c.fillStyle = c.strokeStyle;
     c.textAlign = "left";
     c.textBaseline = "top";
-    const [from, to] = extent([one.low, one.high], 0);
-    c.fillText(`${one.channel}  ${short(from, 3)} … ${short(to, 3)} V`, 8 + channel * 190, 7);
+    c.fillText(`${one.channel}  ${short(from, 3)} … ${short(to, 3)} V`, 8, channel * band + 6);
     said.push(`${one.channel} from ${short(from, 3)} to ${short(to, 3)} volts`);
   });
   c.fillStyle = paint.dim;
   c.textAlign = "right";
-  c.textBaseline = "bottom";
-  c.fillText(`${short((end - begin) * 100, 3)} ms a division`, width - 8, height - 5);
+  c.textBaseline = "top";
+  c.fillText(`${short((end - begin) * 100, 3)} ms a division`, width - 8, 6);
   return `${said.join(", ")}, over ${short((end - begin) * 1000, 3)} milliseconds`;
 }

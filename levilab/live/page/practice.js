@@ -84,7 +84,7 @@ export function openPractice(about, command, run, allowed) {
     now.driven ||= now.drive;
     press("drive", now.drive, now.drive ? "Drive off" : "Drive on");
     press("hold", now.paused, now.paused ? "Let time go on" : "Stop time");
-    write("record", now.busy ? "End the run" : "Record");
+    write("record", now.busy ? "End run" : "Record");
     for (const id of ["drive", "match", "back", "frequency", "frequency-slider", "amplitude", "amplitude-slider", "experiment"]) {
       by(id).disabled = now.busy;
     }

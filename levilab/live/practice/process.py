@@ -64,6 +64,15 @@ CHANNELS = {1: "tape", 2: "drive", 3: "laser"}
 RECORD_S, SAMPLES, VOLTS_PER_DIVISION = 0.2, 1000, 2.0
 #: The drive's frequency moves in even steps of about this time [s]; with uneven ones the top swings about the drive.
 RAMP_STEP_S = 0.5
+#: Whether the drive takes hold of the top depends on how the top points when it comes on, which the light pulse says:
+#: a count ends with one.  The drive comes on so many turns after it, in this order; what held the top is tried first
+#: the next time, since the tape stays where it is on the top.
+TURNS_LATER = (0.0, 0.5, 0.25, 0.75)
+#: The drive can take hold of a top that spins as fast as it is set, within this [Hz].
+CATCHES_WITHIN_HZ = 1.0
+#: A top that is held swings about its drive by less than this [Hz], half a hertz and what it loses while it is counted.
+#: One that is not held loses 0.1 Hz/s to the air: it is compared from the first to the second of these times on [s].
+SWINGS_HZ, COMPARED_S = 0.75, (4.0, 14.0)
 #: The drive before a person has changed it.
 FIRST_HZ, FIRST_VPP, FIRST_WAVEFORM, FIRST_RAMP = 30.0, 10.0, "SQU", 0.1
 
@@ -102,6 +111,19 @@ class Knobs:
     waveform: str = FIRST_WAVEFORM
     ramp_hz_per_s: float = FIRST_RAMP
     on: bool = False
+
+
+@dataclass
+class Catch:
+    """The drive takes hold of the top: tries, each with the drive so many turns after a light pulse.
+
+    Attributes:
+        tries: that were begun.
+        since: when the drive came on for the present one, bench time [s]; None: it waits for the next count.
+    """
+
+    tries: int = 0
+    since: float | None = None
 
 
 @dataclass
@@ -194,6 +216,9 @@ class PracticeProcess:
         self._stopped = ""  # why the run that is recorded is to end
         self._over = False
         self._looking = False  # whether `look` is under way: what it does may wait, too
+        self._catch: Catch | None = None  # while the drive takes hold of the top
+        self._turns_later = list(TURNS_LATER)
+        self._text = ""  # what the drive does, for the page
         self._moved = 0.0  # bench time of the last step of the drive's frequency [s]
         self._tops = 0
         self._probe_m: float | None = None
@@ -215,11 +240,18 @@ class PracticeProcess:
                 if ready is not None:
                     self._report(ready)
                     ready = None
-                while not (self._over or self._wanted is not None):
+                while not self._is_called_away():
                     self._measure(bench)
-            if self._wanted is not None and not self._over:
-                self._record(self._wanted)
+            if (wanted := self._next_run()) is not None:
+                self._record(wanted)
             self._wanted = None
+
+    def _is_called_away(self) -> bool:
+        """Whether a run is to be recorded, or the bench is to end; a command may say so during a count."""
+        return self._over or self._wanted is not None
+
+    def _next_run(self) -> RecordRun | None:
+        return None if self._over else self._wanted
 
     @contextlib.contextmanager
     def _looking_at(self, bench: Bench) -> Iterator[None]:
@@ -229,6 +261,7 @@ class PracticeProcess:
         finally:
             self._bench, self.clock.meanwhile = None, None
             self._knobs.on = False
+            self._catch, self._text = None, ""
 
     def _set_up(self, bench: Bench) -> None:
         bench.counter.prepare(gate_s=GATE_S, trigger_level_v=TRIGGER_V)
@@ -246,6 +279,7 @@ class PracticeProcess:
     def _measure(self, bench: Bench) -> None:
         """Read each instrument once."""
         spin = bench.counter.frequency()
+        self._take_hold(bench, spin)
         flux_density = bench.magnetometer.flux_density()
         for channel, value in (("spin_frequency_hz", spin), ("flux_density_t", flux_density)):
             if value is None:
@@ -321,7 +355,9 @@ class PracticeProcess:
             drive = replace(
                 drive, waveform=knobs.waveform, frequency_hz=knobs.frequency_hz, amplitude_vpp=knobs.amplitude_vpp
             )
-        return State(self.clock.now(), last=dict(self._seen.values), drive=drive, counting=counting, **here)
+        return State(
+            self.clock.now(), text=self._text, last=dict(self._seen.values), drive=drive, counting=counting, **here
+        )
 
     # --- commands ---
 
@@ -359,11 +395,16 @@ class PracticeProcess:
     @_carry_out.register
     def _(self, command: PutBack) -> str:
         self._free_bench()
-        if "spin_frequency_hz" in self._seen.values:
-            raise CommandRefused("the counter sees a top that floats: it can be put back once it has fallen")
+        if self._floats():
+            raise CommandRefused("the top floats: it can be put back once it has fallen")
         self._tops += 1
         self.world.float_top(self._tops)
         return "the top floats again"
+
+    def _floats(self) -> bool:
+        """Whether the top is up now, as a person at the bench sees; the counter knows it a second later."""
+        poses = self._wiring.poses
+        return poses is not None and bool(poses(self.clock.now(), RAMP_STEP_S, 1).up[0])
 
     @_carry_out.register
     def _(self, command: PlaceProbe) -> str:
@@ -393,7 +434,9 @@ class PracticeProcess:
         wanted = replace(knobs, **changes)
         self._check(wanted)
         self._knobs = wanted
-        if wanted.on and command.waveform is not None and command.waveform != knobs.waveform:
+        if self._catch is not None and self._catch.since is None:
+            pass  # the drive comes on with it
+        elif wanted.on and command.waveform is not None and command.waveform != knobs.waveform:
             self._switch_on(bench, self._frequency(bench))
         elif wanted.on and command.amplitude_vpp is not None:
             bench.generator.amplitude = wanted.amplitude_vpp
@@ -401,14 +444,28 @@ class PracticeProcess:
 
     @_carry_out.register
     def _(self, command: SwitchDrive) -> str:
-        bench = self._free_bench()
-        if command.on and not self._knobs.on:
-            self._check(self._knobs)
-            self._switch_on(bench, self._knobs.frequency_hz)
-        elif not command.on:
+        bench, knobs = self._free_bench(), self._knobs
+        if not command.on:
             bench.outputs_off()
-        self._knobs.on = command.on
-        return f"the drive is on at {self._knobs.frequency_hz:g} Hz" if command.on else "the drive is off"
+            self._catch, self._text, knobs.on = None, "", False
+            return "the drive is off"
+        if knobs.on:
+            return f"the drive is on at {knobs.frequency_hz:g} Hz already"
+        self._check(knobs)
+        knobs.on = True
+        spin = self._seen.values.get("spin_frequency_hz")
+        if spin is not None and abs(spin - knobs.frequency_hz) <= CATCHES_WITHIN_HZ:
+            self._catch = Catch()
+            return f"the drive comes on with a light pulse, at the top's spin, {spin:.2f} Hz"
+        self._switch_on(bench, knobs.frequency_hz)
+        beside = "the counter sees no top" if spin is None else f"the top spins at {spin:.2f} Hz"
+        self._say(f"drive on at {knobs.frequency_hz:g} Hz, but {beside}: it takes hold of one that spins as fast")
+        return f"the drive is on at {knobs.frequency_hz:g} Hz"
+
+    def _say(self, text: str) -> None:
+        """Say something to the person at the bench, and leave it in the head of the page."""
+        self._text = text
+        self._report(PracticeEvent("message", text))
 
     def _free_bench(self) -> Bench:
         """The open bench.  Raises CommandRefused while a run is recorded."""
@@ -436,6 +493,54 @@ class PracticeProcess:
         bench.generator.output = True
         self._moved = self.clock.now()
 
+    def _take_hold(self, bench: Bench, spin: float | None) -> None:
+        """Go on with taking hold of the top, just after a count, which ended with a light pulse.
+
+        Args:
+            bench: that is open.
+            spin: that was counted [Hz]; None: no light pulses.
+        """
+        catch = self._catch
+        if catch is None:
+            return
+        if spin is None:
+            if catch.since is None:
+                self._knobs.on = False
+            self._catch = None
+            self._say("no light pulses: the drive has no top to take hold of")
+        elif catch.since is None:
+            self._try_to_hold(bench, catch, spin)
+        elif (held_for := self.clock.now() - catch.since) >= COMPARED_S[0]:
+            self._compare(bench, catch, spin, held_for)
+
+    def _try_to_hold(self, bench: Bench, catch: Catch, spin: float) -> None:
+        self.clock.sleep(self._turns_later[catch.tries] / spin)
+        if catch is not self._catch or self._is_called_away():
+            return  # switched off meanwhile
+        catch.tries += 1
+        self._switch_on(bench, spin)
+        catch.since = self.clock.now()
+        again = "" if catch.tries == 1 else ", a part of a turn later than before"
+        self._say(f"drive on at the top's spin, {spin:.2f} Hz{again}")
+
+    def _compare(self, bench: Bench, catch: Catch, spin: float, held_for: float) -> None:
+        """Compare the spin with the drive: held, not held, or too early to say."""
+        drive = self._frequency(bench)
+        if abs(spin - drive) <= SWINGS_HZ:
+            if held_for >= COMPARED_S[1]:
+                self._catch = None
+                self._turns_later.insert(0, self._turns_later.pop(catch.tries - 1))
+                self._say(f"the top follows the drive at {drive:.2f} Hz")
+            return
+        bench.outputs_off()
+        seen = f"the drive does not hold the top, {spin:.2f} Hz under a drive of {drive:.2f} Hz"
+        if catch.tries < len(self._turns_later):
+            catch.since = None
+            self._say(f"{seen}: it is tried again with the top turned otherwise")
+        else:
+            self._catch, self._knobs.on = None, False
+            self._say(f"{seen}, and the drive is off: match the spin, more volts, a slower ramp")
+
     @staticmethod
     def _frequency(bench: Bench) -> float:
         """The drive's frequency as it was commanded last [Hz]."""
@@ -444,7 +549,8 @@ class PracticeProcess:
     def _move_drive(self) -> None:
         """Move the drive's frequency on towards where it is going, as far as the ramp comes in the time since."""
         since = self.clock.now() - self._moved
-        if self._bench is None or not self._knobs.on or since < RAMP_STEP_S:
+        waits = self._catch is not None and self._catch.since is None
+        if self._bench is None or not self._knobs.on or waits or since < RAMP_STEP_S:
             return
         self._moved += since
         here = self._frequency(self._bench)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -152,6 +153,28 @@ def test_a_run_grows_is_torn_reloaded_and_ends(served: Hall, page: Page, tmp_pat
         until(page, "document.querySelector('#event-list .warning')")
     run.say(status="finished")
     until(page, "document.body.dataset.state === 'finished'")
+
+
+def test_two_views_of_a_run_one_closed_and_opened_again_and_the_folder_deleted(
+    served: Hall, watched: Callable[..., Page], tmp_path: Path
+) -> None:
+    run = GrowingRun(tmp_path)
+    one, two = watched(), watched()
+    with run.running():
+        run.readings(spin_down(3))
+        for page in (one, two):
+            page.goto(address(served, run.folder.name))
+            until(page, "levilab.data.count === 3")
+        one.goto("about:blank")
+        run.readings(spin_down(2, first=3))
+        until(two, "levilab.data.count === 5")
+        one.goto(address(served, run.folder.name))
+        until(one, "levilab.data.count === 5 && document.body.dataset.state === 'running'")
+        assert len(served.watches) == 1
+    shutil.rmtree(run.folder)
+    for page in (one, two):
+        until(page, "document.body.dataset.state === 'missing'")
+        assert page.evaluate("levilab.data.count") == 5  # what was read stays
 
 
 def test_what_the_bench_publishes_is_drawn(served: Hall, page: Page, tmp_path: Path) -> None:

@@ -19,13 +19,14 @@ if TYPE_CHECKING:
     from levilab.live.server import Hall
 
 
-@pytest.fixture
-def served(tmp_path: Path) -> Iterator[Hall]:
-    with PracticeBench(tmp_path) as bench, serving(tmp_path, desk=Desk(bench)) as hall:
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
+    out: Path = tmp_path_factory.mktemp("runs")
+    with PracticeBench(out) as bench, serving(out, desk=Desk(bench)) as hall:
         yield hall
 
 
-def test_a_student_drives_records_and_analyzes(served: Hall, page: Page, tmp_path: Path) -> None:
+def test_a_student_drives_records_and_analyzes(served: Hall, page: Page) -> None:
     page.goto(address(served, token=True))
     until(page, "levilab.data.bench?.last.spin_frequency_hz && levilab.space?.frames")
     page.select_option("#speed", "10")
@@ -33,17 +34,21 @@ def test_a_student_drives_records_and_analyzes(served: Hall, page: Page, tmp_pat
     page.click("#match")
     page.keyboard.press("d")
     until(page, "levilab.data.bench.drive.output")
-    assert page.get_attribute("#drive", "aria-pressed") == "true"
+    until(page, "document.getElementById('drive').getAttribute('aria-pressed') === 'true'")
+    until(page, "document.getElementById('event-list').textContent.includes('the top follows the drive')")
     page.click("#back")
+    until(page, "document.getElementById('said').textContent.includes('once it has fallen')")
     page.click("#record")
     until(page, "levilab.data.bench.busy && levilab.data.count >= 3")
     until(page, "levilab.data.fit")
     page.click("#record")
     until(page, "document.body.dataset.state === 'interrupted'")
+    page.click("#hold")  # the analysis has the machine for itself
+    until(page, "levilab.data.bench.paused")
     page.click("#analyze")
     until(page, "document.querySelectorAll('#figures img').length && document.getElementById('verdict').innerText")
     assert page.locator("#guide .done").count() >= 3
-    (run,) = tmp_path.iterdir()
+    (run,) = served.root.iterdir()
     assert (run / "result.json").exists()
 
 

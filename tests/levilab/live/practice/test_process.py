@@ -125,6 +125,30 @@ def test_a_top_that_is_locked_rises_with_its_drive(session: Script) -> None:
     assert max(abs(spin - drive) for _, drive, spin in course) < 0.6
 
 
+def test_the_drive_takes_hold_with_a_light_pulse_and_says_so(session: Script) -> None:
+    said = session.said("message")
+    assert said[0].startswith("drive on at the top's spin, 29.")
+    assert said[1].startswith("the top follows the drive at ")
+
+
+def test_a_drive_that_does_not_hold_the_top_is_tried_with_the_top_turned_otherwise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("levilab.live.practice.process.TURNS_LATER", (0.5, 0.75, 0.0, 0.25))  # the best ones last
+    script = carry_out(tmp_path, (2.0, MatchDrive()), (2.1, SwitchDrive(on=True)), (50.0, None))
+    said = [text.partition(",")[0] for text in script.said("message")]
+    assert said[-1].startswith("the top follows the drive")
+    assert said[:3] == ["drive on at the top's spin", "the drive does not hold the top", "drive on at the top's spin"]
+    last = script.spins(45.0, 50.0)[-1]
+    assert last[2] == pytest.approx(last[1], abs=0.5)
+
+
+def test_a_drive_far_from_the_spin_says_why_it_holds_nothing(tmp_path: Path) -> None:
+    script = carry_out(tmp_path, (2.0, TuneDrive(frequency_hz=40.0)), (2.1, SwitchDrive(on=True)), (3.0, None))
+    (text,) = script.said("message")
+    assert text.startswith("drive on at 40 Hz, but the top spins at 29.")
+
+
 def test_a_drive_that_is_too_weak_for_the_air_loses_the_top(session: Script) -> None:
     course = session.spins(52.0, 55.0)
     assert {drive for _, drive, _ in course} == {33.0}
@@ -146,7 +170,7 @@ def test_what_the_bench_cannot_do_is_refused_with_what_to_do(session: Script) ->
         "333 Hz: the coil of this bench stands at most 100 Hz",
         "11 Vpp: the coil of this bench stands at most 10 Vpp",
         "no run is being recorded: nothing to stop",
-        "the counter sees a top that floats: it can be put back once ",
+        "the top floats: it can be put back once it has fallen",
         "experiment = dance: one of spin, trace, field, limit, precession is expected"[:60],
         "settings = spin.gate_s=-1: a number above 0 [s] is expected;",
         "a run is being recorded, and the bench is its own: stop the ",
