@@ -110,8 +110,8 @@ class LineDisplay:
 class BarDisplay:
     """The readings as lines, and below them the bench as it is: last value, trend, instruments, time left.
 
-    It has no thread: it is drawn anew when the bench has something to show, at most four times a second.  A terminal that
-    is gone, as with a window that was closed, ends no measurement.
+    It has no thread: it is drawn anew when the bench has something to show, at most four times a second.  A
+    terminal that is gone, as with a window that was closed, ends no measurement.
 
     Args:
         console: by default one on standard error.
