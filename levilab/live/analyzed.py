@@ -71,7 +71,7 @@ class Analyses:
             self.running.discard(folder.name)
 
     def about(self, folder: Path) -> dict[str, Any]:
-        """What there is of a run's analysis: its state, names of figures, the verdict, whether there is a report."""
+        """The state of a run's analysis: its state, names of figures, the verdict, whether there is a report."""
         figures = sorted(path.name for path in folder.iterdir() if FIGURES.fullmatch(path.name))
         return {
             "running": folder.name in self.running,

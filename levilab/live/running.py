@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.errors import AnalysisError
+from analysis.precession.sweep import Sweep, fit_sweep
+from analysis.spindown.fit import SpinDown, fit_spin_down
 from analysis.uncertainty import Estimate
 from levilab.present.numbers import plain, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from analysis.spindown.fit import SpinDown
     from levilab.live.envelope import Array, Groups
 
 #: Spin at which a top falls: mean of the ten published limits [Hz], thesis §4.2.
@@ -92,8 +93,6 @@ def fit_so_far(experiment: str, columns: tuple[str, ...], groups: Groups) -> Run
 
 def spin_down(columns: Mapping[str, Array], size: int) -> Running:
     """The drag laws through a spin-down, the best of them drawn on to the fall."""
-    from analysis.spindown.fit import fit_spin_down
-
     time, spin, u = columns["time_s"], columns["spin_frequency_hz"], columns.get("spin_frequency_u_hz")
     used = np.isfinite(spin) & (np.isfinite(u) if u is not None else True)
     time, spin = time[used], spin[used]
@@ -126,8 +125,6 @@ def _time_of_fall(found: SpinDown, last: float, duration: float) -> float | None
 
 def locked_line(columns: Mapping[str, Array], size: int) -> Running:
     """The line through precession against drive, and the joint test of slope 1 and intercept 0."""
-    from analysis.precession.sweep import Sweep, fit_sweep
-
     drive, precession = columns["drive_frequency_hz"], columns["precession_frequency_hz"]
     u = columns.get("precession_frequency_u_hz")
     used = np.isfinite(drive) & np.isfinite(precession) & (np.isfinite(u) if u is not None else True)

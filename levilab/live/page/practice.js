@@ -27,7 +27,7 @@ export function openPractice(about, command, run, allowed) {
 
   /** What the bench says: a refusal, or a line for the person at it. */
   function hear({kind, text}) {
-    if (kind === "refused" || kind === "ended") write("said", text);
+    if (allowed && (kind === "refused" || kind === "ended")) write("said", text);
   }
 
   let timer = 0, latest = null;

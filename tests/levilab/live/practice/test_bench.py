@@ -13,7 +13,7 @@ from levilab.live.practice.bench import BenchGone, PracticeBench
 from levilab.live.practice.commands import Pause
 from levilab.runs.run import Run
 
-#: Long enough for a machine that is busy [s]; no test waits for it in vain.
+#: Long enough for a machine that is busy [s]; a test that passes waits less.
 PATIENCE_S = 120.0
 
 PARENT = """

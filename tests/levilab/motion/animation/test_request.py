@@ -89,14 +89,15 @@ def test_a_missing_library_is_named_before_anything_is_simulated(
     name: str, library: str, extra: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = importlib.util.find_spec
-    for module in ("page", "film"):
+    for module in ("three", "film"):
         monkeypatch.setattr(
             f"levilab.motion.animation.{module}.find_spec", lambda name: None if name == library else found(name)
         )
     monkeypatch.setattr("levilab.motion.simulation.simulate", None)
     ended = command("simulate", "undriven", "--animate", name, cwd=tmp_path)
     assert ended.status not in {0, 2}
-    assert f"pip install '{extra}'" in ended.err
+    assert "pip install" in ended.err
+    assert extra in ended.err
     assert "Traceback" not in ended.err
 
 
