@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from levilab.errors import LevilabError, UsageError
+from levilab.errors import DataError, LevilabError, UsageError
 from levilab.live.desk import Desk
 from levilab.live.doors import Doors
 from levilab.live.practice.bench import PracticeBench
@@ -93,6 +93,8 @@ def _where(options: LiveOptions) -> tuple[Path, str]:
     if options.mock:
         raise UsageError("mock", "a run and a bench for practice exclude each other: it records runs of its own")
     run = find_run(options.run, options.out).absolute()
+    if not run.is_dir():
+        raise DataError(f"{options.run}: there is no such run or folder; levilab runs lists the runs")
     if not (run / RECORD).exists():
         return run, ""  # a folder with runs
     return run.parent, run.name

@@ -28,6 +28,12 @@ def test_a_port_that_is_taken_is_named(tmp_path: Path) -> None:
     assert "--port" in ended.err
 
 
+def test_a_run_that_is_not_there_is_named(tmp_path: Path) -> None:
+    ended = command("live", "nothere", "--no-open", "--port", "0", cwd=tmp_path)
+    assert ended.status == 1
+    assert "nothere: there is no such run" in ended.err
+
+
 def test_a_run_and_a_bench_for_practice_exclude_each_other(tmp_path: Path) -> None:
     GrowingRun(tmp_path, "one")
     ended = command("live", "one", "--mock", "--no-open", "--port", "0", cwd=tmp_path)
