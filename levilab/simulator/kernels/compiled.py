@@ -42,7 +42,7 @@ def cache_key(sources: Path) -> str:
     return digest.hexdigest()[:16]
 
 
-class InOneFolder(UserProvidedCacheLocator):  # type: ignore[misc]  # numba has no types
+class InOneFolder(UserProvidedCacheLocator):
     """Where numba looks for compiled code: in the folder itself, and not in one named by the path of the source."""
 
     def get_cache_path(self) -> str:
