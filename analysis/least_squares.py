@@ -45,7 +45,13 @@ def _minimizer(residual: Residual, gradient: Gradient, start: Array, most: int =
     )
 
 
-def solve(residual: Residual, gradient: Gradient, start: Array, most: int = MOST_EVALUATIONS) -> tuple[Array, bool]:
+def solve(
+    residual: Residual,
+    gradient: Gradient,
+    start: Array,
+    most: int = MOST_EVALUATIONS,
+    tolerance: float = TOLERANCE,
+) -> tuple[Array, bool]:
     """The parameters of the smallest sum of squares, and whether the search ended there.
 
     A search that does not end in so many evaluations at `most` returns the best point found.
@@ -59,8 +65,8 @@ def solve(residual: Residual, gradient: Gradient, start: Array, most: int = MOST
             Dfun=gradient,
             col_deriv=True,
             full_output=True,
-            ftol=TOLERANCE,
-            xtol=TOLERANCE,
+            ftol=tolerance,
+            xtol=tolerance,
             gtol=0.0,
             maxfev=most,
         )

@@ -136,18 +136,18 @@ class CountedLaw:
 
     def spin(self, tau: Array, q: Array) -> Array:
         """What the counter counts, shape (n,)."""
-        return np.asarray(self._spins(tau, q[None])[0])
+        return np.asarray(self.spins(tau, q[None])[0])
 
     def gradient(self, tau: Array, q: Array) -> Array:
         """Its slopes with q, shape (p, n), by differences: good to 1e-7 of themselves."""
         sizes = 1e-5 * np.maximum(np.abs(q), 0.1)
         sizes[-MORE:] = 1e-4
         steps, p = np.diag(sizes), len(q)
-        spins = self._spins(tau, np.vstack([q + steps, q - steps]))
+        spins = self.spins(tau, np.vstack([q + steps, q - steps]))
         return np.asarray((spins[:p] - spins[p:]) / (2 * sizes[:, None]))
 
-    def _spins(self, tau: Array, rows: Array) -> Array:
-        """What the counter counts for several q, shape (r, p) → (r, n)."""
+    def spins(self, tau: Array, rows: Array) -> Array:
+        """The same for several q, shape (r, p) → (r, n)."""
         shapes = np.array([self.shape(q) for q in rows])
         with np.errstate(all="ignore"):
             return counts(self.law, tau, rows[:, :-MORE], shapes)
