@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from analysis.uncertainty import Estimate
 
 
+#: Ends the name of a quantity that each run of several has: its pulls are as many as runs and trials together.
+OF_ONE_RUN = "_of_one_run"
+
+
 @dataclass(frozen=True)
 class Trial:
     """One set of readings that was made up and analyzed.

@@ -15,6 +15,7 @@ import numpy as np
 
 from analysis.errors import AnalysisError
 from levilab.crosscheck.own import field, limit, precession, spin, spindown
+from levilab.crosscheck.own.model import OF_ONE_RUN
 from levilab.crosscheck.study import CHANCE, COVERAGE, Spread, by_reason, spreads_of
 from levilab.errors import LevilabError
 from levilab.present.document.blocks import Note, Paragraph, Tabular
@@ -35,8 +36,10 @@ OWN: Mapping[str, Callable[[Any], Own]] = MappingProxyType({
 _LONG_TAILS, _MANY = 8, 30
 #: How many trials are made where no number is asked for.
 TRIALS = 200
-#: A report makes as many as fit into so much processor time, and none where these would be too few to say anything.
-REPORT_S, FEWEST = 2.0, 25
+#: A report makes as many as fit into so much processor time, but so many even if they take longer ...
+REPORT_S, ENOUGH = 2.0, 25
+#: ... up to this time: then as many as fit into that, which say less, and none below so few.
+LONGEST_S, FEWEST = 6.0, 5
 
 
 @dataclass(frozen=True)
@@ -127,8 +130,12 @@ def seed_of(analysis: str, inputs: Sequence[str]) -> int:
 
 
 def trials_of_report(subject: Own) -> int:
-    """How many trials a report makes of its own accord; 0 where there is no time for enough of them."""
-    count = min(TRIALS, int(REPORT_S / subject.cost_s))
+    """How many trials a report makes of its own accord; 0 where there is no time for enough of them.
+
+    The cost is the subject's own estimate, and no clock is read: the bytes of a report do not depend on the machine.
+    """
+    wanted, longest = (int(time / subject.cost_s) for time in (REPORT_S, LONGEST_S))
+    count = min(TRIALS, max(wanted, min(ENOUGH, longest)))
     return count if count >= FEWEST else 0
 
 
@@ -193,10 +200,9 @@ def own_table(found: OwnCheck, shown: Mapping[str, str] | None = None) -> Table:
         found: the trials.
         shown: quantity → its symbol.
     """
-    names = shown or {}
     rows = [
         (
-            names.get(one.quantity, one.quantity.replace("_", " ")),
+            _in_words(one.quantity, shown or {}),
             str(one.n),
             f"{one.mean:+.2f} ± {1 / math.sqrt(one.n):.2f}".replace("-", "−"),
             "–" if math.isnan(one.deviation) else f"{one.deviation:.2f} ± {1 / math.sqrt(2 * one.n):.2f}",
@@ -208,19 +214,32 @@ def own_table(found: OwnCheck, shown: Mapping[str, str] | None = None) -> Table:
     return table("", ("quantity", *_NUMBERS, "as wanted"), rows, numbers=_NUMBERS)
 
 
+def _in_words(quantity: str, shown: Mapping[str, str]) -> str:
+    """Its symbol or its name.
+
+    >>> _in_words("c32_of_one_run", {"c32": "C₃/₂"}), _in_words("start_frequency", {})
+    ('C₃/₂ of one run', 'start frequency')
+    """
+    name = quantity.removesuffix(OF_ONE_RUN)
+    return shown.get(name, name.replace("_", " ")) + quantity[len(name) :].replace("_", " ")
+
+
 def in_words(found: OwnCheck) -> str:
     """What the trials say."""
     texts = [f"{found.trials} times anew: {found.about}."]
     if not found.spreads:
         texts.append("No trial came to an estimate.")
     elif found.holds:
-        texts.append("Values and uncertainties of this analysis are right for readings such as these.")
+        few = "" if found.trials >= ENOUGH else f", as far as so few trials show ({found.trials} of {TRIALS})"
+        texts.append(f"Values and uncertainties of this analysis are right for readings such as these{few}.")
     else:
-        wrong = ", ".join(one.quantity.replace("_", " ") for one in found.spreads if not found.is_right(one))
+        wrong = ", ".join(_in_words(one.quantity, {}) for one in found.spreads if not found.is_right(one))
         texts.append(f"For readings such as these the analysis is not right in {wrong}: trust its u the less.")
     if found.law and found.laws:
         n, again = sum(found.laws.values()), found.laws.get(found.law, 0)
-        others = ", ".join(f"{law} {count} times" for law, count in found.laws.items() if law != found.law)
+        others = ", ".join(
+            f"{law} {'once' if count == 1 else f'{count} times'}" for law, count in found.laws.items() if law != found.law
+        )
         texts.append(
             f"The {found.law} law, which is true there, is the best one in {again} of {n} trials"
             + (f" (else {others})" if others else "")
