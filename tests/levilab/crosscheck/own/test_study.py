@@ -12,7 +12,18 @@ import pytest
 
 from levilab.crosscheck.own.model import Own, Trial
 from levilab.crosscheck.own.stored import as_part, file_of, read_own, restored, store
-from levilab.crosscheck.own.study import OWN, check_own, holds, in_words, own_table, seed_of, trials_of_report
+from levilab.crosscheck.own.study import (
+    ENOUGH,
+    FEWEST,
+    OWN,
+    TRIALS,
+    check_own,
+    holds,
+    in_words,
+    own_table,
+    seed_of,
+    trials_of_report,
+)
 from levilab.crosscheck.study import Spread
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
@@ -50,7 +61,25 @@ def test_a_mean_of_several_runs_has_trials_that_differ_as_the_runs_do(runs: Any)
     u = runs.combined.fit("disc").constants["c32"].u
     assert np.std(c, ddof=1) > 0.3 * u  # each run's own readings would give a twelfth
     assert all(trial.law for trial in means)
-    assert trials_of_report(own) == 0  # a report has no time for them
+    assert [pull.quantity for pull in means[0].pulls] == ["c32_of_one_run"] * 2 + ["c32", "exponent"]
+    ones = np.array([pull.value for trial in means for pull in trial.pulls[:2]])
+    assert np.std(ones) == pytest.approx(1, abs=0.65)  # 3 standard errors from 12
+
+
+@pytest.mark.parametrize(
+    ("cost_s", "trials"), [(1e-4, TRIALS), (0.02, 100), (0.13, ENOUGH), (0.3, 20), (1.2, FEWEST), (1.3, 0)]
+)
+def test_a_report_makes_as_many_trials_as_it_has_time_for(cost_s: float, trials: int):
+    """Four runs of 20 readings cost 0.13 s, one with a tilt 0.3 s: a fit with it takes ten times as long."""
+    assert trials_of_report(Own("", lambda _: Trial([]), cost_s)) == trials
+
+
+def test_the_cost_of_a_spin_down_grows_with_its_runs_and_its_tilt(runs: Any, monkeypatch: pytest.MonkeyPatch):
+    two = OWN["spindown"](runs)
+    monkeypatch.setattr("analysis.spindown.lawfit.LawFit.has_tilt", True)
+    tilted = OWN["spindown"](runs)
+    assert trials_of_report(two) == 30
+    assert 10 <= trials_of_report(tilted) < ENOUGH
 
 
 def test_one_spin_down_and_one_scan_come_to_their_own_values(sample_data: Path):
