@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.pulses.matched import turn_times
-from analysis.pulses.regression import Fit, fit_turns, median
+from analysis.pulses.regression import Fit, fit_turns, median, student
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,8 @@ def place_edges(samples: Array, rate: float, fit: Fit, *, width: float, sign: in
         new_fit, fitted = fit_turns(times[use], phase[use]), use
         away = np.abs(phase - new_fit.phase(times))
         spread = 1.4826 * median(away[use])
-        new = (heights > 0.3 * typical) & (away < GROSS * max(spread, 1e-12))
+        far = student(np.count_nonzero(use) - new_fit.coefficients.size, GROSS)  # few turns say little of their spread
+        new = (heights > 0.3 * typical) & (away < far * max(spread, 1e-12))
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break
         use = new

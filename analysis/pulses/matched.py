@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.pulses.regression import Fit, fit_turns, median
+from analysis.pulses.regression import Fit, fit_turns, median, student
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,8 @@ Array = NDArray[np.float64]
 TABLE = 4096
 #: Bins of a coarse profile of the whole turn.
 COARSE = 128
-#: A turn farther off than this many standard deviations is no pulse of the top.
+#: A turn farther off than this many standard deviations is no pulse of the top; than more of them by few turns, which
+#: say little of their standard deviation.
 GROSS = 4.5
 ROUNDS = 8
 #: A pulse train exists where its mean pulse lowers the sum of squares by so many variances of the noise; the best of
@@ -282,7 +283,8 @@ def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None, r
         standard = (phase - fit.phase(times)) * np.sqrt(weight / noise2)
         spread = max(1.4826 * median(np.abs(standard[use])), 0.5)
         fitted = use
-        new = usable & (amplitude > 0.03 * mean) & (np.abs(standard) < GROSS * spread)
+        far = student(np.count_nonzero(use) - fit.coefficients.size, GROSS) * spread
+        new = usable & (amplitude > 0.03 * mean) & (np.abs(standard) < far)
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break
         use = new

@@ -238,7 +238,9 @@ def in_words(found: OwnCheck) -> str:
     if found.law and found.laws:
         n, again = sum(found.laws.values()), found.laws.get(found.law, 0)
         others = ", ".join(
-            f"{law} {'once' if count == 1 else f'{count} times'}" for law, count in found.laws.items() if law != found.law
+            f"{law} {'once' if count == 1 else f'{count} times'}"
+            for law, count in found.laws.items()
+            if law != found.law
         )
         texts.append(
             f"The {found.law} law, which is true there, is the best one in {again} of {n} trials"
