@@ -29,6 +29,8 @@ ROUNDS = 8
 EVIDENCE = 160.0
 #: Harmonics of the pulse are kept as long as on average their power is so many times that of noise.
 NOISY = 3.0
+#: Flanks that climb more than this part of the height from one sample to the next lie where the samples are.
+SHARP = 0.25
 #: A turn with less of a pulse than this part of the mean one counts as missing.
 FAINT = 0.3
 
@@ -76,6 +78,7 @@ class Match:
     flat: whether most tops are at the greatest value that occurs.
     noise, height: of a sample, and of the mean pulse, in the trace's unit.
     bound: of the frequency [Hz]; missing, wrong: numbers of turns; pulse, window: the mean pulse.
+    grid: from one sample to the next, by which flanks may be off that are as sharp [turns]; 0: they are not.
     """
 
     fit: Fit
@@ -93,6 +96,7 @@ class Match:
     wrong: int
     pulse: Pulse
     window: Window
+    grid: float
 
     @property
     def origin(self) -> float:
@@ -310,4 +314,5 @@ def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None, r
         wrong=int(np.count_nonzero(good & ~use)),
         pulse=pulse,
         window=window,
+        grid=float(fit.coefficients[1]) / (fit.half * rate) if steep > SHARP else 0.0,
     )

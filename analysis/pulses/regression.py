@@ -18,8 +18,9 @@ CURVED = 4.0
 FEWEST_FOR_THIRD, FEWEST_FOR_BEND = 12, 8
 #: The noise of the samples counts as so many degrees of freedom, where there are fewer of the residuals.
 FEW = 30.0
-#: Roundings that shift the frequency by so many times what independent ones would are not seen in residuals.
-COHERENT = 2.0
+#: Roundings that would leave residuals of more than so many times those that are seen, and this part of a rounding, did
+#: not happen.
+UNLIKE, UNSEEN = 1.2, 0.05
 #: Rounded times of turns shift the phase gained in half the record by no more than this part of their rounding.
 GRID_AT_MOST = 0.6
 #: Residuals are grouped into so many blocks to see whether neighbours resemble each other ...
@@ -124,9 +125,9 @@ class Fit:
         """The same with at least the uncertainty that comes from samples which are too far apart for the flanks.
 
         A flank between two samples may lie anywhere between them, and residuals do not show it where turns are nearly
-        whole numbers of samples. So the error of a rounded time is carried to the frequency, for all places of the
-        flank between samples and all drifts up to one sample along the record; its mean square is the least variance.
-        Where the flank comes to lie everywhere between samples the residuals show it, and nothing is to be done.
+        whole numbers of samples.  So the error of a rounded time is carried to the frequency, for all places of the
+        flank between samples and all drifts up to one sample along the record; of those that would leave no larger
+        residuals than these, the mean square is the least variance.
 
         Args:
             times: of the turns that were fitted, shape (n,) [s].
@@ -141,11 +142,15 @@ class Fit:
             return self
         u = (times - self.centre) / self.half
         powers = u[:, None] ** np.arange(self.coefficients.size)
-        carried = (powers if weight is None else powers * weight[:, None]) @ self.unit_covariance[1]
+        carried = (powers if weight is None else powers * weight[:, None]) @ self.unit_covariance
         place = np.arange(8)[:, None, None] / 8 + np.linspace(-1, 1, 9)[:, None] * u + times / step
-        rounded = (place - np.rint(place)) * rounding
-        least = float(np.mean((rounded @ carried) ** 2))
-        if least <= max(seen, COHERENT**2 * rounding**2 / 12 * float(carried @ carried)):
+        rounded = ((place - np.rint(place)) * rounding).reshape(-1, times.size)  # [turns]
+        shifts = rounded @ carried
+        left = np.sqrt(np.mean((rounded - shifts @ powers.T) ** 2, axis=1))
+        most = UNLIKE * float(np.sqrt(np.mean(self.residuals**2))) + UNSEEN * rounding
+        possible = left <= max(most, float(left.min()))
+        least = float(np.mean(shifts[possible, 1] ** 2))
+        if least <= seen:
             return self
         wider = self.inflation * student(self.freedom) ** 2
         return replace(self, variance=least / (float(self.unit_covariance[1, 1]) * wider))
