@@ -54,8 +54,8 @@ class SpinFrequency:
         notes: findings.
         bend: how the slope itself changes [Hz/s²], the same at all times; None where no third degree was fitted.
         correlations: of frequency and chirp, frequency and bend, chirp and bend; 0 without a bend.
-        unfitted: the bend [Hz/s²] that a third degree would show, with u by the scatter alone; None where it was fitted,
-            the degree was given, or there are fewer than eight pulses.
+        unfitted: the bend [Hz/s²] that a third degree would show, with u by the scatter alone; None where it was
+            fitted, the degree was given, or there are fewer than eight pulses.
         freedom: degrees of freedom of the scatter that u comes from; u has Student's factor for them.  None: not known.
     """
 

@@ -27,11 +27,14 @@ class Trial:
         pulls: of the quantities.
         law: that the analysis favours; empty where no laws compete.
         excluded: whether the analysis excludes what is true; None where it tests nothing.
+        widened: degrees of freedom of u, where that comes from few readings and was multiplied by Student's factor, so
+            that 68 % lie within it; None: it was not.
     """
 
     pulls: list[Pull]
     law: str = ""
     excluded: bool | None = None
+    widened: float | None = None
 
 
 @dataclass(frozen=True)

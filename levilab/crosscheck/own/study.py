@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.errors import AnalysisError
+from analysis.pulses.regression import student
 from levilab.crosscheck.own import field, limit, precession, spin, spindown
 from levilab.crosscheck.own.model import OF_ONE_RUN
 from levilab.crosscheck.study import CHANCE, COVERAGE, Spread, by_reason, spreads_of
@@ -60,6 +61,7 @@ class OwnCheck:
         failures: why trials came to no estimate → how often.
         freedom: quantity → degrees of freedom of its u, where these are few.
         more: what to know of the pulls.
+        widened: degrees of freedom of u in the median trial, where that has Student's factor; None: it has not.
     """
 
     analysis: str
@@ -78,6 +80,7 @@ class OwnCheck:
     failures: Mapping[str, int]
     freedom: Mapping[str, int]
     more: tuple[str, ...] = ()
+    widened: float | None = None
 
     @property
     def holds(self) -> bool:
@@ -89,7 +92,7 @@ class OwnCheck:
 
     def is_right(self, spread: Spread) -> bool:
         """Whether the pulls of one quantity are as wanted."""
-        return holds(spread, self.freedom.get(spread.quantity))
+        return holds(spread, self.freedom.get(spread.quantity), self.widened)
 
 
 def wanted_coverage(freedom: int | None) -> float:
@@ -105,7 +108,25 @@ def wanted_coverage(freedom: int | None) -> float:
     return float(2 * stdtr(freedom, 1.0) - 1)
 
 
-def holds(spread: Spread, freedom: int | None = None) -> bool:
+def wanted_deviation(freedom: int | None, widened: float | None = None) -> float:
+    """Standard deviation of pulls whose u comes from a scatter with so many degrees of freedom: Student's law.
+
+    Args:
+        freedom: of u that is the scatter's own.
+        widened: of u that was multiplied by Student's factor, so that it covers 68 %.
+
+    >>> wanted_deviation(None), round(wanted_deviation(12), 2), round(wanted_deviation(None, 12), 2)
+    (1.0, 1.1, 1.05)
+    """
+    few = freedom if freedom is not None else widened
+    if few is None:
+        return 1.0
+    if few <= _LONG_TAILS:
+        return math.inf
+    return math.sqrt(few / (few - 2)) / (student(few) if freedom is None else 1.0)
+
+
+def holds(spread: Spread, freedom: int | None = None, widened: float | None = None) -> bool:
     """Whether pulls have no bias and scatter by no more than wanted, with room for chance.
 
     With few degrees of freedom they have long tails, and their standard deviation says nothing: what lies within 1 u
@@ -115,7 +136,7 @@ def holds(spread: Spread, freedom: int | None = None) -> bool:
         return True
     wanted = wanted_coverage(freedom)
     few = CHANCE * math.sqrt(wanted * (1 - wanted) / spread.n)
-    scatter = 1.0 if freedom is None else math.sqrt(freedom / (freedom - 2)) if freedom > _LONG_TAILS else math.inf
+    scatter = wanted_deviation(freedom, widened)
     return (
         abs(spread.mean) <= 0.1 + CHANCE * max(spread.deviation, 1.0) / math.sqrt(spread.n)
         and spread.deviation <= scatter * (1.1 + CHANCE / math.sqrt(2 * spread.n))
@@ -185,7 +206,12 @@ def check_own(
         failures=by_reason(failures),
         freedom=subject.freedom,
         more=subject.more,
+        widened=_median([trial.widened for trial in done if trial.widened is not None]),
     )
+
+
+def _median(values: Sequence[float]) -> float | None:
+    return float(np.median(values)) if values else None
 
 
 # --- how people are shown it ---------------------------------------------------------------------------
@@ -257,6 +283,10 @@ def in_words(found: OwnCheck) -> str:
     if few:
         share = f"{100 * wanted_coverage(min(few)):.0f} %"
         texts.append(f"As u comes from the scatter of few values, {share} within 1 u are right (Student's t).")
+    if found.widened is not None and found.widened < _MANY:
+        wanted = wanted_deviation(None, found.widened)
+        pulls = f"pulls have a standard deviation of {wanted:.2f}" if math.isfinite(wanted) else "pulls have long tails"
+        texts.append(f"u comes from few pulses and is wide enough for 68 % by Student's t; then {pulls}.")
     texts += [f"{text[0].upper()}{text[1:]}." for text in found.more]
     texts += [f"{count} trials came to no estimate: {reason}." for reason, count in found.failures.items()]
     return " ".join(texts)

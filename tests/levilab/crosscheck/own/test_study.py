@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from analysis.pulses.regression import student
 from levilab.crosscheck.own.model import Own, Trial
 from levilab.crosscheck.own.stored import as_part, file_of, read_own, restored, store
 from levilab.crosscheck.own.study import (
@@ -23,6 +24,7 @@ from levilab.crosscheck.own.study import (
     own_table,
     seed_of,
     trials_of_report,
+    wanted_deviation,
 )
 from levilab.crosscheck.study import Spread
 from levilab.errors import DataError
@@ -108,6 +110,25 @@ def test_a_bias_and_a_u_that_is_too_small_are_noticed_and_a_u_too_large_is_not()
     assert not holds(spread(0.4, 1.0))
     assert not holds(spread(0.0, 1.4))
     assert holds(spread(0.0, 0.5))
+
+
+def test_pulls_of_few_pulses_are_compared_with_students_law():
+    t = np.random.default_rng(6).standard_t(9, 4000) / student(9)  # u with Student's factor
+    pulls = Spread("x", tuple(t), 0.1)
+    assert pulls.coverage == pytest.approx(0.683, abs=0.022)  # 3 standard errors
+    assert pulls.deviation == pytest.approx(wanted_deviation(None, 9), abs=0.06)
+    assert holds(replace(pulls, pulls=tuple(1.08 * t)), widened=9)
+    assert not holds(replace(pulls, pulls=tuple(1.08 * t)))
+    assert not holds(replace(pulls, pulls=tuple(1.3 * t)), widened=9)
+
+
+def test_a_record_of_few_pulses_says_by_how_much_pulls_scatter(sample_data: Path):
+    checked = check_own("spin", result("spin", sample_data / "trace-laser"), {}, 150)
+    assert checked.widened == 15  # 19 pulses, four coefficients
+    assert checked.holds
+    assert "pulls have a standard deviation of 1.04" in in_words(checked)
+    # single bends that were not fitted made it 1.3 to 1.5, single records at half the frequency 1000
+    assert {round(one.deviation, 1) for one in checked.spreads} <= {0.9, 1.0, 1.1}
 
 
 def test_a_wrong_analysis_is_named(monkeypatch: pytest.MonkeyPatch, sample_data: Path):
