@@ -60,7 +60,9 @@ def place_edges(samples: Array, rate: float, fit: Fit, *, width: float, sign: in
         new_fit, fitted = fit_turns(times[use], phase[use]), use
         away = np.abs(phase - new_fit.phase(times))
         spread = 1.4826 * median(away[use])
-        far = student(np.count_nonzero(use) - new_fit.coefficients.size, GROSS)  # few turns say little of their spread
+        far = student(
+            int(np.count_nonzero(use)) - new_fit.coefficients.size, GROSS
+        )  # few turns say little of their spread
         new = (heights > 0.3 * typical) & (away < far * max(spread, 1e-12))
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break
@@ -86,7 +88,7 @@ def _steepness(x: Array, side: int, height: float) -> float:
     inner = squares[:, side : 3 * side]
     noise = float(squares[:, :side].mean() + squares[:, 3 * side :].mean()) / 2
     of_flanks = float(inner.sum()) / len(x) - noise * inner.shape[1]
-    return min(max(of_flanks / (2 * max(height, 1e-150) ** 2), 0.0), 1.0)
+    return float(min(max(of_flanks / (2 * max(height, 1e-150) ** 2), 0.0), 1.0))
 
 
 def _sums(side: int) -> Array:

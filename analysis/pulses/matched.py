@@ -287,7 +287,7 @@ def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None, r
         standard = (phase - fit.phase(times)) * np.sqrt(weight / noise2)
         spread = max(1.4826 * median(np.abs(standard[use])), 0.5)
         fitted = use
-        far = student(np.count_nonzero(use) - fit.coefficients.size, GROSS) * spread
+        far = student(int(np.count_nonzero(use)) - fit.coefficients.size, GROSS) * spread
         new = usable & (amplitude > 0.03 * mean) & (np.abs(standard) < far)
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.budget import gate_bias
 from analysis.least_squares import MOST_EVALUATIONS, TOLERANCE, profile, solve
 from analysis.numbers import digits
 from analysis.residuals import DENSE, ar1, durbin_watson, runs_test_p
@@ -424,12 +425,12 @@ def _part(row: Array, gate: float | None) -> Parts:
 
 
 def _moved_by_gate(found: Solution, slopes: Array, gate: float) -> Array:
-    """By how much means over a gate [s] move the parameters, shape (p,): Simpson's rule gives ν″T²/24."""
+    """By how much means over a gate [s] move the parameters, shape (p,)."""
     readings = found.readings
     half = min(gate / readings.duration / 2, 0.5)
     middle = np.clip(readings.tau, half, 1 - half)
     before, here, after = (found.law.spin(tau, found.q) for tau in (middle - half, middle, middle + half))
-    bias = (before + after - 2 * here) / 6 * readings.weight
+    bias = gate_bias(before, here, after) * readings.weight
     assert found.curvature.covariance is not None
     return np.asarray(slopes @ (found.curvature.covariance @ (found.slopes @ bias)))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.budget import printed_step
+from analysis.budget import gate_bias, printed_step
 from analysis.residuals import DENSE
 from analysis.spindown.combine import combine
 from analysis.spindown.drag import LAWS
@@ -83,7 +83,7 @@ class _Run:
         def at(times: Array) -> Array:
             return np.asarray(counted(LAWS[self.fit.name], times, solution))
 
-        bias = (at(middle - half) + at(middle + half) - 2 * at(middle)) / 6 if half else 0.0
+        bias = gate_bias(at(middle - half), at(middle), at(middle + half)) if half else 0.0
         return np.asarray(frequency * (at(tau) + bias))
 
 

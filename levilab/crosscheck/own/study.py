@@ -256,8 +256,8 @@ def in_words(found: OwnCheck) -> str:
     if not found.spreads:
         texts.append("No trial came to an estimate.")
     elif found.holds:
-        few = "" if found.trials >= ENOUGH else f", as far as so few trials show ({found.trials} of {TRIALS})"
-        texts.append(f"Values and uncertainties of this analysis are right for readings such as these{few}.")
+        so_far = "" if found.trials >= ENOUGH else f", as far as so few trials show ({found.trials} of {TRIALS})"
+        texts.append(f"Values and uncertainties of this analysis are right for readings such as these{so_far}.")
     else:
         wrong = ", ".join(_in_words(one.quantity, {}) for one in found.spreads if not found.is_right(one))
         texts.append(f"For readings such as these the analysis is not right in {wrong}: trust its u the less.")
@@ -286,7 +286,7 @@ def in_words(found: OwnCheck) -> str:
     if found.widened is not None and found.widened < _MANY:
         wanted = wanted_deviation(None, found.widened)
         pulls = f"pulls have a standard deviation of {wanted:.2f}" if math.isfinite(wanted) else "pulls have long tails"
-        texts.append(f"u comes from few pulses and is wide enough for 68 % by Student's t; then {pulls}.")
+        texts.append(f"As u comes from few pulses and holds 68 % by Student's factor, {pulls}.")
     texts += [f"{text[0].upper()}{text[1:]}." for text in found.more]
     texts += [f"{count} trials came to no estimate: {reason}." for reason, count in found.failures.items()]
     return " ".join(texts)
