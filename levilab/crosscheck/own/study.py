@@ -216,11 +216,11 @@ def _median(values: Sequence[float]) -> float | None:
 
 # --- how people are shown it ---------------------------------------------------------------------------
 
-_NUMBERS = ("trials", "mean pull", "s.d. of pulls", "within 1 u")
+_NUMBERS = ("pulls", "mean pull", "s.d. of pulls", "within 1 u")
 
 
 def own_table(found: OwnCheck, shown: Mapping[str, str] | None = None) -> Table:
-    """A row a quantity; behind ± stands what chance leaves to so many trials, one standard error.
+    """A row a quantity; behind ± stands what chance leaves to so many pulls, one standard error.
 
     Args:
         found: the trials.
@@ -296,7 +296,7 @@ def own_blocks(found: OwnCheck, shown: Mapping[str, str] | None = None) -> tuple
     """The trials as blocks of a report."""
     note = (
         "A pull is (estimate − truth)/u; wanted are a mean of 0, a standard deviation of 1, and 68 % within 1 u. "
-        "Behind ± stands what chance leaves to so many trials, one standard error. As wanted is what misses this by a "
+        "Behind ± stands what chance leaves to so many pulls, one standard error. As wanted is what misses this by a "
         "tenth at most and three standard errors; smaller deviations mean that u is on the safe side."
     )
     return (
