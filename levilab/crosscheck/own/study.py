@@ -40,7 +40,7 @@ TRIALS = 200
 #: A report makes as many as fit into so much processor time, but so many even if they take longer ...
 REPORT_S, ENOUGH = 2.0, 25
 #: ... up to this time: then as many as fit into that, which say less, and none below so few.
-LONGEST_S, FEWEST = 6.0, 5
+LONGEST_S, FEWEST = 4.0, 5
 
 
 @dataclass(frozen=True)
