@@ -11,6 +11,11 @@ from dataclasses import dataclass
 from math import hypot, sqrt
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
 #: Relative: the rows add up to u, but for rounding and the digits in which results are kept.
 ROUNDING = 1e-6
 #: A result's u grows by less than this with the rows that are not in it: they are negligible.
@@ -162,13 +167,14 @@ def u_of_limit(limit: float) -> float:
     return limit / sqrt(3)
 
 
-def gate_bias(second_derivative: float, gate: float) -> float:
-    """By how much the mean over a gate exceeds the value in its middle, ν″T²/24, to second order.
+def gate_bias(before: Array, middle: Array, after: Array) -> Array:
+    """By how much means over a gate exceed the values in its middle, by Simpson's rule: to second order ν″T²/24.
 
     The next term is ν⁗T⁴/1920: of a spin that decays by 0.3 %/s and a gate of 10 s, 10⁻⁵ of this one.
 
     Args:
-        second_derivative: ν″ [Hz/s²].
-        gate: T [s].
+        before: the values at the gate's beginning, shape (n,).
+        middle: in its middle.
+        after: at its end.
     """
-    return second_derivative * gate**2 / 24
+    return (before + after - 2 * middle) / 6

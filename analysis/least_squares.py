@@ -1,4 +1,8 @@
-"""Least squares by Levenberg and Marquardt (MINPACK's lmder, through lmfit), with exact slopes."""
+"""Least squares by Levenberg and Marquardt (MINPACK's lmder), with exact slopes; intervals by lmfit.
+
+A fit calls MINPACK through scipy, as lmfit does itself: the same steps to the same numbers, at half the time.  Setting
+parameters up and wrapping each evaluation cost more than the evaluations, and a cross-check makes hundreds of fits.
+"""
 
 import warnings
 from collections.abc import Callable
@@ -15,6 +19,8 @@ Gradient = Callable[[Array], Array]  # q of shape (p,) → slopes of that, shape
 # minimum, and exact to about 1e-12 where the data are free of noise.
 TOLERANCE = 1e-12
 MOST_EVALUATIONS = 500  # a sound fit needs 5 to 30
+# MINPACK's words for an end: all but "improper input" (0) and "too many evaluations" (5).
+_ENDED = frozenset({1, 2, 3, 4, 6, 7, 8})
 
 
 def _minimizer(residual: Residual, gradient: Gradient, start: Array, most: int = MOST_EVALUATIONS) -> Any:
@@ -39,22 +45,32 @@ def _minimizer(residual: Residual, gradient: Gradient, start: Array, most: int =
     )
 
 
-def solve(residual: Residual, gradient: Gradient, start: Array, most: int = MOST_EVALUATIONS) -> tuple[Array, bool]:
+def solve(
+    residual: Residual,
+    gradient: Gradient,
+    start: Array,
+    most: int = MOST_EVALUATIONS,
+    tolerance: float = TOLERANCE,
+) -> tuple[Array, bool]:
     """The parameters of the smallest sum of squares, and whether the search ended there.
 
     A search that does not end in so many evaluations at `most` returns the best point found.
     """
-    accepted = start
+    from scipy.optimize import leastsq
 
-    def remember(q: Array) -> Array:
-        nonlocal accepted  # MINPACK asks for slopes only where it has accepted a step
-        accepted = q
-        return gradient(q)
-
-    result = _minimizer(residual, remember, start, most).leastsq()
-    if result.aborted:
-        return accepted, False
-    return np.array([parameter.value for parameter in result.params.values()]), True
+    with np.errstate(all="ignore"):  # a search may step to where a law overflows, and comes back
+        q, _, _, _, ended = leastsq(
+            residual,
+            start,
+            Dfun=gradient,
+            col_deriv=True,
+            full_output=True,
+            ftol=tolerance,
+            xtol=tolerance,
+            gtol=0.0,
+            maxfev=most,
+        )
+    return np.atleast_1d(q), ended in _ENDED
 
 
 def profile(

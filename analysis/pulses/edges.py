@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.pulses.matched import turn_times
-from analysis.pulses.regression import Fit, fit_turns, median
+from analysis.pulses.regression import Fit, fit_turns, median, student
 
 Array = NDArray[np.float64]
 
@@ -60,11 +60,14 @@ def place_edges(samples: Array, rate: float, fit: Fit, *, width: float, sign: in
         new_fit, fitted = fit_turns(times[use], phase[use]), use
         away = np.abs(phase - new_fit.phase(times))
         spread = 1.4826 * median(away[use])
-        new = (heights > 0.3 * typical) & (away < GROSS * max(spread, 1e-12))
+        far = student(
+            int(np.count_nonzero(use)) - new_fit.coefficients.size, GROSS
+        )  # few turns say little of their spread
+        new = (heights > 0.3 * typical) & (away < far * max(spread, 1e-12))
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break
         use = new
-    steep = float(np.abs(np.diff(mean)).max()) / max(abs(centre - floor), 1e-300)
+    steep = _steepness(x, side, abs(centre - floor))
     new_fit = new_fit.with_grid(times[fitted], None, step=1 / rate, steep=steep)
     rest = (x if use.all() else x[use]) - mean
     noise = float(np.sqrt(np.einsum("ij,ij->", rest, rest) / rest.size))
@@ -73,6 +76,19 @@ def place_edges(samples: Array, rate: float, fit: Fit, *, width: float, sign: in
     bound = float(np.sqrt(new_fit.unit_covariance[1, 1] / information)) * noise / new_fit.half
     wrong = times.size - missing - int(np.count_nonzero(use))
     return Edges(new_fit, int(np.count_nonzero(use)), noise, sign * (centre - floor), bound, missing, wrong)
+
+
+def _steepness(x: Array, side: int, height: float) -> float:
+    """Part of its height that a flank climbs between two samples: 1 for a step, 1/k for an even one of k samples.
+
+    From the squares of the steps in each piece, since in the mean of pieces that lie a sample apart a step is two
+    smaller ones; those on either side of the pulse are noise.  x: pieces of 4 side + 1 samples, shape (turns, …).
+    """
+    squares = np.diff(x, axis=1) ** 2
+    inner = squares[:, side : 3 * side]
+    noise = float(squares[:, :side].mean() + squares[:, 3 * side :].mean()) / 2
+    of_flanks = float(inner.sum()) / len(x) - noise * inner.shape[1]
+    return float(min(max(of_flanks / (2 * max(height, 1e-150) ** 2), 0.0), 1.0))
 
 
 def _sums(side: int) -> Array:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.pulses.regression import Fit, fit_turns, median
+from analysis.pulses.regression import Fit, fit_turns, median, student
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,8 @@ Array = NDArray[np.float64]
 TABLE = 4096
 #: Bins of a coarse profile of the whole turn.
 COARSE = 128
-#: A turn farther off than this many standard deviations is no pulse of the top.
+#: A turn farther off than this many standard deviations is no pulse of the top; than more of them by few turns, which
+#: say little of their standard deviation.
 GROSS = 4.5
 ROUNDS = 8
 #: A pulse train exists where its mean pulse lowers the sum of squares by so many variances of the noise; the best of
@@ -28,6 +29,8 @@ ROUNDS = 8
 EVIDENCE = 160.0
 #: Harmonics of the pulse are kept as long as on average their power is so many times that of noise.
 NOISY = 3.0
+#: Flanks that climb more than this part of the height from one sample to the next lie where the samples are.
+SHARP = 0.25
 #: A turn with less of a pulse than this part of the mean one counts as missing.
 FAINT = 0.3
 
@@ -75,6 +78,7 @@ class Match:
     flat: whether most tops are at the greatest value that occurs.
     noise, height: of a sample, and of the mean pulse, in the trace's unit.
     bound: of the frequency [Hz]; missing, wrong: numbers of turns; pulse, window: the mean pulse.
+    grid: from one sample to the next, by which flanks may be off that are as sharp [turns]; 0: they are not.
     """
 
     fit: Fit
@@ -92,6 +96,7 @@ class Match:
     wrong: int
     pulse: Pulse
     window: Window
+    grid: float
 
     @property
     def origin(self) -> float:
@@ -282,7 +287,8 @@ def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None, r
         standard = (phase - fit.phase(times)) * np.sqrt(weight / noise2)
         spread = max(1.4826 * median(np.abs(standard[use])), 0.5)
         fitted = use
-        new = usable & (amplitude > 0.03 * mean) & (np.abs(standard) < GROSS * spread)
+        far = student(int(np.count_nonzero(use)) - fit.coefficients.size, GROSS) * spread
+        new = usable & (amplitude > 0.03 * mean) & (np.abs(standard) < far)
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break
         use = new
@@ -308,4 +314,5 @@ def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None, r
         wrong=int(np.count_nonzero(good & ~use)),
         pulse=pulse,
         window=window,
+        grid=float(fit.coefficients[1]) / (fit.half * rate) if steep > SHARP else 0.0,
     )

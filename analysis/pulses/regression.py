@@ -14,10 +14,13 @@ Array = NDArray[np.float64]
 #: The slope's own change is fitted where it differs from 0 by so many standard uncertainties, or, by few residuals, by
 #: as many as chance seldom makes of it as these.
 CURVED = 4.0
+#: Turns from which on a third degree is fitted, and from which on the bend it would show is looked at.
+FEWEST_FOR_THIRD, FEWEST_FOR_BEND = 12, 8
 #: The noise of the samples counts as so many degrees of freedom, where there are fewer of the residuals.
 FEW = 30.0
-#: Roundings that shift the frequency by so many times what independent ones would are not seen in residuals.
-COHERENT = 2.0
+#: Roundings that would leave residuals of more than so many times those that are seen, and this part of a rounding, did
+#: not happen.
+UNLIKE, UNSEEN = 1.2, 0.05
 #: Rounded times of turns shift the phase gained in half the record by no more than this part of their rounding.
 GRID_AT_MOST = 0.6
 #: Residuals are grouped into so many blocks to see whether neighbours resemble each other ...
@@ -43,6 +46,8 @@ class Fit:
         inflation: factor on variance because neighbours resemble each other (below 1: they alternate).
         freedom: degrees of freedom of variance x inflation.
         residuals: [turns], shape (n,).
+        unfitted: the bend that one degree more would show, and its u without Student's factor [Hz/s²]; None where the
+            degree was given, a third one was fitted, or there are too few turns.
     """
 
     coefficients: Array
@@ -53,6 +58,7 @@ class Fit:
     inflation: float
     freedom: float
     residuals: Array
+    unfitted: tuple[float, float] | None = None
 
     @property
     def covariance(self) -> Array:
@@ -119,9 +125,9 @@ class Fit:
         """The same with at least the uncertainty that comes from samples which are too far apart for the flanks.
 
         A flank between two samples may lie anywhere between them, and residuals do not show it where turns are nearly
-        whole numbers of samples. So the error of a rounded time is carried to the frequency, for all places of the
-        flank between samples and all drifts up to one sample along the record; its mean square is the least variance.
-        Where the flank comes to lie everywhere between samples the residuals show it, and nothing is to be done.
+        whole numbers of samples.  So the error of a rounded time is carried to the frequency, for all places of the
+        flank between samples and all drifts up to one sample along the record; of those that would leave no larger
+        residuals than these, the mean square is the least variance.
 
         Args:
             times: of the turns that were fitted, shape (n,) [s].
@@ -136,11 +142,15 @@ class Fit:
             return self
         u = (times - self.centre) / self.half
         powers = u[:, None] ** np.arange(self.coefficients.size)
-        carried = (powers if weight is None else powers * weight[:, None]) @ self.unit_covariance[1]
+        carried = (powers if weight is None else powers * weight[:, None]) @ self.unit_covariance
         place = np.arange(8)[:, None, None] / 8 + np.linspace(-1, 1, 9)[:, None] * u + times / step
-        rounded = (place - np.rint(place)) * rounding
-        least = float(np.mean((rounded @ carried) ** 2))
-        if least <= max(seen, COHERENT**2 * rounding**2 / 12 * float(carried @ carried)):
+        rounded = ((place - np.rint(place)) * rounding).reshape(-1, times.size)  # [turns]
+        shifts = rounded @ carried
+        left = np.sqrt(np.mean((rounded - shifts @ powers.T) ** 2, axis=1))
+        most = UNLIKE * float(np.sqrt(np.mean(self.residuals**2))) + UNSEEN * rounding
+        possible = left <= max(most, float(left.min()))
+        least = float(np.mean(shifts[possible, 1] ** 2))
+        if least <= seen:
             return self
         wider = self.inflation * student(self.freedom) ** 2
         return replace(self, variance=least / (float(self.unit_covariance[1, 1]) * wider))
@@ -205,17 +215,20 @@ def fit_turns(times: Array, turns: Array, weight: Array | None = None, *, degree
     times, turns: shape (n,); weight: of each (1/variance, relative), shape (n,); degree: None: two, or three where it
     differs from two significantly.
     """
-    fit, third = _fit(times, turns, weight, degree or 2)
-    if degree is None and times.size >= 12 and third > CURVED:
-        cubic, _ = _fit(times, turns, weight, 3)
+    fit, third, u_third = _fit(times, turns, weight, degree or 2)
+    if degree is not None or times.size < FEWEST_FOR_BEND:
+        return fit
+    if times.size >= FEWEST_FOR_THIRD and abs(third) > CURVED * u_third:
+        cubic, *_ = _fit(times, turns, weight, 3)
         u = float(np.sqrt(cubic.unit_covariance[3, 3] * cubic.variance * max(1.0, cubic.inflation)))
         if abs(cubic.coefficients[3]) > student(cubic.freedom, CURVED) * u:
             return cubic
-    return fit
+    unit = 6 / fit.half**3
+    return replace(fit, unfitted=(unit * third, unit * u_third * max(1.0, fit.inflation) ** 0.5))
 
 
-def _fit(times: Array, turns: Array, weight: Array | None, degree: int) -> tuple[Fit, float]:
-    """The fit, and how many standard uncertainties the next coefficient would be away from 0, were all white."""
+def _fit(times: Array, turns: Array, weight: Array | None, degree: int) -> tuple[Fit, float, float]:
+    """The fit, and the next coefficient with its standard uncertainty, were all white."""
     centre, half = 0.5 * float(times[0] + times[-1]), 0.5 * float(times[-1] - times[0])
     degree = min(degree, times.size - 1)
     u = (times - centre) / half
@@ -236,9 +249,13 @@ def _fit(times: Array, turns: Array, weight: Array | None, degree: int) -> tuple
     standard = goal - columns[:, : degree + 1] @ coefficients
     residuals = standard if weight is None else standard / root
     left = float(standard @ standard) - float(along[-1]) ** 2
-    third = abs(float(along[-1])) / np.sqrt(max(left, 1e-300) / max(times.size - degree - 2, 1))
+    last = float(triangle[-1, -1]) or 1e-300
+    third, u_third = (
+        float(along[-1]) / last,
+        float(np.sqrt(max(left, 1e-300) / max(times.size - degree - 2, 1))) / abs(last),
+    )
     variance, inflation, freedom = scatter(standard, turns, degree + 1)
-    return Fit(coefficients, inverse @ inverse.T, centre, half, variance, inflation, freedom, residuals), third
+    return Fit(coefficients, inverse @ inverse.T, centre, half, variance, inflation, freedom, residuals), third, u_third
 
 
 def scatter(residuals: Array, turns: Array, parameters: int) -> tuple[float, float, float]:

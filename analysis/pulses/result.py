@@ -14,6 +14,11 @@ UNDER_DRAG, UNDER_DRAG_U = 1.5, 0.5
 #: Faster and faster: only a drive does that.
 UNDER_DRIVE, UNDER_DRIVE_U = 0.0, 0.6
 
+#: Odds of a bend that neither a drag nor an even ramp makes, as the swing of a top about its drive does, before the
+#: pulses are seen, times the part of what it may be that pulses leave open.  The bend is fitted from four standard
+#: uncertainties on: there the pulses have made it 12 to 1.
+OTHER_BEND = 0.004
+
 Method = Literal["edges", "matched", "likelihood"]
 
 
@@ -49,6 +54,9 @@ class SpinFrequency:
         notes: findings.
         bend: how the slope itself changes [Hz/s²], the same at all times; None where no third degree was fitted.
         correlations: of frequency and chirp, frequency and bend, chirp and bend; 0 without a bend.
+        unfitted: the bend [Hz/s²] that a third degree would show, with u by the scatter alone; None where it was
+            fitted, the degree was given, or there are fewer than eight pulses.
+        freedom: degrees of freedom of the scatter that u comes from; u has Student's factor for them.  None: not known.
     """
 
     frequency: Estimate
@@ -65,6 +73,8 @@ class SpinFrequency:
     notes: tuple[Finding, ...] = ()
     bend: Estimate | None = None
     correlations: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    unfitted: Estimate | None = None
+    freedom: float | None = None
 
     def at(self, time: float) -> Estimate:
         """The frequency at another time [s], along the slope and its bend."""
@@ -89,6 +99,9 @@ class SpinFrequency:
         through times over a span T gives a frequency in the middle that is ν″T²/40 too high; with a third degree
         nothing of that is left.  Either of them gives a slope that is ν‴T²/56 too high.  Both are taken off, with
         n = 1.5 ± 0.5 for a top that gets slower, or with the bend that was fitted where it is one of a drag.
+
+        Where no third degree was fitted there may still be a bend that no drag makes: what it would do to the
+        frequency is in u, as probable as the pulses make it.
         """
         frequency, chirp = self.frequency, self.chirp
         if not frequency.value or not chirp.value:
@@ -97,7 +110,8 @@ class SpinFrequency:
         second, third = chirp.value**2 / frequency.value, chirp.value**3 / frequency.value**2
         n, u_n = (UNDER_DRAG, UNDER_DRAG_U) if chirp.value < 0 else (UNDER_DRIVE, UNDER_DRIVE_U)
         if self.bend is None:
-            frequency = _less(frequency, n * second * span2 / 40, u_n * second * span2 / 40)
+            u_bend = math.hypot(u_n * second, self._other_bend(n * second, u_n * second))
+            frequency = _less(frequency, n * second * span2 / 40, u_bend * span2 / 40)
         else:
             assert self.bend.value is not None
             fitted, u_fitted = self.bend.value / second, (self.bend.u or 0.0) / second
@@ -108,6 +122,20 @@ class SpinFrequency:
         most = third * span2 / 56
         chirp = _less(chirp, n * (2 * n - 1) * most, abs(4 * n - 1) * u_n * most)
         return replace(self, frequency=frequency, chirp=chirp)
+
+    def _other_bend(self, expected: float, u_expected: float) -> float:
+        """Root mean square of what a bend that was not fitted adds to the expected one [Hz/s²].
+
+        The average over two models, with and without it, about the one that is shown (K. P. Burnham & D. R. Anderson,
+        Model Selection (2002), §4.3); the evidence is the ratio of Student's likelihoods.
+        """
+        if self.unfitted is None or self.unfitted.value is None or not self.unfitted.u:
+            return 0.0
+        freedom = max(self.pulses - 4, 1)
+        away, u = self.unfitted.value - expected, math.hypot(self.unfitted.u, u_expected)
+        log_odds = math.log(OTHER_BEND) + 0.5 * (freedom + 1) * math.log1p((away / u) ** 2 / freedom)
+        probability = 1 / (1 + math.exp(-min(log_odds, 50.0)))
+        return math.sqrt(probability) * math.hypot(away, u)
 
 
 def _less(estimate: Estimate, bias: float, u_bias: float) -> Estimate:

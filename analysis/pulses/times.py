@@ -12,6 +12,7 @@ from analysis.numbers import digits
 from analysis.pulses.regression import Fit, fit_turns, median, student
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.turns import Numbering, number_turns
+from analysis.uncertainty import Estimate
 
 Array = NDArray[np.float64]
 
@@ -74,7 +75,14 @@ def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None) -> SpinF
         findings_of(train),
         train.fit.bend,
         train.fit.correlations(reference),
+        unfitted_of(train.fit),
+        train.fit.freedom,
     )
+
+
+def unfitted_of(fit: Fit) -> Estimate | None:
+    """The bend that a fit left out."""
+    return None if fit.unfitted is None else Estimate(*fit.unfitted, "Hz/s^2")
 
 
 def checked_times(pulse_times: ArrayLike) -> Array:

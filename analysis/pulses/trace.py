@@ -20,7 +20,7 @@ from analysis.pulses.matched import Match, match, window_of
 from analysis.pulses.regression import median, student
 from analysis.pulses.result import Finding, Method, SpinFrequency
 from analysis.pulses.search import Events, find_events, shorten
-from analysis.pulses.times import FEWEST, Train, correlated, fit_train
+from analysis.pulses.times import FEWEST, Train, correlated, fit_train, unfitted_of
 
 if TYPE_CHECKING:
     from analysis.pulses.regression import Fit
@@ -48,6 +48,8 @@ SCATTERED, UNDERSTATED = 0.25, 3.0
 #: where they scatter by more than this part of a bin, which the bins themselves do not, and where no more than this
 #: part of the turns is without its own pulse.
 BY_NOISE, BY_BINS, MOST_ODD = 3.2, 0.25, 0.1
+#: A likelihood that is as great at half the frequency may be so at a quarter.
+MOST_DOUBLINGS = 2
 #: Two frequencies that differ by no more than this part count the same turns.
 SAME = 0.1
 #: And not where every second pulse lies so many standard deviations from the others.
@@ -314,12 +316,17 @@ def _doubt(found: Match) -> str:
 
 def _without_trap(trace: Trace, found: Match, degree: int | None) -> tuple[Match, tuple[Finding, ...]]:
     """The match at half or twice the frequency where that is the top's, and the findings about it."""
-    if traps.repeats(found):
+    notes: tuple[Finding, ...] = ()
+    for _ in range(MOST_DOUBLINGS):
+        if not traps.repeats(found):
+            break
         twice = trace.match(found.fit.times(2.0), degree)
-        if twice is not None and not traps.alternates(twice):
-            return twice, (
-                Finding("half", "two equal pulses a turn: half the frequency fitted too, and was not taken"),
-            )
+        if twice is None or traps.alternates(twice):
+            break
+        found = twice  # which may be half of it in turn: a quarter of the frequency fits, too
+        notes = (Finding("half", "two equal pulses a turn: half the frequency fitted too, and was not taken"),)
+    if notes:
+        return found, notes
     if why := traps.alternates(found) or traps.elsewhere(trace.bins, found.fit.phase(trace.middles)):
         half = trace.match(found.fit.times(0.5), degree)
         if half is not None:
@@ -392,6 +399,8 @@ def _result(pulses: Found, start: float) -> SpinFrequency:
         notes=tuple(more),
         bend=bend,
         correlations=(own or fit).correlations(reference),
+        unfitted=unfitted_of(own or fit),
+        freedom=(own or fit).freedom,
     )
 
 

@@ -44,11 +44,14 @@ def repeats(found: Match) -> bool:
 
 
 def alternates(found: Match) -> str:
-    """How every second pulse differs from the others; empty if it does not."""
+    """How every second pulse differs from the others; empty if it does not.
+
+    Turns of 167½ samples have flanks that lie on either side of a sample by turns: that is no second mark.
+    """
     odd = found.numbers % 2 == 1
     for values, least, what in (
         (found.heights, HIGHER, "has another height"),
-        (found.shifts, ASIDE, "is not half-way between its neighbours"),
+        (found.shifts, max(ASIDE, found.grid), "is not half-way between its neighbours"),
     ):
         a, b = values[odd & found.used], values[~odd & found.used]
         if min(a.size, b.size) < 8:

@@ -82,7 +82,7 @@ def _power_gradient(tau: Array, q: Array, m: float | None = None) -> Array:
 
 def _power_slowing(x: Array, q: Array, m: float | None = None) -> Array:
     """−dx/dτ of a power law."""
-    order = float(q[2]) if m is None else m
+    order = q[2] if m is None else m
     return np.asarray(q[1] * np.exp(_clip((order + 1) * np.log(x), LARGEST_LOG)))
 
 
@@ -125,7 +125,7 @@ class DragLaw:
         orders: m = n − 1 of each term, none where the exponent is itself a parameter.
         spin: dimensionless closed form, (τ, q) → x, shapes (n,), (p,) → (n,).
         gradient: its slopes with respect to q, (τ, q) → (p, n).
-        slowing: −dx/dτ at spins x, (x, q) → (n,), shapes (n,), (p,).
+        slowing: −dx/dτ at spins x, (x, q) → (n,), shapes (n,), (p,); of several tops (r, n), (p, r, 1) → (r, n).
     """
 
     name: str

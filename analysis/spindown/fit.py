@@ -10,7 +10,7 @@ from analysis.errors import UnknownName
 from analysis.numbers import digits
 from analysis.residuals import Correlation, Jump, correlation, gross_errors, largest_jump, studentised
 from analysis.spindown.drag import LAWS
-from analysis.spindown.hidden import bend, hidden_tilt
+from analysis.spindown.hidden import bends, hidden_tilt
 from analysis.spindown.lawfit import (
     ROUNDING,
     UNCERTAINTIES,
@@ -320,7 +320,7 @@ def _one_step(plain: Solution, law: CountedLaw) -> float:
     n, k = stats.n, stats.n_parameters + 1 + (not stats.sigma_known)
     if plain.curvature.covariance is None or n - k < 2:
         return float("inf")
-    more = bend(plain, law, amplitude=0.004, gap=law.gap)
+    (more,) = bends(plain, law, [(0.004, law.gap, 0.0)])
     if not np.isfinite(more).all():
         return float("inf")
     q, _ = np.linalg.qr(plain.slopes.T)

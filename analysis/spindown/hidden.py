@@ -8,6 +8,7 @@ probable a tilt is after all.  The variance is that of an average over two model
 (K. P. Burnham & D. R. Anderson, Model Selection (2002), §4.3), with the weight from the evidence.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -66,13 +67,19 @@ def odds_of_tilt(last_hz: float) -> float:
     return TILTED / (1 - TILTED) * tilted / upright
 
 
-def bend(plain: Solution, law: CountedLaw, *, amplitude: float = 0.0, gap: float, wobble: float = 0.0) -> Array:
-    """By how much a count with tilt or wobble differs from the law itself, in units of u, shape (n,)."""
+def bends(plain: Solution, law: CountedLaw, shapes: Sequence[tuple[float, float, float]]) -> Array:
+    """By how much counts with tilts or wobbles differ from the law itself, in units of u, shape (r, n).
+
+    Args:
+        plain: the law.
+        law: with the tilt.
+        shapes: amplitude A, gap and wobble of each.
+    """
     readings = plain.readings
     few = np.linspace(0.0, 1.0, min(len(readings), MOST_POINTS))
     with np.errstate(all="ignore"):
-        more = law.spin(few, np.array([*plain.q, amplitude, gap, wobble])) - law.law.spin(few, plain.q)
-    return np.asarray(np.interp(readings.tau, few, more) * readings.weight)
+        more = law.spins(few, np.array([[*plain.q, *shape] for shape in shapes])) - law.law.spin(few, plain.q)
+    return np.array([np.interp(readings.tau, few, row) * readings.weight for row in more])
 
 
 def hidden_tilt(plain: Solution, noise: float, wobble: Wobble = UNKNOWN_ORIGIN) -> HiddenTilt | None:
@@ -93,13 +100,13 @@ def hidden_tilt(plain: Solution, noise: float, wobble: Wobble = UNKNOWN_ORIGIN) 
         return None  # more than twice the square of the resonance: a tilt is no larger than δ/3
     nearer = float(np.exp(-2 * (gap - LAST_GAP)))
     law = CountedLaw(LAWS[plain.law.name], float(readings.x[-1]))
-    bends = np.array([bend(plain, law, amplitude=A, gap=gap) / A, bend(plain, law, gap=gap, wobble=_WOBBLE) / _WOBBLE])
-    if not np.isfinite(bends).all():
+    bent = bends(plain, law, [(A, gap, 0.0), (0.0, gap, _WOBBLE)]) / np.array([[A], [_WOBBLE]])
+    if not np.isfinite(bent).all():
         return None
     beforehand, u = np.array([A * nearer, wobble.value]), np.array([A_U * nearer, wobble.u])
     q, _ = np.linalg.qr(plain.slopes.T)
     # in units of what is known beforehand; what the law's own parameters can follow is no evidence
-    own = (bends - (bends @ q) @ q.T) * u[:, None]
+    own = (bent - (bent @ q) @ q.T) * u[:, None]
     noise = max(noise, 1e-5 * float(np.abs(own).max()))  # readings without noise: as good as these
     own, mean = own / noise, beforehand / u
     after = np.linalg.inv(np.eye(2) + own @ own.T)
@@ -108,7 +115,7 @@ def hidden_tilt(plain: Solution, noise: float, wobble: Wobble = UNKNOWN_ORIGIN) 
     odds = odds_of_tilt(last_hz) * float(np.exp(np.clip(evidence, -50.0, 50.0)))
     probability = odds / (1 + odds)
     with np.errstate(over="ignore", invalid="ignore"):
-        moved = -covariance @ plain.slopes @ (bends * u[:, None]).T
+        moved = -covariance @ plain.slopes @ (bent * u[:, None]).T
         spread = probability * moved @ (after + np.outer(found, found)) @ moved.T
         # a top has one tilt, and nutates anew in each run: by about the same, what is expected, and by chance
         own = probability * after[1, 1] * np.outer(moved[:, 1], moved[:, 1])

@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.least_squares import MOST_EVALUATIONS, profile, solve
+from analysis.budget import gate_bias
+from analysis.least_squares import MOST_EVALUATIONS, TOLERANCE, profile, solve
 from analysis.numbers import digits
 from analysis.residuals import DENSE, ar1, durbin_watson, runs_test_p
 from analysis.spindown.drag import LAWS, DragLaw
@@ -22,6 +23,8 @@ Uncertainty = Literal["covariance", "profile", "bootstrap"]
 Intervals = Sequence[tuple[float, float] | None]
 
 MOST_WITH_TILT = 60  # a law that the readings suit needs 5 to 15
+# Its slopes are differences, good to 1e-7: a closer search creeps.  Parameters are within 1e-4 u of the minimum.
+TOLERANCE_WITH_TILT = 1e-9
 MAX_STATED_FACTOR = 3.0  # u(ln c) above which "known to a factor" says nothing
 ROUNDING = 64 * float(np.finfo(float).eps)  # relative: residuals below it are the computer's, not the top's
 
@@ -232,7 +235,8 @@ def solution(law: Law, readings: Readings, start: Array | None = None, scale: fl
     residual, gradient = _objective(law, readings, readings.x, scale)
     begin = _start(law, readings) if start is None and isinstance(law, DragLaw) else start
     assert begin is not None
-    q, converged = solve(residual, gradient, begin, MOST_EVALUATIONS if isinstance(law, DragLaw) else MOST_WITH_TILT)
+    limits = (MOST_EVALUATIONS, TOLERANCE) if isinstance(law, DragLaw) else (MOST_WITH_TILT, TOLERANCE_WITH_TILT)
+    q, converged = solve(residual, gradient, begin, *limits)
     n = len(readings)
     left, slopes = -residual(q), gradient(q)
     bent = curvature(slopes)
@@ -421,12 +425,12 @@ def _part(row: Array, gate: float | None) -> Parts:
 
 
 def _moved_by_gate(found: Solution, slopes: Array, gate: float) -> Array:
-    """By how much means over a gate [s] move the parameters, shape (p,): Simpson's rule gives ν″T²/24."""
+    """By how much means over a gate [s] move the parameters, shape (p,)."""
     readings = found.readings
     half = min(gate / readings.duration / 2, 0.5)
     middle = np.clip(readings.tau, half, 1 - half)
     before, here, after = (found.law.spin(tau, found.q) for tau in (middle - half, middle, middle + half))
-    bias = (before + after - 2 * here) / 6 * readings.weight
+    bias = gate_bias(before, here, after) * readings.weight
     assert found.curvature.covariance is not None
     return np.asarray(slopes @ (found.curvature.covariance @ (found.slopes @ bias)))
 

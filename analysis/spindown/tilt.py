@@ -65,6 +65,9 @@ UNITS = ("rad", "Hz", "Hz")
 MORE = len(PARAMETERS)
 _SLEEPING = 2 * float(np.sqrt(KAPPA * (1 - KAPPA)))
 _NODES = 120
+_GRID = np.linspace(0.0, 1.0, _NODES)
+# Counts at so many times are worked out at once: for few readings numpy's calls cost more than their numbers.
+_AT_ONCE = 20_000
 _LARGEST_TILT2 = 0.3  # tan²θ: far beyond what a top survives
 _GAUSS = np.array([0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)]), np.array([5.0, 8.0, 5.0]) / 18
 
@@ -133,18 +136,21 @@ class CountedLaw:
 
     def spin(self, tau: Array, q: Array) -> Array:
         """What the counter counts, shape (n,)."""
-        s, resonance, wobble = self.shape(q)
-        with np.errstate(all="ignore"):
-            return count(self.law, tau, q[:-MORE], s, resonance, wobble=wobble)
+        return np.asarray(self.spins(tau, q[None])[0])
 
     def gradient(self, tau: Array, q: Array) -> Array:
         """Its slopes with q, shape (p, n), by differences: good to 1e-7 of themselves."""
-        rows = []
-        for i in range(len(q)):
-            step = np.zeros(len(q))
-            step[i] = 1e-4 if i >= len(q) - MORE else 1e-5 * max(abs(float(q[i])), 0.1)
-            rows.append((self.spin(tau, q + step) - self.spin(tau, q - step)) / (2 * step[i]))
-        return np.array(rows)
+        sizes = 1e-5 * np.maximum(np.abs(q), 0.1)
+        sizes[-MORE:] = 1e-4
+        steps, p = np.diag(sizes), len(q)
+        spins = self.spins(tau, np.vstack([q + steps, q - steps]))
+        return np.asarray((spins[:p] - spins[p:]) / (2 * sizes[:, None]))
+
+    def spins(self, tau: Array, rows: Array) -> Array:
+        """The same for several q, shape (r, p) → (r, n)."""
+        shapes = np.array([self.shape(q) for q in rows])
+        with np.errstate(all="ignore"):
+            return counts(self.law, tau, rows[:, :-MORE], shapes)
 
     def natural(self, q: Array, reference_hz: float, duration: float) -> tuple[Array, Array]:
         """As `DragLaw.natural`, then δ [rad], ν_r [Hz] and K [Hz]."""
@@ -182,7 +188,7 @@ def counted(law: DragLaw, tau: Array, solution: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Path:
-    """The way of a top down its spin, in units of the resonance, at points of ln η."""
+    """The ways of tops down their spin, in units of the resonance, at points of ln η; shape (r, k) each."""
 
     spin: Array  # Ω/Ω_r
     slope: Array  # dΩ/d ln η
@@ -190,7 +196,7 @@ class _Path:
     momentum_slope: Array  # of Ω(1 − κ sin²θ), with ln η
 
 
-def _path(log_eta: Array, s: float) -> _Path:
+def _path(log_eta: Array, s: Array) -> _Path:
     eta = np.exp(log_eta)
     w = np.maximum(1 + s * eta**2, 0.1)
     lift = np.maximum(1 + BETA * s * (eta + eta**2 / 2), 0.1)
@@ -215,50 +221,73 @@ def count(law: DragLaw, tau: Array, q: Array, s: float, resonance: float, *, wob
     Returns:
         Shape (n,); beyond the fall, which a search may meet, a straight line.
     """
-    x0 = min(max(float(q[0]), resonance * 1.001), 1e3)
-    first = 1 / ((1.01 * x0 / resonance) ** 2 - 1)
-    log_eta, path = _nodes(first, s)
+    return np.asarray(counts(law, tau, np.array([q]), np.array([[s, resonance, wobble]]))[0])
+
+
+def counts(law: DragLaw, tau: Array, q: Array, shapes: Array) -> Array:
+    """The same of several tops; q of shape (r, p), shapes: s, resonance and wobble of each, shape (r, 3) → (r, n)."""
+    many = max(_AT_ONCE // max(len(tau), 1), 1)
+    parts = [_counts(law, tau, q[k : k + many], shapes[k : k + many]) for k in range(0, len(q), many)]
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+def _counts(law: DragLaw, tau: Array, q: Array, shapes: Array) -> Array:
+    s, resonance, wobble = shapes.T[:, :, None]
+    of_law = q.T[:, :, None]
+    x0 = np.minimum(np.maximum(of_law[0], resonance * 1.001), 1e3)
+    log_eta, path = _nodes(1 / ((1.01 * x0 / resonance) ** 2 - 1), s)
     # time between the nodes by three points of Gauss and Legendre: 1e-10 of it
     width = np.diff(log_eta)
-    inner = (log_eta[:-1, None] + width[:, None] * _GAUSS[0]).ravel()
+    inner = (log_eta[:, :-1, None] + width[:, :, None] * _GAUSS[0]).reshape(len(q), -1)
     within = _path(inner, s)
-    lapse = (_time_slope(law, within, q, resonance).reshape(-1, 3) @ _GAUSS[1]) * width
-    time = np.concatenate([[0.0], np.cumsum(lapse)])
+    lapse = (_time_slope(law, within, of_law, resonance).reshape(*width.shape, 3) @ _GAUSS[1]) * width
+    time = np.concatenate([np.zeros((len(q), 1)), np.cumsum(lapse, axis=1)], axis=1)
     spin = resonance * path.spin
-    slope = resonance * path.slope / _time_slope(law, path, q, resonance)  # dx/dτ
-    start = float(_hermite(np.array([-x0]), -spin, time, -1 / slope)[0])
+    slope = resonance * path.slope / _time_slope(law, path, of_law, resonance)  # dx/dτ
+    start = _hermite(-x0, -spin, time, -1 / slope)
     even = _hermite(tau + start, time, spin, slope)
-    even = np.nan_to_num(np.clip(even, -1e3, 1e3))  # a search may go anywhere
+    even = np.nan_to_num(np.minimum(np.maximum(even, -1e3), 1e3))  # a search may go anywhere
     return np.asarray(even + wobble / np.sqrt(np.maximum((even / (_SLEEPING * resonance)) ** 2 - 1, 0.05)))
 
 
-def _nodes(first: float, s: float) -> tuple[Array, _Path]:
-    """From a little above the start down to the fall, where the spin would rise again, or to the resonance."""
-    last = min(2e3, float(np.sqrt(_LARGEST_TILT2 / max(abs(s), 1e-12))))
-    log_eta = np.linspace(np.log(first), np.log(max(last, 1.5 * first)), _NODES)
+def _nodes(first: Array, s: Array) -> tuple[Array, _Path]:
+    """From a little above the start down to the fall, where the spin would rise again, or to the resonance.
+
+    first, s: shape (r, 1).
+    """
+    begin = np.log(first)
+    last = np.minimum(2e3, np.sqrt(_LARGEST_TILT2 / np.maximum(np.abs(s), 1e-12)))
+    end = np.log(np.maximum(last, 1.5 * first))
+    log_eta = begin + (end - begin) * _GRID
     path = _path(log_eta, s)
-    turned = np.flatnonzero(np.minimum(-path.slope, -path.momentum_slope) <= 1e-4)
-    if not len(turned):
+    turned = np.minimum(-path.slope, -path.momentum_slope) <= 1e-4
+    falls = turned.any(axis=1)
+    if not falls.any():
         return log_eta, path
-    end = log_eta[max(int(turned[0]) - 1, 2)]
-    log_eta = np.linspace(log_eta[0], end, _NODES)
+    at = np.maximum(np.argmax(turned, axis=1) - 1, 2)
+    end[falls, 0] = log_eta[falls, at[falls]]
+    log_eta = begin + (end - begin) * _GRID
     return log_eta, _path(log_eta, s)
 
 
-def _time_slope(law: DragLaw, path: _Path, q: Array, resonance: float) -> Array:
+def _time_slope(law: DragLaw, path: _Path, q: Array, resonance: Array) -> Array:
     """dτ/d ln η."""
     slowing = law.slowing(resonance * path.spin * path.axial, q) * path.axial
     return np.asarray(-resonance * path.momentum_slope / np.where(np.abs(slowing) > 1e-30, slowing, 1e-30))
 
 
 def _hermite(at: Array, x: Array, y: Array, slope: Array) -> Array:
-    """y(at) by a cubic between the nodes x, which rise; beyond them by a straight line."""
-    k = np.clip(np.searchsorted(x, at) - 1, 0, len(x) - 2)
-    h = np.maximum(x[k + 1] - x[k], 1e-300)
-    u = (at - x[k]) / h
-    inside = np.clip(u, 0.0, 1.0)
+    """y(at) by a cubic between the nodes x, which rise; beyond them by a straight line; shape (r, n) of (r, k)."""
+    found = np.array([np.searchsorted(row, wanted) for row, wanted in zip(x, at, strict=True)])
+    k = np.minimum(np.maximum(found - 1, 0), x.shape[1] - 2)
+    row = np.arange(len(x))[:, None]
+    left = x[row, k]
+    h = np.maximum(x[row, k + 1] - left, 1e-300)
+    u = (at - left) / h
+    inside = np.minimum(np.maximum(u, 0.0), 1.0)
     v = 1 - inside
-    value = v**2 * ((1 + 2 * inside) * y[k] + inside * h * slope[k])
-    value = value + inside**2 * ((1 + 2 * v) * y[k + 1] - v * h * slope[k + 1])
+    before, after = slope[row, k], slope[row, k + 1]
+    value = v**2 * ((1 + 2 * inside) * y[row, k] + inside * h * before)
+    value = value + inside**2 * ((1 + 2 * v) * y[row, k + 1] - v * h * after)
     beyond = (u - inside) * h
-    return np.asarray(value + beyond * np.where(beyond < 0, slope[k], slope[k + 1]))
+    return np.asarray(value + beyond * np.where(beyond < 0, before, after))

@@ -40,7 +40,7 @@ def report(
         bool,
         typer.Option(
             "--crosscheck/--no-crosscheck",
-            help="Make a cross-check with the result's own parameters where none is stored and it takes 2 s at most.",
+            help="Make a cross-check with the result's own parameters where none is stored and it takes seconds.",
         ),
     ] = True,
 ) -> None:

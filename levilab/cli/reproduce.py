@@ -23,13 +23,13 @@ def reproduce(
         ),
     ] = None,
     only: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="CHAPTER,…",
             help="These chapters alone: stability, limits, paths, driven, spindown, statistics, dipole, errata, "
             "beyond, simon, gans.",
         ),
-    ] = "",
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Make the chapters, print them, write the report, and end with 1 where something is unexpected."""

@@ -34,10 +34,7 @@ class Analyses:
         self.failed: dict[str, str] = {}
 
     def begin(self, folder: Path) -> None:
-        """Analyze a run and write its report, if that is not under way.
-
-        A cross-check is not made for it: that simulates for a minute, and a person waits.
-        """
+        """Analyze a run and write its report, if that is not under way."""
         if folder.name in self.running:
             return
         self.running.add(folder.name)
@@ -51,7 +48,7 @@ class Analyses:
         try:
             for words in (
                 ["analyze", str(folder)],
-                ["report", str(folder), "--no-crosscheck", "--output", str(folder / REPORT)],
+                ["report", str(folder), "--output", str(folder / REPORT)],
             ):
                 ended = subprocess.run(  # noqa: S603 - this program, with a folder that is a run
                     [sys.executable, "-m", "levilab", *words],

@@ -160,14 +160,19 @@ _QUANTITIES = (
     ("least spin", "Hz", 1.0, "spin_min_hz"),
     ("greatest spin", "Hz", 1.0, "spin_max_hz"),
     ("spin of the washers at the end", "Hz", 1.0, "washer_spin_end_hz"),
-    ("lifetime", "s", 1.0, "end_s"),
 )
+_LIFETIME, _WHOLE_TIME = "lifetime", "up for the whole time"
+
+
+def _time_up(found: Mapping[str, Any]) -> tuple[str, str, float, str]:
+    """How long the top was up: of one that did not fall that is as long as it was simulated, and no lifetime."""
+    return _LIFETIME if isinstance(found.get("fell"), dict) else _WHOLE_TIME, "s", 1.0, "end_s"
 
 
 def _numbers(found: Mapping[str, Any], scene: Scene) -> Iterator[tuple[str, str, str]]:
-    for name, unit, factor, key in _QUANTITIES:
+    for name, unit, factor, key in (*_QUANTITIES, _time_up(found)):
         value = found.get(key)
-        if scene.observed == "spin" and not ("spin" in name or name == "lifetime"):
+        if scene.observed == "spin" and "spin" not in name and key != "end_s":
             continue
         if isinstance(value, int | float):
             yield name, plain(factor * value + 0.0, 5), unit

@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 #: Widths of figures [inches]: one column of a journal, and two.
 NARROW, WIDE = 3.4, 7.0
-#: Pixels below which a wide figure's smallest text (7 pt) is less than 8 pixels high: a page that is narrower lets the
-#: figure be moved sideways instead of shrinking it further.
-LEAST_PX = 576
 
 
 def _sheet() -> dict[str, Any]:

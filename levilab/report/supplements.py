@@ -32,7 +32,7 @@ def stored_trials(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
 
 
 def trials(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
-    """The same; where there is none a shorter one, if that takes two seconds at most."""
+    """The same; where there is none a shorter one, of as many trials as a report has time for."""
     stored = stored_trials(analysis, found)
     if stored or analysis.name not in OWN:
         return stored

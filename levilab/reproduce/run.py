@@ -55,20 +55,22 @@ class Reproduction:
         return not self.unexpected
 
 
-def chosen(only: str) -> list[Chapter]:
-    """The chapters of a list with commas, in the order of the report; all for an empty one.
+def chosen(only: str | None) -> list[Chapter]:
+    """The chapters of a list with commas, in the order of the report; all for None.
 
     Raises:
-        UsageError: there is no such chapter.
+        UsageError: there is no such chapter, or the list is empty.
 
     >>> [chapter.name for chapter in chosen("errata, limits")]
     ['limits', 'errata']
     """
+    if only is None:
+        return list(CHAPTERS.values())
     names = [name.strip() for name in only.split(",") if name.strip()]
-    for name in names:
+    for name in names or [only]:
         if name not in CHAPTERS:
-            raise UsageError("only", f"chapters are {', '.join(CHAPTERS)}", value=name)
-    return [chapter for chapter in CHAPTERS.values() if not names or chapter.name in names]
+            raise UsageError("only", f"chapters are {', '.join(CHAPTERS)}", value=name or "''")
+    return [chapter for chapter in CHAPTERS.values() if chapter.name in names]
 
 
 def reproduce(chapters: Iterable[Chapter], progress: Callable[[float, str], None] | None = None) -> Reproduction:

@@ -62,7 +62,9 @@ def test_rounding_scatters_by_as_much_as_its_row_says():
 def test_a_mean_over_a_gate_exceeds_the_middle_by_the_bias():
     t = np.linspace(-0.5, 0.5, 20001)
     curve = 30.0 - 0.1 * t + 0.5 * 4.5e-4 * t**2
-    assert np.trapezoid(curve, t) - 30.0 == pytest.approx(gate_bias(4.5e-4, 1.0), rel=1e-4)
+    bias = float(gate_bias(curve[0], curve[10000], curve[-1]))
+    assert np.trapezoid(curve, t) - 30.0 == pytest.approx(bias, rel=1e-4)
+    assert bias == pytest.approx(4.5e-4 / 24, rel=1e-6)  # ν″T²/24
 
 
 def test_rest_is_what_is_left_of_a_sum_of_squares():

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.field.analysis import FieldAnalysis
 
 #: Processor time of a trial, for each scan [s].
-_COST_S = 0.03
+_COST_S = 0.016
 #: What is compared; a thickness that the calliper alone gives has the pulls of the calliper.
 _COMPARED = ("strength", "origin", "thickness", "background")
 

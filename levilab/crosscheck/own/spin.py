@@ -80,7 +80,8 @@ def _compared(found: SpinFrequency, spin: SpinFrequency, shift: float = 0.0) -> 
         [
             pull("frequency", found.frequency, frequency + chirp * at + bend * at**2 / 2),
             pull("chirp", found.chirp, chirp + bend * at),
-        ]
+        ],
+        widened=found.freedom,
     )
 
 

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.budget import printed_step
+from analysis.budget import gate_bias, printed_step
+from analysis.residuals import DENSE
 from analysis.spindown.combine import combine
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import fit_spin_down, is_correlated
 from analysis.spindown.tilt import counted
-from levilab.crosscheck.own.model import Own, Trial, pull
+from levilab.crosscheck.own.model import OF_ONE_RUN, Own, Trial, pull
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.spindown.analysis import EXPERIMENT, TILTED
 
@@ -25,8 +26,10 @@ if TYPE_CHECKING:
 
     Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
-#: Processor time of one run's fits [s].
-_COST_S = 0.065
+#: Processor time of the fits of one run [s]: of any, for a reading, and for the square of their number up to `DENSE`.
+_COST_S, _COST_OF_READING_S, _COST_OF_PAIR_S = 0.03, 1.6e-5, 5e-6
+#: What fitting the tilt adds to that, for any run and for a reading.
+_COST_OF_TILT_S, _TILTED_READING_S = 0.25, 3e-4
 #: Runs that scatter by so many times what their readings leave give u from their scatter alone.
 _SCATTERS = 1.5
 #: The exponent of a law of one power.
@@ -61,6 +64,13 @@ class _Run:
         """Made-up readings, the constants multiplied by factors, shape (n,) [Hz]."""
         return _rounded(self.curve(factors) + self.noise * _noise(random, len(self.time), self.rho), self.step)
 
+    @property
+    def cost_s(self) -> float:
+        """Processor time of its fits, as measured [s]."""
+        n = len(self.time)
+        cost = _COST_S + n * _COST_OF_READING_S + (n**2 * _COST_OF_PAIR_S if n <= DENSE else 0.0)
+        return cost + (_COST_OF_TILT_S + n * _TILTED_READING_S if self.tilt else 0.0)
+
     def curve(self, factors: Sequence[float]) -> Array:
         """The mean over the gate of what the counter counts, shape (n,) [Hz]."""
         frequency, duration = self.fit.reference
@@ -73,7 +83,7 @@ class _Run:
         def at(times: Array) -> Array:
             return np.asarray(counted(LAWS[self.fit.name], times, solution))
 
-        bias = (at(middle - half) + at(middle + half) - 2 * at(middle)) / 6 if half else 0.0
+        bias = gate_bias(at(middle - half), at(middle), at(middle + half)) if half else 0.0
         return np.asarray(frequency * (at(tau) + bias))
 
 
@@ -95,7 +105,7 @@ def own(found: SpinDownAnalysis) -> Own:
         + ("constants that differ from run to run as these do, " if several else "")
         + "with the times, scatter, correlation, gate and digits of the readings",
         trial=lambda random: _trial(random, runs, law, constants, spread),
-        cost_s=_COST_S * len(runs),
+        cost_s=sum(run.cost_s for run in runs),
         law=law,
         freedom=_freedom(found, law, constants),
         more=more,
@@ -156,7 +166,7 @@ def _trial(
     """All runs made up and analyzed."""
     several = len(runs) > 1
     means = [float(np.mean([run.fit.parameters[name].value or 0.0 for run in runs])) for name in constants]
-    fits = []
+    fits, pulls = [], []
     for run in runs:
         # of several runs each has a constant of its own about the mean; of one it is the fitted one
         truths = [mean * (1 + s * random.standard_normal()) for mean, s in zip(means, spread, strict=True)]
@@ -166,9 +176,16 @@ def _trial(
         ]
         readings = run.readings(random, factors)
         fits.append(fit_spin_down(run.time, readings, run.u, tilt=run.tilt, driven=run.driven, gate=run.gate or None))
+        if several:
+            own = fits[-1].fit(law).parameters
+            pulls += [
+                pull(f"{name}{OF_ONE_RUN}", own[name], truth)
+                for name, truth in zip(constants, truths, strict=True)
+                if name != "c"
+            ]
     together = combine(fits)
     found = together.fit(law).constants if several else fits[0].fit(law).parameters
-    pulls = [pull(name, found[name], mean) for name, mean in zip(constants, means, strict=True) if name != "c"]
+    pulls += [pull(name, found[name], mean) for name, mean in zip(constants, means, strict=True) if name != "c"]
     if not several:
         truth = runs[0].fit.parameters["start_frequency"].value or 0.0
         pulls.append(pull("start_frequency", found["start_frequency"], truth))

@@ -56,6 +56,7 @@ class CheckPart(Part):
     failures: dict[str, int]
     freedom: dict[str, int] = Field(default_factory=dict)
     more: tuple[str, ...]
+    widened: float | None = Field(default=None, ge=1)
 
 
 class FilePart(Part):

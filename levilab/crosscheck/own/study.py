@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.errors import AnalysisError
+from analysis.pulses.regression import student
 from levilab.crosscheck.own import field, limit, precession, spin, spindown
+from levilab.crosscheck.own.model import OF_ONE_RUN
 from levilab.crosscheck.study import CHANCE, COVERAGE, Spread, by_reason, spreads_of
 from levilab.errors import LevilabError
 from levilab.present.document.blocks import Note, Paragraph, Tabular
@@ -35,8 +37,10 @@ OWN: Mapping[str, Callable[[Any], Own]] = MappingProxyType({
 _LONG_TAILS, _MANY = 8, 30
 #: How many trials are made where no number is asked for.
 TRIALS = 200
-#: A report makes as many as fit into so much processor time, and none where these would be too few to say anything.
-REPORT_S, FEWEST = 2.0, 25
+#: A report makes as many as fit into so much processor time, but so many even if they take longer ...
+REPORT_S, ENOUGH = 2.0, 25
+#: ... up to this time: then as many as fit into that, which say less, and none below so few.
+LONGEST_S, FEWEST = 4.0, 5
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,7 @@ class OwnCheck:
         failures: why trials came to no estimate → how often.
         freedom: quantity → degrees of freedom of its u, where these are few.
         more: what to know of the pulls.
+        widened: degrees of freedom of u in the median trial, where that has Student's factor; None: it has not.
     """
 
     analysis: str
@@ -75,6 +80,7 @@ class OwnCheck:
     failures: Mapping[str, int]
     freedom: Mapping[str, int]
     more: tuple[str, ...] = ()
+    widened: float | None = None
 
     @property
     def holds(self) -> bool:
@@ -86,7 +92,7 @@ class OwnCheck:
 
     def is_right(self, spread: Spread) -> bool:
         """Whether the pulls of one quantity are as wanted."""
-        return holds(spread, self.freedom.get(spread.quantity))
+        return holds(spread, self.freedom.get(spread.quantity), self.widened)
 
 
 def wanted_coverage(freedom: int | None) -> float:
@@ -102,7 +108,25 @@ def wanted_coverage(freedom: int | None) -> float:
     return float(2 * stdtr(freedom, 1.0) - 1)
 
 
-def holds(spread: Spread, freedom: int | None = None) -> bool:
+def wanted_deviation(freedom: int | None, widened: float | None = None) -> float:
+    """Standard deviation of pulls whose u comes from a scatter with so many degrees of freedom: Student's law.
+
+    Args:
+        freedom: of u that is the scatter's own.
+        widened: of u that was multiplied by Student's factor, so that it covers 68 %.
+
+    >>> wanted_deviation(None), round(wanted_deviation(12), 2), round(wanted_deviation(None, 12), 2)
+    (1.0, 1.1, 1.05)
+    """
+    few = freedom if freedom is not None else widened
+    if few is None:
+        return 1.0
+    if few <= _LONG_TAILS:
+        return math.inf
+    return math.sqrt(few / (few - 2)) / (student(few) if freedom is None else 1.0)
+
+
+def holds(spread: Spread, freedom: int | None = None, widened: float | None = None) -> bool:
     """Whether pulls have no bias and scatter by no more than wanted, with room for chance.
 
     With few degrees of freedom they have long tails, and their standard deviation says nothing: what lies within 1 u
@@ -112,7 +136,7 @@ def holds(spread: Spread, freedom: int | None = None) -> bool:
         return True
     wanted = wanted_coverage(freedom)
     few = CHANCE * math.sqrt(wanted * (1 - wanted) / spread.n)
-    scatter = 1.0 if freedom is None else math.sqrt(freedom / (freedom - 2)) if freedom > _LONG_TAILS else math.inf
+    scatter = wanted_deviation(freedom, widened)
     return (
         abs(spread.mean) <= 0.1 + CHANCE * max(spread.deviation, 1.0) / math.sqrt(spread.n)
         and spread.deviation <= scatter * (1.1 + CHANCE / math.sqrt(2 * spread.n))
@@ -127,8 +151,12 @@ def seed_of(analysis: str, inputs: Sequence[str]) -> int:
 
 
 def trials_of_report(subject: Own) -> int:
-    """How many trials a report makes of its own accord; 0 where there is no time for enough of them."""
-    count = min(TRIALS, int(REPORT_S / subject.cost_s))
+    """How many trials a report makes of its own accord; 0 where there is no time for enough of them.
+
+    The cost is the subject's own estimate, and no clock is read: the bytes of a report do not depend on the machine.
+    """
+    wanted, longest = (int(time / subject.cost_s) for time in (REPORT_S, LONGEST_S))
+    count = min(TRIALS, max(wanted, min(ENOUGH, longest)))
     return count if count >= FEWEST else 0
 
 
@@ -178,25 +206,29 @@ def check_own(
         failures=by_reason(failures),
         freedom=subject.freedom,
         more=subject.more,
+        widened=_median([trial.widened for trial in done if trial.widened is not None]),
     )
+
+
+def _median(values: Sequence[float]) -> float | None:
+    return float(np.median(values)) if values else None
 
 
 # --- how people are shown it ---------------------------------------------------------------------------
 
-_NUMBERS = ("trials", "mean pull", "s.d. of pulls", "within 1 u")
+_NUMBERS = ("pulls", "mean pull", "s.d. of pulls", "within 1 u")
 
 
 def own_table(found: OwnCheck, shown: Mapping[str, str] | None = None) -> Table:
-    """A row a quantity; behind ± stands what chance leaves to so many trials, one standard error.
+    """A row a quantity; behind ± stands what chance leaves to so many pulls, one standard error.
 
     Args:
         found: the trials.
         shown: quantity → its symbol.
     """
-    names = shown or {}
     rows = [
         (
-            names.get(one.quantity, one.quantity.replace("_", " ")),
+            _in_words(one.quantity, shown or {}),
             str(one.n),
             f"{one.mean:+.2f} ± {1 / math.sqrt(one.n):.2f}".replace("-", "−"),
             "–" if math.isnan(one.deviation) else f"{one.deviation:.2f} ± {1 / math.sqrt(2 * one.n):.2f}",
@@ -208,19 +240,34 @@ def own_table(found: OwnCheck, shown: Mapping[str, str] | None = None) -> Table:
     return table("", ("quantity", *_NUMBERS, "as wanted"), rows, numbers=_NUMBERS)
 
 
+def _in_words(quantity: str, shown: Mapping[str, str]) -> str:
+    """Its symbol or its name.
+
+    >>> _in_words("c32_of_one_run", {"c32": "C₃/₂"}), _in_words("start_frequency", {})
+    ('C₃/₂ of one run', 'start frequency')
+    """
+    name = quantity.removesuffix(OF_ONE_RUN)
+    return shown.get(name, name.replace("_", " ")) + quantity[len(name) :].replace("_", " ")
+
+
 def in_words(found: OwnCheck) -> str:
     """What the trials say."""
     texts = [f"{found.trials} times anew: {found.about}."]
     if not found.spreads:
         texts.append("No trial came to an estimate.")
     elif found.holds:
-        texts.append("Values and uncertainties of this analysis are right for readings such as these.")
+        so_far = "" if found.trials >= ENOUGH else f", as far as so few trials show ({found.trials} of {TRIALS})"
+        texts.append(f"Values and uncertainties of this analysis are right for readings such as these{so_far}.")
     else:
-        wrong = ", ".join(one.quantity.replace("_", " ") for one in found.spreads if not found.is_right(one))
+        wrong = ", ".join(_in_words(one.quantity, {}) for one in found.spreads if not found.is_right(one))
         texts.append(f"For readings such as these the analysis is not right in {wrong}: trust its u the less.")
     if found.law and found.laws:
         n, again = sum(found.laws.values()), found.laws.get(found.law, 0)
-        others = ", ".join(f"{law} {count} times" for law, count in found.laws.items() if law != found.law)
+        others = ", ".join(
+            f"{law} {'once' if count == 1 else f'{count} times'}"
+            for law, count in found.laws.items()
+            if law != found.law
+        )
         texts.append(
             f"The {found.law} law, which is true there, is the best one in {again} of {n} trials"
             + (f" (else {others})" if others else "")
@@ -236,6 +283,10 @@ def in_words(found: OwnCheck) -> str:
     if few:
         share = f"{100 * wanted_coverage(min(few)):.0f} %"
         texts.append(f"As u comes from the scatter of few values, {share} within 1 u are right (Student's t).")
+    if found.widened is not None and found.widened < _MANY:
+        wanted = wanted_deviation(None, found.widened)
+        pulls = f"pulls have a standard deviation of {wanted:.2f}" if math.isfinite(wanted) else "pulls have long tails"
+        texts.append(f"As u comes from few pulses and holds 68 % by Student's factor, {pulls}.")
     texts += [f"{text[0].upper()}{text[1:]}." for text in found.more]
     texts += [f"{count} trials came to no estimate: {reason}." for reason, count in found.failures.items()]
     return " ".join(texts)
@@ -245,7 +296,7 @@ def own_blocks(found: OwnCheck, shown: Mapping[str, str] | None = None) -> tuple
     """The trials as blocks of a report."""
     note = (
         "A pull is (estimate − truth)/u; wanted are a mean of 0, a standard deviation of 1, and 68 % within 1 u. "
-        "Behind ± stands what chance leaves to so many trials, one standard error. As wanted is what misses this by a "
+        "Behind ± stands what chance leaves to so many pulls, one standard error. As wanted is what misses this by a "
         "tenth at most and three standard errors; smaller deviations mean that u is on the safe side."
     )
     return (

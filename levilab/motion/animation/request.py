@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     from levilab.motion.summary import Summary
     from levilab.simulator.scene import Scene
-    from levilab.simulator.trajectory import Trajectory
 
     Progress = Callable[[float], None]
 
@@ -136,9 +135,11 @@ def check_request(request: AnimationRequest, scene: Scene, duration: float) -> N
             f"a number from {_SLOWEST:g} to {_FASTEST:g} is expected, as 0.05 for a twentieth of the real speed",
             value=speed,
         )
+    start, stop = _span(request, duration)
     if chosen.encode:
-        start, stop = _span(request, duration)
         _check_pictures(chosen, stop - start, speed)
+    else:  # it turns no slower than at the start, and perhaps faster later
+        _count_for_page(scene, stop - start, abs(scene.start.spin_hz))
     chosen.check()
 
 
@@ -178,7 +179,7 @@ def animate(
     speed = chosen.speed if request.speed is None else request.speed
     progress = progress or (lambda _: None)
     if chosen.encode is None:
-        count = _count_for_page(summary.motion, start, stop)
+        count = _count_for_page(summary.motion.scene, stop - start, turn_rate(summary.motion))
     else:
         _check_pictures(chosen, stop - start, speed)
         count = _POSES_A_PICTURE * max(round((stop - start) / speed * chosen.pictures_per_s), 1)
@@ -207,10 +208,19 @@ def _span(request: AnimationRequest, end: float, *, fell: bool = False) -> tuple
     return 0.0, min(usual, end)
 
 
-def _count_for_page(motion: Trajectory, start: float, stop: float) -> int:
-    """Intervals between the poses of a page: enough for each turn, and as many as fit."""
-    span, most = stop - start, most_poses(len(columns_of(motion.scene))) - 1
-    turning = max(turn_rate(motion), _LEAST_RATE_HZ / POSES_A_TURN)
+def _count_for_page(scene: Scene, span: float, turns: float) -> int:
+    """Intervals between the poses of a page: enough for each turn, and as many as fit.
+
+    Args:
+        scene: whose poses they are.
+        span: of the animation [s].
+        turns: of the fastest part in a second.
+
+    Raises:
+        UsageError: even the fewest poses do not fit.
+    """
+    most = most_poses(len(columns_of(scene))) - 1
+    turning = max(turns, _LEAST_RATE_HZ / POSES_A_TURN)
     wanted, least = math.ceil(span * turning * POSES_A_TURN), math.ceil(span * turning * FEWEST_A_TURN)
     if least > most:
         raise UsageError(

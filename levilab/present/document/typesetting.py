@@ -17,10 +17,12 @@ _MINUS = re.compile(r"(?:(?<=[\s(\[=±×])|(?<!.))-(?=\d)")
 _HIGH = str.maketrans("⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ-", "+−0123456789n−")
 _LOW = str.maketrans("₊₋₀₁₂₃₄₅₆₇₈₉", "+−0123456789")
 #: Powers by raised characters, and those that no raised character exists for: ^−½, ^½ and ^(1−n).
-#: Indices by lowered characters, the fraction of C₃/₂ among them, and ν_r: a Greek letter, a low line, one letter.
+#: Indices by lowered characters, the fraction of C₃/₂ among them; ν_r: a Greek letter, a low line, one letter; and
+#: B_z: a plain letter with the name of a component, which is no part of a file's name and no column (x_m, time_s).
 _RUNS = re.compile(
     r"(?P<raised>[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ]+)|\^(?P<half>−?½)|(?<=rad/s\))\^(?P<ascii>-1/2)|\^\((?P<power>1−n)\)"
     r"|(?P<lowered>[₊₋₀₁₂₃₄₅₆₇₈₉]+(?:/[₀₁₂₃₄₅₆₇₈₉]+)?)|(?<=[α-ωΑ-Ω])_(?P<index>[a-zA-Z0-9])(?![a-zA-Z0-9_])"
+    r"|(?<=(?<![\w./\\-])[a-zA-Z])_(?P<component>[xyz])(?![\w/\\-]|\.\w)"
 )
 
 
@@ -39,6 +41,8 @@ def typeset(text: str) -> tuple[Run, ...]:
     [('2.34(3)×10', ''), ('−4', 'high'), (' (rad/s)', ''), ('−½', 'high'), ('/s', '')]
     >>> [run.text for run in typeset("C₃/₂, ν_r, but file_r and x^2") if run.level == "low"]
     ['3/2', 'r']
+    >>> [run.text for run in typeset("n_x + i n_y, B_z. But x_m, a_x.csv, of_x, b/a_z, a_1")if run.level == "low"]
+    ['x', 'y', 'z']
     >>> [run.text for run in typeset("-0.012 of 2026-11-22-run -3")]
     ['−0.012 of 2026-11-22-run −3']
     >>> typeset("")
@@ -57,6 +61,6 @@ def typeset(text: str) -> tuple[Run, ...]:
 
 def _run(found: re.Match[str]) -> Run:
     name = str(found.lastgroup)
-    if name in {"lowered", "index"}:
+    if name in {"lowered", "index", "component"}:
         return Run(found[name].translate(_LOW), "low")
     return Run(found[name].translate(_HIGH), "high")

@@ -11,9 +11,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-#: The files beside this module, without their ending.
-SOURCES = ("thesis", "simon-1997", "gans-1998")
-
 
 @dataclass(frozen=True)
 class Printed:
@@ -51,7 +48,7 @@ class Printed:
 
 @cache
 def published(source: str) -> Mapping[str, Printed]:
-    """Return the numbers of a source, by their dotted names; those of a list end in .0, .1 and so on.
+    """Return the numbers of a source by their dotted names; those of a list end in .0, .1 and so on.
 
     >>> published("thesis")["limits.lower.IC1"].text, published("thesis")["measured.limits.0"].value
     ('22.06', 21.7)

@@ -64,6 +64,32 @@ def test_few_pulses_widen_the_uncertainty_to_68_per_cent():
     assert covered == pytest.approx(0.683, abs=0.063)  # 3 standard errors; without Student's t it would be 0.61
 
 
+def test_a_bend_that_is_too_small_to_be_fitted_is_in_the_uncertainty():
+    """Of a top that swings about its drive: 19 pulses show a bend of five standard uncertainties, or nearly."""
+    random, pulls, fitted = np.random.default_rng(3), [], 0
+    turns = np.arange(-9.0, 10.0)
+    times = turns / 30
+    bend = 5 * 6 * 30 * 1e-4 * np.sqrt(np.linalg.inv((a := np.vander(times, 4, increasing=True)).T @ a)[3, 3])
+    for _ in range(5):
+        times = times - (30 * times + bend * times**3 / 6 - turns) / (30 + bend * times**2 / 2)
+    for _ in range(150):
+        found = spin_of_times(times + 1e-4 * random.standard_normal(19)).under_drag()
+        pulls.append((found.frequency.value - 30 - bend * found.reference_time**2 / 2) / found.frequency.u)
+        fitted += found.bend is not None
+    assert 30 < fitted < 90  # the others have a parabola, off by 11 times what its residuals show
+    assert np.std(pulls) < 2.1  # without the part of the bend 4.2
+    assert np.mean(np.abs(pulls) < 2) > 0.7  # without it 0.36
+
+
+def test_a_bend_that_is_none_widens_the_uncertainty_by_little():
+    random, times, pulls = np.random.default_rng(3), np.arange(19) / 30, []
+    for _ in range(300):
+        plain = spin_of_times(times + 1e-4 * random.standard_normal(19))
+        found = plain.under_drag()
+        pulls.append((found.frequency.value - 30) / found.frequency.u)
+    assert np.std(pulls) == pytest.approx(1.04, abs=0.15)  # Student's t of 16; 3 standard errors
+
+
 def test_missing_doubled_and_wrong_pulses_are_counted():
     random, times = np.random.default_rng(4), pulse_times()
     kept = np.delete(times, random.choice(np.arange(1, times.size - 1), 100, replace=False))

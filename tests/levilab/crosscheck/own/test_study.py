@@ -10,9 +10,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from analysis.pulses.regression import student
 from levilab.crosscheck.own.model import Own, Trial
 from levilab.crosscheck.own.stored import as_part, file_of, read_own, restored, store
-from levilab.crosscheck.own.study import OWN, check_own, holds, in_words, own_table, seed_of, trials_of_report
+from levilab.crosscheck.own.study import (
+    ENOUGH,
+    FEWEST,
+    OWN,
+    TRIALS,
+    check_own,
+    holds,
+    in_words,
+    own_table,
+    seed_of,
+    trials_of_report,
+    wanted_deviation,
+)
 from levilab.crosscheck.study import Spread
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
@@ -50,7 +63,25 @@ def test_a_mean_of_several_runs_has_trials_that_differ_as_the_runs_do(runs: Any)
     u = runs.combined.fit("disc").constants["c32"].u
     assert np.std(c, ddof=1) > 0.3 * u  # each run's own readings would give a twelfth
     assert all(trial.law for trial in means)
-    assert trials_of_report(own) == 0  # a report has no time for them
+    assert [pull.quantity for pull in means[0].pulls] == ["c32_of_one_run"] * 2 + ["c32", "exponent"]
+    ones = np.array([pull.value for trial in means for pull in trial.pulls[:2]])
+    assert np.std(ones) == pytest.approx(1, abs=0.65)  # 3 standard errors from 12
+
+
+@pytest.mark.parametrize(
+    ("cost_s", "trials"), [(1e-4, TRIALS), (0.02, 100), (0.13, ENOUGH), (0.3, 13), (0.8, FEWEST), (0.9, 0)]
+)
+def test_a_report_makes_as_many_trials_as_it_has_time_for(cost_s: float, trials: int):
+    """Four runs of 20 readings cost 0.13 s, one with a tilt 0.3 s: a fit with it takes ten times as long."""
+    assert trials_of_report(Own("", lambda _: Trial([]), cost_s)) == trials
+
+
+def test_the_cost_of_a_spin_down_grows_with_its_runs_and_its_tilt(runs: Any, monkeypatch: pytest.MonkeyPatch):
+    two = OWN["spindown"](runs)
+    monkeypatch.setattr("analysis.spindown.lawfit.LawFit.has_tilt", True)
+    tilted = OWN["spindown"](runs)
+    assert trials_of_report(two) == 30
+    assert FEWEST < trials_of_report(tilted) < 10
 
 
 def test_one_spin_down_and_one_scan_come_to_their_own_values(sample_data: Path):
@@ -79,6 +110,25 @@ def test_a_bias_and_a_u_that_is_too_small_are_noticed_and_a_u_too_large_is_not()
     assert not holds(spread(0.4, 1.0))
     assert not holds(spread(0.0, 1.4))
     assert holds(spread(0.0, 0.5))
+
+
+def test_pulls_of_few_pulses_are_compared_with_students_law():
+    t = np.random.default_rng(6).standard_t(9, 4000) / student(9)  # u with Student's factor
+    pulls = Spread("x", tuple(t), 0.1)
+    assert pulls.coverage == pytest.approx(0.683, abs=0.022)  # 3 standard errors
+    assert pulls.deviation == pytest.approx(wanted_deviation(None, 9), abs=0.06)
+    assert holds(replace(pulls, pulls=tuple(1.08 * t)), widened=9)
+    assert not holds(replace(pulls, pulls=tuple(1.08 * t)))
+    assert not holds(replace(pulls, pulls=tuple(1.3 * t)), widened=9)
+
+
+def test_a_record_of_few_pulses_says_by_how_much_pulls_scatter(sample_data: Path):
+    checked = check_own("spin", result("spin", sample_data / "trace-laser"), {}, 150)
+    assert checked.widened == 15  # 19 pulses, four coefficients
+    assert checked.holds
+    assert "pulls have a standard deviation of 1.04" in in_words(checked)
+    # single bends that were not fitted made it 1.3 to 1.5, single records at half the frequency 1000
+    assert {round(one.deviation, 1) for one in checked.spreads} <= {0.9, 1.0, 1.1}
 
 
 def test_a_wrong_analysis_is_named(monkeypatch: pytest.MonkeyPatch, sample_data: Path):

@@ -61,7 +61,9 @@ def test_what_makes_no_sense_is_refused_before_anything_is_simulated(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_page_of_too_long_a_span_names_the_longest_one(tmp_path: Path) -> None:
+def test_a_page_of_too_long_a_span_names_the_longest_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before anything is simulated: 90 s take a while."""
+    monkeypatch.setattr("levilab.motion.simulation.run_simulation", None)
     ended = command(
         "simulate",
         "undriven",
