@@ -305,8 +305,8 @@ def compare_with_drive(session: Session[D], slip: Slip) -> None:
 # --- a top, and time, for a series or a sweep ---
 
 
-def have_a_top(session: Session[D], text: str, number: int, *, within_s: float) -> None:
-    """See that a top floats; where none does, ask a person for one.
+def have_a_top(session: Session[D], text: str, number: int, *, within_s: float) -> bool:
+    """See that a top floats; where none does, ask a person for one.  Returns whether that was needed.
 
     Args:
         session: the acquisition.
@@ -318,13 +318,14 @@ def have_a_top(session: Session[D], text: str, number: int, *, within_s: float) 
         ExperimentFailed: the counter still sees none.
     """
     if spin_now(session) is not None:
-        return
+        return False
     session.ask(FloatTop(text, number))
     end = session.now() + within_s
     while spin_now(session) is None:
         if session.now() >= end:
             raise no_light(session)
         session.wait(_LOOK_FOR_TOP_S)
+    return True
 
 
 def is_over(session: Session[D]) -> bool:
