@@ -100,6 +100,10 @@ class DidNotFollow(ExperimentFailed):
     """The drive did not bring the top to where it should."""
 
 
+class NoLight(ExperimentFailed):
+    """The counter counts nothing."""
+
+
 class NotHeld(Exception):
     """The top does not spin with the drive; what is seen instead.
 
@@ -197,8 +201,8 @@ def drive_up(session: Session[D], to: float | None = None) -> None:
 def _did_not_follow(session: Session[D], target: float, seen: str) -> DidNotFollow:
     name = session.writer.record.experiment
     return DidNotFollow(
-        f"the top did not follow the drive to {target:g} Hz ({seen}): ramp slower ({name}.ramp_hz_per_s) or drive "
-        f"harder ({name}.drive_amplitude_vpp)"
+        f"the top did not follow the drive to {target:g} Hz ({seen})",
+        f"ramp slower ({name}.ramp_hz_per_s) or drive harder ({name}.drive_amplitude_vpp)",
     )
 
 
@@ -208,16 +212,16 @@ def _free_spin(session: Session[D], target: float, before: str) -> float:
     if spin is None and before:
         raise _did_not_follow(session, target, f"{before}; then it fell")
     if spin is None:
-        raise no_light(session)
+        raise _no_light(session)
     return spin
 
 
-def no_light(session: Session[D]) -> ExperimentFailed:
-    """What to look at where the counter counts nothing."""
+def _no_light(session: Session[D]) -> NoLight:
     name = session.writer.record.experiment
-    return ExperimentFailed(
-        f"the counter sees no light pulses at {session.settings.trigger_level_v:g} V: is the top floating and "
-        f"lit, and the trigger level between dark and bright ({name}.trigger_level_v in the bench file)?"
+    return NoLight(
+        f"the counter sees no light pulses at {session.settings.trigger_level_v:g} V",
+        "is the top floating and lit, and the trigger level between dark and bright "
+        f"({name}.trigger_level_v in the bench file)?",
     )
 
 
@@ -323,7 +327,7 @@ def have_a_top(session: Session[D], text: str, number: int, *, within_s: float) 
     end = session.now() + within_s
     while spin_now(session) is None:
         if session.now() >= end:
-            raise no_light(session)
+            raise _no_light(session)
         session.wait(_LOOK_FOR_TOP_S)
     return True
 

@@ -39,7 +39,16 @@ Row = dict[str, float]
 
 
 class ExperimentFailed(LevilabError):
-    """The experiment cannot go on, for a reason that lies on the bench."""
+    """The experiment cannot go on, for a reason that lies on the bench.
+
+    Attributes:
+        seen: what was seen; the text without what is to be done about it.
+        advice: what is to be done; empty where `seen` says it.
+    """
+
+    def __init__(self, seen: str, advice: str = "") -> None:
+        self.seen, self.advice = seen, advice
+        super().__init__(f"{seen}: {advice}" if advice else seen)
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,8 @@ class Desk:
             self.count += 1
             if event.kind == "ready":
                 self.scene = event.scene
-            self.said.append({"n": self.count, "kind": event.kind, "text": event.text[:_LONGEST_TEXT]})
+            text = event.text[:_LONGEST_TEXT]
+            self.said.append({"n": self.count, "kind": event.kind, "text": text, "status": event.status})
 
     def said_after(self, number: object) -> list[dict[str, Any]]:
         """Return what was said after that of a number."""

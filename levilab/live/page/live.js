@@ -11,7 +11,11 @@ const NEWS_EVERY_MS = 6000;
 const MOST_EVENTS = 200;
 const STATES = {
   none: "no run yet", running: "running", finished: "finished", interrupted: "interrupted", failed: "failed",
-  silent: "bench silent", lost: "instrument lost", missing: "no run", unreachable: "server gone", idle: "ready",
+  setup: "the bench is being set up", silent: "bench silent", lost: "instrument lost", missing: "no run", unreachable: "server gone", idle: "ready",
+};
+const LONGER = {  // what stands beside the state
+  setup: "some seconds; at the first start the simulator is compiled, which takes up to a minute",
+  unreachable: "it is tried again; start levilab live anew if it was ended",
 };
 const SLIP_HZ = 0.05;  // a top that follows is counted this near to its drive
 
@@ -141,7 +145,8 @@ function stateOf() {
   if (!reachable) return "unreachable";
   if (bench?.lost?.length && !bench.silent) return "lost";
   if (about?.status === "running" && bench?.silent) return "silent";
-  if (practice && !bench?.busy && (!about || about.status === "missing")) return bench && !bench.silent ? "idle" : "silent";
+  if (practice && !bench) return practice.ended ? "silent" : "setup";
+  if (practice && !bench.busy && (!about || about.status === "missing")) return bench.silent ? "silent" : "idle";
   return about ? about.status : "none";
 }
 
@@ -152,7 +157,7 @@ function show() {
   write("state-word", STATES[state] || state);
   const lost = bench?.lost?.length ? `the ${bench.lost.join(" and the ")} does not answer` : "";
   const running = about?.status === "running" || practice;
-  write("state-text", lost || (state === "unreachable" ? "it is tried again" : about?.problem || (running && !bench?.silent && bench?.text) || ""));
+  write("state-text", lost || LONGER[state] || about?.problem || (running && !bench?.silent && bench?.text) || "");
   by("synthetic").hidden = !(about?.synthetic || (!about && bench?.virtual));
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
   write("elapsed", Number.isFinite(elapsed) ? lapse(elapsed) : "");
@@ -166,7 +171,7 @@ function show() {
   document.body.classList.toggle("no-scope", !data.records.size && !practice && Boolean(about) && about.status !== "running");
   write("count", data.count ? `${data.count.toLocaleString("en").replaceAll(",", "\u202f")}${data.readings?.single === false ? ", each stroke from the lowest to the highest of many" : ""}` : "");
   by("empty").hidden = data.count > 0;
-  write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: "No run yet: the guide says how to record one."}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
+  write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: "No run yet: the guide says how to record one.", setup: "The bench is being set up."}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
   document.title = `${state === "running" && data.count ? `${data.count} readings · ` : ""}levilab live`;
   practice?.show(bench, about, data.count);
   space?.setSpeed?.(bench?.speed, bench?.paused || bench?.silent);
