@@ -9,6 +9,7 @@ is damped comes back to zero voltage for the same reason: Stewart, Appl. Phys. L
 """
 
 from __future__ import annotations
+
 from dataclasses import dataclass
 
 #: A count is of so long a gate [s] and moves the drive by this share of its difference to the spin; after so many the

@@ -29,7 +29,9 @@ class BenchGone(LevilabError):
 
 
 class PracticeBench:
-    """A virtual bench in a process of its own.  Its time stands still while no view looks and no run is recorded.  It ends with `close`, or when the process that holds it dies.
+    """A virtual bench in a process of its own.  It ends with `close`, or when the process that holds it dies.
+
+    Its time stands still while no view looks and no run is recorded.
 
     No call waits but `close`; call `events` some ten times a second::
 

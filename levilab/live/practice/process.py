@@ -70,7 +70,7 @@ RAMP_STEP_S = 0.5
 #: The drive can take hold of a top that spins as fast as it is set, within this [Hz].
 CATCHES_WITHIN_HZ = 1.0
 #: A top that the drive took hold of swings about it by less than this [Hz], on the ramp, too.  One that is not held
-#: loses 0.1 Hz/s to the air: so long after the drive has yielded it is compared [s], and it is lost from so far on [Hz].
+#: loses 0.1 Hz/s to the air: so long after the drive has yielded it is compared [s].  So far off [Hz] it is lost.
 SWINGS_HZ, COMPARED_S, LOST_HZ = 0.4, 6.0, 1.0
 #: A top that follows the drive so much higher than where it took hold was tuned up [Hz].
 TUNED_UP_HZ = 0.5
@@ -345,7 +345,7 @@ class PracticeProcess:
             self._looking = False
 
     def _rest(self) -> None:
-        """Let time stand still where a person says so, and while no view looks: a top would be down before it is seen."""
+        """Let time stand still where a person says so, and while no view looks, lest the top be down when one comes."""
         is_idle = self._is_ready and self._session is None and self._wanted is None
         alone = self._options.rests and is_idle and not self._publisher.is_watched
         self.clock.paused = not self._over and (self._paused or alone)
@@ -434,7 +434,7 @@ class PracticeProcess:
         self._request(command)  # raises where it is not possible
         if command.experiment in NEED_A_TOP and not self._floats():
             raise CommandRefused(
-                f"the top is down, and a {command.experiment} run begins with one that floats: put the top back, then record"
+                f"the top is down, and a {command.experiment} run begins with one that floats: put the top back first"
             )
         self._wanted, self._stopped = command, ""
         return f"the run begins: {command.experiment}"
