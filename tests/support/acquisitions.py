@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from levilab.world.spin_world import World
 
-#: Counts before the drive is off: the spin at first, 27 while the drive takes hold, every 10 s of some 200 on the way up,
-#: and at the end of it.
+#: Counts before the drive is off: the spin at first, 27 while the drive takes hold, every 10 s of some 200 on the way
+#: up, and at the end of it.
 BEFORE = 48
 
 
