@@ -28,17 +28,20 @@ export function openPractice(about, command, run, allowed) {
   /** What the bench says: a refusal, or a line for the person at it. */
   function hear({kind, text, status}) {
     now.ended ||= kind === "ended";
+    if (allowed && (kind === "done" || kind === "recording")) write("said", "");
     if (allowed && (kind === "refused" || kind === "ended" || (kind === "recorded" && status === "failed"))) write("said", text);
   }
 
   let timer = 0, latest = null;
   function tune(values) {
     latest = {...latest, ...values};
-    timer ||= setTimeout(() => {
-      timer = 0;
-      send("tune the drive", latest);
-      latest = null;
-    }, SENDS_EVERY_MS);
+    timer ||= setTimeout(sendTune, SENDS_EVERY_MS);
+  }
+  function sendTune() {
+    const values = latest;
+    clearTimeout(timer);
+    [timer, latest] = [0, null];
+    return values && !now.busy ? send("tune the drive", values) : undefined;
   }
   const pair = (number, slider, key) => {
     const pass = (source, other) => {
@@ -61,7 +64,12 @@ export function openPractice(about, command, run, allowed) {
     record: () => now.busy ? send("stop the run") : send("record a run", {experiment: by("experiment").value}),
     analyze: () => openResult(run()),
   };
-  for (const [id, act] of Object.entries(does)) by(id).addEventListener("click", act);
+  for (const [id, act] of Object.entries(does)) {
+    by(id).addEventListener("click", async () => {
+      await sendTune();  // what was typed just before comes first
+      act();
+    });
+  }
   by("speed").addEventListener("change", () => send("set the speed", {speed: Number(by("speed").value)}));
 
   /** Tune by a step, as with the keys. */
@@ -77,10 +85,12 @@ export function openPractice(about, command, run, allowed) {
     write(id, text);
   }
 
-  function show(bench, about_run, readings) {
+  /** @param {boolean} down whether the top is down while nothing is recorded. */
+  function show(bench, about_run, readings, down) {
     if (!bench) return;
     const {drive} = bench;
     Object.assign(now, {drive: Boolean(drive?.output), busy: bench.busy, paused: bench.paused});
+    by("back").classList.toggle("main", down);
     press("drive", now.drive, now.drive ? "Drive off" : "Drive on");
     press("hold", now.paused, now.paused ? "Let time go on" : "Stop time");
     write("record", now.busy ? "End run" : "Record");
@@ -150,7 +160,7 @@ export function openPractice(about, command, run, allowed) {
 
   return {
     show, step, hear, get ended() { return now.ended; },
-    act: (id) => !by(id).disabled && does[id](),
+    act: (id) => by(id).click(),
   };
 }
 
