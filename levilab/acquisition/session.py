@@ -42,13 +42,13 @@ class ExperimentFailed(LevilabError):
     """The experiment cannot go on, for a reason that lies on the bench.
 
     Attributes:
-        seen: what was seen; the text without what is to be done about it.
-        advice: what is to be done; empty where `seen` says it.
+        observed: what was seen; the text without what is to be done about it.
+        advice: what is to be done; empty where `observed` says it.
     """
 
-    def __init__(self, seen: str, advice: str = "") -> None:
-        self.seen, self.advice = seen, advice
-        super().__init__(f"{seen}: {advice}" if advice else seen)
+    def __init__(self, observed: str, advice: str = "") -> None:
+        self.observed, self.advice = observed, advice
+        super().__init__(f"{observed}: {advice}" if advice else observed)
 
 
 @dataclass(frozen=True)

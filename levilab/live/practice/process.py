@@ -654,7 +654,7 @@ class PracticeProcess:
             yield self.look
         except ExperimentFailed as failed:
             # no bench file is at hand here, and the settings are the page's
-            raise ExperimentFailed(failed.seen, ADVICE.get(type(failed), failed.advice)) from failed
+            raise ExperimentFailed(failed.observed, ADVICE.get(type(failed), failed.advice)) from failed
         finally:
             if session.stop.by and session.stop.by.startswith("SIG"):
                 self._over = True
