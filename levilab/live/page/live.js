@@ -66,7 +66,7 @@ function take(head, arrays) {
 
 function turnTo(run) {
   Object.assign(seen, {run, readings: -1, events: 0, fit: -1});
-  Object.assign(data, {readings: null, fit: null, about: null, last: {}, count: 0, trend: NaN});
+  Object.assign(data, {readings: null, fit: null, about: null, ended: "", last: {}, count: 0, trend: NaN});
   by("event-list").replaceChildren();
   pointed = -1;
   dirty = {plot: true, trace: true};
@@ -98,6 +98,7 @@ function takeEvents(events) {
   for (const event of events) {
     if (event.n <= seen.events) continue;
     seen.events = event.n;
+    if (/^(failed|interrupted)$/.test(event.kind)) data.ended = event.text;
     const loud = /warning|damaged/.test(event.kind) ? "warning" : /lost|failed|not reached/.test(event.kind) ? "lost" : "";
     listEvent(event.time_s === null ? "" : lapse(event.time_s).replace(" min", ""), event.text, loud);
   }
@@ -160,7 +161,7 @@ function show() {
   const running = about?.status === "running" || practice;
   const down = Boolean(practice) && data.up === false && Boolean(bench) && !bench.silent && !bench.busy;
   const advice = down ? `the top is down: “Top back” floats it again${data.count ? ", “Analyze” shows what was recorded" : ""}` : "";
-  write("state-text", lost || LONGER[state] || advice || about?.problem || (running && !bench?.silent && bench?.text) || "");
+  write("state-text", lost || LONGER[state] || advice || about?.problem || ended(about) || (running && !bench?.silent && bench?.text) || "");
   by("synthetic").hidden = !(about?.synthetic || (!about && bench?.virtual));
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
   write("elapsed", Number.isFinite(elapsed) ? lapse(elapsed) : "");
@@ -181,6 +182,11 @@ function show() {
   space?.setSpeed?.(bench?.speed, bench?.paused || bench?.silent);
   showTop(bench);
   speak(state, left);
+}
+
+/** How a run ended that did not finish: its last event. */
+function ended(about) {
+  return /failed|interrupted/.test(about?.status) ? data.ended || "" : "";
 }
 
 function showBar(about, bench) {
