@@ -39,7 +39,7 @@ EXPERIMENTS = {
         "precession.hold_s=5",
     ),
     "limit": ("limit.repetitions=2",),
-    "trace": (),
+    "trace": ("trace.records=5", "trace.interval_s=2"),  # a free top is down before ten records of every 10 s
     "field": (),
 }
 

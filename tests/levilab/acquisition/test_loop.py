@@ -390,7 +390,7 @@ def test_why_a_run_failed_is_written_down_without_backquotes(tmp_path: Path, mon
     with pytest.raises(CannotWrite, match="`out`"):
         acquire(mock(tmp_path), Silent())
     (folder,) = tmp_path.iterdir()
-    assert Run.load(folder).events()[-1]["text"] == "CannotWrite: the disk is full: choose another place with out"
+    assert Run.load(folder).events()[-1]["text"] == "the disk is full: choose another place with out"
 
 
 def test_what_a_resumed_virtual_run_goes_through_again_is_not_shown(tmp_path: Path) -> None:
