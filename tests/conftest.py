@@ -1,5 +1,6 @@
 """What all tests share."""
 
+import functools
 import os
 import signal
 import sys
@@ -45,8 +46,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     tests = Path(__file__).parent
     slow = [(tests / name).resolve() for name in SLOW.split()]
     assert all(path.exists() for path in slow), "SLOW in tests/conftest.py names a file that is gone"
+    is_slow = functools.cache(lambda file: any(file.is_relative_to(path) for path in slow))
     for item in items:
-        if any(item.path.is_relative_to(path) for path in slow):
+        if is_slow(item.path):
             item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 

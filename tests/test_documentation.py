@@ -43,21 +43,24 @@ def test_python_in_the_pages_prints_what_it_says(page: str, code: str, tmp_path:
     assert shown.getvalue().splitlines() == re.findall(r"print\(.*\)  # (.*)", code)
 
 
-def steps() -> dict[str, list[tuple[str, str]]]:
-    """Page → (command, what the page shows of its output), in order, each once; "" where it shows nothing.
+def steps() -> dict[str, dict[str, list[str]]]:
+    """Page → command → what the page shows of its output; in order, each command once.
 
     Blocks of ``sh`` are commands alone.  In a block of ``console`` a command stands after ``$``, above its output.
     """
-    found: dict[str, list[tuple[str, str]]] = {}
+    found: dict[str, dict[str, list[str]]] = {}
     for page in PAGES:
-        text, steps = page.read_text(encoding="utf-8"), found.setdefault(page.relative_to(ROOT).as_posix(), [])
+        text, steps = page.read_text(encoding="utf-8"), list[tuple[str, str]]()
         for language, block in re.findall(r"```(sh|console)\n(.*?)```", text, re.DOTALL):
             if language == "sh":
                 lines = [line.split("  #")[0].strip() for line in block.splitlines()]
                 steps += [(line, "") for line in lines if line.startswith("levilab ") and ".csv" not in line]
             else:
                 steps += re.findall(r"^\$ (levilab .*)\n((?:(?!\$ ).*\n)*)", block, re.MULTILINE)
-    return {page: list(dict.fromkeys(steps)) for page, steps in found.items() if steps}
+        for line, shown in steps:
+            outputs = found.setdefault(page.relative_to(ROOT).as_posix(), {}).setdefault(line, [])
+            outputs += [shown] if shown else []
+    return found
 
 
 def as_pattern(shown: str) -> str:
@@ -71,11 +74,11 @@ def as_pattern(shown: str) -> str:
 @pytest.mark.parametrize("page", steps())
 def test_the_commands_of_a_page_work_one_after_another(tmp_path: Path, page: str) -> None:
     shutil.copytree(ROOT / "sample_data", tmp_path / "sample_data")
-    for line, shown in steps()[page]:
+    for line, outputs in steps()[page].items():
         ended = command(*shlex.split(line)[1:], cwd=tmp_path)
         assert ended.status == 0, (line, ended.err)
-        if shown:
-            written = ended.err + ended.out  # progress comes before results
+        written = ended.err + ended.out  # progress comes before results
+        for shown in outputs:
             assert re.match(as_pattern(shown), written), (line, shown, written)
 
 

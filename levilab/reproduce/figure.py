@@ -225,7 +225,6 @@ def _draw_falls(axes: Axes, shown: Scans) -> None:
         axes.plot(k + spread, values, ".", color=colour, markersize=3)
         axes.plot([k - 0.4, k + 0.4], [WITH_DRAG_HZ[name]] * 2, color=colour, linestyle=(0, (4, 2)))
     axes.set_xticks(range(len(shown.falling)), list(shown.falling))
-    axes.tick_params(axis="x", which="minor", bottom=False)
     axes.set_ylabel("spin at the fall  [Hz]")
     axes.set_title("With drag")
 
@@ -423,7 +422,6 @@ def statistics_figure(values: Array, found: Statistics, edge: float) -> Figure:
     left.axhline(edge, color=ORANGE, linestyle=":")
     left.plot(np.arange(1, values.size + 1), values, **LOOKS["readings"].as_points)
     left.set(xlabel="top", ylabel="spin at the fall  [Hz]", xlim=(0.5, values.size + 0.5))
-    left.tick_params(axis="x", which="minor", bottom=False)
     quantiles = ndtri((np.arange(values.size) + 0.625) / (values.size + 0.25))
     right.plot(quantiles, mean + scatter * quantiles, color=LOOKS["fit"].colour)
     right.plot(quantiles, np.sort(values), **LOOKS["readings"].as_points)

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Pixels that a letter's box is larger than the letter, and by how much less than a line's box is looked at.
 _EDGE = 1.5
+#: Of the points of a line: where its pieces begin, and where they end.
+_STARTS, _ENDS = slice(None, -1), slice(1, None)
 
 
 @contextlib.contextmanager
@@ -46,12 +48,11 @@ def faults(figure: Figure) -> list[str]:
         found += [f"{_named(text)} over {_named(other)}" for other, at in boxes[:k] if _overlap(box, at)]
     for axes in figure.axes:
         if axes.get_visible():
-            found += [
-                f"{_named(text)} over {what}"
-                for what, marks in _drawn(axes)
-                for text, box in boxes
-                if _hits(marks, box)
-            ]
+            for what, marks in _drawn(axes):
+                if len(marks):
+                    around = Bbox((marks.min(axis=0), marks.max(axis=0)))
+                    beside = [(text, box) for text, box in boxes if _overlap(around, box)]
+                    found += [f"{_named(text)} over {what}" for text, box in beside if _hits(marks, box)]
     return found
 
 
@@ -89,7 +90,7 @@ def _inside(box: Bbox, whole: Bbox) -> bool:
 
 
 def _overlap(one: Bbox, other: Bbox) -> bool:
-    return one.x0 < other.x1 and other.x0 < one.x1 and one.y0 < other.y1 and other.y0 < one.y1
+    return bool(one.x0 <= other.x1 and other.x0 <= one.x1 and one.y0 <= other.y1 and other.y0 <= one.y1)
 
 
 def _drawn(axes: Axes) -> Iterator[tuple[str, Array]]:
@@ -100,10 +101,11 @@ def _drawn(axes: Axes) -> Iterator[tuple[str, Array]]:
             yield f"the line {line.get_label()}", _clipped(_line(line), inside if line.get_clip_on() else None)
     for bars in axes.collections:
         if isinstance(bars, LineCollection) and bars.get_visible():
-            transform = bars.get_transform()
-            pieces = [_dense(transform.transform(piece)) for piece in bars.get_segments() if len(piece) > 1]
+            pieces = [piece for piece in bars.get_segments() if len(piece) > 1]
             if pieces:
-                yield "a bar", _clipped(np.concatenate(pieces), inside)
+                to_pixels = bars.get_transform().transform
+                starts, ends = (to_pixels(np.concatenate([piece[k] for piece in pieces])) for k in (_STARTS, _ENDS))
+                yield "a bar", _clipped(_between(starts, ends), inside)
 
 
 def _line(line: Line2D) -> Array:
@@ -116,12 +118,19 @@ def _line(line: Line2D) -> Array:
 
 
 def _dense(points: Array) -> Array:
-    """The line through some points as points at most a pixel apart; no more than can matter."""
-    points = np.clip(points, -1e4, 1e4)
-    steps = np.maximum(np.ceil(np.hypot(*np.diff(points, axis=0).T)).astype(int), 1)
+    """The line through some points as points at most a pixel apart."""
+    return _between(points[_STARTS], points[_ENDS])
+
+
+def _between(starts: Array, ends: Array) -> Array:
+    """Straight pieces as points at most a pixel apart, with both ends; no more than can matter."""
+    starts, ends = (np.clip(points, -1e4, 1e4) for points in (starts, ends))
+    steps = np.maximum(np.ceil(np.hypot(*(ends - starts).T)).astype(int), 1)
     if steps.sum() > 200_000:
-        return points
-    return np.concatenate([np.linspace(a, b, n + 1) for a, b, n in zip(points[:-1], points[1:], steps, strict=True)])
+        return np.concatenate([starts, ends])
+    number = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)  # of the step in its piece
+    step = np.repeat((ends - starts) / steps[:, None], steps, axis=0)
+    return np.concatenate([np.repeat(starts, steps, axis=0) + number[:, None] * step, ends])
 
 
 def _clipped(points: Array, box: Bbox | None) -> Array:

@@ -73,7 +73,6 @@ def _speeds(axes: Axes, found: Study) -> None:
     axes.set_xscale("log")
     axes.set(xlabel="MS/s of one core; bar: aim", ylim=(-0.6, len(names) - 0.4))
     axes.set_yticks(range(len(names)), list(reversed(names)), fontsize=SMALL)
-    axes.tick_params(axis="y", which="minor", left=False)
 
 
 def _hard(axes: Axes, scores: tuple[Score, ...]) -> None:
@@ -89,6 +88,5 @@ def _hard(axes: Axes, scores: tuple[Score, ...]) -> None:
         [s.name + (f" ({s.failures} failed)" if s.failures else "") for s in reversed(scores)],
         fontsize=SMALL,
     )
-    axes.tick_params(axis="y", which="minor", left=False)
     axes.set_title("The default on hard cases; shaded: as wanted", fontsize=8)
     axes.set(xlabel="1σ intervals that hold the truth  [%]", xlim=(55, 81), ylim=(-0.8, len(scores) - 0.2))

@@ -106,7 +106,6 @@ def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.ticklabel_format(axis="y", useOffset=False)
     axes.set(xlabel="top, one after another", ylabel="spin frequency ν  [Hz]")
-    axes.tick_params(axis="x", which="minor", bottom=False)
     title = ("Lower limit: the spin at which a free top falls", _upper_title(group))[group.which == "upper"]
     made_up = {bool(source.synthetic) for source in analysis.sources}
     own = all(analysis.sources[number].synthetic for number in group.runs)
@@ -184,7 +183,6 @@ def _draw_distribution(axes: Axes, analysis: LimitAnalysis, group: Limits) -> No
     axes.tick_params(labelleft=False)
     axes.set_xlabel("tops")
     axes.xaxis.set_major_locator(MaxNLocator(4, integer=True))
-    axes.tick_params(axis="x", which="minor", bottom=False)
     if s == 0:
         axes.text(0.5, 0.5, "too few for\na distribution" if len(limits) < _FEWEST else "all alike", ha="center",
                   va="center", fontsize=SMALL, color="0.35", transform=axes.transAxes)  # fmt: skip

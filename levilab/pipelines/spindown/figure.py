@@ -385,7 +385,7 @@ def _draw_straight_lines(figure: Figure, top: float, analysis: SpinDownAnalysis)
             axes.tick_params(labelsize=SMALL)
         above.tick_params(labelbottom=False)
         strip.set(xlabel="time  [s]", xlim=above.get_xlim())
-    most = max(abs(limit) for strip in strips for limit in strip.get_ylim())
+    most = 1.1 * max(abs(limit) for strip in strips for limit in strip.get_ylim())
     for strip in strips:
         strip.set_ylim(-most, most)  # in parts of the range, so that one sees which line is the straightest
     strips[0].set_ylabel("off  [%]", fontsize=8)

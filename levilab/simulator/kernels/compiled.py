@@ -1,7 +1,8 @@
 """How the simulator's kernels are compiled, and where the machine code is kept.
 
 Numba keeps compiled code on disk and looks at one source file to see whether it is still good.  Ours are put
-together from several files, so they are kept in a folder that is named by the source of all of them.
+together from several files, so they are kept in a folder that is named by the source of all of them, wherever that
+lies: a second environment, or the same version installed anew, compiles nothing.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numba
 import numba.core
 from numba.core import types
+from numba.core.caching import UserProvidedCacheLocator
 from numba.extending import intrinsic, overload
 from platformdirs import user_cache_path
 
@@ -38,6 +40,14 @@ def cache_key(sources: Path) -> str:
     for source in sorted(sources.glob("*.py")):
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
+
+
+class InOneFolder(UserProvidedCacheLocator):
+    """Where numba looks for compiled code: in the folder itself, and not in one named by the path of the source."""
+
+    def get_cache_path(self) -> str:
+        """The folder."""
+        return os.path.dirname(self._cache_path)  # noqa: PTH120 - a text, as numba has it
 
 
 @cache
@@ -81,8 +91,9 @@ def aside(function: F) -> F:
 def kernel(function: F) -> F:
     """An entry point: compiled once for each kind of scene, kept on disk, run without the interpreter's lock."""
     config: Any = numba.core.config
-    before, folder = config.CACHE_DIR, _folder()
-    config.CACHE_DIR = before or str(folder or "")  # read by numba here, when the function is decorated
+    before, locators, folder = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES, _folder()
+    if folder and not before:  # read by numba here, when the function is decorated
+        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = str(folder), f"{__name__}.{InOneFolder.__name__}"
     try:
         compiled: F = numba.njit(
             function,
@@ -93,7 +104,7 @@ def kernel(function: F) -> F:
             boundscheck=False,
         )
     finally:
-        config.CACHE_DIR = before
+        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before, locators
     return compiled
 
 

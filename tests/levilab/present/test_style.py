@@ -13,6 +13,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from levilab.present.style import STYLE, WIDE, as_pdf, as_png, as_svg, save_png
+from support.figures import faults
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -105,3 +106,13 @@ def test_the_same_figure_is_saved_as_the_same_bytes_with_its_fonts_inside() -> N
     assert as_png(drawing()) == as_png(drawing())
     assert b"/FontFile2" in page
     assert b"/CreationDate" not in page
+
+
+def test_what_lies_over_a_line_or_a_bar_is_found() -> None:
+    figure = Figure()
+    axes = figure.add_subplot()
+    axes.plot([0, 1], [0, 1], label="slope")
+    axes.vlines([0.2], 0, 1)
+    for x, y, text in ((0.5, 0.48, "on the slope"), (0.18, 0.7, "on a bar"), (0.8, 0.1, "free")):
+        axes.text(x, y, text)
+    assert faults(figure) == ["'on the slope' over the line slope", "'on a bar' over a bar"]

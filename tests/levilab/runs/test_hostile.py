@@ -383,7 +383,9 @@ def test_too_few_open_files_from_the_start_cost_one_line(tmp_path: Path, files: 
 
 
 @posix_only
-@pytest.mark.parametrize("words", [["acquire", "spin", "--mock"], ["report", str(SAMPLE)], ["runs", str(SAMPLE)]])
+@pytest.mark.parametrize(
+    "words", [["acquire", "spin", "--mock"], ["report", str(SAMPLE), "--no-crosscheck"], ["runs", str(SAMPLE)]]
+)
 def test_too_few_open_files_cost_one_line(tmp_path: Path, words: list[str]) -> None:
     """In this process, which has imported all by then; it may open so many files more than it has."""
     import resource

@@ -31,6 +31,18 @@ def analysis_of(*paths: Path, u: float | None = None) -> SpinDownAnalysis:
     return analyze_spindowns(paths, SpinDownOptions(reading_u=u))
 
 
+@pytest.fixture(scope="module")
+def analysis(tmp_path_factory: pytest.TempPathFactory) -> SpinDownAnalysis:
+    """Of a run of twenty readings with their u."""
+    return analysis_of(spin_down_csv(tmp_path_factory.mktemp("run") / "a.csv"))
+
+
+@pytest.fixture(scope="module")
+def figure(analysis: SpinDownAnalysis) -> Figure:
+    """Its figure, which no test changes."""
+    return spindown_figure(analysis)
+
+
 def panels(figure: Figure) -> tuple[Axes, list[Axes], list[Axes], list[Axes]]:
     """The spin, the residuals, the straight lines and the strips below them."""
     spin, _, _, *others = figure.axes
@@ -61,8 +73,8 @@ def with_readings(path: Path, rows: Sequence[tuple[int, str]]) -> Path:
     return path
 
 
-def test_every_axis_says_quantity_and_unit(tmp_path: Path) -> None:
-    spin, residuals, lines, strips = panels(spindown_figure(analysis_of(spin_down_csv(tmp_path / "a.csv"))))
+def test_every_axis_says_quantity_and_unit(figure: Figure) -> None:
+    spin, residuals, lines, strips = panels(figure)
     assert "Hz" in spin.get_ylabel()
     assert "[s]" in spin.get_xlabel()
     assert [axes.get_title(loc="left") for axes in residuals] == list(COLOURS)
@@ -71,15 +83,16 @@ def test_every_axis_says_quantity_and_unit(tmp_path: Path) -> None:
     assert all("[s]" in axes.get_xlabel() for axes in (*residuals, *strips))
 
 
-def test_straight_line_panels_show_angular_frequency_as_the_tables_do(tmp_path: Path) -> None:
-    analysis = analysis_of(spin_down_csv(tmp_path / "a.csv"))
-    lines = panels(spindown_figure(analysis))[2]
+def test_straight_line_panels_show_angular_frequency_as_the_tables_do(
+    analysis: SpinDownAnalysis, figure: Figure
+) -> None:
+    lines = panels(figure)[2]
     drawn = next(line for line in lines[0].get_lines() if line.get_linestyle() == "None")
     assert np.asarray(drawn.get_ydata()) == pytest.approx(np.log(2 * np.pi * analysis.runs[0].frequency))
 
 
-def test_good_laws_share_a_scale_and_a_bad_one_says_that_it_has_its_own(tmp_path: Path) -> None:
-    residuals = panels(spindown_figure(analysis_of(spin_down_csv(tmp_path / "a.csv"))))[1]
+def test_good_laws_share_a_scale_and_a_bad_one_says_that_it_has_its_own(figure: Figure) -> None:
+    residuals = panels(figure)[1]
     tops = {axes.get_title(loc="left"): axes.get_ylim()[1] for axes in residuals}
     assert tops["disc"] == tops["mixed"] == tops["power"]
     assert tops["stokes"] > 3 * tops["disc"]
@@ -121,9 +134,7 @@ def test_an_outlier_squeezes_nothing_and_stands_at_the_edge_with_its_value(tmp_p
     assert legend(spin).count("left out") == 1
 
 
-def test_every_law_is_drawn_against_the_best_one_and_named_with_the_verdict(tmp_path: Path) -> None:
-    analysis = analysis_of(spin_down_csv(tmp_path / "a.csv"))
-    figure = spindown_figure(analysis)
+def test_every_law_is_drawn_against_the_best_one_and_named_with_the_verdict(figure: Figure) -> None:
     assert curves(panels(figure)[0]) == [COLOURS["disc"]]
     axes = differences(figure)
     lines = [np.asarray(line.get_ydata()) for line in axes.get_lines() if line.get_linestyle() != "None"]
@@ -139,10 +150,9 @@ def test_every_law_is_drawn_against_the_best_one_and_named_with_the_verdict(tmp_
     assert float(names["stokes"].split()[-2].lstrip("+−")) == pytest.approx(farthest, rel=0.05)
 
 
-def test_the_band_of_the_best_law_is_twice_its_u(tmp_path: Path) -> None:
-    analysis = analysis_of(spin_down_csv(tmp_path / "a.csv"))
+def test_the_band_of_the_best_law_is_twice_its_u(analysis: SpinDownAnalysis, figure: Figure) -> None:
     run = analysis.runs[0]
-    (band,) = [one for one in differences(spindown_figure(analysis)).collections if isinstance(one, PolyCollection)]
+    (band,) = [one for one in differences(figure).collections if isinstance(one, PolyCollection)]
     u = run.fit("disc").u_spin_frequency(run.time[[0]])
     assert u is not None
     at_start = np.array([y for x, y in band.get_paths()[0].vertices.tolist() if x == run.time[0]])
@@ -150,7 +160,7 @@ def test_the_band_of_the_best_law_is_twice_its_u(tmp_path: Path) -> None:
 
 
 def test_many_runs_are_one_mark_and_one_law_each(tmp_path: Path) -> None:
-    analysis = analysis_of(*(spin_down_csv(tmp_path / f"{k}.csv", seed=k) for k in range(12)))
+    analysis = analysis_of(*(spin_down_csv(tmp_path / f"{k}.csv", seed=k, n=10) for k in range(12)))
     figure = spindown_figure(analysis)
     spin = panels(figure)[0]
     assert curves(spin) == 12 * [COLOURS[analysis.combined.best]]
@@ -169,8 +179,8 @@ def test_nothing_that_is_written_lies_over_anything_else(tmp_path: Path, rows: i
     assert faults(spindown_figure(analysis_of(path))) == []
 
 
-def test_readings_answer_to_the_pointer_where_each_is_a_point(tmp_path: Path) -> None:
-    page = as_svg(spindown_figure(analysis_of(spin_down_csv(tmp_path / "a.csv"))), "x")
+def test_readings_answer_to_the_pointer_where_each_is_a_point(figure: Figure) -> None:
+    page = as_svg(figure, "x")
     for name in ("readings-0", "residuals-best-0", "residuals-disc-0"):
         group = page[page.index(f'<g id="x-{name}">') :]
         assert group[: group.index("</g>\n   </g>")].count("<use") == 20
@@ -193,6 +203,5 @@ def test_many_readings_are_thinned_out_and_means_show_the_shape(tmp_path: Path) 
         assert 40 in points
 
 
-def test_the_same_results_are_drawn_as_the_same_bytes(sample_data: Path) -> None:
-    analysis = analysis_of(sample_data)
+def test_the_same_results_are_drawn_as_the_same_bytes(analysis: SpinDownAnalysis) -> None:
     assert as_svg(spindown_figure(analysis)) == as_svg(spindown_figure(analysis))

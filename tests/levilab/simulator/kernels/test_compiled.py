@@ -5,6 +5,7 @@ import shutil
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 
 from levilab.simulator.kernels import compiled
@@ -45,6 +46,22 @@ def test_the_code_on_the_disk_lies_under_the_key_of_the_room(monkeypatch, tmp_pa
     folder = compiled._folder.__wrapped__()
     assert folder == tmp_path / "kernels" / compiled.cache_key(KERNELS)
     assert folder.is_dir()
+
+
+def test_it_lies_there_wherever_the_sources_do(monkeypatch, tmp_path):
+    # else a second environment would compile all of it once more
+    monkeypatch.setattr(numba.core.config, "CACHE_DIR", "")
+    monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
+    places = set()
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        source = tmp_path / name / "motion.py"
+        source.write_text("def advance(x):\n    return x + 1\n", encoding="utf-8")
+        scope = {}
+        exec(compile(source.read_text(encoding="utf-8"), source, "exec"), scope)
+        places.add(str(compiled.kernel(scope["advance"]).stats.cache_path))
+    assert places == {str(tmp_path)}
+    assert numba.core.config.CACHE_LOCATOR_CLASSES == ""
 
 
 @pytest.mark.parametrize("source", sorted(KERNELS.glob("*.py")), ids=lambda path: path.name)
