@@ -16,7 +16,8 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT)]
 from support.browser import DESK, FLAGS, executable  # noqa: E402
 from support.live_pages import until  # noqa: E402
 
-#: The page draws smooth edges where it finds a graphics card; the picture is to show that.
+#: The browser of this script draws without a graphics card, where the page leaves smooth edges out to be fast.  So it
+#: is made to name a card: the picture shows the page as on a machine that has one.  Nothing but the edges differs.
 GRAPHICS = """for (const kind of [WebGLRenderingContext, WebGL2RenderingContext]) {
     const before = kind.prototype.getParameter;
     kind.prototype.getParameter = function (what) {

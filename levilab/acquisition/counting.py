@@ -56,11 +56,21 @@ class AnotherTop(ExperimentFailed):
         )
 
 
-def prepare_counter(session: Session[S]) -> None:
-    """Set the counter up for the light of a top."""
+def prepare_counter(session: Session[S], gate_s: float | None = None) -> None:
+    """Set the counter up for the light of a top; a gate is as long as the settings say, or gate_s [s]."""
     settings = session.settings
-    session.bench.counter.prepare(gate_s=settings.gate_s, trigger_level_v=settings.trigger_level_v)
+    session.bench.counter.prepare(
+        gate_s=settings.gate_s if gate_s is None else gate_s, trigger_level_v=settings.trigger_level_v
+    )
     session.bench.record_settings("counter")
+
+
+def prepare_counter_again(session: Session[S], gate_s: float | None = None) -> None:
+    """Set the counter up in the middle of a run; one that fails is reached again."""
+    try:
+        prepare_counter(session, gate_s)
+    except InstrumentError as error:
+        session.reconnect("counter", error, lambda: prepare_counter(session, gate_s))
 
 
 def spin_now(session: Session[S]) -> float | None:

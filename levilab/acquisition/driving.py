@@ -15,8 +15,9 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from analysis.locked import Slip, slip_of
 from instruments.errors import InstrumentError, OutOfRange
-from levilab.acquisition.counting import spin_now
+from levilab.acquisition.counting import prepare_counter_again, spin_now
 from levilab.acquisition.experiment import CounterSettings
+from levilab.acquisition.grip import COUNTS, GRIP_GATE_S, Grip
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.bench.person import FloatTop
@@ -38,10 +39,9 @@ HELD_WITHIN_HZ = 1.0
 #: a third of a turn in 10 s each, nor by so many standard uncertainties; a lost top loses 1 Hz meanwhile.  Of so many
 #: counts in a half.
 _DRIFTS_HZ, _DRIFTS_BY_U, _FEWEST_IN_HALF = 0.1, 3.0, 3
-#: Whether the drive takes hold depends on how the top happens to point when it comes on, and one time in four it does
-#: not.  So the top is looked at so often on the way [s] (one that is not held loses 0.1 Hz/s to the air), and tried
-#: again with the drive so many turns later: a reading ends with a pulse, so without that it would point as before.
-_LOOK_EVERY_S, _TURNS_LATER = 10.0, (0.0, 0.5, 0.25, 0.75)
+#: A top that the drive did not take hold of, or lost, loses 0.1 Hz/s to the air: it is looked at so often on the way
+#: [s], and the drive tries so many times.
+_LOOK_EVERY_S, _TRIES_TO_HOLD = 10.0, 4
 #: A top that a person was asked for is looked for so often [s].
 _LOOK_FOR_TOP_S = 2.0
 #: A point of a sweep is tried so often, and so many that fail one after the other end the sweep.
@@ -98,6 +98,10 @@ D = TypeVar("D", bound=DriveSettings)
 
 class DidNotFollow(ExperimentFailed):
     """The drive did not bring the top to where it should."""
+
+
+class NoLight(ExperimentFailed):
+    """The counter counts nothing."""
 
 
 class NotHeld(Exception):
@@ -173,9 +177,8 @@ def drive_up(session: Session[D], to: float | None = None) -> None:
     settings = session.settings
     target = settings.drive_frequency_hz if to is None else to
     seen = ""
-    for tries, later in enumerate(_TURNS_LATER, 1):
+    for tries in range(1, _TRIES_TO_HOLD + 1):
         spin = _free_spin(session, target, seen)
-        session.wait(later / spin)
         session.stop.check()  # the drive does not go on once the end was asked for
         session.bench.generator.prepare(
             waveform=settings.drive_waveform, frequency_hz=spin, amplitude_vpp=settings.drive_amplitude_vpp
@@ -183,13 +186,13 @@ def drive_up(session: Session[D], to: float | None = None) -> None:
         session.event("drive on", f"drive on at the top's spin, {spin:.2f} Hz", frequency_hz=spin)
         session.bench.generator.output = True
         try:
-            held = _ramp(session, spin, target)
+            held = _ramp(session, _take_hold(session, spin), target)
             session.event("locked", f"the top follows the drive at {held:.2f} Hz", frequency_hz=held)
             _hold(session, target)
         except NotHeld as lost:
             session.bench.outputs_off()
             seen = str(lost)
-            session.event("not held", f"try {tries} of {len(_TURNS_LATER)}: the drive does not hold the top, {seen}")
+            session.event("not held", f"try {tries} of {_TRIES_TO_HOLD}: the drive does not hold the top, {seen}")
         else:
             return
     raise _did_not_follow(session, target, seen)
@@ -198,8 +201,8 @@ def drive_up(session: Session[D], to: float | None = None) -> None:
 def _did_not_follow(session: Session[D], target: float, seen: str) -> DidNotFollow:
     name = session.writer.record.experiment
     return DidNotFollow(
-        f"the top did not follow the drive to {target:g} Hz ({seen}): ramp slower ({name}.ramp_hz_per_s) or drive "
-        f"harder ({name}.drive_amplitude_vpp)"
+        f"the top did not follow the drive to {target:g} Hz ({seen})",
+        f"ramp slower ({name}.ramp_hz_per_s) or drive harder ({name}.drive_amplitude_vpp)",
     )
 
 
@@ -209,17 +212,37 @@ def _free_spin(session: Session[D], target: float, before: str) -> float:
     if spin is None and before:
         raise _did_not_follow(session, target, f"{before}; then it fell")
     if spin is None:
-        raise no_light(session)
+        raise _no_light(session)
     return spin
 
 
-def no_light(session: Session[D]) -> ExperimentFailed:
-    """What to look at where the counter counts nothing."""
+def _no_light(session: Session[D]) -> NoLight:
     name = session.writer.record.experiment
-    return ExperimentFailed(
-        f"the counter sees no light pulses at {session.settings.trigger_level_v:g} V: is the top floating and "
-        f"lit, and the trigger level between dark and bright ({name}.trigger_level_v in the bench file)?"
+    return NoLight(
+        f"the counter sees no light pulses at {session.settings.trigger_level_v:g} V",
+        "is the top floating and lit, and the trigger level between dark and bright "
+        f"({name}.trigger_level_v in the bench file)?",
     )
+
+
+def _take_hold(session: Session[D], spin: float) -> float:
+    """Let a drive that has come on at the top's spin yield to it until it holds; its frequency then [Hz].
+
+    Raises NotHeld.
+    """
+    gate_s, limits, grip = session.settings.gate_s, session.bench.generator.limits, Grip(spin)
+    prepare_counter_again(session, min(gate_s, GRIP_GATE_S))
+    seen: float | None = None
+    while not (grip.is_over or grip.is_lost):
+        session.stop.check()
+        seen = spin_now(session)
+        drive = min(max(grip.follow(seen), limits.drive_lowest_hz), limits.drive_frequency_hz)
+        session.bench.generator.frequency = drive
+        session.progress(f"the drive takes hold at {drive:.2f} Hz", grip.counts / COUNTS)
+    prepare_counter_again(session, gate_s)
+    if grip.is_lost:
+        raise NotHeld(seen, grip.drive)
+    return grip.drive
 
 
 def _ramp(session: Session[D], start: float, target: float) -> float:
@@ -286,8 +309,8 @@ def compare_with_drive(session: Session[D], slip: Slip) -> None:
 # --- a top, and time, for a series or a sweep ---
 
 
-def have_a_top(session: Session[D], text: str, number: int, *, within_s: float) -> None:
-    """See that a top floats; where none does, ask a person for one.
+def have_a_top(session: Session[D], text: str, number: int, *, within_s: float) -> bool:
+    """See that a top floats; where none does, ask a person for one.  Returns whether that was needed.
 
     Args:
         session: the acquisition.
@@ -299,13 +322,14 @@ def have_a_top(session: Session[D], text: str, number: int, *, within_s: float) 
         ExperimentFailed: the counter still sees none.
     """
     if spin_now(session) is not None:
-        return
+        return False
     session.ask(FloatTop(text, number))
     end = session.now() + within_s
     while spin_now(session) is None:
         if session.now() >= end:
-            raise no_light(session)
+            raise _no_light(session)
         session.wait(_LOOK_FOR_TOP_S)
+    return True
 
 
 def is_over(session: Session[D]) -> bool:

@@ -16,7 +16,7 @@ from levilab.acquisition.onlooker import publishing
 from levilab.acquisition.session import Earlier, Session
 from levilab.acquisition.table import EXPERIMENTS, settings_of
 from levilab.bench.bench import open_bench
-from levilab.errors import unquoted
+from levilab.errors import LevilabError, unquoted
 from levilab.files import CannotWrite
 from levilab.interruption import Interrupted, watching_for_interruption
 from levilab.runs.run import Run, RunRecord, utc_now
@@ -87,13 +87,19 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
         except Exception as error:
             # the disk may be full: the first thing that went wrong is what counts
             with contextlib.suppress(CannotWrite):
-                writer.event(None, "failed", unquoted(f"{type(error).__name__}: {error}"))
+                writer.event(None, "failed", _in_words(error))
                 writer.finish("failed")
             if not writer.record.instruments and not request.wire_log:
                 writer.discard()
             raise
         writer.finish(status)
     return Run.load(writer.folder)
+
+
+def _in_words(error: Exception) -> str:
+    """What ended a run: a known failure in its own words; of any other its name helps who mends it."""
+    known = isinstance(error, LevilabError | InstrumentError)
+    return unquoted(str(error) if known else f"{type(error).__name__}: {error}")
 
 
 def _writer(request: AcquisitionRequest, show: Display) -> RunWriter:

@@ -39,7 +39,16 @@ Row = dict[str, float]
 
 
 class ExperimentFailed(LevilabError):
-    """The experiment cannot go on, for a reason that lies on the bench."""
+    """The experiment cannot go on, for a reason that lies on the bench.
+
+    Attributes:
+        observed: what was seen; the text without what is to be done about it.
+        advice: what is to be done; empty where `observed` says it.
+    """
+
+    def __init__(self, observed: str, advice: str = "") -> None:
+        self.observed, self.advice = observed, advice
+        super().__init__(f"{observed}: {advice}" if advice else observed)
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,8 @@ def live(
 
     def announce(address: str) -> None:
         result(address)
-        message("Ctrl-C ends the view" + (" and the bench for practice" if mock else "; a run goes on without it"))
+        bench = " and the bench for practice, whose time stands still while no page is open"
+        message("Ctrl-C ends the view" + (bench if mock else "; a run goes on without it"))
         if not no_open:
             import webbrowser
 

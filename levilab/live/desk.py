@@ -39,7 +39,7 @@ EXPERIMENTS = {
         "precession.hold_s=5",
     ),
     "limit": ("limit.repetitions=2",),
-    "trace": (),
+    "trace": ("trace.records=5", "trace.interval_s=2"),  # a free top is down before ten records of every 10 s
     "field": (),
 }
 
@@ -75,7 +75,8 @@ class Desk:
             self.count += 1
             if event.kind == "ready":
                 self.scene = event.scene
-            self.said.append({"n": self.count, "kind": event.kind, "text": event.text[:_LONGEST_TEXT]})
+            text = event.text[:_LONGEST_TEXT]
+            self.said.append({"n": self.count, "kind": event.kind, "text": text, "status": event.status})
 
     def said_after(self, number: object) -> list[dict[str, Any]]:
         """Return what was said after that of a number."""

@@ -20,7 +20,7 @@ from levilab.telemetry.messages import Poses, Record, State
 from levilab.telemetry.subscriber import Subscriber
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from levilab.telemetry.address import Address
     from levilab.telemetry.messages import Message
@@ -308,9 +308,3 @@ def _trend(groups: Any, place: dict[str, int]) -> float | None:
     known = np.isfinite(t) & np.isfinite(f)
     t, f = t[known], f[known]
     return float((f[-1] - f[0]) / (t[-1] - t[0])) if len(t) > 1 and t[-1] > t[0] else None
-
-
-def messages_of(watch: Watch, messages: Iterable[Message]) -> None:
-    """Let a watch take in messages without a bench, as tests and pictures do."""
-    for message in messages:
-        watch._take(message)

@@ -103,6 +103,7 @@ class State:
         paused: whether the bench's time stands still.
         probe_m: height of the magnetometer's probe above the base; None: in its chamber, or not known [m].
         busy: on a bench for practice, whether a run is being recorded.
+        took_hold, tuned_up: there, whether a top was seen to follow the drive yet, and to follow it up.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = _READ
@@ -125,6 +126,8 @@ class State:
     paused: bool = False
     probe_m: float | None = None
     busy: bool = False
+    took_hold: bool = False
+    tuned_up: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
     from levilab.world.spin_world import World
 
-#: Counts before the drive is off: the spin at first, every 10 s of the 201 on the way up, and at the end of it.
-BEFORE = 22
+#: Counts before the drive is off: the spin at first, 27 while the drive takes hold, every 10 s of some 200 on the way
+#: up, and at the end of it.
+BEFORE = 48
 
 
 #: A held top is counted for 20 s, which is a third of what an acquisition costs.

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
     from levilab.live.desk import Desk
+    from levilab.live.watch import Watch
+    from levilab.telemetry.messages import Message
 
 #: A page is waited for so long; one that works is not waited for [s].
 PATIENCE_S = 90.0
@@ -57,6 +59,12 @@ def until(page: Page, expression: str) -> Any:
         assert time.monotonic() < end, f"still not: {expression}; {page.evaluate('document.body.innerText')[:600]}"
         page.wait_for_timeout(30)
     return found
+
+
+def publish(watch: Watch, *messages: Message) -> None:
+    """Let a watch take in messages without a bench."""
+    for message in messages:
+        watch._take(message)
 
 
 class GrowingRun:

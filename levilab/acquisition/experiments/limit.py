@@ -120,28 +120,29 @@ def _with_a_top(
     Returns False where the time is over.  Raises DidNotFollow after so many falls: what was measured is kept, and the
     run can be resumed.
     """
-    falls = 0
+    falls, fell = 0, True
     while not is_over(session):
-        _have_the_next_top(session)
+        asked = _have_the_next_top(session)
+        falls += asked and not fell  # it fell just after it was seen up
         try:
             return measure(session, keep)
         except (DidNotFollow, AnotherTop) as failed:
             fell = spin_now(session) is None
             falls += fell
-            if falls == _MOST_FALLS:
+            if falls >= _MOST_FALLS:
                 raise
             session.event("once more", f"{failed}; it {'fell' if fell else 'is still up'}, once more")
     return False
 
 
-def _have_the_next_top(session: Session[LimitSettings]) -> None:
-    """See that the next top floats; where none does, ask for one.  Raises ExperimentFailed."""
+def _have_the_next_top(session: Session[LimitSettings]) -> bool:
+    """See that the next top floats; where none does, ask for one, and return True.  Raises ExperimentFailed."""
     settings, number = session.settings, len(session.rows)
     session.progress(f"top {number + 1} of {settings.repetitions}", number / settings.repetitions)
     if number and _spins_freely(session):
         _coast_down(session)
     text = f"Top {number + 1} of {settings.repetitions}: spin the top and let it float."
-    have_a_top(session, text, number, within_s=settings.float_s)
+    return have_a_top(session, text, number, within_s=settings.float_s)
 
 
 def _spins_freely(session: Session[LimitSettings]) -> bool:

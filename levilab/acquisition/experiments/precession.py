@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from analysis.precession.gates import FEWEST, Gates, Rate, Swing, pulses_too_many, rates_at_point, swing_of
 from instruments.errors import InstrumentError
-from levilab.acquisition.counting import gate_began, prepare_counter
+from levilab.acquisition.counting import gate_began, prepare_counter, prepare_counter_again
 from levilab.acquisition.driving import DriveSettings, NotHeld, PointFailed, check_drive, held_spin, sweep_drive
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.session import ExperimentFailed
@@ -211,7 +211,7 @@ def _measure(session: Session[PrecessionSettings], drive: float) -> tuple[Row, d
     laser = _counted(session, drive, "precession_frequency_hz", level_v, channel)
     if settings.laser_input == 1:
         session.ask(Task("Connect the tape's phototransistor to the counter's input 1 again."))
-    _count_the_tape_again(session)
+    prepare_counter_again(session)
     held_spin(session, drive)  # else what the laser counted is of a top on its way down
     _check_pulses(session, laser)
     spin, precession = rates_at_point(spins, laser)
@@ -260,14 +260,6 @@ def calming_step(swing: Swing, drive: float, now: float, limits: DriveLimits) ->
         if limits.drive_lowest_hz <= frequency <= limits.drive_frequency_hz:
             return swing.crest + number * half - _STEP_S / 2, frequency
     return None
-
-
-def _count_the_tape_again(session: Session[PrecessionSettings]) -> None:
-    """Set the counter up for the tape; one that fails is reached again."""
-    try:
-        prepare_counter(session)
-    except InstrumentError as error:
-        session.reconnect("counter", error, lambda: prepare_counter(session))
 
 
 def _counted(session: Session[PrecessionSettings], drive: float, what: str, level_v: float, channel: int) -> Gates:

@@ -11,12 +11,16 @@ const NEWS_EVERY_MS = 6000;
 const MOST_EVENTS = 200;
 const STATES = {
   none: "no run yet", running: "running", finished: "finished", interrupted: "interrupted", failed: "failed",
-  silent: "bench silent", lost: "instrument lost", missing: "no run", unreachable: "server gone", idle: "ready",
+  setup: "the bench is being set up", silent: "bench silent", lost: "instrument lost", missing: "no run", unreachable: "server gone", idle: "ready",
 };
-const SLIP_HZ = 0.05;  // a top that follows is counted this near to its drive
+const LONGER = {  // what stands beside the state
+  setup: "some seconds; at the first start the simulator is compiled, which takes up to a minute",
+  unreachable: "it is tried again; start levilab live anew if it was ended",
+};
+const SLIP_HZ = 0.05, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive; while it swings, or the drive moves
 
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, records: {}};
-const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, last: {}, count: 0, trend: NaN};
+const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, up: null, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
 let paused = false, drawn = null, pointed = -1, space = null, wanted = "", practice = null, reachable = true;
 let spoken = 0, close = null, dirty = {plot: true, trace: true};
@@ -42,7 +46,7 @@ function take(head, arrays) {
   for (const one of head.said) {
     seen.said = one.n;
     practice?.hear(one);
-    if (/message|refused|ended/.test(one.kind) && data.about?.status !== "running") listEvent("", one.text, one.kind === "message" ? "" : "warning");
+    if (/message|refused|ended/.test(one.kind) && data.about?.status !== "running" && !data.bench?.busy) listEvent("", one.text, one.kind === "message" ? "" : "warning");
   }
   if (head.about) {
     if (data.about && data.about.status !== head.about.status) listRuns(seen.run);
@@ -62,7 +66,7 @@ function take(head, arrays) {
 
 function turnTo(run) {
   Object.assign(seen, {run, readings: -1, events: 0, fit: -1});
-  Object.assign(data, {readings: null, fit: null, about: null, last: {}, count: 0, trend: NaN});
+  Object.assign(data, {readings: null, fit: null, about: null, ended: "", last: {}, count: 0, trend: NaN});
   by("event-list").replaceChildren();
   pointed = -1;
   dirty = {plot: true, trace: true};
@@ -94,6 +98,7 @@ function takeEvents(events) {
   for (const event of events) {
     if (event.n <= seen.events) continue;
     seen.events = event.n;
+    if (/^(failed|interrupted)$/.test(event.kind)) data.ended = event.text;
     const loud = /warning|damaged/.test(event.kind) ? "warning" : /lost|failed|not reached/.test(event.kind) ? "lost" : "";
     listEvent(event.time_s === null ? "" : lapse(event.time_s).replace(" min", ""), event.text, loud);
   }
@@ -110,6 +115,7 @@ function takePoses(pieces, arrays) {
   if (!space) openTop();
   for (const [k, piece] of pieces.entries()) {
     seen.poses = piece.number;
+    data.up = arrays[`up_${k}`].at(-1) > 0.5;
     space.add(piece.start_s, piece.step_s, arrays[`position_${k}`], arrays[`quaternion_${k}`], arrays[`up_${k}`]);
   }
 }
@@ -141,7 +147,8 @@ function stateOf() {
   if (!reachable) return "unreachable";
   if (bench?.lost?.length && !bench.silent) return "lost";
   if (about?.status === "running" && bench?.silent) return "silent";
-  if (practice && !bench?.busy && (!about || about.status === "missing")) return bench && !bench.silent ? "idle" : "silent";
+  if (practice && !bench) return practice.ended ? "silent" : "setup";
+  if (practice && !bench.busy && (!about || about.status === "missing")) return bench.silent ? "silent" : "idle";
   return about ? about.status : "none";
 }
 
@@ -152,7 +159,9 @@ function show() {
   write("state-word", STATES[state] || state);
   const lost = bench?.lost?.length ? `the ${bench.lost.join(" and the ")} does not answer` : "";
   const running = about?.status === "running" || practice;
-  write("state-text", lost || (state === "unreachable" ? "it is tried again" : about?.problem || (running && !bench?.silent && bench?.text) || ""));
+  const down = Boolean(practice) && data.up === false && Boolean(bench) && !bench.silent && !bench.busy;
+  const advice = down ? `the top is down: “Top back” floats it again${data.count ? ", “Analyze” shows what was recorded" : ""}` : "";
+  write("state-text", lost || LONGER[state] || advice || about?.problem || ended(about) || (running && !bench?.silent && bench?.text) || "");
   by("synthetic").hidden = !(about?.synthetic || (!about && bench?.virtual));
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
   write("elapsed", Number.isFinite(elapsed) ? lapse(elapsed) : "");
@@ -165,13 +174,19 @@ function show() {
   showFacts(about);
   document.body.classList.toggle("no-scope", !data.records.size && !practice && Boolean(about) && about.status !== "running");
   write("count", data.count ? `${data.count.toLocaleString("en").replaceAll(",", "\u202f")}${data.readings?.single === false ? ", each stroke from the lowest to the highest of many" : ""}` : "");
+  by("fit-head").hidden = by("fit-lines").hidden = !data.count;
   by("empty").hidden = data.count > 0;
-  write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: "No run yet: the guide says how to record one."}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
+  write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: "No run yet: the guide says how to record one.", setup: "The bench is being set up."}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
   document.title = `${state === "running" && data.count ? `${data.count} readings · ` : ""}levilab live`;
-  practice?.show(bench, about, data.count);
+  practice?.show(bench, about, data.count, down);
   space?.setSpeed?.(bench?.speed, bench?.paused || bench?.silent);
   showTop(bench);
   speak(state, left);
+}
+
+/** How a run ended that did not finish: its last event. */
+function ended(about) {
+  return /failed|interrupted/.test(about?.status) ? data.ended || "" : "";
 }
 
 function showBar(about, bench) {
@@ -186,7 +201,8 @@ const stale = (id, is) => by(id).closest(".display").classList.toggle("stale", i
 
 function showCounter(bench, last) {
   const live = bench && !bench.silent ? bench.last : {};
-  const spin = live.spin_frequency_hz ?? last.spin_frequency_hz ?? live.spin_seen_hz ?? last.spin_seen_hz;
+  const before = practice && bench && !bench.busy ? {} : last;  // a bench that is idle shows what it counts now
+  const spin = live.spin_frequency_hz ?? before.spin_frequency_hz ?? live.spin_seen_hz ?? before.spin_seen_hz;
   write("spin-value", Number.isFinite(spin) ? spin.toFixed(4) : "––.––––");
   stale("spin-value", !bench || bench.silent);
   const trend = data.trend;
@@ -207,7 +223,7 @@ function showGenerator(bench, last) {
   write("signal", drive?.waveform ? `${drive.waveform}, ${short(drive.amplitude_vpp)} Vpp${drive.offset_v ? `, offset ${short(drive.offset_v)} V` : ""}` : "–");
   const spin = bench?.last?.spin_frequency_hz;
   const off = Number.isFinite(spin) && drive?.output ? spin - drive.frequency_hz : NaN;
-  write("lock", Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? "follows" : "beside it"}, ${off >= 0 ? "+" : ""}${fixed(off, 4)} Hz` : "–");
+  write("lock", Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? "follows" : Math.abs(off) < SWINGS_HZ ? "near it" : "beside it"}, ${off >= 0 ? "+" : ""}${fixed(off, 3)} Hz` : "–");
   write("generator-model", modelOf("generator"));
 }
 

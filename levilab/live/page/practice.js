@@ -15,7 +15,7 @@ export function openPractice(about, command, run, allowed) {
   document.body.classList.add("practice");
   by("practice").hidden = false;
   for (const experiment of about.experiments) by("experiment").append(make("option", experiment));
-  const now = {drive: false, busy: false, paused: false, hz: 30, seen: "", analyzed: "", tuned: false, driven: false};
+  const now = {drive: false, busy: false, paused: false, analyzed: "", ended: false};
 
   by("controls").disabled = !allowed;
   if (!allowed) write("said", "This page may only look: open the address that the terminal shows.");
@@ -26,18 +26,22 @@ export function openPractice(about, command, run, allowed) {
   }
 
   /** What the bench says: a refusal, or a line for the person at it. */
-  function hear({kind, text}) {
-    if (allowed && (kind === "refused" || kind === "ended")) write("said", text);
+  function hear({kind, text, status}) {
+    now.ended ||= kind === "ended";
+    if (allowed && (kind === "done" || kind === "recording")) write("said", "");
+    if (allowed && (kind === "refused" || kind === "ended" || (kind === "recorded" && status === "failed"))) write("said", text);
   }
 
   let timer = 0, latest = null;
   function tune(values) {
     latest = {...latest, ...values};
-    timer ||= setTimeout(() => {
-      timer = 0;
-      send("tune the drive", latest);
-      latest = null;
-    }, SENDS_EVERY_MS);
+    timer ||= setTimeout(sendTune, SENDS_EVERY_MS);
+  }
+  function sendTune() {
+    const values = latest;
+    clearTimeout(timer);
+    [timer, latest] = [0, null];
+    return values && !now.busy ? send("tune the drive", values) : undefined;
   }
   const pair = (number, slider, key) => {
     const pass = (source, other) => {
@@ -45,7 +49,6 @@ export function openPractice(about, command, run, allowed) {
       if (source.value === "" || !source.checkValidity()) return;
       other.value = source.value;
       tune({[key]: value});
-      if (key === "frequency_hz") now.tuned ||= now.drive;
     };
     by(number).addEventListener("change", () => pass(by(number), by(slider)));
     by(slider).addEventListener("input", () => pass(by(slider), by(number)));
@@ -61,7 +64,12 @@ export function openPractice(about, command, run, allowed) {
     record: () => now.busy ? send("stop the run") : send("record a run", {experiment: by("experiment").value}),
     analyze: () => openResult(run()),
   };
-  for (const [id, act] of Object.entries(does)) by(id).addEventListener("click", act);
+  for (const [id, act] of Object.entries(does)) {
+    by(id).addEventListener("click", async () => {
+      await sendTune();  // what was typed just before comes first
+      act();
+    });
+  }
   by("speed").addEventListener("change", () => send("set the speed", {speed: Number(by("speed").value)}));
 
   /** Tune by a step, as with the keys. */
@@ -77,11 +85,12 @@ export function openPractice(about, command, run, allowed) {
     write(id, text);
   }
 
-  function show(bench, about_run, readings) {
+  /** @param {boolean} down whether the top is down while nothing is recorded. */
+  function show(bench, about_run, readings, down) {
     if (!bench) return;
     const {drive} = bench;
     Object.assign(now, {drive: Boolean(drive?.output), busy: bench.busy, paused: bench.paused});
-    now.driven ||= now.drive;
+    by("back").classList.toggle("main", down);
     press("drive", now.drive, now.drive ? "Drive off" : "Drive on");
     press("hold", now.paused, now.paused ? "Let time go on" : "Stop time");
     write("record", now.busy ? "End run" : "Record");
@@ -106,18 +115,15 @@ export function openPractice(about, command, run, allowed) {
   function guide(bench, run_now, readings) {
     const ended = run_now && run_now.status !== "running" && readings > 0;
     const done = {
-      drive: now.driven, tune: now.tuned || now.busy || ended, record: Boolean(ended), analyze: now.analyzed === run() && ended,
+      drive: bench.took_hold, tune: bench.tuned_up, record: Boolean(ended), analyze: Boolean(ended) && now.analyzed === run(),
       report: false,
     };
-    if (done.record) done.drive = done.tune = true;
-    let current = true;
-    for (const item of by("guide").children) {
-      const is = done[item.dataset.step];
-      item.className = is ? "done" : current ? "now" : "";
+    const items = [...by("guide").children], last = items.map((item) => Boolean(done[item.dataset.step])).lastIndexOf(true);
+    items.forEach((item, k) => {  // a step may be left out: what comes next is the one behind the last that was done
+      item.className = done[item.dataset.step] ? "done" : k === last + 1 ? "now" : "";
       if (item.className === "now") item.setAttribute("aria-current", "step");
       else item.removeAttribute("aria-current");
-      current &&= is;
-    }
+    });
   }
 
   async function openResult(name) {
@@ -153,8 +159,8 @@ export function openPractice(about, command, run, allowed) {
   }
 
   return {
-    show, step, hear,
-    act: (id) => !by(id).disabled && does[id](),
+    show, step, hear, get ended() { return now.ended; },
+    act: (id) => by(id).click(),
   };
 }
 

@@ -31,6 +31,8 @@ class BenchGone(LevilabError):
 class PracticeBench:
     """A virtual bench in a process of its own.  It ends with `close`, or when the process that holds it dies.
 
+    Its time stands still while no view looks and no run is recorded.
+
     No call waits but `close`; call `events` some ten times a second::
 
         with PracticeBench(Path("runs")) as bench:
@@ -49,7 +51,7 @@ class PracticeBench:
     """
 
     def __init__(self, out: Path = Path("runs"), *, scene: str = "practice", seed: int = 0) -> None:
-        self._options = PracticeOptions(str(out), scene, seed)
+        self._options = PracticeOptions(str(out), scene, seed, rests=True)
         self._process: Apart | None = None
         self._pipe: Connection | None = None
         self._number = 0

@@ -15,9 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 from instruments.clock import PacedClock
 from instruments.errors import InstrumentError
+from levilab.acquisition.driving import DidNotFollow, NoLight
+from levilab.acquisition.grip import Grip
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.onlooker import Sent, counting_of, drive_of, state_of
 from levilab.acquisition.request import AcquisitionOptions, request_at
+from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.bench import open_bench
 from levilab.bench.config import Limits
 from levilab.errors import LevilabError, unquoted
@@ -64,15 +67,15 @@ CHANNELS = {1: "tape", 2: "drive", 3: "laser"}
 RECORD_S, SAMPLES, VOLTS_PER_DIVISION = 0.2, 1000, 2.0
 #: The drive's frequency moves in even steps of about this time [s]; with uneven ones the top swings about the drive.
 RAMP_STEP_S = 0.5
-#: Whether the drive takes hold of the top depends on how the top points when it comes on, which the light pulse says:
-#: a count ends with one.  The drive comes on so many turns after it, in this order; what held the top is tried first
-#: the next time, since the tape stays where it is on the top.
-TURNS_LATER = (0.0, 0.5, 0.25, 0.75)
 #: The drive can take hold of a top that spins as fast as it is set, within this [Hz].
 CATCHES_WITHIN_HZ = 1.0
-#: A top that is held swings about its drive by less than this [Hz], half a hertz and what it loses while it is counted.
-#: One that is not held loses 0.1 Hz/s to the air: it is compared from the first to the second of these times on [s].
-SWINGS_HZ, COMPARED_S = 0.75, (4.0, 14.0)
+#: A top that the drive took hold of swings about it by less than this [Hz], on the ramp, too.  One that is not held
+#: loses 0.1 Hz/s to the air: so long after the drive has yielded it is compared [s].  So far off [Hz] it is lost.
+SWINGS_HZ, COMPARED_S, LOST_HZ = 0.4, 6.0, 1.0
+#: A top that follows the drive so much higher than where it took hold was tuned up [Hz].
+TUNED_UP_HZ = 0.5
+#: Experiments for which a top has to be up when they begin; for `limit` the virtual person puts one back.
+NEED_A_TOP = frozenset({"spin", "precession", "trace"})
 #: The drive before a person has changed it.
 FIRST_HZ, FIRST_VPP, FIRST_WAVEFORM, FIRST_RAMP = 30.0, 10.0, "SQU", 0.1
 
@@ -86,12 +89,14 @@ class PracticeOptions:
         scene: name or file of the scene of the top.
         seed: of the light's noise.
         speed: seconds of the bench in one of the wall; infinite: it does not wait, for tests.
+        rests: whether its time stands still while no view looks and no run is recorded.
     """
 
     out: str
     scene: str
     seed: int
     speed: float = 1.0
+    rests: bool = False
 
 
 @dataclass
@@ -114,16 +119,27 @@ class Knobs:
 
 
 @dataclass
-class Catch:
-    """The drive takes hold of the top: tries, each with the drive so many turns after a light pulse.
+class Hold:
+    """The drive and the top, from the moment the drive is to take hold of it.
 
     Attributes:
-        tries: that were begun.
-        since: when the drive came on for the present one, bench time [s]; None: it waits for the next count.
+        asked_hz: where the drive was set when it was switched on [Hz].
+        grip: while the drive yields to the top; None: it waits for the next count.
+        since: when the drive stood still, bench time [s].
+        at_hz: where the top was first seen to follow [Hz]; None before.
+        is_lost: whether it follows no more.
     """
 
-    tries: int = 0
+    asked_hz: float
+    grip: Grip | None = None
     since: float | None = None
+    at_hz: float | None = None
+    is_lost: bool = False
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether the drive's frequency is for the top to say, and not for the ramp."""
+        return self.since is None
 
 
 @dataclass
@@ -137,6 +153,19 @@ class Seen:
 
     values: dict[str, float] = field(default_factory=dict)
     records: dict[str, tuple[int, float, Trace]] = field(default_factory=dict)
+
+
+#: What a person can do at this bench about a run that failed.
+ADVICE: dict[type[ExperimentFailed], str] = {
+    DidNotFollow: "put the top back if it is down, and record once more",
+    NoLight: "put the top back, and record once more",
+}
+#: What a person can do about a top that the drive lost.
+AGAIN = "switch it off, match the spin, and go up more slowly"
+
+
+def _in_words(spin: float | None) -> str:
+    return "no light pulses" if spin is None else f"{spin:.2f} Hz"
 
 
 def work(options: PracticeOptions, pipe: Connection) -> None:
@@ -216,8 +245,10 @@ class PracticeProcess:
         self._stopped = ""  # why the run that is recorded is to end
         self._over = False
         self._looking = False  # whether `look` is under way: what it does may wait, too
-        self._catch: Catch | None = None  # while the drive takes hold of the top
-        self._turns_later = list(TURNS_LATER)
+        self._hold: Hold | None = None  # of the drive, while it is on near the top's spin
+        self._took_hold = self._tuned_up = False  # whether a person has come so far
+        self._paused = False  # by a person
+        self._is_ready = False
         self._text = ""  # what the drive does, for the page
         self._moved = 0.0  # bench time of the last step of the drive's frequency [s]
         self._tops = 0
@@ -239,7 +270,7 @@ class PracticeProcess:
                 self._set_up(bench)
                 if ready is not None:
                     self._report(ready)
-                    ready = None
+                    ready, self._is_ready = None, True
                 while not self._is_called_away():
                     self._measure(bench)
             if (wanted := self._next_run()) is not None:
@@ -261,7 +292,7 @@ class PracticeProcess:
         finally:
             self._bench, self.clock.meanwhile = None, None
             self._knobs.on = False
-            self._catch, self._text = None, ""
+            self._hold, self._text = None, ""
 
     def _set_up(self, bench: Bench) -> None:
         bench.counter.prepare(gate_s=GATE_S, trigger_level_v=TRIGGER_V)
@@ -279,13 +310,11 @@ class PracticeProcess:
     def _measure(self, bench: Bench) -> None:
         """Read each instrument once."""
         spin = bench.counter.frequency()
-        self._take_hold(bench, spin)
-        flux_density = bench.magnetometer.flux_density()
-        for channel, value in (("spin_frequency_hz", spin), ("flux_density_t", flux_density)):
-            if value is None:
-                self._seen.values.pop(channel, None)
-            else:
-                self._seen.values[channel] = value
+        self._saw("spin_frequency_hz", spin)
+        self._go_on_with_hold(bench, spin)
+        if self._hold is not None and self._hold.grip is not None and self._hold.is_under_way:
+            return  # the drive yields to the top: no other instrument keeps it waiting
+        self._saw("flux_density_t", bench.magnetometer.flux_density())
         now = self._publisher.clock()
         if self._publisher.is_watched and now >= self._next_record:
             self._next_record = now + 0.5
@@ -293,6 +322,12 @@ class PracticeProcess:
             for input_, channel in CHANNELS.items():
                 number = self._seen.records[channel][0] + 1 if channel in self._seen.records else 1
                 self._seen.records[channel] = number, self.clock.now(), bench.oscilloscope.trace(input_)
+
+    def _saw(self, channel: str, value: float | None) -> None:
+        if value is None:
+            self._seen.values.pop(channel, None)
+        else:
+            self._seen.values[channel] = value
 
     # --- what goes on meanwhile ---
 
@@ -305,8 +340,15 @@ class PracticeProcess:
             self._read_commands()
             self._move_drive()
             self._publish()
+            self._rest()
         finally:
             self._looking = False
+
+    def _rest(self) -> None:
+        """Let time stand still where a person says so, and while no view looks, lest the top be down when one comes."""
+        is_idle = self._is_ready and self._session is None and self._wanted is None
+        alone = self._options.rests and is_idle and not self._publisher.is_watched
+        self.clock.paused = not self._over and (self._paused or alone)
 
     def _read_commands(self) -> None:
         if self._end.by:
@@ -320,7 +362,7 @@ class PracticeProcess:
     def _finish(self, why: str) -> None:
         """End all: a run is kept, and time passes at once."""
         self._over, self._stopped = True, self._stopped or why
-        self.clock.speed, self.clock.paused = math.inf, False
+        self.clock.speed, self.clock.paused = math.inf, False  # and `_rest` leaves it so
         if self._session is not None:
             self._session.stop.by = self._session.stop.by or self._stopped
 
@@ -345,7 +387,8 @@ class PracticeProcess:
     def state(self) -> State:
         """Return what views are shown."""
         speed = self.clock.speed if math.isfinite(self.clock.speed) else None
-        here: dict[str, Any] = {"virtual": True, "speed": speed, "paused": self.clock.paused, "probe_m": self._probe_m}
+        here: dict[str, Any] = {"virtual": True, "speed": speed, "paused": self._paused, "probe_m": self._probe_m}
+        here |= {"took_hold": self._took_hold, "tuned_up": self._tuned_up}
         if self._session is not None:
             return replace(state_of(self._session, virtual=True), busy=True, **here)
         drive = drive_of(self._bench) if self._bench else None
@@ -373,7 +416,7 @@ class PracticeProcess:
 
     @_carry_out.register
     def _(self, command: Pause) -> str:
-        self.clock.paused = command.on
+        self._paused = command.on
         return "the bench's time stands still" if command.on else "the bench's time goes on"
 
     @_carry_out.register
@@ -389,6 +432,10 @@ class PracticeProcess:
     def _(self, command: RecordRun) -> str:
         self._free_bench()
         self._request(command)  # raises where it is not possible
+        if command.experiment in NEED_A_TOP and not self._floats():
+            raise CommandRefused(
+                f"the top is down, and a {command.experiment} run begins with one that floats: put the top back first"
+            )
         self._wanted, self._stopped = command, ""
         return f"the run begins: {command.experiment}"
 
@@ -434,7 +481,7 @@ class PracticeProcess:
         wanted = replace(knobs, **changes)
         self._check(wanted)
         self._knobs = wanted
-        if self._catch is not None and self._catch.since is None:
+        if self._hold is not None and self._hold.grip is None:
             pass  # the drive comes on with it
         elif wanted.on and command.waveform is not None and command.waveform != knobs.waveform:
             self._switch_on(bench, self._frequency(bench))
@@ -447,7 +494,7 @@ class PracticeProcess:
         bench, knobs = self._free_bench(), self._knobs
         if not command.on:
             bench.outputs_off()
-            self._catch, self._text, knobs.on = None, "", False
+            self._hold, self._text, knobs.on = None, "", False
             return "the drive is off"
         if knobs.on:
             return f"the drive is on at {knobs.frequency_hz:g} Hz already"
@@ -455,7 +502,7 @@ class PracticeProcess:
         knobs.on = True
         spin = self._seen.values.get("spin_frequency_hz")
         if spin is not None and abs(spin - knobs.frequency_hz) <= CATCHES_WITHIN_HZ:
-            self._catch = Catch()
+            self._hold = Hold(knobs.frequency_hz)
             return f"the drive comes on with a light pulse, at the top's spin, {spin:.2f} Hz"
         self._switch_on(bench, knobs.frequency_hz)
         beside = "the counter sees no top" if spin is None else f"the top spins at {spin:.2f} Hz"
@@ -493,53 +540,65 @@ class PracticeProcess:
         bench.generator.output = True
         self._moved = self.clock.now()
 
-    def _take_hold(self, bench: Bench, spin: float | None) -> None:
-        """Go on with taking hold of the top, just after a count, which ended with a light pulse.
+    def _go_on_with_hold(self, bench: Bench, spin: float | None) -> None:
+        """Go on with taking hold of the top, or see whether it follows, just after a count.
 
         Args:
             bench: that is open.
             spin: that was counted [Hz]; None: no light pulses.
         """
-        catch = self._catch
-        if catch is None:
+        hold = self._hold
+        if hold is None or hold.is_lost:
             return
+        if hold.grip is None:
+            self._begin_to_hold(bench, hold, spin)
+        elif hold.since is None:
+            self._yield(bench, hold, hold.grip, spin)
+        elif self.clock.now() - hold.since >= COMPARED_S:
+            self._compare(bench, hold, spin)
+
+    def _begin_to_hold(self, bench: Bench, hold: Hold, spin: float | None) -> None:
         if spin is None:
-            if catch.since is None:
-                self._knobs.on = False
-            self._catch = None
+            self._hold, self._knobs.on = None, False
             self._say("no light pulses: the drive has no top to take hold of")
-        elif catch.since is None:
-            self._try_to_hold(bench, catch, spin)
-        elif (held_for := self.clock.now() - catch.since) >= COMPARED_S[0]:
-            self._compare(bench, catch, spin, held_for)
-
-    def _try_to_hold(self, bench: Bench, catch: Catch, spin: float) -> None:
-        self.clock.sleep(self._turns_later[catch.tries] / spin)
-        if catch is not self._catch or self._is_called_away():
-            return  # switched off meanwhile
-        catch.tries += 1
-        self._switch_on(bench, spin)
-        catch.since = self.clock.now()
-        again = "" if catch.tries == 1 else ", a part of a turn later than before"
-        self._say(f"drive on at the top's spin, {spin:.2f} Hz{again}")
-
-    def _compare(self, bench: Bench, catch: Catch, spin: float, held_for: float) -> None:
-        """Compare the spin with the drive: held, not held, or too early to say."""
-        drive = self._frequency(bench)
-        if abs(spin - drive) <= SWINGS_HZ:
-            if held_for >= COMPARED_S[1]:
-                self._catch = None
-                self._turns_later.insert(0, self._turns_later.pop(catch.tries - 1))
-                self._say(f"the top follows the drive at {drive:.2f} Hz")
             return
+        self._switch_on(bench, spin)
+        hold.grip = Grip(spin)
+        self._say(f"drive on at the top's spin, {spin:.2f} Hz; for some seconds it yields to the top")
+
+    def _yield(self, bench: Bench, hold: Hold, grip: Grip, spin: float | None) -> None:
+        bench.generator.frequency = grip.follow(spin)
+        if grip.is_lost:
+            self._give_up(bench, spin, grip.drive)
+        elif grip.is_over:
+            hold.since = self._moved = self.clock.now()
+            if self._knobs.frequency_hz == hold.asked_hz:  # else a person has tuned it on meanwhile
+                self._knobs.frequency_hz = grip.drive
+
+    def _compare(self, bench: Bench, hold: Hold, spin: float | None) -> None:
+        """Compare the spin with the drive: it follows, was tuned up, or was lost."""
+        drive = self._frequency(bench)
+        off = math.inf if spin is None else abs(spin - drive)
+        if hold.at_hz is None:
+            if off > SWINGS_HZ:
+                self._give_up(bench, spin, drive)
+                return
+            hold.at_hz, self._took_hold = drive, True
+            self._say(f"the top follows the drive at {drive:.2f} Hz")
+        elif off > LOST_HZ:
+            hold.is_lost = True
+            self._say(f"the drive has lost the top, {_in_words(spin)} under a drive of {drive:.2f} Hz: {AGAIN}")
+        elif off <= SWINGS_HZ and drive >= hold.at_hz + TUNED_UP_HZ and not self._tuned_up:
+            self._tuned_up = True
+            self._say(f"the top follows the drive up, to {drive:.2f} Hz by now")
+
+    def _give_up(self, bench: Bench, spin: float | None, drive: float) -> None:
         bench.outputs_off()
-        seen = f"the drive does not hold the top, {spin:.2f} Hz under a drive of {drive:.2f} Hz"
-        if catch.tries < len(self._turns_later):
-            catch.since = None
-            self._say(f"{seen}: it is tried again with the top turned otherwise")
-        else:
-            self._catch, self._knobs.on = None, False
-            self._say(f"{seen}, and the drive is off: match the spin, more volts, a slower ramp")
+        self._hold, self._knobs.on = None, False
+        self._say(
+            f"the drive does not hold the top, {_in_words(spin)} under a drive of {drive:.2f} Hz, and it is off: "
+            "match the spin and switch it on again, with more volts"
+        )
 
     @staticmethod
     def _frequency(bench: Bench) -> float:
@@ -549,8 +608,8 @@ class PracticeProcess:
     def _move_drive(self) -> None:
         """Move the drive's frequency on towards where it is going, as far as the ramp comes in the time since."""
         since = self.clock.now() - self._moved
-        waits = self._catch is not None and self._catch.since is None
-        if self._bench is None or not self._knobs.on or waits or since < RAMP_STEP_S:
+        yields = self._hold is not None and self._hold.is_under_way
+        if self._bench is None or not self._knobs.on or yields or since < RAMP_STEP_S:
             return
         self._moved += since
         here = self._frequency(self._bench)
@@ -593,6 +652,9 @@ class PracticeProcess:
         self._report(PracticeEvent("recording", self._session.writer.record.experiment, folder=self._folder))
         try:
             yield self.look
+        except ExperimentFailed as failed:
+            # no bench file is at hand here, and the settings are the page's
+            raise ExperimentFailed(failed.observed, ADVICE.get(type(failed), failed.advice)) from failed
         finally:
             if session.stop.by and session.stop.by.startswith("SIG"):
                 self._over = True

@@ -169,7 +169,7 @@ def test_a_generator_that_fails_on_the_way_up_is_off_and_the_way_is_gone_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # at the generator's address only the ramp asks for its error queue so often
-    cut = Fault("disconnected", question=r"SYST:ERR\?", after=45)
+    cut = Fault("disconnected", question=r"SYST:ERR\?", after=150)
     run = acquired(tmp_path, monkeypatch, cut)
     order = kinds(run)
     assert run.status == "finished"

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from levilab.live.watch import messages_of
 from levilab.telemetry.messages import Counting, Drive, Poses, Record, State
 from support.browser import DESK, PHONE, watch
-from support.live_pages import GrowingRun, address, serving, spin_down, until
+from support.live_pages import GrowingRun, address, publish, serving, spin_down, until
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -185,14 +184,12 @@ def test_what_the_bench_publishes_is_drawn(served: Hall, page: Page, tmp_path: P
     turn = np.arange(n) * 2 * np.pi * 30 / 400
     quaternion = np.stack([0 * turn, 0 * turn, np.sin(turn / 2), np.cos(turn / 2)], axis=1)
     position = np.tile([0.0, 0.0, 0.075], (n, 1))
-    messages_of(
+    publish(
         served.watches[run.folder.name],
-        [
-            State(1.0, drive=Drive("SIN", 31.25, 10.0, 0.0, output=True), counting=Counting(0.5, 0.6),
-                  last={"spin_frequency_hz": 31.25, "flux_density_t": 0.0191}, virtual=True, speed=1.0),
-            Record(1, "tape", 1.0, -0.1, 2e-4, wave, wave),
-            Poses(0.0, 1 / 400, position, quaternion, np.ones(n, dtype=bool)),
-        ],
+        State(1.0, drive=Drive("SIN", 31.25, 10.0, 0.0, output=True), counting=Counting(0.5, 0.6),
+              last={"spin_frequency_hz": 31.25, "flux_density_t": 0.0191}, virtual=True, speed=1.0),
+        Record(1, "tape", 1.0, -0.1, 2e-4, wave, wave),
+        Poses(0.0, 1 / 400, position, quaternion, np.ones(n, dtype=bool)),
     )  # fmt: skip
     until(page, "levilab.space?.frames > 1")
     assert page.inner_text("#drive-value") == "31.2500"
