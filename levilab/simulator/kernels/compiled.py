@@ -12,7 +12,9 @@ import hashlib
 import os
 import shutil
 import sys
+import tempfile
 import time
+import uuid
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -20,7 +22,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numba
 import numba.core
 from numba.core import types
-from numba.core.caching import UserProvidedCacheLocator
+from numba.core.caching import IndexDataCacheFile, UserProvidedCacheLocator
 from numba.extending import intrinsic, overload
 from platformdirs import user_cache_path
 
@@ -35,8 +37,13 @@ PART_OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}, "forceinl
 
 
 def cache_key(sources: Path) -> str:
-    """What compiled code depends on: the files of this folder and no others, numba's version and Python's."""
-    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
+    """What compiled code depends on: the files of this folder and no others, numba's version and Python's.
+
+    And whether numba has Intel's vector library, without which code that calls it does not run.  The processor is not
+    in it: numba asks for the one that code was compiled for.
+    """
+    config: Any = numba.core.config
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]} {config.USING_SVML}".encode())
     for source in sorted(sources.glob("*.py")):
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
@@ -49,6 +56,22 @@ class InOneFolder(UserProvidedCacheLocator):
         """The folder."""
         return os.path.dirname(self._cache_path)  # noqa: PTH120 - a text, as numba has it
 
+    def get_source_stamp(self) -> str:
+        """The same for all: the folder's name says of which source it is, and a file's time is that of one copy."""
+        return ""
+
+
+class FilesOfTheirOwn(IndexDataCacheFile):
+    """The files of a kernel, in which two processes that save at once never take each other's code for their own.
+
+    Numba numbers the files by the index as it was before: both processes could write code for different scenes as
+    number 1, and the index of the last one would name the code of the other.  With a name of its own for each file an
+    entry of the index is lost at most, which costs a compilation.
+    """
+
+    def _data_name(self, _number: int) -> str:
+        return f"{Path(self._index_name).stem}.{uuid.uuid4().hex[:16]}.nbc"
+
 
 @cache
 def _folder() -> Path | None:
@@ -60,11 +83,12 @@ def _folder() -> Path | None:
     try:
         if not folder.exists():
             _sweep(folder.parent)
-            folder.mkdir(parents=True)
+            folder.mkdir(parents=True, exist_ok=True)  # another process may be faster
         folder.touch()  # that it is in use
-        return folder if os.access(folder, os.W_OK) else None
+        tempfile.TemporaryFile(dir=folder).close()  # numba does the same, and raises where it cannot
     except OSError:
         return None
+    return folder
 
 
 def _sweep(kernels: Path) -> None:
@@ -105,7 +129,14 @@ def kernel(function: F) -> F:
         )
     finally:
         config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before, locators
+    if folder and not before:
+        _name_files_apart(compiled)
     return compiled
+
+
+def _name_files_apart(compiled: Any) -> None:
+    kept, files = compiled._cache, compiled._cache._cache_file
+    kept._cache_file = FilesOfTheirOwn(files._cache_path, kept._impl.filename_base, files._source_stamp)
 
 
 def kind(numba_type: Any) -> type:

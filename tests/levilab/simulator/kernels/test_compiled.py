@@ -1,6 +1,7 @@
 """The room of the compiled code: what is in it, and that it is compiled anew for changes in it alone."""
 
 import ast
+import os
 import shutil
 import sys
 from pathlib import Path
@@ -48,20 +49,47 @@ def test_the_code_on_the_disk_lies_under_the_key_of_the_room(monkeypatch, tmp_pa
     assert folder.is_dir()
 
 
-def test_it_lies_there_wherever_the_sources_do(monkeypatch, tmp_path):
-    # else a second environment would compile all of it once more
+def test_a_copy_of_the_sources_compiles_nothing_anew(monkeypatch, tmp_path):
+    # a second environment, or the same version installed anew: another place, another time of its files
     monkeypatch.setattr(numba.core.config, "CACHE_DIR", "")
     monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
-    places = set()
-    for name in ("one", "two"):
+    stats = []
+    for k, name in enumerate(("one", "two")):
         (tmp_path / name).mkdir()
         source = tmp_path / name / "motion.py"
         source.write_text("def advance(x):\n    return x + 1\n", encoding="utf-8")
+        os.utime(source, (1e9 + k, 1e9 + k))
         scope = {}
         exec(compile(source.read_text(encoding="utf-8"), source, "exec"), scope)
-        places.add(str(compiled.kernel(scope["advance"]).stats.cache_path))
-    assert places == {str(tmp_path)}
+        kernel = compiled.kernel(scope["advance"])
+        assert kernel(1) == 2
+        stats.append(kernel.stats)
+    assert {str(one.cache_path) for one in stats} == {str(tmp_path)}
+    assert [sum(one.cache_hits.values()) for one in stats] == [0, 1]
     assert numba.core.config.CACHE_LOCATOR_CLASSES == ""
+
+
+def test_two_processes_that_save_at_once_keep_their_code_apart(monkeypatch, tmp_path):
+    one, two, later = (compiled.FilesOfTheirOwn(str(tmp_path), "motion.advance-1.py311", "") for _ in range(3))
+    monkeypatch.setattr(two, "_load_index", dict)  # it looked before the first one saved
+    write = one._save_data
+
+    def be_slow(name, data):
+        two.save("of two", "code of two")
+        write(name, data)
+
+    monkeypatch.setattr(one, "_save_data", be_slow)
+    one.save("of one", "code of one")
+    assert later.load("of two") == "code of two"
+    assert later.load("of one") is None  # compiled once more
+    later.save("of one", "code of one")
+    assert (later.load("of one"), later.load("of two")) == ("code of one", "code of two")
+
+
+def test_a_folder_that_another_process_makes_at_the_same_time_is_used(monkeypatch, tmp_path):
+    monkeypatch.setattr(compiled, "user_cache_path", lambda *_, **__: tmp_path)
+    monkeypatch.setattr(compiled, "_sweep", lambda kernels: (kernels / compiled.cache_key(KERNELS)).mkdir(parents=True))
+    assert compiled._folder.__wrapped__() is not None
 
 
 @pytest.mark.parametrize("source", sorted(KERNELS.glob("*.py")), ids=lambda path: path.name)
