@@ -73,14 +73,17 @@ def prepare_counter_again(session: Session[S], gate_s: float | None = None) -> N
         session.reconnect("counter", error, lambda: prepare_counter(session, gate_s))
 
 
-def spin_now(session: Session[S]) -> float | None:
-    """What the counter counts, outside of readings [Hz]; one that fails is reached again, a few times."""
+def spin_now(session: Session[S], gate_s: float | None = None) -> float | None:
+    """What the counter counts, outside of readings [Hz]; one that fails is reached again, a few times.
+
+    gate_s: as it was prepared.
+    """
     while True:
         try:
             spin = session.bench.counter.frequency()
             session.check_settings("counter")
         except InstrumentError as error:
-            session.reconnect("counter", error, lambda: prepare_counter(session))
+            session.reconnect("counter", error, lambda: prepare_counter(session, gate_s))
         else:
             session.saw("spin_frequency_hz", spin)
             return spin

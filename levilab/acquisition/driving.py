@@ -230,16 +230,16 @@ def _take_hold(session: Session[D], spin: float) -> float:
 
     Raises NotHeld.
     """
-    gate_s, limits, grip = session.settings.gate_s, session.bench.generator.limits, Grip(spin)
-    prepare_counter_again(session, min(gate_s, GRIP_GATE_S))
+    limits = session.bench.generator.limits
+    grip = Grip(spin, limits.drive_lowest_hz, limits.drive_frequency_hz)
+    prepare_counter_again(session, GRIP_GATE_S)
     seen: float | None = None
     while not (grip.is_over or grip.is_lost):
         session.stop.check()
-        seen = spin_now(session)
-        drive = min(max(grip.follow(seen), limits.drive_lowest_hz), limits.drive_frequency_hz)
-        session.bench.generator.frequency = drive
-        session.progress(f"the drive takes hold at {drive:.2f} Hz", grip.counts / COUNTS)
-    prepare_counter_again(session, gate_s)
+        seen = spin_now(session, GRIP_GATE_S)
+        session.bench.generator.frequency = grip.follow(seen)
+        session.progress(f"the drive takes hold at {grip.drive:.2f} Hz", grip.counts / COUNTS)
+    prepare_counter_again(session)
     if grip.is_lost:
         raise NotHeld(seen, grip.drive)
     return grip.drive

@@ -10,12 +10,14 @@ is damped comes back to zero voltage for the same reason: Stewart, Appl. Phys. L
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 #: A count is of so long a gate [s] and moves the drive by this share of its difference to the spin; after so many the
 #: drive stands still.  As a pendulum with the pull of 0.4 mT at 2 to 6 % of the moment across the axis, drag at 26 and
 #: 33 Hz, and 0.03 Hz of noise, 400 angles each: all were held after 27 counts, and swung by less than 0.06 Hz.  With a
-#: share of 0.2 up to 6 % were not; gates of 1 s come too late for the swing, whose period is 2.5 to 4.5 s.
+#: share of 0.2 up to 6 % were not; gates of 1 s come too late for the swing, whose period is 2.5 to 4.5 s, and with
+#: gates of 0.1 s the counts are over before it holds, and their noise moves the drive.
 GRIP_GATE_S, SHARE, COUNTS = 0.5, 0.4, 27
 #: A spin that is farther from the drive is not that of a top that it could hold [Hz]; so many counts in a row without
 #: such a spin end the try.
@@ -28,6 +30,7 @@ class Grip:
 
     Attributes:
         drive: its frequency [Hz].
+        lowest, highest: that it may have [Hz].
         counts: so far.
         missed: the last ones of them that show no top that it could hold.
 
@@ -37,6 +40,8 @@ class Grip:
     """
 
     drive: float
+    lowest: float = 0.0
+    highest: float = math.inf
     counts: int = 0
     missed: int = 0
 
@@ -57,5 +62,6 @@ class Grip:
             self.missed += 1
         else:
             self.missed = 0
-            self.drive = round(self.drive + SHARE * (spin - self.drive), 6)
+            nearer = round(self.drive + SHARE * (spin - self.drive), 6)
+            self.drive = min(max(nearer, self.lowest), self.highest)
         return self.drive

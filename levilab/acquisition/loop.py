@@ -97,7 +97,7 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
 
 
 def _in_words(error: Exception) -> str:
-    """What ended a run: a known failure in its own words; of any other its name helps who mends it."""
+    """What ended a run: the words of a known failure; the class, too, of one that nothing in this program expects."""
     known = isinstance(error, LevilabError | InstrumentError)
     return unquoted(str(error) if known else f"{type(error).__name__}: {error}")
 

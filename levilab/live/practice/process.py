@@ -563,7 +563,7 @@ class PracticeProcess:
             self._say("no light pulses: the drive has no top to take hold of")
             return
         self._switch_on(bench, spin)
-        hold.grip = Grip(spin)
+        hold.grip = Grip(spin, bench.generator.limits.drive_lowest_hz, bench.generator.limits.drive_frequency_hz)
         self._say(f"drive on at the top's spin, {spin:.2f} Hz; for some seconds it yields to the top")
 
     def _yield(self, bench: Bench, hold: Hold, grip: Grip, spin: float | None) -> None:

@@ -52,6 +52,11 @@ def test_a_spin_that_it_could_not_hold_moves_no_drive_and_ends_the_try() -> None
     assert grip.is_lost
 
 
+def test_a_drive_stays_within_its_limits() -> None:
+    grip = Grip(30.0, lowest=29.9, highest=30.1)
+    assert [grip.follow(spin) for spin in (29.5, 29.5, 30.5, 30.5)] == [29.9, 29.9, 30.1, 30.1]
+
+
 @pytest.mark.parametrize("spin", [30.0, 29.9])
 def test_a_drive_stands_still_after_its_counts(spin: float) -> None:
     grip = Grip(30.0)

@@ -10,6 +10,8 @@ import pytest
 
 from instruments.errors import InstrumentError
 from instruments.virtual.bench.faults import FAULTS, Fault
+from levilab.acquisition.counting import prepare_counter
+from levilab.acquisition.grip import GRIP_GATE_S
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.session import MOST_LOSSES
 from levilab.acquisition.table import settings_of, with_settings
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from instruments.virtual.bench.bench import VirtualBench
+    from levilab.acquisition.experiment import CounterSettings
+    from levilab.acquisition.session import Session
     from levilab.runs.run import Run
 
 
@@ -163,6 +167,21 @@ def test_a_counter_that_fails_before_the_first_reading_is_reached_again(
     assert run.status == "finished"
     assert kinds(run)[:3].count("found again") == 1
     assert kinds(run).count("drive on") == 1
+
+
+def test_a_counter_that_is_reset_while_the_drive_takes_hold_counts_on_with_short_gates(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gates: list[float | None] = []
+
+    def prepare(session: Session[CounterSettings], gate_s: float | None = None) -> None:
+        gates.append(gate_s)
+        prepare_counter(session, gate_s)
+
+    monkeypatch.setattr("levilab.acquisition.counting.prepare_counter", prepare)
+    run = acquired(tmp_path, monkeypatch, Fault("reset", question=r"READ\?", after=5))
+    assert kinds(run)[:3] == ["drive on", "instrument lost", "found again"]
+    assert gates == [GRIP_GATE_S, GRIP_GATE_S, None]
 
 
 def test_a_generator_that_fails_on_the_way_up_is_off_and_the_way_is_gone_again(
