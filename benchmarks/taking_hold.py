@@ -1,4 +1,4 @@
-"""How often the drive takes hold of a top that points anywhere (docs/decisions/0022-telemetry-and-practice.md).
+"""How often the drive takes hold of a top that points anywhere (docs/decisions/0022-telemetry.md).
 
     python benchmarks/taking_hold.py            # 100 spin-downs, some CPU minutes; writes results/taking_hold.json
 

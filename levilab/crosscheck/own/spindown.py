@@ -177,9 +177,9 @@ def _trial(
         readings = run.readings(random, factors)
         fits.append(fit_spin_down(run.time, readings, run.u, tilt=run.tilt, driven=run.driven, gate=run.gate or None))
         if several:
-            own = fits[-1].fit(law).parameters
+            of_run = fits[-1].fit(law).parameters
             pulls += [
-                pull(f"{name}{OF_ONE_RUN}", own[name], truth)
+                pull(f"{name}{OF_ONE_RUN}", of_run[name], truth)
                 for name, truth in zip(constants, truths, strict=True)
                 if name != "c"
             ]
