@@ -60,9 +60,8 @@ def place_edges(samples: Array, rate: float, fit: Fit, *, width: float, sign: in
         new_fit, fitted = fit_turns(times[use], phase[use]), use
         away = np.abs(phase - new_fit.phase(times))
         spread = 1.4826 * median(away[use])
-        far = student(
-            int(np.count_nonzero(use)) - new_fit.coefficients.size, GROSS
-        )  # few turns say little of their spread
+        # few turns say little of their spread
+        far = student(int(np.count_nonzero(use)) - new_fit.coefficients.size, GROSS)
         new = (heights > 0.3 * typical) & (away < far * max(spread, 1e-12))
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break

@@ -228,7 +228,7 @@ def fit_turns(times: Array, turns: Array, weight: Array | None = None, *, degree
 
 
 def _fit(times: Array, turns: Array, weight: Array | None, degree: int) -> tuple[Fit, float, float]:
-    """The fit, and the next coefficient with its standard uncertainty, were all white."""
+    """The fit, and the coefficient of one degree more with its standard uncertainty if all residuals are white."""
     centre, half = 0.5 * float(times[0] + times[-1]), 0.5 * float(times[-1] - times[0])
     degree = min(degree, times.size - 1)
     u = (times - centre) / half
@@ -250,10 +250,8 @@ def _fit(times: Array, turns: Array, weight: Array | None, degree: int) -> tuple
     residuals = standard if weight is None else standard / root
     left = float(standard @ standard) - float(along[-1]) ** 2
     last = float(triangle[-1, -1]) or 1e-300
-    third, u_third = (
-        float(along[-1]) / last,
-        float(np.sqrt(max(left, 1e-300) / max(times.size - degree - 2, 1))) / abs(last),
-    )
+    third = float(along[-1]) / last
+    u_third = float(np.sqrt(max(left, 1e-300) / max(times.size - degree - 2, 1))) / abs(last)
     variance, inflation, freedom = scatter(standard, turns, degree + 1)
     return Fit(coefficients, inverse @ inverse.T, centre, half, variance, inflation, freedom, residuals), third, u_third
 

@@ -129,14 +129,10 @@ def kernel(function: F) -> F:
         )
     finally:
         config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before, locators
-    if folder and not before:
-        _name_files_apart(compiled)
+    kept: Any = getattr(compiled, "_cache", None)  # none where NUMBA_DISABLE_JIT is set
+    if kept is not None and folder and not before:
+        kept._cache_file.__class__ = FilesOfTheirOwn
     return compiled
-
-
-def _name_files_apart(compiled: Any) -> None:
-    kept, files = compiled._cache, compiled._cache._cache_file
-    kept._cache_file = FilesOfTheirOwn(files._cache_path, kept._impl.filename_base, files._source_stamp)
 
 
 def kind(numba_type: Any) -> type:
