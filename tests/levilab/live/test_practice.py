@@ -41,7 +41,8 @@ def test_a_student_drives_records_and_analyzes(served: Hall, page: Page, monkeyp
     page.keyboard.press("d")
     until(page, "levilab.data.bench.drive.output")
     until(page, "document.getElementById('drive').getAttribute('aria-pressed') === 'true'")
-    assert page.locator("#guide .done").count() == 0  # nothing is ticked that was not seen
+    ticked_early = "document.querySelectorAll('#guide .done').length && !levilab.data.bench.took_hold"
+    assert not page.evaluate(ticked_early)  # a slow machine may come here when the drive has taken hold
     until(page, "document.getElementById('event-list').textContent.includes('the top follows the drive')")
     until(page, "document.querySelectorAll('#guide .done').length === 1")
     page.click("#back")
