@@ -54,12 +54,13 @@ def solve(
 ) -> tuple[Array, bool]:
     """The parameters of the smallest sum of squares, and whether the search ended there.
 
-    A search that does not end in so many evaluations at `most` returns the best point found.
+    A search that does not end in so many evaluations at `most` returns the best point found.  One that begins where a
+    residual is no number has not ended, though MINPACK says so.
     """
     from scipy.optimize import leastsq
 
     with np.errstate(all="ignore"):  # a search may step to where a law overflows, and comes back
-        q, _, _, _, ended = leastsq(
+        q, _, info, _, ended = leastsq(
             residual,
             start,
             Dfun=gradient,
@@ -70,7 +71,7 @@ def solve(
             gtol=0.0,
             maxfev=most,
         )
-    return np.atleast_1d(q), ended in _ENDED
+    return np.atleast_1d(q), ended in _ENDED and bool(np.isfinite(info["fvec"]).all())
 
 
 def profile(
