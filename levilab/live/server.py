@@ -1,6 +1,6 @@
 """The server of the live view: a page, its modules, and frames over a WebSocket.
 
-One task reads what is new 20 times a second while a page is open.  A page asks for each frame, and gets it when there
+One task reads what is new 22 times a second while a page is open.  A page asks for each frame, and gets it when there
 is something that it does not have: a slow page gets fewer frames, and nothing queues.
 """
 
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from levilab.live.desk import Desk
     from levilab.live.running import Running
 
-#: Frames a second, at most; and so long a page waits for a frame in which nothing is new [s].
-FRAMES_PER_S, PATIENCE_S = 20, 1.0
+#: Frames a second at most, so that 20 come to the page; and so long a page waits for one in which nothing is new [s].
+FRAMES_PER_S, PATIENCE_S = 22, 1.0
 #: The longest question of a page [bytes].
 _LONGEST_ASK = 4096
 PAGE = Path(__file__).parent / "page"

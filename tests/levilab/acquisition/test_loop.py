@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    import pandas as pd
+
 
 @pytest.fixture
 def outputs(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
@@ -67,13 +69,23 @@ def test_a_spin_down_is_read_every_ten_seconds_until_the_top_falls(tmp_path: Pat
     assert [event["kind"] for event in run.events()] == ["drive on", "locked", "drive off", "asked again", "fell"]
 
 
-def test_the_readings_follow_the_law_of_the_world_within_their_uncertainty(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def fifteen_runs(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[SpinWorld, pd.DataFrame]]:
+    """Worlds with the readings that were taken in each, seeds 0 to 14."""
+    out, found = tmp_path_factory.mktemp("fifteen"), []
+    for seed in range(15):
+        world = SpinWorld(random_scene(seed), VirtualClock())
+        found.append((world, acquire(in_world(mock(out, seed), world), Silent()).readings().frame))
+    return found
+
+
+def test_the_readings_follow_the_law_of_the_world_within_their_uncertainty(
+    fifteen_runs: list[tuple[SpinWorld, pd.DataFrame]],
+) -> None:
     """χ² over 15 runs about the true curve: only the gate's finite length (2e-5 Hz) and the start come between."""
     chi_square, n = 0.0, 0
-    for seed in range(15):
-        frame = acquire(mock(tmp_path, seed), Silent()).readings().frame
-        scene = random_scene(seed)
-        c = scene.constants[0]
+    for world, frame in fifteen_runs:
+        c = world.scene.constants[0]
         # free of the start: ν^(−1/2) of the law is a straight line of known slope
         y, t = frame["spin_frequency_hz"].to_numpy() ** -0.5, frame["time_s"].to_numpy()
         slope = c * np.sqrt(2 * np.pi) / 2
@@ -275,12 +287,12 @@ def test_a_signal_while_connecting_never_lets_the_drive_on(
     assert True not in outputs
 
 
-def test_the_time_of_a_reading_is_the_middle_of_its_gate(tmp_path: Path) -> None:
+def test_the_time_of_a_reading_is_the_middle_of_its_gate(
+    fifteen_runs: list[tuple[SpinWorld, pd.DataFrame]],
+) -> None:
     """At 40 Hz and 0.1 Hz/s a time stamp that is half a gate off would be 0.05 Hz off; the mean of 15 runs tells."""
     off = []
-    for seed in range(15):
-        world = SpinWorld(random_scene(seed), VirtualClock())
-        frame = acquire(in_world(mock(tmp_path, seed), world), Silent()).readings().frame
+    for world, frame in fifteen_runs:
         released = [stretch for stretch in world._stretches if stretch.phase is Phase.COASTING][-1].start
         spin, _ = world.motion(released + frame["time_s"].to_numpy()[:8])
         off += list(frame["spin_frequency_hz"].to_numpy()[:8] - spin / (2 * np.pi))
