@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from analysis.errors import AnalysisError
 from analysis.precession.sweep import Sweep, fit_sweep
 from analysis.spindown.fit import SpinDown, fit_spin_down
+from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.uncertainty import Estimate
 from levilab.present.numbers import plain, with_uncertainty
 
@@ -24,6 +25,8 @@ FALL_HZ = 21.86
 _POINTS = 400
 #: A curve goes on beyond the readings, but for no longer than this many times their duration.
 _BEYOND = 4.0
+#: Parameters that no law is known by: the start, and what the counter sees of the wobble.
+_NOT_OF_THE_LAW = {"start_frequency", *WOBBLE}
 #: Equations as the page sets them: what follows ^ in brackets is raised.
 EQUATIONS = {
     "stokes": "ω̇ = −C₁ ω",
@@ -72,23 +75,34 @@ class Running:
 Columns = dict[str, "Array"]
 
 
-def fit_so_far(experiment: str, columns: tuple[str, ...], groups: Groups) -> Running | None:
+def fit_so_far(experiment: str, columns: tuple[str, ...], groups: Groups, *, ended: bool = False) -> Running | None:
     """Fit the readings of a run so far; None for an experiment without a running fit.
 
     Args:
         experiment: its name.
         columns: names of the readings' channels.
         groups: the readings.
+        ended: whether no reading will come any more: nothing is forecast then.
     """
     method = METHODS.get(experiment)
     if method is None:
         return None
     by_name = {name: groups.mean[k] for k, name in enumerate(columns)}
     try:
-        return method(by_name, groups.size)
+        found = method(by_name, groups.size)
     except (AnalysisError, KeyError) as error:
         text = str(error) if isinstance(error, AnalysisError) else f"there is no column {error}"
-        return Running("no fit yet", (text,))
+        return Running("no fit" if ended else "no fit yet", (text,))
+    return _without_forecast(found) if ended else found
+
+
+def _without_forecast(found: Running) -> Running:
+    """The fit of a run that has ended: its line goes as far as the readings."""
+    curve = found.curve
+    if curve is not None and np.isfinite(curve.solid_to):
+        x = np.append(curve.x[curve.x < curve.solid_to], curve.solid_to)
+        curve = replace(curve, x=x, y=np.interp(x, curve.x, curve.y), solid_to=np.inf)
+    return replace(found, head=found.head.replace(" so far", ""), curve=curve, end_s=None)
 
 
 def spin_down(columns: Mapping[str, Array], size: int) -> Running:
@@ -100,7 +114,7 @@ def spin_down(columns: Mapping[str, Array], size: int) -> Running:
     best = found.fit(found.best)
     until = _time_of_fall(found, float(time[-1]), float(time[-1] - time[0]))
     x = np.linspace(time[0], until if until is not None else time[-1], _POINTS)
-    constants = [with_uncertainty(value) for name, value in best.parameters.items() if name != "start_frequency"]
+    constants = [with_uncertainty(value) for name, value in best.parameters.items() if name not in _NOT_OF_THE_LAW]
     others = [name for name in found.verdict.indistinguishable if name != found.best]
     lines = [
         ", ".join(constants),

@@ -64,7 +64,7 @@ class Watch:
         self.fit: Running | None = None
         self.fit_version = 0
         self._bench = bench
-        self._fitted = -1  # version of the readings
+        self._fitted = (-1, False)  # version of the readings, and whether they are all
         self._fit_again = 0.0
         self._heard = -np.inf
         self._records: dict[str, Record] = {}
@@ -129,7 +129,7 @@ class Watch:
         """Follow another run folder from now on."""
         if self.followed is None or folder != self.followed.folder:
             self.followed = Followed(folder, self.clock)
-            self.fit, self._fitted = None, -1
+            self.fit, self._fitted = None, (-1, False)
             self.fit_version += 1
             self.tick += 1
 
@@ -138,20 +138,21 @@ class Watch:
     def fit_task(self) -> Callable[[], Running | None] | None:
         """Return what to compute in a thread, if it is time; `fitted` takes the result."""
         followed = self.followed
+        ended = followed is not None and followed.status != "running"
         if (
             followed is None
             or followed.record is None
-            or followed.version == self._fitted
+            or (followed.version, ended) == self._fitted
             or followed.behind
             or self.clock() < self._fit_again
         ):
             return None
-        self._fitted = followed.version
+        self._fitted = (followed.version, ended)
         experiment, columns, readings = followed.record.experiment, followed.columns, followed.readings
         groups = readings.groups()
 
         def compute() -> Running | None:
-            return fit_so_far(experiment, columns, groups)
+            return fit_so_far(experiment, columns, groups, ended=ended)
 
         return compute
 

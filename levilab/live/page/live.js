@@ -14,7 +14,7 @@ const STATES = {
   setup: "the bench is being set up", silent: "bench silent", lost: "instrument lost", missing: "no run", unreachable: "server gone", idle: "ready",
 };
 const LONGER = {  // what stands beside the state
-  setup: "some seconds; at the first start the simulator is compiled, which takes up to a minute",
+  setup: "some seconds; up to a minute at the first start, which compiles",
   unreachable: "it is tried again; start levilab live anew if it was ended",
 };
 const SLIP_HZ = 0.05, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive; while it swings, or the drive moves

@@ -45,8 +45,12 @@ export function openPractice(about, command, run, allowed) {
   }
   const pair = (number, slider, key) => {
     const pass = (source, other) => {
-      const value = Number(source.value);
-      if (source.value === "" || !source.checkValidity()) return;
+      const value = Number(source.value), {rangeUnderflow, rangeOverflow} = source.validity;
+      if (source.value === "") return;
+      if (rangeUnderflow || rangeOverflow) {  // a value between the steps is as good: the drive takes any
+        write("said", `${source.getAttribute("aria-label")}: from ${source.min} to ${source.max}, not ${source.value}`);
+        return;
+      }
       other.value = source.value;
       tune({[key]: value});
     };

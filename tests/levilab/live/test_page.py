@@ -53,7 +53,9 @@ def shown(browser: Browser, hall: Hall) -> Iterator[Page]:
 def test_a_finished_run_stands_there_with_its_fit(shown: Page) -> None:
     assert shown.inner_text("#state-word") == "finished"
     assert shown.inner_text("#count") == "19"
-    assert "disc law so far" in shown.inner_text("#fit-head")
+    assert shown.inner_text("#fit-head").startswith("disc law   ω̇")  # no "so far", and nothing dashed beyond the last
+    assert shown.evaluate("levilab.data.fit.x.at(-1) - levilab.data.readings.x.at(-1)") == 0
+    assert shown.inner_text("#fit-lines").split(" · ")[0].count("(") == 2  # one constant: its u, and its unit
     assert shown.inner_text("#spin-value") == f"{spin_down(19)[-1][1]:.4f}"
 
 

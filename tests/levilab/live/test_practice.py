@@ -45,6 +45,12 @@ def test_a_student_drives_records_and_analyzes(served: Hall, page: Page, monkeyp
     assert not page.evaluate(ticked_early)  # a slow machine may come here when the drive has taken hold
     until(page, "document.getElementById('event-list').textContent.includes('the top follows the drive')")
     until(page, "document.querySelectorAll('#guide .done').length === 1")
+    page.evaluate("levilab.data.before = levilab.data.bench.drive.frequency_hz")
+    page.keyboard.press(".")  # from a spin that was counted, which lies between the steps of the field
+    until(page, "Math.abs(levilab.data.bench.drive.frequency_hz - levilab.data.before - 0.05) < 0.006")
+    page.fill("#frequency", "333")
+    page.keyboard.press("Tab")
+    until(page, "document.getElementById('said').textContent === 'drive frequency in hertz: from 1 to 100, not 333'")
     page.click("#back")
     until(page, "document.getElementById('said').textContent.includes('once it has fallen')")
     page.click("#record")
