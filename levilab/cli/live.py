@@ -39,7 +39,7 @@ def live(
             webbrowser.open(address)
 
     try:
-        serve_live(LiveOptions(run, out, mock, port), announce)
+        serve_live(LiveOptions(run, out, mock, port), announce, message)
     except KeyboardInterrupt:
         message("levilab: the view is closed")
         raise typer.Exit(exit_codes.INTERRUPTED) from None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.errors import AnalysisError
+from analysis.errors import AnalysisError, TooFewReadings
 from analysis.precession.sweep import Sweep, fit_sweep
 from analysis.spindown.fit import SpinDown, fit_spin_down
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
@@ -90,6 +90,8 @@ def fit_so_far(experiment: str, columns: tuple[str, ...], groups: Groups, *, end
     by_name = {name: groups.mean[k] for k, name in enumerate(columns)}
     try:
         found = method(by_name, groups.size)
+    except TooFewReadings as error:
+        return Running("no fit", (str(error),)) if ended else Running("no fit yet", ("it begins after some readings",))
     except (AnalysisError, KeyError) as error:
         text = str(error) if isinstance(error, AnalysisError) else f"there is no column {error}"
         return Running("no fit" if ended else "no fit yet", (text,))

@@ -51,12 +51,13 @@ class LiveOptions:
     seed: int = 0
 
 
-def serve_live(options: LiveOptions, announce: Callable[[str], None]) -> None:
+def serve_live(options: LiveOptions, announce: Callable[[str], None], say: Callable[[str], None]) -> None:
     """Serve until Ctrl-C or SIGTERM.
 
     Args:
         options: what to show, and where.
         announce: is called with the address, once pages can be opened.
+        say: is called with a line for the person at the terminal.
 
     Raises:
         UsageError: a run and a bench for practice at once.
@@ -70,6 +71,8 @@ def serve_live(options: LiveOptions, announce: Callable[[str], None]) -> None:
     with contextlib.closing(_listening(options.port)) as listening, contextlib.ExitStack() as at_end:
         doors = Doors(listening.getsockname()[1])
         bench = at_end.enter_context(PracticeBench(root, seed=options.seed)) if options.mock else None
+        if bench:
+            at_end.callback(say, "the bench is switched off; a run that is being recorded is kept")
         hall = Hall(root, shown, doors, Desk(bench) if bench else None)
         config = uvicorn.Config(
             application(hall),

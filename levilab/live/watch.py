@@ -157,7 +157,11 @@ class Watch:
         return compute
 
     def fitted(self, found: Running | None, took_s: float) -> None:
-        """Take in what was computed, and how long it took."""
+        """Take in what was computed, and the processor time that it took [s].
+
+        That of the first fit says nothing of the next ones: it imports what it needs.
+        """
+        took_s = took_s if self.fit_version else 0.0
         self._fit_again = self.clock() + min(max(_FIT_EVERY_S, took_s / _FIT_SHARE), _FIT_PAUSE_S)
         self.fit = found
         self.fit_version += 1

@@ -499,6 +499,7 @@ def gans_figure(spins: Array, tilts: Array, up: Flags, window: tuple[float, floa
     figure, (axes,) = _figure(3.0, (0.085, 0.15, 0.66, 0.8))
     axes.pcolormesh(spins, tilts, up.T.astype(float), cmap=FATES, vmin=0, vmax=1, shading="nearest", rasterized=True)
     axes.set_yscale("log")
+    axes.tick_params(which="both", direction="out")  # inside they would lie below the map
     for edge in window:
         if math.isfinite(edge):
             axes.axvline(edge, **LOOKS["theory"].as_line)

@@ -21,8 +21,9 @@ export function openPractice(about, command, run, allowed) {
   if (!allowed) write("said", "This page may only look: open the address that the terminal shows.");
 
   async function send(what, values = {}) {
+    if (allowed) write("said", "");  // and not later: what the bench says may come before the answer
     const wrong = await command({do: what, ...values});
-    if (allowed) write("said", wrong);
+    if (allowed && wrong) write("said", wrong);
   }
 
   /** What the bench says: a refusal, or a line for the person at it. */
@@ -67,6 +68,7 @@ export function openPractice(about, command, run, allowed) {
     hold: () => send("pause", {on: !now.paused}),
     record: () => now.busy ? send("stop the run") : send("record a run", {experiment: by("experiment").value}),
     analyze: () => openResult(run()),
+    report: () => { now.read = run(); },
   };
   for (const [id, act] of Object.entries(does)) {
     by(id).addEventListener("click", async () => {
@@ -120,7 +122,7 @@ export function openPractice(about, command, run, allowed) {
     const ended = run_now && run_now.status !== "running" && readings > 0;
     const done = {
       drive: bench.took_hold, tune: bench.tuned_up, record: Boolean(ended), analyze: Boolean(ended) && now.analyzed === run(),
-      report: false,
+      report: Boolean(ended) && now.read === run(),
     };
     const items = [...by("guide").children], last = items.map((item) => Boolean(done[item.dataset.step])).lastIndexOf(true);
     items.forEach((item, k) => {  // a step may be left out: what comes next is the one behind the last that was done
