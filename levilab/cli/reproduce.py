@@ -32,7 +32,10 @@ def reproduce(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Make the chapters, print them, write the report, and end with 1 where something is unexpected."""
+    """Make the chapters, print them, write the report, and end with 1 where something is unexpected.
+
+    All of them take about a minute, the first time half a minute more.
+    """
     from levilab.reproduce.run import chosen
 
     wanted = chosen(only)  # a wrong name is refused before anything is computed

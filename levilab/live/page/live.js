@@ -160,7 +160,7 @@ function show() {
   const lost = bench?.lost?.length ? `the ${bench.lost.join(" and the ")} does not answer` : "";
   const running = about?.status === "running" || practice;
   const down = Boolean(practice) && data.up === false && Boolean(bench) && !bench.silent && !bench.busy;
-  const advice = down ? `the top is down: “Top back” floats it again${data.count ? ", “Analyze” shows what was recorded" : ""}` : "";
+  const advice = !down ? "" : data.count ? "the top is down: “Analyze” the run, or “Top back”" : "the top is down: “Top back” floats it again";
   write("state-text", lost || LONGER[state] || advice || about?.problem || ended(about) || (running && !bench?.silent && bench?.text) || "");
   by("synthetic").hidden = !(about?.synthetic || (!about && bench?.virtual));
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
