@@ -23,7 +23,7 @@ MOST_EVALUATIONS = 500  # a sound fit needs 5 to 30
 _ENDED = frozenset({1, 2, 3, 4, 6, 7, 8})
 
 
-def _minimizer(residual: Residual, gradient: Gradient, start: Array, most: int = MOST_EVALUATIONS) -> Any:
+def _minimizer(residual: Residual, gradient: Gradient, start: Array) -> Any:
     from lmfit import Minimizer, Parameter
 
     def values(parameters: Any) -> Array:
@@ -37,7 +37,7 @@ def _minimizer(residual: Residual, gradient: Gradient, start: Array, most: int =
     return Minimizer(
         lambda parameters: residual(values(parameters)),
         [Parameter(f"q{i}", value=float(value)) for i, value in enumerate(start)],
-        max_nfev=most,
+        max_nfev=MOST_EVALUATIONS,
         Dfun=slopes,
         col_deriv=1,
         ftol=TOLERANCE,

@@ -248,7 +248,7 @@ class PracticeProcess:
         self._hold: Hold | None = None  # of the drive, while it is on near the top's spin
         self._took_hold = self._tuned_up = False  # whether a person has come so far
         self._paused = False  # by a person
-        self._is_ready = False
+        self._is_ready = False  # whether the instruments have answered
         self._text = ""  # what the drive does, for the page
         self._moved = 0.0  # bench time of the last step of the drive's frequency [s]
         self._tops = 0
@@ -261,16 +261,14 @@ class PracticeProcess:
         """Be the bench until the end."""
         address = self._publisher.address
         said: dict[str, Any] = {"port": address.port, "token": address.token.hex()} if address else {}
-        ready: PracticeEvent | None = PracticeEvent(
-            "ready", f"the top of the scene {self.scene.name}", scene=self.scene.as_table(), **said
-        )
+        ready = PracticeEvent("ready", f"the top of the scene {self.scene.name}", scene=self.scene.as_table(), **said)
         self._place_probe(0.072)
         while not self._over:
             with open_bench(self._wiring, tuple(self._wiring.instruments)) as bench, self._looking_at(bench):
                 self._set_up(bench)
-                if ready is not None:
+                if not self._is_ready:
                     self._report(ready)
-                    ready, self._is_ready = None, True
+                    self._is_ready = True
                 while not self._is_called_away():
                     self._measure(bench)
             if (wanted := self._next_run()) is not None:
@@ -503,7 +501,7 @@ class PracticeProcess:
         spin = self._seen.values.get("spin_frequency_hz")
         if spin is not None and abs(spin - knobs.frequency_hz) <= CATCHES_WITHIN_HZ:
             self._hold = Hold(knobs.frequency_hz)
-            return f"the drive comes on with a light pulse, at the top's spin, {spin:.2f} Hz"
+            return f"the drive comes on after the next count, at the top's spin, {spin:.2f} Hz"
         self._switch_on(bench, knobs.frequency_hz)
         beside = "the counter sees no top" if spin is None else f"the top spins at {spin:.2f} Hz"
         self._say(f"drive on at {knobs.frequency_hz:g} Hz, but {beside}: it takes hold of one that spins as fast")
