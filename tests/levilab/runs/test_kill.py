@@ -190,7 +190,9 @@ class Small:
 
 
 LIMITED = """
-import os, resource, signal
+import os, resource, signal, sys
+# Python before 3.12.8 and 3.13.1 keeps the bytecode of a module that is cut short here, and cannot import it again
+sys.dont_write_bytecode = True
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 sync, count = os.fsync, 0
 def limiting(fd):
