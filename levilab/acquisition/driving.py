@@ -21,6 +21,7 @@ from levilab.acquisition.grip import COUNTS, GRIP_GATE_S, Grip
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.bench.person import FloatTop
+from levilab.present.numbers import signed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -238,7 +239,9 @@ def _take_hold(session: Session[D], spin: float) -> float:
         session.stop.check()
         seen = spin_now(session, GRIP_GATE_S)
         session.bench.generator.frequency = grip.follow(seen)
-        session.progress(f"the drive takes hold at {grip.drive:.2f} Hz", grip.counts / COUNTS)
+        session.progress(
+            f"the drive takes hold: count {grip.counts} of {COUNTS}, {grip.drive:.2f} Hz", grip.counts / COUNTS
+        )
     prepare_counter_again(session)
     if grip.is_lost:
         raise NotHeld(seen, grip.drive)
@@ -300,7 +303,7 @@ def has_drifted(counts: Sequence[float]) -> bool:
 
 def compare_with_drive(session: Session[D], slip: Slip) -> None:
     """Write down how the counted spin of a held top compares with its drive; a tape that slips is warned of."""
-    text = f"held at {slip.drive:.2f} Hz: counted {slip.spin:.3f} Hz, {slip.difference:+.3f} Hz beside the drive"
+    text = f"held at {slip.drive:.2f} Hz: counted {slip.spin:.3f} Hz, {signed(slip.difference, 3)} Hz beside the drive"
     session.event("held", text, spin_frequency_hz=slip.spin, drive_frequency_hz=slip.drive, u_hz=slip.u)
     if slip.warning:
         session.warn(slip.warning)

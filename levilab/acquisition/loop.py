@@ -163,8 +163,8 @@ def _earlier(request: AcquisitionRequest) -> Earlier | None:
     """What is resumed."""
     if request.resume is None:
         return None
-    frame = request.resume.readings().frame
-    rows = [{str(k): float(v) for k, v in row.items()} for row in frame.to_dict("records")]
+    columns = request.resume.readings().columns
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*(c.tolist() for c in columns.values()), strict=True)]
     return Earlier(request.resume, rows, replay=request.synthetic_how is not None)
 
 

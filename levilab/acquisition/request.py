@@ -148,8 +148,10 @@ def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequenc
         key, equals, text = setting.partition("=")
         name, dot, field = key.strip().partition(".")
         if not (equals and dot and name in EXPERIMENTS):
-            instead = f", {experiment}.{setting}?" if equals and not dot else ""
-            expected = f"{experiment}.KEY=VALUE is expected{instead}"
+            expected = f"{experiment}.KEY=VALUE is expected"
+            if equals and not dot:
+                refuse_unknown(config, experiment, name)
+                expected += f", {experiment}.{setting}?"
             raise UsageError(
                 "settings", f"{expected}; levilab acquire {experiment} --settings lists all", value=setting
             )
@@ -204,7 +206,7 @@ def _check_readings(run: Run, request: AcquisitionRequest) -> None:
     if list(readings.header) != names:
         raise CannotResume(f"{readings.path}: the columns {', '.join(names)} are expected; {_ANEW}")
     for channel in channels:
-        if channel.unit == "Hz" and channel.name in readings.frame and not (readings.column(channel.name) > 0).all():
+        if channel.unit == "Hz" and channel.name in readings.columns and not (readings.column(channel.name) > 0).all():
             raise CannotResume(f"{readings.path}: {channel.name}: only numbers above 0 are expected; {_ANEW}")
     last = float(readings.column("time_s")[-1])
     if isinstance(settings, CounterSettings) and settings.one_top and last > settings.longest_s:

@@ -1,4 +1,4 @@
-"""The numbers in the rows of a table of text, read at once where every line is plain, else line by line.
+"""The numbers in the rows of a table of text, read at once where there are many and every line is plain, else by line.
 
 Plain is a file in which the number of line ends and separators is that of full rows and every field that is used is
 a number or a missed reading; pandas then reads it at its full speed. All else (comments among the rows, quotation
@@ -24,6 +24,7 @@ from levilab.formats.layout import Layout
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+FEW = 1 << 16  # bytes that are read line by line before pandas is imported
 BLOCK = 1 << 17  # bytes counted at once: small enough for the cache
 ONE_BYTE_ENCODINGS = ("utf-8", "utf-8-sig", "latin-1")  # those in which a line end is one byte, whatever precedes it
 _ITS_OWN_COLUMN = "write what stands behind the ± into a column of its own, with the title u"
@@ -54,7 +55,8 @@ def read_rows(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unen
         TableError: a line is damaged.
         OSError: the file cannot be read.
     """
-    rows = _read_at_once(path, layout, chosen, drop_unended=drop_unended)
+    few = path.stat().st_size < FEW
+    rows = None if few else _read_at_once(path, layout, chosen, drop_unended=drop_unended)
     return rows or _read_lines(path, layout, chosen, drop_unended=drop_unended)
 
 

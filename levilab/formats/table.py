@@ -7,6 +7,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,15 +52,26 @@ TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 class Table:
     """A table of readings.
 
-    `frame` has canonical columns (`time_s`, `spin_frequency_hz`, …) in SI, float64, all finite; `lines`, shape
+    `columns` are canonical (`time_s`, `spin_frequency_hz`, …): SI, float64, shape (rows,), all finite; `lines`, shape
     (rows,), is the 1-based line of `path` that each row stands in; `header` are the titles in the file.
     """
 
     path: Path
-    frame: "pd.DataFrame"
+    columns: "Mapping[str, NDArray[np.float64]]"
     warnings: tuple[str, ...]
     header: tuple[str, ...]
     lines: "NDArray[np.int64]"
+
+    def __len__(self) -> int:
+        """How many readings there are."""
+        return self.lines.size
+
+    @cached_property
+    def frame(self) -> "pd.DataFrame":
+        """The columns as pandas has them."""
+        import pandas as pd
+
+        return pd.DataFrame(dict(self.columns), dtype=np.float64)
 
     def column(self, name: str) -> "NDArray[np.float64]":
         """A canonical column in SI, shape (rows,).
@@ -67,10 +79,9 @@ class Table:
         Raises:
             TableError: the file has no such column.
         """
-        if name not in self.frame.columns:
+        if name not in self.columns:
             raise _no_column(self.path, name, self.header)
-        values: NDArray[np.float64] = self.frame[name].to_numpy(dtype=np.float64)
-        return values
+        return self.columns[name]
 
 
 def read_table(
@@ -115,10 +126,10 @@ def read_table(
                 raise _no_column(path, name, header)
         rows = read_rows(path, layout, chosen)
     table = _table(path, header, chosen, rows, (*warnings, *doubts))
-    if len(table.frame) >= FEWEST:
+    if len(table) >= FEWEST:
         return table
-    what = f"{len(table.frame)} reading{'s' * (len(table.frame) != 1)}" if rows.lines.size else "only a header"
-    missed = f" and {rows.lines.size - len(table.frame)} missed ones" if rows.lines.size > len(table.frame) else ""
+    what = f"{len(table)} reading{'s' * (len(table) != 1)}" if rows.lines.size else "only a header"
+    missed = f" and {rows.lines.size - len(table)} missed ones" if rows.lines.size > len(table) else ""
     raise TableError(
         path,
         f"holds {what}{missed}, at least {FEWEST} readings are needed: record longer",
@@ -256,8 +267,6 @@ def _table(
     path: Path, header: tuple[str, ...], chosen: Sequence[Column], rows: Rows, warnings: tuple[str, ...]
 ) -> Table:
     """Leave out missed readings, and columns of uncertainties with gaps; then convert to SI."""
-    import pandas as pd
-
     name = shorten(str(path), 200)
     notes = [*warnings, *([f"{name}, {rows.torn} and is left out"] if rows.torn else [])]
     notes += [f"{name}: {rows.doubt}"] if rows.doubt else []
@@ -280,12 +289,12 @@ def _table(
     if not good.all():
         notes.append(_missed(name, lines[~good], good.size))
         lines, kept = lines[good], {column: values[good] for column, values in kept.items()}
-    frame = {c.name: values if c.factor == 1 else values * c.factor for c, values in kept.items()}
+    columns = {c.name: values if c.factor == 1 else values * c.factor for c, values in kept.items()}
     for name in [c.name for c in kept if c.inverse and c.name in QUANTITIES]:
-        frame[name] = 1 / frame[name]
+        columns[name] = 1 / columns[name]
         if any(c.inverse and c.name == companion(name) for c in kept):
-            frame[companion(name)] = frame[companion(name)] * frame[name] ** 2  # u(1/T) = u(T)/T²
-    return Table(path, pd.DataFrame(frame, dtype=np.float64), tuple(notes), header, lines)
+            columns[companion(name)] = columns[companion(name)] * columns[name] ** 2  # u(1/T) = u(T)/T²
+    return Table(path, columns, tuple(notes), header, lines)
 
 
 def _missed(name: str, lines: "NDArray[np.int64]", rows: int) -> str:

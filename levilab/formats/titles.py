@@ -252,8 +252,15 @@ def known_titles(header: Sequence[str]) -> int:
 
 
 def nearly_a_frequency(text: str) -> str | None:
-    """How a frequency follows from what a column holds, None if none does."""
-    return next((how for word, how in NEARLY_FREQUENCIES.items() if _plain_name(text).startswith(word)), None)
+    """How a frequency follows from what a column holds, None if none does.
+
+    >>> nearly_a_frequency("Drehzahl")
+    'say its unit in the title, or `columns` = f=Drehzahl [rpm]'
+    """
+    name = _plain_name(text)
+    if name in NEED_UNITS:
+        return f"say its unit in the title, or `columns` = f={text.strip()} [rpm]"
+    return next((how for word, how in NEARLY_FREQUENCIES.items() if name.startswith(word)), None)
 
 
 def as_a_period(text: str) -> Title | None:

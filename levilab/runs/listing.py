@@ -136,10 +136,10 @@ def _read(run: Run) -> _Rows:
     """By reading them as an analysis does.  Raises DataError."""
     if not (run.folder / READINGS).exists():
         return _Rows(0, None, of_records=False)
-    frame = run.readings().frame
-    times = frame["time_s"] if len(frame) and "time_s" in frame else None
-    length = None if times is None else _length(run, float(times.iloc[0]), float(times.iloc[-1]))
-    return _Rows(len(frame), length, "record" in frame)
+    table = run.readings()
+    times = table.columns.get("time_s")
+    length = None if times is None or not times.size else _length(run, float(times[0]), float(times[-1]))
+    return _Rows(len(table), length, "record" in table.columns)
 
 
 _COMMAS = methodcaller("count", b",")

@@ -174,7 +174,7 @@ class Run:
 
     def count(self) -> int:
         """How many readings there are; a run of another kind, without readings.csv, has none."""
-        return len(self.readings().frame) if (self.folder / READINGS).exists() else 0
+        return len(self.readings()) if (self.folder / READINGS).exists() else 0
 
     def elapsed(self) -> float:
         """Seconds on the wall since time zero.  Raises DataError if the run ended before it, or the clock was set."""

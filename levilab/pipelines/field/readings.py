@@ -81,7 +81,7 @@ def field_readings(table: Table) -> FieldReadings:
     if heights < FEWEST_HEIGHTS:  # here and not in the fit alone: a scan broken off spoils no search of a folder
         span = {"lowest": float(height.min()), "highest": float(height.max())}
         raise TableError(table.path, str(TooFewHeights(seen=heights, needed=FEWEST_HEIGHTS, **span)))
-    columns = table.frame.columns
+    columns = table.columns
     own = OWN_U in columns
     u_name = OWN_U if own else "flux_density_u_t"
     height_u = table.column("height_u_m") if "height_u_m" in columns else None

@@ -104,11 +104,10 @@ def _single_column(path: Path, *, guess: bool) -> Table | None:
     factor = 1.0 if title is None or title.unit is None else unit_factor(title.unit, "frequency")
     if factor is None or not (guess or named):
         return None
-    import pandas as pd
-
     values = np.array([float(line.replace(",", ".")) for _, line in numbers])
-    frame = pd.DataFrame({QUANTITIES[0]: values * factor})
-    return Table(path, frame, (), tuple(titles), np.array([k for k, _ in numbers], dtype=np.int64))
+    return Table(
+        path, {QUANTITIES[0]: values * factor}, (), tuple(titles), np.array([k for k, _ in numbers], dtype=np.int64)
+    )
 
 
 def read_limit_run(run: Run, _: InputOptions) -> LimitReadings:
@@ -130,7 +129,7 @@ def limit_readings(table: Table) -> LimitReadings:
     limit = table.column("spin_frequency_hz")
     if not limit.size:
         raise TableError(table.path, "holds no limit: at least one repetition is needed")
-    has_u = "spin_frequency_u_hz" in table.frame.columns
+    has_u = "spin_frequency_u_hz" in table.columns
     u = table.column("spin_frequency_u_hz") if has_u else None
     must_be_positive(table, limit, "the limit", "Hz, but a spinning top is above 0: remove the row")
     if u is not None:

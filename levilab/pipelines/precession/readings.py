@@ -154,20 +154,20 @@ def sweep_readings(table: Table) -> Readings:
             f"holds {drive.size} points, up to {MOST_POINTS} are expected: give one mean for each drive frequency",
         )
     for name, what in _OF.items():
-        if name in table.frame:
+        if name in table.columns:
             _check(table, table.column(name), f"the {what} frequency")
     if np.ptp(drive) <= SAME * drive.max():
         raise TableError(
             table.path, f"all {drive.size} points are at a drive frequency of {drive[0]:g} Hz: sweep the drive"
         )
-    u = {name: table.column(name) for name in _OF_U if name in table.frame}
+    u = {name: table.column(name) for name in _OF_U if name in table.columns}
     warnings = list(table.warnings)
-    if "spin_frequency_u_hz" in u and "spin_frequency_hz" not in table.frame and "precession_frequency_u_hz" not in u:
+    if "spin_frequency_u_hz" in u and "spin_frequency_hz" not in table.columns and "precession_frequency_u_hz" not in u:
         u["precession_frequency_u_hz"] = u.pop("spin_frequency_u_hz")
         warnings.append(f"{table.path.name}: the column of uncertainties is taken for that of the precession")
     for name, values in u.items():
         _check_u(table, values, _OF_U[name], precession)
-    has_spin = "spin_frequency_hz" in table.frame
+    has_spin = "spin_frequency_hz" in table.columns
     return Readings(
         drive=drive,
         precession=precession,
@@ -175,7 +175,7 @@ def sweep_readings(table: Table) -> Readings:
         u_drive=u.get("drive_frequency_u_hz"),
         spin=table.column("spin_frequency_hz") if has_spin else None,
         u_spin=u.get("spin_frequency_u_hz") if has_spin else None,
-        time=table.column("time_s") if "time_s" in table.frame else None,
+        time=table.column("time_s") if "time_s" in table.columns else None,
         warnings=tuple(warnings),
     )
 

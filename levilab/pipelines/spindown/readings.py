@@ -153,7 +153,7 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
             or a frequency or an uncertainty is not positive; the line of the file is named.
     """
     time, frequency = table.column("time_s"), table.column("spin_frequency_hz")
-    has_u = "spin_frequency_u_hz" in table.frame.columns
+    has_u = "spin_frequency_u_hz" in table.columns
     u = table.column("spin_frequency_u_hz") if has_u else None
     if time.size < fewest:
         raise TableError(table.path, f"holds {time.size} readings, at least {fewest} are needed: record longer")

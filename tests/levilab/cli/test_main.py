@@ -353,8 +353,8 @@ IMPORTS: list[tuple[list[list[str]], set[str]]] = [
         [["--help"], ["acquire", "spin", "--help"], ["simulate", "--help"], ["simulate", "nowhere"], ["--version"]],
         set[str](),
     ),
-    ([["runs", "."], ["analyze", "nowhere"]], {"numpy", "pandas"}),
-    ([["acquire", "spin", "--mock"]], {"numpy", "pandas", "pyvisa"}),
+    ([["runs", "."], ["analyze", "nowhere"]], {"numpy"}),
+    ([["acquire", "spin", "--mock"]], {"numpy", "pyvisa"}),
 ]
 
 

@@ -282,6 +282,7 @@ def test_a_series_ends_when_its_time_is_over(tmp_path: Path) -> None:
         ("limit.gate_s=3", "gate_s = 3 must be shorter than interval_s = 2"),
         ("which=upper", "limit.KEY=VALUE is expected, limit.which=upper?"),
         ("limit.which", "limit.KEY=VALUE is expected"),
+        ("what=upper", "there is no such setting; levilab acquire limit --settings lists all"),
         ("spin.hold_s=1", "is a setting of levilab acquire spin, this is levilab acquire limit"),
     ],
 )
