@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import re
 import subprocess
 import sys
 import threading
 from typing import TYPE_CHECKING, Any
 
+from analysis.uncertainty import Estimate
+from levilab.present.numbers import with_uncertainty
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
 #: Figures that stand beside a run, and its report.
@@ -19,6 +24,8 @@ REPORT = "report.html"
 RESULT = "result.json"
 #: An analysis that takes longer than this is given up [s].
 _LONGEST_S = 600.0
+#: What a page shows of a result at most [characters].
+_LONGEST_TEXT = 2000
 
 
 class Analyses:
@@ -32,6 +39,9 @@ class Analyses:
     def __init__(self) -> None:
         self.running: set[str] = set()
         self.failed: dict[str, str] = {}
+        self._processes: set[subprocess.Popen[str]] = set()
+        self._is_over = False
+        self._lock = threading.Lock()
 
     def begin(self, folder: Path) -> None:
         """Analyze a run and write its report, if that is not under way."""
@@ -50,22 +60,44 @@ class Analyses:
                 ["analyze", str(folder)],
                 ["report", str(folder), "--output", str(folder / REPORT)],
             ):
-                ended = subprocess.run(  # noqa: S603 - this program, with a folder that is a run
-                    [sys.executable, "-m", "levilab", *words],
-                    stdin=subprocess.DEVNULL,
-                    capture_output=True,
-                    encoding="utf-8",
-                    errors="replace",
-                    timeout=_LONGEST_S,
-                    check=False,
-                )
-                if ended.returncode:
-                    self.failed[folder.name] = ended.stderr.strip()[-600:] or f"levilab {words[0]} failed"
+                status, err = self._run(words)
+                if status:
+                    self.failed[folder.name] = err.strip()[-600:] or f"levilab {words[0]} failed"
                     return
         except (OSError, subprocess.SubprocessError) as error:
             self.failed[folder.name] = str(error)
         finally:
             self.running.discard(folder.name)
+
+    def _run(self, words: Sequence[str]) -> tuple[int, str]:
+        """Run a command of this program.  Returns its exit status, and what it wrote about failures."""
+        with self._lock:
+            if self._is_over:
+                return 1, "the live view was ended"
+            process = subprocess.Popen(  # noqa: S603 - this program, with a folder that is a run
+                [sys.executable, "-m", "levilab", *words],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                encoding="utf-8",
+                errors="replace",
+            )
+            self._processes.add(process)
+        with process:
+            try:
+                _, err = process.communicate(timeout=_LONGEST_S)
+                return process.returncode, err
+            finally:
+                process.kill()
+                with self._lock:
+                    self._processes.discard(process)
+
+    def end(self) -> None:
+        """Give up what is under way: files are replaced whole, so none is left torn."""
+        with self._lock:
+            self._is_over = True
+            for process in self._processes:
+                process.terminate()
 
     def about(self, folder: Path) -> dict[str, Any]:
         """The state of a run's analysis: its state, names of figures, the verdict, whether there is a report."""
@@ -90,6 +122,21 @@ def _result(folder: Path) -> dict[str, Any]:
     warnings = found.get("warnings")
     return {
         "analysis": str(found.get("analysis", ""))[:40],
-        "verdict": [str(text)[:2000] for text in verdicts if text],
+        "verdict": [str(text)[:_LONGEST_TEXT] for text in verdicts if text] or _values(found.get("values")),
         "warnings": [str(text)[:600] for text in warnings][:10] if isinstance(warnings, list) else [],
     }
+
+
+def _values(values: Any) -> list[str]:
+    """What was found, in one line, for an analysis whose result has no verdict: each value that has an uncertainty."""
+    found = [
+        f"{name.replace('_', ' ')} {with_uncertainty(Estimate(one['value'], one['u'], str(one.get('unit', ''))))}"
+        for name, one in (values.items() if isinstance(values, dict) else ())
+        if isinstance(one, dict) and _is_number(one.get("value")) and _is_number(one.get("u")) and one["u"] > 0
+    ]
+    return [", ".join(found)[:_LONGEST_TEXT]] if found else []
+
+
+def _is_number(value: Any) -> bool:
+    """Whether it is a number as an analysis writes it; a person may have changed the file."""
+    return isinstance(value, float) and math.isfinite(value)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError
@@ -13,8 +14,6 @@ from levilab.runs.run import read_record
 from levilab.simulator.scene import read_scene, scene_of
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from levilab.live.practice.bench import PracticeBench
     from levilab.telemetry.address import Address
 
@@ -53,17 +52,20 @@ class Desk:
         count: of what it has said.
         said: the latest of that.
         scene: of its top, None until it is ready.
+        folder: of the run that it recorded last, or records; None before.
     """
 
     bench: PracticeBench
     count: int = 0
     said: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=_MOST_SAID))
     scene: dict[str, Any] | None = None
+    folder: Path | None = None
+    _records: bool = False  # whether a run is recorded; its events, which pages list, hold what the bench says
 
     @property
     def about(self) -> dict[str, Any]:
         """What the page has to know at first."""
-        return {"experiments": [*EXPERIMENTS]}
+        return {"experiments": [*EXPERIMENTS], "run": self.folder.name if self.folder else ""}
 
     def address(self) -> Address | None:
         """Where it publishes; None until it is ready."""
@@ -75,8 +77,12 @@ class Desk:
             self.count += 1
             if event.kind == "ready":
                 self.scene = event.scene
+            if event.kind == "recording" and event.folder:
+                self.folder = Path(event.folder)
             text = event.text[:_LONGEST_TEXT]
-            self.said.append({"n": self.count, "kind": event.kind, "text": text, "status": event.status})
+            self._records = event.kind == "recording" or (self._records and event.kind != "recorded")
+            about = {"n": self.count, "kind": event.kind, "text": text, "status": event.status}
+            self.said.append(about | {"of_run": self._records and event.kind == "message"})
 
     def said_after(self, number: object) -> list[dict[str, Any]]:
         """Return what was said after that of a number."""

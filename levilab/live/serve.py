@@ -18,7 +18,7 @@ from levilab.live.server import Hall, application
 from levilab.runs.run import RECORD, find_run
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Collection, Iterator
 
     from uvicorn import Server
 
@@ -67,12 +67,18 @@ def serve_live(options: LiveOptions, announce: Callable[[str], None], say: Calla
     """
     import uvicorn
 
+    class Saying(uvicorn.Server):
+        """A server that says at the first Ctrl-C what it waits for."""
+
+        async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+            if text := farewell(bench, hall.analyses.running):
+                say(text)
+            await super().shutdown(sockets)
+
     root, shown = _where(options)
     with contextlib.closing(_listening(options.port)) as listening, contextlib.ExitStack() as at_end:
         doors = Doors(listening.getsockname()[1])
         bench = at_end.enter_context(PracticeBench(root, seed=options.seed)) if options.mock else None
-        if bench:
-            at_end.callback(say, "the bench is switched off; a run that is being recorded is kept")
         hall = Hall(root, shown, doors, Desk(bench) if bench else None)
         config = uvicorn.Config(
             application(hall),
@@ -84,9 +90,26 @@ def serve_live(options: LiveOptions, announce: Callable[[str], None], say: Calla
             server_header=False,
             timeout_graceful_shutdown=_GOODBYE_S,
         )
-        server = uvicorn.Server(config)
+        server = Saying(config)
         with _announcing(server, doors, announce, commands=options.mock):
             server.run(sockets=[listening])
+
+
+def farewell(bench: PracticeBench | None, analyzed: Collection[str] = ()) -> str:
+    """Return what the person at the terminal has to know when the view is to end; empty where it ends at once.
+
+    Args:
+        bench: the one for practice.
+        analyzed: names of the runs that are being analyzed.
+    """
+    parts = []
+    if bench and bench.may_record:
+        parts.append("the run that is being recorded ends with the reading under way and is kept")
+    if analyzed:
+        parts.append(f"the analysis of {', '.join(sorted(analyzed))} is given up; levilab analyze makes it")
+    if bench:
+        parts.append("the bench is switched off")
+    return "; ".join(parts)
 
 
 def _where(options: LiveOptions) -> tuple[Path, str]:

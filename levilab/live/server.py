@@ -73,10 +73,10 @@ class Hall:
 
     @contextlib.contextmanager
     def watching(self, name: str) -> Iterator[Watch]:
-        """The watch of a run, shared by all pages that look at it; "" is the bench for practice."""
+        """The watch of a run, shared by all pages that look at it; "" is what the bench for practice recorded last."""
         if name not in self.watches:
-            bench = self.desk.address if self.desk and not name else None
-            self.watches[name] = Watch(self.root / name if name else None, bench)
+            folder = self.root / name if name else self.desk.folder if self.desk else None
+            self.watches[name] = Watch(folder, self.desk.address if self.desk else None, stays=bool(name))
         self.pages[name] = self.pages.get(name, 0) + 1
         try:
             yield self.watches[name]
@@ -210,7 +210,7 @@ class Pages:
             while len(text := await socket.receive_text()) <= _LONGEST_ASK:
                 ask = _table(text)
                 await hall.wait_for_news(watch, ask.get("tick"))
-                said = hall.desk.said_after(ask.get("said")) if hall.desk and not name else []
+                said = hall.desk.said_after(ask.get("said")) if hall.desk else []
                 await socket.send_bytes(watch.frame(ask, said))
             await socket.close(1009)
 
@@ -226,6 +226,7 @@ def application(hall: Hall) -> Guard:
             yield
         finally:
             reading.cancel()
+            hall.analyses.end()
 
     routes = [
         Route("/", pages.page),

@@ -42,8 +42,8 @@ _SETTINGS = {"frequency_hz", "amplitude_vpp", "waveform", "offset_v", "gate_s", 
 class Watch:
     """What is known of a run and of its bench now.
 
-    Pages change nothing here, and nothing is kept for any of them.  Without a folder it follows what a bench for
-    practice records; `bench` returns where that publishes.
+    Pages change nothing here, and nothing is kept for any of them.  With a bench for practice, it follows what that
+    records, unless it stays with its run; `bench` returns where that publishes.
 
     Attributes:
         followed: the run folder; None while a bench for practice has recorded none.
@@ -56,13 +56,17 @@ class Watch:
         folder: Path | None,
         bench: Callable[[], Address | None] | None = None,
         clock: Callable[[], float] = time.monotonic,
+        *,
+        stays: bool = False,
     ) -> None:
         self.clock = clock
+        self._stays = stays
         self.followed = Followed(folder, clock) if folder else None
         self.state: State | None = None
         self.tick = 0
         self.fit: Running | None = None
         self.fit_version = 0
+        self._has_fitted = False
         self._bench = bench
         self._fitted = (-1, False)  # version of the readings, and whether they are all
         self._fit_again = 0.0
@@ -117,7 +121,7 @@ class Watch:
         self.tick += 1
         if isinstance(message, State):
             self.state = message
-            if self._bench and message.folder:
+            if self._bench and message.folder and not self._stays:
                 self._turn_to(Path(message.folder))
         elif isinstance(message, Record):
             self._records[message.channel] = message
@@ -144,7 +148,7 @@ class Watch:
             or followed.record is None
             or (followed.version, ended) == self._fitted
             or followed.behind
-            or self.clock() < self._fit_again
+            or (self.clock() < self._fit_again and not ended)  # the last fit of a run waits for nothing
         ):
             return None
         self._fitted = (followed.version, ended)
@@ -159,9 +163,10 @@ class Watch:
     def fitted(self, found: Running | None, took_s: float) -> None:
         """Take in what was computed, and the processor time that it took [s].
 
-        That of the first fit says nothing of the next ones: it imports what it needs.
+        That of the first fit that draws a line says nothing of the next ones: it imports what it needs.
         """
-        took_s = took_s if self.fit_version else 0.0
+        took_s = took_s if self._has_fitted else 0.0
+        self._has_fitted |= found is not None and found.curve is not None
         self._fit_again = self.clock() + min(max(_FIT_EVERY_S, took_s / _FIT_SHARE), _FIT_PAUSE_S)
         self.fit = found
         self.fit_version += 1

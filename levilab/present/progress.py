@@ -75,12 +75,13 @@ class LineDisplay:
 
     def __init__(self) -> None:
         self._gone = False
-        self._fifths = 0
+        self._fifths, self._prepared = 0, ""
 
     def preparing(self, text: str, fraction: float) -> None:
-        """A line each fifth of the way."""
-        if int(5 * fraction) > self._fifths:
-            self._fifths = int(5 * fraction)
+        """A line each fifth of the way, of each part of it; none that is as the last."""
+        before, self._fifths = self._fifths, int(5 * fraction)
+        if self._fifths > before and text != self._prepared:
+            self._prepared = text
             self.message(text)
 
     def reading(self, text: str, elapsed: float, remaining: float) -> None:

@@ -13,6 +13,7 @@ import os
 import sys
 import threading
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import resource_tracker
 from multiprocessing.context import SpawnContext, SpawnProcess
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -52,6 +53,7 @@ class _Worker(SpawnProcess):
     """A worker process; its environment is set while it is started, and restored in the parent afterwards."""
 
     def start(self) -> None:
+        _start_tracker()
         with _one_thread_each(), _without_main(), interruption_blocked():
             super().start()
 
@@ -64,12 +66,19 @@ class Apart(SpawnProcess):
 
     def start(self) -> None:
         """Start it."""
+        _start_tracker()
         with _without_main(), interruption_blocked():
             super().start()
 
 
 class _Context(SpawnContext):
     Process = _Worker
+
+
+def _start_tracker() -> None:
+    """Start Python's tracker of shared memory before Ctrl-C is blocked: its start lets Ctrl-C through."""
+    if sys.platform != "win32":
+        resource_tracker.ensure_running()
 
 
 @contextlib.contextmanager

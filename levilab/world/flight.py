@@ -140,6 +140,13 @@ class Flight:
             self._pieces.cut(math.nextafter(time, math.inf))
             self._state, self._step, self._known_until = self._start_state(time), None, time
 
+    def take_away(self, time: float) -> None:
+        """Let no top be up from this time on, as after a fall."""
+        self.simulate_until(time)
+        if isinstance(self._pieces.at(time), _Flying):
+            self._pieces.cut(time)
+            self._fall(time)
+
     def forget(self, before: float) -> None:
         """Drop the pieces that ended before this time [s]."""
         self._pieces.forget(before)

@@ -109,6 +109,10 @@ class MotionWorld:
         """Put the top back to where the scene starts; see World."""
         self._flight.put_back(self.clock.now())
 
+    def take_top(self) -> None:
+        """Take the top out of the air; see World."""
+        self._flight.take_away(self.clock.now())
+
     def catch_up(self) -> None:
         """Simulate up to the present time; see World.  Else one query might have to wait for hours of motion."""
         self._drop_history()

@@ -74,6 +74,9 @@ class World(Protocol):
             number: of tops before it.
         """
 
+    def take_top(self) -> None:
+        """Take the top out of the air by hand, if it floats: none is up until the next one is put there."""
+
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """The coil's field at start + step·k, shape (n,) [T]."""
 
@@ -240,6 +243,15 @@ class SpinWorld:
             self._stretches.cut(math.nextafter(time, math.inf))
             spin = 2 * math.pi * self.scene.start_hz
             self._plan_future(_Stretch(time, spin, now.angle, Phase.COASTING, number=number))
+
+    def take_top(self) -> None:
+        """Take the top out of the air; see :class:`World`."""
+        time = self.clock.now()
+        self._put_back_until(time)
+        now = self._stretch_at(time)
+        if now.phase is not Phase.FALLEN:
+            self._stretches.cut(time)
+            self._append(replace(now, phase=Phase.FALLEN, spin=0.0))
 
     def catch_up(self) -> None:
         """Drop old history; a closed form needs no simulation.  See :class:`World`."""

@@ -65,6 +65,11 @@ def wait_for_ever(address: Address | None) -> None:
         say_and_wait(address)
 
 
+def end_with_what_is_blocked() -> None:
+    """End with status 0 where Ctrl-C is blocked in this process."""
+    raise SystemExit(signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ()))
+
+
 def surroundings(number: int) -> dict[str, Any]:
     """What a worker process has inherited."""
     return {

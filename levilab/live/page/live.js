@@ -17,6 +17,10 @@ const LONGER = {  // what stands beside the state
   setup: "some seconds; up to a minute at the first start, which compiles",
   unreachable: "it is tried again; start levilab live anew if it was ended",
 };
+/** A record of the oscilloscope that is older is shown as old [s of bench time; where that is faster, of the wall]. */
+const OLD_S = 2;
+/** What a practice bench's oscilloscope shows, from above. */
+const CHANNELS = ["tape", "drive", "laser"];
 const SLIP_HZ = 0.05, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive; while it swings, or the drive moves
 
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, records: {}};
@@ -43,10 +47,12 @@ function take(head, arrays) {
   seen.tick = head.tick;
   if (head.run !== seen.run) turnTo(head.run);
   data.bench = head.bench;
+  let follows = false;
   for (const one of head.said) {
     seen.said = one.n;
     practice?.hear(one);
-    if (/message|refused|ended/.test(one.kind) && data.about?.status !== "running" && !data.bench?.busy) listEvent("", one.text, one.kind === "message" ? "" : "warning");
+    follows ||= Boolean(practice) && wanted !== "" && one.kind === "recording";
+    if (/message|refused|ended/.test(one.kind) && !one.of_run) listEvent("", one.text, one.kind === "message" ? "" : "warning");
   }
   if (head.about) {
     if (data.about && data.about.status !== head.about.status) listRuns(seen.run);
@@ -62,6 +68,7 @@ function take(head, arrays) {
   });
   if (head.poses.length) takePoses(head.poses, arrays);
   show();
+  if (follows) open(wanted = "");  // an older run was chosen, and a new one begins
 }
 
 function turnTo(run) {
@@ -166,7 +173,8 @@ function show() {
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
   write("elapsed", Number.isFinite(elapsed) ? lapse(elapsed) : "");
   const left = about?.status !== "running" ? NaN : bench?.time_left_s ?? (Number.isFinite(data.end) ? data.end - last.time_s : NaN);
-  write("left", Number.isFinite(left) && left >= 0 ? `about ${lapse(left)} left` : "");
+  const pace = practice && bench?.speed !== 1 ? " of bench time" : "";
+  write("left", Number.isFinite(left) && left >= 0 ? `about ${lapse(left)}${pace} left` : "");
   showBar(about, bench);
   showCounter(bench, last);
   showGenerator(bench, last);
@@ -181,6 +189,7 @@ function show() {
   practice?.show(bench, about, data.count, down);
   space?.setSpeed?.(bench?.speed, bench?.paused || bench?.silent);
   showTop(bench);
+  showAge(bench);
   speak(state, left);
 }
 
@@ -199,13 +208,16 @@ function showBar(about, bench) {
 
 const stale = (id, is) => by(id).closest(".display").classList.toggle("stale", is);
 
+/** The last values of the run that is shown; none at a bench for practice that does not record it: it shows what it measures now. */
+const ofRun = (bench, last) => practice && bench && (!bench.busy || data.about?.status !== "running") ? {} : last;
+
 function showCounter(bench, last) {
   const live = bench && !bench.silent ? bench.last : {};
-  const before = practice && bench && !bench.busy ? {} : last;  // a bench that is idle shows what it counts now
+  const before = ofRun(bench, last);
   const spin = live.spin_frequency_hz ?? before.spin_frequency_hz ?? live.spin_seen_hz ?? before.spin_seen_hz;
   write("spin-value", Number.isFinite(spin) ? spin.toFixed(4) : "––.––––");
   stale("spin-value", !bench || bench.silent);
-  const trend = data.trend;
+  const trend = practice && data.about?.status !== "running" ? NaN : data.trend;  // that of the run, while it is recorded
   const much = Math.abs(trend) >= 0.0005;
   write("trend", Number.isFinite(trend) ? `${much ? (trend < 0 ? "↓ " : "↑ ") : "→ "}${fixed(trend, 4)} Hz/s` : "–");
   const counting = bench?.counting ?? data.about?.settings?.counter;
@@ -228,10 +240,12 @@ function showGenerator(bench, last) {
 }
 
 function showMagnetometer(bench, last) {
-  const field = bench?.last?.flux_density_t ?? last.flux_density_t;
+  const live = bench?.last || {};
+  const from = Number.isFinite(live.flux_density_t) ? live : ofRun(bench, last);  // a value and its height belong together
+  const field = from.flux_density_t, height = from.height_m ?? bench?.probe_m;
   write("field-value", Number.isFinite(field) ? fixed(field * 1000, 3) : "–");
   stale("field-value", !bench || bench.silent);
-  write("probe", Number.isFinite(bench?.probe_m) ? `${short(bench.probe_m * 100)} cm above the base` : Number.isFinite(last.height_m) ? `${short(last.height_m * 100)} cm above the base` : "–");
+  write("probe", Number.isFinite(height) ? `${short(height * 100)} cm above the base` : "–");
   write("magnetometer-model", modelOf("magnetometer"));
   write("scope-model", modelOf("oscilloscope"));
 }
@@ -268,6 +282,17 @@ function showTop(bench) {
   by("space").setAttribute("aria-label", `the top over its base in three dimensions: it ${pose.up ? `floats ${height}` : "does not float"}`);
 }
 
+/** Say how old what the oscilloscope shows is, where it is old. */
+function showAge(bench) {
+  const age = data.records.size && bench ? bench.time_s - Math.max(...[...data.records.values()].map((one) => one.time_s)) : 0;
+  const old = age > OLD_S * Math.max(1, bench?.speed || 1);
+  by("scope").classList.toggle("old", old);
+  const said = old ? `record of ${lapse(age)} ago` : "";
+  if (by("scope-key").textContent === said) return;
+  write("scope-key", said);
+  dirty.trace = true;
+}
+
 /** Say the last reading to those who listen, at most every few seconds. */
 function speak(state, left) {
   const now = performance.now();
@@ -295,7 +320,10 @@ function draw() {
   }
   if (dirty.trace) {
     dirty.trace = false;
-    by("trace").setAttribute("aria-label", drawRecords(papers.trace, [...data.records.values()]));
+    const place = ({channel}) => CHANNELS.indexOf(channel);  // they may come in any order
+    const records = [...data.records.values()].sort((one, two) => place(one) - place(two));
+    const said = [drawRecords(papers.trace, records), by("scope-key").textContent];
+    by("trace").setAttribute("aria-label", said.filter(Boolean).join("; "));
   }
 }
 
@@ -411,6 +439,12 @@ async function listRuns(chosen) {
     option.value = run.name;
     return option;
   }));
+  if (listed.practice && !listed.practice.run && listed.runs.length) {  // the runs are older than this bench
+    const option = make("option", "no run of this bench yet");
+    option.value = "";
+    select.prepend(option);
+    select.value = "";
+  }
   if (!listed.runs.length) select.append(make("option", "none yet"));
   select.value = chosen || select.value;
   return listed;

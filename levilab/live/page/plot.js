@@ -77,6 +77,7 @@ export function at(xs, ys, x) {
 }
 
 const LEFT = 58, RIGHT = 12, TOP = 8, BOTTOM = 34, GAP = 22;  // in the gap stands what is below it
+const ASIDE = 28;  // for the name of an axis beside its numbers
 
 /**
  * Draw readings with their running fit, and below them what the fit leaves over.
@@ -95,7 +96,9 @@ export function drawReadings(paper, data, pointed) {
   const bottom = height - BOTTOM, split = bottom - (fit ? below + GAP : 0);
 
   const xs = extent(fit ? [x, fit.x] : [x], 0.02), ys = extent(fit ? [low, high, fit.y] : [low, high], 0.06);
-  const toX = (value) => LEFT + (value - xs[0]) / (xs[1] - xs[0]) * (width - LEFT - RIGHT);
+  const yMarks = ticks(ys[0] * fy, ys[1] * fy, split / 46), yTexts = yMarks.map((mark) => fixed(mark, decimals(yMarks)));
+  const edge = Math.max(LEFT, ASIDE + Math.max(...yTexts.map((text) => c.measureText(text).width)));
+  const toX = (value) => edge + (value - xs[0]) / (xs[1] - xs[0]) * (width - edge - RIGHT);
   const toY = (value) => split - (value - ys[0]) / (ys[1] - ys[0]) * (split - TOP);
 
   const left = new Float32Array(n), leftLow = new Float32Array(n), leftHigh = new Float32Array(n);
@@ -115,31 +118,31 @@ export function drawReadings(paper, data, pointed) {
   c.fillStyle = paint.soft;
   c.strokeStyle = paint.grid;
   c.textBaseline = "middle";
-  const xMarks = ticks(xs[0] * fx, xs[1] * fx, width / 90), yMarks = ticks(ys[0] * fy, ys[1] * fy, split / 46);
+  const xMarks = ticks(xs[0] * fx, xs[1] * fx, width / 90);
   for (const [from, to] of fit ? [[TOP, split], [bottom - below, bottom]] : [[TOP, bottom]]) {
     line(c, xMarks.map((mark) => [toX(mark / fx), from, toX(mark / fx), to]));
   }
-  line(c, yMarks.flatMap((mark) => [[LEFT, toY(mark / fy), width - RIGHT, toY(mark / fy)]]));
+  line(c, yMarks.flatMap((mark) => [[edge, toY(mark / fy), width - RIGHT, toY(mark / fy)]]));
   c.textAlign = "right";
-  for (const mark of yMarks) c.fillText(fixed(mark, decimals(yMarks)), LEFT - 7, toY(mark / fy));
+  yMarks.forEach((mark, k) => c.fillText(yTexts[k], edge - 7, toY(mark / fy)));
   c.textAlign = "center";
   for (const mark of xMarks) c.fillText(fixed(mark, decimals(xMarks)), toX(mark / fx), bottom + 11);
-  c.fillText(named(data.xAxis), (LEFT + width - RIGHT) / 2, height - 8);
+  c.fillText(named(data.xAxis), (edge + width - RIGHT) / 2, height - 8);
   upright(c, named(data.yAxis), 11, (TOP + split) / 2);
   if (fit) {
     c.strokeStyle = paint.soft;
-    line(c, [[LEFT, middle, width - RIGHT, middle]]);
+    line(c, [[edge, middle, width - RIGHT, middle]]);
     c.textAlign = "right";
     const power = 10 ** Math.floor(Math.log10(0.8 * reach * fy));
     const one = [5, 2, 1].map((k) => k * power).find((k) => k <= 0.8 * reach * fy);
-    for (const mark of [-one, 0, one]) c.fillText(short(mark, 2), LEFT - 7, toLeft(mark / fy));
+    for (const mark of [-one, 0, one]) c.fillText(short(mark, 2), edge - 7, toLeft(mark / fy));
     c.textAlign = "left";
-    c.fillText("readings − fit", LEFT, bottom - below - 10);
+    c.fillText("readings − fit", edge, bottom - below - 10);
     c.strokeStyle = paint.line;
-    c.strokeRect(LEFT + 0.5, bottom - below + 0.5, width - LEFT - RIGHT - 1, below - 1);
+    c.strokeRect(edge + 0.5, bottom - below + 0.5, width - edge - RIGHT - 1, below - 1);
   }
   c.strokeStyle = paint.line;
-  c.strokeRect(LEFT + 0.5, TOP + 0.5, width - LEFT - RIGHT - 1, split - TOP - 1);
+  c.strokeRect(edge + 0.5, TOP + 0.5, width - edge - RIGHT - 1, split - TOP - 1);
 
   // the fit: its band, the line, and dashed what it expects
   if (fit) {

@@ -108,7 +108,7 @@ export function openPractice(about, command, run, allowed) {
       follow("frequency", drive.frequency_hz, 2);
     }
     if (drive && !timer && !/^amplitude/.test(document.activeElement?.id)) follow("amplitude", drive.amplitude_vpp, 1);
-    if (bench.speed && document.activeElement !== by("speed")) choose(by("speed"), bench.speed);
+    if (bench.speed && bench.speed !== now.speed) choose(by("speed"), now.speed = bench.speed);  // else it may just be chosen
     guide(bench, about_run, readings);
   }
 
@@ -159,7 +159,7 @@ export function openPractice(about, command, run, allowed) {
         by("report").href = `run/${encodeURIComponent(name)}/${found.report}`;
         by("report").hidden = false;
       }
-      write("writing", found.running ? "The report is being written…" : "");
+      write("writing", found.running && !found.report ? "The report is being written…" : "");
       if (!found.running) return;
     }
   }

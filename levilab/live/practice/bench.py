@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from levilab.errors import LevilabError
-from levilab.live.practice.commands import PracticeEvent, event_from_bytes, to_bytes
+from levilab.live.practice.commands import PracticeEvent, RecordRun, event_from_bytes, to_bytes
 from levilab.live.practice.process import PracticeOptions, work
 from levilab.telemetry.address import Address
 from levilab.workers.pool import Apart
@@ -19,9 +19,10 @@ if TYPE_CHECKING:
 
     from levilab.live.practice.commands import Command
 
-#: How long the process is waited for at the end [s]: a run under way ends with its reading.  Then it is asked by a
-#: signal, and at last killed: its outputs are virtual.
-_PATIENCE_S, _MORE_S = 20.0, 5.0
+#: How long the process is waited for at the end [s].  A run under way ends with its reading; then the process is asked
+#: by a signal, and at last killed.  Without a run nothing can be lost, since the outputs are virtual: where it does not
+#: end soon, as while it compiles, it is killed.
+_PATIENCE_S, _MORE_S, _WITHOUT_A_RUN_S = 20.0, 5.0, 1.0
 
 
 class BenchGone(LevilabError):
@@ -55,6 +56,7 @@ class PracticeBench:
         self._process: Apart | None = None
         self._pipe: Connection | None = None
         self._number = 0
+        self._runs: set[int] = set()  # numbers of the commands that may have begun a run
         self.address: Address | None = None
         self.is_over = False
 
@@ -81,7 +83,14 @@ class PracticeBench:
             self._pipe.send_bytes(to_bytes(self._number, command))
         except (OSError, ValueError) as error:
             raise gone from error
+        if isinstance(command, RecordRun):
+            self._runs.add(self._number)
         return self._number
+
+    @property
+    def may_record(self) -> bool:
+        """Whether a run may be under way: one was asked for, and is neither refused nor over by what `events` found."""
+        return bool(self._runs) and not self.is_over
 
     def events(self) -> list[PracticeEvent]:
         """Return what the bench has reported since the last call; "ended" is the last of all."""
@@ -96,20 +105,26 @@ class PracticeBench:
             if event.kind == "ready":
                 self.address = Address(event.port, bytes.fromhex(event.token))
                 event = replace(event, port=0, token="")  # a secret of this program
+            if event.kind == "refused" and event.number is not None:
+                self._runs.discard(event.number)
+            elif event.kind == "recorded":  # while a run is recorded, others are refused
+                self._runs.discard(min(self._runs, default=0))
             self.is_over = event.kind == "ended"
             found.append(event)
         return found
 
     def close(self) -> None:
         """End the process: a run under way is kept, the outputs go off."""
+        self.events()  # a run may be over by now
+        records = self.may_record
         if self._pipe is not None:
             self._pipe.close()
         self._pipe = None
         process, self._process = self._process, None
         if process is None:
             return
-        process.join(_PATIENCE_S)
-        for end in (process.terminate, process.kill):
+        process.join(_PATIENCE_S if records else _WITHOUT_A_RUN_S)
+        for end in (process.terminate, process.kill) if records else (process.kill,):
             if process.is_alive():
                 end()
                 process.join(_MORE_S)

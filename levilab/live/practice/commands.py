@@ -59,7 +59,7 @@ class MatchDrive(Settings):
 
 
 class PutBack(Settings):
-    """Spin the top by hand and let it float again, if it has fallen."""
+    """Spin the top by hand and let it float; one that still floats, perhaps too slowly, is spun anew."""
 
     do: Literal["put the top back"] = "put the top back"
 

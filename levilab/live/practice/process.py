@@ -76,6 +76,11 @@ SWINGS_HZ, COMPARED_S, LOST_HZ = 0.4, 6.0, 1.0
 TUNED_UP_HZ = 0.5
 #: Experiments for which a top has to be up when they begin; for `limit` the virtual person puts one back.
 NEED_A_TOP = frozenset({"spin", "precession", "trace"})
+#: Experiments that move the magnetometer's probe: where it stands, their readings say.
+MOVE_THE_PROBE = frozenset({"field"})
+#: How fast the bench's time passes once a run is over, if it was faster: while it is analyzed nothing moves that is
+#: worth a processor [seconds of the bench in one of the wall].
+AFTER_A_RUN = 1.0
 #: The drive before a person has changed it.
 FIRST_HZ, FIRST_VPP, FIRST_WAVEFORM, FIRST_RAMP = 30.0, 10.0, "SQU", 0.1
 
@@ -241,6 +246,7 @@ class PracticeProcess:
         self._knobs, self._seen, self._sent = Knobs(), Seen(), Sent()
         self._bench: Bench | None = None  # open between runs
         self._session: Session[Any] | None = None  # of the run that is recorded
+        self._folder = ""
         self._wanted: RecordRun | None = None
         self._stopped = ""  # why the run that is recorded is to end
         self._over = False
@@ -388,6 +394,8 @@ class PracticeProcess:
         here: dict[str, Any] = {"virtual": True, "speed": speed, "paused": self._paused, "probe_m": self._probe_m}
         here |= {"took_hold": self._took_hold, "tuned_up": self._tuned_up}
         if self._session is not None:
+            if self._session.writer.record.experiment in MOVE_THE_PROBE:
+                here["probe_m"] = None
             return replace(state_of(self._session, virtual=True), busy=True, **here)
         drive = drive_of(self._bench) if self._bench else None
         counting = counting_of(self._bench) if self._bench else None
@@ -440,9 +448,8 @@ class PracticeProcess:
     @_carry_out.register
     def _(self, command: PutBack) -> str:
         self._free_bench()
-        if self._floats():
-            raise CommandRefused("the top floats: it can be put back once it has fallen")
         self._tops += 1
+        self.world.take_top()
         self.world.float_top(self._tops)
         return "the top floats again"
 
@@ -469,7 +476,10 @@ class PracticeProcess:
         if spin is None:
             raise CommandRefused("the counter sees no top whose spin the drive could be set to: put the top back first")
         if self._knobs.on:
-            raise CommandRefused("the drive is on, and its frequency goes by the ramp: switch it off first")
+            raise CommandRefused(
+                "the drive is on, and changes its frequency only slowly, so it cannot be set to the spin at once: "
+                "switch it off, then match"
+            )
         return self._carry_out(TuneDrive(frequency_hz=round(spin, 2)))
 
     @_carry_out.register
@@ -504,12 +514,18 @@ class PracticeProcess:
             return f"the drive comes on after the next count, at the top's spin, {spin:.2f} Hz"
         self._switch_on(bench, knobs.frequency_hz)
         beside = "the counter sees no top" if spin is None else f"the top spins at {spin:.2f} Hz"
-        self._say(f"drive on at {knobs.frequency_hz:g} Hz, but {beside}: it takes hold of one that spins as fast")
+        takes = "it takes hold of one that spins as fast"
+        self._say(f"drive on at {knobs.frequency_hz:g} Hz, but {beside}: {takes}", f"the drive holds no top: {takes}")
         return f"the drive is on at {knobs.frequency_hz:g} Hz"
 
-    def _say(self, text: str) -> None:
-        """Say something to the person at the bench, and leave it in the head of the page."""
-        self._text = text
+    def _say(self, text: str, lasting: str = "") -> None:
+        """Say something to the person at the bench, and leave it in the head of the page.
+
+        Args:
+            text: with the numbers of this moment.
+            lasting: what stands in the head, where those numbers would grow old; empty: the text itself.
+        """
+        self._text = lasting or text
         self._report(PracticeEvent("message", text))
 
     def _free_bench(self) -> Bench:
@@ -582,13 +598,16 @@ class PracticeProcess:
                 self._give_up(bench, spin, drive)
                 return
             hold.at_hz, self._took_hold = drive, True
-            self._say(f"the top follows the drive at {drive:.2f} Hz")
+            self._say(f"the top follows the drive at {drive:.2f} Hz", "the top follows the drive")
         elif off > LOST_HZ:
             hold.is_lost = True
-            self._say(f"the drive has lost the top, {_in_words(spin)} under a drive of {drive:.2f} Hz: {AGAIN}")
+            self._say(
+                f"the drive has lost the top, {_in_words(spin)} under a drive of {drive:.2f} Hz: {AGAIN}",
+                f"the drive has lost the top: {AGAIN}",
+            )
         elif off <= SWINGS_HZ and drive >= hold.at_hz + TUNED_UP_HZ and not self._tuned_up:
             self._tuned_up = True
-            self._say(f"the top follows the drive up, to {drive:.2f} Hz by now")
+            self._say(f"the top follows the drive up, to {drive:.2f} Hz by now", "the top follows the drive up")
 
     def _give_up(self, bench: Bench, spin: float | None, drive: float) -> None:
         bench.outputs_off()
@@ -633,6 +652,7 @@ class PracticeProcess:
     def _record(self, command: RecordRun) -> None:
         """Carry out an experiment; whatever ends it, the bench goes on."""
         self._seen.values.clear()
+        self._folder = ""  # a run may fail before it has one
         try:
             run = acquire(self._request(command), LinesToReport(self._report), self._watching)
         except (LevilabError, InstrumentError) as error:
@@ -640,6 +660,10 @@ class PracticeProcess:
         else:
             text = f"{run.status}: {run.count()} readings"
             self._report(PracticeEvent("recorded", text, status=run.status, folder=str(run.folder)))
+        self._place_probe(self._probe_m)  # a run may have moved it
+        if AFTER_A_RUN < self.clock.speed < math.inf:
+            self.clock.speed = AFTER_A_RUN
+            self._say(f"the run is over: speed {AFTER_A_RUN:g}\u00a0× again")
 
     @contextlib.contextmanager
     def _watching(self, session: Session[Any], wiring: Wiring) -> Iterator[Callable[[], None]]:

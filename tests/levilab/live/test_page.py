@@ -70,6 +70,14 @@ def test_nothing_that_a_run_contains_becomes_markup(shown: Page) -> None:
 def test_on_a_desk_nothing_scrolls(shown: Page) -> None:
     root = "document.documentElement"
     assert shown.evaluate(f"[{root}.scrollWidth, {root}.scrollHeight]") == [DESK["width"], DESK["height"]]
+    cut_off = """[document.getElementById("state-text")].map((one) => {
+        one.textContent = "a long text on the state of a run, ".repeat(6);
+        const [right, bottom] = [one.getBoundingClientRect().right, one.getBoundingClientRect().bottom];
+        const found = one.scrollWidth > one.clientWidth || right > innerWidth - 300
+            || bottom > document.querySelector("main").getBoundingClientRect().top;
+        one.textContent = "";
+        return found; })[0]"""
+    assert not shown.evaluate(cut_off)
 
 
 def test_every_control_has_a_name_and_every_part_a_heading(shown: Page) -> None:
@@ -199,6 +207,11 @@ def test_what_the_bench_publishes_is_drawn(served: Hall, page: Page, tmp_path: P
     assert page.inner_text("#field-value") == "19.100"
     assert until(page, "document.getElementById('top-text').textContent") == "floats at 75.0 mm"
     assert "tape from -1 to 1 volts" in page.get_attribute("#trace", "aria-label").replace("−", "-")
+    assert page.inner_text("#scope-key") == ""
+    later = State(13.0, last={"height_m": 0.11, "flux_density_t": 0.00896}, virtual=True, speed=1.0, probe_m=0.072)
+    publish(served.watches[run.folder.name], later)
+    assert until(page, "document.getElementById('scope-key').textContent") == "record of 12 s ago"
+    assert [page.inner_text(f"#{name}") for name in ("field-value", "probe")] == ["8.960", "11 cm above the base"]
 
 
 def test_a_million_readings_are_drawn_from_a_few_thousand_numbers(served: Hall, page: Page, tmp_path: Path) -> None:

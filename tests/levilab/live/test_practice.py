@@ -8,7 +8,7 @@ import pytest
 
 from levilab.live.desk import EXPERIMENTS, Desk
 from levilab.live.practice.bench import PracticeBench
-from support.live_pages import address, serving, until
+from support.live_pages import GrowingRun, address, serving, spin_down, until
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,9 +19,13 @@ if TYPE_CHECKING:
     from levilab.live.server import Hall
 
 
+OLDER = "20251122T100000Z-spin-0000"
+
+
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
     out: Path = tmp_path_factory.mktemp("runs")
+    GrowingRun(out, OLDER).readings(spin_down(19))
     with PracticeBench(out) as bench, serving(out, desk=Desk(bench)) as hall:
         yield hall
 
@@ -51,21 +55,28 @@ def test_a_student_drives_records_and_analyzes(served: Hall, page: Page, monkeyp
     page.fill("#frequency", "333")
     page.keyboard.press("Tab")
     until(page, "document.getElementById('said').textContent === 'drive frequency in hertz: from 1 to 100, not 333'")
-    page.click("#back")
-    until(page, "document.getElementById('said').textContent.includes('once it has fallen')")
+    assert page.evaluate("[levilab.seen.run, document.getElementById('run').value, levilab.data.count]") == ["", "", 0]
+    can_be_analyzed = "!document.getElementById('analyze').disabled"
+    page.select_option("#run", OLDER)  # of another bench, and it is there like one of this
+    until(page, f"levilab.data.count === 19 && levilab.data.bench && {can_be_analyzed}")
     page.click("#record")
-    until(page, "levilab.data.bench.busy && levilab.data.count >= 3")
+    until(page, f"levilab.data.bench?.busy && levilab.seen.run !== '{OLDER}' && levilab.data.count >= 3")
     until(page, "levilab.data.fit")
     page.click("#record")
     until(page, "document.body.dataset.state === 'interrupted'")
+    until(page, "document.getElementById('speed').value === '1'")  # after a run
+    name = page.input_value("#run")
+    page.reload()
+    until(page, f"levilab.seen.run === '{name}' && levilab.data.count >= 3 && {can_be_analyzed}")
+    assert page.input_value("#run") == name
     page.click("#hold")  # the analysis has the machine for itself
     until(page, "levilab.data.bench.paused")
     page.click("#analyze")
     until(page, "document.querySelectorAll('#figures img').length && document.getElementById('verdict').innerText")
     done = "[...document.querySelectorAll('#guide .done')].map((one) => one.dataset.step).join()"
     until(page, f"{done} === 'drive,record,analyze'")  # the drive was not tuned up by hand
-    (run,) = served.root.iterdir()
-    assert (run / "result.json").exists()
+    assert sorted(path.name for path in served.root.iterdir()) == [OLDER, name]
+    assert (served.root / name / "result.json").exists()
 
 
 def test_a_page_without_the_token_may_only_look(served: Hall, page: Page) -> None:

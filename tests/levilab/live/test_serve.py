@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import socket
 import subprocess
 import sys
+import time
 from typing import TYPE_CHECKING
 
 import pytest
 
+from levilab.live.analyzed import Analyses
+from levilab.live.practice.bench import PracticeBench
+from levilab.live.serve import farewell
 from levilab.motion.animation.three import MissingThree, three_js
 from support.commands import command
 from support.live_pages import GrowingRun
@@ -55,6 +60,39 @@ def test_the_help_loads_no_server() -> None:
         "assert not {'nicegui', 'starlette', 'uvicorn'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+def test_ctrl_c_says_at_once_what_the_end_waits_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = PracticeBench(tmp_path)
+    assert farewell(None) == ""
+    assert farewell(bench) == "the bench is switched off"
+    monkeypatch.setattr(PracticeBench, "may_record", True)
+    assert farewell(bench, {"run-2", "run-1"}) == (
+        "the run that is being recorded ends with the reading under way and is kept; "
+        "the analysis of run-1, run-2 is given up; levilab analyze makes it; the bench is switched off"
+    )
+
+
+def test_a_result_without_a_verdict_is_said_by_its_values(tmp_path: Path) -> None:
+    frequency, bound = ({"value": -29.44559, "u": u, "unit": "Hz"} for u in (5e-4, None))
+    wrong = {"frequency": {"value": 1.0, "u": -1.0}, "other": {"value": 10**400, "u": 1.0}, "last": {"value": 1.0}}
+    for values, said in (
+        ({"frequency": frequency, "bound": bound}, ["frequency −29.4456(5) Hz"]), ([1], []), ({}, []), (wrong, []),
+    ):  # fmt: skip
+        (tmp_path / "result.json").write_text(json.dumps({"runs": [{}], "values": values}), encoding="utf-8")
+        assert Analyses().about(tmp_path)["verdict"] == said
+
+
+def test_an_analysis_ends_with_the_view(tmp_path: Path) -> None:
+    analyses = Analyses()
+    under_way = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"], text=True)
+    analyses._processes.add(under_way)
+    analyses.end()
+    assert under_way.wait() != 0
+    analyses.begin(tmp_path)
+    while analyses.running:
+        time.sleep(0.001)
+    assert analyses.failed == {tmp_path.name: "the live view was ended"}
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal to one process alone")

@@ -76,6 +76,22 @@ def test_a_worker_ignores_ctrl_c_and_has_one_thread() -> None:
     assert done.result == {"interrupted": False, "threads": "1", "main": None}
 
 
+FIRST = """
+from levilab.workers.pool import Apart
+from support.tasks import end_with_what_is_blocked
+first = Apart(target=end_with_what_is_blocked)
+first.start()
+first.join()
+raise SystemExit(first.exitcode)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signal is blocked there")
+def test_the_first_process_that_is_started_leaves_ctrl_c_to_its_parent_too() -> None:
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    subprocess.run([sys.executable, "-c", FIRST], env=environment, check=True)
+
+
 def test_an_error_that_cannot_be_unpickled_keeps_its_words() -> None:
     [done] = results_of(tasks.raise_two_words, [0], processes(1))
     assert isinstance(done.error, RuntimeError)

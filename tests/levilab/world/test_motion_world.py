@@ -321,7 +321,7 @@ def test_the_probe_sees_the_field_of_the_scenes_base():
 )
 def test_a_bench_that_runs_for_hours_drops_old_history(look):
     top = world(FALLING, put_back_after_s=60.0)
-    for _ in range(24):
+    for _ in range(16):
         top.clock.sleep(3600.0)
         look(top)
     kept = len(top._flight._pieces)

@@ -220,6 +220,17 @@ def test_no_drive_raises_a_top_that_has_fallen():
     assert np.all(top.light(210.0, 1e-4, 10_000) == QUIET.tape.dark)
 
 
+def test_a_hand_takes_a_top_that_floats_and_spins_it_anew():
+    clock = VirtualClock()
+    top = SpinWorld(QUIET, clock)
+    clock.sleep(50.0)
+    top.take_top()
+    assert spin_hz(top, 51.0) == 0.0
+    top.float_top(1)
+    assert spin_hz(top, 49.0) < QUIET.start_hz - 1.0
+    assert spin_hz(top, 50.0) == pytest.approx(QUIET.start_hz)
+
+
 def test_a_held_top_does_not_fall():
     top = world()
     drive(top, 0.0, "SIN", 30.0, FIELD)

@@ -5,13 +5,18 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from multiprocessing import Pipe
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from levilab.live.practice.bench import BenchGone, PracticeBench
-from levilab.live.practice.commands import Pause
+from levilab.live.practice.commands import Pause, PracticeEvent, RecordRun, event_to_bytes
 from levilab.runs.run import Run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 #: Long enough for a machine that is busy [s]; a test that passes waits less.
 PATIENCE_S = 120.0
@@ -57,3 +62,40 @@ def test_a_bench_that_is_not_there_says_so(tmp_path: Path) -> None:
     with pytest.raises(BenchGone, match="start it anew"):
         bench.command(Pause(on=True))
     bench.close()
+
+
+class Busy:
+    """A process that does not end by itself, as one that compiles."""
+
+    def __init__(self) -> None:
+        self.did: list[str] = []
+
+    def join(self, timeout: float) -> None:
+        self.did.append(f"join {timeout:g} s")
+
+    def is_alive(self) -> bool:
+        return "kill" not in self.did
+
+    def __getattr__(self, name: str) -> Callable[[], None]:
+        return lambda: self.did.append(name)
+
+
+def test_without_a_run_the_end_waits_a_second_and_with_one_for_its_reading(tmp_path: Path) -> None:
+    for answers, may_record in (
+        ([], True),
+        ([PracticeEvent("done", number=1), PracticeEvent("recording")], True),
+        ([PracticeEvent("refused", number=1)], False),
+        ([PracticeEvent("done", number=1), PracticeEvent("recorded", status="failed")], False),
+    ):
+        bench, process = PracticeBench(tmp_path), Busy()
+        near_end, far_end = Pipe()
+        bench._pipe, bench._process = near_end, process  # type: ignore[assignment]
+        assert not bench.may_record
+        bench.command(RecordRun(experiment="field"))
+        for answer in answers:
+            far_end.send_bytes(event_to_bytes(answer))
+        bench.close()
+        assert bench.may_record is may_record
+        assert process.did[0] == ("join 20 s" if may_record else "join 1 s")
+        assert process.did[1] == ("terminate" if may_record else "kill")
+        far_end.close()

@@ -81,11 +81,12 @@ def carry_out(
     *commands: tuple[float, Command | None],
     start_hz: float = 30.0,
     script: type[Script] = Script,
+    clock: PacedClock | None = None,
     **options: Any,
 ) -> Script:
     """Carry out a script at a bench that does not wait."""
     scene = read_scene("practice").changed({"start.spin_hz": start_hz})
-    clock = PacedClock(math.inf)
+    clock = clock or PacedClock(math.inf)
     far_end = script(clock, [*commands])
     world = scene_world(scene, lambda: clock, lambda _: None)
     how = PracticeOptions(str(out), "practice", 1, **options)
@@ -106,6 +107,26 @@ def test_the_time_of_a_bench_stands_still_while_no_view_looks(tmp_path: Path) ->
     script = carry_out(tmp_path, (1000.0, None), script=Lonely, rests=True)
     assert script.states[-1].time_s < 2.0  # and not 1000 s
     assert not script.states[-1].paused  # which is what a person says
+
+
+class Patient(Script):
+    """Closes the pipe when a run is over."""
+
+    def poll(self) -> bool:
+        return super().poll() and (self.commands[0][1] is not None or bool(self.said("recorded")))
+
+
+def test_after_a_run_the_time_of_the_bench_is_no_faster_than_real_time(tmp_path: Path) -> None:
+    run = (0.1, RecordRun(experiment="field")), (0.2, StopRun()), (0.2, None)
+    script = carry_out(tmp_path, *run, script=Patient, clock=PacedClock(1e4))
+    assert [script.states[0].speed, script.states[-1].speed] == [1e4, 1.0]
+    assert script.said("message")[-1] == "the run is over: speed 1\u00a0× again"
+    assert script.states[-1].text == script.said("message")[-1]
+    # the probe, which lay in its chamber, stands again where the bench says
+    assert {state.probe_m for state in script.states if state.busy} == {None}
+    assert script.states[-1].probe_m == 0.072
+    assert script.process
+    assert script.process.world.flux_density(0.0) == pytest.approx(0.0191, rel=0.01)
 
 
 QUICK = ("spin.drive_frequency_hz=31", "spin.hold_s=2", "spin.interval_s=2", "spin.gate_s=0.5")
@@ -131,7 +152,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Script:
         (92.0, RecordRun(experiment="spin", settings=QUICK, note="<b>first</b>")),
         (93.0, SwitchDrive(on=True)),
         (93.0, RecordRun(experiment="field")),
-        (150.0, StopRun()),
+        (154.0, StopRun()),
         (160.0, RecordRun(experiment="field")),
         (165.0, None),
     )
@@ -195,7 +216,6 @@ def test_what_the_bench_cannot_do_is_refused_with_what_to_do(session: Script) ->
         "333 Hz: the coil of this bench stands at most 100 Hz",
         "11 Vpp: the coil of this bench stands at most 10 Vpp",
         "no run is being recorded: nothing to stop",
-        "the top floats: it can be put back once it has fallen",
         "experiment = dance: one of spin, trace, field, limit, precession is expected"[:60],
         "settings = spin.gate_s=-1: a number above 0 [s] is expected;",
         "a run is being recorded, and the bench is its own: stop the ",
@@ -206,6 +226,13 @@ def test_what_the_bench_cannot_do_is_refused_with_what_to_do(session: Script) ->
 def test_each_command_has_one_answer(session: Script) -> None:
     answers = [event["number"] for event in session.events if event["kind"] in {"done", "refused"}]
     assert sorted(answers) == list(range(1, session.sent + 1))
+
+
+def test_a_top_that_still_floats_is_spun_anew(session: Script) -> None:
+    assert session.said("done").count("the top floats again") == 1
+    before, after = (session.spins(a, b)[-1][2] for a, b in ((87.0, 88.0), (91.0, 92.0)))
+    assert before < 32.4
+    assert after == pytest.approx(29.8, abs=0.3)  # of 30 Hz some seconds ago
 
 
 def test_the_probe_is_where_it_was_put(session: Script) -> None:

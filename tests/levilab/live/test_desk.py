@@ -1,0 +1,25 @@
+"""What the server keeps of what the bench for practice says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from levilab.live.desk import Desk
+from levilab.live.practice.commands import PracticeEvent
+
+
+@dataclass
+class Talking:
+    """A bench that has said these."""
+
+    said: list[PracticeEvent]
+
+    def events(self) -> list[PracticeEvent]:
+        return self.said
+
+
+def test_what_is_said_of_a_run_is_marked_since_it_stands_among_its_events() -> None:
+    kinds = ("message", "recording", "message", "refused", "recorded", "message")
+    desk = Desk(Talking([PracticeEvent(kind, "x") for kind in kinds]))  # type: ignore[arg-type]
+    desk.step()
+    assert [one["of_run"] for one in desk.said_after(0)] == [False, False, True, False, False, False]

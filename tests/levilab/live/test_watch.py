@@ -1,0 +1,63 @@
+"""When the running fit is computed: on a clock that the test moves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from levilab.live.running import Curve, Running
+from levilab.live.watch import Watch
+from levilab.telemetry.messages import State
+from support.live_pages import GrowingRun, publish, spin_down
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+LINE = Running("a law so far", curve=Curve(np.arange(2.0), np.arange(2.0)))
+
+
+def looking(watch: Watch) -> Watch:
+    watch.step()
+    while watch.followed and watch.followed.behind:
+        watch.step()
+    return watch
+
+
+@pytest.mark.parametrize("practice", [False, True])
+def test_the_first_fit_does_not_count_for_the_pause_to_the_next(tmp_path: Path, practice: bool) -> None:
+    run, now = GrowingRun(tmp_path), 0.0
+    watch = Watch(None, lambda: None, lambda: now) if practice else Watch(run.folder, clock=lambda: now)
+    if practice:  # as the bench begins to record
+        publish(watch, State(0.0, folder=str(run.folder)))
+    with run.running():
+        run.readings(spin_down(3))
+        for k, found in enumerate((Running("no fit yet"), LINE)):  # the second one imports what it needs
+            assert looking(watch).fit_task()
+            watch.fitted(found, 0.4)
+            run.readings(spin_down(1, first=3 + k))
+            now += 1.6
+        assert looking(watch).fit_task()
+        watch.fitted(LINE, 0.4)
+        run.readings(spin_down(1, first=5))
+        now += 7.9
+        assert not looking(watch).fit_task()
+        now += 0.2
+        assert watch.fit_task()  # after 20 times the processor time
+
+
+def test_the_last_fit_of_a_run_waits_for_nothing(tmp_path: Path) -> None:
+    run = GrowingRun(tmp_path)
+    watch = Watch(run.folder, clock=lambda: 0.0)
+    with run.running():
+        run.readings(spin_down(3))
+        assert looking(watch).fit_task()
+        watch.fitted(None, 0.1)
+        run.readings(spin_down(1, first=3))
+        assert not looking(watch).fit_task()
+    run.say(status="finished")
+    assert looking(watch).fit_task()
+    watch.fitted(None, 0.1)
+    assert not looking(watch).fit_task()

@@ -1,0 +1,14 @@
+"""What a log says of the way to the first reading."""
+
+from __future__ import annotations
+
+from levilab.present.progress import LineDisplay
+
+
+def test_a_log_has_a_line_each_fifth_of_each_part_and_none_twice(capsys) -> None:
+    display = LineDisplay()
+    for k in range(1, 11):
+        display.preparing(f"raised by {k} Hz", k / 10)
+    for k in range(1, 11):
+        display.preparing("held", k / 10)
+    assert capsys.readouterr().err.splitlines() == [*(f"raised by {k} Hz" for k in (2, 4, 6, 8, 10)), "held"]
