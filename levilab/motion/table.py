@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
+from analysis.numbers import with_minus
 from levilab.motion.effects import LEAST_HZ, LEAST_M
 from levilab.motion.lock import is_locked
 from levilab.motion.summary import changing_energy
+from levilab.present.numbers import fixed
 from levilab.present.terminal import new_table, terminal
 
 if TYPE_CHECKING:
@@ -59,8 +61,8 @@ def _motion_facts(summary: Summary) -> list[tuple[str, str]]:
         return facts
     facts.insert(0, ("height", summary.heights))
     if motion.scene.washers.inertia_kg_m2 > 0:
-        washers = motion.washer_spin_hz
-        facts.append(("loose washers", f"{washers[0]:.3f} Hz at the start, {washers[-1]:.3f} Hz at the end"))
+        first, last = (fixed(motion.washer_spin_hz[k], 3) for k in (0, -1))
+        facts.append(("loose washers", f"{first} Hz at the start, {last} Hz at the end"))
     if (locked := is_locked(motion.scene, motion.states, survived=motion.survived)) is not None:
         facts.append(("drive", "holds the top, which is locked to it" if locked else "does not hold the top"))
     facts.append(("tilt", f"up to {_angle(float(motion.tilt.max()))}"))
@@ -108,7 +110,8 @@ def _lines_table(summary: Summary) -> Table:
         numbers=("frequency \\[Hz]", "amplitude \\[mrad]"),
     )  # fmt: skip
     for line in summary.lines.lines:
-        shown.add_row(f"{line.frequency:.{digits}f}", f"{1000 * line.amplitude:.3g}", line.name or "not identified")
+        frequency = with_minus(f"{line.frequency:.{digits}f}")
+        shown.add_row(frequency, f"{1000 * line.amplitude:.3g}", line.name or "not identified")
     of = f", of the first {summary.lines.until:.3g} s" if summary.lines.until < 0.99 * summary.end else ""
     shown.caption = f"resolution {resolution:.2g} Hz{of}"
     shown.caption_justify = "left"
@@ -144,4 +147,4 @@ def _shown(change: float, least: float, factor: float) -> str:
     """Two digits: the next effect changes the third."""
     if math.isnan(change):
         return "–"
-    return f"{factor * change:+.2g}" if change else f"< {factor * least:g}"
+    return with_minus(f"{factor * change:+.2g}") if change else f"< {factor * least:g}"

@@ -20,12 +20,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from analysis.numbers import digits
 from levilab.errors import UsageError
 from levilab.motion.animation.film import Film, in_mm, nice_length, still, table_of_colours
 from levilab.motion.animation.parts import COLOURS, parts_of
 from levilab.motion.animation.poses import height_for_camera
 from levilab.motion.animation.three import MissingThree, three_js
-from levilab.motion.animation.words import short_speed, speed_in_words
+from levilab.motion.animation.words import short_speed, speed_in_words, unbroken
+from levilab.present.numbers import fixed, plain
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
@@ -99,6 +101,7 @@ def as_page(page: Page) -> bytes:
     environment = Environment(
         loader=FileSystemLoader(folder), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
+    environment.filters["unbroken"] = unbroken
     title = poses.scene.name or "A scene without a name"
     alt = _alt(page)
     middle = len(poses.times) // 2
@@ -168,7 +171,7 @@ def _data(page: Page, alt: str, readings: list[tuple[str, str, int]]) -> dict[st
     bar = nice_length(0.45 * span)
     return {
         "alt": alt,
-        "bar": {"length": bar, "text": in_mm(bar)},
+        "bar": {"length": bar, "text": unbroken(in_mm(bar))},
         "columns": columns_of(poses),
         "count": len(poses.times),
         "drive_mt": 1000 * poses.scene.drive.amplitude_t,
@@ -182,12 +185,12 @@ def _data(page: Page, alt: str, readings: list[tuple[str, str, int]]) -> dict[st
 
 def _readings(poses: Poses) -> list[tuple[str, str, int]]:
     """Name, unit and digits after the point of what is read."""
-    found = [("time", " s", 3), ("height", " cm", 2), ("tilt", "°", 1), ("spin", " Hz", 2)]
+    found = [("time", "\u00a0s", 3), ("height", "\u00a0cm", 2), ("tilt", "°", 1), ("spin", "\u00a0Hz", 2)]
     columns = columns_of(poses)
     if "slip" in columns:
-        found.append(("slip", " turns", 2))
+        found.append(("slip", "\u00a0turns", 2))
     if "drive" in columns:
-        found.append(("drive", " mT", 2))
+        found.append(("drive", "\u00a0mT", 2))
     return found
 
 
@@ -245,9 +248,9 @@ def _numbers(page: Page) -> list[tuple[str, str]]:
         ("end", page.summary.ending),
         ("height", f"{heights.min():.2f} to {heights.max():.2f} cm above the base's centre"),
         ("tilt", f"{tilts.min():.1f} to {tilts.max():.1f}° of the axis against the base's"),
-        ("spin", f"{poses.spins.min():.2f} to {poses.spins.max():.2f} Hz"),
+        ("spin", f"{fixed(poses.spins.min(), 2)} to {fixed(poses.spins.max(), 2)} Hz"),
         ("mass", f"{1000 * scene.top.mass_kg:.4g} g"),
-        ("moment", f"{scene.top.moment_a_m2:.4g} A m²".replace("-", "−")),
+        ("moment", f"{digits(scene.top.moment_a_m2, 4)} A m²"),
         ("base", f"{100 * scene.base.inner_radius_m:.3g} to {100 * scene.base.outer_radius_m:.3g} cm radius"),
     ]
     if "drive" in columns_of(poses):
@@ -256,7 +259,7 @@ def _numbers(page: Page) -> list[tuple[str, str]]:
     error = max(accuracy.position, accuracy.axis)
     return [
         *found,
-        ("error", f"estimated at most {error:.1g} (place in m, axis in rad) at the end of the simulation"),
+        ("error", f"estimated at most {plain(error, 1)} (place in m, axis in rad) at the end of the simulation"),
         ("poses", f"{len(poses.times)}, {1 / (poses.times[1] - poses.times[0]):.0f} a second"),
         ("sizes", "magnet and base as in the scene; the other parts in the proportions of such a top"),
     ]

@@ -38,8 +38,22 @@ _MOST_PICTURES = 3000
 _POSES_A_PICTURE = 3
 #: A page has at least so many poses a second: the wobble is faster than the spin of a slow top.
 _LEAST_RATE_HZ = 240.0
+#: Tolerance of the simulation that finds out whether a top falls early.
+_COARSE = 1e-3
 #: With fewer pictures in a turn the eye loses which way the top turns.
 _PICTURES_A_TURN = 4
+
+
+class SpanTooLong(UsageError):
+    """More of the motion is to be shown than a file holds.
+
+    Attributes:
+        longest: span that it holds [s].
+    """
+
+    def __init__(self, text: str, longest: float) -> None:
+        self.longest = longest
+        super().__init__("animate_to", text)
 
 
 @dataclass(frozen=True)
@@ -135,22 +149,38 @@ def check_request(request: AnimationRequest, scene: Scene, duration: float) -> N
             f"a number from {_SLOWEST:g} to {_FASTEST:g} is expected, as 0.05 for a twentieth of the real speed",
             value=speed,
         )
-    start, stop = _span(request, duration)
-    if chosen.encode:
-        _check_pictures(chosen, stop - start, speed)
-    else:  # it turns no slower than at the start, and perhaps faster later
-        _count_for_page(scene, stop - start, abs(scene.start.spin_hz))
     chosen.check()
+    _check_span(request, scene, duration, speed)
+
+
+def _check_span(request: AnimationRequest, scene: Scene, duration: float, speed: float) -> None:
+    """Raise SpanTooLong, unless the top falls early enough."""
+    start, stop = _span(request, duration)
+    try:
+        if request.format.encode:
+            _check_pictures(request.format, stop - start, speed)
+        else:  # it turns no slower than at the start, and perhaps faster later
+            _count_for_page(scene, stop - start, abs(scene.start.spin_hz))
+    except SpanTooLong as error:
+        if not _is_lost_by(scene, start + error.longest):
+            raise
+
+
+def _is_lost_by(scene: Scene, time: float) -> bool:
+    """Whether the top falls before a time [s], by a coarse simulation; `animate` checks the span that there is."""
+    from levilab.simulator.single import simulate
+
+    return simulate(scene, time, tolerance=_COARSE, rate=None).fell is not None
 
 
 def _check_pictures(chosen: _Format, span: float, speed: float) -> None:
     pictures = span / speed * chosen.pictures_per_s
     if pictures > _MOST_PICTURES:
         longest = _MOST_PICTURES / chosen.pictures_per_s * speed
-        raise UsageError(
-            "animate_to",
+        raise SpanTooLong(
             f"{span:.4g} s at speed {speed:g} are {pictures:.0f} pictures, at most {_MOST_PICTURES} are drawn: "
             f"choose a span of at most {longest:.3g} s, or a higher `animate_speed`",
+            longest,
         )
 
 
@@ -217,16 +247,17 @@ def _count_for_page(scene: Scene, span: float, turns: float) -> int:
         turns: of the fastest part in a second.
 
     Raises:
-        UsageError: even the fewest poses do not fit.
+        SpanTooLong: even the fewest poses do not fit.
     """
     most = most_poses(len(columns_of(scene))) - 1
     turning = max(turns, _LEAST_RATE_HZ / POSES_A_TURN)
     wanted, least = math.ceil(span * turning * POSES_A_TURN), math.ceil(span * turning * FEWEST_A_TURN)
     if least > most:
-        raise UsageError(
-            "animate_to",
+        longest = most / (turning * FEWEST_A_TURN)
+        raise SpanTooLong(
             f"{span:.4g} s at {turning:.3g} turns a second are {least} poses, a page of at most 1.5 MB holds {most}: "
-            f"choose a span of at most {most / (turning * FEWEST_A_TURN):.3g} s with `animate_from` and `animate_to`",
+            f"choose a span of at most {longest:.3g} s with `animate_from` and `animate_to`",
+            longest,
         )
     return max(min(wanted, most), 1)
 

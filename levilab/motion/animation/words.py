@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING
+
+from levilab.present.numbers import fixed
 
 if TYPE_CHECKING:
     from levilab.motion.animation.poses import Poses
+
+
+#: The space between a number and its unit, or within a unit.
+_BEFORE_A_UNIT = re.compile(r"(?<=\d) (?=(?:A m²|[mckµ]?m|s|Hz|m?T|k?g|rad|turns|MB)(?:\W|$))|(?<=\d[ \u00a0]A) (?=m²)")
 
 
 def speed_in_words(speed: float) -> str:
@@ -36,21 +43,21 @@ def readout(poses: Poses, k: int) -> list[tuple[str, str]]:
     """Names and values of what is read at the k-th pose."""
     rows = [
         ("time", f"{poses.times[k]:.3f} s"),
-        ("height", f"{number(100 * poses.positions[k, 2], 2)} cm"),
+        ("height", f"{fixed(100 * poses.positions[k, 2], 2)} cm"),
         ("tilt", f"{math.degrees(poses.tilts[k]):.1f}°"),
-        ("spin", f"{number(poses.spins[k], 2)} Hz"),
+        ("spin", f"{fixed(poses.spins[k], 2)} Hz"),
     ]
     if poses.scene.washers.inertia_kg_m2 > 0:
-        rows.append(("slip", f"{number(poses.slips[k] / (2 * math.pi), 2)} turns"))
+        rows.append(("slip", f"{fixed(poses.slips[k] / (2 * math.pi), 2)} turns"))
     if poses.scene.drive.waveform != "off":
-        rows.append(("drive", f"{number(1000 * poses.scene.drive.amplitude_t * poses.drive[k], 2)} mT"))
+        rows.append(("drive", f"{fixed(1000 * poses.scene.drive.amplitude_t * poses.drive[k], 2)} mT"))
     return rows
 
 
-def number(value: float, digits: int) -> str:
-    """A number with so many digits after the point; a zero has no sign.
+def unbroken(text: str) -> str:
+    r"""Bind numbers to their units, and what units consist of, with spaces at which no line ends.
 
-    >>> number(-0.254, 2), number(-0.001, 2)
-    ('−0.25', '0.00')
+    >>> unbroken("from 0.5 s to 2 cm radius, 0.71 A m², 1/20 of real speed, 3 parts")
+    'from 0.5\xa0s to 2\xa0cm radius, 0.71\xa0A\xa0m², 1/20 of real speed, 3 parts'
     """
-    return f"{round(float(value), digits) + 0.0:.{digits}f}".replace("-", "−")
+    return _BEFORE_A_UNIT.sub("\u00a0", text)

@@ -191,6 +191,8 @@ def test_on_a_telephone_in_the_dark_nothing_is_wider_than_the_screen(
     page.wait_for_function("() => Number(document.getElementById('read-time').textContent) > 0")
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
     assert canvas(page)[-20:, :20].mean() < 60
+    texts = page.locator("#scale, #readout dd, td, .lead, .legend li").all_inner_texts()
+    assert [text for text in texts if re.search(r"\d (mm|cm|s|Hz|mT|g|A)\b", text)] == []
 
 
 def test_without_script_there_are_a_picture_and_the_numbers(watched: Callable[..., pw.Page], path: Path) -> None:

@@ -30,6 +30,9 @@ def test_a_fall_is_what_is_shown_unless_a_span_is_given(tmp_path: Path) -> None:
     assert ended.status == 0
     assert '"animation": "fall.html"' in ended.out
     assert "to 0.2571 s, where it is lost" in (tmp_path / "fall.html").read_text(encoding="utf-8")
+    long = ("simulate", "undriven", "--duration", "90", "--set", "start.spin_hz=20", "--animate-from", "0")
+    ended = command(*long, "--animate-to", "90", "--animate", "fall.html", cwd=tmp_path)
+    assert ended.status == 0  # the span up to the fall is short enough
     late = command(*words, "--animate", "late.html", "--animate-from", "1", cwd=tmp_path)
     assert late.status == 2
     assert "--animate-from 1: the top was lost after 0.2571 s already" in late.err
