@@ -412,10 +412,10 @@ def _miscounts(readings: Readings) -> tuple[NDArray[np.intp], Array]:
     none of them moves, and then to what lies near it, until that stays the same. If more than a quarter of the
     readings lie far away no law fits, and none is left out.
     """
-    from scipy.ndimage import median_filter
-
     n = len(readings)
-    smooth = median_filter(readings.x, size=WINDOW, mode="nearest")
+    # by numpy: scipy.ndimage takes longer to import than a usual run to fit
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(readings.x, WINDOW // 2, mode="edge"), WINDOW)
+    smooth = np.median(windows, axis=1)
     far = np.abs(readings.x / smooth - 1) > MISCOUNT / 2
     if not far.any():
         return np.flatnonzero(far), np.empty(0)
@@ -434,10 +434,15 @@ def _miscounts(readings: Readings) -> tuple[NDArray[np.intp], Array]:
     return np.flatnonzero(far), off[far] / scatter
 
 
+#: More standard deviations than this are not counted: all other readings lie on the law then.
+_MOST_DEVIATIONS = 1000
+
+
 def _outlier_warnings(readings: Readings, search: _Search, *, kept: bool) -> list[str]:
     done = "was kept as asked" if kept else "was left out"
     return [
-        f"the reading of {readings.frequency[i]:.6g} Hz at {readings.time[i]:.12g} s lies {digits(deviation, 3)} "
+        f"the reading of {readings.frequency[i]:.6g} Hz at {round(readings.time[i], 3):.12g} s lies "
+        f"{digits(deviation, 3) if deviation < _MOST_DEVIATIONS else f'more than {_MOST_DEVIATIONS}'} "
         f"standard deviations from the others and {done}"
         for i, deviation in zip(search.indices, search.deviations, strict=True)
     ]

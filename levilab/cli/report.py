@@ -19,8 +19,8 @@ def report(
         typer.Option(
             "--output",
             "-o",
-            metavar="FILE.html|FILE.pdf",
-            help=r"The file to write; its ending chooses the format.  PDF needs levilab\[pdf].",
+            metavar="FILE",
+            help=r"The file to write; its ending, .html or .pdf, chooses the format.  PDF needs levilab\[pdf].",
         ),
     ] = Path("report.html"),
     tables: Annotated[

@@ -17,8 +17,8 @@ def reproduce(
         typer.Option(
             "--output",
             "-o",
-            metavar="FILE.html|FILE.pdf",
-            help=r"The report; its ending chooses the format.  PDF needs levilab\[pdf].",
+            metavar="FILE",
+            help=r"The report; its ending, .html or .pdf, chooses the format.  PDF needs levilab\[pdf].",
             show_default="reproduce.html, and none with --json",
         ),
     ] = None,

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from levilab.crosscheck.study import COVERAGE
+from levilab.present.numbers import signed
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def _cells(spread: Spread) -> tuple[str, ...]:
     return (
         spread.quantity,
         str(n),
-        f"{spread.mean:+.2f} ± {1 / math.sqrt(n):.2f}",
+        f"{signed(spread.mean, 2)} ± {1 / math.sqrt(n):.2f}",
         "–" if math.isnan(spread.deviation) else f"{spread.deviation:.2f} ± {1 / math.sqrt(2 * n):.2f}",
         f"{100 * spread.coverage:.0f} ± {100 * math.sqrt(COVERAGE * (1 - COVERAGE) / n):.0f} %",
         _percent(spread.relative_u),

@@ -86,6 +86,14 @@ class Analyzed(Generic[S, R, T, Opt]):
         """Inputs whose numbers are taken together."""
         return (self.sources,)
 
+    def inputs_of(self, value: str) -> Sequence[Source[S]]:
+        """Inputs that a value of all together is made of, by its name in result.json."""
+        return self.sources
+
+    def inputs_of_budget(self, budget: Budget) -> Sequence[Source[S]]:
+        """Inputs that the number of a budget of all together is made of."""
+        return self.sources
+
     def about_all(self) -> Iterable[str]:
         """What to know of all inputs together before using the numbers."""
         return ()

@@ -10,12 +10,13 @@ from analysis.budget import Component, u_of_limit
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from instruments.time_bases import TIME_BASES
+from levilab.pipelines.sources import mark_of
 from levilab.present.document.blocks import Bullets, Details, Note, Paragraph, Tabular
 from levilab.present.numbers import enumeration, in_words, with_uncertainty
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from typing import Any
 
     from analysis.budget import Budget
@@ -221,20 +222,29 @@ def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, s
         shown: quantity → its symbol.
     """
     of_each = [
-        (source.name, origin.budget)
+        (source, origin.budget)
         for source, origin in zip(found.sources, found.origins, strict=True)
         if len(found.sources) > 1 and origin.budget
     ]
     printed = len(of_each) if len(of_each) < _MANY else 0 if found.budget else 1
     each: list[Block] = [
-        Details(f"{name} by itself", budget_blocks(budget, shown, name), on_paper="whole" if k < printed else "out")
-        for k, (name, budget) in enumerate(of_each[:_MOST_RUNS])
+        _by_itself(source, budgets, shown, is_printed=k < printed)
+        for k, (source, budgets) in enumerate(of_each[:_MOST_RUNS])
     ]
     if printed < len(each) and not found.budget:
         each.append(Note("Only the first of them is printed; all are in the report as HTML, and in result.json."))
     if not found.budget and not each:
         return (Paragraph("The result was written before budgets were kept with it: levilab analyze makes them."),)
-    return (*budget_blocks(found.budget, shown), *each)
+    together = budget_blocks(found.budget, shown, mark=lambda budget: mark_of(found.inputs_of_budget(budget)))
+    return (*together, *each)
+
+
+def _by_itself(
+    source: Source[Any], budgets: Sequence[Budget], shown: Mapping[str, str] | None, *, is_printed: bool
+) -> Details:
+    """The budgets of one input among several."""
+    blocks = budget_blocks(budgets, shown, source.name, lambda _: mark_of([source]))
+    return Details(f"{source.name} by itself", blocks, on_paper="whole" if is_printed else "out")
 
 
 #: From so many runs on their budgets are not printed on paper, but for the first one where no mean has one; and so many
@@ -242,19 +252,26 @@ def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, s
 _MANY, _MOST_RUNS = 3, 12
 
 
-def budget_blocks(budgets: Sequence[Budget], shown: Mapping[str, str] | None = None, of: str = "") -> tuple[Block, ...]:
+def budget_blocks(
+    budgets: Sequence[Budget],
+    shown: Mapping[str, str] | None = None,
+    of: str = "",
+    mark: Callable[[Budget], str] | None = None,
+) -> tuple[Block, ...]:
     """Each budget as a table with what dominates it in a sentence, then where the numbers come from; empty of none.
 
     Args:
         budgets: of the results.
         shown: quantity → its symbol.
         of: the input, for the names of tables; empty for all of them together.
+        mark: what a result is synthetic of, see `Tabular`.
     """
     blocks: list[Block] = []
     for budget in budgets:
         words = " ".join(filter(None, ("budget", of, budget.model, budget.quantity)))
         name = re.sub(r"[^a-z0-9]+", "-", words.casefold()).strip("-")
-        blocks.append(Tabular(name, budget_table(budget, shown), first_column_wraps=True))
+        found = budget_table(budget, shown)
+        blocks.append(Tabular(name, found, first_column_wraps=True, mark=mark(budget) if mark else None))
         blocks.append(Paragraph(in_a_sentence(budget, shown)))
     notes = notes_of(budgets)
     if notes:

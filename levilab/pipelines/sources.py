@@ -15,6 +15,7 @@ from levilab.errors import DataError, DoesNotSuit, NoneUsable
 from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.record import SEARCHED
 from levilab.present.clock import local
+from levilab.present.numbers import list_in_words
 from levilab.runs.run import READINGS, RECORD, Run, find_runs
 
 if TYPE_CHECKING:
@@ -126,6 +127,14 @@ class Source(Generic[R]):
     def start(self) -> datetime | None:
         """When it was measured, in local time: time zero, or else the start of the run."""
         return self.time_zero or (local(self.run.record.started_utc) if self.run else None)
+
+
+def mark_of(sources: Sequence[Source[Any]]) -> str:
+    """What a table says before its caption of inputs that its numbers are made of; empty where none is synthetic."""
+    made_up = [source.name for source in sources if source.synthetic]
+    if not made_up:
+        return ""
+    return "SYNTHETIC." if len(made_up) == len(sources) else f"SYNTHETIC IN PART ({list_in_words(made_up)})."
 
 
 @dataclass(frozen=True)

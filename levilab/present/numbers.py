@@ -6,7 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from analysis.numbers import digits
+from analysis.numbers import digits, with_minus
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -22,6 +22,9 @@ UNITS = {
     "(rad/s)^-1/2/s": "(rad/s)^−½/s",
     "(rad/s)^(1-exponent)/s": "(rad/s)^(1−n)/s",
 }
+
+#: Names that a sentence lists at most.
+MOST_NAMES = 4
 
 #: A column where a smaller uncertainty stands has numbers of very different size.
 MOST_DECIMALS = 1e-6
@@ -106,7 +109,7 @@ def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> s
     ordinary: True without a power of ten, False with one; None: the number decides.
 
     >>> _number(-0.0012, 0.05), _number(-0.012, 0.05)
-    ('0.00(5)', '-0.01(5)')
+    ('0.00(5)', '−0.01(5)')
     """
     from uncertainties import ufloat
 
@@ -115,7 +118,7 @@ def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> s
     if ordinary is None:
         ordinary = 1e-2 <= abs(value) < 1e5 or abs(value) < u < 1e5
     text = f"{ufloat(value, u):SP}" if ordinary else f"{ufloat(value, u):eSP}"
-    return re.sub(r"^-(?=0(\.0*)?\()", "", text)
+    return with_minus(re.sub(r"^-(?=0(\.0*)?\()", "", text))
 
 
 def enumeration(names: Sequence[str]) -> str:
@@ -127,14 +130,33 @@ def enumeration(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
+def list_in_words(names: Sequence[str]) -> str:
+    """The names, or the first of them.
+
+    >>> list_in_words(["a", "b", "c", "d", "e", "f"])
+    'a, b, c, d and 2 more'
+    """
+    more = len(names) - MOST_NAMES
+    return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
+def fixed(value: float, decimals: int) -> str:
+    """A number with so many digits after the point; a zero has no sign.
+
+    >>> fixed(-0.254, 2), fixed(-0.001, 2)
+    ('−0.25', '0.00')
+    """
+    return with_minus(f"{round(float(value), decimals) + 0.0:.{decimals}f}")
+
+
 def signed(value: float, decimals: int) -> str:
     """A number with its sign, and none where it rounds to zero.
 
     >>> signed(0.471, 2), signed(-0.002, 2), signed(-1.614, 2)
-    ('+0.47', '0.00', '-1.61')
+    ('+0.47', '0.00', '−1.61')
     """
     text = f"{value:+.{decimals}f}"
-    return text if float(text) else text[1:]
+    return with_minus(text) if float(text) else text[1:]
 
 
 def decimals_of(u: float | None, most: int = 5) -> int:
@@ -167,11 +189,11 @@ def reading(value: float, u: float | None, residual: float | None) -> tuple[str,
     """A reading, its uncertainty and what a fit leaves over, for three columns; a dash for what is not known.
 
     >>> reading(39.93661, 0.03, -0.012), reading(39.9, None, None)
-    (('39.937', '0.030', '-0.012'), ('39.90000', '—', '—'))
+    (('39.937', '0.030', '−0.012'), ('39.90000', '—', '—'))
     """
     places = decimals_of(u)
     left = "—" if residual is None else signed(residual, places)
-    return f"{value:.{places}f}", "—" if u is None else f"{u:.{places}f}", left
+    return with_minus(f"{value:.{places}f}"), "—" if u is None else f"{u:.{places}f}", left
 
 
 def short_name(name: str) -> str:
@@ -192,8 +214,8 @@ def plain(value: float | None, count: int = 3) -> str:
     if value is None:
         return "—"
     if 1e-4 <= abs(value) < 10**count:
-        return f"{value:#.{count}g}".rstrip(".")
-    return f"{value:.0f}" if 10**count <= abs(value) < 1e6 else digits(value, count)
+        return with_minus(f"{value:#.{count}g}".rstrip("."))
+    return with_minus(f"{value:.0f}") if 10**count <= abs(value) < 1e6 else digits(value, count)
 
 
 def share(weight: float | None) -> str:

@@ -7,6 +7,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from analysis.numbers import with_minus
 from levilab.present.characters import printable
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ def _measured(state: State, trend: Trend, *, plain: bool) -> Iterator[Piece]:
         yield Piece("nothing counted yet" if state.share is not None else "no light, no value", "off")
     for name, word, unit, decimals, factor in shown:
         style = "strong" if name == trend.channel else "plain"
-        yield Piece(f"{word} {state.last[name] * factor:.{decimals}f} {unit}".replace("-", "−"), style)
+        yield Piece(f"{word} {with_minus(f'{state.last[name] * factor:.{decimals}f}')} {unit}", style)
         if name == trend.channel and trend.rate is not None:
             yield Piece(f"{_signed(trend.rate * factor)} {unit}/s")
             if not plain:
@@ -181,7 +182,7 @@ def _signed(value: float) -> str:
     if not value:
         return "0"
     decimals = min(max(1 - math.floor(math.log10(abs(value))), 0), 6)
-    return f"{value:+.{decimals}f}".replace("-", "−")
+    return with_minus(f"{value:+.{decimals}f}")
 
 
 def _clock(seconds: float) -> str:

@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import unquoted
+from levilab.pipelines.sources import mark_of
 from levilab.present.document.blocks import (
     Banner,
     Document,
@@ -16,6 +17,8 @@ from levilab.present.document.blocks import (
     Verdict,
     Warnings,
 )
+from levilab.present.document.marks import with_marks
+from levilab.present.numbers import list_in_words
 from levilab.report.inputs import About, describe, in_common
 from levilab.report.reproduction import reproduction
 from levilab.report.supplements import SUPPLEMENTS
@@ -34,8 +37,6 @@ if TYPE_CHECKING:
 
     Results = Sequence[tuple[Analysis[Any], Any]]
 
-#: Inputs that a message names at most.
-MOST_NAMES = 4
 #: With more inputs the report is an overview: facts that all share stand there once, the section of each can be opened,
 #: and the figure is a PNG, a tenth as large as an SVG of so many lines.
 MOST_IN_FULL = 12
@@ -99,13 +100,14 @@ def blocks_of_part(
     count = sum(map(len, groups))
     warnings = [section(f"{count} warning{'s' * (count > 1)}", "warnings", Warnings(groups))] if groups else []
     more = (block for supplement in supplements for block in supplement(analysis, found))
-    return [
+    blocks = [
         *warnings,
         section("Result", "result", Verdict(part.verdict), *part.result),
         section("Figure", "figure", picture_of(analysis, found, part)),
         *more,
         section(part.runs_title, "runs", *part.runs),
     ]
+    return with_marks(blocks, mark_of(found.sources))
 
 
 def picture_of(analysis: Analysis[A], found: A, part: ReportPart) -> Picture:
@@ -238,9 +240,3 @@ def counted(sources: Sequence[Source[Any]]) -> str:
     files = sum(source.run is None for source in sources)
     kinds = ((len(sources) - files, "run"), (files, "data file"))
     return " and ".join(f"{n} {kind}{'s' * (n > 1)}" for n, kind in kinds if n)
-
-
-def list_in_words(names: Sequence[str]) -> str:
-    """The names, or the first of them."""
-    more = len(names) - MOST_NAMES
-    return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")

@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
+from levilab.pipelines.sources import mark_of
 from levilab.present.clock import moment
 from levilab.present.document.blocks import Details, Fact, Facts, Note, Section, Tabular
+from levilab.present.document.marks import with_marks
 from levilab.present.tables import table
 from levilab.present.words import setting_in_words, settings_in_words, value_in_words
 
@@ -87,10 +89,11 @@ def in_common(inputs: Sequence[Input]) -> tuple[Fact, ...]:
 def describe(parts: Sequence[About]) -> Input:
     """What is known of an input, of which several analyses may say something."""
     source = parts[0].source
+    own = (block for one in parts for block in one.part.blocks)
     return Input(
         name=source.name,
         facts=tuple(fact for fact in _facts(source, parts) if any(fact.texts)),
-        blocks=(*_changes(source), *_events(source), *(block for one in parts for block in one.part.blocks)),
+        blocks=(*_changes(source), *_events(source), *with_marks(own, mark_of([source]))),
     )
 
 

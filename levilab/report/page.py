@@ -16,7 +16,8 @@ from levilab.files import replace_atomically, writing
 from levilab.pipelines.catalogue import recall_suiting, remarks
 from levilab.pipelines.document import NO_RESULT
 from levilab.pipelines.sources import data_files
-from levilab.report.document import document_of, list_in_words, notebook_blocks
+from levilab.present.numbers import list_in_words
+from levilab.report.document import document_of, notebook_blocks
 from levilab.report.html.page import fragment_of, page_of
 from levilab.report.kinds import KINDS
 from levilab.report.pdf.renderer import as_pdf, check_typst

@@ -16,6 +16,7 @@ from analysis.uncertainty import Estimate
 from levilab.motion.lines import lines_of, rate_for
 from levilab.motion.lock import body_angle
 from levilab.present.document.blocks import Note, Picture
+from levilab.present.numbers import signed
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Because, Check, Statement
 from levilab.reproduce.figure import counter_figure, window_figure
@@ -116,8 +117,8 @@ def about_counter(seen: Counted) -> list[Finding]:
             "what a mark on the rim counts",
             "chapter on the spin counter",
             "",
-            f"turns about the vertical, ω₃/cos θ: {1e3 * high[0]:+.0f} mHz at {seen.spin[0]:.0f} Hz, "
-            f"{1e3 * high[-1]:+.0f} mHz at "
+            f"turns about the vertical, ω₃/cos θ: {signed(1e3 * high[0], 0)} mHz at {seen.spin[0]:.0f} Hz, "
+            f"{signed(1e3 * high[-1], 0)} mHz at "
             f"{seen.spin[-1]:.1f} Hz; 1/cos θ explains all but {1e3 * np.sqrt(np.mean(rest**2)):.0f} mHz (rms)",
             holds=bool(high[-1] > 0.02 and np.sqrt(np.mean(rest**2)) < 0.3 * high.max()),
         ),

@@ -9,6 +9,7 @@ import numpy as np
 
 from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Picture
+from levilab.present.numbers import signed
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Because, Check, Statement
 from levilab.reproduce.figure import dipole_figure
@@ -67,9 +68,8 @@ def make() -> Found:
             THESIS["dipole.energy"],
             Estimate(abs(energy), None, "%"),
             Because(
-                f"the thesis says: about. The mean of B_z over a disc is B + ½B″(h²/12 − R²/4) + …: {leading:+.2f} % "
-                "from this "
-                f"term, {energy:+.2f} % in all",
+                f"the thesis says: about. The mean of B_z over a disc is B + ½B″(h²/12 − R²/4) + …: "
+                f"{signed(leading, 2)} % from this term, {signed(energy, 2)} % in all",
                 abs(leading / energy - 1) < 0.5 and abs(energy) < THESIS["dipole.energy"].value,
             ),
         ),

@@ -12,6 +12,7 @@ import numpy as np
 from analysis.stability import SymmetricTop, sleeping_limit, spin_windows
 from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
+from levilab.present.numbers import signed
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Because, Check, Statement, Within
 from levilab.reproduce.figure import simon_figure
@@ -192,8 +193,8 @@ def make() -> Found:
             f"{SIMON['abstract.upper_simulated'].text} rpm = {rpm['upper_simulated']:.0f} rad/s simulated, "
             f"{SIMON['abstract.upper_measured'].text} rpm = {rpm['upper_measured']:.0f} rad/s measured",
             f"the quartic ends at {three.window[1]:.0f} rad/s: "
-            f"{100 * (three.window[1] / rpm['upper_simulated'] - 1):+.0f} % of "
-            f"the simulated, {100 * (three.window[1] / rpm['upper_measured'] - 1):+.0f} % of the measured one",
+            f"{signed(100 * (three.window[1] / rpm['upper_simulated'] - 1), 0)} % of "
+            f"the simulated, {signed(100 * (three.window[1] / rpm['upper_measured'] - 1), 0)} % of the measured one",
             holds=abs(three.window[1] / rpm["upper_simulated"] - 1) < 0.05,
         )
     )

@@ -11,6 +11,7 @@ import numpy as np
 from analysis.limits import Sample, compare, summarize
 from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Picture
+from levilab.present.numbers import signed
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Check, Statement
 from levilab.reproduce.figure import statistics_figure
@@ -71,16 +72,16 @@ def make() -> Found:
             "are the ten normal?",
             THESIS["measured.limits.0"].place,
             "",
-            f"Shapiro and Wilk: W = {w:.3f}, p = {p:.2f}; no outlier, no trend ({1e3 * found.trend.value:+.0f} mHz a "
-            "top, "
-            f"p = {found.trend_p:.2f}); ten values leave the scatter ± {found.scatter.u:.2f} Hz",
+            f"Shapiro and Wilk: W = {w:.3f}, p = {p:.2f}; no outlier, no trend "
+            f"({signed(1e3 * found.trend.value, 0)} mHz a top, p = {found.trend_p:.2f}); "
+            f"ten values leave the scatter ± {found.scatter.u:.2f} Hz",
             holds=p > 0.05 and not found.outliers,
         ),
         Statement(
             "against the exact edge of small motions",
             THESIS["measured.mean"].place,
             "21.86(8) Hz measured; 14.005 Hz by its own estimate",
-            f"{edge.difference.value:+.2f} Hz above the edge at {edge.expected:.2f} Hz (p = {edge.p:.2f}), "
+            f"{signed(edge.difference.value, 2)} Hz above the edge at {edge.expected:.2f} Hz (p = {edge.p:.2f}), "
             f"{found.mean.value - THESIS['stability.estimate'].value:.1f} Hz above the estimate",
             holds=0 < edge.difference.value < 0.5,
         ),

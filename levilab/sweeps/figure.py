@@ -399,7 +399,7 @@ def _draw_thesis(axes: Axes, plan: Plan) -> list[Artist]:
     artists: list[Artist] = []
     for spin, dashes, label in (
         (MEASURED_HZ, "dashdot", f"thesis, measured: lower limit {MEASURED_HZ} ± {MEASURED_U_HZ} Hz"),
-        (HIGHEST_HZ, "dotted", f"thesis, measured: highest synchronised spin, about {HIGHEST_HZ:g} Hz"),
+        (HIGHEST_HZ, "dotted", f"thesis, measured: highest locked spin, about {HIGHEST_HZ:g} Hz"),
     ):
         if low < spin < high:
             _draw_rim(axes, x=spin)

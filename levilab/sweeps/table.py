@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from analysis.numbers import with_minus
 from levilab.present.numbers import in_words as unit_in_words
 from levilab.present.tables import Table, table
 from levilab.sweeps.axes import in_words
@@ -50,7 +51,7 @@ def _row(one: ColumnSummary, points: int) -> tuple[str, ...]:
 def _number(value: Any) -> str:
     if isinstance(value, str):
         return value
-    return f"{value:.5g}" if math.isfinite(value) else "—"
+    return with_minus(f"{value:.5g}") if math.isfinite(value) else "—"
 
 
 def points_table(found: Map) -> Table:

@@ -71,7 +71,7 @@ def _speeds(axes: Axes, found: Study) -> None:
         if name in aims:
             axes.plot([1e-6 * aims[name]], [row], color="black", marker="|", markersize=12, linestyle="")
     axes.set_xscale("log")
-    axes.set(xlabel="MS/s of one core; bar: aim", ylim=(-0.6, len(names) - 0.4))
+    axes.set(xlabel="MS/s of one core\n(bar: aim)", ylim=(-0.6, len(names) - 0.4))
     axes.set_yticks(range(len(names)), list(reversed(names)), fontsize=SMALL)
 
 

@@ -20,6 +20,7 @@ from levilab.crosscheck.own.model import OF_ONE_RUN
 from levilab.crosscheck.study import CHANCE, COVERAGE, Spread, by_reason, spreads_of
 from levilab.errors import LevilabError
 from levilab.present.document.blocks import Note, Paragraph, Tabular
+from levilab.present.numbers import signed
 from levilab.present.tables import Table, table
 
 if TYPE_CHECKING:
@@ -230,7 +231,7 @@ def own_table(found: OwnCheck, shown: Mapping[str, str] | None = None) -> Table:
         (
             _in_words(one.quantity, shown or {}),
             str(one.n),
-            f"{one.mean:+.2f} ± {1 / math.sqrt(one.n):.2f}".replace("-", "−"),
+            f"{signed(one.mean, 2)} ± {1 / math.sqrt(one.n):.2f}",
             "–" if math.isnan(one.deviation) else f"{one.deviation:.2f} ± {1 / math.sqrt(2 * one.n):.2f}",
             f"{100 * one.coverage:.0f} ± {100 * math.sqrt(COVERAGE * (1 - COVERAGE) / one.n):.0f} %",
             "yes" if found.is_right(one) else "NO",
@@ -301,7 +302,8 @@ def own_blocks(found: OwnCheck, shown: Mapping[str, str] | None = None) -> tuple
     )
     return (
         Paragraph(in_words(found)),
-        Tabular(f"crosscheck-{found.analysis}", own_table(found, shown)),
+        # the readings of the trials are made up, whatever the result is of
+        Tabular(f"crosscheck-{found.analysis}", own_table(found, shown), mark="SYNTHETIC."),
         Note(note),
     )
 

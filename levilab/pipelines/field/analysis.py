@@ -206,7 +206,7 @@ def _learned_in_words(scan: FieldScan) -> str:
     ]
     said += [
         f"{one.replace('_', ' ').capitalize()} and {other.replace('_', ' ')} can hardly be told apart "
-        f"(correlation {scan.correlation(one, other):.2f})."
+        f"(correlation {digits(scan.correlation(one, other))})."
         for one, other in pairs
     ]
     return " ".join(said)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
+    from analysis.budget import Budget
     from levilab.pipelines.sources import Source
 
 Which = Literal["lower", "upper"]
@@ -154,7 +155,28 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
     @property
     def averaged(self) -> Sequence[Sequence[Source[LimitReadings]]]:
         """Those of the same conditions."""
-        return tuple(tuple(self.sources[k] for k in group.runs) for group in self.groups)
+        return tuple(self._inputs(group) for group in self.groups)
+
+    def inputs_of(self, value: str) -> Sequence[Source[LimitReadings]]:
+        """Those of the group whose prefix its name has."""
+        return next((self._inputs(one) for one in self.groups if value.startswith(self.prefix(one))), self.sources)
+
+    def inputs_of_budget(self, budget: Budget) -> Sequence[Source[LimitReadings]]:
+        """Those of the group whose mean it is of, or of all groups with the same one."""
+        mean = (budget.model, budget.value, budget.u)
+        groups = ((one, one.statistics.mean) for one in self.groups)
+        alike = [source for one, of in groups if (one.which, of.value, of.u) == mean for source in self._inputs(one)]
+        return alike or self.sources
+
+    def _inputs(self, group: Limits) -> tuple[Source[LimitReadings], ...]:
+        return tuple(self.sources[k] for k in group.runs)
+
+    def prefix(self, group: Limits) -> str:
+        """What the names of a group's values begin with; empty where it is the only group."""
+        if len(self.groups) == 1:
+            return ""
+        of_kind = self.number(group)
+        return f"{group.which}_" if of_kind is None else f"{group.which}_{of_kind}_"
 
     def number(self, group: Limits) -> int | None:
         """The number of a group among those of its kind, from 1; None where it is the only one."""

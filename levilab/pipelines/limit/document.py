@@ -118,14 +118,11 @@ def _run_entries(_: Source[LimitReadings], run: Limits) -> dict[str, Any]:
 
 def _top_values(analysis: LimitAnalysis) -> dict[str, Any]:
     """Of one group by their plain names, else with the kind before them, and its number where it has several."""
-    if len(analysis.groups) == 1:
-        return _values(analysis.groups[0].statistics)
-    values: dict[str, Any] = {}
-    for group in analysis.groups:
-        of_kind = analysis.number(group)
-        prefix = group.which if of_kind is None else f"{group.which}_{of_kind}"
-        values |= {f"{prefix}_{name}": value for name, value in _values(group.statistics).items()}
-    return values
+    return {
+        f"{analysis.prefix(group)}{name}": value
+        for group in analysis.groups
+        for name, value in _values(group.statistics).items()
+    }
 
 
 def _values(found: Statistics) -> dict[str, Any]:

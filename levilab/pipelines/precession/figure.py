@@ -57,9 +57,7 @@ def _draw_line(axes: Axes, analysis: PrecessionAnalysis) -> None:
     fit = analysis.combined
     x = _span(fit)
     axes.plot(x, x, linewidth=1, label="locked top: slope 1,\nintercept 0", zorder=2.4, **LOOKS["locked"].as_line)
-    label = f"line: slope {without_unit(slope_of(fit))},\nintercept {without_unit(intercept_of(fit))} Hz".replace(
-        "-", "−"
-    )
+    label = f"line: slope {without_unit(slope_of(fit))},\nintercept {without_unit(intercept_of(fit))} Hz"
     axes.plot(x, fit.line.at(x), linewidth=1.4, label=label, zorder=2.6, **LOOKS["fit"].as_line)
     axes.plot(x, median_line(fit, x), linewidth=1.6, label="median line, robust", zorder=2.7, **LOOKS["robust"].as_line)
     _draw_bands(axes, x, fit.line.at(x), fit, labels=True)

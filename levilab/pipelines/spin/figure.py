@@ -9,7 +9,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from analysis.numbers import digits
+from analysis.numbers import digits, with_minus
 from levilab.pipelines.spin.analysis import MOST_DRAWN
 from levilab.present.drawing import SMALL, band, headline, panel, synthetic_mark, write
 from levilab.present.looks import LOOKS
@@ -85,7 +85,7 @@ def _title(source: Source[Records], run: SpinRun) -> str:
 
 
 def _reference(spin: SpinFrequency) -> str:
-    return f"{spin.reference_time:.4g} s".replace("-", "−")
+    return with_minus(f"{spin.reference_time:.4g} s")
 
 
 def _drawable(name: str) -> str:

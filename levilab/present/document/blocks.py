@@ -131,6 +131,8 @@ class Tabular:
         note: explains the columns, small print below it.
         first_column_wraps: whether the first column holds names, which may be long and are folded.
         wraps: heads of columns of sentences, which are folded and take the width that others leave.
+        mark: what of it is synthetic, for formats that take it out of the document: "SYNTHETIC.", or empty where
+            nothing is; None: as the banner of the section or document around it says.
     """
 
     name: str
@@ -138,6 +140,7 @@ class Tabular:
     note: str = ""
     first_column_wraps: bool = False
     wraps: tuple[str, ...] = ()
+    mark: str | None = None
 
 
 @dataclass(frozen=True)
@@ -176,8 +179,8 @@ class Points:
 class Picture:
     """A figure.
 
-    It is as wide as the text, its caption below it on the same page; it is never split between pages.  Figures are
-    drawn in dark on white, and stay on a white card where the page is dark.
+    It is as wide as the text, its caption below it on the same page; only a tall one is divided between pages, and only
+    between two rows of panels.  Figures are drawn in dark on white, and stay on a white card where the page is dark.
 
     Attributes:
         name: such as "spindown"; lower case, digits and hyphens; the prefix of ids where it is inlined.

@@ -1,7 +1,7 @@
 """The house's plain notation of powers and indices → runs of text, which each format sets high or low.
 
-Plain text says 10⁻³, s⁻¹, (rad/s)^−½, C₃/₂ and -0.012, so that a terminal can print it.  A format that can set text
-high or low asks here, and gets a minus for the hyphen before a number; nothing else of a text is ever changed.
+Plain text says 10⁻³, s⁻¹, (rad/s)^−½ and C₃/₂, so that a terminal can print it.  A format that can set text high or low
+asks here, and gets a minus for a hyphen before a number, which a person may have typed; nothing else is ever changed.
 """
 
 from __future__ import annotations

@@ -79,7 +79,8 @@ def _csv_files(values: Iterable[Values]) -> Iterator[tuple[str, tuple[str, str]]
 
 def _latex_files(document: Document) -> Iterator[tuple[str, tuple[str, str]]]:
     names = _Names()
-    for block, mark in _tables_in(document.blocks, document.banner.lead if document.banner else ""):
+    for block, around in _tables_in(document.blocks, document.banner.lead if document.banner else ""):
+        mark = around if block.mark is None else block.mark
         name = names.new(block.name)
         latex = as_latex(name, block.table, note=block.note, mark=mark)
         yield f"{name}.tex", (block.table.title or title_of(block.name), latex)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from levilab.present.characters import for_encoding, printable
 from levilab.present.document.typesetting import typeset
+from levilab.report.tables.widths import PARAGRAPH, SMALL_SEPARATION, fit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -39,12 +40,10 @@ _OTHERS = {
 #: φ with a dot, of two characters.
 _PHI_DOT = "φ\N{COMBINING DOT ABOVE}"
 _LEVELS = {"high": r"\textsuperscript{%s}", "low": r"\raisebox{-.4ex}{\scriptsize %s}", "": "%s"}
-#: A column of texts longer than this is a paragraph of the width below [characters].
-_LONG, _WIDTH = 48, "0.4\\linewidth"
 
 
 def as_latex(name: str, table: Table, *, note: str = "", mark: str = "") -> str:
-    """A table as a float with caption and label.
+    """A table as a float with caption and label; folded and in small letters where it is wider than an article.
 
     Args:
         name: of the file; the label is ``tab:NAME``.
@@ -52,18 +51,23 @@ def as_latex(name: str, table: Table, *, note: str = "", mark: str = "") -> str:
         note: small print below it.
         mark: before the caption, such as "SYNTHETIC.".
     """
-    caption = " ".join(filter(None, (escaped(mark), escaped(table.title or title_of(name)))))
-    head = [rf"{_row(table.heads, bold=True)} \\", r"\midrule"] if any(table.heads) else []
+    title = table.title or title_of(name)
+    marks = [mark] if mark and mark.rstrip(".") not in title else []  # which may say it itself
+    caption = escaped(" ".join([*marks, title]))
+    fitted = fit(table)
+    aligned = ["r" if k in table.numbers else "p" if k in fitted.paragraphs else "l" for k in range(len(table.heads))]
+    head = [rf"{_row(fitted.table.heads, aligned, bold=True)} \\", r"\midrule"] if any(table.heads) else []
     lines = [
         "% levilab report --tables; in the preamble: \\usepackage{booktabs}",
         r"\begin{table}[htbp]",
         r"  \centering",
+        *([rf"  \footnotesize\setlength{{\tabcolsep}}{{{SMALL_SEPARATION:g}pt}}"] if fitted.small else []),
         rf"  \caption{{{caption}}}",
         rf"  \label{{tab:{name}}}",
-        rf"  \begin{{tabular}}{{{''.join(_alignments(table))}}}",
+        rf"  \begin{{tabular}}{{{''.join(_COLUMNS[one] for one in aligned)}}}",
         r"    \toprule",
         *(f"    {line}" for line in head),
-        *(f"    {line}" for line in _body(table.rows)),
+        *(f"    {line}" for line in _body(fitted.table.rows, aligned)),
         r"    \bottomrule",
         r"  \end{tabular}",
         *([rf"  \par\smallskip{{\footnotesize {escaped(note)}\par}}"] if note else []),
@@ -81,33 +85,35 @@ def title_of(name: str) -> str:
     return name.replace("-", " ").capitalize()
 
 
-def _alignments(table: Table) -> Iterable[str]:
-    for k in range(len(table.heads)):
-        longest = max((len(line) for row in table.rows for line in row.cells[k].split("\n")), default=0)
-        yield "r" if k in table.numbers else f"p{{{_WIDTH}}}" if longest > _LONG else "l"
+#: What stands for a column in the head of a tabular.
+_COLUMNS = {"r": "r", "l": "l", "p": f"p{{{PARAGRAPH:g}\\linewidth}}"}
 
 
-def _body(rows: Sequence[Row]) -> Iterable[str]:
+def _body(rows: Sequence[Row], aligned: Sequence[str]) -> Iterable[str]:
     for k, row in enumerate(rows):
         if row.kind == "together" and k and rows[k - 1].kind != "together":
             yield r"\midrule"
-        yield rf"{_row(row.cells)} \\"
+        yield rf"{_row(row.cells, aligned)} \\"
 
 
-def _row(cells: Sequence[str], *, bold: bool = False) -> str:
-    return " & ".join(_cell(cell, bold=bold) for cell in cells)
+def _row(cells: Sequence[str], aligned: Sequence[str], *, bold: bool = False) -> str:
+    return " & ".join(_cell(cell, of, bold=bold) for cell, of in zip(cells, aligned, strict=True))
 
 
-def _cell(cell: str, *, bold: bool) -> str:
-    r"""A cell, of several lines perhaps.
+def _cell(cell: str, aligned: str, *, bold: bool) -> str:
+    r"""A cell, of several lines perhaps: the first stands in the line of the row, of a head the last.
 
-    >>> _cell("c₁\n[s⁻¹]", bold=False)
-    '\\shortstack[l]{c\\raisebox{-.4ex}{\\scriptsize 1}\\\\{[}s\\textsuperscript{$-$1}{]}}'
+    >>> _cell("c₁\n[s⁻¹]", "l", bold=False)
+    '\\begin{tabular}[t]{@{}l@{}}c\\raisebox{-.4ex}{\\scriptsize 1}\\\\{[}s\\textsuperscript{$-$1}{]}\\end{tabular}'
     """
     lines = [escaped(line) for line in cell.split("\n")]
     lines = [rf"\textbf{{{line}}}" if bold and line else line for line in lines]
+    if len(lines) == 1:
+        return lines[0]
+    if aligned == "p":
+        return r"\newline ".join(lines)
     stacked = r"\\".join(lines)
-    return lines[0] if len(lines) == 1 else rf"\shortstack[l]{{{stacked}}}"
+    return rf"\begin{{tabular}}[{'b' if bold else 't'}]{{@{{}}{aligned}@{{}}}}{stacked}\end{{tabular}}"
 
 
 def escaped(text: str) -> str:

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 from levilab.pipelines.row import Column, plain, text_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from levilab.pipelines.catalogue import Analysis
     from levilab.pipelines.row import Cell
+    from levilab.pipelines.sources import Source
 
 #: A spreadsheet takes a text that begins with one of these for a formula.
 _FORMULA = re.compile(r"\s*[=+\-@\t\r]")
@@ -85,7 +86,7 @@ def of_analysis(analysis: Analysis[Any], found: Any, folder: Path) -> Iterator[V
         f"{analysis.name}: a row for each quantity of each input, and of all inputs together",
         (INPUT, SYNTHETIC, "model", "quantity", "value", "u", "unit", "interval_68_low", "interval_68_high",
          "scatter", "runs"),
-        tuple(_quantities(document, names)),
+        tuple(_quantities(found, document)),
     )  # fmt: skip
 
 
@@ -99,17 +100,27 @@ def _by_input(analysis: Analysis[Any], document: Mapping[str, Any], names: Seque
     return Values(f"{analysis.name}-inputs", f"{analysis.name}: a row for each input", heads, tuple(rows))
 
 
-def _quantities(document: Mapping[str, Any], names: Sequence[str]) -> Iterator[tuple[Cell, ...]]:
+def _quantities(found: Any, document: Mapping[str, Any]) -> Iterator[tuple[Cell, ...]]:
     analysis = str(document["analysis"])
-    if len(names) > 1:
-        yield from _of_part("all together", analysis, document)
-    for name, part in zip(names, document["runs"], strict=True):
-        yield from _of_part(name, analysis, part)
+    if len(found.sources) > 1:
+        yield from _of_part("all together", analysis, document, found.inputs_of)
+    for source, part in zip(found.sources, document["runs"], strict=True):
+        yield from _of_part(source.name, analysis, part)
 
 
-def _of_part(name: str, analysis: str, part: Mapping[str, Any]) -> Iterator[tuple[Cell, ...]]:
-    synthetic = bool(part["synthetic"])
+def _of_part(
+    name: str,
+    analysis: str,
+    part: Mapping[str, Any],
+    inputs_of: Callable[[str], Sequence[Source[Any]]] | None = None,
+) -> Iterator[tuple[Cell, ...]]:
+    """A row for each value.
+
+    inputs_of: returns the inputs of a quantity, which is synthetic where one of them is; None: as the part is.
+    """
     for model, quantity, found in _values_in(part, analysis):
+        of = inputs_of(quantity) if inputs_of else ()
+        synthetic = any(source.synthetic for source in of) if inputs_of else bool(part["synthetic"])
         low, high = found.get("interval_68") or (None, None)
         value, u, unit = (found.get(key) for key in ("value", "u", "unit"))
         yield name, synthetic, model, quantity, value, u, unit, low, high, found.get("scatter"), found.get("runs")

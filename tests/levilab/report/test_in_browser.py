@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import shutil
 from typing import TYPE_CHECKING
@@ -70,7 +71,7 @@ def test_a_reading_answers_to_the_pointer_with_value_uncertainty_and_residual(de
     desk.mouse.move(box["x"] + box["width"] / 2 + 4, box["y"] + box["height"] / 2)
     tip = desk.get_by_role("tooltip")
     assert tip.is_visible()
-    assert tip.inner_text().split("\n") == ["t = 20 s", "ν = 37.090(30) Hz", "ν − disc law = -0.014 Hz"]
+    assert tip.inner_text().split("\n") == ["t = 20 s", "ν = 37.090(30) Hz", "ν − disc law = −0.014 Hz"]
     desk.mouse.move(2, 2)
     assert not tip.is_visible()
 
@@ -112,6 +113,26 @@ def test_what_is_folded_is_opened_for_the_printer_and_folded_again(desk: Page) -
     assert folded.count() == count
 
 
+def test_on_paper_a_tall_figure_is_divided_between_its_rows_of_panels(desk: Page) -> None:
+    pieces = desk.locator("figure .printed svg")
+    assert not pieces.first.is_visible()
+    desk.emulate_media(media="print")
+    boxes = [box for piece in pieces.all() if (box := piece.bounding_box())]
+    card = desk.locator("figure:has(.printed) .card").bounding_box()
+    joins = pieces.first.locator("use").evaluate("piece => getComputedStyle(piece).strokeLinejoin")
+    desk.emulate_media(media="screen")
+    assert len(boxes) >= 3
+    assert joins == "round", "as those of the drawing"
+    assert card is not None
+    assert card["height"] < 20, "the drawing itself takes no room"
+    ratios = {round(box["width"] / float(piece.get_attribute("viewBox").split()[2]), 3)  # type: ignore[union-attr]
+              for box, piece in zip(boxes, pieces.all(), strict=True)}  # fmt: skip
+    assert len(ratios) == 1, "all pieces are of one scale"
+    for above, below in itertools.pairwise(boxes):
+        assert below["y"] == pytest.approx(above["y"] + above["height"], abs=1)
+        assert above["height"] < 500
+
+
 @pytest.mark.parametrize("script", [True, False])
 def test_on_a_telephone_the_page_is_not_moved_sideways(browser: Browser, report: Path, script: bool) -> None:
     with watch(browser, viewport=PHONE, color_scheme="dark", java_script_enabled=script) as page:
@@ -124,6 +145,8 @@ def test_on_a_telephone_the_page_is_not_moved_sideways(browser: Browser, report:
         assert background == "rgb(20, 24, 28)"
         card = page.locator(".card").first.evaluate("card => getComputedStyle(card).backgroundColor")
         assert card == "rgb(255, 255, 255)"  # figures are drawn in black
+        covers = page.locator(".scroll").first.evaluate("table => getComputedStyle(table).backgroundAttachment")
+        assert covers.startswith("local, local, scroll, scroll")  # the shades of what goes on beyond an edge
 
 
 def _right_edge(page: Page) -> float:

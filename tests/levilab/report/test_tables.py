@@ -17,6 +17,7 @@ from levilab.present.tables import Row, table
 from levilab.report.tables.folder import CONTENTS, folder_of, write_tables
 from levilab.report.tables.latex import as_latex, escaped
 from levilab.report.tables.values import Values, as_csv, of_analysis
+from levilab.report.tables.widths import LINE, SMALL_SEPARATION, fit, units_in_heads, width
 from support.paths import SAMPLE_DATA
 
 if TYPE_CHECKING:
@@ -69,8 +70,8 @@ HOSTILE = "\\input{/etc/passwd} \\write18{x} $ & # % _ ^ ~ { } < > | \" ` ' [x] 
 #: What may stand in the body: a command of LaTeX itself or of booktabs.
 KNOWN = {
     "begin", "end", "centering", "caption", "label", "toprule", "midrule", "bottomrule", "textbf", "textsuperscript",
-    "raisebox", "scriptsize", "shortstack", "par", "smallskip", "footnotesize", "textbackslash", "textasciicircum",
-    "textasciitilde", "times", "nu", "frac", "ldots", "linewidth",
+    "raisebox", "scriptsize", "setlength", "tabcolsep", "par", "smallskip", "footnotesize", "textbackslash",
+    "textasciicircum", "textasciitilde", "times", "nu", "frac", "ldots", "linewidth",
 }  # fmt: skip
 
 
@@ -99,9 +100,39 @@ def test_numbers_are_typeset_as_in_the_report() -> None:
     assert escaped("φ̇ and χ²") == r"$\dot\varphi$ and $\chi$\textsuperscript{2}"
 
 
+def test_a_wide_table_is_folded_and_small_until_it_fits_a_line() -> None:
+    heads = ("source", "type", "u of it", "sensitivity", "adds to u", "share of u²")
+    rows = [
+        ("setting of the heights (not in u)", "B", "0.2 mm", "0.87 mT cm per mm", "0.17 mT cm", "2.9 %"),
+        ("combined: u", "", "", "", "1 mT cm", "< 0.1 %"),
+        ("temperature of the base (not in u)", "B", "not known", "0.28 mT cm per K", "—", ""),
+    ]
+    shown = table("", heads, rows, numbers=heads[2:])
+    fitted = fit(shown)
+    assert fitted.small
+    assert not fit(table("", heads[:2], [row[:2] for row in rows])).small
+    assert fitted.table.heads[4:] == ("adds to u\n[mT cm]", "share of u²\n[%]")
+    assert [row.cells[4] for row in fitted.table.rows] == ["0.17", "1", "—"]
+    widths = [
+        max(width(line) for cell in (*(row.cells[k] for row in fitted.table.rows), head) for line in cell.split("\n"))
+        for k, head in enumerate(fitted.table.heads)
+    ]
+    assert 0.85 * sum(widths) + 2 * SMALL_SEPARATION * len(heads) < LINE
+    text = as_latex("budget", shown)
+    assert r"\footnotesize\setlength{\tabcolsep}{3pt}" in text
+    assert text.count(r"\begin{tabular}[b]{@{}r@{}}") >= 2, "heads end in one line"
+    assert r"\begin{tabular}[t]{@{}l@{}}" in text, "folded names begin in the line of their row"
+
+
+def test_of_trials_each_cell_keeps_what_chance_leaves_to_it() -> None:
+    rows = [("strength", "125", "+0.26 ± 0.09", "71 ± 4 %"), ("origin", "125", "−0.08 ± 0.09", "74 ± 4 %")]
+    shown = table("", ("quantity", "pulls", "mean", "within"), rows, numbers=("pulls", "mean", "within"))
+    assert units_in_heads(shown) == shown
+
+
 def document(*names: str) -> Document:
     shown = table("Laws", ("law", "c₁"), [("disc", "1"), Row(("mean", "2"), "together")], numbers=["c₁"])
-    tables = tuple(Tabular(name, shown) for name in names)
+    tables = tuple(Tabular(name, shown, mark="SYNTHETIC." if name == "quality" else None) for name in names)
     inner = Section("Simulated", (Banner("SYNTHETIC.", ""), Details("more", (Tabular("lines", shown),))))
     return Document("t", "", (Section("Result", tables), inner))
 
@@ -112,6 +143,7 @@ def test_all_tables_are_listed_and_those_of_an_earlier_report_go(tmp_path: Path)
     assert {file.name for file in folder.iterdir()} == {
         CONTENTS, "laws.tex", "laws-2.tex", "quality.tex", "lines.tex", "v.csv",
     }  # fmt: skip
+    assert "SYNTHETIC." in (folder / "quality.tex").read_text(encoding="utf-8")
     (folder / "mine.csv").write_text("1\n", encoding="utf-8")
     files = write_tables(document("laws", "events"), [], folder)
     assert {file.name for file in folder.iterdir()} == {CONTENTS, "laws.tex", "lines.tex", "mine.csv"}

@@ -13,10 +13,13 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting, save
 from levilab.pipelines.limit.analysis import LOWER_EDGE, RESONANCE, UPPER_EDGE, LimitOptions, analyze_limits
+from levilab.pipelines.limit.budget import budget_of_all
 from levilab.pipelines.limit.report import limit_part
 from levilab.pipelines.limit.table import limit_tables
+from levilab.pipelines.sources import mark_of
 from levilab.present.document.blocks import Listing
 from levilab.report.page import write_report
+from levilab.report.tables.values import of_analysis
 from support.spin_downs import spin_down_csv
 
 if TYPE_CHECKING:
@@ -54,6 +57,15 @@ def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Pa
     assert "LOOSE WASHERS" in warning
     assert warning.endswith("(the first of 16 such warnings)")
     assert "passed over: 4 spin runs" in analysis.remarks
+    # the lower limits are real, so nothing that is made of them alone bears the mark
+    marks = [mark_of(analysis.inputs_of_budget(budget)) for budget in budget_of_all(analysis)]
+    assert marks == ["", "SYNTHETIC.", "SYNTHETIC."]
+    assert mark_of(analysis.sources) == "SYNTHETIC IN PART (loose-washers, upper-limits)."
+    _, quantities = of_analysis(ANALYSES["limit"], analysis, tmp_path)
+    together = {row[3]: row[1] for row in quantities.rows if row[0] == "all together"}
+    assert {name: made_up for name, made_up in together.items() if str(name).endswith("_mean")} == {
+        "lower_mean": False, "upper_1_mean": True, "upper_2_mean": True,
+    }  # fmt: skip
 
 
 def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Path) -> None:
