@@ -255,7 +255,7 @@ def draw(results: dict[str, Any], path: Path) -> None:
             axes.set_ylabel("upper limit of the spin  [Hz]")
             axes.axhline(61, color="grey", linewidth=0.8)
             axes.annotate(
-                "thesis 61 Hz", (0.01, 60.5), xycoords=("axes fraction", "data"), va="top", color="grey", fontsize=8
+                "thesis 61 Hz", (0.01, 61.5), xycoords=("axes fraction", "data"), va="bottom", color="grey", fontsize=8
             )
         _draw_swings(swing, results)
         dot = {"color": "grey", "linestyle": "none"}
