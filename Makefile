@@ -3,6 +3,9 @@ PYTHON ?= python3
 BIN    := .venv/bin
 DEMO   := demo
 
+# keep bytecode whatever the environment says: the tests start hundreds of processes, which would compile it anew
+export PYTHONDONTWRITEBYTECODE :=
+
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test quick explore fuzz mutants lint all-pythons wheel peers site bench clean
 

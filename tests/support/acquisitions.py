@@ -19,13 +19,14 @@ if TYPE_CHECKING:
 
     from levilab.world.spin_world import World
 
-#: Counts before the drive is off: the spin at first, 27 while the drive takes hold, every 10 s of some 200 on the way
-#: up, and at the end of it.
-BEFORE = 48
+#: Counts before the drive is off: the spin at first, 27 while the drive takes hold, every 10 s of 50 on the way up, and
+#: at the end of it.
+BEFORE = 33
 
-
-#: A held top is counted for 20 s, which is a third of what an acquisition costs.
+#: A held top is counted for 20 s, and driven up for 200 s: two thirds of what an acquisition costs.
 LET_GO_AT_ONCE = ("spin.hold_s=0",)
+#: A top in full motion would swing about the drive after it.
+RAISED_QUICKLY = (*LET_GO_AT_ONCE, "spin.ramp_hz_per_s=0.2")
 
 
 class Silent:
@@ -68,7 +69,8 @@ class Impatient(Silent):
 
 def mock(out: Path, seed: int | None = 1, **changes: Any) -> AcquisitionRequest:
     """A spin-down on the virtual bench, as the command line asks for it, but let go at once."""
-    settings = () if "resume" in changes else LET_GO_AT_ONCE
+    of_a_new_run = LET_GO_AT_ONCE if "scene" in changes else RAISED_QUICKLY
+    settings = () if "resume" in changes else of_a_new_run
     return request_for("spin", AcquisitionOptions(mock=True, out=out, seed=seed, settings=settings, **changes))
 
 
