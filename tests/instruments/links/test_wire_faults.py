@@ -16,7 +16,7 @@ from support.wire_pairs import FRAMED, KINDS, SEVEN_BITS, STREAMS, WAYS, Pair, a
 
 EXPLORING = settings.get_current_profile_name() == "explore"
 #: Faults for each way and driver, in the suite and in `make explore`.
-FAULTS_EACH = 150 if EXPLORING else 8
+FAULTS_EACH = 150 if EXPLORING else 5
 
 #: Way, model, and what became of a fault → how often.  `pytest -s` prints it.
 tally = collections.Counter()

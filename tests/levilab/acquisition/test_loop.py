@@ -56,6 +56,16 @@ def outputs(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     return seen
 
 
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return acquire(mock(tmp_path_factory.mktemp("usual")), Silent())
+
+
+@pytest.fixture(scope="module")
+def in_full_motion(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return acquire(mock(tmp_path_factory.mktemp("motion"), 5, scene="spindown"), Silent())
+
+
 def test_a_spin_down_is_read_every_ten_seconds_until_the_top_falls(tmp_path: Path, outputs: list[bool]) -> None:
     run = acquire(mock(tmp_path), Silent())
     frame = run.readings().frame
@@ -229,11 +239,11 @@ def test_a_fallen_top_that_rattles_is_not_taken_for_a_spinning_one(
 
 @pytest.mark.parametrize(("reading", "factor"), [(1, 2.0), (5, 2.0), (5, 0.45), (5, 1.3), (12, 1.1)])
 def test_a_miscount_that_cannot_be_is_asked_again_and_not_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reading: int, factor: float
+    usual: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reading: int, factor: float
 ) -> None:
-    whole = acquire(mock(tmp_path / "whole"), Silent()).readings().frame
+    whole = usual.readings().frame
     counting(monkeypatch, lambda k, spin: spin * factor if spin and k == BEFORE + reading else spin)
-    run = acquire(mock(tmp_path / "one"), Silent())
+    run = acquire(mock(tmp_path), Silent())
     frame = run.readings().frame
     assert run.status == "finished"
     asked_again = [event for event in run.events() if event["kind"] == "asked again"]
@@ -247,11 +257,11 @@ def test_a_miscount_that_cannot_be_is_asked_again_and_not_kept(
 
 
 def test_a_miscount_that_could_be_stands_for_the_analysis_to_find(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    usual: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = acquire(mock(tmp_path / "whole"), Silent()).readings().frame
+    whole = usual.readings().frame
     counting(monkeypatch, lambda k, spin: spin * 0.8 if spin and k == BEFORE + 7 else spin)
-    frame = acquire(mock(tmp_path / "one"), Silent()).readings().frame
+    frame = acquire(mock(tmp_path), Silent()).readings().frame
     off = np.abs(frame["spin_frequency_hz"].to_numpy() / whole["spin_frequency_hz"].to_numpy() - 1) > 0.1
     assert np.flatnonzero(off).tolist() == [7]
 
@@ -464,11 +474,11 @@ def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path: Path, monk
 # --- a top in full motion ---
 
 
-def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(tmp_path: Path) -> None:
+def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(in_full_motion: Run) -> None:
     from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
     from levilab.simulator import preset
 
-    run = acquire(mock(tmp_path, scene="spindown"), Silent())
+    run = in_full_motion
     assert [event["kind"] for event in run.events()][-4:] == ["locked", "drive off", "asked again", "fell"]
     spins = run.readings().frame["spin_frequency_hz"]
     assert spins.iloc[0] == pytest.approx(40, abs=0.6)  # it swings about the drive
@@ -480,8 +490,10 @@ def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(tmp_path: Path) ->
     assert disc.value == pytest.approx(2.34e-4, rel=0.009)
 
 
-def test_a_run_in_full_motion_is_repeated_by_its_seed_and_resumed_in_its_scene(tmp_path: Path) -> None:
-    whole = acquire(mock(tmp_path, 5, scene="spindown"), Silent()).readings().frame
+def test_a_run_in_full_motion_is_repeated_by_its_seed_and_resumed_in_its_scene(
+    in_full_motion: Run, tmp_path: Path
+) -> None:
+    whole = in_full_motion.readings().frame
     half = acquire(mock(tmp_path, 5, scene="spindown"), Impatient(6))
     assert half.status == "interrupted"
     run = acquire(mock(tmp_path, None, resume=half.folder), Silent())
