@@ -1,5 +1,6 @@
 """The live view.  Heavy imports happen inside the command."""
 
+import contextlib
 from pathlib import Path
 from typing import Annotated
 
@@ -38,8 +39,7 @@ def live(
 
             webbrowser.open(address)
 
-    try:
+    with contextlib.suppress(KeyboardInterrupt):  # before it serves, or a second one at its end
         serve_live(LiveOptions(run, out, mock, port), announce, message)
-    except KeyboardInterrupt:
-        message("levilab: the view is closed")
-        raise typer.Exit(exit_codes.INTERRUPTED) from None
+    message("levilab: the view is closed")
+    raise typer.Exit(exit_codes.INTERRUPTED)

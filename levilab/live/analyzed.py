@@ -39,19 +39,18 @@ class Analyses:
     def __init__(self) -> None:
         self.running: set[str] = set()
         self.failed: dict[str, str] = {}
+        self._before: dict[Path, tuple[int, int] | None] = {}
         self._processes: set[subprocess.Popen[str]] = set()
         self._is_over = False
         self._lock = threading.Lock()
 
     def begin(self, folder: Path) -> None:
-        """Analyze a run and write its report, if that is not under way."""
+        """Analyze a run and write its report, if that is not under way; the earlier ones stay until new ones are there."""
         if folder.name in self.running:
             return
         self.running.add(folder.name)
         self.failed.pop(folder.name, None)
-        for name in (RESULT, REPORT):  # those of an earlier analysis are not shown for this one
-            with contextlib.suppress(OSError):
-                (folder / name).unlink(missing_ok=True)
+        self._before |= {path: _stamp(path) for path in (folder / RESULT, folder / REPORT)}
         threading.Thread(target=self._carry_out, args=(folder,), daemon=True).start()
 
     def _carry_out(self, folder: Path) -> None:
@@ -100,14 +99,31 @@ class Analyses:
                 process.terminate()
 
     def about(self, folder: Path) -> dict[str, Any]:
-        """The state of a run's analysis: its state, names of figures, the verdict, whether there is a report."""
+        """The state of a run's analysis: its state, names of figures, the verdict, whether there is a report.
+
+        Results of an earlier analysis are not shown for one that is under way or has failed.
+        """
         figures = sorted(path.name for path in folder.iterdir() if FIGURES.fullmatch(path.name))
         return {
             "running": folder.name in self.running,
             "failed": self.failed.get(folder.name, ""),
             "figures": figures,
-            "report": REPORT if (folder / REPORT).is_file() else "",
-        } | _result(folder)
+            "report": REPORT if self._is_new(folder / REPORT) else "",
+        } | (_result(folder) if self._is_new(folder / RESULT) else {})
+
+    def _is_new(self, path: Path) -> bool:
+        """Whether a file is there, and was not before the analysis that was asked for last."""
+        stamp = _stamp(path)
+        return stamp is not None and stamp != self._before.get(path)
+
+
+def _stamp(path: Path) -> tuple[int, int] | None:
+    """What changes when a file is replaced; None where there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_ino
 
 
 def _result(folder: Path) -> dict[str, Any]:

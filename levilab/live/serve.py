@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from levilab.errors import DataError, LevilabError, UsageError
+from levilab.interruption import watching_for_end
 from levilab.live.desk import Desk
 from levilab.live.doors import Doors
 from levilab.live.practice.bench import PracticeBench
@@ -52,7 +53,7 @@ class LiveOptions:
 
 
 def serve_live(options: LiveOptions, announce: Callable[[str], None], say: Callable[[str], None]) -> None:
-    """Serve until Ctrl-C or SIGTERM.
+    """Serve until Ctrl-C, SIGTERM or the end of the terminal.
 
     Args:
         options: what to show, and where.
@@ -69,6 +70,9 @@ def serve_live(options: LiveOptions, announce: Callable[[str], None], say: Calla
 
     class Saying(uvicorn.Server):
         """A server that says at the first Ctrl-C what it waits for."""
+
+        def leave(self) -> None:
+            self.should_exit = True
 
         async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
             if text := farewell(bench, hall.analyses.running):
@@ -91,8 +95,9 @@ def serve_live(options: LiveOptions, announce: Callable[[str], None], say: Calla
             timeout_graceful_shutdown=_GOODBYE_S,
         )
         server = Saying(config)
-        with _announcing(server, doors, announce, commands=options.mock):
-            server.run(sockets=[listening])
+        with _announcing(server, doors, announce, commands=options.mock), watching_for_end() as end:
+            end.wake = server.leave
+            server.run(sockets=[listening])  # which passes the signals that it takes on to `end`
 
 
 def farewell(bench: PracticeBench | None, analyzed: Collection[str] = ()) -> str:

@@ -89,14 +89,23 @@ def test_an_analysis_ends_with_the_view(tmp_path: Path) -> None:
     analyses._processes.add(under_way)
     analyses.end()
     assert under_way.wait() != 0
+    (tmp_path / "result.json").write_text(json.dumps({"runs": [{"verdict": "earlier"}]}), encoding="utf-8")
+    (tmp_path / "report.html").touch()
+    assert analyses.about(tmp_path)["verdict"] == ["earlier"]
     analyses.begin(tmp_path)
     while analyses.running:
         time.sleep(0.001)
     assert analyses.failed == {tmp_path.name: "the live view was ended"}
+    # what an earlier analysis has written stays on the disk, and is not shown for this one
+    assert {path.name for path in tmp_path.iterdir()} == {"result.json", "report.html"}
+    about = analyses.about(tmp_path)
+    assert not about["report"]
+    assert "verdict" not in about
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal to one process alone")
-def test_ctrl_c_ends_the_view_in_one_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_ends_the_view_in_one_line(tmp_path: Path, name: str) -> None:
     words = [sys.executable, "-m", "levilab", "live", "--no-open", "--port", "0"]
     process = subprocess.Popen(
         words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
@@ -104,7 +113,7 @@ def test_ctrl_c_ends_the_view_in_one_line(tmp_path: Path) -> None:
     assert process.stdout is not None
     try:
         assert process.stdout.readline().startswith("http://127.0.0.1:")
-        process.send_signal(signal.SIGINT)
+        process.send_signal(getattr(signal, name))
         _, err = process.communicate(timeout=60)
     finally:
         process.kill()
