@@ -28,6 +28,7 @@ FEW = 1 << 16  # bytes that are read line by line before pandas is imported
 BLOCK = 1 << 17  # bytes counted at once: small enough for the cache
 ONE_BYTE_ENCODINGS = ("utf-8", "utf-8-sig", "latin-1")  # those in which a line end is one byte, whatever precedes it
 _ITS_OWN_COLUMN = "write what stands behind the ± into a column of its own, with the title u"
+TRUTHS = (b"rue", b"RUE", b"alse", b"ALSE")  # of True and False, which pandas takes for 1 and 0
 SPELLINGS = sorted({form for text in MISSING for form in (text, text.upper(), text.title(), "NaN")})
 
 
@@ -110,6 +111,8 @@ def _plain_lines(path: Path, layout: Layout) -> tuple[int, bytes]:
             separators += int(np.count_nonzero(codes == separator))
             # pandas ends a field at the one, and a line at the other, wherever it stands
             if b"\0" in block or block.count(b"\r") != block.count(b"\r\n"):
+                return 0, b""
+            if any(word in block for word in TRUTHS):
                 return 0, b""
     return (lines, rest) if separators == lines * (layout.width - 1) else (0, b"")
 

@@ -456,6 +456,10 @@ def test_any_text_is_read_or_refused(tmp_path, head, body):
 
 @settings(SLOW, max_examples=400)
 @given(st.lists(st.text(alphabet='0123456789.,;eE+-_ "xna\t\r\0#', max_size=12), min_size=1, max_size=6))
+@example(["True"])
+@example(["false"])
+@example(["TRUE", "FALSE"])
+@example(["inf", "-Infinity", "1d3"])
 def test_reading_at_once_and_line_by_line_agree(tmp_path, lines):
     """Whatever pandas takes for a number, the careful way must take for the same one."""
     path = tmp_path / "both.csv"
