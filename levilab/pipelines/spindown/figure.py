@@ -197,7 +197,7 @@ def _draw_weights(axes: Axes, analysis: SpinDownAnalysis) -> None:
         weight = analysis.combined.fit(name).statistics.weight
         look = LOOKS[name]
         axes.barh(-place, weight or 0.0, height=0.3, color=look.colour, linewidth=0)
-        number = "" if weight is None else f"  {weight:.2f}" if weight >= 0.005 or weight == 0 else "  < 0.01"
+        number = "" if weight is None else f"  {weight:.2f}" if weight >= 0.005 or weight == 0 else "  <\u20090.01"
         axes.text(
             0.03, 0.22 - place, f"{name}{number}{_note(analysis, name)}", fontsize=SMALL, va="bottom", color="black"
         )
