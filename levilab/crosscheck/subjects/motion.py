@@ -34,12 +34,12 @@ LONGEST_S = 400.0
 _LEAST_HZ = 1e-6
 
 
-def trial(seed: int, folder: Path) -> list[Pull]:
-    """One spin-down: mass, tilt of the moment and drag are drawn by the seed."""
+def drawn_scene(seed: int) -> Scene:
+    """A top of this seed: mass, tilt of the moment, drag and first spin."""
     random = np.random.default_rng((seed, 3))
     tilt = float(random.uniform(0.022, 0.034))
     coefficient = USUAL * float(random.uniform(0.85, 1.15))
-    scene = preset("spindown").changed(
+    return preset("spindown").changed(
         {
             "top.mass_kg": float(random.uniform(0.02420, 0.02440)),
             "top.moment_tilt": [tilt, 0.97],
@@ -48,6 +48,12 @@ def trial(seed: int, folder: Path) -> list[Pull]:
             "start.spin_hz": float(random.uniform(29.0, 31.0)),
         }
     )
+
+
+def trial(seed: int, folder: Path) -> list[Pull]:
+    """One spin-down of a drawn top."""
+    scene = drawn_scene(seed)
+    coefficient: Any = scene.drag.coefficient
     run = acquired("spin", seed, folder, lambda request: _in_world(request, scene, seed))
     found = spindown_of(run.folder)
     parameters = found.models["disc"]["parameters"]
