@@ -72,7 +72,7 @@ def as_pattern(shown: str) -> str:
     return "".join(lines) + r"\Z"
 
 
-#: The page whose figures are drawn: those of every analysis.  What others show would be the same, and nobody looks.
+#: The page whose figures are drawn: those of every analysis.  No test looks at those of the others.
 DRAWN = "README.md"
 
 

@@ -68,11 +68,11 @@ def test_the_last_fit_of_a_run_waits_for_nothing(tmp_path: Path) -> None:
     assert not looking(watch).fit_task()
 
 
-def test_a_page_is_told_of_a_fit_when_it_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("levilab.live.server.PATIENCE_S", math.inf)  # a page that nobody told would wait for ever
+def test_a_page_that_waits_is_sent_a_fit_when_it_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("levilab.live.server.PATIENCE_S", math.inf)  # a page that is not called would wait for ever
     hall = Hall(tmp_path, "", Doors(1))
 
-    async def told() -> None:
+    async def wait_for_fit() -> None:
         reading = asyncio.create_task(hall.read_on())
         with hall.watching("") as watch:
             page = asyncio.create_task(hall.wait_for_news(watch, watch.tick))
@@ -82,4 +82,4 @@ def test_a_page_is_told_of_a_fit_when_it_is_there(tmp_path: Path, monkeypatch: p
             await asyncio.wait_for(page, HANG_GUARD_S)
         reading.cancel()
 
-    asyncio.run(told())
+    asyncio.run(wait_for_fit())
