@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 _QUANTITY = re.compile(r"`([a-z]\w*)`( = False\b| = True\b| = )?")
 
 
+@cache
 def option_names(app: Any) -> dict[str, tuple[str, str]]:
     """Quantity → the option that sets it, and the one that switches it off (empty if there is none), of all commands.
 
@@ -54,7 +56,7 @@ def with_options(text: str, app: Any) -> str:
 
     Args:
         text: a message.
-        app: see `option_names`, which makes every command.
+        app: see `option_names`, which makes every command, once.
     """
     if not _QUANTITY.search(text):
         return text

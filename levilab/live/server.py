@@ -89,9 +89,9 @@ class Hall:
     async def read_on(self) -> None:
         """Read what is new for all pages, for ever."""
         fitting: set[asyncio.Task[None]] = set()
+        before = self._ticks()
         while True:
             begin = time.monotonic()
-            before = self._ticks()
             if self.desk:
                 self.desk.step()
             for watch in [*self.watches.values()]:
@@ -100,8 +100,9 @@ class Hall:
                     job = asyncio.create_task(self._fit(watch, task))
                     fitting.add(job)
                     job.add_done_callback(fitting.discard)
-            if before != self._ticks():
+            if (now := self._ticks()) != before:  # also by what came since the last round, as a fit
                 self._announce()
+            before = now
             await asyncio.sleep(max(0.005, 1 / FRAMES_PER_S - (time.monotonic() - begin)))
 
     def _ticks(self) -> list[int]:

@@ -60,6 +60,8 @@ FLAGS = (
     "--disable-component-update", "--disable-sync",
     # three dimensions without a graphics card, the same pixels on each machine
     "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
+    # and nothing else by way of the card that is not there: texts and boxes are drawn for a third less
+    "--disable-gpu-compositing", "--disable-gpu-rasterization",
     # nothing leaves the machine, and what tries to is seen as a request that failed
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1, EXCLUDE localhost",
 )  # fmt: skip

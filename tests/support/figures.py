@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
     from numpy.typing import NDArray
 
@@ -34,6 +34,15 @@ def undrawn() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("levilab.present.style.as_png", lambda *_, **__: b"\x89PNG\r\n\x1a\n")
         patch.setattr("levilab.present.style.as_svg", lambda *_, **__: "<svg/>")
+        patch.setattr("levilab.present.style.places_to_divide", lambda _: [])
+        yield
+
+
+@contextlib.contextmanager
+def unmade() -> Iterator[None]:
+    """Figures of analyses are empty, too: for texts of a page whose figure other tests make from the same runs."""
+    with undrawn(), pytest.MonkeyPatch.context() as patch:
+        patch.setattr("levilab.pipelines.catalogue.Analysis.figure", lambda *_: Figure())
         yield
 
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
+from levilab.live.doors import Doors
 from levilab.live.running import Curve, Running
+from levilab.live.server import Hall
 from levilab.live.watch import Watch
 from levilab.telemetry.messages import State
 from support.live_pages import GrowingRun, publish, spin_down
+from support.waiting import HANG_GUARD_S
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -61,3 +66,20 @@ def test_the_last_fit_of_a_run_waits_for_nothing(tmp_path: Path) -> None:
     assert looking(watch).fit_task()
     watch.fitted(None, 0.1)
     assert not looking(watch).fit_task()
+
+
+def test_a_page_that_waits_is_sent_a_fit_when_it_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("levilab.live.server.PATIENCE_S", math.inf)  # a page that is not called would wait for ever
+    hall = Hall(tmp_path, "", Doors(1))
+
+    async def wait_for_fit() -> None:
+        reading = asyncio.create_task(hall.read_on())
+        with hall.watching("") as watch:
+            page = asyncio.create_task(hall.wait_for_news(watch, watch.tick))
+            for _ in range(5):  # both wait now
+                await asyncio.sleep(0)
+            watch.fitted(LINE, 0.1)
+            await asyncio.wait_for(page, HANG_GUARD_S)
+        reading.cancel()
+
+    asyncio.run(wait_for_fit())

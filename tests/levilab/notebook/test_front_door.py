@@ -193,6 +193,7 @@ def test_analyze_writes_nothing_and_save_does(tmp_path: Path) -> None:
     assert written["inputs"][0]["path"] == "../lower-limits/readings.csv"
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_saved_result_of_a_dataframe_has_its_readings_beside(tmp_path: Path) -> None:
     result = levilab.analyze(pd.DataFrame({"spin_frequency_hz": [21.1, 22.2, 23.3]}), "limit")
     file, *_ = result.save(tmp_path)

@@ -196,6 +196,7 @@ def test_an_analysis_that_does_not_suit_is_passed_over(
         analyze_suiting([table], {})
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_sweep_that_keeps_records_is_a_sweep_first(tmp_path: Path, sample_data: Path) -> None:
     """Its records suit the analysis of spins, too, if one of them is named; that one stands above that of sweeps."""
     run = shutil.copytree(sample_data / "precession-sweep", tmp_path / "sweep")

@@ -23,7 +23,7 @@ from levilab.report.inputs import _drive
 from levilab.report.page import render as render_found
 from levilab.report.page import write_report
 from levilab.runs.run import RunRecord
-from support.figures import undrawn
+from support.figures import unmade
 from support.pages import Page
 from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
@@ -81,7 +81,7 @@ def changed(run: Path, **entries: object) -> Path:
 
 
 def text_of(*paths: Path, options: SpinDownOptions | None = None) -> str:
-    with undrawn():
+    with unmade():
         return Page(render(analyze_spindowns(paths, options or SpinDownOptions()))).text
 
 
@@ -216,7 +216,7 @@ def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, rea
 
 
 def reported(*paths: Path, output: Path, tell: Any = None, **options: Any) -> str:
-    with undrawn():
+    with unmade():
         page = write_report(paths, output, options, tell).read_text(encoding="utf-8")
     return Page(page).text
 
@@ -270,6 +270,7 @@ def test_one_p_value_is_the_same_number_on_the_page_and_the_terminal(page: Page)
     assert "2.3×10⁻¹⁴" in page.text
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_report_of_a_data_file_knows_no_instrument_and_says_so(tmp_path: Path) -> None:
     parsed = Page(render(analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))))
     assert "my.csv" in parsed.text
