@@ -8,6 +8,7 @@ lies: a second environment, or the same version installed anew, compiles nothing
 from __future__ import annotations
 
 import contextlib
+import gc
 import hashlib
 import os
 import shutil
@@ -23,6 +24,7 @@ import numba
 import numba.core
 from numba.core import types
 from numba.core.caching import IndexDataCacheFile, UserProvidedCacheLocator
+from numba.core.event import Event, Listener, register
 from numba.extending import intrinsic, overload
 from platformdirs import user_cache_path
 
@@ -33,7 +35,32 @@ F = TypeVar("F", bound="Callable[..., Any]")
 
 # numpy: 1/0 is inf and no exception, whose test would keep loops from becoming SIMD;
 # contract: a·b + c in one rounding.  Nothing that reorders sums.
-PART_OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}, "forceinline": True}
+OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True}
+# Python calls kernels, not their parts: the code for that would take a third of a part's compilation.
+PART_OPTIONS: Any = OPTIONS | {"forceinline": True, "no_cpython_wrapper": True}
+
+
+class _PauseOfGarbageCollection(Listener):
+    """Switches the collector off while numba compiles: it finds nothing to free, and takes a tenth of the time."""
+
+    def __init__(self) -> None:
+        self._depth, self._was_on = 0, False
+
+    def on_start(self, _event: Event) -> None:
+        """Parts are compiled within a kernel's compilation, and all within numba's lock."""
+        if self._depth == 0:
+            self._was_on = gc.isenabled()
+            gc.disable()
+        self._depth += 1
+
+    def on_end(self, _event: Event) -> None:
+        """The outermost one switches it on again."""
+        self._depth -= 1
+        if self._depth == 0 and self._was_on:
+            gc.enable()
+
+
+register("numba:compile", _PauseOfGarbageCollection())  # type: ignore[no-untyped-call]
 
 
 def cache_key(sources: Path) -> str:
@@ -100,7 +127,7 @@ def _sweep(kernels: Path) -> None:
 
 
 def part(function: F) -> F:
-    """A small function that kernels are made of; it is compiled into them."""
+    """A small function that kernels are made of; it is compiled into them, and Python cannot call it."""
     compiled: F = numba.njit(function, **PART_OPTIONS)
     return compiled
 
@@ -119,14 +146,7 @@ def kernel(function: F) -> F:
     if folder and not before:  # read by numba here, when the function is decorated
         config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = str(folder), f"{__name__}.{InOneFolder.__name__}"
     try:
-        compiled: F = numba.njit(
-            function,
-            error_model="numpy",
-            fastmath={"contract"},
-            cache=bool(before or folder),
-            nogil=True,
-            boundscheck=False,
-        )
+        compiled: F = numba.njit(function, **OPTIONS, cache=bool(before or folder), nogil=True, boundscheck=False)
     finally:
         config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before, locators
     kept: Any = getattr(compiled, "_cache", None)  # none where NUMBA_DISABLE_JIT is set

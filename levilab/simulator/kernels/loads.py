@@ -108,17 +108,19 @@ with_force = by_type(
 
 
 @part
-def dipole_load(model: Any, r: Vector, moment: Vector, at: Any, v: Vector, push: float) -> tuple[Vector, Vector]:
+def dipole_load(
+    field: Any, drive: Any, r: Vector, moment: Vector, at: Any, v: Vector, push: float
+) -> tuple[Vector, Vector]:
     """The vector v with push times the force [N] on a dipole added, and the torque [N m], of base and drive."""
     x, y, z = r
-    five = field_functions(model.field, z, x * x + y * y)
-    b = with_drive(model.drive, (five[0] * x, five[0] * y, five[2]), at)
+    five = field_functions(field, z, x * x + y * y)
+    b = with_drive(drive, (five[0] * x, five[0] * y, five[2]), at)
     pushed = (push * moment[0], push * moment[1], push * moment[2])
-    return with_force(model.field, v, five, x, y, pushed), cross(moment, b)
+    return with_force(field, v, five, x, y, pushed), cross(moment, b)
 
 
-def _aligned_load(magnet: Any, model: Any, s: Any, at: Any, v: Any, push: Any) -> Any:
-    return dipole_load(model, s.r, s.n, at, v, push)
+def _aligned_load(magnet: Any, field: Any, drive: Any, s: Any, at: Any, v: Any, push: Any) -> Any:
+    return dipole_load(field, drive, s.r, s.n, at, v, push)
 
 
 @part
@@ -128,25 +130,25 @@ def moment_of(magnet: Any, n: Vector, arm: Vector) -> Vector:
     return (a * n[0] + t * arm[0], a * n[1] + t * arm[1], a * n[2] + t * arm[2])
 
 
-def _tilted_load(magnet: Any, model: Any, s: Any, at: Any, v: Any, push: Any) -> Any:
-    return dipole_load(model, s.r, moment_of(magnet, s.n, s.arm), at, v, push)
+def _tilted_load(magnet: Any, field: Any, drive: Any, s: Any, at: Any, v: Any, push: Any) -> Any:
+    return dipole_load(field, drive, s.r, moment_of(magnet, s.n, s.arm), at, v, push)
 
 
-def _disc_load(magnet: Any, model: Any, s: Any, at: Any, v: Any, push: Any) -> Any:
+def _disc_load(magnet: Any, field: Any, drive: Any, s: Any, at: Any, v: Any, push: Any) -> Any:
     moment = moment_of(magnet, s.n, s.arm)
     third = cross(s.n, s.arm)
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for i in range(magnet.nodes.shape[0]):
         node = magnet.nodes[i]
         offset = plus(plus((node[2] * s.n[0], node[2] * s.n[1], node[2] * s.n[2]), node[0], s.arm), node[1], third)
-        pull, twist = dipole_load(model, plus(s.r, 1.0, offset), moment, at, (0.0, 0.0, 0.0), 1.0)
+        pull, twist = dipole_load(field, drive, plus(s.r, 1.0, offset), moment, at, (0.0, 0.0, 0.0), 1.0)
         force = plus(force, node[3], pull)
         torque = plus(plus(torque, node[3], twist), node[3], cross(offset, pull))
     return plus(v, push, force), torque
 
 
-#: The vector v with push times the force [N] on a magnet added, and the torque [N m]: (magnet, model, state, moment of
-#: the drive, v, push).
+#: The vector v with push times the force [N] on a magnet added, and the torque [N m]: (magnet, field, drive, state,
+#: moment of the drive, v, push).  Not the whole model, of which there are more types than of these parts of it.
 pushed_and_torque = by_type({Aligned: _aligned_load, Tilted: _tilted_load, Disc: _disc_load})
 
 # --- the weight ---

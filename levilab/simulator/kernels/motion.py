@@ -145,7 +145,9 @@ def kick(model: Model, s: State, k: float, level: float, slope: float) -> State:
     """
     body = model.body
     v = velocity_after_gravity(body.gravity, s.v, k)  # what is known first is added first
-    v, torque = pushed_and_torque(model.magnet, model, s, (s.t, level, slope), v, k * body.inverse_mass)
+    v, torque = pushed_and_torque(
+        model.magnet, model.field, model.drive, s, (s.t, level, slope), v, k * body.inverse_mass
+    )
     momentum, loose = momentum_after(model.drag, body, s, torque, k)
     return State(s.r, v, s.n, momentum, s.arm, s.clock, loose, s.t)
 

@@ -86,12 +86,12 @@ def advance(
         first, last = a[0], a[stages]
         s = drift(model, s, first)
         for step in range(counts[i]):
-            for stage in range(stages - 1):
-                s = drift(model, kick(model, s, b[stage], level, slope), a[stage + 1])
-            s = kick(model, s, b[stages - 1], level, slope)
             # the last drift of a step and the first of the next are one
             ahead = first if step + 1 < counts[i] else 0.0
-            s = renormalize(drift(model, s, last + ahead), stops[i] + (step + 1) * h + ahead)
+            a[stages] = last + ahead
+            for stage in range(stages):
+                s = drift(model, kick(model, s, b[stage], level, slope), a[stage + 1])
+            s = renormalize(s, stops[i] + (step + 1) * h + ahead)
             if not (s.r[2] > height and s.r[0] * s.r[0] + s.r[1] * s.r[1] < radius2):
                 return i
         s = renormalize(s, stops[i + 1])

@@ -1,6 +1,7 @@
 """The room of the compiled code: what is in it, and that it is compiled anew for changes in it alone."""
 
 import ast
+import gc
 import os
 import shutil
 import sys
@@ -59,7 +60,7 @@ def test_a_copy_of_the_sources_compiles_nothing_anew(monkeypatch, tmp_path):
         source = tmp_path / name / "motion.py"
         source.write_text("def advance(x):\n    return x + 1\n", encoding="utf-8")
         os.utime(source, (1e9 + k, 1e9 + k))
-        scope = {}
+        scope = {"__name__": compiled.__name__}  # numba imports the module of code from the disk
         exec(compile(source.read_text(encoding="utf-8"), source, "exec"), scope)
         kernel = compiled.kernel(scope["advance"])
         assert kernel(1) == 2
@@ -90,6 +91,36 @@ def test_a_folder_that_another_process_makes_at_the_same_time_is_used(monkeypatc
     monkeypatch.setattr(compiled, "user_cache_path", lambda *_, **__: tmp_path)
     monkeypatch.setattr(compiled, "_sweep", lambda kernels: (kernels / compiled.cache_key(KERNELS)).mkdir(parents=True))
     assert compiled._folder.__wrapped__() is not None
+
+
+@pytest.mark.parametrize("on", [True, False])
+def test_the_collector_pauses_while_numba_compiles_and_is_then_as_before(on):
+    seen = []
+
+    class Watch(numba.core.event.Listener):
+        def on_start(self, event):
+            seen.append(gc.isenabled())
+
+        on_end = on_start
+
+    @compiled.part
+    def inner(x):
+        return x + 1
+
+    @numba.njit
+    def outer(x):
+        return inner(x)
+
+    was_on = gc.isenabled()
+    (gc.enable if on else gc.disable)()
+    try:
+        with numba.core.event.install_listener("numba:compile", Watch()):
+            assert outer(1) == 2
+        assert gc.isenabled() == on
+    finally:
+        (gc.enable if was_on else gc.disable)()
+    # outer, inner in it, and the end of inner: the end of outer reaches those that listen in no order that is promised
+    assert seen[:3] == [False, False, False]
 
 
 @pytest.mark.parametrize("source", sorted(KERNELS.glob("*.py")), ids=lambda path: path.name)

@@ -2,7 +2,6 @@
 
 import math
 
-import numba
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -10,19 +9,24 @@ from scipy.spatial.transform import Rotation
 from levilab.simulator.accuracy import LONGEST_TURN
 from levilab.simulator.kernels import braking, vectors
 from levilab.simulator.spin import DECAYS
+from support.parts import callable_part
+
+rotation, rotate, sine_of_turns = map(callable_part, (vectors.rotation, vectors.rotate, vectors.sine_of_turns))
+decay, mean_decay = callable_part(braking.decay), callable_part(braking.mean_decay)
+slowed, rate = callable_part(braking.spin_after), callable_part(braking.spin_rate)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-3, 0.1, 0.3, 0.5])
 def test_a_turn_is_that_of_rodrigues_to_rounding(angle):
     axis, a = np.array([0.6, -0.64, 0.48]), np.array([0.1, 0.2, -0.97])
-    sinc, cosc = vectors.rotation(angle**2)
-    turned = vectors.rotate(tuple(a), tuple(axis), angle * sinc, angle**2 * cosc)
+    sinc, cosc = rotation(angle**2)
+    turned = rotate(tuple(a), tuple(axis), angle * sinc, angle**2 * cosc)
     assert turned == pytest.approx(Rotation.from_rotvec(axis * angle).apply(a), abs=4e-16)
 
 
 def test_the_longest_turn_of_a_drift_is_as_exact_as_said():
     for angle, error in ((1.0, 3e-15), (LONGEST_TURN, 2e-10)):
-        sinc, cosc = vectors.rotation(angle**2)
+        sinc, cosc = rotation(angle**2)
         assert sinc == pytest.approx(math.sin(angle) / angle, abs=error)
         assert cosc == pytest.approx((1 - math.cos(angle)) / angle**2, abs=error)
 
@@ -31,13 +35,13 @@ def test_the_sine_of_turns_agrees_with_the_library_at_any_phase():
     # 1e4 turns: five minutes of a 30 Hz drive; the rest is the rounding of the argument itself
     for turns in np.concatenate([np.linspace(-1.3, 1.3, 1001), [0.25, 0.5, 0.75, 1e4 + 0.2]]):
         exact = math.sin(2 * math.pi * math.remainder(turns, 1.0))
-        assert vectors.sine_of_turns(turns) == pytest.approx(exact, abs=4e-16)
+        assert sine_of_turns(turns) == pytest.approx(exact, abs=4e-16)
 
 
 @pytest.mark.parametrize("x", [-0.2, -1e-5, 0.0, 1e-9, 0.05, 0.2])
 def test_decay_and_its_average_are_those_of_the_library(x):
-    assert braking.decay(x) == pytest.approx(math.exp(-x), rel=3e-16)
-    assert braking.mean_decay(x) == pytest.approx(-math.expm1(-x) / x if x else 1.0, rel=3e-16)
+    assert decay(x) == pytest.approx(math.exp(-x), rel=3e-16)
+    assert mean_decay(x) == pytest.approx(-math.expm1(-x) / x if x else 1.0, rel=3e-16)
 
 
 LAWS = {
@@ -46,16 +50,6 @@ LAWS = {
     "disc": braking.LaminarDisc(2e-2),
     "mixed": braking.Mixed(0.2, 1e-3),
 }
-
-
-@numba.njit
-def slowed(law, spin, d):
-    return braking.spin_after(law, spin, d)
-
-
-@numba.njit
-def rate(law, spin):
-    return braking.spin_rate(law, spin)
 
 
 @pytest.mark.parametrize("name", LAWS)
