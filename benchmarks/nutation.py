@@ -4,8 +4,8 @@
 
 Tops are drawn as `levilab crosscheck motion` draws them, and raised to 40 Hz as `levilab acquire spin` does.  When they
 have been free for 15 s, the axis n_x + i n_y is taken from the motion itself, 4 s of it, and its line near the
-frequency of nutation gives the angle α.  A counter then counts α²/2 of that frequency f too much, K = α² f/2 √((ν/ν_s)² − 1), and
-√((ν/ν_s)² − 1) = (f − p)/2√(fp), p being the frequency of precession.
+frequency of nutation gives the angle α.  A counter then counts α²/2 of that frequency f too much, which makes
+K = α² f/2 √((ν/ν_s)² − 1), and √((ν/ν_s)² − 1) = (f − p)/2√(fp), p being the frequency of precession.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ class Analyses:
         self._lock = threading.Lock()
 
     def begin(self, folder: Path) -> None:
-        """Analyze a run and write its report, if that is not under way; the earlier ones stay until new ones are there."""
+        """Analyze a run and write its report, if that is not under way; earlier ones stay until then."""
         if folder.name in self.running:
             return
         self.running.add(folder.name)
