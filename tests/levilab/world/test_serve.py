@@ -82,15 +82,40 @@ def test_a_served_top_begins_to_spin_down_with_the_first_message():
         assert world.clock.now() > 0.0
 
 
-@pytest.mark.parametrize(("spin", "low", "high"), [(30.0, 20, 31), (15.0, 9e37, 1e38)], ids=["up", "fallen"])
-def test_a_top_in_full_motion_can_be_served(spin, low, high, tmp_path):
+def answer_to(client, monkeypatch, *words):
+    """What a client has to say of the instruments' resources, in a thread, while `levilab bench serve` runs here."""
+    said = []
+
+    def use(instruments):
+        try:
+            said.append(client({served.kind: served.resources for served in instruments}))
+        finally:
+            signal.raise_signal(signal.SIGTERM)
+
+    def serve_the_client(service, _, tell):
+        return serve(service, lambda instruments: threading.Thread(target=use, args=(instruments,)).start(), tell)
+
+    monkeypatch.setattr("levilab.world.serve.serve", serve_the_client)
+    shown = CliRunner().invoke(bench_app, ["serve", *words], catch_exceptions=False)
+    assert shown.exit_code == 0, shown.output
+    return said[0]
+
+
+@pytest.mark.parametrize(("speed", "low", "high"), [(0.0, 20, 31), (-3.0, 9e37, 1e38)], ids=["up", "fallen"])
+def test_a_top_in_full_motion_can_be_served(speed, low, high, tmp_path, monkeypatch):
     scene = tmp_path / "mine.toml"
-    scene.write_text(f"[start]\nspin_hz = {spin}\n", encoding="utf-8")  # one of 15 Hz falls at once
-    with serving("--scene", str(scene), "--speed", "0.1") as (_, said):  # it spins for longer than this waits
-        names = said["instruments"]["counter"]["resources"]
-        with pyvisa.ResourceManager("@py").open_resource(names["hislip"], timeout=1000 * AT_MOST) as counter:
-            counter.write("INP1:COUP DC;:INP1:LEV:AUTO OFF;:INP1:LEV 0.6;:SENS:FREQ:GATE:TIME 0.3;:SYST:TIM 0.6")
-            assert low < float(counter.query("READ?")) < high
+    # at 3 m/s downwards it has fallen within a hundredth of a second
+    scene.write_text(f"[start]\nspin_hz = 30\nvelocity_m_s = [0, 0, {speed}]\n", encoding="utf-8")
+
+    def frequency(resources):
+        name = resources["counter"]["hislip"]
+        with pyvisa.ResourceManager("@py").open_resource(name, timeout=1000 * AT_MOST) as counter:
+            counter.write("INP1:COUP DC;:INP1:LEV:AUTO OFF;:INP1:LEV 0.6;:SENS:FREQ:GATE:TIME 0.05;:SYST:TIM 0.1")
+            return float(counter.query("READ?"))
+
+    # so slow that it spins, or lies there, for longer than this waits
+    answer = answer_to(frequency, monkeypatch, "--scene", str(scene), "--speed", "0.1")
+    assert low < answer < high
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for one process")
