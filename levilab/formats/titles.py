@@ -255,11 +255,11 @@ def nearly_a_frequency(text: str) -> str | None:
     """How a frequency follows from what a column holds, None if none does.
 
     >>> nearly_a_frequency("Drehzahl")
-    'say its unit in the title, or `columns` = f=Drehzahl [rpm]'
+    'say its unit in the title, or `columns` = "f=Drehzahl [rpm]"'
     """
     name = _plain_name(text)
     if name in NEED_UNITS:
-        return f"say its unit in the title, or `columns` = f={text.strip()} [rpm]"
+        return f'say its unit in the title, or `columns` = "f={text.strip()} [rpm]"'
     return next((how for word, how in NEARLY_FREQUENCIES.items() if name.startswith(word)), None)
 
 

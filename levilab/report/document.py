@@ -202,7 +202,7 @@ def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner | 
     below = "How it was made stands below, under its name."
     if total == 1:
         return Banner("SYNTHETIC.", f"This run did not come from a real bench. {below}")
-    below = "How each was made stands below, under its name."
+    below = "How each was made stands in its run.json and, on the page for a screen, below its name."
     if len(made_up) == total:
         return Banner("SYNTHETIC.", f"None of these {total} runs came from a real bench. {below}")
     said = f"{len(made_up)} of {total} runs did not come from a real bench ({list_in_words(made_up)})."
