@@ -50,5 +50,6 @@ def in_words(found: Reproduction) -> str:
     """The counts in a sentence."""
     agree, differ, added, unexpected = (found.counts[verdict] for verdict in Verdict)
     said = f"{agree} values and statements agree, {differ} differ for a reason that was computed, too"
-    more = f", and {added} facts stand beside them that the sources do not have" if added else ""
+    facts = "1 fact stands" if added == 1 else f"{added} facts stand"
+    more = f", and {facts} beside them that the sources do not have" if added else ""
     return said + (f", {unexpected} are UNEXPECTED" if unexpected else ", none is unexpected") + more + "."
