@@ -73,12 +73,18 @@ def of_all_blocks(text: str, **changes: Any) -> Document:
     return Document(**(vars(whole) | changes))
 
 
-def pages_of(document: Document) -> int:
+def said_of(document: Document, label: str) -> Any:
+    """What the typeset document says of itself for tests."""
     import typst
 
     files: Any = files_of(document)
-    found = typst.query(files, "<pages>", field="value", one=True, font_paths=fonts(), ignore_system_fonts=True)
-    return int(json.loads(found))
+    return json.loads(
+        typst.query(files, f"<{label}>", field="value", one=True, font_paths=fonts(), ignore_system_fonts=True)
+    )
+
+
+def pages_of(document: Document) -> int:
+    return int(said_of(document, "pages"))
 
 
 def data_of(document: Document) -> Any:
@@ -129,6 +135,18 @@ def test_a_long_table_repeats_its_head_and_a_page_knows_how_many_there_are() -> 
     long = Tabular("long", table("Many", ("run", "n"), rows, numbers=["n"]))
     assert pages_of(Document("t", "", (Section("Many", (long,)),))) >= 5
     assert pages_of(Document("t", "", (Paragraph("short"),))) == 1
+
+
+def test_a_heading_and_what_introduces_its_table_stand_on_the_page_of_the_table() -> None:
+    rows = [(f"run {k}", f"{k}") for k in range(10)]
+    below = Section("Below", (Paragraph("It says what follows."), Tabular("t", table("Ten", ("run", "n"), rows))))
+    seen = set()
+    for lines in range(26, 42, 2):  # the heading comes to the end of the first page, and beyond
+        above = Section("Above", (Paragraph("x"),) * lines)
+        (_, heading), (place,) = said_of(Document("t", "", (above, below)), "places")
+        assert heading == place
+        seen.add(place)
+    assert seen == {1, 2}
 
 
 def test_a_first_page_of_several_chapters_says_what_each_found() -> None:
