@@ -8,7 +8,7 @@ UNDRIVEN, DRIVEN = preset("undriven"), preset("driven")
 KINDS = {
     "aligned": UNDRIVEN,
     "exact field": UNDRIVEN.changed({"base.field": "exact"}),
-    "disc magnet": UNDRIVEN.changed({"top.magnet": "disc", "base.field": "paraxial-6"}),
+    "disc magnet": UNDRIVEN.changed({"top.magnet": "disc"}),
     "stokes": UNDRIVEN.changed({"drag.law": "stokes", "drag.coefficient": 0.3}),
     "newton": UNDRIVEN.changed({"drag.law": "newton", "drag.coefficient": 2e-3}),
     "disc": UNDRIVEN.changed({"drag.law": "disc", "drag.coefficient": 2e-2}),

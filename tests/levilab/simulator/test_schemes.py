@@ -47,6 +47,7 @@ def test_a_composition_is_symmetric_and_adds_up_to_one_step(scheme: Scheme):
     assert len(scheme.drifts) == scheme.stages + 1
     assert sum(scheme.drifts) == pytest.approx(1, abs=1e-15)
     assert sum(scheme.kicks) == pytest.approx(1, abs=1e-15)
+    assert {type(number) for number in (*scheme.drifts, *scheme.kicks)} == {float}
 
 
 def test_there_are_as_many_trees_of_an_order_as_the_literature_has():
