@@ -25,6 +25,7 @@ import numba.core
 from numba.core import types
 from numba.core.caching import IndexDataCacheFile, UserProvidedCacheLocator
 from numba.core.event import Event, Listener, register
+from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic, overload
 from platformdirs import user_cache_path
 
@@ -126,17 +127,30 @@ def _sweep(kernels: Path) -> None:
                 shutil.rmtree(old, ignore_errors=True)
 
 
+class _InsideOfKernels(CPUDispatcher):
+    """A compiled function that has no code for calls from Python: one would end the interpreter without a word."""
+
+    def __call__(self, *_arguments: Any, **_named: Any) -> Any:
+        name = self.py_func.__qualname__
+        raise TypeError(f"{name} is compiled into kernels and not for Python: call it in a function of numba.njit")
+
+
 def part(function: F) -> F:
     """A small function that kernels are made of; it is compiled into them, and Python cannot call it."""
-    compiled: F = numba.njit(function, **PART_OPTIONS)
-    return compiled
+    return _inside_of_kernels(function, PART_OPTIONS)
 
 
 def aside(function: F) -> F:
     """A part that kernels call seldom: it is compiled beside them, and not once for each place that calls it."""
-    options = PART_OPTIONS | {"forceinline": False}
-    compiled: F = numba.njit(function, **options)
-    return compiled
+    return _inside_of_kernels(function, PART_OPTIONS | {"forceinline": False})
+
+
+def _inside_of_kernels(function: F, options: Any) -> F:
+    compiled: Any = numba.njit(function, **options)
+    if isinstance(compiled, CPUDispatcher):  # the function itself where NUMBA_DISABLE_JIT is set
+        compiled.__class__ = _InsideOfKernels
+    made: F = compiled
+    return made
 
 
 def kernel(function: F) -> F:

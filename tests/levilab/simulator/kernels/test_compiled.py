@@ -11,6 +11,7 @@ import numba
 import pytest
 
 from levilab.simulator.kernels import compiled
+from support.parts import callable_part
 
 KERNELS = Path(compiled.__file__).parent
 ALLOWED = {"numba", "numpy", "platformdirs", *sys.stdlib_module_names}
@@ -41,6 +42,17 @@ def test_a_change_of_any_file_of_the_room_compiles_anew(copy, name):
     before, source = key(copy), copy / "kernels" / name
     source.write_text(source.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
     assert key(copy) != before
+
+
+@pytest.mark.parametrize("make", [compiled.part, compiled.aside])
+def test_a_part_that_python_calls_raises_and_says_how_to_call_it(make):
+    def twice(x):
+        return 2 * x
+
+    part = make(twice)
+    with pytest.raises(TypeError, match=r"twice is compiled into kernels and not for Python: call it in a function"):
+        part(1.0)
+    assert callable_part(part)(1.0) == 2.0
 
 
 def test_the_code_on_the_disk_lies_under_the_key_of_the_room(monkeypatch, tmp_path):
