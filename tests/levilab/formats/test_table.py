@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from levilab.errors import DataError, UsageError
+from levilab.formats import rows
 from levilab.formats.columns import Column, TableError, shorten
 from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout
@@ -34,6 +35,14 @@ def table_file(tmp_path):
 
     return write
 
+
+@pytest.fixture(params=[rows.FEW, 0], ids=["by line", "at once"])
+def either_way(request, monkeypatch):
+    """A short table is read line by line, a long one at once if its lines are plain: here short ones are, too."""
+    monkeypatch.setattr(rows, "FEW", request.param)
+
+
+BOTH_WAYS = pytest.mark.usefixtures("either_way")
 
 TABLES = {
     "canonical": (f"{T},{F},{U}\n0,61.5,.25\n0.5,61.25,.5\n1,61,.125\n", WITH_U),
@@ -86,6 +95,7 @@ TABLES = {
 }
 
 
+@BOTH_WAYS
 @pytest.mark.parametrize("name", TABLES)
 def test_a_table_reads_the_same_in_every_dialect(name, table_file):
     text, expected = TABLES[name]
@@ -110,6 +120,7 @@ def test_dates_count_from_the_first_that_is_written(table_file):
     assert read_table(table_file(text)).column(T).tolist() == [0, 1, 2]
 
 
+@BOTH_WAYS
 @pytest.mark.parametrize(
     "missed", ["", "-", "--", "n/a", "nan", "NaN", "inf", "-Infinity", "9.91E37", "9.9e+37", "1e999"]
 )
@@ -122,6 +133,7 @@ def test_a_missed_reading_is_left_out_and_told(missed, table_file):
     assert table.warnings[0].endswith("line 3")
 
 
+@BOTH_WAYS
 def test_many_missed_readings_make_one_warning(table_file):
     table = read_table(table_file("t;f\n" + "".join(f"{i};{'' if i % 2 else '61,5'}\n" for i in range(30))))
     assert [w.partition(": ")[2] for w in table.warnings] == [
@@ -129,12 +141,14 @@ def test_many_missed_readings_make_one_warning(table_file):
     ]
 
 
+@BOTH_WAYS
 def test_an_empty_column_of_uncertainties_costs_no_readings(table_file):
     table = read_table(table_file("t,f,u\n0,61.5,\n0.5,61.25,\n1,61,\n"))
     assert list(table.frame.columns) == [T, F]
     assert "'u' is empty" in table.warnings[0]
 
 
+@BOTH_WAYS
 @pytest.mark.parametrize("last", ["1.5", "1.5,6x", "1.5,60.5,7", "1.5,-e"])
 def test_a_torn_last_line_is_left_out_and_told(last, table_file):
     table = read_table(table_file("t,f\n0,61.5\n0.5,61.25\n1,61\n" + last))
@@ -142,6 +156,7 @@ def test_a_torn_last_line_is_left_out_and_told(last, table_file):
     assert f"line 5: '{last}' was cut off" in table.warnings[0]
 
 
+@BOTH_WAYS
 def test_a_last_line_without_end_that_is_a_full_row_counts(table_file):
     assert read_table(table_file("t,f\n0,61.5\n0.5,61.25\n1,61\n1.5,60")).column(F)[-1] == 60
 
@@ -218,6 +233,7 @@ ERRORS = {
 }
 
 
+@BOTH_WAYS
 @pytest.mark.parametrize("name", ERRORS)
 def test_an_error_is_one_line_that_names_file_and_place(name, table_file):
     content, columns, words = ERRORS[name]
@@ -262,6 +278,7 @@ def test_an_unreadable_file_is_reported(error, words, table_file, monkeypatch):
             read(path)
 
 
+@BOTH_WAYS
 @pytest.mark.parametrize(
     ("text", "columns", "says"),
     [
@@ -348,6 +365,7 @@ def test_units_are_those_of_the_quantity_and_case_counts_where_it_must():
 # --- our own run folders -----------------------------------------------------------------------------------------
 
 
+@BOTH_WAYS
 @pytest.mark.parametrize("text", ["", f"{T},{F}\n", f"{T},{F}"])
 def test_a_run_without_readings_is_an_empty_table(text, table_file):
     table = read_run_readings(table_file(text))
@@ -357,6 +375,7 @@ def test_a_run_without_readings_is_an_empty_table(text, table_file):
     assert len(table.warnings) == (text != "" and not text.endswith("\n"))
 
 
+@BOTH_WAYS
 @pytest.mark.parametrize("last", ["1.5,60.5", "1.5,60.", "1.5", "1", "\0\0\0"])
 def test_a_runs_last_line_without_end_is_torn_even_if_it_parses(last, table_file):
     table = read_run_readings(table_file(f"{T},{F}\n0,61.5\n0.5,61.25\n1,61\n{last}"))
@@ -364,6 +383,7 @@ def test_a_runs_last_line_without_end_is_torn_even_if_it_parses(last, table_file
     assert "line 5" in table.warnings[0]
 
 
+@BOTH_WAYS
 def test_a_run_being_written_grows_reading_by_reading(tmp_path):
     path, text = tmp_path / "readings.csv", f"{T},{F}\n0.1,61.5\n0.2,61.25\n"
     seen = []
@@ -374,6 +394,7 @@ def test_a_run_being_written_grows_reading_by_reading(tmp_path):
     assert seen[-1] == 2
 
 
+@BOTH_WAYS
 def test_a_damaged_line_within_a_run_is_an_error(table_file):
     with pytest.raises(TableError, match="line 3"):
         read_run_readings(table_file(f"{T},{F}\n0,61.5\n0.\n1,61\n"))
@@ -485,12 +506,16 @@ def test_a_plain_file_is_read_at_once_as_pandas_would(table_file):
     assert table.warnings == ()
 
 
+@BOTH_WAYS
 def test_one_field_too_many_does_not_hide_one_that_is_missing(table_file):
-    for rows, line in (("0,61\n1,60,5\n2\n3,59\n", 3), ("0,61\n1\n2,60,5\n3,59\n", 3)):
-        with pytest.raises(TableError, match=f"line {line}: .* 2 are expected"):
-            read_table(table_file("t,f\n" + rows))
+    for text in ("0,61\n1,60,5\n2\n3,59\n", "0,61\n1\n2,60,5\n3,59\n"):
+        with pytest.raises(TableError, match=r"line 3: .* 2 are expected"):
+            read_table(table_file("t,f\n" + text))
+    with pytest.raises(TableError, match=r"line 3: .* 3 are expected"):  # beside a column that is not used
+        read_table(table_file("t,f,x\n0,61,1\n1,60,1,5\n2,59\n3,58,1\n"))
 
 
+@BOTH_WAYS
 def test_a_comment_with_as_many_separators_as_a_row_stays_a_comment(table_file):
     table = read_table(table_file("n,t,f\n1,0,61.5\n#2,.2,7\n3,0.5,61.25\n4,1,61\n"))
     assert table.column(T).tolist() == PLAIN[T]
@@ -502,6 +527,7 @@ def test_a_line_far_down_is_named(table_file):
         read_table(table_file(f"t,f\n{rows}# pause\n30001,x\n30002,61\n"))
 
 
+@BOTH_WAYS
 def test_columns_beside_the_wanted_ones_cost_no_reading(table_file):
     rows = "".join(f"{t},{60 - t},{'' if t % 5 else 0.07},ok\n" for t in range(20))
     path = table_file("time_s,spin_frequency_hz,height_m,drive\n" + rows)
@@ -511,6 +537,7 @@ def test_columns_beside_the_wanted_ones_cost_no_reading(table_file):
     assert table.warnings == ()
 
 
+@BOTH_WAYS
 def test_uncertainties_with_gaps_are_not_used_rather_than_readings_lost(table_file):
     rows = "".join(f"{t},{60 - t},{'' if t % 2 else 0.03}\n" for t in range(20))
     table = read_table(table_file("t,f,u\n" + rows))
