@@ -282,7 +282,8 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
     for name, difference in curves.items():
         axes.plot(t, difference, linewidth=1.3, zorder=2.6, **LOOKS[name].as_line)
         where = "" if np.abs(difference).max() <= most else f", to {_signed(difference)} Hz"
-        said = _note(analysis, name).replace("needless", "needless constants") + (", 2 u shaded" if name == best and u is not None else "")
+        shaded = ", 2 u shaded" if name == best and u is not None else ""
+        said = _note(analysis, name).replace("needless", "needless constants") + shaded
         ends.append((float(difference[-1]), name, f"{name}: {said or 'not excluded'}{where}"))
     _name_laws(axes, [end for end in ends if math.isfinite(end[0])])
     of = "" if several == 1 else f"; curves of {'the longest run' if several > 1 else 'the run'}"
