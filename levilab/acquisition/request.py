@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import secrets
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from pydantic import ValidationError
 
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiment import CounterSettings
-from levilab.acquisition.keys import refusal, refuse_unknown
+from levilab.acquisition.keys import allowed, refusal, refuse_unknown
 from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
 from levilab.bench.config import BenchConfig, ConfigError, read_bench
@@ -89,7 +90,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     virtual = options.mock or bool(run and run.record.seed is not None)
     _check_options(options, run, virtual=virtual)
     config = _configuration(experiment, options, run, virtual=virtual)
-    settings_of(config, experiment).check(experiment, config.limits)
+    _check_given(config, experiment, options.settings)
     request = AcquisitionRequest(
         experiment,
         config,
@@ -147,14 +148,13 @@ def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequenc
     for setting in settings:
         key, equals, text = setting.partition("=")
         name, dot, field = key.strip().partition(".")
-        if not (equals and dot and name in EXPERIMENTS):
-            expected = f"{experiment}.KEY=VALUE is expected"
-            if equals and not dot:
-                refuse_unknown(config, experiment, name)
-                expected += f", {experiment}.{setting}?"
-            raise UsageError(
-                "settings", f"{expected}; levilab acquire {experiment} --settings lists all", value=setting
-            )
+        if equals and (not name or (name == experiment and not field)):
+            raise _ill_formed(experiment, setting, "the key is missing: ")
+        if equals and not dot:
+            refuse_unknown(config, experiment, name)
+            raise _ill_formed(experiment, setting, meant=f", {_suggestion(config, experiment, name, text)}")
+        if not equals or name not in EXPERIMENTS:
+            raise _ill_formed(experiment, setting)
         if name != experiment:
             expected = f"is a setting of levilab acquire {name}, this is levilab acquire {experiment}"
             raise UsageError("settings", expected, value=setting)
@@ -165,6 +165,33 @@ def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequenc
         return Configuration.model_validate(table)
     except ValidationError as error:
         raise refusal(error, given, config, experiment) from error
+
+
+def _ill_formed(experiment: str, setting: str, why: str = "", meant: str = "") -> UsageError:
+    what = f"{why}{experiment}.KEY=VALUE is expected{meant}; levilab acquire {experiment} --settings lists all"
+    return UsageError("settings", what, value=setting)
+
+
+def _suggestion(config: BenchConfig, experiment: str, name: str, text: str) -> str:
+    """What was meant by a key without its table; of a value that is refused, what may stand there instead."""
+    whole = f"{experiment}.{name}={text}"
+    try:
+        changed = _with_given_settings(config, experiment, [whole])
+        settings_of(changed, experiment).check(experiment, config.limits)
+    except (UsageError, ConfigError):
+        return f"{experiment}.{name} is {allowed(config, experiment, name)}"
+    return f"{whole}?"
+
+
+def _check_given(config: BenchConfig, experiment: str, settings: Sequence[str]) -> None:
+    """Raise ConfigError for what the bench does not allow, UsageError if it is about a setting that was given."""
+    try:
+        settings_of(config, experiment).check(experiment, config.limits)
+    except ConfigError as error:
+        given = (re.escape(setting.partition("=")[0].strip()) for setting in settings)
+        if any(re.search(rf"\b{key}\b", str(error)) for key in given):
+            raise UsageError("settings", str(error)) from error
+        raise
 
 
 def _as_it_was(run: Run) -> BenchConfig:
@@ -235,8 +262,8 @@ def _on_the_virtual_bench(request: AcquisitionRequest, options: AcquisitionOptio
         return _with_a_spinning_top(request, random_scene(seed), clock)
     if run is None:
         settings = settings_of(config, request.experiment).for_scene(scene)
-        settings.check(request.experiment, config.limits)
         config = with_settings(config, request.experiment, settings)
+        _check_given(config, request.experiment, options.settings)
     return replace(
         request,
         config=config,

@@ -100,7 +100,7 @@ class Option(NamedTuple):
 def _columns(text: str) -> Any:
     from levilab.formats.table import parse_columns
 
-    return parse_columns(text)
+    return parse_columns(text) or None  # none named: those of an earlier result count
 
 
 def _device(path: Path) -> Any:

@@ -12,6 +12,7 @@ from levilab.present.characters import printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
 
 def print_json(document: Any, *, indent: int | None = 2, sort_keys: bool = False) -> None:
@@ -29,6 +30,11 @@ def result(text: str) -> None:
 def message(text: str) -> None:
     """A line on standard error, as `result` writes it."""
     typer.echo(printable(text), err=True)
+
+
+def say_where(report: Path, *, in_new_folder: bool) -> None:
+    """The line at the end of a command that wrote a report; a folder that was made may come from a slip of the pen."""
+    result(f"the report is in {report}{', in a new folder' if in_new_folder else ''}")
 
 
 @contextlib.contextmanager

@@ -10,15 +10,18 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
+from itertools import takewhile
 from typing import Literal
 
 from levilab.formats.titles import known_titles
 
 COMMENTS = ("#", "%", "//")
 COMMENTS_UNLESS_SEMICOLON = (*COMMENTS, ";", "'")
-MISSING = frozenset(
-    ("", "-", "--", "---", "n/a", "na", "n.a.", "nan", "#n/a", "#nv", "#num!", "#wert!", "#value!", "null", "none")
-)
+#: What stands for a missed reading beside an empty field, in small letters.
+MISSING_WORDS = (
+    "-", "--", "---", "n/a", "na", "n.a.", "nan", "#n/a", "#nv", "#num!", "#wert!", "#value!", "null", "none"
+)  # fmt: skip
+MISSING = frozenset(("", *MISSING_WORDS))
 #: Thousands set apart by points before a decimal comma, as 2.394,0 has them; 2.394 alone could be either.
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+,\d+")
 #: What a stopwatch or a clock shows: minutes and seconds, hours before them.
@@ -147,21 +150,31 @@ def content_lines(lines: Sequence[str], dialect: Dialect, first: int = 1) -> Ite
             yield Line(number, fields, tuple(map(dialect.kind, fields)))
 
 
-def find_dialect(lines: Sequence[str]) -> Dialect | None:
+def find_dialect(lines: Sequence[str], first: Sequence[str] = ()) -> Dialect | None:
     """The dialect in which the most lines are rows of equal width; None if nothing looks like a table.
 
     Rows without text count first: "1,5 2,5" is three fields with commas, one of them text, but two numbers
     with blanks. Where there are no rows, known titles decide, so that a mere header is seen as one.
+
+    Args:
+        lines: those that are rows, if there are any.
+        first: the first ones of the file, where titles stand above all rows.
     """
     scores = {d: _score(content_lines(lines, d), SEPARATORS.index(d.separator)) for d in DIALECTS}
     best = max(DIALECTS, key=scores.__getitem__)
     if scores[best][1]:
         return best
-    titles = {
-        d: max((known_titles(x.fields) for x in content_lines(lines, d) if x.is_text), default=0) for d in DIALECTS
-    }
-    best = max(DIALECTS, key=titles.__getitem__)
-    return best if titles[best] else None
+
+    def titles(dialect: Dialect) -> int:
+        candidates = (*_above_rows(first, dialect), *content_lines(lines, dialect))
+        return max((known_titles(line.fields) for line in candidates if line.is_text), default=0)
+
+    best = max(DIALECTS, key=titles)
+    return best if titles(best) else None
+
+
+def _above_rows(lines: Sequence[str], dialect: Dialect) -> Iterator[Line]:
+    return takewhile(lambda line: not line.is_row, content_lines(lines, dialect))
 
 
 def _score(lines: Iterable[Line], rank: int) -> tuple[int, int, int, int]:

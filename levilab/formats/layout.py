@@ -70,7 +70,7 @@ def sniff(path: Path) -> Layout:
         lines.pop()
     if not any(line.strip() for line in lines):
         raise NoTable(path, f"is {'empty' if whole else 'one line without end'}; {EXPORT}")
-    dialect = find_dialect(lines[-SAMPLE:])
+    dialect = find_dialect(lines[-SAMPLE:], lines[:SAMPLE])
     if dialect is None:
         at, line = next((n, line) for n, line in enumerate(lines, 1) if line.strip())
         alone = "; number the rows in a column of their own if there is but one"

@@ -24,7 +24,7 @@ from levilab.formats.columns import (
     quoted,
     shorten,
 )
-from levilab.formats.dialect import Dialect
+from levilab.formats.dialect import MISSING_WORDS, Dialect
 from levilab.formats.layout import Layout, sniff
 from levilab.formats.rows import Rows, read_rows
 from levilab.formats.titles import (
@@ -102,7 +102,8 @@ def read_table(
         guess: whether columns without titles are taken as time, spin frequency and its uncertainty.
 
     Returns:
-        At least three rows. Rows with a missed reading (empty, nan, inf, 9.91E37) are left out, with a warning.
+        At least three rows. Rows with a missed reading (empty, -, n/a, nan, inf, 9.91E37 …) are left out, with a
+        warning that lists what counts as missed.
 
     Raises:
         TableError: there is no such table, or it cannot be understood without doubt.
@@ -287,7 +288,7 @@ def _table(
     good = np.logical_and.reduce(list(present.values())) if present else np.ones(rows.lines.size, bool)
     lines, kept = rows.lines, {column: numbers[column] for column in present}
     if not good.all():
-        notes.append(_missed(name, lines[~good], good.size))
+        notes.append(_missed(name, lines[~good], good.size, periods=any(column.inverse for column in present)))
         lines, kept = lines[good], {column: values[good] for column, values in kept.items()}
     columns = {c.name: values if c.factor == 1 else values * c.factor for c, values in kept.items()}
     for name in [c.name for c in kept if c.inverse and c.name in QUANTITIES]:
@@ -297,9 +298,11 @@ def _table(
     return Table(path, columns, tuple(notes), header, lines)
 
 
-def _missed(name: str, lines: "NDArray[np.int64]", rows: int) -> str:
+def _missed(name: str, lines: "NDArray[np.int64]", rows: int, *, periods: bool) -> str:
+    """The warning of rows that are left out, with all that counts as missed; periods: whether there is one of them."""
+    kinds = ("empty", *MISSING_WORDS, "inf", *(["a period of 0"] if periods else []))
     places = ", ".join(str(line) for line in lines[:5]) + (", …" if lines.size > 5 else "")
     return (
         f"{name}: {lines.size} of {rows} rows {'is' if lines.size == 1 else 'are'} left out as missed "
-        f"(empty, nan, inf or 9.91E37): line{'s' * (lines.size > 1)} {places}"
+        f"({', '.join(kinds)} or 9.91E37): line{'s' * (lines.size > 1)} {places}"
     )

@@ -56,9 +56,9 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
             f"each year ({known.source})"
         )
     elif about:
-        u, note = None, f"not known for {driver or 'this instrument'}: the option clock_u gives it, from its manual"
+        u, note = None, f"not known for {driver or 'this instrument'}: the option --clock-u gives it, from its manual"
     else:
-        u, note = None, "no instrument is recorded: the option clock_u gives it, from the manual"
+        u, note = None, "no instrument is recorded: the option --clock-u gives it, from the manual"
     return Component("time_base", what, "B", u, "1", sensitivity, included=False, note=note, remedy=remedy)
 
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
     from levilab.present.document.blocks import Block
     from levilab.report.inputs import Input
+    from levilab.report.reproduction import Asked
     from levilab.report.supplements import Supplement
 
     Results = Sequence[tuple[Analysis[Any], Any]]
@@ -43,7 +44,10 @@ MOST_IN_FULL = 12
 
 
 def document_of(
-    results: Results, others: Sequence[Section] = (), supplements: Sequence[Supplement] = SUPPLEMENTS
+    results: Results,
+    others: Sequence[Section] = (),
+    supplements: Sequence[Supplement] = SUPPLEMENTS,
+    asked: Asked | None = None,
 ) -> Document:
     """The report.
 
@@ -51,6 +55,7 @@ def document_of(
         results: of measurements: analyses with what they found.
         others: sections of inputs that are no measurement; at least one of the two has something in it.
         supplements: what it says of each analysis beyond its own part.
+        asked: what was asked for, where that is known.
     """
     parts = [analysis.part(found) for analysis, found in results]
     alone = len(results) == 1 and not others
@@ -62,7 +67,7 @@ def document_of(
         blocks += own if alone else [_of_one_analysis(found, part, own, first=not blocks)]
     blocks += others
     if results:
-        blocks += [_measured(results, parts), reproduction(results)]
+        blocks += [_measured(results, parts), reproduction(results, asked)]
     counts = counted(sources)
     subjects = ", ".join([*(part.subject for part in parts), *(one.title.lower() for one in others)])
     return Document(

@@ -21,6 +21,7 @@ from levilab.report.document import document_of, notebook_blocks
 from levilab.report.html.page import fragment_of, page_of
 from levilab.report.kinds import KINDS
 from levilab.report.pdf.renderer import as_pdf, check_typst
+from levilab.report.reproduction import Asked
 from levilab.report.supplements import SUPPLEMENTS, WITH_TRIALS
 from levilab.report.tables.folder import folder_of, write_tables
 from levilab.report.tables.values import of_analysis
@@ -50,15 +51,17 @@ class Format:
     """A format of reports.
 
     Attributes:
+        ending: of the file's name.
         content: of the file, from a document.
         check: raises LevilabError if what it needs is not installed, before anything is analyzed.
     """
 
+    ending: str
     content: Callable[[Document], str | bytes]
     check: Callable[[], None] = lambda: None
 
 
-_HTML, _PDF = Format(page_of), Format(as_pdf, check_typst)
+_HTML, _PDF = Format(".html", page_of), Format(".pdf", as_pdf, check_typst)
 #: The end of a file's name → its format.
 FORMATS: Mapping[str, Format] = MappingProxyType({".html": _HTML, ".htm": _HTML, ".pdf": _PDF})
 
@@ -100,7 +103,8 @@ def write_report(
     sections = [section for kind, found in others for section in kind.sections(found)]
     results = _results(left, given or {}, tell, needed=not others)
     supplements = WITH_TRIALS if crosscheck else SUPPLEMENTS
-    document = replace(document_of(results, sections, supplements), date=_newest(results, others))
+    asked = Asked(paths, form.ending, given or {}, crosscheck)
+    document = replace(document_of(results, sections, supplements, asked), date=_newest(results, others))
     content = form.content(document)
     with writing(f"{output}: could not be written", "choose another place with `output`"):
         output.parent.mkdir(parents=True, exist_ok=True)

@@ -3,30 +3,63 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 from pathlib import PurePath
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from levilab.errors import LevilabError
+from levilab.formats.table import parse_columns
 from levilab.present.document.blocks import Code, Details, Fact, Facts, Note, Paragraph, Section, Tabular
 from levilab.present.tables import table
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from levilab.pipelines.catalogue import Analysis
     from levilab.pipelines.sources import Source
     from levilab.present.document.blocks import Block
 
-#: With more inputs the commands name none, and the inputs are folded away.
+#: With more inputs the commands of analyses name none, and the inputs are folded away.
 _MOST_NAMED = 12
 #: Options of analyses that the command line gives as they are.
 SAME_IN_COMMANDS = (
-    "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "method", "orthogonal", "clock_u"
+    "columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "method", "orthogonal",
+    "clock_u", "free_radii"
 )  # fmt: skip
+#: Those of them that `levilab report` has, too.
+OF_REPORT = ("columns", "channel", "rate", "reading_u", "keep_outliers")
+#: Options of analyses that have other names on the command line.
+_AS_TYPED = MappingProxyType({"height_m": "--height", "height_u_m": "--height-u"})
 
 
-def reproduction(results: Sequence[tuple[Analysis[Any], Any]]) -> Section:
+@dataclass(frozen=True)
+class Asked:
+    """What a report was asked for, but for the name of its file, on which no byte of it depends.
+
+    Attributes:
+        paths: as they were typed; empty: those of the inputs.
+        ending: of the file's name; it stands for the format.
+        given: options by their names.
+        crosscheck: whether one was asked for where none is stored.
+    """
+
+    paths: Sequence[Path] = ()
+    ending: str = ".html"
+    given: Mapping[str, Any] = field(default_factory=dict)
+    crosscheck: bool = True
+
+    def command(self, sources: Sequence[Source[Any]]) -> str:
+        """The command that makes the report again."""
+        paths = [shlex.quote(str(path)) for path in self.paths] or named_in_commands(sources)
+        options = [word for name in OF_REPORT for word in _option(name, self.given.get(name))]
+        no_crosscheck = [] if self.crosscheck else ["--no-crosscheck"]
+        return " ".join(["levilab", "report", *paths, *options, *no_crosscheck, "-o", f"report{self.ending}"])
+
+
+def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked | None = None) -> Section:
     """The section at the end of a report of measurements."""
     sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
     many = len(sources) > _MOST_NAMED
@@ -35,8 +68,11 @@ def reproduction(results: Sequence[tuple[Analysis[Any], Any]]) -> Section:
     return Section(
         "How to reproduce this",
         (
-            Paragraph("The same data, commands and versions give the same numbers, and this report byte for byte."),
-            Code("\n".join(_commands(results, sources))),
+            Paragraph(
+                "The last command makes this report again, byte for byte, where the same data and results lie and the "
+                "versions are the same; those before it make its numbers."
+            ),
+            Code("\n".join([*_commands(results), (asked or Asked()).command(sources)])),
             *_others(results),
             *inputs,
             Facts((Fact("Versions here", (_versions(software_versions()),)),)),
@@ -45,7 +81,8 @@ def reproduction(results: Sequence[tuple[Analysis[Any], Any]]) -> Section:
     )
 
 
-def _commands(results: Sequence[tuple[Analysis[Any], Any]], sources: Sequence[Source[Any]]) -> Iterator[str]:
+def _commands(results: Sequence[tuple[Analysis[Any], Any]]) -> Iterator[str]:
+    """Those of the analyses."""
     for analysis, found in results:
         options = list(dict.fromkeys(_options(origin.options) for origin in found.origins))
         for given in options:
@@ -53,14 +90,14 @@ def _commands(results: Sequence[tuple[Analysis[Any], Any]], sources: Sequence[So
                 s for s, origin in zip(found.sources, found.origins, strict=True) if _options(origin.options) == given
             ]
             yield " ".join(["levilab", "analyze", analysis.name, *named_in_commands(of), *given])
-    yield " ".join(["levilab", "report", *named_in_commands(sources), "-o", "report.html"])
 
 
 def named_in_commands(sources: Sequence[Source[Any]]) -> list[str]:
     """As one types them; of many the folder that holds them."""
     paths = [source.path for source in sources]
     if len(paths) > _MOST_NAMED:
-        paths = list(dict.fromkeys(path.parent for path in paths))
+        folders = dict.fromkeys(path.parent for path in paths)
+        paths = [folder for folder in folders if folders.keys().isdisjoint(folder.parents)]  # each with those below it
     return [shlex.quote(str(path)) for path in paths]
 
 
@@ -69,24 +106,50 @@ def _options(options: Any) -> tuple[str, ...]:
     usual, typed = type(options)(), []
     for name in SAME_IN_COMMANDS:
         value = getattr(options, name, None)
-        if value is None or value == getattr(usual, name):
-            continue
-        flag = f"--{name.replace('_', '-')}"
-        typed += [flag] if value is True else [flag, shlex.quote(str(value))]
+        if value != getattr(usual, name, None):
+            typed += _option(name, value)
     return tuple(typed)
+
+
+def _option(name: str, value: Any) -> list[str]:
+    """An option as one types it.
+
+    >>> _option("keep_outliers", True), _option("columns", {"t": "1", "f": "a b"}), _option("rate", None)
+    (['--keep-outliers'], ['--columns', "'t=1,f=a b'"], [])
+    """
+    if value is None or value is False:
+        return []
+    text = _columns(value) if name == "columns" else str(value)
+    return [_flag(name)] if value is True else [_flag(name), shlex.quote(text)] if text else []
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def _columns(names: Mapping[str, str]) -> str:
+    """Names of columns as text; empty where titles with commas and equals signs make that ambiguous."""
+    text = ",".join(f"{name}={title}" for name, title in names.items())
+    try:
+        return text if parse_columns(text) == names else ""
+    except LevilabError:
+        return ""
 
 
 def _others(results: Sequence[tuple[Analysis[Any], Any]]) -> tuple[Note, ...]:
     """The names of options that are no plain words, such as a file of the top's sizes."""
     options = [origin.options for _, found in results for origin in found.origins]
-    names = sorted({name for one in options for name in _given(one)} - {*SAME_IN_COMMANDS, "guess"})
+    names = sorted({_AS_TYPED.get(name, _flag(name)) for one in options for name in _given(one)})
     return (Note(f"Besides, these options were given: {', '.join(names)}."),) if names else ()
 
 
-def _given(options: Any) -> list[str]:
-    """Names of the options that are not at their defaults."""
+def _given(options: Any) -> Iterator[str]:
+    """Names of the options that are not at their defaults and do not stand in the commands."""
     usual = type(options)()
-    return [field.name for field in fields(options) if getattr(options, field.name) != getattr(usual, field.name)]
+    for name in (one.name for one in fields(options) if one.name != "guess"):
+        value = getattr(options, name)
+        if value != getattr(usual, name) and not (name in SAME_IN_COMMANDS and _option(name, value)):
+            yield name
 
 
 def _data(sources: Sequence[Source[Any]]) -> Tabular:

@@ -45,7 +45,7 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
         ),
         runs_title="Beside theory",
         runs=(
-            Paragraph("What theory says of this top, and how far the mean is from it."),
+            Paragraph("What theory says of the top, and how far the mean is from it."),
             Tabular("limit-theory", theory_table(analysis), _THEORY, first_column_wraps=True),
         ),
         inputs=tuple(

@@ -62,7 +62,7 @@ def theory_table(analysis: LimitAnalysis) -> Table:
         for one in group.comparisons
     ]
     devices = list(dict.fromkeys(group.device.name for group in analysis.groups))
-    top = devices[0] if len(devices) == 1 else f"{len(devices)} tops"
+    top = devices[0] if len(devices) == 1 else f"{len(devices)} kinds of top"
     heads = ("theory", "[Hz]", "mean − theory [Hz]", "p", "agrees")
     return table(f"Beside theory, for {top}", heads, rows)
 

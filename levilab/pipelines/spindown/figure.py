@@ -81,7 +81,7 @@ def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
         if len(analysis.runs) > len(MARKERS):
             _draw_by_run(panel(figure, _LEFT + 4.98, 0.62, 1.3, 1.75), analysis)
         else:
-            _draw_weights(panel(figure, _LEFT + 5.0, 0.62, 1.0, 1.75), analysis)
+            _draw_weights(panel(figure, _LEFT + 4.6, 0.62, 1.4, 1.75), analysis)
         _draw_differences(panel(figure, _LEFT, 2.98, 4.3, 1.5), analysis, unit)
         _draw_residuals(figure, 5.34, analysis, unit)
         _draw_straight_lines(figure, 7.2, analysis)
@@ -197,10 +197,11 @@ def _draw_weights(axes: Axes, analysis: SpinDownAnalysis) -> None:
         weight = analysis.combined.fit(name).statistics.weight
         look = LOOKS[name]
         axes.barh(-place, weight or 0.0, height=0.3, color=look.colour, linewidth=0)
-        number = "" if weight is None else f"  {weight:.2f}" if weight >= 0.005 or weight == 0 else "  <\u20090.01"
+        number = "" if weight is None else f"  {weight:.2f}" if weight >= 0.005 else "  <\u20090.01"
         axes.text(
-            0.03, 0.22 - place, f"{name}{number}{_note(analysis, name)}", fontsize=SMALL, va="bottom", color="black"
-        )
+            0.03, 0.22 - place, ", ".join(filter(None, (f"{name}{number}", _note(analysis, name)))), fontsize=SMALL,
+            va="bottom", color="black",
+        )  # fmt: skip
     known = analysis.combined.fit(analysis.combined.best).statistics.weight is not None
     about = "weight of the law" if known else "too few readings to weigh"
     axes.set(xlim=(0, 1), ylim=(-len(SHOWN_LAWS) + 0.6, 0.75), yticks=[], xlabel=about)
@@ -210,14 +211,15 @@ def _draw_weights(axes: Axes, analysis: SpinDownAnalysis) -> None:
 
 
 def _note(analysis: SpinDownAnalysis, name: str) -> str:
+    """The verdict on a law in a word or two."""
     verdict, best = analysis.combined.verdict, name == analysis.combined.best
     if name in dict(verdict.excluded):
-        return ", excluded"
+        return "excluded"
     if best:
-        return ", best" if verdict.decided else ", first" if verdict.describes else ", nearest"
+        return "best" if verdict.decided else "first" if verdict.describes else "nearest"
     if not verdict.describes:
         return ""
-    return ", as good" if name in verdict.needless or name in verdict.indistinguishable else ""
+    return "needless" if name in verdict.needless else "as good" if name in verdict.indistinguishable else ""
 
 
 def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
@@ -280,7 +282,8 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
     for name, difference in curves.items():
         axes.plot(t, difference, linewidth=1.3, zorder=2.6, **LOOKS[name].as_line)
         where = "" if np.abs(difference).max() <= most else f", to {_signed(difference)} Hz"
-        said = _note(analysis, name)[2:] + (", 2 u shaded" if name == best and u is not None else "")
+        shaded = ", 2 u shaded" if name == best and u is not None else ""
+        said = _note(analysis, name).replace("needless", "needless constants") + shaded
         ends.append((float(difference[-1]), name, f"{name}: {said or 'not excluded'}{where}"))
     _name_laws(axes, [end for end in ends if math.isfinite(end[0])])
     of = "" if several == 1 else f"; curves of {'the longest run' if several > 1 else 'the run'}"
@@ -298,8 +301,8 @@ def _name_laws(axes: Axes, ends: list[tuple[float, str, str]]) -> None:
     order = sorted(ends, key=lambda end: -end[0])
     handles = [Line2D([], [], linewidth=1.3, **LOOKS[law].as_line) for _, law, _ in order]
     axes.legend(
-        handles, [said for _, _, said in order], loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=SMALL,
-        handlelength=2.6, borderaxespad=0, labelspacing=0.9,
+        handles, [said for _, _, said in order], loc="center left", bbox_to_anchor=(0.995, 0.5), fontsize=SMALL,
+        handlelength=2.6, handletextpad=0.5, borderaxespad=0, labelspacing=0.9,
     )  # fmt: skip
 
 

@@ -177,11 +177,11 @@ def _outline_depth(document: Document) -> int:
 
 
 def _in_short(blocks: Iterable[Block]) -> Iterator[Drawn]:
-    """Each chapter for the first page of a report of several: its verdict, and how many warnings it has."""
-    chapters = [block for block in blocks if isinstance(block, Section)]
-    for chapter in chapters if sum(chapter.new_page for chapter in chapters) > 1 else ():
-        inner = [*_all_in(chapter)] if chapter.new_page else []
-        verdict = next((one.text for one in inner if isinstance(one, Verdict)), "")
+    """Each chapter for the first page of a report of several with a verdict: that, and how many warnings it has."""
+    chapters = [(block, [*_all_in(block)]) for block in blocks if isinstance(block, Section)]
+    verdicts = [next((one.text for one in inner if isinstance(one, Verdict)), "") for _, inner in chapters]
+    several = sum(map(bool, verdicts)) > 1
+    for (chapter, inner), verdict in zip(chapters, verdicts, strict=True) if several else ():
         count = sum(len(group) for one in inner if isinstance(one, Warnings) for group in one.groups)
         warnings = f"{count} warning{'s' * (count > 1)}" if count else ""
         yield {"title": _text(chapter.title), "verdict": _text(verdict), "warnings": warnings}

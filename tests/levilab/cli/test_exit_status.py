@@ -31,6 +31,7 @@ WRONG_USAGE = {
     "acquire trace --mock --set trace.duration=1": "did you mean trace.duration_s",
     "acquire trace --mock --set trace.points=1.5": "--set trace.points=1.5: a whole number above 0 is expected",
     "acquire trace --mock --set trace.volts_per_division=50": "a number from 0.001 to 10 [V] is expected",
+    "acquire trace --mock --set trace.trigger_level_v=5": "beyond what the oscilloscope records, -0.35 to 1.65 V",
     "acquire trace --mock --set records=2": "trace.records=2?; levilab acquire trace --settings lists all",
     f"analyze spindown {SAMPLE} --reading-u 0": "--reading-u 0: ",
     f"analyze spindown {SAMPLE} --reading-u -0.1": "--reading-u -0.1: ",
@@ -93,7 +94,6 @@ NOT_UNDERSTOOD = (
 )
 FAILURES = {
     "acquire spin --bench other.toml": "other.toml: there is no such file",
-    "acquire trace --mock --set trace.trigger_level_v=5": "beyond what the oscilloscope records, -0.35 to 1.65 V",
     "acquire spin --mock --resume nowhere": "nowhere/run.json: cannot be read",
     f"acquire spin --mock --resume {SAMPLE}": "is finished",
     "acquire spin --mock --scene spindwon": "did you mean spindown?",

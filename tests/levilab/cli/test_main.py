@@ -128,8 +128,9 @@ def test_the_spin_of_a_record_is_printed_and_written_beside_it(
     assert "--channel chooses another" in " ".join(done.stdout.split())
     for name in ("rigol-ds1000z.csv.result.spin.json", "rigol-ds1000z.csv.spin.png"):
         assert (tmp_path / name).stat().st_size > 1000
-    levilab("report", path, "-o", "page.html", "--no-crosscheck")
-    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    said = levilab("report", path, "-o", "new/page.html", "--no-crosscheck").stdout
+    assert said.endswith("page.html, in a new folder\n")
+    page = (tmp_path / "new" / "page.html").read_text(encoding="utf-8")
     assert "as levilab analyze found it" in page
     assert "30.0009(5)" in page
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from levilab.errors import DataError, UsageError
 from levilab.formats import rows
-from levilab.formats.columns import Column, TableError, shorten
+from levilab.formats.columns import Column, NoTable, TableError, shorten
 from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout
 from levilab.formats.rows import _read_at_once, _read_lines
@@ -136,9 +136,21 @@ def test_a_missed_reading_is_left_out_and_told(missed, table_file):
 @BOTH_WAYS
 def test_many_missed_readings_make_one_warning(table_file):
     table = read_table(table_file("t;f\n" + "".join(f"{i};{'' if i % 2 else '61,5'}\n" for i in range(30))))
-    assert [w.partition(": ")[2] for w in table.warnings] == [
-        "15 of 30 rows are left out as missed (empty, nan, inf or 9.91E37): lines 3, 5, 7, 9, 11, …"
-    ]
+    (warning,) = table.warnings
+    assert warning.partition(": ")[2] == (
+        "15 of 30 rows are left out as missed (empty, -, --, ---, n/a, na, n.a., nan, #n/a, #nv, #num!, #wert!, "
+        "#value!, null, none, inf or 9.91E37): lines 3, 5, 7, 9, 11, …"
+    )
+
+
+def test_a_column_of_true_and_false_is_refused_by_its_line(table_file):
+    for rows in (5, 200, 9000):  # those that the layout is guessed from hold the titles, or do not; beyond 64 kB
+        path = table_file("time_s,spin_frequency_hz\n" + "".join(f"{k},{k % 2 == 0}\n" for k in range(rows)))
+        with pytest.raises(TableError, match="line 2: 'True' stands in column 'spin_frequency_hz', a number"):
+            read_table(path)
+    titles_below = "".join(f"{k},{k}\n" for k in range(20)) + "time_s,spin_frequency_hz\n" + 200 * "no row, but words\n"
+    with pytest.raises(NoTable, match="'0,0' begins no table of at least two columns"):
+        read_table(table_file(titles_below))
 
 
 @BOTH_WAYS

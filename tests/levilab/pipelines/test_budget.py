@@ -175,6 +175,7 @@ def test_a_scope_of_a_known_make_has_its_clock_as_a_row(found: dict[str, Any]):
 def test_a_clock_that_was_not_stated_is_not_known_rather_than_right(found: dict[str, Any]):
     budget = of(found["a sound"].budget, "frequency")
     assert row_of(budget, "time_base").u is None
+    assert "the option --clock-u gives it" in row_of(budget, "time_base").note  # as it is typed
     assert "Not known: clock of the recording" in in_a_sentence(budget)
 
 

@@ -161,3 +161,8 @@ def test_paper_is_light_and_holds_what_is_folded(browser: Browser, report: Path)
         page.emulate_media(media="print")
         assert page.locator("body").evaluate("body => getComputedStyle(body).backgroundColor") == "rgb(255, 255, 255)"
         assert not page.locator(".zoom").first.is_visible()
+        # neither a heading with its lead nor the titles of a table stand alone at the foot of a page
+        for above in ("section > h3", "section > .lead"):
+            assert page.locator(above).first.evaluate("one => getComputedStyle(one).breakAfter") == "avoid"
+        first = page.locator("tbody tr:first-child").first
+        assert first.evaluate("row => getComputedStyle(row).breakBefore") == "avoid"

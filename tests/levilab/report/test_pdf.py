@@ -151,8 +151,8 @@ def test_a_heading_and_what_introduces_its_table_stand_on_the_page_of_the_table(
 
 def test_a_first_page_of_several_chapters_says_what_each_found() -> None:
     chapters = tuple(
-        Section(name, (Warnings((("mind",),)), Section("Result", (Verdict(f"{name} holds"),))), new_page=True)
-        for name in ("one", "two")
+        Section(name, (Warnings((("mind",),)), Section("Result", (Verdict(f"{name} holds"),))), new_page=new)
+        for name, new in (("one", False), ("two", True))  # the first one of a report follows its title where it can
     )
     last = Section("How to reproduce this", (Paragraph("x"),))
     said = data_of(Document("t", "", (*chapters, last)))["chapters"]

@@ -3,23 +3,48 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import shutil
-from typing import TYPE_CHECKING
+from pathlib import Path
 
-from levilab.cli.analyze import OPTIONS
+from levilab.cli.analyze import OPTIONS, analysis_options
+from levilab.cli.report import report
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.present.document.blocks import Code, Facts, Tabular
-from levilab.report.reproduction import SAME_IN_COMMANDS, reproduction
+from levilab.present.document.blocks import Code, Facts, Note, Tabular
+from levilab.report.reproduction import OF_REPORT, SAME_IN_COMMANDS, Asked, reproduction
 from support.paths import SAMPLE_DATA
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def test_the_options_in_commands_are_those_of_the_command_line() -> None:
     assert set(SAME_IN_COMMANDS) <= OPTIONS.keys()
     assert all(OPTIONS[name].to in {"", name} for name in SAME_IN_COMMANDS)
+    assert set(OF_REPORT) == {*SAME_IN_COMMANDS} & inspect.signature(report).parameters.keys()
+
+
+def test_columns_that_are_not_named_are_not_given() -> None:
+    # or the names that an earlier result has would be replaced by none, and stand in the page as an option
+    assert analysis_options({"columns": ""}) == {"columns": None}
+    assert analysis_options({"columns": "t=1,f=2"}) == {"columns": {"t": "1", "f": "2"}}
+
+
+def test_the_command_of_a_report_has_the_paths_the_options_and_the_format_that_were_asked_for() -> None:
+    given = {"columns": {"t": "1", "f": "spin, Hz"}, "rate": None, "uncertainty": "covariance", "keep_outliers": True}
+    asked = Asked((Path("runs"), Path("a b.csv")), ".pdf", given, crosscheck=False)
+    words = "runs 'a b.csv' --columns 't=1,f=spin, Hz' --keep-outliers --no-crosscheck -o report.pdf"
+    assert asked.command([]) == f"levilab report {words}"
+
+
+def test_options_that_no_command_can_hold_are_named_as_they_are_typed() -> None:
+    field = ANALYSES["field"]
+    given = analysis_options({"device": SAMPLE_DATA / "device.toml", "height": 75.8, "free_radii": True})
+    found = field.analyze([SAMPLE_DATA / "field-scan"], field.options_from(given))
+    section = reproduction([(field, found)])
+    assert [block.text for block in section.blocks if isinstance(block, Note)] == [
+        "Besides, these options were given: --device, --height."
+    ]
+    (code,) = (block for block in section.blocks if isinstance(block, Code))
+    assert "field-scan --free-radii\n" in code.text
 
 
 def test_commands_hashes_seeds_and_what_recorded_it_are_there(tmp_path: Path) -> None:

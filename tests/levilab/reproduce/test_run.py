@@ -44,7 +44,7 @@ def test_a_report_has_its_verdicts_and_is_the_same_each_time_and_never_markup():
 def test_the_command_prints_a_table_and_writes_a_report(tmp_path):
     ended = command("reproduce", "--only", "statistics", "-o", str(tmp_path / "deep" / "ten.html"), cwd=tmp_path)
     assert ended.status == 0, ended.err
-    for text in ("published", "here", "agreement", "21.86 Hz", "none is unexpected"):
+    for text in ("published", "here", "agreement", "21.86 Hz", "none is unexpected", "ten.html, in a new folder"):
         assert text in ended.out
     page = (tmp_path / "deep" / "ten.html").read_text(encoding="utf-8")
     assert "Ten measured limits" in page
@@ -67,6 +67,7 @@ def test_a_wrong_number_ends_the_command_with_one(monkeypatch, tmp_path):
     ended = command("reproduce", "--only", "statistics", "-o", str(tmp_path / "ten.html"), cwd=tmp_path)
     assert ended.status == 1
     assert "UNEXPECTED" in ended.out
+    assert "new folder" not in ended.out
     assert (tmp_path / "ten.html").exists()
 
 

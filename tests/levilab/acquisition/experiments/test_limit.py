@@ -19,7 +19,6 @@ from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration, settings_of, with_settings
-from levilab.bench.config import ConfigError
 from levilab.errors import UsageError
 from levilab.pipelines.limit.analysis import LimitOptions, analyze_limits
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
@@ -281,6 +280,12 @@ def test_a_series_ends_when_its_time_is_over(tmp_path: Path) -> None:
         ("limit.colour=red", "there is no such setting; levilab acquire limit --settings lists all"),
         ("limit.gate_s=3", "gate_s = 3 must be shorter than interval_s = 2"),
         ("which=upper", "limit.KEY=VALUE is expected, limit.which=upper?"),
+        ("gate_s=fast", "limit.KEY=VALUE is expected, limit.gate_s is a number above 0 [s]; "),
+        ("drive_frequency_hz=500", "limit.drive_frequency_hz is a number above 0 up to 100 [Hz]; "),
+        ("=3", "the key is missing: limit.KEY=VALUE is expected"),
+        ("limit.=3", "the key is missing: limit.KEY=VALUE is expected"),
+        ("limit=3", "the key is missing: limit.KEY=VALUE is expected"),
+        ("limit.drive_amplitude_vpp=11", "limit.drive_amplitude_vpp = 11 is more than this bench allows"),
         ("limit.which", "limit.KEY=VALUE is expected"),
         ("what=upper", "there is no such setting; levilab acquire limit --settings lists all"),
         ("spin.hold_s=1", "is a setting of levilab acquire spin, this is levilab acquire limit"),
@@ -294,9 +299,9 @@ def test_settings_on_the_command_line_that_cannot_be_are_refused(tmp_path: Path,
 
 
 def test_a_drive_beyond_the_bench_is_refused_before_it_begins(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"limit\.highest_hz = 120 is more than this bench allows"):
+    with pytest.raises(UsageError, match=r"limit\.highest_hz = 120 is more than this bench allows"):
         mock(tmp_path, "limit.which=upper", "limit.highest_hz=120")
-    with pytest.raises(ConfigError, match=r"limit\.highest_hz = 25: more than limit\.drive_frequency_hz = 30"):
+    with pytest.raises(UsageError, match=r"limit\.highest_hz = 25: more than limit\.drive_frequency_hz = 30"):
         mock(tmp_path, "limit.which=upper", "limit.highest_hz=25")
 
 

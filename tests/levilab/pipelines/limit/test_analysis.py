@@ -57,6 +57,7 @@ def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Pa
     assert "LOOSE WASHERS" in warning
     assert warning.endswith("(the first of 16 such warnings)")
     assert "passed over: 4 spin runs" in analysis.remarks
+    assert limit_tables(analysis)[1].title == "Beside theory, for 3 kinds of top"  # of 26 tops
     # the lower limits are real, so nothing that is made of them alone bears the mark
     marks = [mark_of(analysis.inputs_of_budget(budget)) for budget in budget_of_all(analysis)]
     assert marks == ["", "SYNTHETIC.", "SYNTHETIC."]

@@ -192,6 +192,12 @@ def test_the_legend_shows_short_names_and_takes_them_literally(tmp_path: Path) -
     figure = spindown_figure(analysis_of(*paths))
     as_svg(figure)
     assert legend(panels(figure)[0])[1:] == ["spin-7f3a.csv", " _hidden.csv", r"\$a_{b\$.csv", "□.csv"]
+    # of several runs the weight of an excluded law is 0 to the last bit; it is written as that of one run
+    stokes, *_, mixed, _ = (text.get_text() for text in figure.axes[1].texts)
+    assert stokes == "stokes  <\u20090.01, excluded"
+    assert mixed.startswith("mixed  ")
+    assert mixed.endswith(", needless")
+    assert "mixed: needless constants" in legend(differences(figure))
 
 
 def test_many_readings_are_thinned_out_and_means_show_the_shape(tmp_path: Path) -> None:
