@@ -150,6 +150,15 @@ def writing(what: str, advice: str = "choose another place with `out`") -> Itera
         raise CannotWrite(f"{what} ({error.strerror or error}): {advice}") from error
 
 
+def stamp(path: Path) -> tuple[int, int, int] | None:
+    """What changes when a file is written or replaced: its time [ns], size and inode; None where there is none."""
+    try:
+        found = os.stat(path)  # noqa: PTH116 - some 20 times a second
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size, found.st_ino
+
+
 def replace_atomically(path: Path, content: str | bytes) -> None:
     """Write a file so that a reader sees the old one or the new one, whole, whatever happens meanwhile.
 

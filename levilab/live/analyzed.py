@@ -12,6 +12,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from analysis.uncertainty import Estimate
+from levilab.files import stamp
 from levilab.present.numbers import with_uncertainty
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ class Analyses:
     def __init__(self) -> None:
         self.running: set[str] = set()
         self.failed: dict[str, str] = {}
-        self._before: dict[Path, tuple[int, int] | None] = {}
+        self._before: dict[Path, tuple[int, int, int] | None] = {}
         self._processes: set[subprocess.Popen[str]] = set()
         self._is_over = False
         self._lock = threading.Lock()
@@ -50,7 +51,7 @@ class Analyses:
             return
         self.running.add(folder.name)
         self.failed.pop(folder.name, None)
-        self._before |= {path: _stamp(path) for path in (folder / RESULT, folder / REPORT)}
+        self._before |= {path: stamp(path) for path in (folder / RESULT, folder / REPORT, *_figures(folder))}
         threading.Thread(target=self._carry_out, args=(folder,), daemon=True).start()
 
     def _carry_out(self, folder: Path) -> None:
@@ -103,27 +104,23 @@ class Analyses:
 
         Results of an earlier analysis are not shown for one that is under way or has failed.
         """
-        figures = sorted(path.name for path in folder.iterdir() if FIGURES.fullmatch(path.name))
         return {
             "running": folder.name in self.running,
             "failed": self.failed.get(folder.name, ""),
-            "figures": figures,
+            "figures": [path.name for path in _figures(folder) if self._is_new(path)],
             "report": REPORT if self._is_new(folder / REPORT) else "",
+            "analysis": "",
         } | (_result(folder) if self._is_new(folder / RESULT) else {})
 
     def _is_new(self, path: Path) -> bool:
         """Whether a file is there, and was not before the analysis that was asked for last."""
-        stamp = _stamp(path)
-        return stamp is not None and stamp != self._before.get(path)
+        now = stamp(path)
+        return now is not None and now != self._before.get(path)
 
 
-def _stamp(path: Path) -> tuple[int, int] | None:
-    """What changes when a file is replaced; None where there is none."""
-    try:
-        found = path.stat()
-    except OSError:
-        return None
-    return found.st_mtime_ns, found.st_ino
+def _figures(folder: Path) -> list[Path]:
+    """The figures beside a run, sorted by name."""
+    return sorted(path for path in folder.glob("*") if FIGURES.fullmatch(path.name))
 
 
 def _result(folder: Path) -> dict[str, Any]:

@@ -52,20 +52,25 @@ class Desk:
         count: of what it has said.
         said: the latest of that.
         scene: of its top, None until it is ready.
-        folder: of the run that it recorded last, or records; None before.
+        folders: of the runs that it has recorded, or records, in order.
     """
 
     bench: PracticeBench
     count: int = 0
     said: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=_MOST_SAID))
     scene: dict[str, Any] | None = None
-    folder: Path | None = None
-    _records: bool = False  # whether a run is recorded; its events, which pages list, hold what the bench says
+    folders: list[Path] = field(default_factory=list)
+    _records: bool = field(default=False, init=False)  # between "recording" and "recorded"
 
     @property
     def about(self) -> dict[str, Any]:
         """What the page has to know at first."""
-        return {"experiments": [*EXPERIMENTS], "run": self.folder.name if self.folder else ""}
+        return {"experiments": [*EXPERIMENTS], "runs": [folder.name for folder in self.folders]}
+
+    @property
+    def folder(self) -> Path | None:
+        """Of the run that it recorded last, or records; None before."""
+        return self.folders[-1] if self.folders else None
 
     def address(self) -> Address | None:
         """Where it publishes; None until it is ready."""
@@ -78,7 +83,7 @@ class Desk:
             if event.kind == "ready":
                 self.scene = event.scene
             if event.kind == "recording" and event.folder:
-                self.folder = Path(event.folder)
+                self.folders.append(Path(event.folder))
             text = event.text[:_LONGEST_TEXT]
             self._records = event.kind == "recording" or (self._records and event.kind != "recorded")
             about = {"n": self.count, "kind": event.kind, "text": text, "status": event.status}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import os
 import time
 from collections import deque
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.errors import DataError
+from levilab.files import stamp
 from levilab.formats.table import NO_READING
 from levilab.live.envelope import Envelope
 from levilab.live.tail import Tail
@@ -81,14 +81,11 @@ class Followed:
     # --- run.json ---
 
     def _read_record(self) -> None:
-        try:
-            about = os.stat(self.folder / RECORD)  # noqa: PTH116 - 20 times a second
-        except OSError:
+        seen, now = stamp(self.folder / RECORD), self.clock()
+        if seen is None:
             self.status, self.problem = "missing", f"{self.folder}: there is no run.json"
             self._seen = None
             return
-        seen = (about.st_mtime_ns, about.st_size, about.st_ino)
-        now = self.clock()
         if seen == self._seen and (self.status != "running" or now < self._alive_again):
             return
         self._seen, self._alive_again = seen, now + _ALIVE_EVERY_S

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from levilab.live.desk import Desk
     from levilab.live.running import Running
+    from levilab.live.watch import FitTask
 
 #: Frames a second at most, so that 20 come to the page; and so long a page waits for one in which nothing is new [s].
 FRAMES_PER_S, PATIENCE_S = 22, 1.0
@@ -75,7 +76,8 @@ class Hall:
     def watching(self, name: str) -> Iterator[Watch]:
         """The watch of a run, shared by all pages that look at it; "" is what the bench for practice recorded last."""
         if name not in self.watches:
-            folder = self.root / name if name else self.desk.folder if self.desk else None
+            recorded = self.desk.folder if self.desk else None
+            folder = self.root / name if name else recorded
             self.watches[name] = Watch(folder, self.desk.address if self.desk else None, stays=bool(name))
         self.pages[name] = self.pages.get(name, 0) + 1
         try:
@@ -108,8 +110,8 @@ class Hall:
     def _ticks(self) -> list[int]:
         return [*(watch.tick for watch in self.watches.values()), self.desk.count if self.desk else 0]
 
-    async def _fit(self, watch: Watch, task: Callable[[], Running | None]) -> None:
-        watch.fitted(*await asyncio.to_thread(_timed, task))
+    async def _fit(self, watch: Watch, task: FitTask) -> None:
+        watch.fitted(task.folder, *await asyncio.to_thread(_timed, task.compute))
 
     def _announce(self) -> None:
         self.new.set()

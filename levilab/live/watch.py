@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +37,19 @@ _FEWEST_COLUMNS, _MOST_COLUMNS = 50, 2000
 LATEST = 200
 _INSTRUMENT = {"identity", "driver", "address"}
 _SETTINGS = {"frequency_hz", "amplitude_vpp", "waveform", "offset_v", "gate_s", "trigger_level_v"}
+
+
+@dataclass(frozen=True)
+class FitTask:
+    """A running fit that is to be computed.
+
+    Attributes:
+        folder: of the run.
+        compute: returns the fit; None for an experiment without one.
+    """
+
+    folder: Path
+    compute: Callable[[], Running | None]
 
 
 class Watch:
@@ -100,9 +113,12 @@ class Watch:
             self._turn_to(folder)
 
     def _subscribe(self) -> None:
-        """Listen to the bench: the one for practice, or the one that the run folder names."""
-        folder = self.followed.folder if self.followed else None
-        address = self._bench() if self._bench else read_address(folder) if folder else None
+        """Listen to the bench that the run folder names; where it names none, to the one for practice."""
+        address, followed = None, self.followed
+        if followed and (not self._bench or followed.status == "running"):  # a killed program leaves its address there
+            address = read_address(followed.folder)
+        if not address and self._bench:
+            address = self._bench()
         if self._subscriber and address == self._subscriber.address:
             return
         if self._subscriber and address is None:
@@ -133,13 +149,13 @@ class Watch:
         """Follow another run folder from now on."""
         if self.followed is None or folder != self.followed.folder:
             self.followed = Followed(folder, self.clock)
-            self.fit, self._fitted = None, (-1, False)
+            self.fit, self._fitted, self._fit_again = None, (-1, False), 0.0
             self.fit_version += 1
             self.tick += 1
 
     # --- the running fit, which the server computes beside the frames ---
 
-    def fit_task(self) -> Callable[[], Running | None] | None:
+    def fit_task(self) -> FitTask | None:
         """Return what to compute in a thread, if it is time; `fitted` takes the result."""
         followed = self.followed
         ended = followed is not None and followed.status != "running"
@@ -158,15 +174,18 @@ class Watch:
         def compute() -> Running | None:
             return fit_so_far(experiment, columns, groups, ended=ended)
 
-        return compute
+        return FitTask(followed.folder, compute)
 
-    def fitted(self, found: Running | None, took_s: float) -> None:
-        """Take in what was computed, and the processor time that it took [s].
+    def fitted(self, folder: Path, found: Running | None, took_s: float) -> None:
+        """Take in what was computed of a run, and the processor time that it took [s].
 
-        That of the first fit that draws a line says nothing of the next ones: it imports what it needs.
+        It is dropped if another run is followed by now.  The time of the first fit that draws a line says nothing of
+        the next ones: it imports what it needs.
         """
         took_s = took_s if self._has_fitted else 0.0
         self._has_fitted |= found is not None and found.curve is not None
+        if self.followed is None or folder != self.followed.folder:
+            return
         self._fit_again = self.clock() + min(max(_FIT_EVERY_S, took_s / _FIT_SHARE), _FIT_PAUSE_S)
         self.fit = found
         self.fit_version += 1

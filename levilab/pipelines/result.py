@@ -215,10 +215,10 @@ def save(result: Result, place: Place, picture: bytes | None, *, first: bool = T
     advice = "choose another place with `out`, or print only with `save` = False"
     with writing(f"the result could not be written into {place.folder}", advice):
         place.folder.mkdir(parents=True, exist_ok=True)
-        replace_atomically(files[0], text + "\n")
-        if picture is not None:
+        if picture is not None:  # before the result: a reader that finds that shows the figure with it
             files.append(place.figure(result.analysis))
             replace_atomically(files[1], picture)
+        replace_atomically(files[0], text + "\n")
     return files
 
 

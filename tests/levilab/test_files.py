@@ -3,12 +3,28 @@
 from __future__ import annotations
 
 import math
+import os
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.files import finite
+from levilab.files import finite, replace_atomically, stamp
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def test_what_no_number_can_say_is_null_at_any_depth() -> None:
     value = {"a": [1.0, math.nan, {"b": (math.inf, np.float64("-inf"))}], "c": "nan", "d": True, "e": 2}
     assert finite(value) == {"a": [1.0, None, {"b": [None, None]}], "c": "nan", "d": True, "e": 2}
+
+
+def test_a_file_that_was_written_or_replaced_has_another_stamp(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    found = [stamp(path)]
+    for change in (lambda: path.write_text("a"), lambda: path.write_text("bb"), lambda: replace_atomically(path, "cc")):
+        change()
+        os.utime(path, ns=(1, 1))  # as on a disk whose clock is coarse
+        found.append(stamp(path))
+    assert found[0] is None
+    assert len(set(found)) == 4

@@ -166,7 +166,7 @@ function show() {
   write("state-word", STATES[state] || state);
   const lost = bench?.lost?.length ? `the ${bench.lost.join(" and the ")} does not answer` : "";
   const running = about?.status === "running" || practice;
-  const down = Boolean(practice) && data.up === false && Boolean(bench) && !bench.silent && !bench.busy;
+  const down = Boolean(practice) && data.up === false && Boolean(bench) && !bench.silent && !bench.folder;
   const advice = !down ? "" : data.count ? "the top is down: “Analyze” the run, or “Top back”" : "the top is down: “Top back” floats it again";
   write("state-text", lost || LONGER[state] || advice || about?.problem || ended(about) || (running && !bench?.silent && bench?.text) || "");
   by("synthetic").hidden = !(about?.synthetic || (!about && bench?.virtual));
@@ -439,7 +439,7 @@ async function listRuns(chosen) {
     option.value = run.name;
     return option;
   }));
-  if (listed.practice && !listed.practice.run && listed.runs.length) {  // the runs are older than this bench
+  if (listed.practice && !listed.practice.runs.length && listed.runs.length) {  // the runs are older than this bench
     const option = make("option", "no run of this bench yet");
     option.value = "";
     select.prepend(option);
@@ -457,7 +457,7 @@ async function begin() {
   document.body.classList.add("no-top");
   if (bench) {
     document.body.classList.remove("no-top");
-    practice = openPractice(bench, (wanted) => command(wanted, token), () => seen.run, Boolean(token));
+    practice = openPractice(bench, (wanted) => command(wanted, token), () => seen.run, (run) => listed.practice.runs.includes(run), Boolean(token));
   }
   by("keys").classList.toggle("for-practice", Boolean(bench));
   for (const row of document.querySelectorAll(".practice-key")) row.hidden = !bench;

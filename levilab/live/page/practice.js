@@ -9,13 +9,14 @@ const SENDS_EVERY_MS = 120;
  * @param about what the server says of the bench: experiments, limits.
  * @param {(wanted: object) => Promise<string>} command sends one; what is wrong with it, or "".
  * @param {() => string} run name of the run that is shown.
+ * @param {(run: string) => boolean} isOwn whether this bench recorded a run.
  * @param {boolean} allowed whether this page may give commands.
  */
-export function openPractice(about, command, run, allowed) {
+export function openPractice(about, command, run, isOwn, allowed) {
   document.body.classList.add("practice");
   by("practice").hidden = false;
   for (const experiment of about.experiments) by("experiment").append(make("option", experiment));
-  const now = {drive: false, busy: false, paused: false, analyzed: "", ended: false};
+  const now = {drive: false, busy: false, paused: false, analyzed: "", ended: false, elsewhere: false, bench: null};
 
   by("controls").disabled = !allowed;
   if (!allowed) write("said", "This page may only look: open the address that the terminal shows.");
@@ -80,6 +81,7 @@ export function openPractice(about, command, run, allowed) {
 
   /** Tune by a step, as with the keys. */
   function step(hz) {
+    if (now.elsewhere) return;
     const field = by("frequency");
     const value = Math.min(Math.max(Number(field.value) + hz, Number(field.min)), Number(field.max));
     field.value = value.toFixed(2);
@@ -94,6 +96,15 @@ export function openPractice(about, command, run, allowed) {
   /** @param {boolean} down whether the top is down while nothing is recorded. */
   function show(bench, about_run, readings, down) {
     if (!bench) return;
+    const elsewhere = Boolean(bench.folder) && !bench.busy;  // another program's bench records the run that is shown
+    if (elsewhere !== now.elsewhere) {
+      now.elsewhere = elsewhere;
+      by("controls").disabled = !allowed || elsewhere;
+      if (allowed) write("said", elsewhere ? "Another program records this run: choose another one to use the practice bench." : "");
+    }
+    now.bench = elsewhere ? now.bench || bench : bench;
+    guide(now.bench, about_run, readings);
+    if (elsewhere) return;
     const {drive} = bench;
     Object.assign(now, {drive: Boolean(drive?.output), busy: bench.busy, paused: bench.paused});
     by("back").classList.toggle("main", down);
@@ -109,7 +120,6 @@ export function openPractice(about, command, run, allowed) {
     }
     if (drive && !timer && !/^amplitude/.test(document.activeElement?.id)) follow("amplitude", drive.amplitude_vpp, 1);
     if (bench.speed && bench.speed !== now.speed) choose(by("speed"), now.speed = bench.speed);  // else it may just be chosen
-    guide(bench, about_run, readings);
   }
 
   function follow(id, value, decimals) {
@@ -121,7 +131,7 @@ export function openPractice(about, command, run, allowed) {
   function guide(bench, run_now, readings) {
     const ended = run_now && run_now.status !== "running" && readings > 0;
     const done = {
-      drive: bench.took_hold, tune: bench.tuned_up, record: Boolean(ended), analyze: Boolean(ended) && now.analyzed === run(),
+      drive: bench.took_hold, tune: bench.tuned_up, record: Boolean(ended) && isOwn(run()), analyze: Boolean(ended) && now.analyzed === run(),
       report: Boolean(ended) && now.read === run(),
     };
     const items = [...by("guide").children], last = items.map((item) => Boolean(done[item.dataset.step])).lastIndexOf(true);

@@ -56,7 +56,7 @@ class PracticeBench:
         self._process: Apart | None = None
         self._pipe: Connection | None = None
         self._number = 0
-        self._runs: set[int] = set()  # numbers of the commands that may have begun a run
+        self._runs: set[int | None] = set()  # numbers of the commands whose run may be under way
         self.address: Address | None = None
         self.is_over = False
 
@@ -105,10 +105,8 @@ class PracticeBench:
             if event.kind == "ready":
                 self.address = Address(event.port, bytes.fromhex(event.token))
                 event = replace(event, port=0, token="")  # a secret of this program
-            if event.kind == "refused" and event.number is not None:
+            if event.kind in {"refused", "recorded"}:
                 self._runs.discard(event.number)
-            elif event.kind == "recorded":  # while a run is recorded, others are refused
-                self._runs.discard(min(self._runs, default=0))
             self.is_over = event.kind == "ended"
             found.append(event)
         return found

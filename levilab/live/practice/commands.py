@@ -133,7 +133,7 @@ class PracticeEvent:
         kind: "ready" once the instruments answer; "done" or "refused" for each command; "message", a line for the
             person at the bench; "recording" and "recorded", a run; "ended", the process is over.
         text: in words; data, as everything that a run contains.
-        number: of the command that it answers; None where it answers none.
+        number: of the command that it answers, or that began the run; None where there is none.
         folder: of the run.
         status: of the run that ended: finished, interrupted or failed.
         scene: of the simulated top, with "ready".

@@ -248,6 +248,7 @@ class PracticeProcess:
         self._session: Session[Any] | None = None  # of the run that is recorded
         self._folder = ""
         self._wanted: RecordRun | None = None
+        self._number: int | None = None  # of the command that wanted it
         self._stopped = ""  # why the run that is recorded is to end
         self._over = False
         self._looking = False  # whether `look` is under way: what it does may wait, too
@@ -378,6 +379,8 @@ class PracticeProcess:
         except (LevilabError, InstrumentError) as error:
             self._report(PracticeEvent("refused", unquoted(str(error)), number))
         else:
+            if command is self._wanted:
+                self._number = number
             self._report(PracticeEvent("done", text, number))
 
     def _publish(self) -> None:
@@ -656,14 +659,15 @@ class PracticeProcess:
         try:
             run = acquire(self._request(command), LinesToReport(self._report), self._watching)
         except (LevilabError, InstrumentError) as error:
-            self._report(PracticeEvent("recorded", unquoted(str(error)), status="failed", folder=self._folder))
+            text, status, folder = unquoted(str(error)), "failed", self._folder
         else:
-            text = f"{run.status}: {run.count()} readings"
-            self._report(PracticeEvent("recorded", text, status=run.status, folder=str(run.folder)))
+            text, status, folder = f"{run.status}: {run.count()} readings", run.status, str(run.folder)
+        self._report(PracticeEvent("recorded", text, self._number, status=status, folder=folder))
         self._place_probe(self._probe_m)  # a run may have moved it
         if AFTER_A_RUN < self.clock.speed < math.inf:
             self.clock.speed = AFTER_A_RUN
-            self._say(f"the run is over: speed {AFTER_A_RUN:g}\u00a0× again")
+            text = f"the run is over: speed {AFTER_A_RUN:g}\u00a0× again"
+            self._report(PracticeEvent("message", text))  # not in the page's head: the speed may be changed
 
     @contextlib.contextmanager
     def _watching(self, session: Session[Any], wiring: Wiring) -> Iterator[Callable[[], None]]:
@@ -671,7 +675,8 @@ class PracticeProcess:
         self._session, self._folder = session, str(session.writer.folder)
         if self._stopped:
             session.stop.by = self._stopped
-        self._report(PracticeEvent("recording", self._session.writer.record.experiment, folder=self._folder))
+        experiment = session.writer.record.experiment
+        self._report(PracticeEvent("recording", experiment, self._number, folder=self._folder))
         try:
             yield self.look
         except ExperimentFailed as failed:

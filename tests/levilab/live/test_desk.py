@@ -20,6 +20,7 @@ class Talking:
 
 def test_what_is_said_of_a_run_is_marked_since_it_stands_among_its_events() -> None:
     kinds = ("message", "recording", "message", "refused", "recorded", "message")
-    desk = Desk(Talking([PracticeEvent(kind, "x") for kind in kinds]))  # type: ignore[arg-type]
+    desk = Desk(Talking([PracticeEvent(kind, "x", folder="runs/one") for kind in kinds]))  # type: ignore[arg-type]
     desk.step()
+    assert desk.about["runs"] == ["one"]
     assert [one["of_run"] for one in desk.said_after(0)] == [False, False, True, False, False, False]

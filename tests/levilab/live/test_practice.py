@@ -8,11 +8,12 @@ import pytest
 
 from levilab.live.desk import EXPERIMENTS, Desk
 from levilab.live.practice.bench import PracticeBench
-from support.live_pages import GrowingRun, address, serving, spin_down, until
+from levilab.telemetry.address import Address, write_address
+from levilab.telemetry.messages import State
+from support.live_pages import GrowingRun, address, publish, serving, spin_down, until
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
     from playwright.sync_api import Page
 
@@ -23,9 +24,15 @@ OLDER = "20251122T100000Z-spin-0000"
 
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
-    out: Path = tmp_path_factory.mktemp("runs")
-    GrowingRun(out, OLDER).readings(spin_down(19))
+def older(tmp_path_factory: pytest.TempPathFactory) -> GrowingRun:
+    run = GrowingRun(tmp_path_factory.mktemp("runs"), OLDER)
+    run.readings(spin_down(19))
+    return run
+
+
+@pytest.fixture(scope="module")
+def served(older: GrowingRun) -> Iterator[Hall]:
+    out = older.folder.parent
     with PracticeBench(out) as bench, serving(out, desk=Desk(bench)) as hall:
         yield hall
 
@@ -33,9 +40,26 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
 #: A run that is up soon: a student's is at 34 Hz, a minute of the bench later.
 QUICK = ("spin.drive_frequency_hz=31", "spin.drive_waveform=SQU", "spin.ramp_hz_per_s=0.1", "spin.hold_s=2",
          "spin.interval_s=2")  # fmt: skip
+#: The steps of the guide that are ticked.
+DONE = "[...document.querySelectorAll('#guide .done')].map((one) => one.dataset.step).join()"
 
 
-def test_a_student_drives_records_and_analyzes(served: Hall, page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+def see_another_program_record(page: Page, served: Hall, older: GrowingRun) -> None:
+    """The bench of that program is shown, and the controls, which are of the one for practice, are off meanwhile."""
+    with older.running():
+        write_address(older.folder, Address.at(1))
+        until(page, "levilab.data.about.status === 'running'")
+        publish(served.watches[OLDER], State(7.0, folder=str(older.folder)))
+        until(page, "document.getElementById('controls').disabled && levilab.data.bench.time_s === 7")
+        assert page.inner_text("#said").startswith("Another program records this run")
+        assert page.evaluate(DONE) == "drive"  # as before: the guide is of the bench for practice
+    older.say(status="finished")
+    until(page, "!document.getElementById('controls').disabled && document.getElementById('said').textContent === ''")
+
+
+def test_a_student_drives_records_and_analyzes(
+    served: Hall, older: GrowingRun, page: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(EXPERIMENTS, "spin", QUICK)
     page.goto(address(served, token=True))
     until(page, "levilab.data.bench?.last.spin_frequency_hz && levilab.space?.frames")
@@ -59,6 +83,8 @@ def test_a_student_drives_records_and_analyzes(served: Hall, page: Page, monkeyp
     can_be_analyzed = "!document.getElementById('analyze').disabled"
     page.select_option("#run", OLDER)  # of another bench, and it is there like one of this
     until(page, f"levilab.data.count === 19 && levilab.data.bench && {can_be_analyzed}")
+    assert page.evaluate(DONE) == "drive"  # this bench has recorded nothing
+    see_another_program_record(page, served, older)
     page.click("#record")
     until(page, f"levilab.data.bench?.busy && levilab.seen.run !== '{OLDER}' && levilab.data.count >= 3")
     until(page, "levilab.data.fit")
@@ -73,8 +99,7 @@ def test_a_student_drives_records_and_analyzes(served: Hall, page: Page, monkeyp
     until(page, "levilab.data.bench.paused")
     page.click("#analyze")
     until(page, "document.querySelectorAll('#figures img').length && document.getElementById('verdict').innerText")
-    done = "[...document.querySelectorAll('#guide .done')].map((one) => one.dataset.step).join()"
-    until(page, f"{done} === 'drive,record,analyze'")  # the drive was not tuned up by hand
+    until(page, f"{DONE} === 'drive,record,analyze'")  # the drive was not tuned up by hand
     assert sorted(path.name for path in served.root.iterdir()) == [OLDER, name]
     assert (served.root / name / "result.json").exists()
 

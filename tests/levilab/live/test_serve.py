@@ -91,15 +91,16 @@ def test_an_analysis_ends_with_the_view(tmp_path: Path) -> None:
     assert under_way.wait() != 0
     (tmp_path / "result.json").write_text(json.dumps({"runs": [{"verdict": "earlier"}]}), encoding="utf-8")
     (tmp_path / "report.html").touch()
-    assert analyses.about(tmp_path)["verdict"] == ["earlier"]
+    (tmp_path / "spindown.png").touch()
+    assert [analyses.about(tmp_path)[key] for key in ("verdict", "figures")] == [["earlier"], ["spindown.png"]]
     analyses.begin(tmp_path)
     while analyses.running:
         time.sleep(0.001)
     assert analyses.failed == {tmp_path.name: "the live view was ended"}
     # what an earlier analysis has written stays on the disk, and is not shown for this one
-    assert {path.name for path in tmp_path.iterdir()} == {"result.json", "report.html"}
+    assert {path.name for path in tmp_path.iterdir()} == {"result.json", "report.html", "spindown.png"}
     about = analyses.about(tmp_path)
-    assert not about["report"]
+    assert [about[key] for key in ("report", "figures", "analysis")] == ["", [], ""]
     assert "verdict" not in about
 
 

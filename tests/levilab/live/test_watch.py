@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import math
+from contextlib import nullcontext
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
+from levilab.live.desk import Desk
 from levilab.live.doors import Doors
 from levilab.live.running import Curve, Running
 from levilab.live.server import Hall
 from levilab.live.watch import Watch
+from levilab.telemetry.address import Address, write_address
 from levilab.telemetry.messages import State
 from support.live_pages import GrowingRun, publish, spin_down
 from support.waiting import HANG_GUARD_S
@@ -41,11 +45,11 @@ def test_the_first_fit_does_not_count_for_the_pause_to_the_next(tmp_path: Path, 
         run.readings(spin_down(3))
         for k, found in enumerate((Running("no fit yet"), LINE)):  # the second one imports what it needs
             assert looking(watch).fit_task()
-            watch.fitted(found, 0.4)
+            watch.fitted(run.folder, found, 0.4)
             run.readings(spin_down(1, first=3 + k))
             now += 1.6
         assert looking(watch).fit_task()
-        watch.fitted(LINE, 0.4)
+        watch.fitted(run.folder, LINE, 0.4)
         run.readings(spin_down(1, first=5))
         now += 7.9
         assert not looking(watch).fit_task()
@@ -59,26 +63,53 @@ def test_the_last_fit_of_a_run_waits_for_nothing(tmp_path: Path) -> None:
     with run.running():
         run.readings(spin_down(3))
         assert looking(watch).fit_task()
-        watch.fitted(None, 0.1)
+        watch.fitted(run.folder, None, 0.1)
         run.readings(spin_down(1, first=3))
         assert not looking(watch).fit_task()
     run.say(status="finished")
     assert looking(watch).fit_task()
-    watch.fitted(None, 0.1)
+    watch.fitted(run.folder, None, 0.1)
     assert not looking(watch).fit_task()
+
+
+def test_a_fit_under_way_is_dropped_when_the_next_run_begins(tmp_path: Path) -> None:
+    one, two = (GrowingRun(tmp_path, name) for name in ("one", "two"))
+    watch = Watch(one.folder, lambda: None, lambda: 0.0)
+    one.readings(spin_down(3))
+    task = looking(watch).fit_task()
+    assert task
+    with two.running():
+        publish(watch, State(0.0, folder=str(two.folder)))
+        two.readings(spin_down(3))
+        watch.fitted(task.folder, LINE, 0.4)
+        assert watch.fit is None
+        assert looking(watch).fit_task()  # at once
+
+
+def test_a_run_that_another_program_records_is_shown_with_its_own_bench(tmp_path: Path) -> None:
+    run, practice, own = GrowingRun(tmp_path, "one"), Address.at(1), Address.at(2)
+    hall = Hall(tmp_path, "", Doors(1), Desk(SimpleNamespace(address=practice)))  # type: ignore[arg-type]
+    write_address(run.folder, own)
+    for context, expected in ((run.running(), own), (nullcontext(), practice)):  # one that was killed leaves its file
+        with context, hall.watching("one") as watch:
+            for _ in range(2):  # the first one looks at the record
+                watch.step()
+            assert watch._subscriber
+            assert watch._subscriber.address == expected
 
 
 def test_a_page_that_waits_is_sent_a_fit_when_it_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("levilab.live.server.PATIENCE_S", math.inf)  # a page that is not called would wait for ever
-    hall = Hall(tmp_path, "", Doors(1))
+    hall, folder = Hall(tmp_path, "", Doors(1)), tmp_path / "one"  # which is not there, so that nothing else is new
 
     async def wait_for_fit() -> None:
         reading = asyncio.create_task(hall.read_on())
-        with hall.watching("") as watch:
+        with hall.watching("one") as watch:
+            watch.step()
             page = asyncio.create_task(hall.wait_for_news(watch, watch.tick))
             for _ in range(5):  # both wait now
                 await asyncio.sleep(0)
-            watch.fitted(LINE, 0.1)
+            watch.fitted(folder, LINE, 0.1)
             await asyncio.wait_for(page, HANG_GUARD_S)
         reading.cancel()
 

@@ -13,6 +13,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from levilab.errors import DataError
+from levilab.files import replace_atomically
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.catalogue import save as save_found
 from levilab.pipelines.result import Place, beside, read_result, save
@@ -69,11 +70,20 @@ def test_files_that_differ_in_their_ending_alone_keep_their_results(tmp_path: Pa
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_the_result_of_a_run_folder_is_result_json_in_it(tmp_path: Path, sample_data: Path) -> None:
+def test_the_result_of_a_run_folder_is_result_json_in_it(
+    tmp_path: Path, sample_data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     import shutil
 
+    def write(path: Path, content: str | bytes) -> None:
+        written.append(path.name)
+        replace_atomically(path, content)
+
+    written: list[str] = []
+    monkeypatch.setattr("levilab.pipelines.result.replace_atomically", write)
     run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
     assert saved(run) == ["result.json", "spindown.png"]
+    assert written == ["spindown.png", "result.json"]  # who sees the new result sees no old figure
     assert (run / "result.json").is_file()
     assert analyze_spindowns([run / "readings.csv"], SpinDownOptions()).place.result() == run / "result.json"
 

@@ -85,7 +85,8 @@ def test_without_a_run_the_end_waits_a_second_and_with_one_for_its_reading(tmp_p
         ([], True),
         ([PracticeEvent("done", number=1), PracticeEvent("recording")], True),
         ([PracticeEvent("refused", number=1)], False),
-        ([PracticeEvent("done", number=1), PracticeEvent("recorded", status="failed")], False),
+        ([PracticeEvent("done", number=1), PracticeEvent("recorded", number=1, status="failed")], False),
+        ([PracticeEvent("recorded", number=0)], True),  # of another command
     ):
         bench, process = PracticeBench(tmp_path), Busy()
         near_end, far_end = Pipe()
