@@ -65,11 +65,11 @@ def fit(table: Table) -> Fitted:
     paragraphs = frozenset(k for k in range(len(table.heads)) if k not in table.numbers and _longest(table, k) > _LONG)
     if _width(table, paragraphs) + 2 * _SEPARATION * len(table.heads) <= LINE:
         return Fitted(table, small=False, paragraphs=paragraphs)
-    room = (LINE - 2 * SMALL_SEPARATION * len(table.heads)) / _SMALL
+    room = LINE - 2 * SMALL_SEPARATION * len(table.heads)
     free = set(range(len(table.heads))) - paragraphs
     limits: dict[int, float] = {}
     folded = _folded(table, limits, paragraphs)
-    while free and _width(folded, paragraphs) > room:
+    while free and _width(folded, paragraphs, _SMALL) > room:
         widest = max(sorted(free), key=lambda k: _column(folded, k))
         before = _column(folded, widest)
         tried = _folded(table, limits | {widest: _STEP * before}, paragraphs)
@@ -145,8 +145,9 @@ def _fold(cell: str, limit: float) -> str:
     return "\n".join(lines)
 
 
-def _width(table: Table, paragraphs: frozenset[int]) -> float:
-    return sum(PARAGRAPH * LINE if k in paragraphs else _column(table, k) for k in range(len(table.heads)))
+def _width(table: Table, paragraphs: frozenset[int], size: float = 1.0) -> float:
+    """Width without the space between the columns [pt]; that of a paragraph does not depend on the size of letters."""
+    return sum(PARAGRAPH * LINE if k in paragraphs else size * _column(table, k) for k in range(len(table.heads)))
 
 
 def _column(table: Table, k: int) -> float:
