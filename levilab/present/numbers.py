@@ -23,6 +23,13 @@ UNITS = {
     "(rad/s)^(1-exponent)/s": "(rad/s)^(1−n)/s",
 }
 
+#: Units that people are shown; no other text behind a number is a unit.
+KNOWN_UNITS = frozenset({
+    *filter(None, UNITS.values()), "%", "°", "dB", "rad", "mrad", "s", "ms", "µs", "min", "h",
+    "Hz", "kHz", "MHz", "mHz", "µHz", "Hz/s", "mHz/s", "m", "cm", "mm", "µm", "m/s", "m/kg", "kg", "g", "mg",
+    "T", "mT", "µT", "T m", "mT cm", "A m²", "V", "mV", "µV", "Vpp", "A", "Ω", "kΩ", "MΩ", "K", "J", "turns",
+})  # fmt: skip
+
 #: Names that a sentence lists at most.
 MOST_NAMES = 4
 
@@ -101,6 +108,18 @@ def ends(estimate: Estimate) -> tuple[str, str] | None:
 def in_words(unit: str) -> str:
     """A unit as people write it."""
     return UNITS.get(unit, unit)
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that people are shown, or such units with "per" between them or before one.
+
+    >>> [is_unit(text) for text in ("mT cm", "Hz per s", "per Hz", "%")]
+    [True, True, True, True]
+    >>> [is_unit(text) for text in ("s ago", "Hz (u not known)", "of 120", "Hz per", "")]
+    [False, False, False, False, False]
+    """
+    above, per, below = f" {text}".rpartition(" per ")
+    return below.strip() in KNOWN_UNITS and (not per or above.strip() in {"", *KNOWN_UNITS})
 
 
 def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> str:
