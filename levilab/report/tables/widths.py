@@ -37,8 +37,9 @@ _WIDTHS = {
 _WIDE = 740
 #: A number, and what stands behind it.
 _WITH_UNIT = re.compile(r"(?:< )?[−+-]?\d[\d.]*(?:\([\d.]+\))?(?:×10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)? (?P<behind>.+)")
-#: A blank where a line may end: not between a number and its unit, beside a sign, behind "per", or in brackets.
-_BLANK = re.compile(r"(?<![\d⁰¹²³⁴⁵⁶⁷⁸⁹)<=±−])(?<!\bper) (?![=±−])(?![^\[]*\])")
+#: A blank where a line may end: not between a number and its unit, beside a sign, behind "per", before a single letter
+#: (but for "combined: u"), or in brackets.
+_BLANK = re.compile(r"(?<![\d⁰¹²³⁴⁵⁶⁷⁸⁹)<=±−])(?<!\bper) (?![=±−])(?:(?<=: )|(?![^\W\d_](?:\W|$)))(?![^\[]*\])")
 #: Heads are not folded to less than this [pt].
 _LEAST = 50.0
 
@@ -138,6 +139,8 @@ def _fold(cell: str, limit: float) -> str:
 
     >>> _fold("clock of the readings", 60)
     'clock of the\nreadings'
+    >>> _fold("ln ω against t", 58)
+    'ln ω\nagainst t'
     >>> _fold("0.97(3) (rad/s)^−½/s per Hz", 10)
     '0.97(3) (rad/s)^−½/s\nper Hz'
     """
