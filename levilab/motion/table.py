@@ -110,7 +110,7 @@ def _lines_table(summary: Summary) -> Table:
         numbers=("frequency \\[Hz]", "amplitude \\[mrad]"),
     )  # fmt: skip
     for line in summary.lines.lines:
-        frequency = with_minus(f"{line.frequency:.{digits}f}")
+        frequency = fixed(line.frequency, digits)
         shown.add_row(frequency, f"{1000 * line.amplitude:.3g}", line.name or "not identified")
     of = f", of the first {summary.lines.until:.3g} s" if summary.lines.until < 0.99 * summary.end else ""
     shown.caption = f"resolution {resolution:.2g} Hz{of}"

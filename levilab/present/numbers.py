@@ -209,10 +209,12 @@ def reading(value: float, u: float | None, residual: float | None) -> tuple[str,
 
     >>> reading(39.93661, 0.03, -0.012), reading(39.9, None, None)
     (('39.937', '0.030', '−0.012'), ('39.90000', '—', '—'))
+    >>> reading(-0.0001, 0.03, None)
+    ('0.000', '0.030', '—')
     """
     places = decimals_of(u)
     left = "—" if residual is None else signed(residual, places)
-    return with_minus(f"{value:.{places}f}"), "—" if u is None else f"{u:.{places}f}", left
+    return fixed(value, places), "—" if u is None else f"{u:.{places}f}", left
 
 
 def short_name(name: str) -> str:
