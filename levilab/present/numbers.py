@@ -159,10 +159,10 @@ def list_in_words(names: Sequence[str]) -> str:
     return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
-def fixed(value: float, decimals: int) -> str:
+def with_decimals(value: float, decimals: int) -> str:
     """A number with so many digits after the point; a zero has no sign.
 
-    >>> fixed(-0.254, 2), fixed(-0.001, 2)
+    >>> with_decimals(-0.254, 2), with_decimals(-0.001, 2)
     ('−0.25', '0.00')
     """
     return with_minus(f"{round(float(value), decimals) + 0.0:.{decimals}f}")
@@ -214,7 +214,7 @@ def reading(value: float, u: float | None, residual: float | None) -> tuple[str,
     """
     places = decimals_of(u)
     left = "—" if residual is None else signed(residual, places)
-    return fixed(value, places), "—" if u is None else f"{u:.{places}f}", left
+    return with_decimals(value, places), "—" if u is None else f"{u:.{places}f}", left
 
 
 def short_name(name: str) -> str:

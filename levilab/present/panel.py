@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from levilab.present.characters import printable
-from levilab.present.numbers import fixed, signed
+from levilab.present.numbers import signed, with_decimals
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -112,7 +112,7 @@ def _measured(state: State, trend: Trend, *, plain: bool) -> Iterator[Piece]:
         yield Piece("nothing counted yet" if state.share is not None else "no light, no value", "off")
     for name, word, unit, decimals, factor in shown:
         style = "strong" if name == trend.channel else "plain"
-        yield Piece(f"{word} {fixed(state.last[name] * factor, decimals)} {unit}", style)
+        yield Piece(f"{word} {with_decimals(state.last[name] * factor, decimals)} {unit}", style)
         if name == trend.channel and trend.rate is not None:
             yield Piece(f"{_signed(trend.rate * factor)} {unit}/s")
             if not plain:

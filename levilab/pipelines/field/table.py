@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from analysis.field.fit import LEARNS_NOTHING
 from levilab.pipelines.field.quantities import SHOWN
-from levilab.present.numbers import fixed, plain, short_name, with_uncertainty, without_unit
+from levilab.present.numbers import plain, short_name, with_decimals, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -39,8 +39,8 @@ def scans_table(analysis: FieldAnalysis) -> Table:
             (
                 short_name(source.name),
                 str(statistics.n),
-                " … ".join(fixed(1e2 * scan.height[k], 2) for k in (0, -1)),
-                " → ".join(fixed(1e3 * scan.flux_density[k], 3) for k in (0, -1)),
+                " … ".join(with_decimals(1e2 * scan.height[k], 2) for k in (0, -1)),
+                " → ".join(with_decimals(1e3 * scan.flux_density[k], 3) for k in (0, -1)),
                 plain(1e6 * statistics.rms_residual),
                 plain(statistics.reduced_chi_square),
                 plain(statistics.runs_test_p, 2),

@@ -10,11 +10,11 @@ from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
 from levilab.present.numbers import (
     column,
     ends,
-    fixed,
     in_words,
     plain,
     share,
     short_name,
+    with_decimals,
     with_uncertainty,
     without_unit,
 )
@@ -54,7 +54,7 @@ def _runs_table(analysis: SpinDownAnalysis) -> Table:
         (
             source.name,
             str(len(run.time)),
-            f"{fixed(run.time[0], 1)} … {fixed(run.time[-1], 1)}",
+            f"{with_decimals(run.time[0], 1)} … {with_decimals(run.time[-1], 1)}",
             f"{run.frequency[0]:.2f} → {run.frequency[-1]:.2f}",
             run.best if run.verdict.decided else "undecided",
         )
