@@ -63,6 +63,7 @@ class Budget:
         value, u, unit: of the result.
         components: the rows.
         model: of which model it is a parameter; empty where there is one model alone.
+        group: number of the group of inputs that the result is of, from 0; None: of all inputs.
 
     >>> noise = Component("scatter", "scatter of the readings", "A", 0.3, "Hz", 0.1)
     >>> clock = Component("time_base", "the counter's clock", "B", 4e-4, "1", 100.0, included=False)
@@ -77,6 +78,7 @@ class Budget:
     unit: str
     components: tuple[Component, ...]
     model: str = ""
+    group: int | None = None
 
     @property
     def included(self) -> tuple[Component, ...]:

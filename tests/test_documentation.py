@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from support.commands import command
-from support.figures import undrawn
+from support.figures import without_drawing
 from support.paths import ROOT
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ DRAWN = "README.md"
 @pytest.mark.parametrize("page", steps())
 def test_the_commands_of_a_page_work_one_after_another(tmp_path: Path, page: str) -> None:
     shutil.copytree(ROOT / "sample_data", tmp_path / "sample_data")
-    with contextlib.nullcontext() if page == DRAWN else undrawn():
+    with contextlib.nullcontext() if page == DRAWN else without_drawing():
         follow(steps()[page], tmp_path)
 
 

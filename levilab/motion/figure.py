@@ -11,10 +11,11 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from analysis.numbers import digits, with_minus
+from analysis.numbers import digits
 from levilab.motion.summary import changing_energy
 from levilab.present.drawing import SMALL, curve, headline, panel
 from levilab.present.looks import GREY, LOOKS
+from levilab.present.numbers import with_decimals
 from levilab.present.style import STYLE, WIDE
 
 if TYPE_CHECKING:
@@ -334,7 +335,7 @@ def _name_lines(axes: Axes, summary: Summary) -> None:
     lines = sorted(summary.lines.lines, key=lambda line: line.sideband)[:MOST_NAMED]
     for k, line in enumerate(lines):
         waiting = [_pole(axes, other.frequency) for other in lines[k + 1 :] if not other.sideband]
-        number = with_minus(f"{line.frequency:.2f}")
+        number = with_decimals(line.frequency, 2)
         texts = [number] if line.sideband or not line.name else [f"{number} {line.name}", number]
         found = next(filter(None, (_place(axes, line.frequency, text, flags, waiting) for text in texts)), None)
         if found:

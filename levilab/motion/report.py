@@ -28,7 +28,7 @@ from levilab.present.document.blocks import (
     Verdict,
     Warnings,
 )
-from levilab.present.numbers import plain
+from levilab.present.numbers import plain, with_decimals
 from levilab.present.tables import table
 from levilab.runs.run import STATES, Run
 from levilab.simulator.scene import SceneError, changes, scene_of
@@ -195,7 +195,7 @@ def _lines(found: Mapping[str, Any]) -> Iterator[Block]:
     heads = ("frequency [Hz]", "amplitude [mrad]", "what it is")
     rows = [
         (
-            f"{line.get('frequency_hz', math.nan):.3f}",
+            with_decimals(line.get("frequency_hz", math.nan), 3),
             plain(1e3 * line.get("amplitude_rad", math.nan)),
             str(line.get("name") or "not identified"),
         )

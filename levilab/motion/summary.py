@@ -11,7 +11,7 @@ import numpy as np
 from levilab.files import finite
 from levilab.motion.lines import LONGEST_S, AxisLines, lines_of, rate_for
 from levilab.motion.lock import is_locked
-from levilab.present.numbers import fixed
+from levilab.present.numbers import with_decimals
 from levilab.simulator.equilibrium import advice, stability_of
 from levilab.simulator.scene import remarks
 
@@ -68,7 +68,7 @@ class Summary:
     def heights(self) -> str:
         """The range of the heights, in words; a zero has no sign."""
         height = 100 * self.motion.position[:, 2]
-        low, high, mean = (fixed(x, 3) for x in (height.min(), height.max(), height.mean()))
+        low, high, mean = (with_decimals(x, 3) for x in (height.min(), height.max(), height.mean()))
         return f"{low} to {high} cm, mean {mean} cm"
 
     @property
@@ -95,11 +95,13 @@ class Summary:
         spin = self.motion.spin_hz
         first, last, low, high = (float(x) for x in (spin[0], spin[-1], spin.min(), spin.max()))
         if high - low <= CONSTANT * abs(first):
-            return f"constant, {fixed(first, 3)} Hz"
-        said = f"{fixed(first, 3)} Hz at the start, {fixed(last, 3)} Hz at the end"
+            return f"constant, {with_decimals(first, 3)} Hz"
+        said = f"{with_decimals(first, 3)} Hz at the start, {with_decimals(last, 3)} Hz at the end"
         if high - low <= abs(last - first) + SWINGS_HZ:
             return said
-        return f"{said}; {fixed(low, 3)} to {fixed(high, 3)} Hz, mean {fixed(spin.mean(), 3)} Hz"
+        return (
+            f"{said}; {with_decimals(low, 3)} to {with_decimals(high, 3)} Hz, mean {with_decimals(spin.mean(), 3)} Hz"
+        )
 
     @property
     def why_no_lines(self) -> str:

@@ -11,7 +11,7 @@ from analysis.numbers import with_minus
 from levilab.motion.effects import LEAST_HZ, LEAST_M
 from levilab.motion.lock import is_locked
 from levilab.motion.summary import changing_energy
-from levilab.present.numbers import fixed
+from levilab.present.numbers import with_decimals
 from levilab.present.terminal import new_table, terminal
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def _motion_facts(summary: Summary) -> list[tuple[str, str]]:
         return facts
     facts.insert(0, ("height", summary.heights))
     if motion.scene.washers.inertia_kg_m2 > 0:
-        first, last = (fixed(motion.washer_spin_hz[k], 3) for k in (0, -1))
+        first, last = (with_decimals(motion.washer_spin_hz[k], 3) for k in (0, -1))
         facts.append(("loose washers", f"{first} Hz at the start, {last} Hz at the end"))
     if (locked := is_locked(motion.scene, motion.states, survived=motion.survived)) is not None:
         facts.append(("drive", "holds the top, which is locked to it" if locked else "does not hold the top"))
@@ -110,7 +110,7 @@ def _lines_table(summary: Summary) -> Table:
         numbers=("frequency \\[Hz]", "amplitude \\[mrad]"),
     )  # fmt: skip
     for line in summary.lines.lines:
-        frequency = with_minus(f"{line.frequency:.{digits}f}")
+        frequency = with_decimals(line.frequency, digits)
         shown.add_row(frequency, f"{1000 * line.amplitude:.3g}", line.name or "not identified")
     of = f", of the first {summary.lines.until:.3g} s" if summary.lines.until < 0.99 * summary.end else ""
     shown.caption = f"resolution {resolution:.2g} Hz{of}"

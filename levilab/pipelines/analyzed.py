@@ -86,12 +86,8 @@ class Analyzed(Generic[S, R, T, Opt]):
         """Inputs whose numbers are taken together."""
         return (self.sources,)
 
-    def inputs_of(self, value: str) -> Sequence[Source[S]]:
-        """Inputs that a value of all together is made of, by its name in result.json."""
-        return self.sources
-
-    def inputs_of_budget(self, budget: Budget) -> Sequence[Source[S]]:
-        """Inputs that the number of a budget of all together is made of."""
+    def inputs_of(self, group: int | None) -> Sequence[Source[S]]:
+        """Inputs of a group, by the number that values and budgets of all together have; None: all inputs."""
         return self.sources
 
     def about_all(self) -> Iterable[str]:

@@ -235,7 +235,7 @@ def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, s
         each.append(Note("Only the first of them is printed; all are in the report as HTML, and in result.json."))
     if not found.budget and not each:
         return (Paragraph("The result was written before budgets were kept with it: levilab analyze makes them."),)
-    together = budget_blocks(found.budget, shown, mark=lambda budget: mark_of(found.inputs_of_budget(budget)))
+    together = budget_blocks(found.budget, shown, mark=lambda budget: mark_of(found.inputs_of(budget.group)))
     return (*together, *each)
 
 

@@ -210,7 +210,7 @@ class Document(Generic[S, R, Opt, A, D]):
 
 def _budget(budgets: Sequence[Budget]) -> dict[str, Any]:
     """The entry of budgets, where there are any."""
-    return {"budget": [BudgetPart.of(one).model_dump() for one in budgets]} if budgets else {}
+    return {"budget": [BudgetPart.of(one).model_dump(exclude_unset=True) for one in budgets]} if budgets else {}
 
 
 def values_of(estimates: Mapping[str, Estimate]) -> dict[str, dict[str, Any]]:

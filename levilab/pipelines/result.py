@@ -40,7 +40,10 @@ class Part(BaseModel):
 
 
 class Value(Part):
-    """A quantity: a mean over runs has their scatter and says how many there were."""
+    """A quantity: a mean over runs has their scatter and says how many there were.
+
+    group: number of the group of inputs that it is of, from 0; None: of all inputs.
+    """
 
     value: float | None
     u: float | None
@@ -48,6 +51,7 @@ class Value(Part):
     interval_68: tuple[float, float] | None = None
     scatter: float | None = Field(default=None, ge=0)
     runs: int | None = Field(default=None, ge=2)
+    group: int | None = Field(default=None, ge=0)
 
     @model_validator(mode="after")
     def _scatter_is_of_runs(self) -> Self:
@@ -93,18 +97,22 @@ class BudgetPart(Part):
     u_with_all: float = Field(ge=0)
     unit: str
     components: tuple[ComponentPart, ...]
+    group: int | None = Field(default=None, ge=0)
 
     @classmethod
     def of(cls, budget: Budget) -> Self:
         """From a budget."""
         rows = [asdict(one) | {"contribution": one.contribution} for one in budget.components]
-        return cls.model_validate(asdict(budget) | {"u_with_all": budget.u_with_all, "components": rows})
+        entries = asdict(budget) | {"u_with_all": budget.u_with_all, "components": rows}
+        if budget.group is None:
+            del entries["group"]
+        return cls.model_validate(entries)
 
     @property
     def budget(self) -> Budget:
         """The budget, but for what follows from the rest of it."""
         rows = (Component(**one.model_dump(exclude={"contribution"})) for one in self.components)
-        return Budget(self.quantity, self.value, self.u, self.unit, tuple(rows), self.model)
+        return Budget(self.quantity, self.value, self.u, self.unit, tuple(rows), self.model, self.group)
 
 
 def budgets_of(parts: Sequence[BudgetPart]) -> tuple[Budget, ...]:

@@ -18,7 +18,7 @@ Kind = Literal["number", "count", "truth", "text"]
 Cell = str | float | int | bool | None
 
 #: Units of results → the end of a column's name.
-_ENDS = MappingProxyType({
+UNITS_IN_NAMES = MappingProxyType({
     "Hz": "hz", "s": "s", "1": "", "1/s": "per_s", "1/rad": "per_rad", "(rad/s)^-1/2/s": "per_sqrt_rad_s",
     "(rad/s)^(1-exponent)/s": "si", "Hz/s": "hz_per_s", "Hz/s^2": "hz_per_s2", "turns": "turns", "dB": "db",
     "T": "t", "T m": "t_m", "m": "m", "m/kg": "m_per_kg", "kg": "kg", "rad": "rad",
@@ -47,7 +47,7 @@ def name_with_unit(name: str, unit: str) -> str:
     >>> name_with_unit("newton_c2_u", "1/rad"), name_with_unit("slope", "1")
     ('newton_c2_u_per_rad', 'slope')
     """
-    return f"{name}_{_ENDS[unit]}".removesuffix("_")
+    return f"{name}_{UNITS_IN_NAMES[unit]}".removesuffix("_")
 
 
 def estimate(

@@ -23,6 +23,13 @@ UNITS = {
     "(rad/s)^(1-exponent)/s": "(rad/s)^(1−n)/s",
 }
 
+#: Units that people are shown; no other text behind a number is a unit.
+KNOWN_UNITS = frozenset({
+    *filter(None, UNITS.values()), "%", "°", "dB", "rad", "mrad", "s", "ms", "µs", "min", "h",
+    "Hz", "kHz", "MHz", "mHz", "µHz", "Hz/s", "mHz/s", "m", "cm", "mm", "µm", "m/s", "m/kg", "kg", "g", "mg",
+    "T", "mT", "µT", "T m", "mT cm", "A m²", "V", "mV", "µV", "Vpp", "A", "Ω", "kΩ", "MΩ", "K", "J", "turns",
+})  # fmt: skip
+
 #: Names that a sentence lists at most.
 MOST_NAMES = 4
 
@@ -103,6 +110,18 @@ def in_words(unit: str) -> str:
     return UNITS.get(unit, unit)
 
 
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that people are shown, or such units with "per" between them or before one.
+
+    >>> [is_unit(text) for text in ("mT cm", "Hz per s", "per Hz", "%")]
+    [True, True, True, True]
+    >>> [is_unit(text) for text in ("s ago", "Hz (u not known)", "of 120", "Hz per", "")]
+    [False, False, False, False, False]
+    """
+    above, per, below = f" {text}".rpartition(" per ")
+    return below.strip() in KNOWN_UNITS and (not per or above.strip() in {"", *KNOWN_UNITS})
+
+
 def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> str:
     """Round by the rule of the Particle Data Group, with a power of ten instead of leading zeros.
 
@@ -140,10 +159,10 @@ def list_in_words(names: Sequence[str]) -> str:
     return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
-def fixed(value: float, decimals: int) -> str:
+def with_decimals(value: float, decimals: int) -> str:
     """A number with so many digits after the point; a zero has no sign.
 
-    >>> fixed(-0.254, 2), fixed(-0.001, 2)
+    >>> with_decimals(-0.254, 2), with_decimals(-0.001, 2)
     ('−0.25', '0.00')
     """
     return with_minus(f"{round(float(value), decimals) + 0.0:.{decimals}f}")
@@ -190,10 +209,12 @@ def reading(value: float, u: float | None, residual: float | None) -> tuple[str,
 
     >>> reading(39.93661, 0.03, -0.012), reading(39.9, None, None)
     (('39.937', '0.030', '−0.012'), ('39.90000', '—', '—'))
+    >>> reading(-0.0001, 0.03, None)
+    ('0.000', '0.030', '—')
     """
     places = decimals_of(u)
     left = "—" if residual is None else signed(residual, places)
-    return with_minus(f"{value:.{places}f}"), "—" if u is None else f"{u:.{places}f}", left
+    return with_decimals(value, places), "—" if u is None else f"{u:.{places}f}", left
 
 
 def short_name(name: str) -> str:

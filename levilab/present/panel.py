@@ -7,8 +7,8 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-from analysis.numbers import with_minus
 from levilab.present.characters import printable
+from levilab.present.numbers import signed, with_decimals
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -112,7 +112,7 @@ def _measured(state: State, trend: Trend, *, plain: bool) -> Iterator[Piece]:
         yield Piece("nothing counted yet" if state.share is not None else "no light, no value", "off")
     for name, word, unit, decimals, factor in shown:
         style = "strong" if name == trend.channel else "plain"
-        yield Piece(f"{word} {with_minus(f'{state.last[name] * factor:.{decimals}f}')} {unit}", style)
+        yield Piece(f"{word} {with_decimals(state.last[name] * factor, decimals)} {unit}", style)
         if name == trend.channel and trend.rate is not None:
             yield Piece(f"{_signed(trend.rate * factor)} {unit}/s")
             if not plain:
@@ -176,13 +176,13 @@ def _flow(pieces: Sequence[Piece], width: int) -> Iterator[Line]:
 def _signed(value: float) -> str:
     """Return a rate with two digits and a sign.
 
-    >>> [_signed(value) for value in (-0.0934, 0.051, 12.0, 0.0)]
-    ['−0.093', '+0.051', '+12', '0']
+    >>> [_signed(value) for value in (-0.0934, 0.051, 12.0, 0.0, -1e-9)]
+    ['−0.093', '+0.051', '+12', '0', '0.000000']
     """
     if not value:
         return "0"
     decimals = min(max(1 - math.floor(math.log10(abs(value))), 0), 6)
-    return with_minus(f"{value:+.{decimals}f}")
+    return signed(value, decimals)
 
 
 def _clock(seconds: float) -> str:

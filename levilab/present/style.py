@@ -96,7 +96,8 @@ def places_to_divide(figure: Figure) -> list[float]:
     Returns:
         Distances from its top [pt], in their order.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # which what saves no figure does not need
+    # imported here, since commands that draw nothing must not pay for it
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
     with mpl.rc_context(STYLE):

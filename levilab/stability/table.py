@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
-from analysis.numbers import with_minus
+from levilab.present.numbers import with_decimals
 from levilab.present.terminal import new_table, terminal
 from levilab.simulator.equilibrium import advice
 from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
@@ -124,7 +124,7 @@ def _facts_table(found: Stability) -> Any:
 
 def _modes(found: Stability) -> str:
     grows = [f" ({'grows' if mode.imag < 0 else 'decays'})" if abs(mode.imag) > 1e-6 else "" for mode in found.modes]
-    return ", ".join(with_minus(f"{mode.real:.3f}{word}") for mode, word in zip(found.modes, grows, strict=True))
+    return ", ".join(f"{with_decimals(mode.real, 3)}{word}" for mode, word in zip(found.modes, grows, strict=True))
 
 
 def remarks(found: Stability) -> list[str]:

@@ -29,7 +29,7 @@ _STARTS, _ENDS = slice(None, -1), slice(1, None)
 
 
 @contextlib.contextmanager
-def undrawn() -> Iterator[None]:
+def without_drawing() -> Iterator[None]:
     """Figures are made, but matplotlib does not draw them: that is most of what a result or a page costs."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("levilab.present.style.as_png", lambda *_, **__: b"\x89PNG\r\n\x1a\n")
@@ -39,9 +39,9 @@ def undrawn() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def unmade() -> Iterator[None]:
+def without_figures() -> Iterator[None]:
     """Figures of analyses are empty, too: for texts of a page whose figure other tests make from the same runs."""
-    with undrawn(), pytest.MonkeyPatch.context() as patch:
+    with without_drawing(), pytest.MonkeyPatch.context() as patch:
         patch.setattr("levilab.pipelines.catalogue.Analysis.figure", lambda *_: Figure())
         yield
 

@@ -26,8 +26,8 @@ from levilab.motion.animation.film import Film, in_mm, nice_length, still, table
 from levilab.motion.animation.parts import COLOURS, parts_of
 from levilab.motion.animation.poses import height_for_camera
 from levilab.motion.animation.three import MissingThree, three_js
-from levilab.motion.animation.words import short_speed, speed_in_words, unbroken
-from levilab.present.numbers import fixed, plain
+from levilab.motion.animation.words import bind_units, short_speed, speed_in_words
+from levilab.present.numbers import plain, with_decimals
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def as_page(page: Page) -> bytes:
     environment = Environment(
         loader=FileSystemLoader(folder), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    environment.filters["unbroken"] = unbroken
+    environment.filters["bind_units"] = bind_units
     title = poses.scene.name or "A scene without a name"
     alt = _alt(page)
     middle = len(poses.times) // 2
@@ -171,7 +171,7 @@ def _data(page: Page, alt: str, readings: list[tuple[str, str, int]]) -> dict[st
     bar = nice_length(0.45 * span)
     return {
         "alt": alt,
-        "bar": {"length": bar, "text": unbroken(in_mm(bar))},
+        "bar": {"length": bar, "text": bind_units(in_mm(bar))},
         "columns": columns_of(poses),
         "count": len(poses.times),
         "drive_mt": 1000 * poses.scene.drive.amplitude_t,
@@ -248,7 +248,7 @@ def _numbers(page: Page) -> list[tuple[str, str]]:
         ("end", page.summary.ending),
         ("height", f"{heights.min():.2f} to {heights.max():.2f} cm above the base's centre"),
         ("tilt", f"{tilts.min():.1f} to {tilts.max():.1f}° of the axis against the base's"),
-        ("spin", f"{fixed(poses.spins.min(), 2)} to {fixed(poses.spins.max(), 2)} Hz"),
+        ("spin", f"{with_decimals(poses.spins.min(), 2)} to {with_decimals(poses.spins.max(), 2)} Hz"),
         ("mass", f"{1000 * scene.top.mass_kg:.4g} g"),
         ("moment", f"{digits(scene.top.moment_a_m2, 4)} A m²"),
         ("base", f"{100 * scene.base.inner_radius_m:.3g} to {100 * scene.base.outer_radius_m:.3g} cm radius"),

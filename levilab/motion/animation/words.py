@@ -6,7 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from levilab.present.numbers import fixed
+from levilab.present.numbers import with_decimals
 
 if TYPE_CHECKING:
     from levilab.motion.animation.poses import Poses
@@ -43,21 +43,21 @@ def readout(poses: Poses, k: int) -> list[tuple[str, str]]:
     """Names and values of what is read at the k-th pose."""
     rows = [
         ("time", f"{poses.times[k]:.3f} s"),
-        ("height", f"{fixed(100 * poses.positions[k, 2], 2)} cm"),
+        ("height", f"{with_decimals(100 * poses.positions[k, 2], 2)} cm"),
         ("tilt", f"{math.degrees(poses.tilts[k]):.1f}°"),
-        ("spin", f"{fixed(poses.spins[k], 2)} Hz"),
+        ("spin", f"{with_decimals(poses.spins[k], 2)} Hz"),
     ]
     if poses.scene.washers.inertia_kg_m2 > 0:
-        rows.append(("slip", f"{fixed(poses.slips[k] / (2 * math.pi), 2)} turns"))
+        rows.append(("slip", f"{with_decimals(poses.slips[k] / (2 * math.pi), 2)} turns"))
     if poses.scene.drive.waveform != "off":
-        rows.append(("drive", f"{fixed(1000 * poses.scene.drive.amplitude_t * poses.drive[k], 2)} mT"))
+        rows.append(("drive", f"{with_decimals(1000 * poses.scene.drive.amplitude_t * poses.drive[k], 2)} mT"))
     return rows
 
 
-def unbroken(text: str) -> str:
+def bind_units(text: str) -> str:
     r"""Bind numbers to their units, and what units consist of, with spaces at which no line ends.
 
-    >>> unbroken("from 0.5 s to 2 cm radius, 0.71 A m², 1/20 of real speed, 3 parts")
+    >>> bind_units("from 0.5 s to 2 cm radius, 0.71 A m², 1/20 of real speed, 3 parts")
     'from 0.5\xa0s to 2\xa0cm radius, 0.71\xa0A\xa0m², 1/20 of real speed, 3 parts'
     """
     return _BEFORE_A_UNIT.sub("\u00a0", text)

@@ -10,7 +10,7 @@ from levilab.pipelines.field.meaning import meaning
 from levilab.pipelines.field.table import base_table, by_run_table, follows_table, scans_table
 from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
 from levilab.present.document.blocks import Listing, Note, Paragraph, Points, Section, Tabular
-from levilab.present.numbers import off, short_name, signed, with_uncertainty
+from levilab.present.numbers import off, short_name, signed, with_decimals, with_uncertainty
 from levilab.present.tables import table
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def _bases(analysis: FieldAnalysis) -> tuple[Block, ...]:
 def _in_words(run: FieldRun) -> tuple[str, ...]:
     scan = run.scan
     low, high = 1e2 * scan.height[0], 1e2 * scan.height[-1]
-    text = f"{scan.statistics.n} heights, {low:.2f} cm to {high:.2f} cm"
+    text = f"{scan.statistics.n} heights, {with_decimals(low, 2)} cm to {with_decimals(high, 2)} cm"
     u = f"u of a reading against the fit: {1e6 * scan.u.min():.0f} µT to {1e6 * scan.u.max():.0f} µT"
     return text, f"{u}, that of its height included"
 
@@ -94,7 +94,7 @@ def _readings(run: FieldRun) -> Listing:
     shown = min(len(scan.height), MOST_READINGS)
     scaled = scan.residuals / scan.u
     rows = [
-        (f"{1e2 * z:.3f}", f"{1e3 * b:.4f}", signed(float(r), 1))
+        (with_decimals(1e2 * z, 3), with_decimals(1e3 * b, 4), signed(float(r), 1))
         for z, b, r in zip(scan.height[:shown], scan.flux_density[:shown], scaled[:shown], strict=True)
     ]
     heads = ("z [cm]", "B [mT]", "residual [u]")
@@ -118,5 +118,10 @@ def _point(name: str, run: FieldRun, i: int) -> str:
     u = 1e3 * float(scan.u[i])
     field = with_uncertainty(Estimate(1e3 * float(scan.flux_density[i]), u, "mT"))
     residual = float(scan.residuals[i])
-    lines = [name, f"z = {1e2 * scan.height[i]:.3f} cm", f"B = {field}", f"B − fit = {off(1e3 * residual, u)} mT"]
+    lines = [
+        name,
+        f"z = {with_decimals(1e2 * scan.height[i], 3)} cm",
+        f"B = {field}",
+        f"B − fit = {off(1e3 * residual, u)} mT",
+    ]
     return "\n".join(filter(None, lines))

@@ -6,9 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.field.fit import LEARNS_NOTHING
-from analysis.numbers import with_minus
 from levilab.pipelines.field.quantities import SHOWN
-from levilab.present.numbers import plain, short_name, with_uncertainty, without_unit
+from levilab.present.numbers import plain, short_name, with_decimals, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -40,8 +39,8 @@ def scans_table(analysis: FieldAnalysis) -> Table:
             (
                 short_name(source.name),
                 str(statistics.n),
-                " … ".join(with_minus(f"{1e2 * scan.height[k]:.2f}") for k in (0, -1)),
-                " → ".join(with_minus(f"{1e3 * scan.flux_density[k]:.3f}") for k in (0, -1)),
+                " … ".join(with_decimals(1e2 * scan.height[k], 2) for k in (0, -1)),
+                " → ".join(with_decimals(1e3 * scan.flux_density[k], 3) for k in (0, -1)),
                 plain(1e6 * statistics.rms_residual),
                 plain(statistics.reduced_chi_square),
                 plain(statistics.runs_test_p, 2),

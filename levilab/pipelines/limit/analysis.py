@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
-    from analysis.budget import Budget
     from levilab.pipelines.sources import Source
 
 Which = Literal["lower", "upper"]
@@ -155,21 +154,11 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
     @property
     def averaged(self) -> Sequence[Sequence[Source[LimitReadings]]]:
         """Those of the same conditions."""
-        return tuple(self._inputs(group) for group in self.groups)
+        return tuple(tuple(self.sources[k] for k in group.runs) for group in self.groups)
 
-    def inputs_of(self, value: str) -> Sequence[Source[LimitReadings]]:
-        """Those of the group whose prefix its name has."""
-        return next((self._inputs(one) for one in self.groups if value.startswith(self.prefix(one))), self.sources)
-
-    def inputs_of_budget(self, budget: Budget) -> Sequence[Source[LimitReadings]]:
-        """Those of the group whose mean it is of, or of all groups with the same one."""
-        mean = (budget.model, budget.value, budget.u)
-        groups = ((one, one.statistics.mean) for one in self.groups)
-        alike = [source for one, of in groups if (one.which, of.value, of.u) == mean for source in self._inputs(one)]
-        return alike or self.sources
-
-    def _inputs(self, group: Limits) -> tuple[Source[LimitReadings], ...]:
-        return tuple(self.sources[k] for k in group.runs)
+    def inputs_of(self, group: int | None) -> Sequence[Source[LimitReadings]]:
+        """Those of the same conditions, by their number in `groups`; None: all inputs."""
+        return self.sources if group is None else self.averaged[group]
 
     def prefix(self, group: Limits) -> str:
         """What the names of a group's values begin with; empty where it is the only group."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.budget import Budget, Component, printed_step, rest, u_of_step
@@ -28,9 +29,9 @@ def budget_of_run(source: Source[LimitReadings], run: Limits, options: LimitOpti
 def budget_of_all(analysis: LimitAnalysis) -> tuple[Budget, ...]:
     """Of the means of all conditions."""
     return tuple(
-        budget
-        for group in analysis.groups
-        for budget in _budgets([analysis.sources[k] for k in group.runs], group, analysis.options)
+        replace(budget, group=k)
+        for k, (sources, group) in enumerate(zip(analysis.averaged, analysis.groups, strict=True))
+        for budget in _budgets(sources, group, analysis.options)
     )
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from analysis.limits import Comparison, Statistics
 from levilab.pipelines.document import Document, Settings, number, value_of, values_of
@@ -98,6 +98,19 @@ class LimitResult(Result):
     groups: tuple[GroupPart, ...]
     runs: tuple[LimitRunPart, ...]
 
+    @model_validator(mode="after")
+    def _budgets_name_their_groups(self) -> Self:
+        """Earlier results do not say it: each group whose mean has an uncertainty has one budget, in their order."""
+        if any(one.group is not None and one.group >= len(self.groups) for one in self.budget):
+            raise ValueError(f"a budget is of none of the {len(self.groups)} groups")
+        if len(self.groups) == 1 or all(one.group is not None for one in self.budget):
+            return self
+        groups = [k for k, group in enumerate(self.groups) if (mean := group.values.get("mean")) and mean.u]
+        if len(groups) != len(self.budget):
+            raise ValueError(f"{len(self.budget)} budgets but {len(groups)} groups with an uncertainty")
+        budget = tuple(one.model_copy(update={"group": k}) for one, k in zip(self.budget, groups, strict=True))
+        return self.model_copy(update={"budget": budget})
+
 
 # --- writing -------------------------------------------------------------------------------------------
 
@@ -119,8 +132,8 @@ def _run_entries(_: Source[LimitReadings], run: Limits) -> dict[str, Any]:
 def _top_values(analysis: LimitAnalysis) -> dict[str, Any]:
     """Of one group by their plain names, else with the kind before them, and its number where it has several."""
     return {
-        f"{analysis.prefix(group)}{name}": value
-        for group in analysis.groups
+        f"{analysis.prefix(group)}{name}": value | {"group": k}
+        for k, group in enumerate(analysis.groups)
         for name, value in _values(group.statistics).items()
     }
 

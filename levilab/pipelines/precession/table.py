@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from analysis.uncertainty import Estimate
 from levilab.pipelines.precession.analysis import at_most, intercept_of, slope_of
-from levilab.present.numbers import column, plain, short_name, signed, without_unit
+from levilab.present.numbers import column, plain, short_name, signed, with_decimals, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -144,7 +144,7 @@ def coherence_table(run: PrecessionRun, name: str = "") -> Table:
             f"{run.fit.points[one.point].drive:.6g}",
             str(one.coherence.pulses),
             f"{one.coherence.length:.4f}",
-            f"{math.degrees(one.coherence.phase_rad):.0f}",
+            with_decimals(math.degrees(one.coherence.phase_rad), 0),
             drift,
             f"{one.coherence.excursion_turns:.2f}",
             "yes" if one.coherence.locked else "no",

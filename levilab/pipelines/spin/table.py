@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from levilab.present.clock import with_clock
-from levilab.present.numbers import column, plain, short_name
+from levilab.present.numbers import column, plain, short_name, with_decimals
 from levilab.present.tables import Table, table
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def frequency_table(analysis: SpinAnalysis) -> Table:
             short_name(source.name),
             spin,
             slope,
-            f"{run.spin.reference_time:.4f}",
+            with_decimals(run.spin.reference_time, 4),
             run.spin.method,
             plain(None if run.spin.bound is None else 1e3 * run.spin.bound, 2),
         )
@@ -71,7 +71,7 @@ def series_table(source: Source[Records], run: SpinRun, most: int) -> Table:
     step = max(-(-len(series) // most), 1)
     heads, clocks = with_clock(source.time_zero, series.time.tolist(), ("time [s]", "spin [Hz]", "u [mHz]"))
     rows = [
-        (*clocks[k], f"{series.time[k]:.2f}", f"{series.frequency[k]:.4f}", plain(1e3 * float(series.u[k]), 2))
+        (*clocks[k], with_decimals(series.time[k], 2), f"{series.frequency[k]:.4f}", plain(1e3 * float(series.u[k]), 2))
         for k in range(0, len(series), step)
     ]
     which = "each" if step == 1 else f"every {step}th"

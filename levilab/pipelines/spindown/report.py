@@ -21,7 +21,7 @@ from levilab.pipelines.spindown.table import (
 )
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Details, Listing, Note, Paragraph, Points, Tabular
-from levilab.present.numbers import column, ends, in_words, off, reading, short_name, with_uncertainty
+from levilab.present.numbers import column, ends, in_words, off, reading, short_name, with_decimals, with_uncertainty
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -267,7 +267,7 @@ def _in_words(source: Source[Readings], fit: SpinDown, options: SpinDownOptions)
     if outliers:
         text += f", {outliers} of them outlier{'s' * (outliers > 1)}, {'kept' if options.keep_outliers else 'left out'}"
     t, nu = fit.time, fit.frequency
-    span = f"{t[0]:.1f} s to {t[-1]:.1f} s, {nu[0]:.2f} Hz to {nu[-1]:.2f} Hz"
+    span = f"{with_decimals(t[0], 1)} s to {with_decimals(t[-1], 1)} s, {nu[0]:.2f} Hz to {nu[-1]:.2f} Hz"
     return f"{text}; {span}", _uncertainty(source, fit, options)
 
 
@@ -301,7 +301,7 @@ def _readings(source: Source[Readings], fit: SpinDown, options: SpinDownOptions,
     heads, clocks = with_clock(source.time_zero, readings.time[:shown].tolist(), named)
     rows = [
         Row(
-            (*clocks[i], f"{t:.3f}", *reading(float(nu), u_, left.get(i))),
+            (*clocks[i], with_decimals(t, 3), *reading(float(nu), u_, left.get(i))),
             "outlier" if i in outliers else "",
         )
         for i, (t, nu, u_) in enumerate(zip(readings.time[:shown], readings.frequency[:shown], u, strict=True))

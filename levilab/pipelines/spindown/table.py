@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING
 from analysis.numbers import digits
 from analysis.spindown.tilt import counted
 from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
-from levilab.present.numbers import column, ends, in_words, plain, share, short_name, with_uncertainty, without_unit
+from levilab.present.numbers import (
+    column,
+    ends,
+    in_words,
+    plain,
+    share,
+    short_name,
+    with_decimals,
+    with_uncertainty,
+    without_unit,
+)
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -44,7 +54,7 @@ def _runs_table(analysis: SpinDownAnalysis) -> Table:
         (
             source.name,
             str(len(run.time)),
-            f"{run.time[0]:.1f} … {run.time[-1]:.1f}",
+            f"{with_decimals(run.time[0], 1)} … {with_decimals(run.time[-1], 1)}",
             f"{run.frequency[0]:.2f} → {run.frequency[-1]:.2f}",
             run.best if run.verdict.decided else "undecided",
         )

@@ -112,14 +112,14 @@ def _of_part(
     name: str,
     analysis: str,
     part: Mapping[str, Any],
-    inputs_of: Callable[[str], Sequence[Source[Any]]] | None = None,
+    inputs_of: Callable[[int | None], Sequence[Source[Any]]] | None = None,
 ) -> Iterator[tuple[Cell, ...]]:
     """A row for each value.
 
-    inputs_of: returns the inputs of a quantity, which is synthetic where one of them is; None: as the part is.
+    inputs_of: returns the inputs of a group, whose values are synthetic where one of them is; None: as the part is.
     """
     for model, quantity, found in _values_in(part, analysis):
-        of = inputs_of(quantity) if inputs_of else ()
+        of = inputs_of(found.get("group")) if inputs_of else ()
         synthetic = any(source.synthetic for source in of) if inputs_of else bool(part["synthetic"])
         low, high = found.get("interval_68") or (None, None)
         value, u, unit = (found.get(key) for key in ("value", "u", "unit"))

@@ -12,6 +12,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from levilab.present.document.typesetting import typeset
+from levilab.present.numbers import is_unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -34,12 +35,11 @@ _WIDTHS = {
     **dict.fromkeys("acegovxyzkq0123456789", 510), **dict.fromkeys("bdhnpu", 556), **dict.fromkeys("mwMW", 833),
 }  # fmt: skip
 _WIDE = 740
-#: A number, and the unit behind it: no "± 0.07", "… 21", "of 120" or "Hz, u not determined".
-_WITH_UNIT = re.compile(
-    r"(?:< )?[−+-]?\d[\d.]*(?:\([\d.]+\))?(?:×10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)? (?P<unit>(?!of |to )[^\s\d,;±…→][^,;±…→]*)"
-)
-#: A blank where a line may end: not between a number and its unit, beside a sign, behind "per", or in brackets.
-_BLANK = re.compile(r"(?<![\d⁰¹²³⁴⁵⁶⁷⁸⁹)<=±−])(?<!\bper) (?![=±−])(?![^\[]*\])")
+#: A number, and what stands behind it.
+_WITH_UNIT = re.compile(r"(?:< )?[−+-]?\d[\d.]*(?:\([\d.]+\))?(?:×10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)? (?P<behind>.+)")
+#: A blank where a line may end: not between a number and its unit, beside a sign, behind "per", before a single letter
+#: (but for "combined: u"), or in brackets.
+_BLANK = re.compile(r"(?<![\d⁰¹²³⁴⁵⁶⁷⁸⁹)<=±−])(?<!\bper) (?![=±−])(?:(?<=: )|(?![^\W\d_](?:\W|$)))(?![^\[]*\])")
 #: Heads are not folded to less than this [pt].
 _LEAST = 50.0
 
@@ -65,11 +65,11 @@ def fit(table: Table) -> Fitted:
     paragraphs = frozenset(k for k in range(len(table.heads)) if k not in table.numbers and _longest(table, k) > _LONG)
     if _width(table, paragraphs) + 2 * _SEPARATION * len(table.heads) <= LINE:
         return Fitted(table, small=False, paragraphs=paragraphs)
-    room = (LINE - 2 * SMALL_SEPARATION * len(table.heads)) / _SMALL
+    room = LINE - 2 * SMALL_SEPARATION * len(table.heads)
     free = set(range(len(table.heads))) - paragraphs
     limits: dict[int, float] = {}
     folded = _folded(table, limits, paragraphs)
-    while free and _width(folded, paragraphs) > room:
+    while free and _width(folded, paragraphs, _SMALL) > room:
         widest = max(sorted(free), key=lambda k: _column(folded, k))
         before = _column(folded, widest)
         tried = _folded(table, limits | {widest: _STEP * before}, paragraphs)
@@ -93,12 +93,22 @@ def units_in_heads(table: Table) -> Table:
     columns = [[row.cells[k] for row in table.rows] for k in range(len(table.heads))]
     heads = list(table.heads)
     for k in sorted(table.numbers):
-        units = {found["unit"] if (found := _WITH_UNIT.fullmatch(cell)) else "" for cell in columns[k] if _counts(cell)}
+        units = {_unit(cell) for cell in columns[k] if _counts(cell)}
         if len(units) == 1 and heads[k] and (unit := units.pop()):
             heads[k] = f"{heads[k]}\n[{unit}]"
             columns[k] = [cell.removesuffix(f" {unit}") for cell in columns[k]]
     rows = (replace(row, cells=tuple(column[i] for column in columns)) for i, row in enumerate(table.rows))
     return replace(table, heads=tuple(heads), rows=tuple(rows))
+
+
+def _unit(cell: str) -> str:
+    """The unit of the number of a cell; empty where something else stands behind it, or nothing.
+
+    >>> _unit("0.87(2) mT cm per mm"), _unit("1.2 Hz (u not known)"), _unit("1.5 s ago")
+    ('mT cm per mm', '', '')
+    """
+    found = _WITH_UNIT.fullmatch(cell)
+    return found["behind"] if found and is_unit(found["behind"]) else ""
 
 
 def _counts(cell: str) -> bool:
@@ -129,6 +139,8 @@ def _fold(cell: str, limit: float) -> str:
 
     >>> _fold("clock of the readings", 60)
     'clock of the\nreadings'
+    >>> _fold("ln ω against t", 58)
+    'ln ω\nagainst t'
     >>> _fold("0.97(3) (rad/s)^−½/s per Hz", 10)
     '0.97(3) (rad/s)^−½/s\nper Hz'
     """
@@ -145,8 +157,9 @@ def _fold(cell: str, limit: float) -> str:
     return "\n".join(lines)
 
 
-def _width(table: Table, paragraphs: frozenset[int]) -> float:
-    return sum(PARAGRAPH * LINE if k in paragraphs else _column(table, k) for k in range(len(table.heads)))
+def _width(table: Table, paragraphs: frozenset[int], size: float = 1.0) -> float:
+    """Width without the space between the columns [pt]; that of a paragraph does not depend on the size of letters."""
+    return sum(PARAGRAPH * LINE if k in paragraphs else size * _column(table, k) for k in range(len(table.heads)))
 
 
 def _column(table: Table, k: int) -> float:

@@ -161,11 +161,14 @@ def test_the_spin_is_reported_with_its_range_where_it_swings_and_as_constant_whe
 
 def test_the_table_says_what_its_numbers_are(capsys: pytest.CaptureFixture[str]) -> None:
     found = summary(preset("undriven"), 5.0)
-    unknown = replace(found.lines, lines=(replace(found.lines.lines[0], name=""),))
+    unknown = replace(found.lines, lines=(replace(found.lines.lines[0], name="", frequency=-1e-4),))
     print_motion(replace(found, lines=unknown, energy_change=0.0))
     shown = capsys.readouterr().out
     for words in ("steps of at most ", "exactly constant", "not identified", "resolution 0.4 Hz", "mrad, 2"):
         assert words in shown
+    assert next(line for line in shown.splitlines() if "not identified" in line).split()[0] == "0.00", (
+        "zero has no sign"
+    )
     print_motion(summary(preset("undriven").changed({"start.spin_hz": 15.0}), 1.0))
     tilt = next(line for line in capsys.readouterr().out.splitlines() if "tilt" in line)
     assert tilt.split() == ["tilt", "up", "to", "101°"]

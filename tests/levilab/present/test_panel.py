@@ -40,6 +40,10 @@ def test_a_person_sees_value_trend_instruments_and_time_left() -> None:
     ]
 
 
+def test_a_field_of_zero_has_no_sign() -> None:
+    assert "field 0.0000 mT" in texts(replace(LOCKED, last={"flux_density_t": -1e-9}))[0]
+
+
 def test_without_the_characters_there_is_no_spark_line() -> None:
     first, *_, last = texts(LOCKED, plain=True)
     assert "▁" not in first

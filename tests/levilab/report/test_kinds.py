@@ -22,7 +22,7 @@ from levilab.sweeps.request import SweepRequest, store_for
 from levilab.sweeps.run import compile_for, run
 from levilab.sweeps.store import SCHEMA
 from levilab.workers import this_process
-from support.figures import undrawn
+from support.figures import without_drawing
 from support.paths import SAMPLE_DATA
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a simulated motion, a sweep and a result of stability."""
     place = tmp_path_factory.mktemp("simulated")
     scene = with_settings(preset("undriven"), ["top.mass_kg=0.0252", "start.spin_hz=31"])
-    with undrawn():
+    with without_drawing():
         run_simulation(SimulationRequest(scene, 1.2, 1e-6, 100.0, place / "runs"), silent)
     request = SweepRequest(scene, ("start.spin_hz=18:40:3", "start.position_m.2=0.070:0.072:2"), duration=0.3)
     store = store_for(request, place / "map.zarr")
@@ -125,7 +125,7 @@ def test_a_motion_that_is_not_whole_is_an_error_that_names_the_folder(folder: Pa
 
 def test_simulations_and_a_measurement_go_into_one_report(place: Path, tmp_path: Path) -> None:
     said: list[str] = []
-    with undrawn():
+    with without_drawing():
         paths = [place, place / "where.json", SAMPLE_DATA / "lower-limits"]
         page = write_report(paths, tmp_path / "x.html", tell=said.append, tables=True).read_text(encoding="utf-8")
     for title in (
@@ -145,7 +145,7 @@ def test_simulations_and_a_measurement_go_into_one_report(place: Path, tmp_path:
 
 
 def test_a_report_of_simulations_alone_is_synthetic_as_a_whole(place: Path, tmp_path: Path) -> None:
-    with undrawn():
+    with without_drawing():
         page = write_report([place / "map.zarr"], tmp_path / "x.html").read_text(encoding="utf-8")
     assert page.count("SYNTHETIC") >= 2
     assert "levilab sweep" in page or "How to reproduce it" in page

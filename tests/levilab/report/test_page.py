@@ -23,7 +23,7 @@ from levilab.report.inputs import _drive
 from levilab.report.page import render as render_found
 from levilab.report.page import write_report
 from levilab.runs.run import RunRecord
-from support.figures import unmade
+from support.figures import without_figures
 from support.pages import Page
 from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
@@ -81,7 +81,7 @@ def changed(run: Path, **entries: object) -> Path:
 
 
 def text_of(*paths: Path, options: SpinDownOptions | None = None) -> str:
-    with unmade():
+    with without_figures():
         return Page(render(analyze_spindowns(paths, options or SpinDownOptions()))).text
 
 
@@ -216,7 +216,7 @@ def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, rea
 
 
 def reported(*paths: Path, output: Path, tell: Any = None, **options: Any) -> str:
-    with unmade():
+    with without_figures():
         page = write_report(paths, output, options, tell).read_text(encoding="utf-8")
     return Page(page).text
 

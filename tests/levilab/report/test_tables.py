@@ -12,12 +12,16 @@ import pytest
 
 from levilab.errors import LevilabError
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.field.quantities import SHOWN as FIELD
+from levilab.pipelines.row import UNITS_IN_NAMES
 from levilab.present.document.blocks import Banner, Details, Document, Section, Tabular
+from levilab.present.numbers import in_words
 from levilab.present.tables import Row, table
+from levilab.present.words import UNITS as WORDS
 from levilab.report.tables.folder import CONTENTS, folder_of, write_tables
 from levilab.report.tables.latex import as_latex, escaped
 from levilab.report.tables.values import Values, as_csv, of_analysis
-from levilab.report.tables.widths import LINE, SMALL_SEPARATION, fit, units_in_heads, width
+from levilab.report.tables.widths import LINE, PARAGRAPH, SMALL_SEPARATION, Fitted, fit, units_in_heads, width
 from support.paths import SAMPLE_DATA
 
 if TYPE_CHECKING:
@@ -113,21 +117,46 @@ def test_a_wide_table_is_folded_and_small_until_it_fits_a_line() -> None:
     assert not fit(table("", heads[:2], [row[:2] for row in rows])).small
     assert fitted.table.heads[4:] == ("adds to u\n[mT cm]", "share of u²\n[%]")
     assert [row.cells[4] for row in fitted.table.rows] == ["0.17", "1", "—"]
-    widths = [
-        max(width(line) for cell in (*(row.cells[k] for row in fitted.table.rows), head) for line in cell.split("\n"))
-        for k, head in enumerate(fitted.table.heads)
-    ]
-    assert 0.85 * sum(widths) + 2 * SMALL_SEPARATION * len(heads) < LINE
+    assert set_width(fitted) < LINE
     text = as_latex("budget", shown)
     assert r"\footnotesize\setlength{\tabcolsep}{3pt}" in text
     assert text.count(r"\begin{tabular}[b]{@{}r@{}}") >= 2, "heads end in one line"
     assert r"\begin{tabular}[t]{@{}l@{}}" in text, "folded names begin in the line of their row"
+    assert text.index(r"\caption") < text.index(r"\footnotesize"), "all captions of a thesis are of one size"
+
+
+def test_a_paragraph_is_as_wide_in_small_letters() -> None:
+    heads = ("source", "where it comes from", "type", "sensitivity", "adds to u")
+    remark = "the standard deviation of one top from another, of eight tops and two runs"
+    rows = [("temperature of the base", remark, "B", "0.28 mT cm per K", "not known"), ("u", "", "", "1", "2")]
+    fitted = fit(table("", heads, rows, numbers=heads[3:]))
+    assert fitted.paragraphs == {1}
+    assert fitted.table.rows[0].cells[1] == remark
+    assert set_width(fitted) < LINE
+
+
+def set_width(fitted: Fitted) -> float:
+    """Width of a table in small letters [pt]; a paragraph is a part of the line, whatever the letters are."""
+    rows = (fitted.table.heads, *(row.cells for row in fitted.table.rows))
+    columns = [max(width(line) for cell in column for line in cell.split("\n")) for column in zip(*rows, strict=True)]
+    set_columns = (PARAGRAPH * LINE if k in fitted.paragraphs else 0.85 * found for k, found in enumerate(columns))
+    return sum(set_columns) + 2 * SMALL_SEPARATION * len(columns)
 
 
 def test_of_trials_each_cell_keeps_what_chance_leaves_to_it() -> None:
     rows = [("strength", "125", "+0.26 ± 0.09", "71 ± 4 %"), ("origin", "125", "−0.08 ± 0.09", "74 ± 4 %")]
     shown = table("", ("quantity", "pulls", "mean", "within"), rows, numbers=("pulls", "mean", "within"))
     assert units_in_heads(shown) == shown
+
+
+def test_only_units_go_to_the_head() -> None:
+    for behind in ("Hz (u not known)", "s ago", "tops", "of 120", "per"):
+        shown = table("", ("x",), [(f"1.2 {behind}",), (f"3 {behind}",)], numbers=["x"])
+        assert units_in_heads(shown) == shown
+    of_results = {in_words(unit) for unit in UNITS_IN_NAMES} | {shown.unit for shown in FIELD.values()}
+    for unit in of_results - {""} | set(WORDS.values()) | {"mT cm per K", "per Hz"}:
+        found = units_in_heads(table("", ("x",), [(f"< −1.2(3)×10⁻³ {unit}",)], numbers=["x"]))
+        assert found.heads == (f"x\n[{unit}]",)
 
 
 def document(*names: str) -> Document:

@@ -22,6 +22,12 @@ def test_the_table_has_the_figures_of_the_thesis_beside(capsys):
     assert "21.86" not in other
 
 
+def test_a_mode_of_frequency_zero_has_no_sign(capsys):
+    print_stability(replace(stability_of(UNDRIVEN), modes=(-1e-5 + 0.5j, -2.5 + 0j)))
+    assert "0.000 (decays), −2.500" in (shown := capsys.readouterr().out)
+    assert "−0.000" not in shown
+
+
 def test_the_region_above_the_others_is_the_upper_one_and_a_single_one_is_not(capsys):
     found = stability_of(UNDRIVEN)
     for count, names in ((1, ["lower"]), (2, ["lower", "upper"]), (3, ["lower", "lower", "upper"])):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +19,7 @@ from levilab.pipelines.field.device import FieldOptions, known_of
 from levilab.pipelines.field.document import DOCUMENT
 from levilab.pipelines.field.figure import field_figure
 from levilab.pipelines.field.report import field_part
-from levilab.pipelines.field.table import field_tables
+from levilab.pipelines.field.table import field_tables, scans_table
 from levilab.pipelines.result import save
 from levilab.pipelines.sources import collect
 from levilab.pipelines.top import calculate_top
@@ -94,6 +95,9 @@ def test_a_result_holds_what_was_found_and_is_read_not_computed(
     for name in ("height", "flux_density", "u", "residuals", "covariance"):  # all that is drawn comes from these
         assert np.array_equal(getattr(recalled.runs[0].scan, name), getattr(found.runs[0].scan, name)), name
     assert recalled.all_warnings == found.all_warnings
+    zero = replace(found.runs[0].scan, height=np.array([-1e-5, 0.05]), flux_density=np.array([-2e-7, 0.03]))
+    (row,) = scans_table(replace(found, runs=(replace(found.runs[0], scan=zero),))).rows
+    assert row.cells[2:4] == ("0.00 … 5.00", "0.000 → 30.000"), "zero has no sign"
 
 
 def test_other_options_are_computed_anew_with_those_of_the_result(scan: Path) -> None:

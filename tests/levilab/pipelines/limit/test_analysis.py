@@ -12,8 +12,14 @@ import pytest
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting, save
-from levilab.pipelines.limit.analysis import LOWER_EDGE, RESONANCE, UPPER_EDGE, LimitOptions, analyze_limits
-from levilab.pipelines.limit.budget import budget_of_all
+from levilab.pipelines.limit.analysis import (
+    LOWER_EDGE,
+    RESONANCE,
+    UPPER_EDGE,
+    LimitAnalysis,
+    LimitOptions,
+    analyze_limits,
+)
 from levilab.pipelines.limit.report import limit_part
 from levilab.pipelines.limit.table import limit_tables
 from levilab.pipelines.sources import mark_of
@@ -46,7 +52,7 @@ def test_theory_beside_them_is_that_of_the_thesis_top(sample_data: Path, tmp_pat
 
 
 def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Path) -> None:
-    analysis = analyze_limits([sample_data], LimitOptions())
+    analysis = ANALYSES["limit"].analyze([sample_data], LimitOptions())
     document = ANALYSES["limit"].document(analysis, tmp_path)
     assert {"lower_mean", "upper_1_mean", "upper_2_standard_error"} <= document["values"].keys()
     assert "The top was lost by the drive 8 times." in analysis.groups[1].text
@@ -59,14 +65,43 @@ def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Pa
     assert "passed over: 4 spin runs" in analysis.remarks
     assert limit_tables(analysis)[1].title == "Beside theory, for 3 kinds of top"  # of 26 tops
     # the lower limits are real, so nothing that is made of them alone bears the mark
-    marks = [mark_of(analysis.inputs_of_budget(budget)) for budget in budget_of_all(analysis)]
-    assert marks == ["", "SYNTHETIC.", "SYNTHETIC."]
+    assert marks_of_budgets(analysis) == ["", "SYNTHETIC.", "SYNTHETIC."]
     assert mark_of(analysis.sources) == "SYNTHETIC IN PART (loose-washers, upper-limits)."
     _, quantities = of_analysis(ANALYSES["limit"], analysis, tmp_path)
     together = {row[3]: row[1] for row in quantities.rows if row[0] == "all together"}
     assert {name: made_up for name, made_up in together.items() if str(name).endswith("_mean")} == {
         "lower_mean": False, "upper_1_mean": True, "upper_2_mean": True,
     }  # fmt: skip
+
+
+def marks_of_budgets(analysis: LimitAnalysis) -> list[str]:
+    return [mark_of(analysis.inputs_of(budget.group)) for budget in analysis.budget]
+
+
+def test_groups_of_the_same_mean_are_told_apart(sample_data: Path, tmp_path: Path) -> None:
+    """Also in results that were written before budgets had the numbers of their groups."""
+    limits = ["67.5,0.25", "68.5,0.25", "68,0.25", "69,0.25"]
+    for name, changes, rows in (("a", {}, limits), ("b", {"drive_amplitude_vpp": 20.0}, reversed(limits))):
+        folder = shutil.copytree(sample_data / "upper-limits", tmp_path / name)
+        record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        record["configuration"]["limit"] |= changes
+        record["synthetic"] = name == "a"
+        (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
+        text = "\n".join(["spin_frequency_hz,spin_frequency_u_hz", *rows, ""])
+        (folder / "readings.csv").write_text(text, encoding="utf-8")
+    analysis = ANALYSES["limit"].analyze([tmp_path], LimitOptions())
+    one, other = (group.statistics.mean for group in analysis.groups)
+    assert one == other
+    assert marks_of_budgets(analysis) == ["SYNTHETIC.", ""]
+    document = ANALYSES["limit"].document(analysis, tmp_path)
+    assert [document["values"][f"upper_{k}_mean"]["group"] for k in (1, 2)] == [0, 1]
+    assert [budget.pop("group") for budget in document["budget"]] == [0, 1]
+    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    assert marks_of_budgets(ANALYSES["limit"].recall([tmp_path], LimitOptions())) == ["SYNTHETIC.", ""]
+    document["budget"][0]["group"] = 2
+    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(DataError, match="a budget is of none of the 2 groups"):
+        ANALYSES["limit"].recall([tmp_path], LimitOptions())
 
 
 def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Path) -> None:
