@@ -12,11 +12,10 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from levilab.errors import DataError, UsageError
-from levilab.formats import rows
 from levilab.formats.columns import Column, NoTable, TableError, shorten
 from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout
-from levilab.formats.rows import _read_at_once, _read_lines
+from levilab.formats.rows import FEW, _read_at_once, _read_lines
 from levilab.formats.table import ColumnsError, parse_columns, read_run_readings, read_table
 from levilab.formats.titles import read_title, unit_factor
 
@@ -36,10 +35,10 @@ def table_file(tmp_path):
     return write
 
 
-@pytest.fixture(params=[rows.FEW, 0], ids=["by line", "at once"])
+@pytest.fixture(params=[FEW, 0], ids=["by line", "at once"])
 def either_way(request, monkeypatch):
     """A short table is read line by line, a long one at once if its lines are plain: here short ones are, too."""
-    monkeypatch.setattr(rows, "FEW", request.param)
+    monkeypatch.setattr("levilab.formats.rows.FEW", request.param)
 
 
 BOTH_WAYS = pytest.mark.usefixtures("either_way")
