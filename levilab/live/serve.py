@@ -84,6 +84,7 @@ def serve_live(options: LiveOptions, announce: Callable[[str], None], say: Calla
         doors = Doors(listening.getsockname()[1])
         bench = at_end.enter_context(PracticeBench(root, seed=options.seed)) if options.mock else None
         hall = Hall(root, shown, doors, Desk(bench) if bench else None)
+        at_end.callback(hall.analyses.end)  # also after a second Ctrl-C, at which the server leaves the end out
         config = uvicorn.Config(
             application(hall),
             log_config=None,
