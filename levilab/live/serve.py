@@ -20,6 +20,7 @@ from levilab.runs.run import RECORD, find_run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
+    from types import FrameType
 
     from uvicorn import Server
 
@@ -74,6 +75,10 @@ def serve_live(options: LiveOptions, announce: Callable[[str], None], say: Calla
         def leave(self) -> None:
             self.should_exit = True
 
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            super().handle_exit(sig, frame)
+            self.force_exit = False  # by a second Ctrl-C: analyses would go on, and the end takes a second at most
+
         async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
             if text := farewell(bench, hall.analyses.running):
                 say(text)
@@ -84,7 +89,6 @@ def serve_live(options: LiveOptions, announce: Callable[[str], None], say: Calla
         doors = Doors(listening.getsockname()[1])
         bench = at_end.enter_context(PracticeBench(root, seed=options.seed)) if options.mock else None
         hall = Hall(root, shown, doors, Desk(bench) if bench else None)
-        at_end.callback(hall.analyses.end)  # also after a second Ctrl-C, at which the server leaves the end out
         config = uvicorn.Config(
             application(hall),
             log_config=None,
