@@ -52,7 +52,7 @@ function take(head, arrays) {
     seen.said = one.n;
     practice?.hear(one);
     follows ||= Boolean(practice) && wanted !== "" && one.kind === "recording";
-    if (/message|refused|ended/.test(one.kind) && !one.of_run) listEvent("", one.text, one.kind === "message" ? "" : "warning");
+    if (/message|refused|ended/.test(one.kind) && !one.of_run) listEvent(one, one.text, one.kind === "message" ? "" : "warning");
   }
   if (head.about) {
     if (data.about && data.about.status !== head.about.status) listRuns(seen.run);
@@ -75,6 +75,7 @@ function turnTo(run) {
   Object.assign(seen, {run, readings: -1, events: 0, fit: -1});
   Object.assign(data, {readings: null, fit: null, about: null, ended: "", last: {}, count: 0, trend: NaN});
   by("event-list").replaceChildren();
+  by("events-key").hidden = true;
   pointed = -1;
   dirty = {plot: true, trace: true};
   if (by("run").value !== run && run) listRuns(run);
@@ -107,13 +108,18 @@ function takeEvents(events) {
     seen.events = event.n;
     if (/^(failed|interrupted)$/.test(event.kind)) data.ended = event.text;
     const loud = /warning|damaged/.test(event.kind) ? "warning" : /lost|failed|not reached/.test(event.kind) ? "lost" : "";
-    listEvent(event.time_s === null ? "" : lapse(event.time_s).replace(" min", ""), event.text, loud);
+    listEvent(event, event.text, loud);
   }
 }
 
-function listEvent(when, text, loud) {
+/** Events of a run have its time; before its start, and at a bench without one, they have that of the clock. */
+function listEvent({time_s, utc}, text, loud) {
   const list = by("event-list"), item = make("li", "", loud);
-  item.append(make("time", when), make("span", text));
+  const ofRun = typeof time_s === "number", clock = ofRun ? "" : /T(\d\d:\d\d:\d\d)/.exec(utc)?.[1] || "";
+  const when = make("time", ofRun ? lapse(time_s).replace(" min", "") : clock);
+  if (clock) when.dateTime = utc;
+  by("events-key").hidden &&= !clock;
+  item.append(when, make("span", text));
   list.prepend(item);
   while (list.children.length > MOST_EVENTS) list.lastChild.remove();
 }

@@ -34,6 +34,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     hostile.readings(spin_down(19))
     hostile.event(HOSTILE, kind=HOSTILE)
+    hostile.event("the top follows the drive", time_s=130.0)
     return root
 
 
@@ -67,6 +68,12 @@ def test_nothing_that_a_run_contains_becomes_markup(shown: Page) -> None:
     assert HOSTILE in shown.inner_text("#event-list")
     assert HOSTILE in shown.inner_text("#facts")
     assert HOSTILE in shown.text_content("#counter-model")
+
+
+def test_events_before_the_start_have_the_time_of_the_clock(shown: Page) -> None:
+    times = shown.evaluate("[...document.querySelectorAll('#event-list time')].map((one) => one.textContent)")
+    assert times == ["2:10", "09:00:05"]  # the latest first
+    assert shown.inner_text("#events-key") == "clock times are UTC"
 
 
 def test_on_a_desk_nothing_scrolls(shown: Page) -> None:
