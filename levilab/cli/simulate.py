@@ -130,8 +130,8 @@ def _animate(request: "AnimationRequest", summary: "Summary", in_words: "Callabl
     from levilab.present.progress import ShareBar
 
     with interruptible("no animation was written"), contextlib.closing(ShareBar("drawing")) as share:
-        path = animate(request, summary, lambda text: message(in_words(text)), share)
-    message(f"wrote {path}")
+        shown = animate(request, summary, lambda text: message(in_words(text)), share)
+    message(f"wrote {request.path}: {shown}")
 
 
 def _explained(scene: "Scene", duration: float) -> "tuple[Effect, ...]":

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import LevilabError
 from levilab.live.practice.commands import RecordRun, command_of
 from levilab.motion.animation.parts import parts_of
-from levilab.runs.run import read_record
+from levilab.runs.run import read_record, utc_now
 from levilab.simulator.scene import read_scene, scene_of
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class Desk:
                 self.folders.append(Path(event.folder))
             text = event.text[:_LONGEST_TEXT]
             self._records = event.kind == "recording" or (self._records and event.kind != "recorded")
-            about = {"n": self.count, "kind": event.kind, "text": text, "status": event.status}
+            about = {"n": self.count, "kind": event.kind, "text": text, "status": event.status, "utc": utc_now()}
             self.said.append(about | {"of_run": self._records and event.kind == "message"})
 
     def said_after(self, number: object) -> list[dict[str, Any]]:

@@ -17,14 +17,14 @@ const LONGER = {  // what stands beside the state
   setup: "some seconds; up to a minute at the first start, which compiles",
   unreachable: "it is tried again; start levilab live anew if it was ended",
 };
-/** A record of the oscilloscope that is older is shown as old [s of bench time; where that is faster, of the wall]. */
-const OLD_S = 2;
+/** A record of the oscilloscope that is older is marked with its age [s of bench time; where that is faster, of the wall]: without pulses a count takes 2.5 s. */
+const OLD_S = 3;
 /** What a practice bench's oscilloscope shows, from above. */
 const CHANNELS = ["tape", "drive", "laser"];
 const SLIP_HZ = 0.05, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive; while it swings, or the drive moves
 
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, records: {}};
-const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, up: null, last: {}, count: 0, trend: NaN};
+const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
 let paused = false, drawn = null, pointed = -1, space = null, wanted = "", practice = null, reachable = true;
 let spoken = 0, close = null, dirty = {plot: true, trace: true};
@@ -52,7 +52,7 @@ function take(head, arrays) {
     seen.said = one.n;
     practice?.hear(one);
     follows ||= Boolean(practice) && wanted !== "" && one.kind === "recording";
-    if (/message|refused|ended/.test(one.kind) && !one.of_run) listEvent("", one.text, one.kind === "message" ? "" : "warning");
+    if (/message|refused|ended/.test(one.kind) && !one.of_run) listEvent(one, one.text, one.kind === "message" ? "" : "warning");
   }
   if (head.about) {
     if (data.about && data.about.status !== head.about.status) listRuns(seen.run);
@@ -75,6 +75,7 @@ function turnTo(run) {
   Object.assign(seen, {run, readings: -1, events: 0, fit: -1});
   Object.assign(data, {readings: null, fit: null, about: null, ended: "", last: {}, count: 0, trend: NaN});
   by("event-list").replaceChildren();
+  by("events-key").hidden = true;
   pointed = -1;
   dirty = {plot: true, trace: true};
   if (by("run").value !== run && run) listRuns(run);
@@ -107,13 +108,18 @@ function takeEvents(events) {
     seen.events = event.n;
     if (/^(failed|interrupted)$/.test(event.kind)) data.ended = event.text;
     const loud = /warning|damaged/.test(event.kind) ? "warning" : /lost|failed|not reached/.test(event.kind) ? "lost" : "";
-    listEvent(event.time_s === null ? "" : lapse(event.time_s).replace(" min", ""), event.text, loud);
+    listEvent(event, event.text, loud);
   }
 }
 
-function listEvent(when, text, loud) {
+/** Events of a run have its time; before its start, and at a bench without one, they have that of the clock. */
+function listEvent({time_s, utc}, text, loud) {
   const list = by("event-list"), item = make("li", "", loud);
-  item.append(make("time", when), make("span", text));
+  const ofRun = typeof time_s === "number", clock = ofRun ? "" : /T(\d\d:\d\d:\d\d)/.exec(utc)?.[1] || "";
+  const when = make("time", ofRun ? lapse(time_s).replace(" min", "") : clock);
+  if (clock) when.dateTime = utc;
+  by("events-key").hidden &&= !clock;
+  item.append(when, make("span", text));
   list.prepend(item);
   while (list.children.length > MOST_EVENTS) list.lastChild.remove();
 }
@@ -122,7 +128,9 @@ function takePoses(pieces, arrays) {
   if (!space) openTop();
   for (const [k, piece] of pieces.entries()) {
     seen.poses = piece.number;
-    data.up = arrays[`up_${k}`].at(-1) > 0.5;
+    const up = arrays[`up_${k}`], last = up.findLastIndex((one) => one > 0.5);
+    data.up = last === up.length - 1;
+    if (last >= 0) data.lastUp = piece.start_s + last * piece.step_s;
     space.add(piece.start_s, piece.step_s, arrays[`position_${k}`], arrays[`quaternion_${k}`], arrays[`up_${k}`]);
   }
 }
@@ -282,15 +290,22 @@ function showTop(bench) {
   by("space").setAttribute("aria-label", `the top over its base in three dimensions: it ${pose.up ? `floats ${height}` : "does not float"}`);
 }
 
-/** Say how old what the oscilloscope shows is, where it is old. */
+/** Say beside the oscilloscope that no top is up, and of each record how old it is, where it is old. */
 function showAge(bench) {
-  const age = data.records.size && bench ? bench.time_s - Math.max(...[...data.records.values()].map((one) => one.time_s)) : 0;
-  const old = age > OLD_S * Math.max(1, bench?.speed || 1);
-  by("scope").classList.toggle("old", old);
-  const said = old ? `record of ${lapse(age)} ago` : "";
-  if (by("scope-key").textContent === said) return;
-  write("scope-key", said);
-  dirty.trace = true;
+  write("scope-key", data.up === false ? "the top is down" : "");
+  for (const one of data.records.values()) {
+    const said = ageOf(one, bench);
+    if (one.said === said) continue;
+    one.said = said;
+    dirty.trace = true;
+  }
+}
+
+/** A run need not record all channels, and a counter that sees no pulse keeps the oscilloscope waiting. */
+function ageOf(record, bench) {
+  if (data.up === false && record.time_s <= data.lastUp) return "before the fall";
+  const age = bench ? bench.time_s - record.time_s : 0;
+  return age > OLD_S * Math.max(1, bench?.speed || 1) ? `${lapse(age)} ago` : "";
 }
 
 /** Say the last reading to those who listen, at most every few seconds. */
@@ -417,7 +432,7 @@ function open(run) {
   close?.();
   Object.assign(seen, {run: null, tick: -1, poses: 0, records: {}});
   data.records.clear();
-  data.bench = null;
+  Object.assign(data, {bench: null, up: null, lastUp: NaN});
   close = connect({
     run, ask, show: take,
     changed: (is) => {

@@ -17,7 +17,7 @@ from levilab.errors import LevilabError
 from levilab.motion.animation.paint import Painter, Pose, font
 from levilab.motion.animation.parts import COLOURS, parts_of
 from levilab.motion.animation.poses import height_for_camera, matrices
-from levilab.motion.animation.words import readout, speed_in_words
+from levilab.motion.animation.words import readout, span_in_words, speed_in_words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -180,6 +180,10 @@ class _Words:
         self._unit = min(film.size)
         self._small, self._large = font(self._unit / 36), font(self._unit / 26)
         self._line = self._unit / 25
+        speed = film.speed
+        self._about = ("simulated",) if speed is None else (
+            f"simulated, {speed_in_words(speed)}", span_in_words(film.poses)
+        )  # fmt: skip
         self._inset = _Inset(film)
 
     def write(self, picture: Image, k: int) -> None:
@@ -193,10 +197,10 @@ class _Words:
         while len(name) > 4 and pen.textlength(name, self._large) > 0.56 * picture.width:
             name = f"{name[:-2]}…"
         pen.text((edge, 0.8 * edge), name, text, self._large)
-        how = "simulated" if self._film.speed is None else f"simulated, {speed_in_words(self._film.speed)}"
-        pen.text((edge, 0.8 * edge + 1.5 * line), how, faint, self._small)
+        for row, said in enumerate(self._about):
+            pen.text((edge, 0.8 * edge + (1.5 + 1.1 * row) * line), said, faint, self._small)
         for row, (label, value) in enumerate(readout(self._film.poses, k)):
-            y = 0.8 * edge + (3.2 + 1.2 * row) * line
+            y = 0.8 * edge + (2.1 + 1.1 * len(self._about) + 1.2 * row) * line
             pen.text((edge, y), label, faint, self._small)
             pen.text((edge + 0.29 * self._unit, y), value, text, self._small, anchor="ra")
         self._inset.draw(pen, k, self._colours, self._small)

@@ -26,7 +26,7 @@ from levilab.motion.animation.film import Film, in_mm, nice_length, still, table
 from levilab.motion.animation.parts import COLOURS, parts_of
 from levilab.motion.animation.poses import height_for_camera
 from levilab.motion.animation.three import MissingThree, three_js
-from levilab.motion.animation.words import bind_units, short_speed, speed_in_words
+from levilab.motion.animation.words import bind_units, short_speed, span_in_words, speed_in_words
 from levilab.present.numbers import plain, with_decimals
 from levilab.software import software_versions
 
@@ -112,7 +112,7 @@ def as_page(page: Page) -> bytes:
     readings = _readings(poses)
     text = environment.get_template("page.html.j2").render(
         title=title,
-        lead=f"A Levitron as computed by levilab, {_span(poses)}, at first at {speed_in_words(page.speed)}.",
+        lead=f"A Levitron as computed by levilab, {span_in_words(poses)}, at first at {speed_in_words(page.speed)}.",
         alt=alt,
         still_light=_data_address(stills["light"], "light"),
         still_dark=_data_address(stills["dark"], "dark"),
@@ -194,17 +194,12 @@ def _readings(poses: Poses) -> list[tuple[str, str, int]]:
     return found
 
 
-def _span(poses: Poses) -> str:
-    last = ", where it is lost" if poses.fell else ""
-    return f"from {poses.times[0]:.4g} s to {poses.times[-1]:.4g} s{last}"
-
-
 def _alt(page: Page) -> str:
     poses = page.poses
     height, tilt = 100 * poses.positions[:, 2].mean(), math.degrees(poses.tilts.max())
     return (
         f"A spinning top with a magnet, a disc and a stem, on average {height:.1f} cm above a ring magnet, "
-        f"{_span(poses)}; its axis leans by up to {tilt:.1f} degrees"
+        f"{span_in_words(poses)}; its axis leans by up to {tilt:.1f} degrees"
     )
 
 
@@ -244,7 +239,7 @@ def _numbers(page: Page) -> list[tuple[str, str]]:
     tilts, heights = np.degrees(poses.tilts), 100 * poses.positions[:, 2]
     found = [
         ("scene", scene.description or "no description"),
-        ("shown", f"{_span(poses)}, of {float(motion.time[-1]):.4g} s that were simulated"),
+        ("shown", f"{span_in_words(poses)}, of {float(motion.time[-1]):.4g} s that were simulated"),
         ("end", page.summary.ending),
         ("height", f"{heights.min():.2f} to {heights.max():.2f} cm above the base's centre"),
         ("tilt", f"{tilts.min():.1f} to {tilts.max():.1f}° of the axis against the base's"),

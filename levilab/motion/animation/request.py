@@ -19,6 +19,7 @@ from levilab.motion.animation.page import (
     three_for_page,
 )
 from levilab.motion.animation.poses import poses_of, turn_rate
+from levilab.motion.animation.words import span_in_words, speed_in_words
 from levilab.simulator.compilation import announce_compilation
 
 if TYPE_CHECKING:
@@ -186,7 +187,7 @@ def _check_pictures(chosen: _Format, span: float, speed: float) -> None:
 
 def animate(
     request: AnimationRequest, summary: Summary, message: Callable[[str], None], progress: Progress | None = None
-) -> Path:
+) -> str:
     """Animate a span of a simulated motion; what does not come to its end leaves nothing behind.
 
     Args:
@@ -196,7 +197,7 @@ def animate(
         progress: called with the share that is done.
 
     Returns:
-        The file.
+        What the file shows, in words.
 
     Raises:
         UsageError: the top was lost before the span, or the file would become too large.
@@ -224,7 +225,7 @@ def animate(
     with writing(f"{request.path}: could not be written", "choose another place with `animate`"):
         request.path.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(request.path, content)
-    return request.path
+    return f"the motion {span_in_words(poses)}, at {speed_in_words(speed)}"
 
 
 def _span(request: AnimationRequest, end: float, *, fell: bool = False) -> tuple[float, float]:

@@ -39,6 +39,12 @@ def short_speed(speed: float) -> str:
     return speed_in_words(speed).removesuffix(" of real speed") if speed < 1 else f"{speed:g}"
 
 
+def span_in_words(poses: Poses) -> str:
+    """The seconds of the motion that are shown."""
+    last = ", where it is lost" if poses.fell else ""
+    return f"from {poses.times[0]:.4g} s to {poses.times[-1]:.4g} s{last}"
+
+
 def readout(poses: Poses, k: int) -> list[tuple[str, str]]:
     """Names and values of what is read at the k-th pose."""
     rows = [

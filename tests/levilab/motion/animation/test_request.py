@@ -19,7 +19,8 @@ SHORT = ("simulate", "undriven", "--duration", "0.2", "--animate-to", "0.05")
 def test_a_film_of_the_chosen_span_is_written(tmp_path: Path) -> None:
     ended = command(*SHORT, "--animate", "films/top.gif", cwd=tmp_path)
     assert ended.status == 0
-    assert ended.err.splitlines()[-1] == f"wrote {Path('films/top.gif')}"
+    shown = "the motion from 0 s to 0.05 s, at 1/20 of real speed"
+    assert ended.err.splitlines()[-1] == f"wrote {Path('films/top.gif')}: {shown}"
     with Image.open(tmp_path / "films/top.gif") as film:
         assert film.n_frames == 21  # type: ignore[attr-defined]
 

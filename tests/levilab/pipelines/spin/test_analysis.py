@@ -15,8 +15,9 @@ from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 from levilab.pipelines.catalogue import save as save_found
-from levilab.pipelines.spin.analysis import SpinOptions, analyze_spins
+from levilab.pipelines.spin.analysis import Series, SpinOptions, analyze_spins
 from levilab.pipelines.spin.figure import spin_figure
+from levilab.pipelines.spin.meaning import meaning
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
 from levilab.runs.run import Run, RunRecord, utc_now
 from levilab.runs.waveforms import run_waveforms
@@ -132,6 +133,14 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> Non
     assert series.time == pytest.approx([-0.2, 9.8, 19.8], abs=0.05)  # the middles of 0.4 s before they were complete
     by_start = 0.1 * 0.02 / np.sqrt(3)  # the slope, and how often a driver asks whether a record is complete
     assert series.u[1] == pytest.approx(np.hypot(analysis.runs[0].spin.frequency.u, by_start), rel=0.01)
+    assert "It loses 0.34 % of its spin a second, as a free top does in air." in meaning(analysis)[0]
+    alone = Series(series.time[1:2], series.frequency[1:2], series.u[1:2])  # of 0.4 s
+    (text,) = meaning(replace(analysis, runs=(replace(analysis.runs[0], series=alone),)))
+    assert "In 0.38 s no change of its spin shows beyond the uncertainty: it loses or gains less than" in text
+    assert "A free top loses some 0.3 % a second to the air: a longer record shows that" in text
+    held = Series(series.time, series.frequency.mean() + series.u * [1, -1, 1], series.u)
+    (text,) = meaning(replace(analysis, runs=(replace(analysis.runs[0], series=held),)))
+    assert "less than air takes from a free top: does a drive hold it?" in text
     document = ANALYSES["spin"].document(analysis, traced)
     assert document["inputs"][0]["path"] == "traces.jsonl"
     assert save_found(ANALYSES["spin"], analysis)[0] == traced / "result.json"
