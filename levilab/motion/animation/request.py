@@ -151,19 +151,30 @@ def check_request(request: AnimationRequest, scene: Scene, duration: float) -> N
             value=speed,
         )
     chosen.check()
-    _check_span(request, scene, duration, speed)
 
 
-def _check_span(request: AnimationRequest, scene: Scene, duration: float, speed: float) -> None:
-    """Raise SpanTooLong, unless the top falls early enough."""
+def check_span(request: AnimationRequest, scene: Scene, duration: float, message: Callable[[str], None]) -> None:
+    """Raise SpanTooLong where the span is longer than the file holds, unless the top falls early enough.
+
+    Only then it is simulated, coarsely, to find out whether it falls.
+
+    Args:
+        request: checked by `check_request`.
+        scene: what will be simulated.
+        duration: for how long [s].
+        message: called when code is compiled for it.
+    """
     start, stop = _span(request, duration)
+    speed = request.format.speed if request.speed is None else request.speed
     try:
         if request.format.encode:
             _check_pictures(request.format, stop - start, speed)
         else:  # it turns no slower than at the start, and perhaps faster later
             _count_for_page(scene, stop - start, abs(scene.start.spin_hz))
     except SpanTooLong as error:
-        if not _is_lost_by(scene, start + error.longest):
+        with announce_compilation(message):
+            is_lost = _is_lost_by(scene, start + error.longest)
+        if not is_lost:
             raise
 
 
@@ -191,7 +202,7 @@ def animate(
     """Animate a span of a simulated motion; what does not come to its end leaves nothing behind.
 
     Args:
-        request: checked by `check_request`.
+        request: checked by `check_request` and `check_span`.
         summary: of the motion.
         message: called with what a viewer should know.
         progress: called with the share that is done.

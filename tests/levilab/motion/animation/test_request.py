@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from numba.core.event import trigger_event
 from PIL import Image
 
 from levilab.motion.animation import request
+from levilab.simulator.kernels.splitting import advance
 from support.commands import command
 
 #: A twentieth of a second, in 20 pictures.
@@ -66,8 +68,14 @@ def test_what_makes_no_sense_is_refused_before_anything_is_simulated(
 
 
 def test_a_page_of_too_long_a_span_names_the_longest_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Before anything is simulated: 90 s take a while."""
+    """Before the motion is simulated: 90 s take a while.  Whether the top falls early is, and code compiled for it."""
+
+    def stays_up(*_: object) -> bool:
+        with trigger_event("numba:compile", {"dispatcher": advance}):
+            return False
+
     monkeypatch.setattr("levilab.motion.simulation.run_simulation", None)
+    monkeypatch.setattr("levilab.motion.animation.request._is_lost_by", stays_up)
     ended = command(
         "simulate",
         "undriven",
@@ -84,6 +92,7 @@ def test_a_page_of_too_long_a_span_names_the_longest_one(tmp_path: Path, monkeyp
     assert ended.status == 2
     assert "a page of at most 1.5 MB holds" in ended.err
     assert "choose a span of at most 6" in ended.err
+    assert "compiling for this kind of scene" in ended.err
     assert not list(tmp_path.iterdir())
 
 
