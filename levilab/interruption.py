@@ -3,14 +3,17 @@
 An acquisition finishes its reading, switches the outputs off and keeps the run (`watching_for_interruption`).  A server
 ends when its event loop has its turn (`watching_for_end`).  Work that must not be torn postpones Ctrl-C
 (`interruption_postponed`).  A process that works for another leaves Ctrl-C to that one (`interruption_blocked`,
-`ignore_interruption`).  Elsewhere Ctrl-C is Python's KeyboardInterrupt, which the command line turns into one line
-and an exit status.
+`ignore_interruption`).  While modules are imported, and after the last word, Ctrl-C ends the process at once
+(`interruption_ends_process`, `end_process_at_interruption`).  Elsewhere Ctrl-C is Python's KeyboardInterrupt, which the
+command line turns into one line and an exit status.
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
+import sys
 import threading
 from typing import TYPE_CHECKING
 
@@ -40,8 +43,9 @@ class Stop:
     """Whether a signal asked for the end.
 
     The first signal is only noted, so that it tears no exchange with an instrument; `check()` raises Interrupted where
-    the program can end well.  The second signal raises Interrupted at once, in case an exchange hangs.  Later signals
-    are ignored, so that nothing can keep the outputs from going off.
+    the program can end well.  The second one raises Interrupted at once, in case an exchange hangs, but only within
+    `exposed()`: while a run folder is made or completed nothing is torn.  Once Interrupted was raised, signals are
+    ignored, so that nothing can keep the outputs from going off, nor the run from being kept.
 
     Attributes:
         by: the name of the latest signal; None: there was none.
@@ -49,13 +53,23 @@ class Stop:
 
     def __init__(self) -> None:
         self.by: str | None = None
-        self._is_shielded = False
+        self._is_shielded = True
         self._raises_at_once = False
 
     def check(self) -> None:
         """Raise Interrupted if a signal asked for the end."""
         if self.by:
+            self._is_shielded = True
             raise Interrupted(self.by)
+
+    @contextlib.contextmanager
+    def exposed(self) -> Iterator[None]:
+        """Let the second signal raise Interrupted at once, while an exchange with an instrument may hang."""
+        self._is_shielded = False
+        try:
+            yield
+        finally:
+            self._is_shielded = True
 
     def shield(self) -> None:
         """Let no signal raise Interrupted from now on: the outputs are going off."""
@@ -162,6 +176,48 @@ def interruption_postponed() -> Iterator[Callable[[], None]]:
 def ignore_interruption() -> None:
     """Ignore Ctrl-C in this process from now on: the process that started it receives it as well, and ends it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextlib.contextmanager
+def interruption_ends_process(status: int, line: str) -> Iterator[None]:
+    """Let Ctrl-C end this process at once while modules are imported and nothing has begun (main thread only).
+
+    KeyboardInterrupt would not do there.  In a callback of the import system Python ignores it; while a class is made
+    it becomes the cause of a RuntimeError; and where it passes an exec(), as of dataclasses, Python ends by the signal
+    in spite of every handler.
+
+    Args:
+        status: of the process.
+        line: what it says on standard error.
+    """
+    before = end_process_at_interruption(status, line)
+    try:
+        yield
+    finally:
+        if before is not None:
+            signal.signal(signal.SIGINT, before)
+
+
+def end_process_at_interruption(status: int, line: str = "") -> Callable[[int, FrameType | None], object] | None:
+    """Let Ctrl-C end this process at once from now on; see `interruption_ends_process`.
+
+    Returns:
+        Python's handler, which was in force before; None where another is, or none, and stays.
+    """
+
+    def end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - a signal handler
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(Exception):  # it may be at work, or closed
+                stream.flush()
+        with contextlib.suppress(OSError):
+            os.write(2, line.encode())
+        os._exit(status)
+
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        return None
+    signal.signal(signal.SIGINT, end)
+    return signal.default_int_handler
 
 
 @contextlib.contextmanager

@@ -77,7 +77,8 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
     experiment = EXPERIMENTS[request.experiment]
     with watching_for_interruption() as stop, _writer(request, show) as writer, contextlib.closing(show):
         try:
-            _at_the_bench(experiment, request, writer, show, stop, watch=watch)
+            with stop.exposed():
+                _at_the_bench(experiment, request, writer, show, stop, watch=watch)
             status: Status = "finished"
         except Interrupted as interruption:
             text = f"interrupted by {interruption.by}, outputs are off"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from levilab.cli import exit_codes
+from levilab.cli.importing import importing
 from levilab.cli.later import Later
 from levilab.cli.options import Json
 from levilab.cli.output import message, print_json, result
@@ -73,11 +74,13 @@ def acquire_experiment(
     as_json: Json = False,
 ) -> None:
     """Carry out the experiment that the command is named after."""
-    from levilab.acquisition.loop import acquire
-    from levilab.acquisition.request import AcquisitionOptions, chosen_settings, request_for
-    from levilab.acquisition.table import EXPERIMENTS
-    from levilab.bench.person import ask_no_person
-    from levilab.present.progress import to_stderr
+    with importing():
+        from levilab.acquisition.loop import acquire
+        from levilab.acquisition.request import AcquisitionOptions, chosen_settings, request_for
+        from levilab.acquisition.table import EXPERIMENTS
+        from levilab.bench.person import ask_no_person
+        from levilab.interruption import watching_for_end
+        from levilab.present.progress import to_stderr
 
     options = AcquisitionOptions(
         mock=mock,
@@ -97,17 +100,19 @@ def acquire_experiment(
     if list_settings:
         _print_settings(chosen_settings(experiment, options), experiment, as_json=as_json)
         return
-    run = acquire(request_for(experiment, options), to_stderr())
-    readings = run.count()
-    if as_json:
-        print_json({"run": str(run.folder), "status": run.status, "readings": readings}, indent=None)
-    else:
-        called = EXPERIMENTS[experiment].called
-        result(f"{run.status}: {readings} {called}{'s' * (readings != 1)} in {run.folder}")
-    if run.status == "interrupted":
-        if readings:
-            message(f"go on with it: levilab acquire {experiment} --resume {run.folder}")
-        raise typer.Exit(exit_codes.INTERRUPTED)
+    request = request_for(experiment, options)
+    with watching_for_end():  # `acquire` takes the signals; after it the run is kept, and one more changes nothing
+        run = acquire(request, to_stderr())
+        readings = run.count()
+        if as_json:
+            print_json({"run": str(run.folder), "status": run.status, "readings": readings}, indent=None)
+        else:
+            called = EXPERIMENTS[experiment].called
+            result(f"{run.status}: {readings} {called}{'s' * (readings != 1)} in {run.folder}")
+        if run.status == "interrupted":
+            if readings:
+                message(f"go on with it: levilab acquire {experiment} --resume {run.folder}")
+            raise typer.Exit(exit_codes.INTERRUPTED)
 
 
 def _print_settings(config: "BenchConfig", experiment: str, *, as_json: bool) -> None:

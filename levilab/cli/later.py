@@ -8,6 +8,8 @@ from typing import Any
 import typer
 import typer.core
 
+from levilab.cli.importing import importing
+
 
 class Later(typer.core.TyperCommand):
     """A stand-in for a command, with its name and its texts.
@@ -26,7 +28,8 @@ class Later(typer.core.TyperCommand):
     def command(self) -> Any:
         """The command itself."""
         assert self.callback is not None
-        made = self.callback()
+        with importing():
+            made = self.callback()
         if not isinstance(made, typer.Typer):
             made, function = typer.Typer(add_completion=False), made
             made.command(self.name)(function)

@@ -12,6 +12,7 @@ import typer
 import typer.core
 
 from levilab.cli import exit_codes
+from levilab.cli.importing import importing
 from levilab.cli.later import Later
 from levilab.cli.output import message
 from levilab.cli.quantities import in_options
@@ -23,6 +24,11 @@ _SHOULD_BE = r"Input should be (a valid )?(.*?)(, unable to .*|, got .*)?"
 class Commands(typer.core.TyperGroup):
     """All commands.  The wrong value of an option is refused in plain words; Ctrl-C ends them in one line."""
 
+    def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
+        """Read the options before the command, which imports pydantic."""
+        with importing():
+            return super().make_context(info_name, args, parent, **extra)
+
     def invoke(self, ctx: Any) -> Any:
         """Carry out what was called."""
         try:
@@ -30,7 +36,7 @@ class Commands(typer.core.TyperGroup):
         except typer.BadParameter as error:
             error.message = in_plain_words(error.message, _refused(error))
             raise
-        except KeyboardInterrupt:  # while a command is imported; what can be lost later is said by the command itself
+        except KeyboardInterrupt:  # what can be lost is said by the command itself
             message("levilab: interrupted")
             raise typer.Exit(exit_codes.INTERRUPTED) from None
 

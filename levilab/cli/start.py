@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import atexit
 import sys
 
 from levilab.cli.exit_codes import INTERRUPTED
+from levilab.cli.importing import LINE, importing
+from levilab.interruption import end_process_at_interruption, ignore_interruption
 
 
 def main() -> None:
     """Import the application and carry out the command line."""
+    atexit.register(ignore_interruption)  # runs last: while Python itself ends, Ctrl-C would end it by the signal
     try:
-        from levilab.cli.main import main as carry_out  # with typer: a tenth of a second, in which Ctrl-C may come
+        with importing():
+            from levilab.cli.main import main as carry_out  # with typer: a tenth of a second, in which Ctrl-C may come
 
         carry_out()
     except KeyboardInterrupt:
-        sys.stderr.write("levilab: interrupted\n")
+        sys.stderr.write(LINE)
         sys.exit(INTERRUPTED)
+    finally:  # what was to be said is said; what is left are threads to wait for
+        end_process_at_interruption(INTERRUPTED)

@@ -25,6 +25,10 @@ REPORT = "report.html"
 RESULT = "result.json"
 #: An analysis that takes longer than this is given up [s].
 _LONGEST_S = 600.0
+#: Signals to the view's process group, as Ctrl-C in a terminal, leave an analysis alone: the view ends it and says so.
+_APART: dict[str, Any] = {
+    "start_new_session": True, "creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
+}  # fmt: skip
 #: What a page shows of a result at most [characters].
 _LONGEST_TEXT = 2000
 
@@ -81,6 +85,7 @@ class Analyses:
                 stderr=subprocess.PIPE,
                 encoding="utf-8",
                 errors="replace",
+                **_APART,
             )
             self._processes.add(process)
         with process:

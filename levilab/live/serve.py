@@ -20,6 +20,7 @@ from levilab.runs.run import RECORD, find_run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
+    from types import FrameType
 
     from uvicorn import Server
 
@@ -73,6 +74,10 @@ def serve_live(options: LiveOptions, announce: Callable[[str], None], say: Calla
 
         def leave(self) -> None:
             self.should_exit = True
+
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            super().handle_exit(sig, frame)
+            self.force_exit = False  # by a second Ctrl-C: analyses would go on, and the end takes a second at most
 
         async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
             if text := farewell(bench, hall.analyses.running):

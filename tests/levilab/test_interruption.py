@@ -5,7 +5,13 @@ import threading
 
 import pytest
 
-from levilab.interruption import Interrupted, interruption_postponed, watching_for_interruption
+from levilab.interruption import (
+    Interrupted,
+    end_process_at_interruption,
+    interruption_ends_process,
+    interruption_postponed,
+    watching_for_interruption,
+)
 
 SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 
@@ -34,7 +40,7 @@ def test_the_first_signal_is_only_noted_and_raised_where_it_is_looked_for(number
 
 @pytest.mark.parametrize("number", SIGNALS)
 def test_the_second_signal_breaks_through_once(number):
-    with watching_for_interruption() as stop:
+    with watching_for_interruption() as stop, stop.exposed():
         signal.raise_signal(number)
         with pytest.raises(Interrupted):
             signal.raise_signal(number)
@@ -43,8 +49,24 @@ def test_the_second_signal_breaks_through_once(number):
             stop.check()
 
 
+def test_while_a_run_is_made_or_completed_signals_are_only_noted():
+    with watching_for_interruption() as stop:
+        for _ in range(3):
+            signal.raise_signal(signal.SIGINT)
+        with stop.exposed(), pytest.raises(Interrupted):
+            stop.check()
+        signal.raise_signal(signal.SIGINT)
+    with watching_for_interruption() as stop:
+        with stop.exposed():
+            signal.raise_signal(signal.SIGINT)
+            with pytest.raises(Interrupted):
+                stop.check()
+            signal.raise_signal(signal.SIGINT)  # on the way out already
+        signal.raise_signal(signal.SIGINT)
+
+
 def test_two_different_signals_count_together():
-    with watching_for_interruption():
+    with watching_for_interruption() as stop, stop.exposed():
         signal.raise_signal(signal.SIGTERM)
         with pytest.raises(Interrupted, match="SIGINT"):
             signal.raise_signal(signal.SIGINT)
@@ -52,7 +74,7 @@ def test_two_different_signals_count_together():
 
 @pytest.mark.parametrize("before", [0, 1])
 def test_nothing_breaks_through_the_shield(before):
-    with watching_for_interruption() as stop:
+    with watching_for_interruption() as stop, stop.exposed():
         for _ in range(before):
             signal.raise_signal(signal.SIGINT)
         stop.shield()
@@ -115,3 +137,16 @@ def test_postponed_ctrl_c_comes_at_the_end_at_the_latest():
         reached = True
     assert reached
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_while_modules_are_imported_ctrl_c_ends_the_process_in_one_line(monkeypatch, capfd):
+    ended = []
+    monkeypatch.setattr("os._exit", ended.append)
+    with interruption_ends_process(130, "interrupted\n"):
+        signal.raise_signal(signal.SIGINT)
+    assert (ended, capfd.readouterr().err) == ([130], "interrupted\n")
+    with pytest.raises(KeyboardInterrupt):  # from here on it is Python's
+        signal.raise_signal(signal.SIGINT)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    assert end_process_at_interruption(130) is None  # what a shell had it ignore stays ignored
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN

@@ -17,14 +17,14 @@ const LONGER = {  // what stands beside the state
   setup: "some seconds; up to a minute at the first start, which compiles",
   unreachable: "it is tried again; start levilab live anew if it was ended",
 };
-/** A record of the oscilloscope that is older is shown as old [s of bench time; where that is faster, of the wall]. */
-const OLD_S = 2;
+/** A record of the oscilloscope that is older is marked with its age [s of bench time; where that is faster, of the wall]: without pulses a count takes 2.5 s. */
+const OLD_S = 3;
 /** What a practice bench's oscilloscope shows, from above. */
 const CHANNELS = ["tape", "drive", "laser"];
 const SLIP_HZ = 0.05, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive; while it swings, or the drive moves
 
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, records: {}};
-const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, up: null, last: {}, count: 0, trend: NaN};
+const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
 let paused = false, drawn = null, pointed = -1, space = null, wanted = "", practice = null, reachable = true;
 let spoken = 0, close = null, dirty = {plot: true, trace: true};
@@ -122,7 +122,9 @@ function takePoses(pieces, arrays) {
   if (!space) openTop();
   for (const [k, piece] of pieces.entries()) {
     seen.poses = piece.number;
-    data.up = arrays[`up_${k}`].at(-1) > 0.5;
+    const up = arrays[`up_${k}`], last = up.findLastIndex((one) => one > 0.5);
+    data.up = last === up.length - 1;
+    if (last >= 0) data.lastUp = piece.start_s + last * piece.step_s;
     space.add(piece.start_s, piece.step_s, arrays[`position_${k}`], arrays[`quaternion_${k}`], arrays[`up_${k}`]);
   }
 }
@@ -282,15 +284,22 @@ function showTop(bench) {
   by("space").setAttribute("aria-label", `the top over its base in three dimensions: it ${pose.up ? `floats ${height}` : "does not float"}`);
 }
 
-/** Say how old what the oscilloscope shows is, where it is old. */
+/** Say beside the oscilloscope that no top is up, and of each record how old it is, where it is old. */
 function showAge(bench) {
-  const age = data.records.size && bench ? bench.time_s - Math.max(...[...data.records.values()].map((one) => one.time_s)) : 0;
-  const old = age > OLD_S * Math.max(1, bench?.speed || 1);
-  by("scope").classList.toggle("old", old);
-  const said = old ? `record of ${lapse(age)} ago` : "";
-  if (by("scope-key").textContent === said) return;
-  write("scope-key", said);
-  dirty.trace = true;
+  write("scope-key", data.up === false ? "the top is down" : "");
+  for (const one of data.records.values()) {
+    const said = ageOf(one, bench);
+    if (one.said === said) continue;
+    one.said = said;
+    dirty.trace = true;
+  }
+}
+
+/** A run need not record all channels, and a counter that sees no pulse keeps the oscilloscope waiting. */
+function ageOf(record, bench) {
+  if (data.up === false && record.time_s <= data.lastUp) return "before the fall";
+  const age = bench ? bench.time_s - record.time_s : 0;
+  return age > OLD_S * Math.max(1, bench?.speed || 1) ? `${lapse(age)} ago` : "";
 }
 
 /** Say the last reading to those who listen, at most every few seconds. */
@@ -417,7 +426,7 @@ function open(run) {
   close?.();
   Object.assign(seen, {run: null, tick: -1, poses: 0, records: {}});
   data.records.clear();
-  data.bench = null;
+  Object.assign(data, {bench: null, up: null, lastUp: NaN});
   close = connect({
     run, ask, show: take,
     changed: (is) => {

@@ -254,7 +254,15 @@ function curve(c, fit, toX, toY, wanted) {
 /** The screen of the oscilloscope is at least so high [V]. */
 const LEAST_SPAN_V = 0.8;
 
-/** Draw the oscilloscope's screen: each channel's latest record, one below the other, on one scale of time. */
+/** A record with something said of it is old: it is drawn so faintly. */
+const FAINT = 0.45;
+
+/**
+ * Draw the oscilloscope's screen: each channel's latest record, one below the other, on one scale of time.
+ *
+ * @param records channel, low, high, start_s, step_s, and said: how old it is, "" for a new one.
+ * @returns the same in words.
+ */
 export function drawRecords(paper, records) {
   const paint = colours(), {context: c} = paper;
   const [width, height] = paper.fit();
@@ -281,6 +289,8 @@ export function drawRecords(paper, records) {
     const floor = (channel + 1) * band - 7, ceiling = channel * band + 24;  // above it stands what it is
     const toX = (k) => (one.start_s + (k + 0.5) * one.step_s - begin) / (end - begin) * width;
     const toY = (value) => floor - (value - lowest) / (highest - lowest) * (floor - ceiling);
+    const old = one.said ? `, ${one.said}` : "";
+    c.globalAlpha = old ? FAINT : 1;
     c.strokeStyle = paint[`trace-${channel % 4 + 1}`];
     c.lineWidth = 1.2;
     c.beginPath();
@@ -289,11 +299,12 @@ export function drawRecords(paper, records) {
       if (one.high[k] !== one.low[k]) c.lineTo(toX(k), toY(one.high[k]));
     }
     c.stroke();
+    c.globalAlpha = 1;
     c.fillStyle = c.strokeStyle;
     c.textAlign = "left";
     c.textBaseline = "top";
-    c.fillText(`${one.channel}  ${short(from, 3)} … ${short(to, 3)} V`, 8, channel * band + 6);
-    said.push(`${one.channel} from ${short(from, 3)} to ${short(to, 3)} volts`);
+    c.fillText(`${one.channel}  ${short(from, 3)} … ${short(to, 3)} V${old}`, 8, channel * band + 6);
+    said.push(`${one.channel} from ${short(from, 3)} to ${short(to, 3)} volts${old}`);
   });
   c.fillStyle = paint.dim;
   c.textAlign = "right";

@@ -154,10 +154,12 @@ class Seen:
     Attributes:
         values: channel → value.
         records: of the oscilloscope, as `Doing` has them.
+        number: of the last record.
     """
 
     values: dict[str, float] = field(default_factory=dict)
     records: dict[str, tuple[int, float, Trace]] = field(default_factory=dict)
+    number: int = 0
 
 
 #: What a person can do at this bench about a run that failed.
@@ -324,9 +326,10 @@ class PracticeProcess:
         if self._publisher.is_watched and now >= self._next_record:
             self._next_record = now + 0.5
             bench.oscilloscope.acquire(timeout_s=1.0)
+            taken = self.clock.now()  # the record's way to this computer takes longer
+            self._seen.number += 1
             for input_, channel in CHANNELS.items():
-                number = self._seen.records[channel][0] + 1 if channel in self._seen.records else 1
-                self._seen.records[channel] = number, self.clock.now(), bench.oscilloscope.trace(input_)
+                self._seen.records[channel] = self._seen.number, taken, bench.oscilloscope.trace(input_)
 
     def _saw(self, channel: str, value: float | None) -> None:
         if value is None:
@@ -655,6 +658,7 @@ class PracticeProcess:
     def _record(self, command: RecordRun) -> None:
         """Carry out an experiment; whatever ends it, the bench goes on."""
         self._seen.values.clear()
+        self._seen.records.clear()  # else views get them once more when the run is over
         self._folder = ""  # a run may fail before it has one
         try:
             run = acquire(self._request(command), LinesToReport(self._report), self._watching)

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from levilab.runs.run import Status
+
 
 @pytest.fixture
 def outputs(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
@@ -291,6 +293,13 @@ def test_a_signal_while_connecting_never_lets_the_drive_on(
         answer: str = identity(self)
         return answer
 
+    def and_again(self: RunWriter, status: Status) -> None:  # an impatient person's do not tear what is kept
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+        finish(self, status)
+
+    finish = RunWriter.finish
+    monkeypatch.setattr(RunWriter, "finish", and_again)
     monkeypatch.setattr(driver, "identity", interrupted)
     run = acquire(mock(tmp_path), Silent())
     assert run.status == "interrupted"

@@ -11,6 +11,7 @@ import pytest
 from levilab.cli.exit_codes import INTERRUPTED
 from levilab.cli.later import Later
 from levilab.cli.start import main
+from levilab.interruption import ignore_interruption
 from support.commands import command
 from support.paths import ROOT
 
@@ -30,10 +31,14 @@ def test_the_console_script_starts_the_application() -> None:
 def test_ctrl_c_at_the_start_ends_in_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    afterwards: list[Any] = []  # one more Ctrl-C while Python ends changes nothing
+    monkeypatch.setattr("levilab.cli.start.end_process_at_interruption", afterwards.append)
+    monkeypatch.setattr("atexit.register", afterwards.append)
     monkeypatch.setattr("levilab.cli.main.main", interrupt)
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == INTERRUPTED
+    assert afterwards == [ignore_interruption, INTERRUPTED]
     assert capsys.readouterr().err == "levilab: interrupted\n"
 
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 HOSTILE = '<img src=x onerror="window.hacked=1"><script>window.hacked=1</script>&lt;b&gt;'
 NAME = "20261122T090000Z-spin-0bad"
+#: What is said of the oscilloscope's screen to those who do not see it.
+SAID = "document.getElementById('trace').getAttribute('aria-label')"
 
 
 @pytest.fixture(scope="module")
@@ -210,8 +212,19 @@ def test_what_the_bench_publishes_is_drawn(served: Hall, page: Page, tmp_path: P
     assert page.inner_text("#scope-key") == ""
     later = State(13.0, last={"height_m": 0.11, "flux_density_t": 0.00896}, virtual=True, speed=1.0, probe_m=0.072)
     publish(served.watches[run.folder.name], later)
-    assert until(page, "document.getElementById('scope-key').textContent") == "record of 12 s ago"
+    assert "volts, 12 s ago, over" in until(page, f"{SAID}.includes('ago') && {SAID}")
     assert [page.inner_text(f"#{name}") for name in ("field-value", "probe")] == ["8.960", "11 cm above the base"]
+    # the laser is not among the channels of this run, and the top falls before the next record of the tape
+    up = np.arange(n) < n / 2
+    publish(
+        served.watches[run.folder.name],
+        Record(1, "laser", 13.0, -0.1, 2e-4, wave, wave),
+        Poses(13.0, 1 / 400, position, quaternion, up),
+    )
+    assert until(page, "document.getElementById('scope-key').textContent") == "the top is down"
+    assert until(page, f"{SAID}.match(/fall/g)?.length") == 2
+    publish(served.watches[run.folder.name], Record(2, "tape", 13.9, -0.1, 2e-4, 0 * wave, 0 * wave))
+    assert until(page, f"{SAID}.includes('tape from 0 to 0 volts, laser from') && {SAID}").count("before the fall") == 1
 
 
 def test_a_million_readings_are_drawn_from_a_few_thousand_numbers(served: Hall, page: Page, tmp_path: Path) -> None:

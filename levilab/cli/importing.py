@@ -1,0 +1,18 @@
+"""Ctrl-C while a command imports what it needs, before it does anything."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from levilab.cli.exit_codes import INTERRUPTED
+from levilab.interruption import interruption_ends_process
+
+if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
+LINE = "levilab: interrupted\n"
+
+
+def importing() -> AbstractContextManager[None]:
+    """The context of these imports: Ctrl-C ends the process in one line."""
+    return interruption_ends_process(INTERRUPTED, LINE)
