@@ -229,7 +229,6 @@ def application(hall: Hall) -> Guard:
             yield
         finally:
             reading.cancel()
-            hall.analyses.end()
 
     routes = [
         Route("/", pages.page),
