@@ -4,9 +4,9 @@ An acquisition finishes its reading, switches the outputs off and keeps the run 
 ends when its event loop has its turn (`watching_for_end`).  Work that must not be torn postpones Ctrl-C
 (`interruption_postponed`).  A process that works for another leaves Ctrl-C to that one (`interruption_blocked`,
 `ignore_interruption`).  While modules are imported, and after the last word, Ctrl-C ends the process at once
-(`interruption_ends_process`, `end_process_at_interruption`), and while Python ends every signal is ignored
-(`ignore_all_signals`).  Elsewhere Ctrl-C is Python's KeyboardInterrupt, which the
-command line turns into one line and an exit status.
+(`interruption_ends_process`, `end_process_at_interruption`); while Python ends all signals are ignored
+(`ignore_all_signals`).  Elsewhere Ctrl-C is Python's KeyboardInterrupt, which the command line turns into one line and
+an exit status.
 """
 
 from __future__ import annotations
