@@ -124,6 +124,7 @@ export async function openSpace(canvas, of) {
       if (JSON.stringify(of) === JSON.stringify(parts)) return;
       build(of);
       resize();
+      if (state) state = show();  // the new top stands where the old one stood
     },
     setRate: (value) => { rate = value; },
     setSpeed: (value, still) => { speed = still ? 0 : value || 1; },
