@@ -4,8 +4,9 @@ An acquisition finishes its reading, switches the outputs off and keeps the run 
 ends when its event loop has its turn (`watching_for_end`).  Work that must not be torn postpones Ctrl-C
 (`interruption_postponed`).  A process that works for another leaves Ctrl-C to that one (`interruption_blocked`,
 `ignore_interruption`).  While modules are imported, and after the last word, Ctrl-C ends the process at once
-(`interruption_ends_process`, `end_process_at_interruption`).  Elsewhere Ctrl-C is Python's KeyboardInterrupt, which the
-command line turns into one line and an exit status.
+(`interruption_ends_process`, `end_process_at_interruption`); while Python ends all signals are ignored
+(`ignore_all_signals`).  Elsewhere Ctrl-C is Python's KeyboardInterrupt, which the command line turns into one line and
+an exit status.
 """
 
 from __future__ import annotations
@@ -176,6 +177,12 @@ def interruption_postponed() -> Iterator[Callable[[], None]]:
 def ignore_interruption() -> None:
     """Ignore Ctrl-C in this process from now on: the process that started it receives it as well, and ends it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def ignore_all_signals() -> None:
+    """Ignore what asks for the end, in this process and from now on: it has said its last word, and is ending."""
+    for number in _SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 @contextlib.contextmanager

@@ -1,12 +1,12 @@
 """The live view.  Heavy imports happen inside the command."""
 
-import contextlib
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from levilab.cli import exit_codes
+from levilab.cli.importing import importing
 from levilab.cli.output import message, result
 
 
@@ -25,10 +25,12 @@ def live(
     no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser: print the address only.")] = False,
 ) -> None:
     """Serve the view until Ctrl-C."""
-    from levilab.motion.animation.three import three_js
+    with importing():
+        from levilab.motion.animation.three import three_js
 
-    three_js("the live view")  # raises where the extra is not installed
-    from levilab.live.serve import LiveOptions, serve_live
+        three_js("the live view")  # raises where the extra is not installed
+        from levilab.interruption import watching_for_end
+        from levilab.live.serve import LiveOptions, serve_live
 
     def announce(address: str) -> None:
         result(address)
@@ -39,7 +41,7 @@ def live(
 
             webbrowser.open(address)
 
-    with contextlib.suppress(KeyboardInterrupt):  # before it serves, or a second one at its end
-        serve_live(LiveOptions(run, out, mock, port), announce, message)
-    message("levilab: the view is closed")
+    with watching_for_end() as end:  # up to the last word
+        serve_live(LiveOptions(run, out, mock, port), end, announce, message)
+        message("levilab: the view is closed")
     raise typer.Exit(exit_codes.INTERRUPTED)

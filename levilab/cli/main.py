@@ -1,7 +1,6 @@
 """The application, the help of its commands, and its console script.  What a command needs is imported by its call."""
 
 import codecs
-import contextlib
 import os
 import re
 import sys
@@ -14,7 +13,7 @@ import typer.core
 from levilab.cli import exit_codes
 from levilab.cli.importing import importing
 from levilab.cli.later import Later
-from levilab.cli.output import message
+from levilab.cli.output import message, silence
 from levilab.cli.quantities import in_options
 
 #: How typer, which reads values with pydantic, begins and ends what it says of a wrong one.
@@ -239,7 +238,8 @@ def main() -> None:
     try:
         app()
     except BrokenPipeError:  # the reader closed the pipe
-        _silence_output()
+        for stream in (sys.stdout, sys.stderr):
+            silence(stream)
         sys.exit(exit_codes.FAILED)
     except Exception as error:  # noqa: BLE001 - sorted by kind below
         _exit_with(error)
@@ -254,21 +254,12 @@ def _exit_with(error: Exception) -> NoReturn:
         status, text = exit_codes.FAILED, str(error)
     if status is None:
         raise error
-    with contextlib.suppress(OSError):
-        message("levilab: " + _in_one_line(text))
+    message("levilab: " + _in_one_line(text))
     sys.exit(status)
 
 
 def _in_one_line(text: str) -> str:
     return " ".join(text.split())
-
-
-def _silence_output() -> None:
-    """Python flushes its streams when it ends; into a broken pipe it would complain."""
-    with open(os.devnull, "w", encoding="utf-8") as nowhere:  # noqa: PTH123 - a descriptor is needed
-        for stream in (sys.stdout, sys.stderr):
-            with contextlib.suppress(OSError, ValueError):
-                os.dup2(nowhere.fileno(), stream.fileno())
 
 
 def _prepare_output() -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING, Any
+import os
+import sys
+from typing import TYPE_CHECKING, Any, TextIO
 
 import typer
 
@@ -28,8 +30,17 @@ def result(text: str) -> None:
 
 
 def message(text: str) -> None:
-    """A line on standard error, as `result` writes it."""
-    typer.echo(printable(text), err=True)
+    """A line on standard error, as `result` writes it.  One that is closed, as with its terminal, ends nothing."""
+    try:
+        typer.echo(printable(text), err=True)
+    except OSError:
+        silence(sys.stderr)
+
+
+def silence(stream: TextIO) -> None:
+    """Throw away what goes to a closed stream: Python flushes it when it ends, and would complain."""
+    with contextlib.suppress(OSError, ValueError), open(os.devnull, "w", encoding="utf-8") as nowhere:  # noqa: PTH123 - a descriptor is needed
+        os.dup2(nowhere.fileno(), stream.fileno())
 
 
 def say_where(report: Path, *, in_new_folder: bool) -> None:

@@ -7,12 +7,12 @@ import sys
 
 from levilab.cli.exit_codes import INTERRUPTED
 from levilab.cli.importing import LINE, importing
-from levilab.interruption import end_process_at_interruption, ignore_interruption
+from levilab.interruption import end_process_at_interruption, ignore_all_signals
 
 
 def main() -> None:
     """Import the application and carry out the command line."""
-    atexit.register(ignore_interruption)  # runs last: while Python itself ends, Ctrl-C would end it by the signal
+    atexit.register(ignore_all_signals)  # runs last: while Python itself ends, 0.2 s, a signal would give the status
     try:
         with importing():
             from levilab.cli.main import main as carry_out  # with typer: a tenth of a second, in which Ctrl-C may come

@@ -25,6 +25,8 @@ REPORT = "report.html"
 RESULT = "result.json"
 #: An analysis that takes longer than this is given up [s].
 _LONGEST_S = 600.0
+#: An analysis that is given up ends at once; it is waited for so long at most [s].
+_PATIENCE_S = 5.0
 #: Signals to the view's process group, as Ctrl-C in a terminal, leave an analysis alone: the view ends it and says so.
 _APART: dict[str, Any] = {
     "start_new_session": True, "creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
@@ -46,6 +48,7 @@ class Analyses:
         self.failed: dict[str, str] = {}
         self._before: dict[Path, tuple[int, int, int] | None] = {}
         self._processes: set[subprocess.Popen[str]] = set()
+        self._threads: set[threading.Thread] = set()
         self._is_over = False
         self._lock = threading.Lock()
 
@@ -56,7 +59,10 @@ class Analyses:
         self.running.add(folder.name)
         self.failed.pop(folder.name, None)
         self._before |= {path: stamp(path) for path in (folder / RESULT, folder / REPORT, *_figures(folder))}
-        threading.Thread(target=self._carry_out, args=(folder,), daemon=True).start()
+        self._threads = {thread for thread in self._threads if thread.is_alive()}
+        thread = threading.Thread(target=self._carry_out, args=(folder,), daemon=True)
+        thread.start()
+        self._threads.add(thread)
 
     def _carry_out(self, folder: Path) -> None:
         try:
@@ -68,6 +74,10 @@ class Analyses:
                 if status:
                     self.failed[folder.name] = err.strip()[-600:] or f"levilab {words[0]} failed"
                     return
+        except subprocess.TimeoutExpired:
+            self.failed[folder.name] = (
+                f"the analysis took longer than {_LONGEST_S / 60:g} min, and was given up; levilab analyze has no limit"
+            )
         except (OSError, subprocess.SubprocessError) as error:
             self.failed[folder.name] = str(error)
         finally:
@@ -98,11 +108,13 @@ class Analyses:
                     self._processes.discard(process)
 
     def end(self) -> None:
-        """Give up what is under way: files are replaced whole, so none is left torn."""
+        """Give up what is under way, and wait for its end: files are replaced whole, so none is left torn."""
         with self._lock:
             self._is_over = True
             for process in self._processes:
                 process.terminate()
+        for thread in self._threads:
+            thread.join(_PATIENCE_S)
 
     def about(self, folder: Path) -> dict[str, Any]:
         """The state of a run's analysis: its state, names of figures, the verdict, whether there is a report.

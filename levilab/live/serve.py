@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import uvicorn
+
 from levilab.errors import DataError, LevilabError, UsageError
-from levilab.interruption import watching_for_end
 from levilab.live.desk import Desk
 from levilab.live.doors import Doors
 from levilab.live.practice.bench import PracticeBench
@@ -20,9 +21,8 @@ from levilab.runs.run import RECORD, find_run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
-    from types import FrameType
 
-    from uvicorn import Server
+    from levilab.interruption import End
 
 #: Only programs of this machine reach it.
 HOST = "127.0.0.1"
@@ -53,11 +53,43 @@ class LiveOptions:
     seed: int = 0
 
 
-def serve_live(options: LiveOptions, announce: Callable[[str], None], say: Callable[[str], None]) -> None:
-    """Serve until Ctrl-C, SIGTERM or the end of the terminal.
+class ViewServer(uvicorn.Server):
+    """A server that leaves signals to the program, and says when it is to end what the end waits for.
+
+    Args:
+        config: what is served, and how.
+        farewell: returns what the person at the terminal has to know then; empty where it ends at once.
+        say: is called with that.
+    """
+
+    def __init__(self, config: uvicorn.Config, farewell: Callable[[], str], say: Callable[[str], None]) -> None:
+        super().__init__(config)
+        self._farewell, self._say = farewell, say
+
+    def leave(self) -> None:
+        """End soon; a signal's handler may call this, and more than once."""
+        self.should_exit = True
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Take no signals: uvicorn would give them back before the bench is closed, and hurry at the second Ctrl-C."""
+        yield
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Say what the end waits for, and close what is open."""
+        if text := self._farewell():
+            self._say(text)
+        await super().shutdown(sockets)
+
+
+def serve_live(options: LiveOptions, end: End, announce: Callable[[str], None], say: Callable[[str], None]) -> None:
+    """Serve until a signal asks for the end.
+
+    The signals are taken until this has returned, so that none keeps the bench from being switched off.
 
     Args:
         options: what to show, and where.
+        end: of `watching_for_end`, whose context outlasts this call.
         announce: is called with the address, once pages can be opened.
         say: is called with a line for the person at the terminal.
 
@@ -67,23 +99,6 @@ def serve_live(options: LiveOptions, announce: Callable[[str], None], say: Calla
         DataError: there is no such run.
         CannotShow: the port is taken.
     """
-    import uvicorn
-
-    class Saying(uvicorn.Server):
-        """A server that says at the first Ctrl-C what it waits for."""
-
-        def leave(self) -> None:
-            self.should_exit = True
-
-        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-            super().handle_exit(sig, frame)
-            self.force_exit = False  # by a second Ctrl-C: analyses would go on, and the end takes a second at most
-
-        async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-            if text := farewell(bench, hall.analyses.running):
-                say(text)
-            await super().shutdown(sockets)
-
     root, shown = _where(options)
     with contextlib.closing(_listening(options.port)) as listening, contextlib.ExitStack() as at_end:
         doors = Doors(listening.getsockname()[1])
@@ -99,10 +114,13 @@ def serve_live(options: LiveOptions, announce: Callable[[str], None], say: Calla
             server_header=False,
             timeout_graceful_shutdown=_GOODBYE_S,
         )
-        server = Saying(config)
-        with _announcing(server, doors, announce, commands=options.mock), watching_for_end() as end:
-            end.wake = server.leave
-            server.run(sockets=[listening])  # which passes the signals that it takes on to `end`
+        at_end.callback(hall.analyses.end)
+        server = ViewServer(config, lambda: farewell(bench, hall.analyses.running), say)
+        end.wake = server.leave
+        if end.by:  # before there was a server to wake
+            return
+        with _announcing(server, doors, announce, commands=options.mock):
+            server.run(sockets=[listening])
 
 
 def farewell(bench: PracticeBench | None, analyzed: Collection[str] = ()) -> str:
@@ -155,14 +173,14 @@ def _listening(port: int) -> socket.socket:
 
 
 @contextlib.contextmanager
-def _announcing(server: Server, doors: Doors, announce: Callable[[str], None], *, commands: bool) -> Iterator[None]:
+def _announcing(server: ViewServer, doors: Doors, announce: Callable[[str], None], *, commands: bool) -> Iterator[None]:
     """Say the address once the server has started; a thread waits for that, since the server takes the main one."""
     over = threading.Event()
 
     def wait() -> None:
         while not server.started and not over.wait(0.02):
             pass
-        if server.started:
+        if server.started and not server.should_exit:
             announce(f"http://{HOST}:{doors.port}/" + (f"#{doors.token}" if commands else ""))
 
     waiting = threading.Thread(target=wait, daemon=True)

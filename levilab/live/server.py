@@ -177,7 +177,11 @@ class Pages:
     async def parts(self, request: Request) -> Response:
         """What is drawn of the top."""
         hall, name = self.hall, request.query_params.get("run", "")
-        scene = hall.desk.scene if hall.desk else scene_of_run(hall.root / name) if hall.is_run(name) else None
+        watch, scene = hall.watches.get(name), None
+        if hall.desk and not (watch and watch.has_own_bench):
+            scene = hall.desk.scene
+        elif hall.is_run(name):
+            scene = scene_of_run(hall.root / name)
         return self._json(await asyncio.to_thread(parts_for, scene))
 
     async def of_run(self, request: Request) -> Response:
@@ -229,7 +233,6 @@ def application(hall: Hall) -> Guard:
             yield
         finally:
             reading.cancel()
-            hall.analyses.end()
 
     routes = [
         Route("/", pages.page),

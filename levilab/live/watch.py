@@ -112,11 +112,16 @@ class Watch:
         if folder := followed.continued_in:
             self._turn_to(folder)
 
+    @property
+    def has_own_bench(self) -> bool:
+        """Whether its bench is the one that the run folder names; else it is the one for practice."""
+        if self.followed is None:
+            return False
+        return not self._bench or self.followed.status == "running"  # a killed program leaves its address there
+
     def _subscribe(self) -> None:
         """Listen to the bench that the run folder names; where it names none, to the one for practice."""
-        address, followed = None, self.followed
-        if followed and (not self._bench or followed.status == "running"):  # a killed program leaves its address there
-            address = read_address(followed.folder)
+        address = read_address(self.followed.folder) if self.followed and self.has_own_bench else None
         if not address and self._bench:
             address = self._bench()
         if self._subscriber and address == self._subscriber.address:

@@ -8,6 +8,7 @@ import pytest
 from levilab.interruption import (
     Interrupted,
     end_process_at_interruption,
+    ignore_all_signals,
     interruption_ends_process,
     interruption_postponed,
     watching_for_interruption,
@@ -150,3 +151,9 @@ def test_while_modules_are_imported_ctrl_c_ends_the_process_in_one_line(monkeypa
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     assert end_process_at_interruption(130) is None  # what a shell had it ignore stays ignored
     assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+
+
+def test_while_python_ends_no_signal_gives_the_status():
+    ignore_all_signals()
+    for number in SIGNALS:
+        signal.raise_signal(number)

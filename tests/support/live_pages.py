@@ -45,6 +45,7 @@ def serving(root: Path, shown: str = "", desk: Desk | None = None) -> Iterator[H
         finally:
             server.should_exit = True
             thread.join(PATIENCE_S)
+            hall.analyses.end()
 
 
 def address(hall: Hall, run: str = "", *, token: bool = False) -> str:

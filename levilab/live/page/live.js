@@ -26,7 +26,7 @@ const SLIP_HZ = 0.05, SWINGS_HZ = 0.5;  // a top that follows is counted this ne
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, records: {}};
 const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
-let paused = false, drawn = null, pointed = -1, space = null, wanted = "", practice = null, reachable = true;
+let paused = false, drawn = null, pointed = -1, space = null, topOf = "", wanted = "", practice = null, reachable = true;
 let spoken = 0, close = null, dirty = {plot: true, trace: true};
 window.levilab = {frames: 0, drawn: 0, seen, data};  // what tests and benchmarks read
 
@@ -125,7 +125,14 @@ function listEvent({time_s, utc}, text, loud) {
 }
 
 function takePoses(pieces, arrays) {
-  if (!space) openTop();
+  const about = `${seen.run} ${data.about?.status}`;  // a run of another program has a top of its own while it is recorded
+  if (!space) {
+    topOf = about;
+    openTop();
+  } else if (about !== topOf && space.setParts) {
+    topOf = about;
+    partsNow().then(space.setParts);
+  }
   for (const [k, piece] of pieces.entries()) {
     seen.poses = piece.number;
     const up = arrays[`up_${k}`], last = up.findLastIndex((one) => one > 0.5);
@@ -135,13 +142,16 @@ function takePoses(pieces, arrays) {
   }
 }
 
+/** What is drawn of the top that is shown. */
+const partsNow = async () => (await fetch(`parts?run=${encodeURIComponent(seen.run)}`)).json();
+
 /** Load what draws three dimensions when the first poses have come, and not before. */
 async function openTop() {
   const early = [];
   space = {add: (...pieces) => early.length < 50 && early.push(pieces)};
   document.body.classList.remove("no-top");
   try {
-    const parts = await (await fetch(`parts?run=${encodeURIComponent(seen.run)}`)).json();
+    const parts = await partsNow();
     const {openSpace} = await import("./motion.js");
     space = await openSpace(by("space"), parts);
     for (const pieces of early) space.add(...pieces);

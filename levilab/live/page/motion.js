@@ -15,13 +15,19 @@ const LEAST_MS = SOFTWARE ? 46 : 0;
 /** Pixels without a graphics card, as a part of those that are shown: half would do, but is coarse to look at. */
 const SOFTWARE_RATIO = 0.75;
 
-export async function openSpace(canvas, parts) {
+/** @param of what is drawn of the top and its base, as the server describes it. */
+export async function openSpace(canvas, of) {
   const {THREE, OrbitControls} = await import("./three.js");
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const renderer = new THREE.WebGLRenderer({canvas, antialias: !SOFTWARE, powerPreference: "low-power"});
   renderer.setPixelRatio(SOFTWARE ? SOFTWARE_RATIO : Math.min(devicePixelRatio || 1, 2));
-  const view = buildScene(THREE, parts, dark.matches ? "dark" : "light");
-  view.show({drive: false});
+  let parts = null, view = null;
+  function build(of) {
+    parts = of;
+    view = buildScene(THREE, parts, dark.matches ? "dark" : "light");
+    view.show({drive: false});
+  }
+  build(of);
   const camera = buildCamera(THREE, parts, 1);
   const orbit = new OrbitControls(camera, canvas);
   orbit.target.copy(camera.userData.target);
@@ -113,6 +119,13 @@ export async function openSpace(canvas, parts) {
 
   return {
     add,
+    get parts() { return parts; },
+    setParts: (of) => {
+      if (JSON.stringify(of) === JSON.stringify(parts)) return;
+      build(of);
+      resize();
+      if (state) state = show();  // the new top stands where the old one stood
+    },
     setRate: (value) => { rate = value; },
     setSpeed: (value, still) => { speed = still ? 0 : value || 1; },
     pause: (value) => { paused = value; },

@@ -129,10 +129,9 @@ export function openPractice(about, command, run, isOwn, allowed) {
   }
 
   function guide(bench, run_now, readings) {
-    const ended = run_now && run_now.status !== "running" && readings > 0;
+    const name = run(), recorded = Boolean(run_now) && run_now.status !== "running" && readings > 0 && isOwn(name);  // by this bench
     const done = {
-      drive: bench.took_hold, tune: bench.tuned_up, record: Boolean(ended) && isOwn(run()), analyze: Boolean(ended) && now.analyzed === run(),
-      report: Boolean(ended) && now.read === run(),
+      drive: bench.took_hold, tune: bench.tuned_up, record: recorded, analyze: recorded && now.analyzed === name, report: recorded && now.read === name,
     };
     const items = [...by("guide").children], last = items.map((item) => Boolean(done[item.dataset.step])).lastIndexOf(true);
     items.forEach((item, k) => {  // a step may be left out: what comes next is the one behind the last that was done

@@ -121,11 +121,15 @@ class PracticeBench:
         process, self._process = self._process, None
         if process is None:
             return
-        process.join(_PATIENCE_S if records else _WITHOUT_A_RUN_S)
-        for end in (process.terminate, process.kill) if records else (process.kill,):
-            if process.is_alive():
-                end()
-                process.join(_MORE_S)
+        try:
+            process.join(_PATIENCE_S if records else _WITHOUT_A_RUN_S)
+            for end in (process.terminate, process.kill) if records else (process.kill,):
+                if process.is_alive():
+                    end()
+                    process.join(_MORE_S)
+        finally:
+            if not records and process.is_alive():  # after Ctrl-C in a join: else Python at its end would wait for it
+                process.kill()
         with contextlib.suppress(ValueError):  # it does not even die
             process.close()
 

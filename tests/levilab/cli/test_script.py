@@ -11,7 +11,7 @@ import pytest
 from levilab.cli.exit_codes import INTERRUPTED
 from levilab.cli.later import Later
 from levilab.cli.start import main
-from levilab.interruption import ignore_interruption
+from levilab.interruption import ignore_all_signals
 from support.commands import command
 from support.paths import ROOT
 
@@ -38,7 +38,7 @@ def test_ctrl_c_at_the_start_ends_in_one_line(
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == INTERRUPTED
-    assert afterwards == [ignore_interruption, INTERRUPTED]
+    assert afterwards == [ignore_all_signals, INTERRUPTED]
     assert capsys.readouterr().err == "levilab: interrupted\n"
 
 

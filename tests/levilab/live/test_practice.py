@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from levilab.live.desk import EXPERIMENTS, Desk
 from levilab.live.practice.bench import PracticeBench
+from levilab.simulator import preset
 from levilab.telemetry.address import Address, write_address
-from levilab.telemetry.messages import State
+from levilab.telemetry.messages import Poses, State
 from support.live_pages import GrowingRun, address, publish, serving, spin_down, until
 
 if TYPE_CHECKING:
@@ -46,15 +48,22 @@ DONE = "[...document.querySelectorAll('#guide .done')].map((one) => one.dataset.
 
 def see_another_program_record(page: Page, served: Hall, older: GrowingRun) -> None:
     """The bench of that program is shown, and the controls, which are of the one for practice, are off meanwhile."""
+    scene = preset("practice").as_table()
+    scene["base"] |= {"outer_radius_m": 0.07}
+    older.say(configuration={"scene": scene})
+    outer = page.evaluate("levilab.space.parts.base.outer")
     with older.running():
         write_address(older.folder, Address.at(1))
         until(page, "levilab.data.about.status === 'running'")
-        publish(served.watches[OLDER], State(7.0, folder=str(older.folder)))
+        pose = Poses(7.0, 1 / 400, np.full((1, 3), 0.1), np.array([[0.0, 0.0, 0.0, 1.0]]), np.ones(1, dtype=bool))
+        publish(served.watches[OLDER], State(7.0, folder=str(older.folder)), pose)
         until(page, "document.getElementById('controls').disabled && levilab.data.bench.time_s === 7")
         assert page.inner_text("#said").startswith("Another program records this run")
         assert page.evaluate(DONE) == "drive"  # as before: the guide is of the bench for practice
+        until(page, "levilab.space.parts.base.outer === 0.07")  # the top and the base of that program
     older.say(status="finished")
     until(page, "!document.getElementById('controls').disabled && document.getElementById('said').textContent === ''")
+    until(page, f"levilab.space.parts.base.outer === {outer}")  # and those of the bench for practice
 
 
 def test_a_student_drives_records_and_analyzes(
@@ -83,6 +92,14 @@ def test_a_student_drives_records_and_analyzes(
     can_be_analyzed = "!document.getElementById('analyze').disabled"
     page.select_option("#run", OLDER)  # of another bench, and it is there like one of this
     until(page, f"levilab.data.count === 19 && levilab.data.bench && {can_be_analyzed}")
+    with monkeypatch.context() as quick:
+        quick.setattr(served.analyses, "_run", lambda _: (0, ""))
+        page.click("#analyze")
+        until(page, "document.getElementById('result').open && !document.getElementById('verdict').innerText")
+    page.keyboard.press("Escape")
+    page.evaluate("document.getElementById('report').click()")
+    frames = page.evaluate("levilab.frames")
+    until(page, f"levilab.frames > {frames}")
     assert page.evaluate(DONE) == "drive"  # this bench has recorded nothing
     see_another_program_record(page, served, older)
     page.click("#record")

@@ -8,20 +8,27 @@ import signal
 import socket
 import subprocess
 import sys
-import time
-from typing import TYPE_CHECKING
+from queue import Queue
+from typing import TYPE_CHECKING, Any, Self
 
 import pytest
 
+from levilab.interruption import End
 from levilab.live.analyzed import Analyses
 from levilab.live.practice.bench import PracticeBench
-from levilab.live.serve import farewell
+from levilab.live.serve import LiveOptions, ViewServer, farewell, serve_live
 from levilab.motion.animation.three import MissingThree, three_js
 from support.commands import command
 from support.live_pages import GrowingRun
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from levilab.live.practice.commands import PracticeEvent
+
+#: Long enough for a machine that is busy [s]; a test that passes waits less.
+PATIENCE_S = 60.0
+SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 
 
 def test_a_port_that_is_taken_is_named(tmp_path: Path) -> None:
@@ -83,33 +90,108 @@ def test_a_result_without_a_verdict_is_said_by_its_values(tmp_path: Path) -> Non
         assert Analyses().about(tmp_path)["verdict"] == said
 
 
-def test_an_analysis_ends_with_the_view(tmp_path: Path) -> None:
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> Queue[subprocess.Popen[str]]:
+    """The processes of analyses, as they are started."""
+    processes: Queue[subprocess.Popen[str]] = Queue()
+    start = subprocess.Popen
+
+    def note(*args: Any, **kwargs: Any) -> subprocess.Popen[str]:
+        process = start(*args, **kwargs)
+        processes.put(process)
+        return process
+
+    monkeypatch.setattr("levilab.live.analyzed.subprocess.Popen", note)
+    return processes
+
+
+def test_an_analysis_ends_with_the_view(tmp_path: Path, started: Queue[subprocess.Popen[str]]) -> None:
     analyses = Analyses()
-    under_way = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"], text=True)
-    analyses._processes.add(under_way)
     analyses.begin(tmp_path)
-    while len(analyses._processes) < 2:
-        time.sleep(0.001)
+    process = started.get(timeout=PATIENCE_S)
     if sys.platform != "win32":  # a signal to the view's group leaves it to the view to end the analysis, and to say so
-        (process,) = analyses._processes - {under_way}
         assert os.getpgid(process.pid) != os.getpgid(0)
     analyses.end()
-    assert under_way.wait() != 0
-    while analyses.running:
-        time.sleep(0.001)
+    assert process.returncode not in {None, 0}
+    assert not analyses.running
     (tmp_path / "result.json").write_text(json.dumps({"runs": [{"verdict": "earlier"}]}), encoding="utf-8")
     (tmp_path / "report.html").touch()
     (tmp_path / "spindown.png").touch()
     assert [analyses.about(tmp_path)[key] for key in ("verdict", "figures")] == [["earlier"], ["spindown.png"]]
     analyses.begin(tmp_path)
-    while analyses.running:
-        time.sleep(0.001)
+    analyses.end()
+    assert started.empty()
     assert analyses.failed == {tmp_path.name: "the live view was ended"}
     # what an earlier analysis has written stays on the disk, and is not shown for this one
     assert {path.name for path in tmp_path.iterdir()} == {"result.json", "report.html", "spindown.png"}
     about = analyses.about(tmp_path)
     assert [about[key] for key in ("report", "figures", "analysis")] == ["", [], ""]
     assert "verdict" not in about
+
+
+def test_an_analysis_that_takes_too_long_is_killed(
+    tmp_path: Path, started: Queue[subprocess.Popen[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("levilab.live.analyzed._LONGEST_S", 0.0)
+    analyses = Analyses()
+    analyses.begin(tmp_path)
+    status = started.get(timeout=PATIENCE_S).wait(PATIENCE_S)
+    assert status == (1 if sys.platform == "win32" else -signal.SIGKILL)
+    analyses.end()
+    assert "was given up" in analyses.failed[tmp_path.name]
+
+
+def test_a_second_analysis_replaces_the_result_that_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    analyses, verdicts, meanwhile = Analyses(), iter(["first", "the second"]), []
+
+    def analyze(words: list[str]) -> tuple[int, str]:
+        if words[0] == "analyze":
+            meanwhile.append(analyses.about(tmp_path).get("verdict"))
+            text = json.dumps({"runs": [{"verdict": next(verdicts)}]})
+            (tmp_path / "result.json").write_text(text, encoding="utf-8")
+        return 0, ""
+
+    monkeypatch.setattr(analyses, "_run", analyze)
+    for verdict in ("first", "the second"):
+        analyses.begin(tmp_path)
+        analyses.end()  # which waits for the thread
+        assert analyses.about(tmp_path)["verdict"] == [verdict]
+    assert meanwhile == [None, None]
+
+
+class Bench(PracticeBench):
+    """A bench without a process.  Signals come while it is looked at, and while it is closed."""
+
+    def start(self) -> Self:
+        return self
+
+    def events(self) -> list[PracticeEvent]:
+        signal.raise_signal(signal.SIGINT)
+        return []
+
+    def close(self) -> None:
+        for number in SIGNALS:
+            signal.raise_signal(number)
+
+
+def test_no_signal_is_given_back_before_the_bench_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given_back: list[int] = []
+    before = {number: signal.signal(number, lambda number, _: given_back.append(number)) for number in SIGNALS}
+    monkeypatch.setattr("levilab.live.serve.PracticeBench", Bench)
+    try:
+        ended = command("live", "--mock", "--no-open", "--port", "0", cwd=tmp_path)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert (ended.status, given_back) == (130, [])
+    assert ended.err.splitlines()[-2:] == ["the bench is switched off", "levilab: the view is closed"]
+
+
+def test_a_signal_before_the_server_leaves_it_unstarted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ViewServer, "run", lambda *_, **__: pytest.fail("it serves"))
+    end = End()
+    end(signal.SIGTERM, None)
+    serve_live(LiveOptions(out=tmp_path, port=0), end, pytest.fail, pytest.fail)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal to one process alone")

@@ -100,3 +100,18 @@ def test_without_a_run_the_end_waits_a_second_and_with_one_for_its_reading(tmp_p
         assert process.did[0] == ("join 20 s" if may_record else "join 1 s")
         assert process.did[1] == ("terminate" if may_record else "kill")
         far_end.close()
+
+
+def test_ctrl_c_while_a_bench_ends_that_records_nothing_kills_it_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench, process = PracticeBench(tmp_path), Busy()
+    bench._process = process  # type: ignore[assignment]
+
+    def be_interrupted(_: float) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(process, "join", be_interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        bench.close()
+    assert process.did == ["kill"]
