@@ -27,6 +27,8 @@ BEFORE = 33
 LET_GO_AT_ONCE = ("spin.hold_s=0",)
 #: A top in full motion would swing about the drive after it.
 RAISED_QUICKLY = (*LET_GO_AT_ONCE, "spin.ramp_hz_per_s=0.2")
+#: The same on the command line.
+QUICKLY = [word for setting in RAISED_QUICKLY for word in ("--set", setting)]
 
 
 class Silent:
