@@ -91,9 +91,9 @@ def test_a_spin_down_is_read_every_ten_seconds_until_the_top_falls(whole: Whole)
     run = whole.run
     frame = run.readings().frame
     assert run.status == "finished"
-    assert 17 <= len(frame) <= 22  # about 190 s; the fall scatters by 0.25 Hz, which is 3 s, the drag by 2 %, 4 s
+    assert 13 <= len(frame) <= 18  # about 145 s; the fall scatters by 0.25 Hz, which is 3 s, the drag by 2 %, 3 s
     assert np.allclose(np.diff(frame["time_s"]), 10, atol=0.06)  # the gate waits for an edge, 1/22 s at the most
-    assert frame["spin_frequency_hz"].iloc[0] == pytest.approx(40, abs=0.2)  # 0.5 s after the drive, 0.1 Hz/s
+    assert frame["spin_frequency_hz"].iloc[0] == pytest.approx(35, abs=0.2)  # 0.5 s after the drive, 0.1 Hz/s
     assert 21 < frame["spin_frequency_hz"].iloc[-1] < 24
     assert (frame["spin_frequency_u_hz"] == 0.03).all()
     assert whole.outputs[-1] is False
@@ -213,7 +213,7 @@ def test_ctrl_c_twice_breaks_through_an_exchange_and_outputs_go_off(
     assert outputs[-1] is False
 
 
-@pytest.mark.parametrize("when", [0, 1, 2, 20, 28, 29, BEFORE - 1, BEFORE, BEFORE + 1, BEFORE + 18])
+@pytest.mark.parametrize("when", [0, 1, 2, 20, 28, 29, BEFORE - 1, BEFORE, BEFORE + 1, BEFORE + 12])
 def test_an_exception_at_any_moment_leaves_outputs_off_and_the_readings_so_far(
     tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch, when: int
 ) -> None:
@@ -317,7 +317,7 @@ def test_a_signal_while_connecting_never_lets_the_drive_on(
 def test_the_time_of_a_reading_is_the_middle_of_its_gate(
     ten_runs: list[tuple[SpinWorld, pd.DataFrame]],
 ) -> None:
-    """At 40 Hz and 0.1 Hz/s a time stamp that is half a gate off would be 0.05 Hz off; the mean of ten runs tells."""
+    """At 35 Hz and 0.1 Hz/s a time stamp that is half a gate off would be 0.05 Hz off; the mean of ten runs tells."""
     off = []
     for world, frame in ten_runs:
         released = [stretch for stretch in world._stretches if stretch.phase is Phase.COASTING][-1].start
