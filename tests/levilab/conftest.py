@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from support.commands import command
-from support.figures import undrawn
+from support.figures import unmade
 from support.paths import SAMPLE_DATA
 from support.waiting import HANG_GUARD_S
 
@@ -27,8 +27,8 @@ def sample_data() -> Path:
 
 @pytest.fixture
 def undrawn_figures() -> Iterator[None]:
-    """For a test that looks at no figure; see `undrawn`."""
-    with undrawn():
+    """For a test that looks at no figure; see `unmade`."""
+    with unmade():
         yield
 
 
