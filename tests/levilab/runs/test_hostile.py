@@ -384,7 +384,8 @@ def test_too_few_open_files_from_the_start_cost_one_line(tmp_path: Path, files: 
 
 @posix_only
 @pytest.mark.parametrize(
-    "words", [["acquire", "spin", "--mock", *QUICKLY], ["report", str(SAMPLE), "--no-crosscheck"], ["runs", str(SAMPLE)]]
+    "words",
+    [["acquire", "spin", "--mock", *QUICKLY], ["report", str(SAMPLE), "--no-crosscheck"], ["runs", str(SAMPLE)]],
 )
 def test_too_few_open_files_cost_one_line(tmp_path: Path, words: list[str]) -> None:
     """In this process, which has imported all by then; it may open ever more files than it has, until it succeeds."""
