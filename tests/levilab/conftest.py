@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from support.commands import command
-from support.figures import without_drawing
+from support.figures import without_figures
 from support.paths import SAMPLE_DATA
 from support.waiting import HANG_GUARD_S
 
@@ -27,8 +27,8 @@ def sample_data() -> Path:
 
 @pytest.fixture
 def undrawn_figures() -> Iterator[None]:
-    """For a test that looks at no figure; see `without_drawing`."""
-    with without_drawing():
+    """For a test that looks at no figure; see `without_figures`."""
+    with without_figures():
         yield
 
 

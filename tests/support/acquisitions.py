@@ -19,14 +19,16 @@ if TYPE_CHECKING:
 
     from levilab.world.spin_world import World
 
-#: Counts before the drive is off: the spin at first, 27 while the drive takes hold, every 10 s of 50 on the way up, and
+#: Counts before the drive is off: the spin at first, 27 while the drive takes hold, every 10 s of 25 on the way up, and
 #: at the end of it.
-BEFORE = 33
+BEFORE = 31
 
 #: A held top is counted for 20 s, and driven up for 200 s: two thirds of what an acquisition costs.
 LET_GO_AT_ONCE = ("spin.hold_s=0",)
-#: A top in full motion would swing about the drive after it.
-RAISED_QUICKLY = (*LET_GO_AT_ONCE, "spin.ramp_hz_per_s=0.2")
+#: From 30 Hz to 35 Hz, and down again in 150 s.  A top in full motion would swing about the drive after it.
+RAISED_QUICKLY = (*LET_GO_AT_ONCE, "spin.ramp_hz_per_s=0.2", "spin.drive_frequency_hz=35")
+#: The same on the command line.
+QUICKLY = [word for setting in RAISED_QUICKLY for word in ("--set", setting)]
 
 
 class Silent:

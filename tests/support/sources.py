@@ -29,4 +29,5 @@ def sources() -> dict[str, ast.Module]:
     try:
         return {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in modules()}
     finally:
+        gc.freeze()
         gc.enable()

@@ -17,6 +17,7 @@ from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.errors import InstrumentError, NoAnswer
 from instruments.virtual.bench.visa_library import library_for
+from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from levilab.acquisition.counting import is_plausible
 from levilab.acquisition.experiments.spin import SpinSettings, time_left
 from levilab.acquisition.loop import AcquisitionRequest, acquire
@@ -40,13 +41,9 @@ if TYPE_CHECKING:
     from levilab.runs.run import Status
 
 
-@pytest.fixture
-def outputs(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
-    """What the generator's output was set to, in order."""
+def watch_outputs(patch: pytest.MonkeyPatch) -> list[bool]:
+    """What the generator's output is set to from now on, in order."""
     seen: list[bool] = []
-    listener = "instruments.virtual.generator.keysight_33500b.Virtual33500B.on_change"
-    from instruments.virtual.generator.keysight_33500b import Virtual33500B
-
     on_change = Virtual33500B.on_change
 
     def watched(self: Virtual33500B, name: str) -> None:
@@ -54,13 +51,37 @@ def outputs(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
             seen.append(bool(self.settings["1:output"]))
         on_change(self, name)
 
-    monkeypatch.setattr(listener, watched)
+    patch.setattr(Virtual33500B, "on_change", watched)
     return seen
 
 
+@pytest.fixture
+def outputs(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """What the generator's output was set to, in order."""
+    return watch_outputs(monkeypatch)
+
+
+@dataclasses.dataclass(frozen=True)
+class Whole:
+    """A run that nothing disturbs, what was shown of it, and what the generator's output was set to."""
+
+    run: Run
+    show: Silent
+    outputs: list[bool]
+
+
 @pytest.fixture(scope="module")
-def usual(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return acquire(mock(tmp_path_factory.mktemp("usual")), Silent())
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
+    show = Silent()
+    with pytest.MonkeyPatch.context() as patch:
+        outputs = watch_outputs(patch)
+        run = acquire(mock(tmp_path_factory.mktemp("usual"), note="first try", wire_log=True), show)
+    return Whole(run, show, outputs)
+
+
+@pytest.fixture
+def usual(whole: Whole) -> Run:
+    return whole.run
 
 
 @pytest.fixture(scope="module")
@@ -68,35 +89,35 @@ def in_full_motion(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return acquire(mock(tmp_path_factory.mktemp("motion"), 5, scene="spindown"), Silent())
 
 
-def test_a_spin_down_is_read_every_ten_seconds_until_the_top_falls(tmp_path: Path, outputs: list[bool]) -> None:
-    run = acquire(mock(tmp_path), Silent())
+def test_a_spin_down_is_read_every_ten_seconds_until_the_top_falls(whole: Whole) -> None:
+    run = whole.run
     frame = run.readings().frame
     assert run.status == "finished"
-    assert 17 <= len(frame) <= 22  # about 190 s; the fall scatters by 0.25 Hz, which is 3 s, the drag by 2 %, 4 s
+    assert 13 <= len(frame) <= 18  # about 145 s; the fall scatters by 0.25 Hz, which is 3 s, the drag by 2 %, 3 s
     assert np.allclose(np.diff(frame["time_s"]), 10, atol=0.06)  # the gate waits for an edge, 1/22 s at the most
-    assert frame["spin_frequency_hz"].iloc[0] == pytest.approx(40, abs=0.2)  # 0.5 s after the drive, 0.1 Hz/s
+    assert frame["spin_frequency_hz"].iloc[0] == pytest.approx(35, abs=0.2)  # 0.5 s after the drive, 0.1 Hz/s
     assert 21 < frame["spin_frequency_hz"].iloc[-1] < 24
     assert (frame["spin_frequency_u_hz"] == 0.03).all()
-    assert outputs[-1] is False
+    assert whole.outputs[-1] is False
     assert [event["kind"] for event in run.events()] == ["drive on", "locked", "drive off", "asked again", "fell"]
 
 
 @pytest.fixture(scope="module")
-def fifteen_runs(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[SpinWorld, pd.DataFrame]]:
-    """Worlds with the readings that were taken in each, seeds 0 to 14."""
-    out, found = tmp_path_factory.mktemp("fifteen"), []
-    for seed in range(15):
+def ten_runs(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[SpinWorld, pd.DataFrame]]:
+    """Worlds with the readings that were taken in each, seeds 0 to 9."""
+    out, found = tmp_path_factory.mktemp("ten"), []
+    for seed in range(10):
         world = SpinWorld(random_scene(seed), VirtualClock())
         found.append((world, acquire(in_world(mock(out, seed), world), Silent()).readings().frame))
     return found
 
 
 def test_the_readings_follow_the_law_of_the_world_within_their_uncertainty(
-    fifteen_runs: list[tuple[SpinWorld, pd.DataFrame]],
+    ten_runs: list[tuple[SpinWorld, pd.DataFrame]],
 ) -> None:
-    """χ² over 15 runs about the true curve: only the gate's finite length (2e-5 Hz) and the start come between."""
+    """χ² over ten runs about the true curve: only the gate's finite length (2e-5 Hz) and the start come between."""
     chi_square, n = 0.0, 0
-    for world, frame in fifteen_runs:
+    for world, frame in ten_runs:
         c = world.scene.constants[0]
         # free of the start: ν^(−1/2) of the law is a straight line of known slope
         y, t = frame["spin_frequency_hz"].to_numpy() ** -0.5, frame["time_s"].to_numpy()
@@ -105,12 +126,11 @@ def test_the_readings_follow_the_law_of_the_world_within_their_uncertainty(
         offset = np.average(y - slope * t, weights=u**-2)
         chi_square += float(np.sum(((y - slope * t - offset) / u) ** 2))
         n += len(y) - 1
-    assert chi_square / n == pytest.approx(1, abs=4 * np.sqrt(2 / n))  # 4 standard deviations of χ²/n
+    assert chi_square / n == pytest.approx(1, abs=3 * np.sqrt(2 / n))  # 3 standard deviations of χ²/n: 0.3
 
 
-def test_what_was_done_stands_in_run_json(tmp_path: Path) -> None:
-    run = acquire(mock(tmp_path, note="first try"), Silent())
-    record = json.loads((run.folder / "run.json").read_text(encoding="utf-8"))
+def test_what_was_done_stands_in_run_json(usual: Run) -> None:
+    record = json.loads((usual.folder / "run.json").read_text(encoding="utf-8"))
     assert record["schema"] == "levilab-run/1"
     assert record["synthetic"] is True
     assert "no real top" in record["synthetic_how"]
@@ -122,23 +142,20 @@ def test_what_was_done_stands_in_run_json(tmp_path: Path) -> None:
     assert record["software"]["levilab"]
 
 
-def test_the_same_seed_gives_the_same_readings_and_another_one_others(tmp_path: Path) -> None:
-    first, again, other = (
-        (acquire(mock(tmp_path, seed), Silent()).folder / "readings.csv").read_bytes() for seed in (5, 5, 6)
-    )
+def test_the_same_seed_gives_the_same_readings_and_another_one_others(usual: Run, tmp_path: Path) -> None:
+    runs = [usual, *(acquire(mock(tmp_path, seed), Silent()) for seed in (1, 6))]
+    first, again, other = ((run.folder / "readings.csv").read_bytes() for run in runs)
     assert first == again != other
 
 
-def test_what_was_shown_is_what_stands_in_the_folder(tmp_path: Path) -> None:
-    show = Silent()
-    frame = acquire(mock(tmp_path), show).readings().frame
-    assert [float(text.split()[0]) for text in show.readings] == [round(t, 2) for t in frame["time_s"]]
+def test_what_was_shown_is_what_stands_in_the_folder(whole: Whole) -> None:
+    frame = whole.run.readings().frame
+    assert [float(text.split()[0]) for text in whole.show.readings] == [round(t, 2) for t in frame["time_s"]]
 
 
-def test_the_wire_log_holds_every_byte(tmp_path: Path) -> None:
-    run = acquire(mock(tmp_path, wire_log=True), Silent())
-    log = (run.folder / "wire.log").read_text(encoding="utf-8")
-    assert log.count("> b'READ?\\n'") == len(run.readings().frame) + BEFORE + 2  # and two at the fall
+def test_the_wire_log_holds_every_byte(usual: Run) -> None:
+    log = (usual.folder / "wire.log").read_text(encoding="utf-8")
+    assert log.count("> b'READ?\\n'") == len(usual.readings().frame) + BEFORE + 2  # and two at the fall
     assert "> b'OUTP1 OFF\\n'" in log
 
 
@@ -198,7 +215,7 @@ def test_ctrl_c_twice_breaks_through_an_exchange_and_outputs_go_off(
     assert outputs[-1] is False
 
 
-@pytest.mark.parametrize("when", [0, 1, 2, 20, 28, 29, BEFORE - 1, BEFORE, BEFORE + 1, BEFORE + 18])
+@pytest.mark.parametrize("when", [0, 1, 2, 20, 28, 29, BEFORE - 1, BEFORE, BEFORE + 1, BEFORE + 12])
 def test_an_exception_at_any_moment_leaves_outputs_off_and_the_readings_so_far(
     tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch, when: int
 ) -> None:
@@ -307,22 +324,20 @@ def test_a_signal_while_connecting_never_lets_the_drive_on(
 
 
 def test_the_time_of_a_reading_is_the_middle_of_its_gate(
-    fifteen_runs: list[tuple[SpinWorld, pd.DataFrame]],
+    ten_runs: list[tuple[SpinWorld, pd.DataFrame]],
 ) -> None:
-    """At 40 Hz and 0.1 Hz/s a time stamp that is half a gate off would be 0.05 Hz off; the mean of 15 runs tells."""
+    """At 35 Hz and 0.1 Hz/s a time stamp that is half a gate off would be 0.05 Hz off; the mean of ten runs tells."""
     off = []
-    for world, frame in fifteen_runs:
+    for world, frame in ten_runs:
         released = [stretch for stretch in world._stretches if stretch.phase is Phase.COASTING][-1].start
         spin, _ = world.motion(released + frame["time_s"].to_numpy()[:8])
         off += list(frame["spin_frequency_hz"].to_numpy()[:8] - spin / (2 * np.pi))
-    # 120 readings of 0.03 Hz: 0.0027 Hz; 5 ms between the drive's end and time zero: 0.0005 Hz; the reciprocal
+    # 80 readings of 0.03 Hz: 0.0034 Hz; 5 ms between the drive's end and time zero: 0.0005 Hz; the reciprocal
     # counter's own bias near whole numbers of periods: a few mHz
     assert abs(np.mean(off)) < 0.012
 
 
 def test_errors_that_an_earlier_program_left_are_not_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from instruments.virtual.generator.keysight_33500b import Virtual33500B
-
     init = Virtual33500B.__init__
 
     def soiled(self: Virtual33500B, *args: Any, **named: Any) -> None:
@@ -364,11 +379,10 @@ def test_a_full_disk_in_the_middle_leaves_outputs_off_and_the_shown_readings(
     assert [round(t, 2) for t in run.readings().frame["time_s"]][:7] == shown
 
 
-def test_an_interrupted_run_is_resumed_where_it_was_left(tmp_path: Path) -> None:
-    half = acquire(mock(tmp_path, 3), Impatient(8))
+def test_an_interrupted_run_is_resumed_where_it_was_left(usual: Run, tmp_path: Path) -> None:
+    half = acquire(mock(tmp_path), Impatient(8))
     run = acquire(mock(tmp_path, None, resume=half.folder, note="second half"), Silent())
-    whole = acquire(mock(tmp_path, 3), Silent()).readings().frame
-    frame = run.readings().frame
+    whole, frame = usual.readings().frame, run.readings().frame
     assert run.folder == half.folder
     assert run.status == "finished"
     assert len(frame) == len(whole)
@@ -376,7 +390,7 @@ def test_an_interrupted_run_is_resumed_where_it_was_left(tmp_path: Path) -> None
     assert np.allclose(frame["spin_frequency_hz"], whole["spin_frequency_hz"], atol=0.2)
 
 
-@pytest.mark.parametrize("highest", [28.0, 32.0, 40.0])
+@pytest.mark.parametrize("highest", [28.0, 40.0])
 def test_the_first_time_left_is_right_within_a_third(tmp_path: Path, highest: float) -> None:
     show = Silent()
     acquire(of_scene(tmp_path, SpinScene(start_hz=26.0), SpinSettings(drive_frequency_hz=highest)), show)
@@ -503,7 +517,7 @@ def test_a_run_in_full_motion_is_repeated_by_its_seed_and_resumed_in_its_scene(
     in_full_motion: Run, tmp_path: Path
 ) -> None:
     whole = in_full_motion.readings().frame
-    half = acquire(mock(tmp_path, 5, scene="spindown"), Impatient(6))
+    half = acquire(mock(tmp_path, 5, scene="spindown"), Impatient(3))
     assert half.status == "interrupted"
     run = acquire(mock(tmp_path, None, resume=half.folder), Silent())
     assert run.status == "finished"

@@ -17,6 +17,7 @@ from levilab.acquisition.table import EXPERIMENTS
 from levilab.cli.acquire import EXPERIMENT_HELP
 from levilab.cli.analyze import COMMANDS, OPTIONS
 from levilab.pipelines.catalogue import ANALYSES
+from support.acquisitions import QUICKLY
 from support.commands import command
 from support.spin_downs import spin_down_csv
 from support.waiting import HANG_GUARD_S
@@ -55,12 +56,13 @@ def test_the_version_is_printed(levilab: Command) -> None:
     assert levilab("--version").stdout == f"levilab {version('levilab')}\n"
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_acquire_analyze_report_and_list_from_an_empty_folder(
     levilab: Command, levilab_process: Command, tmp_path: Path
 ) -> None:
     for decoy in ("analysis.py", "instruments.py", "pyvisa_levilab.py"):
         (tmp_path / decoy).write_text("raise SystemExit('the decoy was imported')", encoding="utf-8")
-    acquired = levilab_process("acquire", "spin", "--mock", "--note", "one")
+    acquired = levilab_process("acquire", "spin", "--mock", *QUICKLY, "--note", "one")
     assert acquired.stdout.startswith("finished: ")
     assert "s left" in acquired.stderr
     analyzed = levilab("analyze", "spindown", "runs")
@@ -76,7 +78,7 @@ def test_acquire_analyze_report_and_list_from_an_empty_folder(
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_json_is_one_document_and_nothing_else(levilab: Command) -> None:
-    acquired = json.loads(levilab("acquire", "spin", "--mock", "--seed", "2", "--json").stdout)
+    acquired = json.loads(levilab("acquire", "spin", "--mock", *QUICKLY, "--seed", "2", "--json").stdout)
     assert acquired["status"] == "finished"
     result = json.loads(levilab("analyze", "spindown", acquired["run"], "--json").stdout)
     assert result["best_model"] == "disc"
@@ -155,8 +157,8 @@ def test_notes_name_options_on_the_terminal_and_quantities_where_stored(
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab: Command, tmp_path: Path) -> None:
-    for k, name in enumerate(("a.csv", "b.csv")):
-        levilab("analyze", "spindown", spin_down_csv(tmp_path / name, seed=k), "--uncertainty", "profile")
+    for k, (name, *options) in enumerate((("a.csv",), ("b.csv", "--uncertainty", "profile"))):
+        levilab("analyze", "spindown", spin_down_csv(tmp_path / name, seed=k), *options)
     names = {path.name for path in tmp_path.iterdir()}
     assert {f"{file}.csv.{kind}" for file in "ab" for kind in ("result.json", "spindown.png")} <= names
     levilab("report", "b.csv", "--no-crosscheck")
@@ -276,17 +278,18 @@ def test_an_instrument_that_does_not_answer_is_status_3(levilab: Command, tmp_pa
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_run_is_meant_by_its_short_name(levilab: Command) -> None:
-    run = json.loads(levilab("acquire", "spin", "--mock", "--json").stdout)["run"]
+def test_a_run_is_meant_by_its_short_name_and_not_resumed_once_finished(levilab: Command) -> None:
+    run = json.loads(levilab("acquire", "spin", "--mock", *QUICKLY, "--json").stdout)["run"]
     short = run.split("Z-")[1]
     assert short in levilab("runs").stdout
     assert json.loads(levilab("analyze", "spindown", short, "--json").stdout)["inputs"]
-    assert "is finished" in levilab("acquire", "spin", "--resume", short, check=1).stderr
+    for name in (short, run):
+        assert "is finished" in levilab("acquire", "spin", "--resume", name, check=1).stderr
 
 
 def test_a_reader_that_goes_away_costs_neither_the_run_nor_the_result(tmp_path: Path) -> None:
     """As in `levilab … | head -1`: the first line is read, then the pipe is closed."""
-    for words in (["acquire", "spin", "--mock"], ["analyze", "spindown", "runs"]):
+    for words in (["acquire", "spin", "--mock", *QUICKLY], ["analyze", "spindown", "runs"]):
         process = subprocess.Popen(
             [sys.executable, "-m", "levilab", *words],
             cwd=tmp_path,
@@ -304,8 +307,8 @@ def test_a_reader_that_goes_away_costs_neither_the_run_nor_the_result(tmp_path: 
 
 def test_the_bench_file_sets_the_experiment_of_the_virtual_bench_too(levilab: Command, tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("[spin]\ninterval_s = 20.0\n", encoding="utf-8")
-    readings = json.loads(levilab("acquire", "spin", "--mock", "--bench", "mine.toml", "--json").stdout)["readings"]
-    assert 8 <= readings <= 11
+    words = ("acquire", "spin", "--mock", *QUICKLY, "--bench", "mine.toml", "--json")
+    assert 8 <= json.loads(levilab(*words).stdout)["readings"] <= 11
 
 
 def test_a_drive_beyond_the_limits_is_refused_before_anything_is_touched(levilab: Command, tmp_path: Path) -> None:
@@ -318,11 +321,6 @@ def test_a_drive_beyond_the_limits_is_refused_before_anything_is_touched(levilab
 def test_intervals_are_shown_when_asked_for(levilab: Command, tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv")
     assert "68 %: " in levilab("analyze", "spindown", path, "--uncertainty", "profile", "--no-save").stdout
-
-
-def test_a_finished_run_is_not_resumed(levilab: Command) -> None:
-    run = json.loads(levilab("acquire", "spin", "--mock", "--json").stdout)["run"]
-    assert "is finished" in levilab("acquire", "spin", "--resume", run, check=1).stderr
 
 
 @pytest.mark.usefixtures("undrawn_figures")
@@ -355,7 +353,7 @@ IMPORTS: list[tuple[list[list[str]], set[str]]] = [
         set[str](),
     ),
     ([["runs", "."], ["analyze", "nowhere"]], {"numpy"}),
-    ([["acquire", "spin", "--mock"]], {"numpy", "pyvisa"}),
+    ([["acquire", "spin", "--mock", *QUICKLY]], {"numpy", "pyvisa"}),
 ]
 
 

@@ -21,7 +21,7 @@ import pytest
 
 from levilab.runs.listing import list_runs
 from levilab.runs.run import Run
-from support.acquisitions import LET_GO_AT_ONCE
+from support.acquisitions import QUICKLY
 from support.commands import Ended, command
 from support.waiting import HANG_GUARD_S
 
@@ -33,7 +33,7 @@ def start(out: Path, *, before: str = "") -> subprocess.Popen[str]:
     """A levilab process; `before` is Python that it runs first."""
     program = f"{before}\nimport sys\nsys.argv[0] = 'levilab'\nfrom levilab.cli.main import main\nmain()"
     return subprocess.Popen(
-        [sys.executable, "-c", program, "acquire", "spin", "--mock", "--seed", "7", "--out", str(out)],
+        [sys.executable, "-c", program, "acquire", "spin", "--mock", *QUICKLY, "--seed", "7", "--out", str(out)],
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -120,7 +120,7 @@ def test_at_no_moment_would_a_kill_lose_a_reading_that_was_shown(
         shutil.rmtree(left)
 
     monkeypatch.setattr(os, "fsync", copying)
-    ended = command("acquire", "spin", "--mock", "--seed", "7", "--out", out, cwd=tmp_path)
+    ended = command("acquire", "spin", "--mock", *QUICKLY, "--seed", "7", "--out", out, cwd=tmp_path)
     assert ended.status == 0, ended.err
     assert going_on.count(True) > 60
     assert going_on == sorted(going_on, reverse=True)
@@ -225,7 +225,7 @@ def acquire_on(disk: Disk, out: Path) -> Ended:
     with pytest.MonkeyPatch.context() as patch:
         disk.put_in(patch)
         out.mkdir()
-        return command("acquire", "spin", "--mock", "--seed", "7", "--out", out, "--set", LET_GO_AT_ONCE[0], cwd=out)
+        return command("acquire", "spin", "--mock", *QUICKLY, "--seed", "7", "--out", out, cwd=out)
 
 
 def test_a_disk_that_fills_up_at_any_moment_loses_no_reading_that_was_shown(tmp_path: Path) -> None:

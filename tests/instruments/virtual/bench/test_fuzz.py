@@ -172,7 +172,7 @@ def test_a_program_that_waits_for_ever_for_nothing_leaves_the_clock_alone(name):
 
 def test_a_program_that_asks_and_never_reads_gets_an_error_alone():
     bench = hostile.Bench("33500B", stream=True)
-    bench.send(b"*IDN?\n" * 10_000)
+    bench.send(b"*IDN?\n" * 3 * MOST_ANSWERS)
     assert len(bench.session._answers) <= MOST_ANSWERS
     bench.session.clear()
     bench.send(b"SYST:ERR?\n")

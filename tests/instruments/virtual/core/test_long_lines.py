@@ -1,6 +1,6 @@
-"""Lines of 100 000 signs, of every kind that a pattern looks for: the work grows with the length, not with its square.
+"""Lines of 50 000 signs, of every kind that a pattern looks for: the work grows with the length, not with its square.
 
-Nothing is timed.  Work that grew with the square would last for minutes here, and the guard below would end it.
+Nothing is timed.  Work that grew with the square would last for half a minute here, and the guard below would end it.
 """
 
 import faulthandler
@@ -17,7 +17,7 @@ from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from support.wire import ask, errors, send
 
-MANY = 100_000
+MANY = 50_000
 
 #: What stands behind a header, by what it is made of.
 LONG = {
@@ -52,8 +52,8 @@ def no_light(_start, _step, n):
 
 @pytest.fixture(autouse=True)
 def hang_guard():
-    """A minute, reached by work that grows with the square alone."""
-    faulthandler.dump_traceback_later(60, exit=True)
+    """A quarter of a minute, reached by work that grows with the square alone."""
+    faulthandler.dump_traceback_later(15, exit=True)
     yield
     faulthandler.cancel_dump_traceback_later()
 

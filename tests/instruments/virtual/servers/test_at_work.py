@@ -201,16 +201,16 @@ def test_one_long_line_leaves_the_others_their_turn(monkeypatch):
     bench = Bench(monkeypatch)
 
     async def turns_meanwhile():
-        assert await bench.link().write(b"*RST;" * 50_000)
+        assert await bench.link().write(b"*RST;" * 20_000)
         turns = 0
-        while bench.counter.resets < 50_000:
+        while bench.counter.resets < 20_000:
             before = bench.counter.resets
             await asyncio.sleep(0)
             turns += 1
             assert bench.counter.resets - before <= 2
         return turns
 
-    assert asyncio.run(turns_meanwhile()) >= 25_000
+    assert asyncio.run(turns_meanwhile()) >= 10_000
 
 
 def test_a_flood_of_triggers_does_not_keep_the_instrument_from_its_work(monkeypatch):
@@ -232,14 +232,14 @@ def test_empty_lines_leave_the_others_their_turn(monkeypatch):
 
     async def turns_meanwhile():
         link = bench.link()
-        assert await link.write(b"\n" * (1 << 20))
+        assert await link.write(b"\n" * (1 << 18))
         turns = 0
         while link.is_busy():
             await asyncio.sleep(0)
             turns += 1
         return turns
 
-    assert asyncio.run(turns_meanwhile()) >= 255  # a turn after every 4096 bytes
+    assert asyncio.run(turns_meanwhile()) >= 63  # a turn after every 4096 bytes
 
 
 # --- locks ---
@@ -339,9 +339,9 @@ def test_a_counter_that_was_not_asked_for_long_catches_up_in_slices(monkeypatch)
     counter = Virtual53230A(clock, signal=pulses)
     session = VirtualBench({COUNTER: counter}).open(COUNTER)
     session.write(b"INP1:LEV:AUTO OFF;:INP1:LEV1 0.6;:INP1:COUP DC;:SAMP:COUN 1000000;:INIT")
-    clock.sleep(1000.0)
+    clock.sleep(400.0)
     work = session.catch_up()
     assert session.go_on(work)
     while session.go_on(work):
         pass
-    assert counter._memory.size > 5000
+    assert counter._memory.size > 2000

@@ -57,6 +57,10 @@ def analyzed(*paths: Path, **options: Any) -> SpinDownAnalysis:
     return analysis
 
 
+#: Intervals that are soon found: those of a profile take as long as twenty fits.
+INTERVALS: Any = {"uncertainty": "bootstrap", "bootstrap_samples": 10}
+
+
 def same(one: Any, other: Any) -> bool:
     """Equal to the last bit."""
     if isinstance(one, np.ndarray):
@@ -119,7 +123,7 @@ def test_what_is_shown_is_what_stands_in_the_result(tmp_path: Path) -> None:
 
 
 def test_a_run_that_changed_is_analyzed_and_no_other(runs: Path, fitted: list[str]) -> None:
-    before = analyzed(runs, uncertainty="profile")
+    before = analyzed(runs, **INTERVALS)
     readings = runs / "run-2" / "readings.csv"
     readings.write_text("\n".join(readings.read_text(encoding="utf-8").splitlines()[:-2]) + "\n", encoding="utf-8")
     after = recall_spindowns([runs], SpinDownOptions())
@@ -159,10 +163,10 @@ def test_a_run_is_recalled_from_the_result_of_its_folder(runs: Path, fitted: lis
 @pytest.mark.parametrize("given", [{"reading_u": 0.05}, {"keep_outliers": True}])
 def test_other_options_analyze_anew_with_the_rest_as_before(tmp_path: Path, fitted: list[str], given: Any) -> None:
     path = spin_down_csv(tmp_path / "my.csv")
-    analyzed(path, uncertainty="profile")
+    analyzed(path, **INTERVALS)
     after = recall_spindowns([path], SpinDownOptions(**given))
     assert fitted == ["my.csv"]
-    assert after.origins[0].options == replace(SpinDownOptions(uncertainty="profile"), **given)
+    assert after.origins[0].options == replace(SpinDownOptions(**INTERVALS), **given)
     assert "other options than those of" in after.origins[0].text
     assert recall_spindowns([path], SpinDownOptions()).runs[0].u[0] == 0.03  # type: ignore[index]
 
