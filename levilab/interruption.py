@@ -45,8 +45,8 @@ class Stop:
 
     The first signal is only noted, so that it tears no exchange with an instrument; `check()` raises Interrupted where
     the program can end well.  The second one raises Interrupted at once, in case an exchange hangs, but only within
-    `exposed()`: while a run folder is made or completed nothing is torn.  Once Interrupted was raised, signals are
-    ignored, so that nothing can keep the outputs from going off, nor the run from being kept.
+    `let_second_signal_through()`: while a run folder is made or completed nothing is torn.  Once Interrupted was
+    raised, signals are ignored, so that nothing can keep the outputs from going off, nor the run from being kept.
 
     Attributes:
         by: the name of the latest signal; None: there was none.
@@ -64,7 +64,7 @@ class Stop:
             raise Interrupted(self.by)
 
     @contextlib.contextmanager
-    def exposed(self) -> Iterator[None]:
+    def let_second_signal_through(self) -> Iterator[None]:
         """Let the second signal raise Interrupted at once, while an exchange with an instrument may hang."""
         self._is_shielded = False
         try:
@@ -179,6 +179,15 @@ def ignore_interruption() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
+def let_the_status_count() -> None:
+    """Let the process end with its own status although a KeyboardInterrupt came.
+
+    Where one passes an exec() of text, as those of dataclasses, Python notes it, and ends by the signal whoever handled
+    it since.  The next exec() of text takes the note back.
+    """
+    exec("")  # noqa: S102 - it is empty
+
+
 def ignore_all_signals() -> None:
     """Ignore what asks for the end, in this process and from now on: it has said its last word, and is ending."""
     for number in _SIGNALS:
@@ -189,9 +198,8 @@ def ignore_all_signals() -> None:
 def interruption_ends_process(status: int, line: str) -> Iterator[None]:
     """Let Ctrl-C end this process at once while modules are imported and nothing has begun (main thread only).
 
-    KeyboardInterrupt would not do there.  In a callback of the import system Python ignores it; while a class is made
-    it becomes the cause of a RuntimeError; and where it passes an exec(), as of dataclasses, Python ends by the signal
-    in spite of every handler.
+    KeyboardInterrupt would not do there.  In a callback of the import system Python ignores it, and while a class is
+    made it becomes the cause of a RuntimeError.
 
     Args:
         status: of the process.

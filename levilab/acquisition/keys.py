@@ -127,11 +127,11 @@ def refusal(error: ValidationError, given: Mapping[str, str], config: BenchConfi
     text = str(first.get("ctx", {}).get("error", first["msg"])) if own else ""
     if name not in given:
         return UsageError("settings", f"{experiment}: {text or first['msg']}")
-    what = text or f"{allowed(config, experiment, name)} is expected{hint_about(given[name])}"
+    what = text or f"{allowed_values(config, experiment, name)} is expected{hint_about(given[name])}"
     return UsageError("settings", f"{what}; {_where(experiment)}", value=f"{experiment}.{name}={given[name]}")
 
 
-def allowed(config: BenchConfig, experiment: str, name: str) -> str:
+def allowed_values(config: BenchConfig, experiment: str, name: str) -> str:
     """What may stand at a key of an experiment on this bench, with its unit."""
     return expected(name, _schema(config, experiment)[name])
 

@@ -77,7 +77,7 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
     experiment = EXPERIMENTS[request.experiment]
     with watching_for_interruption() as stop, _writer(request, show) as writer, contextlib.closing(show):
         try:
-            with stop.exposed():
+            with stop.let_second_signal_through():
                 _at_the_bench(experiment, request, writer, show, stop, watch=watch)
             status: Status = "finished"
         except Interrupted as interruption:

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiment import CounterSettings
-from levilab.acquisition.keys import allowed, refusal, refuse_unknown
+from levilab.acquisition.keys import allowed_values, refusal, refuse_unknown
 from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
 from levilab.bench.config import BenchConfig, ConfigError, read_bench
@@ -148,13 +148,13 @@ def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequenc
     for setting in settings:
         key, equals, text = setting.partition("=")
         name, dot, field = key.strip().partition(".")
-        if equals and (not name or (name == experiment and not field)):
-            raise _ill_formed(experiment, setting, "the key is missing: ")
+        if equals and not field and name in {"", experiment}:
+            raise _wrong_form(experiment, setting, "the key is missing: ")
         if equals and not dot:
             refuse_unknown(config, experiment, name)
-            raise _ill_formed(experiment, setting, meant=f", {_suggestion(config, experiment, name, text)}")
+            raise _wrong_form(experiment, setting, meant=f", {_suggestion(config, experiment, name, text)}")
         if not equals or name not in EXPERIMENTS:
-            raise _ill_formed(experiment, setting)
+            raise _wrong_form(experiment, setting)
         if name != experiment:
             expected = f"is a setting of levilab acquire {name}, this is levilab acquire {experiment}"
             raise UsageError("settings", expected, value=setting)
@@ -167,7 +167,7 @@ def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequenc
         raise refusal(error, given, config, experiment) from error
 
 
-def _ill_formed(experiment: str, setting: str, why: str = "", meant: str = "") -> UsageError:
+def _wrong_form(experiment: str, setting: str, why: str = "", meant: str = "") -> UsageError:
     what = f"{why}{experiment}.KEY=VALUE is expected{meant}; levilab acquire {experiment} --settings lists all"
     return UsageError("settings", what, value=setting)
 
@@ -179,7 +179,7 @@ def _suggestion(config: BenchConfig, experiment: str, name: str, text: str) -> s
         changed = _with_given_settings(config, experiment, [whole])
         settings_of(changed, experiment).check(experiment, config.limits)
     except (UsageError, ConfigError):
-        return f"{experiment}.{name} is {allowed(config, experiment, name)}"
+        return f"{experiment}.{name} is {allowed_values(config, experiment, name)}"
     return f"{whole}?"
 
 

@@ -44,7 +44,7 @@ def silence(stream: TextIO) -> None:
 
 
 def say_where(report: Path, *, in_new_folder: bool) -> None:
-    """The line at the end of a command that wrote a report; a folder that was made may come from a slip of the pen."""
+    """The line at the end of a command that wrote a report; a folder that was made may stand for a typing error."""
     result(f"the report is in {report}{', in a new folder' if in_new_folder else ''}")
 
 

@@ -7,7 +7,7 @@ import sys
 
 from levilab.cli.exit_codes import INTERRUPTED
 from levilab.cli.importing import LINE, importing
-from levilab.interruption import end_process_at_interruption, ignore_all_signals
+from levilab.interruption import end_process_at_interruption, ignore_all_signals, let_the_status_count
 
 
 def main() -> None:
@@ -23,3 +23,4 @@ def main() -> None:
         sys.exit(INTERRUPTED)
     finally:  # what was to be said is said; what is left are threads to wait for
         end_process_at_interruption(INTERRUPTED)
+        let_the_status_count()

@@ -61,6 +61,7 @@ class Asked:
 
 def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked | None = None) -> Section:
     """The section at the end of a report of measurements."""
+    asked = asked or Asked()
     sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
     many = len(sources) > _MOST_NAMED
     data = (_data(sources), *_recorded(sources))
@@ -72,7 +73,7 @@ def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked | No
                 "The last command makes this report again, byte for byte, where the same data and results lie and the "
                 "versions are the same; those before it make its numbers."
             ),
-            Code("\n".join([*_commands(results), (asked or Asked()).command(sources)])),
+            Code("\n".join([*_commands(results, asked.paths), asked.command(sources)])),
             *_others(results),
             *inputs,
             Facts((Fact("Versions here", (_versions(software_versions()),)),)),
@@ -81,7 +82,7 @@ def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked | No
     )
 
 
-def _commands(results: Sequence[tuple[Analysis[Any], Any]]) -> Iterator[str]:
+def _commands(results: Sequence[tuple[Analysis[Any], Any]], typed: Sequence[Path]) -> Iterator[str]:
     """Those of the analyses."""
     for analysis, found in results:
         options = list(dict.fromkeys(_options(origin.options) for origin in found.origins))
@@ -89,13 +90,15 @@ def _commands(results: Sequence[tuple[Analysis[Any], Any]]) -> Iterator[str]:
             of = [
                 s for s, origin in zip(found.sources, found.origins, strict=True) if _options(origin.options) == given
             ]
-            yield " ".join(["levilab", "analyze", analysis.name, *named_in_commands(of), *given])
+            yield " ".join(["levilab", "analyze", analysis.name, *named_in_commands(of, typed), *given])
 
 
-def named_in_commands(sources: Sequence[Source[Any]]) -> list[str]:
-    """As one types them; of many the folder that holds them."""
+def named_in_commands(sources: Sequence[Source[Any]], typed: Sequence[Path] = ()) -> list[str]:
+    """As one types them; of many the paths that were typed and hold them, or else their folders."""
     paths = [source.path for source in sources]
     if len(paths) > _MOST_NAMED:
+        if holding := [path for path in typed if any(one.is_relative_to(path) for one in paths)]:
+            return [shlex.quote(str(path)) for path in holding]
         folders = dict.fromkeys(path.parent for path in paths)
         paths = [folder for folder in folders if folders.keys().isdisjoint(folder.parents)]  # each with those below it
     return [shlex.quote(str(path)) for path in paths]

@@ -41,7 +41,7 @@ def test_the_first_signal_is_only_noted_and_raised_where_it_is_looked_for(number
 
 @pytest.mark.parametrize("number", SIGNALS)
 def test_the_second_signal_breaks_through_once(number):
-    with watching_for_interruption() as stop, stop.exposed():
+    with watching_for_interruption() as stop, stop.let_second_signal_through():
         signal.raise_signal(number)
         with pytest.raises(Interrupted):
             signal.raise_signal(number)
@@ -54,11 +54,11 @@ def test_while_a_run_is_made_or_completed_signals_are_only_noted():
     with watching_for_interruption() as stop:
         for _ in range(3):
             signal.raise_signal(signal.SIGINT)
-        with stop.exposed(), pytest.raises(Interrupted):
+        with stop.let_second_signal_through(), pytest.raises(Interrupted):
             stop.check()
         signal.raise_signal(signal.SIGINT)
     with watching_for_interruption() as stop:
-        with stop.exposed():
+        with stop.let_second_signal_through():
             signal.raise_signal(signal.SIGINT)
             with pytest.raises(Interrupted):
                 stop.check()
@@ -67,7 +67,7 @@ def test_while_a_run_is_made_or_completed_signals_are_only_noted():
 
 
 def test_two_different_signals_count_together():
-    with watching_for_interruption() as stop, stop.exposed():
+    with watching_for_interruption() as stop, stop.let_second_signal_through():
         signal.raise_signal(signal.SIGTERM)
         with pytest.raises(Interrupted, match="SIGINT"):
             signal.raise_signal(signal.SIGINT)
@@ -75,7 +75,7 @@ def test_two_different_signals_count_together():
 
 @pytest.mark.parametrize("before", [0, 1])
 def test_nothing_breaks_through_the_shield(before):
-    with watching_for_interruption() as stop, stop.exposed():
+    with watching_for_interruption() as stop, stop.let_second_signal_through():
         for _ in range(before):
             signal.raise_signal(signal.SIGINT)
         stop.shield()

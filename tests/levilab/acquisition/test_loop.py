@@ -326,7 +326,7 @@ def test_a_signal_while_connecting_never_lets_the_drive_on(
 def test_the_time_of_a_reading_is_the_middle_of_its_gate(
     ten_runs: list[tuple[SpinWorld, pd.DataFrame]],
 ) -> None:
-    """At 35 Hz and 0.1 Hz/s a time stamp that is half a gate off would be 0.05 Hz off; the mean of ten runs tells."""
+    """At 0.1 Hz/s a time stamp that is half a gate off would be 0.05 Hz off, which the mean of ten runs shows."""
     off = []
     for world, frame in ten_runs:
         released = [stretch for stretch in world._stretches if stretch.phase is Phase.COASTING][-1].start

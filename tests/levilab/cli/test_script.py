@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tomllib
 from importlib.metadata import EntryPoint
 from typing import TYPE_CHECKING, Any
@@ -40,6 +42,19 @@ def test_ctrl_c_at_the_start_ends_in_one_line(
     assert ended.value.code == INTERRUPTED
     assert afterwards == [ignore_all_signals, INTERRUPTED]
     assert capsys.readouterr().err == "levilab: interrupted\n"
+
+
+def test_ctrl_c_in_an_exec_of_a_library_does_not_end_the_process_by_the_signal() -> None:
+    """Python notes that one passed an exec() of text, here as of a dataclass, and would end with −2."""
+    program = """
+import levilab.cli.main
+from levilab.cli.start import main
+
+levilab.cli.main.main = lambda: exec("raise KeyboardInterrupt")
+main()
+"""
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (INTERRUPTED, "levilab: interrupted\n")
 
 
 def test_ctrl_c_while_a_command_is_imported_ends_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,12 +7,14 @@ import inspect
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 from levilab.cli.analyze import OPTIONS, analysis_options
 from levilab.cli.report import report
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.present.document.blocks import Code, Facts, Note, Tabular
-from levilab.report.reproduction import OF_REPORT, SAME_IN_COMMANDS, Asked, reproduction
+from levilab.report.reproduction import OF_REPORT, SAME_IN_COMMANDS, Asked, named_in_commands, reproduction
 from support.paths import SAMPLE_DATA
 
 
@@ -33,6 +35,14 @@ def test_the_command_of_a_report_has_the_paths_the_options_and_the_format_that_w
     asked = Asked((Path("runs"), Path("a b.csv")), ".pdf", given, crosscheck=False)
     words = "runs 'a b.csv' --columns 't=1,f=spin, Hz' --keep-outliers --no-crosscheck -o report.pdf"
     assert asked.command([]) == f"levilab report {words}"
+
+
+def test_of_many_inputs_the_paths_are_named_that_were_typed() -> None:
+    # their folders would be "many" and ".", which holds more
+    sources: Any = [SimpleNamespace(path=Path("many") / f"{k}.csv") for k in range(14)]
+    sources.append(SimpleNamespace(path=Path("r.csv")))
+    assert named_in_commands(sources, [Path("many"), Path("r.csv"), Path("traces")]) == ["many", "r.csv"]
+    assert named_in_commands(sources[:14]) == ["many"]
 
 
 def test_options_that_no_command_can_hold_are_named_as_they_are_typed() -> None:
