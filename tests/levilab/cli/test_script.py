@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 import tomllib
@@ -13,7 +14,7 @@ import pytest
 from levilab.cli.exit_codes import INTERRUPTED
 from levilab.cli.later import Later
 from levilab.cli.start import main
-from levilab.interruption import ignore_all_signals
+from levilab.interruption import End, ignore_all_signals
 from support.commands import command
 from support.paths import ROOT
 
@@ -61,3 +62,31 @@ def test_ctrl_c_while_a_command_is_imported_ends_in_one_line(tmp_path: Path, mon
     monkeypatch.setattr(Later, "command", property(interrupt))
     ended = command("report", "x", cwd=tmp_path)
     assert (ended.status, ended.err) == (INTERRUPTED, "levilab: interrupted\n")
+
+
+def test_ctrl_c_ends_the_process_while_a_command_is_imported() -> None:
+    handlers: list[Any] = []
+
+    def made() -> Any:
+        handlers.append(signal.getsignal(signal.SIGINT))
+        return lambda: None
+
+    before = signal.getsignal(signal.SIGINT)
+    assert Later("some", callback=made).command.name == "some"
+    assert "end_process_at_interruption" in handlers[0].__qualname__
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_signal_after_the_run_changes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    handlers: list[Any] = []
+
+    class Kept:
+        status, folder = "finished", "somewhere"
+
+        def count(self) -> int:
+            handlers.append(signal.getsignal(signal.SIGTERM))
+            return 3
+
+    monkeypatch.setattr("levilab.acquisition.loop.acquire", lambda *_: Kept())
+    assert command("acquire", "spin", "--mock", cwd=tmp_path).status == 0
+    assert isinstance(handlers[0], End)
