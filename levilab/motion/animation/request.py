@@ -112,6 +112,11 @@ class AnimationRequest:
                 value=self.path,
             ) from None
 
+    @property
+    def played(self) -> float:
+        """The speed that was chosen, or the format's usual one."""
+        return self.format.speed if self.speed is None else self.speed
+
 
 def check_request(request: AnimationRequest, scene: Scene, duration: float) -> None:
     """Raise what is wrong with a request before anything is simulated.
@@ -143,12 +148,11 @@ def check_request(request: AnimationRequest, scene: Scene, duration: float) -> N
             f"a time above {first:g} s and up to the duration of {duration:g} s is expected",
             value=request.stop,
         )
-    speed = chosen.speed if request.speed is None else request.speed
-    if not _SLOWEST <= speed <= _FASTEST:
+    if not _SLOWEST <= request.played <= _FASTEST:
         raise UsageError(
             "animate_speed",
             f"a number from {_SLOWEST:g} to {_FASTEST:g} is expected, as 0.05 for a twentieth of the real speed",
-            value=speed,
+            value=request.played,
         )
     chosen.check()
 
@@ -165,10 +169,9 @@ def check_span(request: AnimationRequest, scene: Scene, duration: float, message
         message: called when code is compiled for it.
     """
     start, stop = _span(request, duration)
-    speed = request.format.speed if request.speed is None else request.speed
     try:
         if request.format.encode:
-            _check_pictures(request.format, stop - start, speed)
+            _check_pictures(request.format, stop - start, request.played)
         else:  # it turns no slower than at the start, and perhaps faster later
             _count_for_page(scene, stop - start, abs(scene.start.spin_hz))
     except SpanTooLong as error:
@@ -218,7 +221,7 @@ def animate(
     if request.start is not None and request.start >= summary.end:
         raise UsageError("animate_from", f"the top was lost after {summary.end:.4g} s already", value=request.start)
     start, stop = _span(request, summary.end, fell=summary.motion.fell is not None)
-    speed = chosen.speed if request.speed is None else request.speed
+    speed = request.played
     progress = progress or (lambda _: None)
     if chosen.encode is None:
         count = _count_for_page(summary.motion.scene, stop - start, turn_rate(summary.motion))
