@@ -15,19 +15,20 @@ const LEAST_MS = SOFTWARE ? 46 : 0;
 /** Pixels without a graphics card, as a part of those that are shown: half would do, but is coarse to look at. */
 const SOFTWARE_RATIO = 0.75;
 
-/** @param of what is drawn of the top and its base, as the server describes it. */
-export async function openSpace(canvas, of) {
+/** @param description of the top and its base, as the server sends it. */
+export async function openSpace(canvas, description) {
   const {THREE, OrbitControls} = await import("./three.js");
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const renderer = new THREE.WebGLRenderer({canvas, antialias: !SOFTWARE, powerPreference: "low-power"});
   renderer.setPixelRatio(SOFTWARE ? SOFTWARE_RATIO : Math.min(devicePixelRatio || 1, 2));
   let parts = null, view = null;
-  function build(of) {
-    parts = of;
+  function build(described) {
+    view?.dispose();
+    parts = described;
     view = buildScene(THREE, parts, dark.matches ? "dark" : "light");
     view.show({drive: false});
   }
-  build(of);
+  build(description);
   const camera = buildCamera(THREE, parts, 1);
   const orbit = new OrbitControls(camera, canvas);
   orbit.target.copy(camera.userData.target);
@@ -120,11 +121,13 @@ export async function openSpace(canvas, of) {
   return {
     add,
     get parts() { return parts; },
-    setParts: (of) => {
-      if (JSON.stringify(of) === JSON.stringify(parts)) return;
-      build(of);
+    setParts: (described) => {
+      if (JSON.stringify(described) === JSON.stringify(parts)) return;
+      build(described);
       resize();
-      if (state) state = show();  // the new top stands where the old one stood
+      if (!state) return;
+      advance(0);  // the poses may have begun anew, and a picture that stands still has not followed
+      state = show();
     },
     setRate: (value) => { rate = value; },
     setSpeed: (value, still) => { speed = still ? 0 : value || 1; },
