@@ -3,7 +3,7 @@
 import {command, connect} from "./connection.js";
 import {drawReadings, drawRecords, saidOf, sheet} from "./plot.js";
 import {openPractice} from "./practice.js";
-import {by, fixed, lapse, make, short, typeset, write} from "./words.js";
+import {between, by, fixed, lapse, make, short, typeset, write} from "./words.js";
 
 /** Spoken news come at most so often [ms]. */
 const NEWS_EVERY_MS = 6000;
@@ -73,7 +73,7 @@ function take(head, arrays) {
 
 function turnTo(run) {
   Object.assign(seen, {run, readings: -1, events: 0, fit: -1});
-  Object.assign(data, {readings: null, fit: null, about: null, ended: "", last: {}, count: 0, trend: NaN});
+  Object.assign(data, {readings: null, fit: null, about: null, ended: "", end: null, last: {}, count: 0, trend: NaN});
   by("event-list").replaceChildren();
   by("events-key").hidden = true;
   pointed = -1;
@@ -98,7 +98,7 @@ function takeFit(about, arrays) {
     ? {...about, x: arrays.fit_x, y: arrays.fit_y, band: arrays.fit_band, solid_to: about.solid_to ?? Infinity} : null;
   typeset(by("fit-head"), about.head || "");
   typeset(by("fit-lines"), (about.lines || []).join(" · "));
-  data.end = about.end_s ?? NaN;
+  data.end = about.end_s || null;
   dirty.plot = true;
 }
 
@@ -190,9 +190,9 @@ function show() {
   by("synthetic").hidden = !(about?.synthetic || (!about && bench?.virtual));
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
   write("elapsed", Number.isFinite(elapsed) ? lapse(elapsed) : "");
-  const left = about?.status !== "running" ? NaN : bench?.time_left_s ?? (Number.isFinite(data.end) ? data.end - last.time_s : NaN);
+  const left = leftOf(about, bench, elapsed);
   const pace = practice && bench?.speed !== 1 ? " of bench time" : "";
-  write("left", Number.isFinite(left) && left >= 0 ? `about ${lapse(left)}${pace} left` : "");
+  write("left", left ? `${left}${pace} left` : "");
   showBar(about, bench);
   showCounter(bench, last);
   showGenerator(bench, last);
@@ -209,6 +209,13 @@ function show() {
   showTop(bench);
   showAge(bench);
   speak(state, left);
+}
+
+/** The time that is left, in words: that of the fit, whose line is drawn, else what the bench says; "" where it is not known. */
+function leftOf(about, bench, elapsed) {
+  if (about?.status !== "running") return "";
+  if (data.end && Number.isFinite(elapsed)) return between(...data.end.map((end) => end - elapsed));
+  return bench?.time_left_s >= 0 ? `about ${lapse(bench.time_left_s)}` : "";
 }
 
 /** How a run ended that did not finish: its last event. */
@@ -323,7 +330,7 @@ function speak(state, left) {
   const now = performance.now();
   if (now - spoken < NEWS_EVERY_MS) return;
   const spin = data.last.spin_frequency_hz;
-  const text = data.count ? `${STATES[state] || state}: reading ${data.count}${Number.isFinite(spin) ? `, ${spin.toFixed(2)} hertz` : ""}${Number.isFinite(left) ? `, about ${lapse(left)} left` : ""}` : STATES[state] || state;
+  const text = data.count ? `${STATES[state] || state}: reading ${data.count}${Number.isFinite(spin) ? `, ${spin.toFixed(2)} hertz` : ""}${left ? `, ${left} left` : ""}` : STATES[state] || state;
   if (by("news").textContent !== text) {
     spoken = now;
     write("news", text);

@@ -169,6 +169,13 @@ def test_a_run_grows_is_torn_reloaded_and_ends(served: Hall, page: Page, tmp_pat
         until(page, "levilab.data.count === 4")
         run.event("the lamp was moved", "warning", 31.0)
         until(page, "document.querySelector('#event-list .warning')")
+        run.readings(spin_down(9, first=4))  # to 120 s; 25 Hz come at 143 s, 21.36 Hz at 199 s
+        until(page, "document.getElementById('left').textContent === 'about 25 to 80 s left'")
+        assert (
+            page.evaluate("Math.abs(levilab.data.fit.x.at(-1) - levilab.data.end[1])") < 0.001
+        )  # the line ends where the head says
+        for limits, said in (("-3, 21", "at most 25 s"), ("-9, -1", ""), ("80, 140", "about 80 s to 2:20 min")):
+            assert page.evaluate(f"import('/page/words.js').then(({{between}}) => between({limits}))") == said
     run.say(status="finished")
     until(page, "document.body.dataset.state === 'finished'")
 
