@@ -23,7 +23,7 @@ const OLD_S = 3;
 const CHANNELS = ["tape", "drive", "laser"];
 const SLIP_HZ = 0.05, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive; while it swings, or the drive moves
 
-const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, records: {}};
+const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, source: null, records: {}};
 const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
 let paused = false, drawn = null, pointed = -1, space = null, topOf = "", wanted = "", practice = null, reachable = true;
@@ -46,6 +46,11 @@ function take(head, arrays) {
   }
   seen.tick = head.tick;
   if (head.run !== seen.run) turnTo(head.run);
+  if (head.source !== seen.source) {  // another bench, with a clock of its own
+    Object.assign(seen, {source: head.source, records: {}});
+    data.records.clear();
+    dirty.trace = true;
+  }
   data.bench = head.bench;
   let follows = false;
   for (const one of head.said) {
