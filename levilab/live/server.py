@@ -116,7 +116,7 @@ class Hall:
             await self.turn_to_another()
 
     async def turn_to_another(self) -> None:
-        """Let pages of the bench for practice that chose no run turn to the one that is recorded: its own before others."""
+        """Let pages that chose no run turn to the one that is recorded: that of the practice bench before others."""
         desk, watch = self.desk, self.watches.get("")
         if desk is None or watch is None:
             return

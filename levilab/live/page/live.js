@@ -21,6 +21,7 @@ const LONGER = {  // what stands beside the state
 const OLD_S = 3;
 /** What a practice bench's oscilloscope shows, from above. */
 const CHANNELS = ["tape", "drive", "laser"];
+const PAUSED = "The view is paused, and shows nothing of what the bench would do: “Go on” first.";
 const SLIP_HZ = 0.05, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive; while it swings, or the drive moves
 
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, source: null, records: {}};
@@ -32,9 +33,21 @@ window.levilab = {frames: 0, drawn: 0, seen, data};  // what tests and benchmark
 
 // --- the address: a token after #, which never leaves the page, and stays for a reload ---
 
-const token = location.hash.slice(1) || sessionStorage.getItem("token") || "";
+const token = tokenInAddress() || sessionStorage.getItem("token") || "";
 if (token) sessionStorage.setItem("token", token);
 history.replaceState(null, "", location.pathname + location.search);
+
+/** What stands after #, but for the name of a part of the page, to which a link leads. */
+function tokenInAddress() {
+  const text = location.hash.slice(1);
+  return by(text) ? "" : text;
+}
+addEventListener("hashchange", () => {  // the address of the terminal in a page that is open
+  if (!tokenInAddress()) return;
+  sessionStorage.setItem("token", tokenInAddress());
+  history.replaceState(null, "", location.pathname + location.search);
+  location.reload();
+});
 
 // --- frames ---
 
@@ -117,7 +130,7 @@ function takeEvents(events) {
   }
 }
 
-/** Events of a run have its time; before its start, and at a bench without one, they have that of the clock. */
+/** The latest stands first.  Events of a run have its time; before its start, and at a bench without one, they have that of the clock. */
 function listEvent({time_s, utc}, text, loud) {
   const list = by("event-list"), item = make("li", "", loud);
   const ofRun = typeof time_s === "number", clock = ofRun ? "" : /T(\d\d:\d\d:\d\d)/.exec(utc)?.[1] || "";
@@ -125,7 +138,8 @@ function listEvent({time_s, utc}, text, loud) {
   if (clock) when.dateTime = utc;
   by("events-key").hidden &&= !clock;
   item.append(when, make("span", text));
-  list.prepend(item);
+  item.dataset.utc = utc || list.firstChild?.dataset.utc || "";  // one that is damaged comes with the last
+  list.insertBefore(item, [...list.children].find((other) => other.dataset.utc <= item.dataset.utc) || null);
   while (list.children.length > MOST_EVENTS) list.lastChild.remove();
 }
 
@@ -411,6 +425,7 @@ function pause() {
   by("pause").setAttribute("aria-pressed", String(paused));
   write("pause", paused ? "Go on" : "Pause view");
   space?.pause?.(paused);
+  if (!paused && by("said").textContent === PAUSED) write("said", "");
 }
 by("pause").addEventListener("click", pause);
 by("help").addEventListener("click", () => by("keys").showModal());
@@ -435,7 +450,8 @@ const KEYS = {
   ";": () => practice?.step(-0.5), "<": () => practice?.step(-0.5),
 };
 document.addEventListener("keydown", (event) => {
-  const typing = event.target.closest?.("input:not([type=checkbox]):not([type=range]), select, textarea, dialog[open]");
+  const fields = event.key === "?" ? "dialog[open]" : "input:not([type=checkbox]):not([type=range]), select, dialog[open]";  // no number and no option has a "?"
+  const typing = event.target.closest?.(fields);
   const pressing = event.key === " " && event.target.closest?.("button, a, input, [role=button]");
   if (typing || pressing || event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.key]) return;
   event.preventDefault();
@@ -494,7 +510,7 @@ async function begin() {
   document.body.classList.add("no-top");
   if (bench) {
     document.body.classList.remove("no-top");
-    practice = openPractice(bench, (wanted) => command(wanted, token), () => seen.run, (run) => listed.practice.runs.includes(run), Boolean(token));
+    practice = openPractice(bench, (wanted) => paused && wanted.do !== "analyze" ? PAUSED : command(wanted, token), () => seen.run, (run) => listed.practice.runs.includes(run), Boolean(token));
   }
   by("keys").classList.toggle("for-practice", Boolean(bench));
   for (const row of document.querySelectorAll(".practice-key")) row.hidden = !bench;

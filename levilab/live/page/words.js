@@ -26,6 +26,9 @@ export function lapse(seconds) {
   return sign + (h ? `${h}:${two(m)}:${two(s)}` : `${m}:${two(s)} min`);
 }
 
+/** The number that a person typed, with a decimal point or a decimal comma; NaN where it is none. */
+export const numberIn = (text) => /^[+\u2212-]?(\d+[.,]?\d*|[.,]\d+)$/.test(text.trim()) ? Number(text.trim().replace("\u2212", "-").replace(",", ".")) : NaN;
+
 /** Two limits of a time that is left [s], in words: "about 20 to 40 s", "at most 30 s"; "" where both are over. */
 export function between(from, to) {
   const round = (seconds) => Math.round(seconds / 5) * 5;

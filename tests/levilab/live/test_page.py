@@ -34,7 +34,8 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     hostile.readings(spin_down(19))
     hostile.event(HOSTILE, kind=HOSTILE)
-    hostile.event("the top follows the drive", time_s=130.0)
+    hostile.event("the top follows the drive", time_s=130.0, utc="2026-11-22T09:03:00.5Z")
+    hostile.event("a command before the run", utc="2026-11-22T08:00:00.1Z")
     return root
 
 
@@ -72,7 +73,7 @@ def test_nothing_that_a_run_contains_becomes_markup(shown: Page) -> None:
 
 def test_events_before_the_start_have_the_time_of_the_clock(shown: Page) -> None:
     times = shown.evaluate("[...document.querySelectorAll('#event-list time')].map((one) => one.textContent)")
-    assert times == ["2:10", "09:00:05"]  # the latest first
+    assert times == ["2:10", "09:00:05", "08:00:00"]  # the latest first, also where it came before
     assert shown.inner_text("#events-key") == "clock times are UTC"
 
 
@@ -135,9 +136,11 @@ def test_the_keys_go_from_reading_to_reading_and_pause(shown: Page) -> None:
     for pressed in ("true", "false"):
         shown.keyboard.press("Space")
         assert shown.get_attribute("#pause", "aria-pressed") == pressed
-    shown.keyboard.press("?")
-    assert shown.locator("#keys").is_visible()
-    shown.keyboard.press("Escape")
+    for part in ("#plot", "#run"):  # also in a list, whose letters choose an option
+        shown.focus(part)
+        shown.keyboard.press("?")
+        assert shown.locator("#keys").is_visible()
+        shown.keyboard.press("Escape")
 
 
 def test_a_phone_scrolls_down_and_not_sideways(watched: Callable[..., Page], hall: Hall) -> None:
