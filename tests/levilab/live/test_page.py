@@ -166,6 +166,9 @@ def test_a_run_grows_is_torn_reloaded_and_ends(served: Hall, page: Page, tmp_pat
         run.add("30.0,37.")
         until(page, "levilab.data.count === 3")
         assert page.inner_text("#state-word") == "running"
+        publish(served.watches[run.folder.name], State(20.0))  # a bench that does not know how long it takes
+        until(page, "levilab.data.bench")
+        assert page.inner_text("#left") == ""
         run.add("1,0.03\n")
         until(page, "levilab.data.count === 4")
         page.reload()
