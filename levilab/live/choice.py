@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 #: Runs to choose from.
 MOST_RUNS = 50
-#: So many of the newest runs are looked at for one that is being recorded.
+#: Of the newest runs, how many are looked at for one that is being recorded.
 _LOOKED_AT = 5
 
 

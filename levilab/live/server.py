@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 #: Frames a second at most, so that 20 come to the page; and so long a page waits for one in which nothing is new [s].
 FRAMES_PER_S, PATIENCE_S = 22, 1.0
-#: So often runs of other programs are looked for [s].
+#: Time between two looks for runs of other programs [s].
 _OTHERS_EVERY_S = 2.0
 #: The longest question of a page [bytes].
 _LONGEST_ASK = 4096
