@@ -54,7 +54,7 @@ def see_another_program_record(page: Page, served: Hall, older: GrowingRun) -> N
     outer = page.evaluate("levilab.space.parts.base.outer")
     with older.running():
         write_address(older.folder, Address.at(1))
-        until(page, "levilab.data.about.status === 'running'")
+        until(page, "levilab.data.about.status === 'running' && levilab.seen.source === 1")  # it listens to that bench
         pose = Poses(7.0, 1 / 400, np.full((1, 3), 0.1), np.array([[0.0, 0.0, 0.0, 1.0]]), np.ones(1, dtype=bool))
         publish(served.watches[OLDER], State(7.0, folder=str(older.folder)), pose)
         until(page, "document.getElementById('controls').disabled && levilab.data.bench.time_s === 7")
