@@ -109,6 +109,21 @@ class LawFit:
         tau = (np.asarray(time, dtype=float) - self.start_time) / duration
         return frequency * counted(self.law, tau, self.solution)
 
+    def forecast(self, time: ArrayLike, last: float) -> Array:
+        """The spin [Hz] of a top that the law alone slows from where the fitted curve stands at the last reading.
+
+        The count's tilt is left out: beyond the readings its curve runs into the resonance, which no top reaches.
+
+        Args:
+            time: on the clock of the readings, shape (n,) [s].
+            last: time of the last reading [s].
+        """
+        frequency, duration = self.reference
+        now = self.spin_frequency([last]) / frequency
+        constants = self.solution[1 : len(self.law.parameters)]
+        tau = (np.asarray(time, dtype=float) - last) / duration
+        return frequency * self.law.spin(tau, np.concatenate([now, constants]))
+
     def u_spin_frequency(self, time: ArrayLike) -> Array | None:
         """The standard uncertainty of the fitted curve [Hz] at times [s], shape (n,); None where it is undefined.
 

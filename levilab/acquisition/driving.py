@@ -188,7 +188,8 @@ def drive_up(session: Session[D], to: float | None = None) -> None:
         session.bench.generator.output = True
         try:
             held = _ramp(session, _take_hold(session, spin), target)
-            session.event("locked", f"the top follows the drive at {held:.2f} Hz", frequency_hz=held)
+            text = f"the top follows the drive at {target:.2f} Hz: {held:.2f} Hz counted"
+            session.event("locked", text, frequency_hz=held)
             _hold(session, target)
         except NotHeld as lost:
             session.bench.outputs_off()

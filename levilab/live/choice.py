@@ -11,11 +11,13 @@ from levilab.errors import DataError
 from levilab.runs.run import RECORD, Run
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
     from pathlib import Path
 
 #: Runs to choose from.
 MOST_RUNS = 50
+#: Of the newest runs, how many are looked at for one that is being recorded.
+_LOOKED_AT = 5
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,17 @@ def _choice(folder: Path) -> Choice:
         return Choice(folder.name, "unreadable")
     record = run.record
     return Choice(folder.name, run.status, record.experiment, record.started_utc or "", record.note[:200])
+
+
+def recorded_now(root: Path, but: Collection[Path] = ()) -> Path | None:
+    """The folder of the newest run that is running, among the newest few; None where there is none.
+
+    Args:
+        root: the folder with the runs.
+        but: folders that do not count.
+    """
+    others = [root / name for name in run_names(root) if root / name not in but]
+    return next((folder for folder in others[:_LOOKED_AT] if _choice(folder).status == "running"), None)
 
 
 def newest(found: list[Choice]) -> str | None:

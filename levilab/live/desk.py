@@ -72,6 +72,11 @@ class Desk:
         """Of the run that it recorded last, or records; None before."""
         return self.folders[-1] if self.folders else None
 
+    @property
+    def is_recording(self) -> bool:
+        """Whether it records a run."""
+        return self._records
+
     def address(self) -> Address | None:
         """Where it publishes; None until it is ready."""
         return self.bench.address

@@ -21,7 +21,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from levilab.errors import LevilabError
 from levilab.live.analyzed import FIGURES, REPORT, Analyses
-from levilab.live.choice import choices, newest
+from levilab.live.choice import choices, newest, recorded_now
 from levilab.live.desk import parts_for, scene_of_run
 from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
 from levilab.live.watch import Watch
@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 #: Frames a second at most, so that 20 come to the page; and so long a page waits for one in which nothing is new [s].
 FRAMES_PER_S, PATIENCE_S = 22, 1.0
+#: Time between two looks for runs of other programs [s].
+_OTHERS_EVERY_S = 2.0
 #: The longest question of a page [bytes].
 _LONGEST_ASK = 4096
 PAGE = Path(__file__).parent / "page"
@@ -106,6 +108,26 @@ class Hall:
                 self._announce()
             before = now
             await asyncio.sleep(max(0.005, 1 / FRAMES_PER_S - (time.monotonic() - begin)))
+
+    async def look_for_others(self) -> None:
+        """Look for runs of other programs, for ever."""
+        while True:
+            await asyncio.sleep(_OTHERS_EVERY_S)
+            await self.turn_to_another()
+
+    async def turn_to_another(self) -> None:
+        """Let pages that chose no run turn to the one that is recorded: that of the practice bench before others."""
+        desk, watch = self.desk, self.watches.get("")
+        if desk is None or watch is None:
+            return
+        if not desk.is_recording:
+            if watch.followed and watch.followed.status == "running":
+                return
+            folder = await asyncio.to_thread(recorded_now, self.root, [*desk.folders])
+        if desk.is_recording:  # it may have begun meanwhile
+            folder = desk.folder
+        if folder:
+            watch.turn_to(folder)
 
     def _ticks(self) -> list[int]:
         return [*(watch.tick for watch in self.watches.values()), self.desk.count if self.desk else 0]
@@ -228,11 +250,12 @@ def application(hall: Hall) -> Guard:
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        reading = asyncio.create_task(hall.read_on())
+        tasks = [asyncio.create_task(work()) for work in (hall.read_on, hall.look_for_others)]
         try:
             yield
         finally:
-            reading.cancel()
+            for task in tasks:
+                task.cancel()
 
     routes = [
         Route("/", pages.page),

@@ -110,7 +110,7 @@ class Watch:
         if before != (followed.version, followed.event_count, followed.status, followed.record, followed.problem):
             self.tick += 1
         if folder := followed.continued_in:
-            self._turn_to(folder)
+            self.turn_to(folder)
 
     @property
     def has_own_bench(self) -> bool:
@@ -131,6 +131,8 @@ class Watch:
         if self._subscriber:
             self._subscriber.close()
             self._subscriber = None
+            self._records.clear()  # times of another bench are of another clock
+            self._poses.clear()
         if address:
             try:
                 self._subscriber = Subscriber(address, self.clock)
@@ -143,14 +145,14 @@ class Watch:
         if isinstance(message, State):
             self.state = message
             if self._bench and message.folder and not self._stays:
-                self._turn_to(Path(message.folder))
+                self.turn_to(Path(message.folder))
         elif isinstance(message, Record):
             self._records[message.channel] = message
         else:
             self._pose_number += 1
             self._poses.append((self._pose_number, message))
 
-    def _turn_to(self, folder: Path) -> None:
+    def turn_to(self, folder: Path) -> None:
         """Follow another run folder from now on."""
         if self.followed is None or folder != self.followed.folder:
             self.followed = Followed(folder, self.clock)
@@ -210,6 +212,7 @@ class Watch:
         name = followed.folder.name if followed else ""
         ask = ask if ask.get("run") == name else {key: ask.get(key) for key in ("columns", "latest", "poses")}
         head: dict[str, Any] = {"tick": self.tick, "run": name, "bench": self._about_bench(), "said": said}
+        head["source"] = self._subscriber.address.port if self._subscriber else None
         arrays: dict[str, Any] = {}
         if followed:
             head["about"] = _about(followed)
@@ -232,7 +235,7 @@ class Watch:
         fit = self.fit
         if fit is None:
             return {"version": self.fit_version}
-        about = {"head": fit.head, "lines": fit.lines, "end_s": fit.end_s, "look": fit.look}
+        about: dict[str, Any] = {"head": fit.head, "lines": fit.lines, "end_s": fit.end_s, "look": fit.look}
         if fit.curve:
             arrays |= {"fit_x": fit.curve.x, "fit_y": fit.curve.y, "fit_band": fit.curve.band}
             about["solid_to"] = fit.curve.solid_to

@@ -100,12 +100,12 @@ class GrowingRun:
         """Append readings."""
         self.add("".join(",".join(map(repr, row)) + "\n" for row in rows))
 
-    def event(self, text: str, kind: str = "said", time_s: float | None = None) -> None:
+    def event(
+        self, text: str, kind: str = "said", time_s: float | None = None, utc: str = "2026-11-22T09:00:05.123456Z"
+    ) -> None:
         """Append an event."""
         with (self.folder / "events.jsonl").open("a", encoding="utf-8") as file:
-            file.write(
-                json.dumps({"utc": "2026-11-22T09:00:05.123456Z", "time_s": time_s, "kind": kind, "text": text}) + "\n"
-            )
+            file.write(json.dumps({"utc": utc, "time_s": time_s, "kind": kind, "text": text}) + "\n")
 
     @contextlib.contextmanager
     def running(self) -> Iterator[None]:

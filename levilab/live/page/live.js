@@ -3,7 +3,7 @@
 import {command, connect} from "./connection.js";
 import {drawReadings, drawRecords, saidOf, sheet} from "./plot.js";
 import {openPractice} from "./practice.js";
-import {by, fixed, lapse, make, short, typeset, write} from "./words.js";
+import {between, by, fixed, lapse, make, short, typeset, write} from "./words.js";
 
 /** Spoken news come at most so often [ms]. */
 const NEWS_EVERY_MS = 6000;
@@ -21,9 +21,10 @@ const LONGER = {  // what stands beside the state
 const OLD_S = 3;
 /** What a practice bench's oscilloscope shows, from above. */
 const CHANNELS = ["tape", "drive", "laser"];
+const PAUSED = "The view is paused, and shows nothing of what the bench would do: “Go on” first.";
 const SLIP_HZ = 0.05, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive; while it swings, or the drive moves
 
-const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, records: {}};
+const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, source: null, records: {}};
 const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
 let paused = false, drawn = null, pointed = -1, space = null, topOf = "", wanted = "", practice = null, reachable = true;
@@ -32,9 +33,21 @@ window.levilab = {frames: 0, drawn: 0, seen, data};  // what tests and benchmark
 
 // --- the address: a token after #, which never leaves the page, and stays for a reload ---
 
-const token = location.hash.slice(1) || sessionStorage.getItem("token") || "";
+const token = tokenInAddress() || sessionStorage.getItem("token") || "";
 if (token) sessionStorage.setItem("token", token);
 history.replaceState(null, "", location.pathname + location.search);
+
+/** What stands after #, but for the name of a part of the page, to which a link leads. */
+function tokenInAddress() {
+  const text = location.hash.slice(1);
+  return by(text) ? "" : text;
+}
+addEventListener("hashchange", () => {  // the address of the terminal in a page that is open
+  if (!tokenInAddress()) return;
+  sessionStorage.setItem("token", tokenInAddress());
+  history.replaceState(null, "", location.pathname + location.search);
+  location.reload();
+});
 
 // --- frames ---
 
@@ -46,6 +59,11 @@ function take(head, arrays) {
   }
   seen.tick = head.tick;
   if (head.run !== seen.run) turnTo(head.run);
+  if (head.source !== seen.source) {  // another bench, with a clock of its own
+    Object.assign(seen, {source: head.source, records: {}});
+    data.records.clear();
+    dirty.trace = true;
+  }
   data.bench = head.bench;
   let follows = false;
   for (const one of head.said) {
@@ -73,7 +91,7 @@ function take(head, arrays) {
 
 function turnTo(run) {
   Object.assign(seen, {run, readings: -1, events: 0, fit: -1});
-  Object.assign(data, {readings: null, fit: null, about: null, ended: "", last: {}, count: 0, trend: NaN});
+  Object.assign(data, {readings: null, fit: null, about: null, ended: "", end: null, last: {}, count: 0, trend: NaN});
   by("event-list").replaceChildren();
   by("events-key").hidden = true;
   pointed = -1;
@@ -98,7 +116,7 @@ function takeFit(about, arrays) {
     ? {...about, x: arrays.fit_x, y: arrays.fit_y, band: arrays.fit_band, solid_to: about.solid_to ?? Infinity} : null;
   typeset(by("fit-head"), about.head || "");
   typeset(by("fit-lines"), (about.lines || []).join(" · "));
-  data.end = about.end_s ?? NaN;
+  data.end = about.end_s || null;
   dirty.plot = true;
 }
 
@@ -112,7 +130,7 @@ function takeEvents(events) {
   }
 }
 
-/** Events of a run have its time; before its start, and at a bench without one, they have that of the clock. */
+/** The latest stands first.  Events of a run have its time; before its start, and at a bench without one, they have that of the clock. */
 function listEvent({time_s, utc}, text, loud) {
   const list = by("event-list"), item = make("li", "", loud);
   const ofRun = typeof time_s === "number", clock = ofRun ? "" : /T(\d\d:\d\d:\d\d)/.exec(utc)?.[1] || "";
@@ -120,7 +138,8 @@ function listEvent({time_s, utc}, text, loud) {
   if (clock) when.dateTime = utc;
   by("events-key").hidden &&= !clock;
   item.append(when, make("span", text));
-  list.prepend(item);
+  item.dataset.utc = utc || list.firstChild?.dataset.utc || "";  // one that is damaged comes with the last
+  list.insertBefore(item, [...list.children].find((other) => other.dataset.utc <= item.dataset.utc) || null);
   while (list.children.length > MOST_EVENTS) list.lastChild.remove();
 }
 
@@ -190,9 +209,9 @@ function show() {
   by("synthetic").hidden = !(about?.synthetic || (!about && bench?.virtual));
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
   write("elapsed", Number.isFinite(elapsed) ? lapse(elapsed) : "");
-  const left = about?.status !== "running" ? NaN : bench?.time_left_s ?? (Number.isFinite(data.end) ? data.end - last.time_s : NaN);
+  const left = leftOf(about, bench, elapsed);
   const pace = practice && bench?.speed !== 1 ? " of bench time" : "";
-  write("left", Number.isFinite(left) && left >= 0 ? `about ${lapse(left)}${pace} left` : "");
+  write("left", left ? `${left}${pace} left` : "");
   showBar(about, bench);
   showCounter(bench, last);
   showGenerator(bench, last);
@@ -209,6 +228,13 @@ function show() {
   showTop(bench);
   showAge(bench);
   speak(state, left);
+}
+
+/** The time that is left, in words: that of the fit, whose line is drawn, else what the bench says; "" where it is not known. */
+function leftOf(about, bench, elapsed) {
+  if (about?.status !== "running") return "";
+  if (data.end && Number.isFinite(elapsed)) return between(...data.end.map((end) => end - elapsed));
+  return Number.isFinite(bench?.time_left_s) ? `about ${lapse(bench.time_left_s)}` : "";
 }
 
 /** How a run ended that did not finish: its last event. */
@@ -323,7 +349,7 @@ function speak(state, left) {
   const now = performance.now();
   if (now - spoken < NEWS_EVERY_MS) return;
   const spin = data.last.spin_frequency_hz;
-  const text = data.count ? `${STATES[state] || state}: reading ${data.count}${Number.isFinite(spin) ? `, ${spin.toFixed(2)} hertz` : ""}${Number.isFinite(left) ? `, about ${lapse(left)} left` : ""}` : STATES[state] || state;
+  const text = data.count ? `${STATES[state] || state}: reading ${data.count}${Number.isFinite(spin) ? `, ${spin.toFixed(2)} hertz` : ""}${left ? `, ${left} left` : ""}` : STATES[state] || state;
   if (by("news").textContent !== text) {
     spoken = now;
     write("news", text);
@@ -399,6 +425,7 @@ function pause() {
   by("pause").setAttribute("aria-pressed", String(paused));
   write("pause", paused ? "Go on" : "Pause view");
   space?.pause?.(paused);
+  if (!paused && by("said").textContent === PAUSED) write("said", "");
 }
 by("pause").addEventListener("click", pause);
 by("help").addEventListener("click", () => by("keys").showModal());
@@ -423,7 +450,8 @@ const KEYS = {
   ";": () => practice?.step(-0.5), "<": () => practice?.step(-0.5),
 };
 document.addEventListener("keydown", (event) => {
-  const typing = event.target.closest?.("input:not([type=checkbox]):not([type=range]), select, textarea, dialog[open]");
+  const fields = event.key === "?" ? "dialog[open]" : "input:not([type=checkbox]):not([type=range]), select, dialog[open]";  // no number and no option has a "?"
+  const typing = event.target.closest?.(fields);
   const pressing = event.key === " " && event.target.closest?.("button, a, input, [role=button]");
   if (typing || pressing || event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.key]) return;
   event.preventDefault();
@@ -482,7 +510,7 @@ async function begin() {
   document.body.classList.add("no-top");
   if (bench) {
     document.body.classList.remove("no-top");
-    practice = openPractice(bench, (wanted) => command(wanted, token), () => seen.run, (run) => listed.practice.runs.includes(run), Boolean(token));
+    practice = openPractice(bench, (wanted) => paused && wanted.do !== "analyze" ? PAUSED : command(wanted, token), () => seen.run, (run) => listed.practice.runs.includes(run), Boolean(token));
   }
   by("keys").classList.toggle("for-practice", Boolean(bench));
   for (const row of document.querySelectorAll(".practice-key")) row.hidden = !bench;

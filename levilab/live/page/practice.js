@@ -1,6 +1,6 @@
 // The bench for practice: controls that send commands, and the guide that shows how far one is.
 
-import {by, make, write} from "./words.js";
+import {by, make, numberIn, write} from "./words.js";
 
 /** A slider that is moved sends at most so often [ms]. */
 const SENDS_EVERY_MS = 120;
@@ -45,19 +45,29 @@ export function openPractice(about, command, run, isOwn, allowed) {
     [timer, latest] = [0, null];
     return values && !now.busy ? send("tune the drive", values) : undefined;
   }
-  const pair = (number, slider, key) => {
-    const pass = (source, other) => {
-      const value = Number(source.value), {rangeUnderflow, rangeOverflow} = source.validity;
-      if (source.value === "") return;
-      if (rangeUnderflow || rangeOverflow) {  // a value between the steps is as good: the drive takes any
-        write("said", `${source.getAttribute("aria-label")}: from ${source.min} to ${source.max}, not ${source.value}`);
+  const pair = (id, slider, key) => {
+    const field = by(id), {min, max, step: size} = field.dataset;  // a value between the steps is as good: the drive takes any
+    const pass = () => {
+      const value = numberIn(field.value), name = field.getAttribute("aria-label");
+      if (field.value.trim() === "") return;
+      if (!(value >= Number(min) && value <= Number(max))) {
+        write("said", `${name}: ${Number.isFinite(value) ? "" : "a number "}from ${min} to ${max}, not ${field.value.trim()}`);
         return;
       }
-      other.value = source.value;
+      field.value = by(slider).value = String(value);
       tune({[key]: value});
     };
-    by(number).addEventListener("change", () => pass(by(number), by(slider)));
-    by(slider).addEventListener("input", () => pass(by(slider), by(number)));
+    field.addEventListener("change", pass);
+    field.addEventListener("keydown", (event) => {
+      const way = {ArrowUp: 1, ArrowDown: -1}[event.key];
+      if (!way) return;
+      event.preventDefault();
+      stepBy(id, way * Number(size));
+    });
+    by(slider).addEventListener("input", () => {
+      field.value = by(slider).value;
+      tune({[key]: Number(field.value)});
+    });
   };
   pair("frequency", "frequency-slider", "frequency_hz");
   pair("amplitude", "amplitude-slider", "amplitude_vpp");
@@ -79,13 +89,17 @@ export function openPractice(about, command, run, isOwn, allowed) {
   }
   by("speed").addEventListener("change", () => send("set the speed", {speed: Number(by("speed").value)}));
 
+  /** Change a field by a step, within its limits; what is no number stays, and is refused. */
+  function stepBy(id, by_so_much) {
+    const field = by(id), value = numberIn(field.value) + by_so_much;
+    const {min, max} = field.dataset;
+    if (Number.isFinite(value)) field.value = Math.min(Math.max(value, Number(min)), Number(max)).toFixed(2);
+    field.dispatchEvent(new Event("change"));
+  }
+
   /** Tune by a step, as with the keys. */
   function step(hz) {
-    if (now.elsewhere) return;
-    const field = by("frequency");
-    const value = Math.min(Math.max(Number(field.value) + hz, Number(field.min)), Number(field.max));
-    field.value = value.toFixed(2);
-    field.dispatchEvent(new Event("change"));
+    if (!now.elsewhere) stepBy("frequency", hz);
   }
 
   function press(id, on, text) {
@@ -100,7 +114,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     if (elsewhere !== now.elsewhere) {
       now.elsewhere = elsewhere;
       by("controls").disabled = !allowed || elsewhere;
-      if (allowed) write("said", elsewhere ? "Another program records this run: choose another one to use the practice bench." : "");
+      if (allowed) write("said", elsewhere ? "Another program records this run: the practice bench rests until it ends, or until another run is chosen above." : "");
     }
     now.bench = elsewhere ? now.bench || bench : bench;
     guide(now.bench, about_run, readings);
@@ -118,7 +132,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     if (drive && !timer && document.activeElement !== by("frequency") && document.activeElement !== by("frequency-slider")) {
       follow("frequency", drive.frequency_hz, 2);
     }
-    if (drive && !timer && !/^amplitude/.test(document.activeElement?.id)) follow("amplitude", drive.amplitude_vpp, 1);
+    if (drive && !timer && !/^amplitude/.test(document.activeElement?.id)) follow("amplitude", drive.amplitude_vpp, 2);
     if (bench.speed && bench.speed !== now.speed) choose(by("speed"), now.speed = bench.speed);  // else it may just be chosen
   }
 

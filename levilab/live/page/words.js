@@ -26,6 +26,20 @@ export function lapse(seconds) {
   return sign + (h ? `${h}:${two(m)}:${two(s)}` : `${m}:${two(s)} min`);
 }
 
+/** The number that a person typed, with a decimal point or a decimal comma; NaN where it is none. */
+export const numberIn = (text) => /^[+\u2212-]?(\d+[.,]?\d*|[.,]\d+)$/.test(text.trim()) ? Number(text.trim().replace("\u2212", "-").replace(",", ".")) : NaN;
+
+/** Two limits of a time that is left [s], in words: "about 20 to 40 s", "at most 30 s"; "" where both are over. */
+export function between(from, to) {
+  const round = (seconds) => Math.round(seconds / 5) * 5;
+  if (to < 0) return "";
+  if (round(from) <= 0) return `at most ${lapse(Math.max(5, Math.ceil(to / 5) * 5))}`;
+  const [first, last] = [lapse(round(from)), lapse(round(to))];
+  if (first === last) return `about ${first}`;
+  const unit = / (s|min)$/.exec(first)?.[0];
+  return `about ${unit && last.endsWith(unit) ? first.slice(0, -unit.length) : first} to ${last}`;
+}
+
 /** Write plain notation: what follows ^ in brackets, or as a number, is raised. */
 export function typeset(element, text) {
   element.replaceChildren(...text.split(/(\^\([^()]*\)|\^[−-]?[\d½]+)/).filter(Boolean).map((piece) => {

@@ -87,6 +87,8 @@ def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(tmp_path: Path, mo
     assert left_out == "the point of 32 Hz is left out: a spin of 31.20 Hz under a drive of 32.00 Hz"
     locked = [event["frequency_hz"] for event in run.events() if event["kind"] == "locked"]
     assert locked == pytest.approx([30.0, 31.0, 31.0], abs=0.2)  # 0.06 Hz of noise
+    at = "the top follows the drive at "  # where the drive is, and what was counted
+    assert [text.split(":")[0] for text in events(run, "locked")] == [f"{at}{hz}.00 Hz" for hz in (30, 31, 31)]
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
 

@@ -34,7 +34,8 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     hostile.readings(spin_down(19))
     hostile.event(HOSTILE, kind=HOSTILE)
-    hostile.event("the top follows the drive", time_s=130.0)
+    hostile.event("the top follows the drive", time_s=130.0, utc="2026-11-22T09:03:00.5Z")
+    hostile.event("a command before the run", utc="2026-11-22T08:00:00.1Z")
     return root
 
 
@@ -72,7 +73,7 @@ def test_nothing_that_a_run_contains_becomes_markup(shown: Page) -> None:
 
 def test_events_before_the_start_have_the_time_of_the_clock(shown: Page) -> None:
     times = shown.evaluate("[...document.querySelectorAll('#event-list time')].map((one) => one.textContent)")
-    assert times == ["2:10", "09:00:05"]  # the latest first
+    assert times == ["2:10", "09:00:05", "08:00:00"]  # the latest first, also where it came before
     assert shown.inner_text("#events-key") == "clock times are UTC"
 
 
@@ -135,9 +136,11 @@ def test_the_keys_go_from_reading_to_reading_and_pause(shown: Page) -> None:
     for pressed in ("true", "false"):
         shown.keyboard.press("Space")
         assert shown.get_attribute("#pause", "aria-pressed") == pressed
-    shown.keyboard.press("?")
-    assert shown.locator("#keys").is_visible()
-    shown.keyboard.press("Escape")
+    for part in ("#plot", "#run"):  # also in a list, whose letters choose an option
+        shown.focus(part)
+        shown.keyboard.press("?")
+        assert shown.locator("#keys").is_visible()
+        shown.keyboard.press("Escape")
 
 
 def test_a_phone_scrolls_down_and_not_sideways(watched: Callable[..., Page], hall: Hall) -> None:
@@ -163,12 +166,22 @@ def test_a_run_grows_is_torn_reloaded_and_ends(served: Hall, page: Page, tmp_pat
         run.add("30.0,37.")
         until(page, "levilab.data.count === 3")
         assert page.inner_text("#state-word") == "running"
+        publish(served.watches[run.folder.name], State(20.0))  # a bench that does not know how long it takes
+        until(page, "levilab.data.bench")
+        assert page.inner_text("#left") == ""
         run.add("1,0.03\n")
         until(page, "levilab.data.count === 4")
         page.reload()
         until(page, "levilab.data.count === 4")
         run.event("the lamp was moved", "warning", 31.0)
         until(page, "document.querySelector('#event-list .warning')")
+        run.readings(spin_down(9, first=4))  # to 120 s; 25 Hz come at 143 s, 21.36 Hz at 199 s
+        until(page, "document.getElementById('left').textContent === 'about 25 to 80 s left'")
+        assert (
+            page.evaluate("Math.abs(levilab.data.fit.x.at(-1) - levilab.data.end[1])") < 0.001
+        )  # the line ends where the head says
+        for limits, said in (("-3, 21", "at most 25 s"), ("-9, -1", ""), ("80, 140", "about 80 s to 2:20 min")):
+            assert page.evaluate(f"import('/page/words.js').then(({{between}}) => between({limits}))") == said
     run.say(status="finished")
     until(page, "document.body.dataset.state === 'finished'")
 

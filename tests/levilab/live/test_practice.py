@@ -54,7 +54,7 @@ def see_another_program_record(page: Page, served: Hall, older: GrowingRun) -> N
     outer = page.evaluate("levilab.space.parts.base.outer")
     with older.running():
         write_address(older.folder, Address.at(1))
-        until(page, "levilab.data.about.status === 'running'")
+        until(page, "levilab.data.about.status === 'running' && levilab.seen.source === 1")  # it listens to that bench
         pose = Poses(7.0, 1 / 400, np.full((1, 3), 0.1), np.array([[0.0, 0.0, 0.0, 1.0]]), np.ones(1, dtype=bool))
         publish(served.watches[OLDER], State(7.0, folder=str(older.folder)), pose)
         until(page, "document.getElementById('controls').disabled && levilab.data.bench.time_s === 7")
@@ -64,6 +64,21 @@ def see_another_program_record(page: Page, served: Hall, older: GrowingRun) -> N
     older.say(status="finished")
     until(page, "!document.getElementById('controls').disabled && document.getElementById('said').textContent === ''")
     until(page, f"levilab.space.parts.base.outer === {outer}")  # and those of the bench for practice
+
+
+def type_into_the_fields(page: Page) -> None:
+    """Numbers with a comma and with a point are taken; what is no number, or none that is allowed, is refused."""
+    for typed, said in (("333", "from 1 to 100, not 333"), ("3o,5", "a number from 1 to 100, not 3o,5")):
+        page.fill("#frequency", typed)
+        page.keyboard.press("Enter")
+        until(page, f"document.getElementById('said').textContent === 'drive frequency in hertz: {said}'")
+    for typed, vpp in (("9,5", 9.5), ("9.75", 9.75)):
+        page.fill("#amplitude", typed)
+        page.keyboard.press("Enter")
+        until(page, f"levilab.data.bench.drive.amplitude_vpp === {vpp}")
+    page.keyboard.press("ArrowUp")
+    until(page, "levilab.data.bench.drive.amplitude_vpp === 10")
+    page.keyboard.press("Tab")
 
 
 def test_a_student_drives_records_and_analyzes(
@@ -85,9 +100,7 @@ def test_a_student_drives_records_and_analyzes(
     page.evaluate("levilab.data.before = levilab.data.bench.drive.frequency_hz")
     page.keyboard.press(".")  # from a spin that was counted, which lies between the steps of the field
     until(page, "Math.abs(levilab.data.bench.drive.frequency_hz - levilab.data.before - 0.05) < 0.006")
-    page.fill("#frequency", "333")
-    page.keyboard.press("Tab")
-    until(page, "document.getElementById('said').textContent === 'drive frequency in hertz: from 1 to 100, not 333'")
+    type_into_the_fields(page)
     assert page.evaluate("[levilab.seen.run, document.getElementById('run').value, levilab.data.count]") == ["", "", 0]
     can_be_analyzed = "!document.getElementById('analyze').disabled"
     page.select_option("#run", OLDER)  # of another bench, and it is there like one of this
@@ -125,3 +138,12 @@ def test_a_page_without_the_token_may_only_look(served: Hall, page: Page) -> Non
     page.goto(address(served))
     until(page, "document.getElementById('controls').disabled")
     assert "only look" in page.inner_text("#said")
+    page.evaluate("location.hash = 'readings'")  # the link to a part of the page is no token
+    with page.expect_event("load"):
+        page.goto(address(served, token=True))  # in the same tab, where only what follows # is new
+    until(page, "!document.getElementById('controls')?.disabled && window.levilab?.data.bench")
+    page.click("#pause")
+    page.click("#drive")
+    until(page, "document.getElementById('said').textContent.startsWith('The view is paused')")
+    page.click("#pause")
+    until(page, "document.getElementById('said').textContent === ''")

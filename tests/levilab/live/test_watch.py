@@ -98,6 +98,30 @@ def test_a_run_that_another_program_records_is_shown_with_its_own_bench(tmp_path
             assert watch._subscriber.address == expected
 
 
+def test_a_page_that_chose_no_run_turns_to_that_of_another_program(tmp_path: Path) -> None:
+    own, other = (GrowingRun(tmp_path, name) for name in ("1-own", "2-other"))
+    desk = SimpleNamespace(address=lambda: None, folder=own.folder, folders=[own.folder], is_recording=False)
+    hall = Hall(tmp_path, "", Doors(1), desk)  # type: ignore[arg-type]
+
+    def shown() -> str:
+        asyncio.run(hall.turn_to_another())
+        assert chosen.followed
+        assert chosen.followed.folder == own.folder  # a run that was chosen by hand stays
+        followed = looking(watch).followed
+        return followed.folder.name if followed else ""
+
+    with hall.watching("") as watch, hall.watching("1-own") as chosen:
+        assert shown() == "1-own"
+        with other.running():
+            desk.is_recording = True
+            assert shown() == "1-own"
+            desk.is_recording = False
+            assert shown() == "2-other"
+            assert shown() == "2-other"
+            desk.is_recording = True
+            assert shown() == "1-own"
+
+
 def test_a_page_that_waits_is_sent_a_fit_when_it_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("levilab.live.server.PATIENCE_S", math.inf)  # a page that is not called would wait for ever
     hall, folder = Hall(tmp_path, "", Doors(1)), tmp_path / "one"  # which is not there, so that nothing else is new

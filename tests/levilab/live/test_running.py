@@ -1,0 +1,32 @@
+"""What the running fit forecasts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analysis.spindown.drag import LAWS
+from analysis.spindown.tilt import count
+from levilab.live.running import FALLS_BETWEEN_HZ, spin_down
+
+C32, START_HZ, RESONANCE_HZ, TILT_RAD = 2.3e-4, 34.0, 21.4, 0.025
+
+
+def test_the_forecast_is_of_the_law_and_does_not_run_into_the_resonance() -> None:
+    time = np.arange(0.5, 116.0, 2.0)
+    q = LAWS["disc"].dimensionless([START_HZ, C32], START_HZ, time[-1])
+    spin = START_HZ * count(LAWS["disc"], time / time[-1], q, TILT_RAD**2, RESONANCE_HZ / START_HZ)
+    noise = np.random.default_rng(2).normal(0, 0.005, time.size)
+    found = spin_down({"time_s": time, "spin_frequency_hz": spin + noise}, 1)
+    curve, last = found.curve, float(time[-1])
+    assert curve is not None
+    assert found.end_s is not None
+    # under the drag of a disc ω^(−1/2) grows evenly, by C/2; 1 s: the fit's C is good to 1 %, of 25 to 30 s
+    ends = [
+        last + max(0.0, (2 * np.pi * limit) ** -0.5 - (2 * np.pi * spin[-1]) ** -0.5) * 2 / C32
+        for limit in FALLS_BETWEEN_HZ
+    ]
+    assert np.abs(np.array(found.end_s) - ends).max() < 1.0
+    assert curve.x[-1] == found.end_s[1]  # the line goes as far as the head of the page says
+    steps = -np.diff(curve.y)
+    assert steps.min() > 0
+    assert steps.max() < 2 * steps.min() * (START_HZ / FALLS_BETWEEN_HZ[1]) ** 1.5  # no kink at the last reading
