@@ -315,6 +315,20 @@ def test_outliers_are_kept_on_request_and_still_named():
     assert "kept" in run.warnings[0]
 
 
+def test_an_outlier_is_so_far_away_as_the_warning_says():
+    y = readings()
+    y[19] += 1.5
+    run = fit_spin_down(T, y, SIGMA, laws=["disc"])
+    off = y[19] - run.fit("disc").spin_frequency(T[19])
+    assert f"{off:.2g} Hz from the disc law, {off / SIGMA:.2g} times its uncertainty" in run.warnings[0]
+    assert "the top may already have been falling" in run.warnings[0]
+    unknown = fit_spin_down(T, y, laws=["disc"])
+    rms = unknown.fit("disc").statistics.rms_residual
+    assert f"{off / rms:.2g} times the rms residual of the others" in unknown.warnings[0]
+    y[19], y[7] = readings()[19], 2 * y[7]
+    assert "falling" not in fit_spin_down(T, y, SIGMA, laws=["disc"]).warnings[0]
+
+
 @pytest.mark.parametrize("u", [SIGMA, None])
 @pytest.mark.parametrize("where", [[0], [19], [3, 4], [0, 1], [18, 19], [3, 8, 14], [2, 3, 11, 12]])
 def test_miscounts_are_found_however_many_hide_one_another(where, u):
