@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from levilab.cli.options import Json, Settings
+from levilab.cli.options import SCENES, Json, Settings
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.errors import DataError, UsageError, WorkersLost
 
@@ -24,7 +24,7 @@ def sweep(
         str,
         typer.Argument(
             metavar="SCENE|STORE",
-            help="The scene: undriven, friction, tilted, driven, loose-washers, precession, spindown, or a file.  "
+            help=f"The scene: {SCENES}, or a file.  "
             "Or the store of a sweep, NAME.zarr, which is shown, and with --resume continued.",
         ),
     ],

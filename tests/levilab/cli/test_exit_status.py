@@ -69,6 +69,10 @@ WRONG_USAGE = {
     "bench serve --scene spindown --speed 1e6": "--speed",
     "bench serve --port-base 65535": "--port-base",
     "bench serve --host ::1": "--host ::1: ",
+    "acquire spin --mock --scene spindwon": "did you mean spindown?",
+    "simulate nowhere": "there is no scene 'nowhere'",
+    "stability nowhere": "there is no scene 'nowhere'",
+    "bench serve --scene nowhere": "there is no scene 'nowhere'",
 }
 #: What the command line itself does not understand is shown with the usage, over several lines.
 NOT_UNDERSTOOD = (
@@ -96,7 +100,6 @@ FAILURES = {
     "acquire spin --bench other.toml": "other.toml: there is no such file",
     "acquire spin --mock --resume nowhere": "nowhere/run.json: cannot be read",
     f"acquire spin --mock --resume {SAMPLE}": "is finished",
-    "acquire spin --mock --scene spindwon": "did you mean spindown?",
     "acquire spin --mock --out file": "choose another place with --out",
     f"analyze spindown {LIMITS}": f"spindown needs a spin run; levilab analyze limit {LIMITS} reads it",
     f"analyze limit {SCOPE}": f"levilab analyze spin {SCOPE} reads it",
@@ -106,15 +109,12 @@ FAILURES = {
     "report nowhere": "nowhere: there is no such file or folder",
     "runs nowhere": "nowhere: there is no such folder",
     "runs file": "file: is a file",
-    "simulate nowhere": "there is no scene 'nowhere'",
     "simulate nowhere.toml": "nowhere.toml: there is no such file",
     "simulate undriven --duration 0.01 --out file": "choose another place with --out",
-    "stability nowhere": "there is no scene 'nowhere'",
     "stability undriven --map --out file": "give another folder with --out",
     "bench check --bench other.toml": "other.toml: there is no such file",
     "bench init --library @levilab --out nowhere/bench.toml": "nowhere is no folder",
     "bench init --library @levilab": "bench.toml is there already",
-    "bench serve --scene nowhere": "there is no scene 'nowhere'",
 }
 INSTRUMENTS = {
     "acquire spin": "TCPIP0::127.0.0.1::9::SOCKET: ",
