@@ -168,7 +168,7 @@ def crosscheck() -> Callable[..., None]:
     return crosscheck
 
 
-@app.command(cls=Later, epilog="Example: levilab reproduce --only limits,errata -o reproduce.html")
+@app.command(cls=Later, epilog='Example: levilab reproduce --only "limits,errata" -o reproduce.html')
 def reproduce() -> Callable[..., None]:
     """Make the tables and figures of the Levitron thesis and of two papers anew: published value beside ours.
 

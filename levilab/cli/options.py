@@ -12,7 +12,7 @@ Columns = Annotated[
     str,
     typer.Option(
         metavar="NAME=COLUMN,…",
-        help="Columns of your file: t=Zeit,f=Kanal2 or t=1,f=3; with a unit in brackets: 'f=Drehzahl \\[rpm]'.",
+        help='Columns of your file: "t=Zeit,f=Kanal2" or "t=1,f=3"; with a unit in brackets: "f=Drehzahl \\[rpm]".',
     ),
 ]
 ReadingU = Annotated[

@@ -159,7 +159,7 @@ def test_a_column_of_true_and_false_is_refused_by_its_line(table_file):
 ])  # fmt: skip
 def test_a_table_with_words_in_it_is_told_which_titles_are_known(separator, header, row, table_file):
     path = table_file("\n".join(map(separator.join, [header, *[row] * 19])) + "\n")
-    with pytest.raises(NoSuchColumn, match=f"no title is known .* among {quoted(header)}: say `columns` = t=NAME"):
+    with pytest.raises(NoSuchColumn, match=f'no title is known .* among {quoted(header)}: say `columns` = "t=NAME'):
         read_table(path)
     with pytest.raises(TableError, match="line 2: 'kalt' stands in column 'Kommentar'"):
         read_table(path, columns={"t": "Temperatur", "f": "Kommentar"})
