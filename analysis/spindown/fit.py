@@ -181,12 +181,29 @@ def fit_spin_down(
         start_time=readings.start_time,
         warnings=(
             *_outlier_warnings(given, search.indices, fits[decision.best], kept=keep_outliers),
+            *_too_good(fits[decision.best]),
             *comparison_warnings(stats, decision.best),
             *correlation_warnings(correlated, len(readings)),
         ),
         correlation=correlated,
         tilt_gain=gain,
     )
+
+
+#: Residuals relative to the spin: the best counters have noise of 1e-11 over a second, and tops are no such clocks.
+NO_MEASUREMENT = 1e-10
+
+
+def _too_good(best: LawFit) -> list[str]:
+    """That readings are calculated ones."""
+    stats, reference = best.statistics, best.reference[0]
+    if stats.degrees_of_freedom < 1 or stats.rms_residual > NO_MEASUREMENT * reference:
+        return []
+    said = (
+        f"the readings lie on the {best.name} law to {digits(stats.rms_residual, 1)} Hz, too good to be measured: "
+        "were they calculated? Then no uncertainty here says anything about a top"
+    )
+    return [said]
 
 
 def _about_jump(jump: Jump | None, readings: Readings) -> str:

@@ -214,6 +214,15 @@ def test_precise_readings_of_a_disc_exclude_stokes_and_newton(u, exponent_u):
     assert f"power, n = 1.495 ± {exponent_u}" in verdict.text
 
 
+def test_readings_on_a_law_to_rounding_are_called_too_good_to_be_measured():
+    time = np.arange(0, 80, 10.0)
+    run = fit_spin_down(time, 40 - 0.1 * time)  # a power law with n = 0
+    assert "n = 0, fits best" in run.verdict.text
+    assert "too good to be measured" in " ".join(run.warnings)
+    rounded = np.round(spin("disc", T, 40.0, 2.34e-4), 6)
+    assert "too good" not in " ".join(fit_spin_down(T, rounded).warnings)
+
+
 def test_rough_readings_cannot_tell_and_say_why():
     verdict = fit_spin_down(T, readings(sigma=3.0), 3.0).verdict
     assert verdict.excluded == ()
