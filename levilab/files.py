@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import math
 import os
 import re
+import tempfile
 import time
 import tomllib
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -148,6 +150,15 @@ def writing(what: str, advice: str = "choose another place with `out`") -> Itera
         yield
     except OSError as error:
         raise CannotWrite(f"{what} ({error.strerror or error}): {advice}") from error
+
+
+def check_writable(path: Path) -> None:
+    """Raise OSError where a file of this path cannot be written; nothing is left behind."""
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    folder = next(place for place in (path.parent, *path.parent.parents) if place.exists())
+    with tempfile.TemporaryFile(dir=folder):
+        pass
 
 
 def stamp(path: Path) -> tuple[int, int, int] | None:

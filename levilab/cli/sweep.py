@@ -162,6 +162,7 @@ def _compute(store: Store, cores: int | None, scheduler: str | None) -> None:
                 run(store, workers, bar)
         except WorkersLost as lost:
             raise WorkersLost(f"{lost}; {what_is_kept()}") from lost
+    message(f"wrote {store.path}")
 
 
 def _show(store: Store, *, as_json: bool) -> None:
