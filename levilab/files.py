@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import math
 import os
 import re
+import tempfile
 import time
 import tomllib
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -35,6 +37,13 @@ def parse_json(text: str) -> Any:
         ValueError: it is not JSON, or it holds what no program of ours writes and much of Python stumbles over:
             nesting beyond DEEPEST, a whole number beyond LARGEST, NaN, infinity, half a surrogate pair.
     """
+    try:
+        return _parsed_json(text)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"from line {error.lineno}, column {error.colno} on") from error
+
+
+def _parsed_json(text: str) -> Any:
     _refuse_surrogates(text)
     if "\\u" not in text and text.count("{") + text.count("[") <= DEEPEST:  # nothing to look for afterwards
         return json.loads(text, parse_int=_whole_number, parse_float=_finite_number, parse_constant=_finite_number)
@@ -148,6 +157,15 @@ def writing(what: str, advice: str = "choose another place with `out`") -> Itera
         yield
     except OSError as error:
         raise CannotWrite(f"{what} ({error.strerror or error}): {advice}") from error
+
+
+def check_writable(path: Path) -> None:
+    """Raise OSError where a file of this path cannot be written; nothing is left behind."""
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    folder = next(place for place in (path.parent, *path.parent.parents) if place.exists())
+    with tempfile.TemporaryFile(dir=folder):
+        pass
 
 
 def stamp(path: Path) -> tuple[int, int, int] | None:

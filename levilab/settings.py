@@ -35,7 +35,35 @@ def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> st
     hint = "" if first["type"] == "literal_error" else hint_about(first["input"])  # where words are expected
     whole_table = first["type"] == "missing" or isinstance(first["input"], dict)
     seen = "" if whole_table else f" = {str(first['input'])[:60]!r}"
-    return f"{where}{seen}: {first['msg']}{hint}{more}"
+    return f"{where}{seen}: {expected(first['msg'])}{hint}{more}"
+
+
+#: How pydantic begins and ends what it says of a wrong value, and its words for what it expects.
+_SHOULD_BE = re.compile(r"Input should be (a valid )?(.*?)(, unable to .*|, got .*)?")
+_IN_PLAIN_WORDS = {
+    "integer": "whole number", "string": "text", "dictionary": "table", "tuple": "list", "array": "list",
+}  # fmt: skip
+
+
+def expected(text: str) -> str:
+    """What pydantic says of a wrong value, in plain words.
+
+    >>> expected("Input should be a valid number, unable to parse string as a number")
+    'a number is expected'
+    >>> expected("Input should be greater than 0"), expected("Input should be 'motion' or 'spin'")
+    ('a number greater than 0 is expected', "'motion' or 'spin' is expected")
+    >>> expected("Input should be a valid boolean, unable to interpret input"), expected("Field required")
+    ('true or false is expected', 'is missing')
+    """
+    found = _SHOULD_BE.fullmatch(text)
+    if not found:
+        return {"Field required": "is missing"}.get(text, text.removeprefix("Value error, "))
+    is_kind, what = bool(found[1]), found[2]
+    if what == "boolean":
+        return "true or false is expected"
+    if is_kind:
+        return f"a {_IN_PLAIN_WORDS.get(what, what)} is expected"
+    return f"{'' if what.startswith((chr(39), 'a ', 'an ')) else 'a number '}{what} is expected"
 
 
 def _meant(where: tuple[int | str, ...], of: type[BaseModel] | None) -> str:

@@ -105,6 +105,38 @@ def test_an_output_is_compared_with_what_a_page_shows_of_it(shown: str, matches:
     assert bool(re.match(as_pattern(shown), "a\nb\nc\n")) is matches
 
 
+#: What a shell takes for more than itself, outside of quotes: zsh looks for files, PowerShell splits at commas.
+SPECIAL = re.compile(r"\S[\[,](?!…)\S|\*|(?<=\s)\[\S")
+
+
+def unquoted(line: str) -> str:
+    """A command without what stands in quotes and without its comment."""
+    return re.sub(r"\"[^\"]*\"|'[^']*'", "", line.split("  #", maxsplit=1)[0])
+
+
+def commands_to_type(text: str) -> list[str]:
+    """The commands of a page, in blocks and within a line, and those of a program's help."""
+    in_blocks = re.findall(r"^(?:\$ )?((?:levilab|pip|python) .*)", text, re.MULTILINE)
+    in_lines = re.findall(r"(?<!`)`((?:levilab|pip|python|--[a-z-]+) [^`\n]*)`", text)
+    return in_blocks + in_lines + re.findall(r"Example: (levilab .*)['\"]", text)
+
+
+def test_commands_mean_the_same_in_every_shell() -> None:
+    sources = [*PAGES, *sorted((ROOT / "levilab/cli").glob("*.py"))]
+    found = [(page.name, line) for page in sources for line in commands_to_type(page.read_text(encoding="utf-8"))]
+    assert len(found) > 100
+    assert not [(page, line) for page, line in found if SPECIAL.search(unquoted(line))]
+
+
+@pytest.mark.parametrize(("line", "special"), [
+    ("levilab simulate undriven --set start.position_m=[0,0,0.073]", True), ("levilab analyze runs/*", True),
+    ("levilab reproduce --only limits,errata  # some", True), ('levilab reproduce --only "limits,errata"', False),
+    ("levilab runs  # all, of [any] kind", False), ("pip install 'levilab[pdf]'", False),
+])  # fmt: skip
+def test_what_a_shell_would_change_is_seen(line: str, special: bool) -> None:
+    assert bool(SPECIAL.search(unquoted(line))) is special
+
+
 def test_make_demo_and_make_test_stand_at_the_top_of_the_readme_and_in_the_makefile() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     first = blocks("sh")[0][1]

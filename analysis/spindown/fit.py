@@ -180,13 +180,30 @@ def fit_spin_down(
         outliers=tuple(search.indices.tolist()),
         start_time=readings.start_time,
         warnings=(
-            *_outlier_warnings(given, search, kept=keep_outliers),
+            *_outlier_warnings(given, search.indices, fits[decision.best], kept=keep_outliers),
+            *_too_good(fits[decision.best]),
             *comparison_warnings(stats, decision.best),
             *correlation_warnings(correlated, len(readings)),
         ),
         correlation=correlated,
         tilt_gain=gain,
     )
+
+
+#: Residuals relative to the spin: the best counters have noise of 1e-11 over a second, and tops are no such clocks.
+NO_MEASUREMENT = 1e-10
+
+
+def _too_good(best: LawFit) -> list[str]:
+    """That readings are calculated ones."""
+    stats, reference = best.statistics, best.reference[0]
+    if stats.degrees_of_freedom < 1 or stats.rms_residual > NO_MEASUREMENT * reference:
+        return []
+    said = (
+        f"the readings lie on the {best.name} law to {digits(stats.rms_residual, 1)} Hz, too good to be measured: "
+        "were they calculated? Then no uncertainty here says anything about a top"
+    )
+    return [said]
 
 
 def _about_jump(jump: Jump | None, readings: Readings) -> str:
@@ -344,10 +361,9 @@ def _known(kind: str, names: Iterable[str], known: Iterable[str]) -> tuple[str, 
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """Gross outliers: indices, how many standard deviations away, and the power law fitted to the others."""
+    """Gross outliers: their indices, and the power law fitted to the others."""
 
     indices: NDArray[np.intp]
-    deviations: Array
     power: Solution | None
 
 
@@ -359,9 +375,9 @@ def _search_outliers(readings: Readings) -> _Search:
     """
     n = len(readings)
     if n < FEWEST_FOR_OUTLIERS:
-        return _Search(np.empty(0, dtype=np.intp), np.empty(0), None)
-    left_out, deviations = _miscounts(readings)
-    found = _far_from(readings, left_out, deviations, None)
+        return _Search(np.empty(0, dtype=np.intp), None)
+    left_out = _miscounts(readings)
+    found = _far_from(readings, left_out, None)
     near_the_fall = (found.indices >= n - max(n // 4, 1)) & ~np.isin(found.indices, left_out)
     if not near_the_fall.any() or n - len(left_out) < FEWEST_FOR_TILT:
         return found
@@ -371,13 +387,13 @@ def _search_outliers(readings: Readings) -> _Search:
         tilted = with_tilt(plain, _counted(plain))
     if tilted is None or _misfit(plain) - _misfit(tilted) < TILT_DEMANDED:
         return found
-    other = _far_from(readings, left_out, deviations, tilted)
+    other = _far_from(readings, left_out, tilted)
     if len(other.indices) >= len(found.indices):
         return found
     return replace(other, power=plain if len(other.indices) == len(left_out) else None)
 
 
-def _far_from(readings: Readings, left_out: NDArray[np.intp], deviations: Array, tilted: Solution | None) -> _Search:
+def _far_from(readings: Readings, left_out: NDArray[np.intp], tilted: Solution | None) -> _Search:
     """The search, by the power law or, from a solution of it on, by the power law with the count's tilt."""
     n = len(readings)
     allowed = len(left_out) + max(1, n // 10)
@@ -396,17 +412,15 @@ def _far_from(readings: Readings, left_out: NDArray[np.intp], deviations: Array,
             t = studentised(found.residuals, found.curvature.leverage, found.n_parameters, floor)
             worst = gross_errors(t, found.n_parameters)[:most]
         if not len(worst):
-            order = np.argsort(left_out)
-            return _Search(left_out[order], deviations[order], found)
+            return _Search(np.sort(left_out), found)
         left_out = np.append(left_out, kept[worst])
-        deviations = np.append(deviations, np.abs(t[worst]))
 
 
 MISCOUNT, FAR, WINDOW = 0.25, 8.0, 5  # relative; robust standard deviations; readings that a median is taken over
 
 
-def _miscounts(readings: Readings) -> tuple[NDArray[np.intp], Array]:
-    """Readings off by a good part of themselves, as twice or half, and by how many standard deviations.
+def _miscounts(readings: Readings) -> NDArray[np.intp]:
+    """Indices of readings off by a good part of themselves, as twice or half.
 
     Several of them hide one another from a search one at a time. So the power law is fitted to running medians, which
     none of them moves, and then to what lies near it, until that stays the same. If more than a quarter of the
@@ -418,7 +432,7 @@ def _miscounts(readings: Readings) -> tuple[NDArray[np.intp], Array]:
     smooth = np.median(windows, axis=1)
     far = np.abs(readings.x / smooth - 1) > MISCOUNT / 2
     if not far.any():
-        return np.flatnonzero(far), np.empty(0)
+        return np.flatnonzero(far)
     found = solution(LAWS["power"], replace(readings, x=smooth))
     for _ in range(10):
         # of an exponent below 1 the fitted top may have stopped: what is read then is far off, not infinitely so
@@ -426,26 +440,51 @@ def _miscounts(readings: Readings) -> tuple[NDArray[np.intp], Array]:
         scatter = max(1.4826 * float(np.median(off)), ROUNDING)  # of normal noise by its median
         now = off > max(MISCOUNT, FAR * scatter)
         if now.sum() > n // 4:
-            return np.empty(0, dtype=np.intp), np.empty(0)
+            return np.empty(0, dtype=np.intp)
         if (now == far).all():
             break
         far = now
         found = solution(LAWS["power"], readings.without(np.flatnonzero(far)))
-    return np.flatnonzero(far), off[far] / scatter
+    return np.flatnonzero(far)
 
 
-#: More standard deviations than this are not counted: all other readings lie on the law then.
-_MOST_DEVIATIONS = 1000
+#: A reading more times the others' residuals away than this is only said to be: all of them lie on the law then.
+_MOST_TIMES = 1000
 
 
-def _outlier_warnings(readings: Readings, search: _Search, *, kept: bool) -> list[str]:
+def _outlier_warnings(readings: Readings, outliers: NDArray[np.intp], best: LawFit, *, kept: bool) -> list[str]:
+    """How far outliers lie from the best law, which was fitted to the others, or to all where they were kept.
+
+    What they were found by is no measure of it: where the tilt alone follows the last reading, a fit without that
+    reading is not known from one with it.
+    """
     done = "was kept as asked" if kept else "was left out"
+    off = np.abs(readings.frequency[outliers] - best.spin_frequency(readings.time[outliers]))
+    own = np.delete(best.residuals, outliers) if kept else best.residuals
+    rms = float(np.sqrt(np.mean(own**2)))
+    units = np.full(len(off), rms) if readings.u is None else readings.u[outliers]
+    measure = "the rms residual of the others" if readings.u is None else "its uncertainty"
+    falling = _last_ones(outliers, len(readings))
     return [
         f"the reading of {readings.frequency[i]:.6g} Hz at {round(readings.time[i], 3):.12g} s lies "
-        f"{digits(deviation, 3) if deviation < _MOST_DEVIATIONS else f'more than {_MOST_DEVIATIONS}'} "
-        f"standard deviations from the others and {done}"
-        for i, deviation in zip(search.indices, search.deviations, strict=True)
+        f"{digits(distance)} Hz from the {best.name} law, {_times(distance, unit)} {measure}, and {done}"
+        f"{'; it stands at the end: the top may already have been falling' if i in falling else ''}"
+        for i, distance, unit in zip(outliers.tolist(), off.tolist(), units.tolist(), strict=True)
     ]
+
+
+def _times(distance: float, unit: float) -> str:
+    """How many times a distance is a unit, in words."""
+    many = distance >= _MOST_TIMES * unit
+    return f"{f'more than {_MOST_TIMES}' if many else digits(distance / unit)} times"
+
+
+def _last_ones(outliers: NDArray[np.intp], n: int) -> frozenset[int]:
+    """Those after which no reading belongs to the law."""
+    last = n - 1
+    while last in outliers:
+        last -= 1
+    return frozenset(i for i in outliers.tolist() if i > last)
 
 
 def comparison_warnings(fits: Mapping[str, Statistics], best: str, *, mixed: bool = False) -> list[str]:

@@ -18,6 +18,8 @@ EXCLUDED, TIED = 10.0, 4.0  # differences of AICc, Burnham & Anderson (2002) §2
 # the scatter exceeds the stated uncertainties, this much is enough against independent readings.
 SHAPE, SHAPE_BEYOND_U = 0.005, 0.01
 SPECIAL_CASES = {"mixed": ("stokes", "newton"), "power": ("stokes", "newton", "disc")}
+#: u of an exponent, or of an angle [rad].
+TOO_SMALL = 5e-10
 _SIMPLE = ("stokes", "newton", "disc")
 
 
@@ -27,7 +29,8 @@ class Verdict:
 
     Attributes:
         best: name of the law with the smallest criterion.
-        decided: whether the readings single out one of the simple laws, or a general one before all of them.
+        decided: whether the readings single out one of the simple laws, or a general one before all of them: no law
+            with fewer constants fits as well.
         indistinguishable: names of the laws that fit as well as the best one, which comes first.
         needless: names of laws that fit as well, but with more constants than it takes.
         weak: names of laws disfavoured but not excluded.
@@ -74,11 +77,15 @@ def verdict(
     excluded = tuple((name, _reason(name, best, fits)) for name in fits if kinds[name] == "excluded")
     open_ = [name for name in (*listed["tied"], *listed["weak"]) if name in _SIMPLE]
     described = not broken and _describes(fits[best], correlation)
-    decided = telling and len(open_) <= 1 and described
+    alike = sorted(listed["tied"], key=lambda name: fits[name].n_parameters)
+    simpler = fits[alike[0]].n_parameters < fits[best].n_parameters
+    decided = telling and len(open_) <= 1 and described and not simpler
     if not described:
         first = _no_law(best, fits[best], correlation, broken)
+    elif decided:
+        first = _about_best(listed["tied"], exponent)
     else:
-        first = _about_best(listed["tied"], exponent) if decided else _undecided(fits[best].n, fall, open_)
+        first = _alike(alike, exponent) if len(open_) == 1 else _undecided(fits[best].n, fall, open_)
     sentences = [
         first,
         _sentence("The readings exclude", [f"{name} ({reason})" for name, reason in excluded], ""),
@@ -135,8 +142,22 @@ def _kind(fits: Mapping[str, Statistics], name: str, best: str) -> str:
 def _reason(name: str, best: str, fits: Mapping[str, Statistics]) -> str:
     fit = fits[name]
     shape = ", and its residuals have a shape" if fit.has_shape else ""
-    left = f"it leaves {digits(fit.rms_residual)} Hz rms, {best} {digits(fits[best].rms_residual)} Hz"
+    own, least = _told_apart(fit.rms_residual, fits[best].rms_residual)
+    left = f"it leaves {own} Hz rms, {best} {least} Hz"
     return f"ΔAICc {fit.difference:.0f}: {left}{shape}"
+
+
+def _told_apart(one: float, other: float) -> tuple[str, str]:
+    """Two numbers with as many digits as it takes to tell them apart.
+
+    >>> _told_apart(0.0204, 0.0197), _told_apart(0.2, 0.027)
+    (('0.0204', '0.0197'), ('0.2', '0.027'))
+    """
+    for count in range(2, 8):
+        texts = digits(one, count), digits(other, count)
+        if texts[0] != texts[1]:
+            break
+    return texts
 
 
 def _about_best(tied: Sequence[str], exponent: Estimate | None) -> str:
@@ -154,6 +175,16 @@ def _about_best(tied: Sequence[str], exponent: Estimate | None) -> str:
     contains = [name for name in others if best in SPECIAL_CASES.get(name, ())]
     expected = " which contains it," if contains == others == ["power"] else ""
     return f"The {best} law fits best; {_list(named)}{expected} cannot be distinguished from it.".replace(",,", ",")
+
+
+def _alike(names: Sequence[str], exponent: Estimate | None) -> str:
+    """Of laws that fit as well as each other, the one with the fewest constants first."""
+    named = [f"power, {_in_words(exponent)}," if name == "power" else name for name in names]
+    laws = f"The laws {_list(named)} cannot be told apart".replace(",,", ",")
+    return (
+        f"{laws}: they fit as well as each other, {names[0]} with the fewest constants. More runs, or a longer fall of "
+        "the spin, can tell."
+    )
 
 
 def _undecided(n: int, fall: float, names: Sequence[str]) -> str:
@@ -180,9 +211,11 @@ def _in_words(exponent: Estimate | None) -> str:
 
 
 def _value(estimate: Estimate) -> str:
-    """As 1.507 ± 0.006."""
+    """As 1.507 ± 0.006; without u where that is smaller than any measurement makes it."""
     assert estimate.value is not None
     assert estimate.u
+    if estimate.u < TOO_SMALL:
+        return f"{round(estimate.value, 9) + 0.0:.9g}"
     digits = min(max(0, -floor(log10(estimate.u)) + (estimate.u < 3 * 10 ** floor(log10(estimate.u)))), 9)
     return f"{estimate.value:.{digits}f} ± {estimate.u:.{digits}f}"
 

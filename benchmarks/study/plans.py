@@ -61,7 +61,7 @@ class Sweep:
         """What makes the same store on the command line; what `levilab sweep` takes anyway is left out."""
         words = [f"levilab sweep {self.scene}", *(f"--sweep {axis}" for axis in self.axes)]
         words += [f'--set "{setting}"' if "[" in setting else f"--set {setting}" for setting in self.settings]
-        words += [f"--observe {self.observe}"] if self.observe != OBSERVED else []
+        words += [f'--observe "{self.observe}"'] if self.observe != OBSERVED else []
         words += [f"--duration {self.duration_s:g}"] if self.duration_s != DURATION_S else []
         words += [f"--tolerance {self.tolerance:g}"] if self.tolerance != TOLERANCE else []
         return " ".join([*words, f"--out {self.name}.zarr"])

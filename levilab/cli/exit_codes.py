@@ -13,10 +13,12 @@ def exit_status(error: Exception) -> int | None:
     from analysis.errors import AnalysisError
     from instruments.errors import InstrumentError
     from levilab.errors import LevilabError, NoInstrument, UsageError
+    from levilab.simulator.keys import UnknownScene
 
     # of several that fit the first one counts
     statuses: tuple[tuple[type[Exception], int], ...] = (
         (UsageError, WRONG_USAGE),
+        (UnknownScene, WRONG_USAGE),
         (InstrumentError, INSTRUMENT),
         (NoInstrument, INSTRUMENT),
         (LevilabError, FAILED),

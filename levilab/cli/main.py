@@ -2,7 +2,6 @@
 
 import codecs
 import os
-import re
 import sys
 from collections.abc import Callable
 from typing import Annotated, Any, NoReturn
@@ -15,9 +14,6 @@ from levilab.cli.importing import importing
 from levilab.cli.later import Later
 from levilab.cli.output import message, silence
 from levilab.cli.quantities import in_options
-
-#: How typer, which reads values with pydantic, begins and ends what it says of a wrong one.
-_SHOULD_BE = r"Input should be (a valid )?(.*?)(, unable to .*|, got .*)?"
 
 
 class Commands(typer.core.TyperGroup):
@@ -54,13 +50,12 @@ def in_plain_words(text: str, seen: object = None) -> str:
     >>> in_plain_words("Input should be greater than or equal to 10")
     'a number greater than or equal to 10 is expected'
     """
-    if found := re.fullmatch(_SHOULD_BE, text):
-        from levilab.settings import hint_about  # with pydantic
+    from levilab.settings import expected, hint_about  # with pydantic
 
-        what = found[2].replace("integer", "whole number")
-        expected = f"a {what} is expected" if found[1] else f"a number {what} is expected"
-        return (f"{seen!r}: " if seen is not None else "") + expected + hint_about(seen, "which --help names")
-    return text.removeprefix("Value error, ")
+    said = expected(text)
+    if not said.endswith(" is expected"):
+        return said
+    return (f"{seen!r}: " if seen is not None else "") + said + hint_about(seen, "which --help names")
 
 
 app = typer.Typer(
@@ -168,7 +163,7 @@ def crosscheck() -> Callable[..., None]:
     return crosscheck
 
 
-@app.command(cls=Later, epilog="Example: levilab reproduce --only limits,errata -o reproduce.html")
+@app.command(cls=Later, epilog='Example: levilab reproduce --only "limits,errata" -o reproduce.html')
 def reproduce() -> Callable[..., None]:
     """Make the tables and figures of the Levitron thesis and of two papers anew: published value beside ours.
 

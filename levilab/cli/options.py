@@ -12,7 +12,7 @@ Columns = Annotated[
     str,
     typer.Option(
         metavar="NAME=COLUMN,…",
-        help="Columns of your file: t=Zeit,f=Kanal2 or t=1,f=3; with a unit in brackets: 'f=Drehzahl \\[rpm]'.",
+        help='Columns of your file: "t=Zeit,f=Kanal2" or "t=1,f=3"; with a unit in brackets: "f=Drehzahl \\[rpm]".',
     ),
 ]
 ReadingU = Annotated[
@@ -34,10 +34,13 @@ KeepOutliers = Annotated[bool, typer.Option("--keep-outliers", help="Fit reading
 Paths = Annotated[
     list[Path], typer.Argument(metavar="PATH…", readable=False, help="Run folders, data files, or folders to search.")
 ]
+#: Those that come with levilab, simple ones first; help is not to wait for their files.
+SCENES = "undriven, friction, tilted, driven, loose-washers, precession, spindown, practice"
 Presets = Annotated[
     str,
     typer.Argument(
-        metavar="SCENE", help="undriven, friction, tilted, driven, loose-washers, precession, spindown, or a file."
+        metavar="SCENE",
+        help=f"{SCENES}, or a file.",
     ),
 ]
 Settings = Annotated[

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from levilab.cli.options import Json, Settings
+from levilab.cli.options import SCENES, Json, Settings
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.errors import DataError, UsageError, WorkersLost
 
@@ -24,7 +24,7 @@ def sweep(
         str,
         typer.Argument(
             metavar="SCENE|STORE",
-            help="The scene: undriven, friction, tilted, driven, loose-washers, precession, spindown, or a file.  "
+            help=f"The scene: {SCENES}, or a file.  "
             "Or the store of a sweep, NAME.zarr, which is shown, and with --resume continued.",
         ),
     ],
@@ -162,6 +162,7 @@ def _compute(store: Store, cores: int | None, scheduler: str | None) -> None:
                 run(store, workers, bar)
         except WorkersLost as lost:
             raise WorkersLost(f"{lost}; {what_is_kept()}") from lost
+    message(f"wrote {store.path}")
 
 
 def _show(store: Store, *, as_json: bool) -> None:

@@ -8,7 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from levilab.formats.columns import NoTable, shorten
-from levilab.formats.dialect import Dialect, Line, content_lines, filled_count, find_dialect, most_common
+from levilab.formats.dialect import (
+    SEPARATORS,
+    Dialect,
+    Line,
+    content_lines,
+    filled_count,
+    find_dialect,
+    most_common,
+)
 from levilab.formats.titles import is_unit, known_titles
 
 HEAD = 65536  # bytes that the guess rests upon
@@ -71,12 +79,29 @@ def sniff(path: Path) -> Layout:
     if not any(line.strip() for line in lines):
         raise NoTable(path, f"is {'empty' if whole else 'one line without end'}; {EXPORT}")
     dialect = find_dialect(lines[-SAMPLE:], lines[:SAMPLE])
+    if dialect is None and (words := _of_words(lines, encoding, head)):
+        return words
     if dialect is None:
         at, line = next((n, line) for n, line in enumerate(lines, 1) if line.strip())
         alone = "; number the rows in a column of their own if there is but one"
         seen = f"'{shorten(line.strip())}' begins no table of at least two columns"
         raise NoTable(path, f"{seen}; {EXPORT}{alone}", line=at)
     return lay_out(lines, encoding, dialect, head)
+
+
+def _of_words(lines: list[str], encoding: str, head: bytes) -> Layout | None:
+    """A table without two numbers in a row, below titles that are not known: it has columns, though none of ours."""
+    for separator in filter(None, SEPARATORS):
+        dialect = Dialect(separator, ".")
+        content = list(content_lines(lines[:SAMPLE], dialect))
+        if len(content) < 2 or not content[0].is_text:
+            continue
+        first = content[0]
+        if {line.filled_count for line in content} == {first.filled_count}:
+            header = first.fields[: first.filled_count]
+            start = _offset(head, first.number + 1)
+            return Layout(encoding, dialect, header, first.number, (), first.number + 1, start, len(header))
+    return None
 
 
 def _encoding(head: bytes) -> str:

@@ -4,7 +4,7 @@ A file is sniffed (`layout`), its titles are understood (`columns`), its rows re
 """
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -119,7 +119,7 @@ def read_table(
             raise NoSuchColumn(
                 path,
                 f"no title is known ({known} …) among {quoted(header)}: say `columns` = "
-                + ",".join(f"{_key(name)}=NAME" for name in wanted_names),
+                + _in_one_word(f"{_key(name)}=NAME" for name in wanted_names),
                 line=layout.header_line or layout.first_line,
             )
         for name in needed:
@@ -198,6 +198,12 @@ def parse_columns(text: str) -> dict[str, str]:
     return found
 
 
+def _in_one_word(columns: Iterable[str]) -> str:
+    """Columns as any shell takes them: PowerShell would split them at a comma."""
+    text = ",".join(columns)
+    return f'"{text}"' if "," in text else text
+
+
 def _key(name: str) -> str:
     """What `columns` calls a canonical column."""
     return next((short for short, long in SHORTHANDS.items() if long == name), name)
@@ -253,12 +259,14 @@ def _titles(
     if layout.header_line:
         raise NoSuchColumn(
             path,
-            f"is no header for the {layout.width} columns below: correct it, or say `columns` = t=1,f=2",
+            f'is no header for the {layout.width} columns below: correct it, or say `columns` = "t=1,f=2"',
             line=layout.header_line,
         )
     if layout.width > len(TITLES_WITHOUT_HEADER) or not guess:
         raise NoSuchColumn(
-            path, f"{layout.width} columns and no header; add one, or say `columns` = t=1,f=2", line=layout.first_line
+            path,
+            f'{layout.width} columns and no header; add one, or say `columns` = "t=1,f=2"',
+            line=layout.first_line,
         )
     taken = dict(zip(TITLES_WITHOUT_HEADER, numbers, strict=False))
     return numbers, taken, [f"{shorten(str(path), 200)}: no header; the columns are taken as {', '.join(taken)}"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import math
 import os
@@ -209,9 +210,18 @@ def _with_short_names(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
     return tuple(replace(source, name=name) for source, name in zip(sources, names, strict=True))
 
 
+def no_such_path(path: Path) -> DataError:
+    """What to say of a path that does not exist: a name beside it that is nearly the same, or where it was sought."""
+    folder = next(place for place in (path.parent, *path.parent.parents) if place.is_dir())
+    wanted = path.relative_to(folder).parts[0] if folder != path.parent else path.name
+    near = difflib.get_close_matches(wanted, sorted(one.name for one in folder.iterdir()), n=1, cutoff=0.8)
+    advice = f"did you mean {folder / near[0]}?" if near else "check the name; levilab runs lists the runs of a folder"
+    return DataError(f"{path}: there is no such file or folder in {folder.resolve()}: {advice}")
+
+
 def _one(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
     if not path.exists():
-        raise DataError(f"{path}: there is no such file or folder")
+        raise no_such_path(path)
     if path.is_dir():
         return _of_run(Run.load(path), needs, options)
     if path.name == needs.data and (path.parent / RECORD).exists():

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DoesNotSuit, NoneUsable, UsageError
-from levilab.files import replace_atomically, writing
+from levilab.files import check_writable, replace_atomically, writing
 from levilab.pipelines.catalogue import recall_suiting, remarks
 from levilab.pipelines.document import NO_RESULT
 from levilab.pipelines.sources import data_files
@@ -29,6 +29,7 @@ from levilab.runs.run import find_runs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from levilab.pipelines.analyzed import A
@@ -99,6 +100,8 @@ def write_report(
     if form is None:
         raise UnknownFormat("output", "a name that ends in .html or .pdf is expected", value=output)
     form.check()
+    with _writing(output):
+        check_writable(output)  # before what takes long
     others, left = _sorted_by_kind(paths)
     sections = [section for kind, found in others for section in kind.sections(found)]
     results = _results(left, given or {}, tell, needed=not others)
@@ -106,7 +109,7 @@ def write_report(
     asked = Asked(paths, form.ending, given or {}, crosscheck)
     document = replace(document_of(results, sections, supplements, asked), date=_newest(results, others))
     content = form.content(document)
-    with writing(f"{output}: could not be written", "choose another place with `output`"):
+    with _writing(output):
         output.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(output, content)
     if tables:
@@ -114,6 +117,10 @@ def write_report(
     for text in _remarks(results, others) if tell else ():
         tell(text)  # type: ignore[misc]
     return output
+
+
+def _writing(output: Path) -> AbstractContextManager[None]:
+    return writing(f"{output}: could not be written", "choose another place with `output`")
 
 
 def _sorted_by_kind(paths: Sequence[Path]) -> tuple[Found, list[Path]]:

@@ -46,6 +46,10 @@ class SceneError(LevilabError):
     """A scene that cannot be simulated as it is described."""
 
 
+class UnknownScene(SceneError):
+    """A name that none of the scenes has that come with levilab."""
+
+
 def parse_setting(setting: str) -> tuple[str, Any]:
     """Split KEY=VALUE into a dotted key and a value of TOML; a word without quotes is a string.
 

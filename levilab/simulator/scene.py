@@ -16,7 +16,7 @@ from pydantic import NonNegativeFloat, ValidationError, model_validator
 
 from levilab.files import parse_toml
 from levilab.settings import in_one_line
-from levilab.simulator.keys import SceneError, Table, as_toml, nearest, parse_setting, set_key, short_text
+from levilab.simulator.keys import SceneError, Table, UnknownScene, as_toml, nearest, parse_setting, set_key, short_text
 from levilab.simulator.parts import Base, Drag, Drive, Escape, Part, Start, Top, Washers
 
 if TYPE_CHECKING:
@@ -281,7 +281,8 @@ def preset(name: str) -> Scene:
         return _read_file(_scenes_folder() / f"{name}.toml", name)
     near = nearest(name, presets())
     meant = f"did you mean {near}? Known" if near else "known"
-    raise SceneError(f"there is no scene {name!r}: {meant} are {', '.join(presets())}; or give the path of a TOML file")
+    known = ", ".join(presets())
+    raise UnknownScene(f"there is no scene {name!r}: {meant} are {known}; or give the path of a TOML file")
 
 
 def changes(scene: Scene) -> dict[str, Any] | None:

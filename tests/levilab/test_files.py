@@ -7,8 +7,9 @@ import os
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pytest
 
-from levilab.files import finite, replace_atomically, stamp
+from levilab.files import finite, parse_json, replace_atomically, stamp
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,3 +29,8 @@ def test_a_file_that_was_written_or_replaced_has_another_stamp(tmp_path: Path) -
         found.append(stamp(path))
     assert found[0] is None
     assert len(set(found)) == 4
+
+
+def test_what_is_not_json_is_said_by_its_place_alone() -> None:
+    with pytest.raises(ValueError, match=r"^from line 2, column 1 on$"):
+        parse_json("{\nx}")

@@ -167,6 +167,10 @@ def _artist(film: Film, *, with_words: bool = True) -> Callable[[int], Image]:
     return draw
 
 
+#: How much a veil hides, of 255: a path behind it shows where it goes on, and numbers before it can be read.
+_VEIL = 225
+
+
 class _Words:
     """What is written on a film, and the path of the centre seen from above.
 
@@ -185,6 +189,7 @@ class _Words:
             f"simulated, {speed_in_words(speed)}", span_in_words(film.poses)
         )  # fmt: skip
         self._inset = _Inset(film)
+        self._veil: Image | None = None
 
     def write(self, picture: Image, k: int) -> None:
         """Write the numbers of the k-th pose, and draw the path up to then."""
@@ -196,14 +201,34 @@ class _Words:
         name = self._film.poses.scene.name or "scene"
         while len(name) > 4 and pen.textlength(name, self._large) > 0.56 * picture.width:
             name = f"{name[:-2]}…"
+        rows = readout(self._film.poses, k)
+        first = 0.8 * edge + (2.1 + 1.1 * len(self._about)) * line  # of the numbers
+        about = [(0.8 * edge + (1.5 + 1.1 * row) * line, said) for row, said in enumerate(self._about)]
+        if self._veil is None:
+            widths = [(0.8 * edge, pen.textlength(name, self._large))]
+            widths += [(y, pen.textlength(said, self._small)) for y, said in about]
+            widths += [(first + 1.2 * row * line, 0.29 * self._unit) for row in range(len(rows))]
+            self._veil = self._veil_behind(picture.size, widths)
+        picture.paste(self._colours["background"], (0, 0), self._veil)
         pen.text((edge, 0.8 * edge), name, text, self._large)
-        for row, said in enumerate(self._about):
-            pen.text((edge, 0.8 * edge + (1.5 + 1.1 * row) * line), said, faint, self._small)
-        for row, (label, value) in enumerate(readout(self._film.poses, k)):
-            y = 0.8 * edge + (2.1 + 1.1 * len(self._about) + 1.2 * row) * line
+        for y, said in about:
+            pen.text((edge, y), said, faint, self._small)
+        for row, (label, value) in enumerate(rows):
+            y = first + 1.2 * row * line
             pen.text((edge, y), label, faint, self._small)
             pen.text((edge + 0.29 * self._unit, y), value, text, self._small, anchor="ra")
         self._inset.draw(pen, k, self._colours, self._small)
+
+    def _veil_behind(self, size: tuple[int, int], rows: list[tuple[float, float]]) -> Image:
+        """What hides most of a path behind lines of text, of these heights and widths, and behind the inset's frame."""
+        from PIL import Image, ImageDraw
+
+        veil, edge, line = Image.new("L", size), self._line, self._line
+        pen = ImageDraw.Draw(veil)
+        for y, width in rows:
+            pen.rectangle((edge - line / 3, y - line / 4, edge + width + line / 3, y + line), fill=_VEIL)
+        pen.rectangle(self._inset.frame, fill=_VEIL)
+        return veil
 
 
 class _Inset:
@@ -221,9 +246,15 @@ class _Inset:
         centre = np.array([self._left + self._size / 2, self._top + self._size / 2])
         self._path = (flat - self._middle) * np.array([1, -1]) * self._pixels_per_m + centre
 
+    @property
+    def frame(self) -> tuple[float, float, float, float]:
+        """Left, upper, right and lower edge with what is written above and below [pixels]."""
+        size = self._size
+        return self._left - size / 20, self._top - size / 5, self._left + 1.05 * size, self._top + 1.3 * size
+
     def draw(self, pen: ImageDraw, k: int, colours: dict[str, Colour], small: BaseFont) -> None:
         left, top, size = self._left, self._top, self._size
-        pen.rectangle((left, top, left + size, top + size), fill=colours["background"], outline=colours["ground"])
+        pen.rectangle((left, top, left + size, top + size), outline=colours["faint"])
         pen.line(self._path[: k + 1].ravel().tolist() or [0, 0], fill=colours["path"], width=1)
         x, y = self._path[k]
         pen.ellipse((x - 3, y - 3, x + 3, y + 3), fill=colours["mark"])

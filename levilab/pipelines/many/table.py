@@ -13,7 +13,7 @@ from levilab.errors import DataError, NoneUsable
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.many.file import TableFile, check_name
 from levilab.pipelines.many.one import PassedOver, Row, Task, analyze_one, columns_of, name_of, row
-from levilab.pipelines.sources import data_files, sha256_of
+from levilab.pipelines.sources import data_files, no_such_path, sha256_of
 from levilab.runs.run import RECORD, find_run, run_folders
 from levilab.software import software_versions
 from levilab.workers import processes, results_of, this_process
@@ -168,7 +168,7 @@ def inputs(paths: Sequence[Path]) -> Iterator[tuple[str, bool, bool]]:
     """
     for path in map(find_run, paths):
         if not path.exists():
-            raise DataError(f"{path}: there is no such file or folder")
+            raise no_such_path(path)
         yield from _below(path)
 
 

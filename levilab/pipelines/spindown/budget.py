@@ -10,15 +10,17 @@ import numpy as np
 
 from analysis.budget import Budget, Component, printed_step, rest, u_of_step
 from analysis.numbers import digits
+from analysis.spindown.drag import LAWS
 from levilab.pipelines.budget import bench_clock, direct_row, gate_of, setting_of, time_base
 from levilab.pipelines.spindown.analysis import EXPERIMENT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from analysis.spindown.combine import Mean
+    from analysis.spindown.combine import CombinedLaw, Mean
     from analysis.spindown.fit import SpinDown
     from analysis.spindown.lawfit import LawFit, Parts
+    from analysis.spindown.verdict import Verdict
     from analysis.uncertainty import Estimate
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions
@@ -38,7 +40,7 @@ _TO_HALVE = 4
 
 
 def budget_of_run(source: Source[Readings], run: SpinDown, options: SpinDownOptions) -> tuple[Budget, ...]:
-    """Of the parameters of the best law, and of the exponent."""
+    """Of the parameters of the best law, of constants of others as good with no more of them, of the exponent."""
     return tuple(
         Budget(name, estimate.value, estimate.u, estimate.unit, tuple(_rows(source, run, fit, name, options)), fit.name)
         for fit, name in _wanted(run)
@@ -49,8 +51,16 @@ def budget_of_run(source: Source[Readings], run: SpinDown, options: SpinDownOpti
 def _wanted(run: SpinDown) -> list[tuple[LawFit, str]]:
     best = run.fit(run.best)
     wanted = [(best, name) for name in best.parameters if _is_determined(best, name)]
+    as_good = [(run.fit(law), name) for law in _as_good(run.verdict, run.fits) for name in LAWS[law].constants]
     others = [fit for fit in run.fits if fit.name == _POWER and fit is not best]
-    return wanted + [(fit, _EXPONENT) for fit in others]
+    return wanted + as_good + [(fit, _EXPONENT) for fit in others]
+
+
+def _as_good(verdict: Verdict, fits: Sequence[LawFit | CombinedLaw]) -> list[str]:
+    """The laws with constants of their own that fit as well as the best one and have no more of them."""
+    count = {fit.name: len(LAWS[fit.name].constants) for fit in fits}
+    tied = [name for name in verdict.indistinguishable if name not in {verdict.best, _POWER}]
+    return [name for name in tied if count[name] <= count[verdict.best]]
 
 
 def _is_determined(fit: LawFit, name: str) -> bool:
@@ -169,7 +179,8 @@ def budget_of_all(analysis: SpinDownAnalysis) -> tuple[Budget, ...]:
     """Of the means over several runs, from the budgets of each."""
     combined = analysis.combined
     best = combined.fit(combined.best)
-    wanted = [(best.name, name, mean) for name, mean in best.constants.items() if name != "c"]
+    laws = [best, *(combined.fit(name) for name in _as_good(combined.verdict, combined.fits))]
+    wanted = [(law.name, name, mean) for law in laws for name, mean in law.constants.items() if name != "c"]
     if best.name != _POWER:
         power = next((fit for fit in combined.fits if fit.name == _POWER), None)
         wanted += [(_POWER, _EXPONENT, power.constants[_EXPONENT])] if power else []

@@ -114,8 +114,9 @@ def _laws(analysis: SpinDownAnalysis) -> tuple[Tabular, Tabular]:
         f"{u}{'' if several else _intervals(analysis)}"
     )
     quality = (
-        "constants: how many were fitted, beside the start of each run; the exponent is common to all runs. χ²/dof is "
-        "near 1 where a law leaves nothing but the readings' own uncertainty. ΔAICc counts against a law, more than 10 "
+        "constants: how many were fitted, beside the start of each run; the exponent is common to all runs, and the "
+        "tilt δ counts where the readings show it. χ²/dof is near 1 where a law leaves nothing but the readings' own "
+        "uncertainty. ΔAICc counts against a law, more than 10 "
         "excludes it; weight: the law's share of the evidence (Akaike). Order test p (Wald–Wolfowitz): how probable it "
         "is that residuals in random order change their sign so seldom, or so often; below 0.01 they have a shape. "
         f"Durbin–Watson is near 2 for noise: chance alone gives {low:.2f} to {high:.2f} (2 ± 4/√n, 2σ); less means a "
@@ -136,8 +137,8 @@ def _count(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
     explained = (
         "A counter counts turns about the vertical. A moment that points off the axis by δ makes the top wobble with "
         "its spin, the more the nearer the spin is to the resonance ν_r, and the count is higher than the spin by what "
-        "is given for the last reading. Where neighbouring readings resemble each other they say as much as fewer "
-        "independent ones."
+        "is given for the last reading. K, beside a law's constants, is the size of what nutation adds. Where "
+        "neighbouring readings resemble each other they say as much as fewer independent ones."
     )
     shown = Tabular("spindown-count", found, explained)
     if len(found.rows) <= MOST_COUNTS:

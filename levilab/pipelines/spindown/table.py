@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
+from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.tilt import counted
 from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
 from levilab.present.numbers import (
@@ -43,7 +44,7 @@ _WITH_TENTHS = 100.0
 def spindown_tables(analysis: SpinDownAnalysis) -> tuple[Table, ...]:
     """The runs, the laws, how well they fit, the straight lines.  Each fits a terminal of 80 columns."""
     quality = quality_table(analysis, QUALITY)
-    count = count_table(analysis)
+    count = count_table(analysis, symbols=True)
     return _runs_table(analysis), _laws_table(analysis), quality, *([count] if count else []), _lines_table(analysis)
 
 
@@ -84,10 +85,12 @@ def is_best(analysis: SpinDownAnalysis, law: str) -> bool:
 
 
 def law_constants(analysis: SpinDownAnalysis, name: str) -> Mapping[str, Estimate]:
-    """A law's constants: means over the runs, or with its start those of the only one."""
-    if len(analysis.runs) == 1:
-        return analysis.runs[0].fit(name).parameters
-    return analysis.combined.fit(name).constants
+    """A law's constants: means over the runs, or with its start those of the only one; no wobble by an excluded law."""
+    if len(analysis.runs) > 1:
+        return analysis.combined.fit(name).constants
+    found = analysis.runs[0].fit(name).parameters
+    excluded = name in dict(analysis.combined.verdict.excluded)
+    return {one: value for one, value in found.items() if not (excluded and one in WOBBLE)}
 
 
 def quality_table(analysis: SpinDownAnalysis, heads: Sequence[str]) -> Table:
@@ -112,7 +115,12 @@ def _quality(statistics: Statistics, runs: int) -> list[str]:
     ]
 
 
-def count_table(analysis: SpinDownAnalysis) -> Table | None:
+#: For the terminal, where nothing else explains them.
+_WOBBLE_SYMBOLS = "δ: tilt of the moment; ν_r: resonance, below the last reading"
+_NUTATION = "; K, with the laws: nutation"
+
+
+def count_table(analysis: SpinDownAnalysis, *, symbols: bool = False) -> Table | None:
     """What the count holds beside the spin, and as how many readings correlated ones count; None: neither is seen."""
     if not any(run.has_tilt or run.is_correlated for run in analysis.runs):
         return None
@@ -135,7 +143,10 @@ def count_table(analysis: SpinDownAnalysis) -> Table | None:
                 )
             )
         )
+    tilted = any(run.has_tilt for run in analysis.runs)
     title = "What the counter sees of the wobble, by the best law"
+    if tilted and symbols:
+        title += f". {_WOBBLE_SYMBOLS}{_NUTATION if len(analysis.runs) == 1 else ''}"
     return table(title, heads, rows)
 
 

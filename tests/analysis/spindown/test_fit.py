@@ -214,6 +214,15 @@ def test_precise_readings_of_a_disc_exclude_stokes_and_newton(u, exponent_u):
     assert f"power, n = 1.495 ± {exponent_u}" in verdict.text
 
 
+def test_readings_on_a_law_to_rounding_are_called_too_good_to_be_measured():
+    time = np.arange(0, 80, 10.0)
+    run = fit_spin_down(time, 40 - 0.1 * time)  # a power law with n = 0
+    assert "n = 0, fits best" in run.verdict.text
+    assert "too good to be measured" in " ".join(run.warnings)
+    rounded = np.round(spin("disc", T, 40.0, 2.34e-4), 6)
+    assert "too good" not in " ".join(fit_spin_down(T, rounded).warnings)
+
+
 def test_rough_readings_cannot_tell_and_say_why():
     verdict = fit_spin_down(T, readings(sigma=3.0), 3.0).verdict
     assert verdict.excluded == ()
@@ -313,6 +322,20 @@ def test_outliers_are_kept_on_request_and_still_named():
     run = fit_spin_down(T, y, SIGMA, keep_outliers=True)
     assert (run.outliers, run.time.size) == ((7,), 20)
     assert "kept" in run.warnings[0]
+
+
+def test_an_outlier_is_so_far_away_as_the_warning_says():
+    y = readings()
+    y[19] += 1.5
+    run = fit_spin_down(T, y, SIGMA, laws=["disc"])
+    off = y[19] - run.fit("disc").spin_frequency(T[19])
+    assert f"{off:.2g} Hz from the disc law, {off / SIGMA:.2g} times its uncertainty" in run.warnings[0]
+    assert "the top may already have been falling" in run.warnings[0]
+    unknown = fit_spin_down(T, y, laws=["disc"])
+    rms = unknown.fit("disc").statistics.rms_residual
+    assert f"{off / rms:.2g} times the rms residual of the others" in unknown.warnings[0]
+    y[19], y[7] = readings()[19], 2 * y[7]
+    assert "falling" not in fit_spin_down(T, y, SIGMA, laws=["disc"]).warnings[0]
 
 
 @pytest.mark.parametrize("u", [SIGMA, None])

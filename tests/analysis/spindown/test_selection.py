@@ -77,3 +77,17 @@ def test_a_law_with_more_constants_is_needless_only_where_it_fits_as_well(worse,
     # mixed does not contain the disc: it may fit worse with a constant more
     found = judged(disc=fit(18.0), mixed=fit(18.0 + worse, p=3))
     assert ("mixed" in found.needless) is needless
+
+
+def test_of_laws_that_fit_alike_none_is_singled_out_before_one_with_fewer_constants():
+    found = judged(mixed=fit(18.0, p=3), disc=fit(21.5, p=2), stokes=fit(90.0, p=2))  # ΔAICc 0.7 in favour of mixed
+    assert found.best == "mixed"
+    assert not found.decided
+    assert found.text.startswith("The laws disc and mixed cannot be told apart: they fit as well as each other, disc")
+    assert judged(disc=fit(18.0, p=2), mixed=fit(17.0, p=3)).decided
+
+
+def test_the_reason_of_an_exclusion_has_digits_that_differ():
+    # u = 0.01 Hz: rms 0.01010 and 0.01040 Hz
+    found = judged(disc=fit(2040.0, n=2000, p=2), mixed=fit(2163.0, n=2000, p=2))
+    assert "it leaves 0.0104 Hz rms, disc 0.0101 Hz" in dict(found.excluded)["mixed"]

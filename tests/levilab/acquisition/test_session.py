@@ -136,7 +136,7 @@ def test_codes_that_were_changed_afterwards_are_refused(request_of_a_scan: Acqui
     [
         ("{", "a line of it is damaged"),
         ("[" * 5000 + "]" * 5000, "nested"),
-        ('{"number": 1}', "describes no record: time_s: Field required"),
+        ('{"number": 1}', "describes no record: time_s: is missing"),
         ('{"path": "../../elsewhere.npy"}', "describes no record"),
     ],
 )

@@ -421,7 +421,7 @@ def test_an_empty_description_is_a_bench_without_instruments(tmp_path):
         ("[spin]\ngate_s = inf", "spin.gate_s = 'inf'"),
         ("[spin]\ndrive_waveform = 'SAW'", "'SIN', 'SQU' or 'TRI'"),
         ("[limits]\ndrive_amplitude_vpp = nan", "limits.drive_amplitude_vpp"),
-        ("[counter]\nmodel = '53230A'", "counter.address: Field required"),
+        ("[counter]\nmodel = '53230A'", "counter.address: is missing"),
         ("counter = 3", "counter = '3'"),
         ("[spin]\ngate = 1\nlevel = 2", "(and 1 more)"),
         ("[spin\n", "not readable as TOML"),

@@ -16,7 +16,9 @@ import pytest
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.cli.acquire import EXPERIMENT_HELP
 from levilab.cli.analyze import COMMANDS, OPTIONS
+from levilab.cli.options import SCENES
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.simulator.scene import presets
 from support.acquisitions import QUICKLY
 from support.commands import command
 from support.spin_downs import spin_down_csv
@@ -380,3 +382,7 @@ def test_nothing_heavy_is_imported_where_it_is_not_used(
     assert len(heavy) == len(commands)
     for words, seen in zip(commands, heavy, strict=True):
         assert seen <= allowed, words
+
+
+def test_help_lists_the_scenes_that_come_with_levilab() -> None:
+    assert sorted(SCENES.split(", ")) == presets()

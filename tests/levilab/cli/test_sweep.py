@@ -29,6 +29,7 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("sweep")
     ended = command(*MAP, cwd=folder)
     assert ended.status == 0, ended.err
+    assert "wrote map.zarr\n" in ended.err
     return folder, ended.out
 
 

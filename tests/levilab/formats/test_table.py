@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from levilab.errors import DataError, UsageError
-from levilab.formats.columns import Column, NoTable, TableError, shorten
+from levilab.formats.columns import Column, NoSuchColumn, NoTable, TableError, quoted, shorten
 from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout
 from levilab.formats.rows import FEW, _read_at_once, _read_lines
@@ -150,6 +150,25 @@ def test_a_column_of_true_and_false_is_refused_by_its_line(table_file):
     titles_below = "".join(f"{k},{k}\n" for k in range(20)) + "time_s,spin_frequency_hz\n" + 200 * "no row, but words\n"
     with pytest.raises(NoTable, match="'0,0' begins no table of at least two columns"):
         read_table(table_file(titles_below))
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize(("header", "row"), [
+    (("Datum", "Temperatur", "Kommentar"), ("2024-01-05", "21.5", "kalt")),
+    (("Temperatur", "Kommentar"), ("21", "kalt")),
+])  # fmt: skip
+def test_a_table_with_words_in_it_is_told_which_titles_are_known(separator, header, row, table_file):
+    path = table_file("\n".join(map(separator.join, [header, *[row] * 19])) + "\n")
+    with pytest.raises(NoSuchColumn, match=f'no title is known .* among {quoted(header)}: say `columns` = "t=NAME'):
+        read_table(path)
+    with pytest.raises(TableError, match="line 2: 'kalt' stands in column 'Kommentar'"):
+        read_table(path, columns={"t": "Temperatur", "f": "Kommentar"})
+
+
+@pytest.mark.parametrize("text", ["hello world\nthis is prose\nand more, with a comma\n", "one, two\n"])
+def test_prose_is_no_table(text, table_file):
+    with pytest.raises(NoTable, match="begins no table of at least two columns"):
+        read_table(table_file(text))
 
 
 @BOTH_WAYS

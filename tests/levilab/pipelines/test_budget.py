@@ -14,6 +14,7 @@ from levilab.pipelines.budget import budget_blocks, budget_table, budgets_of_res
 from levilab.pipelines.catalogue import ANALYSES, save
 from levilab.present.document.blocks import Details, Paragraph, Tabular
 from support.paths import ROOT
+from support.spin_downs import spin_down_csv
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -93,6 +94,14 @@ def test_a_result_that_is_read_back_has_the_same_budgets(
     after = row.recall(paths, row.options_from(given))
     assert after.budget == before.budget
     assert [origin.budget for origin in after.origins] == [origin.budget for origin in before.origins]
+
+
+def test_a_law_as_good_with_fewer_constants_has_its_budget_too(tmp_path: Path):
+    analysis = analyzed("spindown", [spin_down_csv(tmp_path / "run.csv", seed=7)])
+    assert analysis.combined.best == "mixed"
+    assert analysis.text.startswith("The laws disc, mixed and power, n = 1.481 ± 0.015, cannot be told apart")
+    assert {(one.model, one.quantity) for one in analysis.budget} >= {("disc", "c32"), ("mixed", "c1"), ("mixed", "c2")}
+    assert of(analysis.budget, "c32").closes
 
 
 def test_a_result_without_budgets_is_read_and_says_how_to_get_them(sample_data: Path, tmp_path: Path):

@@ -114,7 +114,7 @@ ONE = {"value": 1, "u": 1, "unit": ""}
     [
         (["schema"], "levilab-result/9", "schema is 'levilab-result/9', expected 'levilab-result/1'"),
         (["schema"], ..., "schema is None"),
-        (["models"], ..., "models: Field required"),
+        (["models"], ..., "models: is missing"),
         (["models", 2, "name"], "cubic", "'cubic' is no drag law"),
         (["models", 2, "parameters"], {}, "disc lacks one of its constants c32"),
         (["runs", 0, "models", 2, "fit", "solution"], [1.0], "disc: its solution is missing or of another law"),

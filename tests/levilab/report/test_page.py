@@ -345,8 +345,9 @@ def test_a_result_that_lies_elsewhere_is_found_by_its_own_path(tmp_path: Path, r
         reported(elsewhere, output=tmp_path / "page.html")
 
 
-@pytest.mark.usefixtures("undrawn_figures")
-def test_a_report_that_cannot_be_written_is_reported_in_one_line(tmp_path: Path, sample_data: Path) -> None:
+def test_a_report_that_cannot_be_written_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
-    with pytest.raises(LevilabError, match="`output`"):
-        write_report([sample_data / "spin-down-1"], tmp_path / "file" / "report.html")
+    (tmp_path / "folder.html").mkdir()
+    for output in (tmp_path / "file" / "report.html", tmp_path / "folder.html"):
+        with pytest.raises(LevilabError, match="`output`"):
+            write_report([tmp_path / "no run, which would be said first"], output)

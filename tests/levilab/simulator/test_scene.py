@@ -149,7 +149,7 @@ def test_any_unknown_name_is_refused_in_one_line(name):
         (b"top = ", "not readable as TOML"),
         (b"\xff", "not readable as TOML"),
         (b"[top]\nmas_kg = 1", "there is no key top.mas_kg; did you mean top.mass_kg?"),
-        (b"[top]\nmass_kg = '1'", "top.mass_kg = '1': Input should be a valid number"),
+        (b"[top]\nmass_kg = '1'", "top.mass_kg = '1': a number is expected"),
         (b"top = 3", "top = 3: a table is expected, with the keys mass_kg"),
     ],
 )
@@ -192,7 +192,7 @@ def test_a_number_is_taken_as_people_write_it(text, value):
 
 
 def test_a_value_with_a_line_break_sets_no_other_key():
-    assert "valid number" in refusal("top.mass_kg=1\nbase = 2")
+    assert "a number is expected" in refusal("top.mass_kg=1\nbase = 2")
 
 
 def test_values_that_only_go_together_can_be_set_together_in_any_order():
@@ -260,19 +260,19 @@ def test_every_synonym_stands_for_keys_that_there_are():
 # --- values ---
 
 REFUSED = [
-    ("top.mass_kg=-1", "top.mass_kg = '-1': Input should be greater than 0"),
-    ("top.mass_kg='1'", "top.mass_kg = '1': Input should be a valid number"),
-    ("top.mass_kg=0,025", "should be a valid number; write a decimal point, not a comma"),
-    ("start.spin_hz=30Hz", "valid number; write the number without its unit, which is in the key's name"),
+    ("top.mass_kg=-1", "top.mass_kg = '-1': a number greater than 0"),
+    ("top.mass_kg='1'", "top.mass_kg = '1': a number is expected"),
+    ("top.mass_kg=0,025", "a number is expected; write a decimal point, not a comma"),
+    ("start.spin_hz=30Hz", "a number is expected; write the number without its unit, which is in the key's name"),
     ("start.spin_hz=3e1 turns/s", "without its unit"),
-    ("top.mass_kg=true", "top.mass_kg = 'True': Input should be a valid number"),
+    ("top.mass_kg=true", "top.mass_kg = 'True': a number is expected"),
     ("top.mass_kg=inf", "finite number"),
-    ("top.mass_kg=nan", "Input should be"),
+    ("top.mass_kg=nan", "is expected"),
     ("base.inner_radius_m=0", "greater than 0"),
     ("base.outer_radius_m=0.03", "base.outer_radius_m = 0.03: more than base.inner_radius_m = 0.03 is expected"),
-    ("base.field=paraxial-3", "base.field = 'paraxial-3': Input should be 'exact', 'paraxial-2', 'paraxial-4'"),
+    ("base.field=paraxial-3", "base.field = 'paraxial-3': 'exact', 'paraxial-2', 'paraxial-4'"),
     ("base.field=paraxial-22", "'paraxial-18' or 'paraxial-20'"),
-    ("base.tilt_rad=1.5708", "base.tilt_rad = '1.5708': Input should be less than 1.57"),
+    ("base.tilt_rad=1.5708", "base.tilt_rad = '1.5708': a number less than 1.57"),
     ("top.inertia_axial_kg_m2=3e-6", "at most twice top.inertia_transverse_kg_m2 = 1.04e-06 is expected"),
     ("top.inertia_axial_kg_m2=0", "greater than 0"),
     ("top.moment_a_m2=0", "top.moment_a_m2 = 0.0: any number but 0 is expected"),
@@ -282,7 +282,7 @@ REFUSED = [
     ("top.magnet_height_m=0", "greater than 0"),
     ("washers.inertia_kg_m2=1.731314e-6", "less than top.inertia_axial_kg_m2 = 1.731314e-06 is expected"),
     ("washers.drag_share=1.1", "less than or equal to 1"),
-    ("drag.law=stoke", "drag.law = 'stoke': Input should be 'none', 'stokes', 'newton', 'disc' or 'mixed'"),
+    ("drag.law=stoke", "drag.law = 'stoke': 'none', 'stokes', 'newton', 'disc' or 'mixed'"),
     ("drag.coefficient=-1", "drag.coefficient = '-1': a number from 0 is expected"),
     ("drag.coefficient=nan", "a number from 0 is expected"),
     ("drag.coefficient=[1,2,3]", "a number from 0 is expected"),
@@ -304,12 +304,12 @@ REFUSED = [
     ("escape.height_m=0.071", "above escape.height_m = 0.071 is expected"),
     ("start.position_m.0=0.021", "a place within escape.radius_m = 0.02"),
     ("start.tilt_rad=-0.01", "greater than or equal to 0"),
-    ("start.tilt_rad=3.1416", "start.tilt_rad = '3.1416': Input should be less than 3.14159"),
+    ("start.tilt_rad=3.1416", "start.tilt_rad = '3.1416': a number less than 3.14159"),
     ("start={precession='steady',tilt_rad=0}", "start.precession = steady: start.tilt_rad above 0 is expected"),
-    ("start.position_m=[0,0,'a']", "start.position_m.2 = 'a': Input should be a valid number"),
+    ("start.position_m=[0,0,'a']", "start.position_m.2 = 'a': a number is expected"),
     ("start.position_m=0.07", "3 numbers in brackets are expected"),
     ("gravity_m_s2=-1", "greater than or equal to 0"),
-    ("observed=light", "observed = 'light': Input should be 'motion' or 'spin'"),
+    ("observed=light", "observed = 'light': 'motion' or 'spin'"),
 ]
 
 

@@ -102,6 +102,22 @@ def test_the_path_and_the_dark_theme_change_the_picture(poses: Poses) -> None:
     assert begin.mean() > 150
 
 
+def test_a_path_behind_the_numbers_does_not_cross_them(painter: Painter, poses: Poses) -> None:
+    left = np.array([np.sin(NEAR), -np.cos(NEAR), 0.0])
+    positions = poses.positions + 0.048 * left  # where the numbers stand
+    positions[:, 2] += np.linspace(0.02, -0.03, len(positions))
+    fields = {name: getattr(poses, name) for name in Poses.__dataclass_fields__} | {"positions": positions}
+    film = Film(Poses(**fields), 0.05, 20.0, (480, 480))
+    path = np.array(painter.colours["path"])
+
+    def in_its_colour(*, with_words: bool) -> int:
+        numbers = np.asarray(still(film, 60, with_words=with_words), dtype=int)[95:185, 15:165]
+        return int((np.abs(numbers - path).sum(axis=2) < 150).sum())
+
+    assert in_its_colour(with_words=False) > 30
+    assert in_its_colour(with_words=True) == 0
+
+
 def test_a_gif_has_its_pictures_its_time_and_the_same_bytes_each_time(poses: Poses) -> None:
     shares: list[float] = []
     film = Film(poses, 0.05, 20.0, (480, 480), every=3)

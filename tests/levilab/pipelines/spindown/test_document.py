@@ -17,7 +17,7 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.result import save
 from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis, SpinDownOptions, analyze_spindowns
 from levilab.pipelines.spindown.document import DOCUMENT
-from levilab.pipelines.spindown.table import count_table, tilt_part
+from levilab.pipelines.spindown.table import count_table, law_constants, tilt_part
 from support.spin_downs import spin_down_csv
 
 if TYPE_CHECKING:
@@ -316,4 +316,11 @@ def test_a_run_with_a_tilt_of_its_own_is_recalled_with_its_curves(tmp_path: Path
     found = count_table(recalled)
     assert found is not None
     assert found == count_table(analysis)
+    shown = [table for table in SPINDOWN.tables(recalled) if table.title.startswith("What the counter sees")]
+    assert "δ: tilt of the moment; ν_r: resonance" in shown[0].title
+    assert after.fit("stokes").has_tilt
+    assert "stokes" in dict(recalled.combined.verdict.excluded)
+    assert {"stokes": False, "disc": True}.items() <= {
+        name: "moment_tilt" in law_constants(recalled, name) for name in LAWS
+    }.items()  # an excluded law says nothing of the wobble
     assert tilt_part(after.fit("disc"), after.time)[-1] == pytest.approx(0.2, abs=0.1)
