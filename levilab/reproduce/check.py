@@ -33,6 +33,15 @@ class Verdict(Enum):
     UNEXPECTED = "UNEXPECTED"
 
 
+class Comparison(Enum):
+    """What a comparison is worth: what ours is compared with, and whether ours could have come out otherwise."""
+
+    INDEPENDENT = "published"
+    FITTED = "published; ours is fitted to it"
+    CONSTRUCTED = "published; ours is made to return it"
+    RECOMPUTED = "not published; computed a second way by us"
+
+
 @dataclass(frozen=True)
 class Rounding:
     """Ours is the published number within half a unit of its last digit, beside our own u."""
@@ -94,6 +103,11 @@ class Finding(Protocol):
         ...
 
     @property
+    def comparison(self) -> Comparison | None:
+        """What the comparison is worth; None where nothing is compared."""
+        ...
+
+    @property
     def verdict(self) -> Verdict:
         """What the comparison says."""
         ...
@@ -113,12 +127,19 @@ class Check:
         published: as printed.
         ours: in the unit of the published one.
         way: how they are compared.
+        how: what the comparison is worth, of a number that the source prints.
     """
 
     name: str
     published: Printed
     ours: Estimate
     way: Way = Rounding()
+    how: Comparison = Comparison.INDEPENDENT
+
+    @property
+    def comparison(self) -> Comparison:
+        """What the comparison is worth: a number that the source does not print is ours."""
+        return Comparison.RECOMPUTED if self.published.recomputed else self.how
 
     @property
     def difference(self) -> float:
@@ -144,7 +165,7 @@ class Check:
     @property
     def place(self) -> str:
         """Where it stands in the source."""
-        return self.published.place + (", recomputed apart" if self.published.recomputed else "")
+        return self.published.place
 
     @property
     def published_text(self) -> str:
@@ -229,6 +250,11 @@ class Erratum:
     reading: str = ""
 
     @property
+    def comparison(self) -> Comparison:
+        """The source prints the equation, and nothing here was fitted to it."""
+        return Comparison.INDEPENDENT
+
+    @property
     def name(self) -> str:
         """What is compared."""
         return self.test
@@ -272,6 +298,7 @@ class Statement:
         found: what we found, with its numbers.
         holds: whether that is what the sentence says.
         reason: why it differs, where it does and the reason was found to hold; empty: it must hold.
+        how: what trying it is worth, of a sentence that the source has.
     """
 
     name: str
@@ -280,6 +307,12 @@ class Statement:
     found: str
     holds: bool
     reason: str = ""
+    how: Comparison = Comparison.INDEPENDENT
+
+    @property
+    def comparison(self) -> Comparison | None:
+        """What trying it is worth; None for a fact that the source does not have."""
+        return self.how if self.said else None
 
     @property
     def published_text(self) -> str:
@@ -310,6 +343,12 @@ def counts(findings: Iterable[Finding]) -> dict[Verdict, int]:
     return {verdict: found.count(verdict) for verdict in Verdict}
 
 
+def agreeing(findings: Iterable[Finding]) -> dict[Comparison, int]:
+    """How many agree, by what their comparison is worth."""
+    found = [one.comparison for one in findings if one.verdict is Verdict.AGREES]
+    return {comparison: found.count(comparison) for comparison in Comparison}
+
+
 def as_document(finding: Finding) -> dict[str, Any]:
     """A finding for JSON: texts as people see them, and the numbers with full precision."""
     document: dict[str, Any] = {
@@ -318,6 +357,7 @@ def as_document(finding: Finding) -> dict[str, Any]:
         "published": finding.published_text,
         "ours": finding.ours_text,
         "verdict": finding.verdict.name.lower(),
+        "comparison": finding.comparison.name.lower() if finding.comparison else None,
         "why": finding.why,
     }
     if isinstance(finding, Check):

@@ -11,7 +11,7 @@ import numpy as np
 from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Because, Check, Statement, Within
+from levilab.reproduce.check import Because, Check, Comparison, Statement, Within
 from levilab.reproduce.figure import Scans, limits_figure
 from levilab.reproduce.tops import DURATION_S, FALL_M, MASS_KG, THESIS, Array, Flags, many, scan, started, survivors
 from levilab.simulator.equilibrium import stability_of
@@ -103,6 +103,7 @@ def lower_checks(lower: dict[str, Array], mass: float) -> list[Finding]:
                 THESIS[f"limits.lower.{name}"],
                 Estimate(float(lower[name][at]), None, "Hz"),
                 Within(room, f"a step of {STEP_HZ:g} Hz in each of two scans, and half a step of mass, 0.0025 g"),
+                Comparison.FITTED,
             )
         )
     return found

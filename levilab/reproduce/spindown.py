@@ -13,7 +13,7 @@ from analysis.spindown.fit import fit_spin_down
 from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Check, Statement, Within
+from levilab.reproduce.check import Check, Comparison, Statement, Within
 from levilab.reproduce.figure import spindown_figure
 from levilab.reproduce.synthetic import NOISE_HZ, READINGS, MadeUp, solve, straight_lines
 from levilab.reproduce.tops import THESIS
@@ -54,9 +54,11 @@ def straight(runs: tuple[MadeUp, ...]) -> list[Finding]:
         c1, c2 = straight_lines(run.time, run.spin)
         for name, key, value, unit in (("C₁", "c1", c1, "1/s"), ("|C₂|", "c2", c2, "1/rad")):
             printed = several("thesis", f"spindown.{key}")[number]
-            found.append(Check(f"run {number + 1}: {name}, straight line", printed, Estimate(value, None, unit)))
+            line = f"run {number + 1}: {name}, straight line"
+            found.append(Check(line, printed, Estimate(value, None, unit), how=Comparison.CONSTRUCTED))
     average = mean([Estimate(straight_lines(run.time, run.spin)[0], None, "1/s") for run in runs])
-    found.append(Check("mean of C₁", THESIS["spindown.mean_c1"], Estimate(average.value, average.u, "1/s")))
+    ours = Estimate(average.value, average.u, "1/s")
+    found.append(Check("mean of C₁", THESIS["spindown.mean_c1"], ours, how=Comparison.CONSTRUCTED))
     return found
 
 
@@ -89,6 +91,7 @@ def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
             f"under n = 3/2, {1e3 * worst['stokes']:.0f} under n = 1, {1e3 * worst['newton']:.0f} under n = 2 "
             f"(noise: {1e3 * NOISE_HZ:.0f})",
             holds=abs(average.value - 1.5) < 3 * average.u and worst["stokes"] > 2 * worst["disc"] < worst["newton"],
+            how=Comparison.CONSTRUCTED,
         ),
         Check(
             "von Kármán's disc of the top's radius in air",
@@ -104,6 +107,7 @@ def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
             f"{np.mean([fit.fit('disc').parameters['c32'].value for fit in fits]) / karman_disc():.2f} times the "
             "disc's drag",
             holds=abs(_reynolds(20) - 1700) < 50 and abs(_reynolds(60) - 5200) < 50,
+            how=Comparison.RECOMPUTED,
         ),
     ]
     return found

@@ -11,9 +11,13 @@ import pytest
 from levilab.present.document.blocks import Picture
 from levilab.present.style import as_svg
 from levilab.reproduce import beyond, dipole, errata, gans, limits, simon, spindown, statistics, windows
-from levilab.reproduce.check import Because, Check, Statement, Verdict, counts
+from levilab.reproduce.check import Because, Check, Comparison, Statement, Verdict, counts
+from levilab.reproduce.table import numbers
 from levilab.reproduce.tops import THESIS, scan, started, survivors
 from levilab.stability.scan import all_up_until, last_up, lower_limit, upper_edges
+from support.paths import ROOT
+
+PAGE = ROOT / "docs/reproduce.md"
 
 #: Chapters that take less than a second together, and how many findings have each verdict.
 QUICK = {
@@ -34,6 +38,26 @@ def test_a_quick_chapter_has_the_verdicts_that_are_expected(quick, name):
     found = quick[name]
     assert {verdict: n for verdict, n in counts(found.findings).items() if n} == QUICK[name][1]
     assert found.said
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_the_page_gives_the_counts_of_a_chapter(quick, name):
+    (row,) = (line for line in PAGE.read_text(encoding="utf-8").splitlines() if line.startswith(f"| `{name}`: "))
+    assert [cell.strip() for cell in row.strip("|").split("|")[1:]] == numbers(quick[name].findings)
+
+
+def test_numbers_that_ours_was_made_for_do_not_count_as_independent(quick):
+    kinds = {one.name: one.comparison for found in quick.values() for one in found.findings}
+    assert kinds["run 1: C₁, straight line"] is Comparison.CONSTRUCTED
+    assert kinds["mean of C₁"] is Comparison.CONSTRUCTED
+    assert kinds["neither model is a perfect fit"] is Comparison.CONSTRUCTED
+    assert kinds["the thesis's estimate, for 25.30 g at 7.3 cm"] is Comparison.FITTED
+    assert kinds["b = 2a: lower region from"] is Comparison.RECOMPUTED
+    assert kinds["mean of ten"] is Comparison.INDEPENDENT
+    near = {name: np.full(limits.MASSES_KG.size, one[0]) for name, one in limits.SIMULATED_HZ.items()}
+    mass, *lower = limits.lower_checks(near, float(limits.MASSES_KG[5]))
+    assert mass.comparison is None
+    assert {one.comparison for one in lower} == {Comparison.FITTED}
 
 
 @pytest.mark.parametrize("name", QUICK)
