@@ -46,7 +46,7 @@ def _compared_with(one: Finding) -> str:
     """What ours is compared with, and below it what that is."""
     if one.comparison is None:
         return one.published_text
-    what = "what the print gives, not printed itself" if isinstance(one, Erratum) else one.comparison.value
+    what = "what the print gives" if isinstance(one, Erratum) else one.comparison.value
     return f"{one.published_text}\n{what}"
 
 
