@@ -37,9 +37,9 @@ class Comparison(Enum):
     """What a comparison is worth: what ours is compared with, and whether ours could have come out otherwise."""
 
     INDEPENDENT = "published"
-    FITTED = "published; ours is fitted to it"
-    CONSTRUCTED = "published; ours is made to return it"
-    RECOMPUTED = "not published; computed a second way by us"
+    FITTED = "published; fitted"
+    CONSTRUCTED = "published; by construction"
+    RECOMPUTED = "our second way"
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,22 @@ class Within:
 
 
 @dataclass(frozen=True)
+class Among:
+    """Ours is no single number: starts that the source does not tell apart give others.
+
+    Attributes:
+        low, high: the least and the greatest of ours, in the number's unit.
+        step: of the scan, by which each of them may be off.
+        why: what the range is of.
+    """
+
+    low: float
+    high: float
+    step: float
+    why: str
+
+
+@dataclass(frozen=True)
 class Because:
     """Ours differs for a reason that is computed, too.
 
@@ -76,7 +92,7 @@ class Because:
     tolerance: float = 0.0
 
 
-Way = Rounding | Within | Because
+Way = Rounding | Within | Among | Because
 
 
 class Finding(Protocol):
@@ -154,7 +170,13 @@ class Check:
             return Verdict.AGREES
         if isinstance(self.way, Within) and off <= self.way.tolerance * (1 + _FLOAT):
             return Verdict.AGREES
+        if isinstance(self.way, Among) and self._is_among(self.way):
+            return Verdict.AGREES
         return Verdict.DIFFERS if isinstance(self.way, Because) and self._is_explained(self.way) else Verdict.UNEXPECTED
+
+    def _is_among(self, way: Among) -> bool:
+        room = (self.published.rounding + way.step) * (1 + _FLOAT)
+        return way.low - room <= self.published.value <= way.high + room
 
     def _is_explained(self, way: Because) -> bool:
         if isinstance(way.explained, bool):
@@ -184,6 +206,8 @@ class Check:
         """The tolerance with its reason, or why it differs; empty within the rounding of the print."""
         if isinstance(self.way, Because):
             return self.way.why if self.verdict is not Verdict.AGREES else ""
+        if isinstance(self.way, Among):
+            return self.way.why if abs(self.difference) > self.published.rounding * (1 + _FLOAT) else ""
         if isinstance(self.way, Within) and abs(self.difference) > self.published.rounding:
             return f"within {digits(self.way.tolerance, 2)}: {self.way.why}"
         return "within our u" if abs(self.difference) > self.published.rounding * (1 + _FLOAT) else ""

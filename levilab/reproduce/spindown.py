@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.numbers import digits
 from analysis.spindown.combine import mean
 from analysis.spindown.fit import fit_spin_down
 from analysis.uncertainty import Estimate
@@ -68,12 +69,14 @@ def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
     for number, fit in enumerate(fits):
         printed = several("thesis", "spindown.c32")[number]
         c32 = fit.fit("disc").parameters["c32"]
+        assert c32.u is not None
+        room = 2 * math.sqrt(2) * c32.u
         found.append(
             Check(
                 f"run {number + 1}: C of the disc's law",
                 printed,
                 Estimate(c32.value, c32.u, printed.unit),
-                Within(1.5e-6, "the noise of these readings is another one"),
+                Within(room, f"the noise of these readings is another one: twice √2 times our u of {digits(c32.u, 2)}"),
             )
         )
     exponents = [fit.fit("power").parameters["exponent"] for fit in fits]
@@ -97,7 +100,10 @@ def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
             "von Kármán's disc of the top's radius in air",
             THESIS["spindown.karman"],
             Estimate(karman_disc(), None, "(rad/s)^-1/2/s"),
-            Within(2e-7, "of density and viscosity of the air"),
+            Within(
+                karman_disc() * (0.005 / AIR_KG_M3 + 0.005e-5 / (2 * AIR_M2_S)),
+                f"{AIR_KG_M3:.2f} kg/m³ and {AIR_M2_S:.2e} m²/s of the air are rounded to three digits",
+            ),
         ),
         Statement(
             "the flow about the top is laminar",
