@@ -127,6 +127,7 @@ def of_azimuth(found: Azimuth, lines: AxisLines) -> list[Finding]:
     power = sum(line.amplitude**2 for line in named)
     all_power = float(np.mean(np.abs(lines.signal[0]) ** 2)) if lines.signal else math.nan
     near = {width: power_near(lines, width) for width in NEAR_LINES_HZ}
+    parts = ", ".join(f"{100 * share:.1f} % lie within {width:g} Hz" for width, share in near.items())
     return [
         Statement(
             "φ̇ of the driven top",
@@ -148,7 +149,7 @@ def of_azimuth(found: Azimuth, lines: AxisLines) -> list[Finding]:
             "figure of the driven precession",
             "",
             f"{len(named)} steady lines, each with a name, hold {100 * power / all_power:.0f} % of its power; of "
-            f"all of it {', '.join(f'{100 * share:.1f} % lie within {width:g} Hz' for width, share in near.items())} of them. "
+            f"all of it {parts} of them. "
             "Whether what the lines do not hold is further sidebands or lines that wander is not told apart",
             holds=power > 0.8 * all_power and near[NEAR_LINES_HZ[-1]] > 0.99,
         ),
