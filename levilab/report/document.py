@@ -207,17 +207,17 @@ def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner | 
     below = "How it was made stands below, under its name."
     if total == 1:
         return Banner("SYNTHETIC.", f"This run did not come from a real bench. {below}")
-    below = "How each was made stands in its run.json and, on the page for a screen, below its name."
+    where = ("How each was made stands below its name.", "How each was made stands in its run.json.")
     if len(made_up) == total:
-        return Banner("SYNTHETIC.", f"None of these {total} runs came from a real bench. {below}")
+        return Banner("SYNTHETIC.", f"None of these {total} runs came from a real bench.", *where)
     said = f"{len(made_up)} of {total} runs did not come from a real bench ({list_in_words(made_up)})."
     if not mixed and files:
         said = f"Of {counted(sources)} {len(made_up)} did not come from a real bench ({list_in_words(made_up)})."
-        return Banner("SYNTHETIC IN PART.", f"{said} A data file does not say where it is from. {below}")
+        return Banner("SYNTHETIC IN PART.", f"{said} A data file does not say where it is from.", *where)
     if not mixed:
-        return Banner("REAL AND SYNTHETIC RUNS.", f"{said} {below}")
+        return Banner("REAL AND SYNTHETIC RUNS.", said, *where)
     consequence = "Means, comparisons and figure are of both together and so no measurement: report the real runs "
-    return Banner("REAL AND SYNTHETIC RUNS MIXED.", f"{said} {consequence}by themselves. {below}")
+    return Banner("REAL AND SYNTHETIC RUNS MIXED.", f"{said} {consequence}by themselves.", *where)
 
 
 # --- a part in a notebook ------------------------------------------------------------------------------
