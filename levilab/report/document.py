@@ -107,12 +107,20 @@ def blocks_of_part(
     more = (block for supplement in supplements for block in supplement(analysis, found))
     blocks = [
         *warnings,
-        section("Result", "result", Verdict(part.verdict), *part.result),
+        section("Result", "result", Verdict(_verdict(found, part)), *part.result),
         section("Figure", "figure", picture_of(analysis, found, part)),
         *more,
         section(part.runs_title, "runs", *part.runs),
     ]
     return with_marks(blocks, mark_of(found.sources))
+
+
+def _verdict(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
+    """The verdict, which says itself if its numbers are of real and synthetic inputs together: it is read alone."""
+    if not _mixes(found):
+        return part.verdict
+    made_up = sum(source.synthetic for source in found.sources)
+    return f"MIXED, and so no measurement ({made_up} of {len(found.sources)} inputs are SYNTHETIC): {part.verdict}"
 
 
 def picture_of(analysis: Analysis[A], found: A, part: ReportPart) -> Picture:
