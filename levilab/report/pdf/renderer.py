@@ -49,7 +49,7 @@ SHORT_TITLE = 90
 #: Entries up to which an outline has those of the second depth.
 MOST_ENTRIES = 20
 #: Height over width from which a figure may leave its place in the text for the top of a page.
-TALL = 0.4
+TALL = 0.62
 #: Height over the width of the text beyond which a figure with its caption does not fit on a page.
 TALLEST = 1.2
 #: Of alike warnings so many are printed like the first.

@@ -153,7 +153,7 @@ def test_a_heading_and_what_introduces_its_table_stand_on_the_page_of_the_table(
 def test_a_tall_figure_stands_between_the_heading_of_its_chapter_and_the_next_one() -> None:
     def tall() -> Figure:
         figure = drawn()
-        figure.set_size_inches(7, 4)
+        figure.set_size_inches(7, 4.6)
         return figure
 
     def chapter(name: str, lines: int) -> Section:
