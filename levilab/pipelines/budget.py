@@ -131,7 +131,7 @@ def budget_table(budget: Budget, shown: Mapping[str, str] | None = None) -> Tabl
     left_out = budget.left_out
     rows += [Row((f"{cells[0]} (not in u)", *cells[1:])) for one in left_out if (cells := _cells(budget, one))]
     if any(one.contribution for one in left_out):
-        rows.append(Row(("u with all of it", "", "", "", _number(budget.u_with_all, unit), ""), "together"))
+        rows.append(Row(("u with all that is known", "", "", "", _number(budget.u_with_all, unit), ""), "together"))
     return table(title_of(budget, shown), HEADS, rows, numbers=HEADS[2:])
 
 
@@ -201,7 +201,7 @@ def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str
     known = [one for one in budget.left_out if one.contribution]
     if known and not budget.misses_nothing:
         whole = _number(budget.u_with_all, in_words(budget.unit))
-        texts.append(f"Not in u: {enumeration([one.source for one in known])}; with all of it u is {whole}.")
+        texts.append(f"Not in u: {enumeration([one.source for one in known])}; with all that is known u is {whole}.")
     elif known:
         texts.append(f"Not in u, and negligible: {enumeration([one.source for one in known])}.")
     unknown = [one for one in budget.left_out if one.u is None and one.sensitivity]

@@ -107,12 +107,20 @@ def blocks_of_part(
     more = (block for supplement in supplements for block in supplement(analysis, found))
     blocks = [
         *warnings,
-        section("Result", "result", Verdict(part.verdict), *part.result),
+        section("Result", "result", Verdict(_verdict(found, part)), *part.result),
         section("Figure", "figure", picture_of(analysis, found, part)),
         *more,
         section(part.runs_title, "runs", *part.runs),
     ]
     return with_marks(blocks, mark_of(found.sources))
+
+
+def _verdict(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
+    """The verdict, which says itself if its numbers are of real and synthetic inputs together: it is read alone."""
+    if not _mixes(found):
+        return part.verdict
+    made_up = sum(source.synthetic for source in found.sources)
+    return f"MIXED, and so no measurement ({made_up} of {len(found.sources)} inputs are SYNTHETIC): {part.verdict}"
 
 
 def picture_of(analysis: Analysis[A], found: A, part: ReportPart) -> Picture:
@@ -207,17 +215,17 @@ def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner | 
     below = "How it was made stands below, under its name."
     if total == 1:
         return Banner("SYNTHETIC.", f"This run did not come from a real bench. {below}")
-    below = "How each was made stands in its run.json and, on the page for a screen, below its name."
+    where = ("How each was made stands below its name.", "How each was made stands in its run.json.")
     if len(made_up) == total:
-        return Banner("SYNTHETIC.", f"None of these {total} runs came from a real bench. {below}")
+        return Banner("SYNTHETIC.", f"None of these {total} runs came from a real bench.", *where)
     said = f"{len(made_up)} of {total} runs did not come from a real bench ({list_in_words(made_up)})."
     if not mixed and files:
         said = f"Of {counted(sources)} {len(made_up)} did not come from a real bench ({list_in_words(made_up)})."
-        return Banner("SYNTHETIC IN PART.", f"{said} A data file does not say where it is from. {below}")
+        return Banner("SYNTHETIC IN PART.", f"{said} A data file does not say where it is from.", *where)
     if not mixed:
-        return Banner("REAL AND SYNTHETIC RUNS.", f"{said} {below}")
+        return Banner("REAL AND SYNTHETIC RUNS.", said, *where)
     consequence = "Means, comparisons and figure are of both together and so no measurement: report the real runs "
-    return Banner("REAL AND SYNTHETIC RUNS MIXED.", f"{said} {consequence}by themselves. {below}")
+    return Banner("REAL AND SYNTHETIC RUNS MIXED.", f"{said} {consequence}by themselves.", *where)
 
 
 # --- a part in a notebook ------------------------------------------------------------------------------

@@ -33,6 +33,15 @@ class Verdict(Enum):
     UNEXPECTED = "UNEXPECTED"
 
 
+class Comparison(Enum):
+    """What a comparison is worth: what ours is compared with, and whether ours could have come out otherwise."""
+
+    INDEPENDENT = "published"
+    FITTED = "published; fitted"
+    CONSTRUCTED = "published; by construction"
+    RECOMPUTED = "our second way"
+
+
 @dataclass(frozen=True)
 class Rounding:
     """Ours is the published number within half a unit of its last digit, beside our own u."""
@@ -52,6 +61,22 @@ class Within:
 
 
 @dataclass(frozen=True)
+class Among:
+    """Ours is no single number: starts that the source does not tell apart give others.
+
+    Attributes:
+        low, high: the least and the greatest of ours, in the number's unit.
+        step: of the scan, by which each of them may be off.
+        why: what the range is of.
+    """
+
+    low: float
+    high: float
+    step: float
+    why: str
+
+
+@dataclass(frozen=True)
 class Because:
     """Ours differs for a reason that is computed, too.
 
@@ -67,7 +92,7 @@ class Because:
     tolerance: float = 0.0
 
 
-Way = Rounding | Within | Because
+Way = Rounding | Within | Among | Because
 
 
 class Finding(Protocol):
@@ -94,6 +119,11 @@ class Finding(Protocol):
         ...
 
     @property
+    def comparison(self) -> Comparison | None:
+        """What the comparison is worth; None where nothing is compared."""
+        ...
+
+    @property
     def verdict(self) -> Verdict:
         """What the comparison says."""
         ...
@@ -113,12 +143,19 @@ class Check:
         published: as printed.
         ours: in the unit of the published one.
         way: how they are compared.
+        how: what the comparison is worth, of a number that the source prints.
     """
 
     name: str
     published: Printed
     ours: Estimate
     way: Way = Rounding()
+    how: Comparison = Comparison.INDEPENDENT
+
+    @property
+    def comparison(self) -> Comparison:
+        """What the comparison is worth: a number that the source does not print is ours."""
+        return Comparison.RECOMPUTED if self.published.recomputed else self.how
 
     @property
     def difference(self) -> float:
@@ -133,7 +170,13 @@ class Check:
             return Verdict.AGREES
         if isinstance(self.way, Within) and off <= self.way.tolerance * (1 + _FLOAT):
             return Verdict.AGREES
+        if isinstance(self.way, Among) and self._is_among(self.way):
+            return Verdict.AGREES
         return Verdict.DIFFERS if isinstance(self.way, Because) and self._is_explained(self.way) else Verdict.UNEXPECTED
+
+    def _is_among(self, way: Among) -> bool:
+        room = (self.published.rounding + way.step) * (1 + _FLOAT)
+        return way.low - room <= self.published.value <= way.high + room
 
     def _is_explained(self, way: Because) -> bool:
         if isinstance(way.explained, bool):
@@ -144,7 +187,7 @@ class Check:
     @property
     def place(self) -> str:
         """Where it stands in the source."""
-        return self.published.place + (", recomputed apart" if self.published.recomputed else "")
+        return self.published.place
 
     @property
     def published_text(self) -> str:
@@ -163,6 +206,8 @@ class Check:
         """The tolerance with its reason, or why it differs; empty within the rounding of the print."""
         if isinstance(self.way, Because):
             return self.way.why if self.verdict is not Verdict.AGREES else ""
+        if isinstance(self.way, Among):
+            return self.way.why if abs(self.difference) > self.published.rounding * (1 + _FLOAT) else ""
         if isinstance(self.way, Within) and abs(self.difference) > self.published.rounding:
             return f"within {digits(self.way.tolerance, 2)}: {self.way.why}"
         return "within our u" if abs(self.difference) > self.published.rounding * (1 + _FLOAT) else ""
@@ -229,6 +274,11 @@ class Erratum:
     reading: str = ""
 
     @property
+    def comparison(self) -> Comparison:
+        """The source prints the equation, and nothing here was fitted to it."""
+        return Comparison.INDEPENDENT
+
+    @property
     def name(self) -> str:
         """What is compared."""
         return self.test
@@ -272,6 +322,7 @@ class Statement:
         found: what we found, with its numbers.
         holds: whether that is what the sentence says.
         reason: why it differs, where it does and the reason was found to hold; empty: it must hold.
+        how: what trying it is worth, of a sentence that the source has.
     """
 
     name: str
@@ -280,6 +331,12 @@ class Statement:
     found: str
     holds: bool
     reason: str = ""
+    how: Comparison = Comparison.INDEPENDENT
+
+    @property
+    def comparison(self) -> Comparison | None:
+        """What trying it is worth; None for a fact that the source does not have."""
+        return self.how if self.said else None
 
     @property
     def published_text(self) -> str:
@@ -310,6 +367,12 @@ def counts(findings: Iterable[Finding]) -> dict[Verdict, int]:
     return {verdict: found.count(verdict) for verdict in Verdict}
 
 
+def agreeing(findings: Iterable[Finding]) -> dict[Comparison, int]:
+    """How many agree, by what their comparison is worth."""
+    found = [one.comparison for one in findings if one.verdict is Verdict.AGREES]
+    return {comparison: found.count(comparison) for comparison in Comparison}
+
+
 def as_document(finding: Finding) -> dict[str, Any]:
     """A finding for JSON: texts as people see them, and the numbers with full precision."""
     document: dict[str, Any] = {
@@ -318,6 +381,7 @@ def as_document(finding: Finding) -> dict[str, Any]:
         "published": finding.published_text,
         "ours": finding.ours_text,
         "verdict": finding.verdict.name.lower(),
+        "comparison": finding.comparison.name.lower() if finding.comparison else None,
         "why": finding.why,
     }
     if isinstance(finding, Check):

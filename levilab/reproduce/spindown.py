@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.numbers import digits
 from analysis.spindown.combine import mean
 from analysis.spindown.fit import fit_spin_down
 from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Check, Statement, Within
+from levilab.reproduce.check import Check, Comparison, Statement, Within
 from levilab.reproduce.figure import spindown_figure
 from levilab.reproduce.synthetic import NOISE_HZ, READINGS, MadeUp, solve, straight_lines
 from levilab.reproduce.tops import THESIS
@@ -54,9 +55,11 @@ def straight(runs: tuple[MadeUp, ...]) -> list[Finding]:
         c1, c2 = straight_lines(run.time, run.spin)
         for name, key, value, unit in (("C₁", "c1", c1, "1/s"), ("|C₂|", "c2", c2, "1/rad")):
             printed = several("thesis", f"spindown.{key}")[number]
-            found.append(Check(f"run {number + 1}: {name}, straight line", printed, Estimate(value, None, unit)))
+            line = f"run {number + 1}: {name}, straight line"
+            found.append(Check(line, printed, Estimate(value, None, unit), how=Comparison.CONSTRUCTED))
     average = mean([Estimate(straight_lines(run.time, run.spin)[0], None, "1/s") for run in runs])
-    found.append(Check("mean of C₁", THESIS["spindown.mean_c1"], Estimate(average.value, average.u, "1/s")))
+    ours = Estimate(average.value, average.u, "1/s")
+    found.append(Check("mean of C₁", THESIS["spindown.mean_c1"], ours, how=Comparison.CONSTRUCTED))
     return found
 
 
@@ -66,12 +69,14 @@ def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
     for number, fit in enumerate(fits):
         printed = several("thesis", "spindown.c32")[number]
         c32 = fit.fit("disc").parameters["c32"]
+        assert c32.u is not None
+        room = 2 * math.sqrt(2) * c32.u
         found.append(
             Check(
                 f"run {number + 1}: C of the disc's law",
                 printed,
                 Estimate(c32.value, c32.u, printed.unit),
-                Within(1.5e-6, "the noise of these readings is another one"),
+                Within(room, f"the noise of these readings is another one: twice √2 times our u of {digits(c32.u, 2)}"),
             )
         )
     exponents = [fit.fit("power").parameters["exponent"] for fit in fits]
@@ -89,12 +94,16 @@ def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
             f"under n = 3/2, {1e3 * worst['stokes']:.0f} under n = 1, {1e3 * worst['newton']:.0f} under n = 2 "
             f"(noise: {1e3 * NOISE_HZ:.0f})",
             holds=abs(average.value - 1.5) < 3 * average.u and worst["stokes"] > 2 * worst["disc"] < worst["newton"],
+            how=Comparison.CONSTRUCTED,
         ),
         Check(
             "von Kármán's disc of the top's radius in air",
             THESIS["spindown.karman"],
             Estimate(karman_disc(), None, "(rad/s)^-1/2/s"),
-            Within(2e-7, "of density and viscosity of the air"),
+            Within(
+                karman_disc() * (0.005 / AIR_KG_M3 + 0.005e-5 / (2 * AIR_M2_S)),
+                f"{AIR_KG_M3:.2f} kg/m³ and {AIR_M2_S:.2e} m²/s of the air are rounded to three digits",
+            ),
         ),
         Statement(
             "the flow about the top is laminar",
@@ -104,6 +113,7 @@ def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
             f"{np.mean([fit.fit('disc').parameters['c32'].value for fit in fits]) / karman_disc():.2f} times the "
             "disc's drag",
             holds=abs(_reynolds(20) - 1700) < 50 and abs(_reynolds(60) - 5200) < 50,
+            how=Comparison.RECOMPUTED,
         ),
     ]
     return found

@@ -36,6 +36,15 @@ def normality(values: Array) -> tuple[float, float]:
     return float(found.statistic), float(found.pvalue)
 
 
+def _trend(p: float) -> str:
+    """What the p-value of a trend says.
+
+    >>> _trend(0.5), _trend(0.06), _trend(0.04)
+    ('no trend', 'a trend is neither shown nor excluded', 'a trend')
+    """
+    return "a trend" if p < 0.05 else "a trend is neither shown nor excluded" if p < 0.2 else "no trend"
+
+
 def make() -> Found:
     """Make the chapter."""
     values = np.array([one.value for one in several("thesis", "measured.limits")])
@@ -72,8 +81,8 @@ def make() -> Found:
             "are the ten normal?",
             THESIS["measured.limits.0"].place,
             "",
-            f"Shapiro and Wilk: W = {w:.3f}, p = {p:.2f}; no outlier, no trend "
-            f"({signed(1e3 * found.trend.value, 0)} mHz a top, p = {found.trend_p:.2f}); "
+            f"Shapiro and Wilk: W = {w:.3f}, p = {p:.2f}; no outlier; {_trend(found.trend_p)} "
+            f"({signed(1e3 * found.trend.value, 0)} mHz a top, p = {found.trend_p:.3f}); "
             f"ten values leave the scatter ± {found.scatter.u:.2f} Hz",
             holds=p > 0.05 and not found.outliers,
         ),

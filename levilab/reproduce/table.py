@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from levilab.present.tables import Row, Table, table
-from levilab.reproduce.check import Verdict, counts
+from levilab.reproduce.check import Comparison, Erratum, Verdict, agreeing, counts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +20,14 @@ WORDS = {
     Verdict.ADDED: "found here",
     Verdict.UNEXPECTED: "UNEXPECTED",
 }
-HEADS = ("", "published", "here", "agreement")
+HEADS = ("", "compared with", "here", "agreement")
+#: Heads of the overview for those that agree.
+KINDS = {
+    Comparison.INDEPENDENT: "agree with\nthe source",
+    Comparison.FITTED: "agree,\nfitted",
+    Comparison.CONSTRUCTED: "agree by\nconstruction",
+    Comparison.RECOMPUTED: "agree with our\nsecond way",
+}
 
 
 def findings_table(title: str, findings: Sequence[Finding]) -> Table:
@@ -32,24 +39,43 @@ def findings_table(title: str, findings: Sequence[Finding]) -> Table:
 
 def _cells(one: Finding) -> tuple[str, ...]:
     agreement = f"{WORDS[one.verdict]}: {one.why}" if one.why else WORDS[one.verdict]
-    return f"{one.name}\n{one.place}", one.published_text, one.ours_text, agreement
+    return f"{one.name}\n{one.place}", _compared_with(one), one.ours_text, agreement
+
+
+def _compared_with(one: Finding) -> str:
+    """What ours is compared with, and below it what that is."""
+    if one.comparison is None:
+        return one.published_text
+    what = "what the print gives" if isinstance(one, Erratum) else one.comparison.value
+    return f"{one.published_text}\n{what}"
 
 
 def overview(found: Reproduction) -> Table:
-    """A row a chapter: how many agree, differ for a reason, are found here alone, and are unexpected."""
-    heads = ("chapter", "agree", "differ for a reason", "found here", "unexpected")
+    """A row a chapter: how many agree, of each kind, differ for a reason, are found here alone, are unexpected."""
+    heads = ("chapter", *KINDS.values(), "differ for\na reason", "found\nhere", "unexpected")
     rows = [
-        Row((f"{chapter.title} ({chapter.name})", *(str(n) for n in counts(of_chapter.findings).values())))
+        Row((f"{chapter.title} ({chapter.name})", *numbers(of_chapter.findings)))
         for chapter, of_chapter in found.chapters
     ]
-    total = Row(("together", *(str(n) for n in found.counts.values())), "together")
+    total = Row(("together", *numbers(found.findings)), "together")
     return table("", heads, [*rows, total], numbers=heads[1:])
+
+
+def numbers(findings: Sequence[Finding]) -> list[str]:
+    """The counts of a row of the overview."""
+    others = [count for verdict, count in counts(findings).items() if verdict is not Verdict.AGREES]
+    return [str(n) for n in (*agreeing(findings).values(), *others)]
 
 
 def in_words(found: Reproduction) -> str:
     """The counts in a sentence."""
     agree, differ, added, unexpected = (found.counts[verdict] for verdict in Verdict)
-    said = f"{agree} values and statements agree, {differ} differ for a reason that was computed, too"
+    independent, fitted, constructed, recomputed = agreeing(found.findings).values()
+    said = (
+        f"{independent} values and statements agree with what a source prints or says; {agree - independent} more "
+        f"agree, but prove less: {recomputed} with a second computation of our own, {constructed} by construction, "
+        f"{fitted} after a fit to them. {differ} differ for a reason that was computed, too"
+    )
     facts = "1 fact stands" if added == 1 else f"{added} facts stand"
     more = f", and {facts} beside them that the sources do not have" if added else ""
     return said + (f", {unexpected} are UNEXPECTED" if unexpected else ", none is unexpected") + more + "."

@@ -12,7 +12,7 @@ from analysis.stability import floating_mass, reduced_mass, thesis_limit
 from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Because, Check
+from levilab.reproduce.check import Because, Check, Comparison
 from levilab.reproduce.figure import Contours, contour_figure
 from levilab.reproduce.tops import THESIS
 from levilab.simulator.equilibrium import stability_of
@@ -96,11 +96,13 @@ def device() -> list[Check]:
             f"height of a top of {1e3 * found.scene.top.mass_kg:.2f} g",
             THESIS["device.height"],
             Estimate(100 * found.floating.height, None, "cm"),
+            how=Comparison.FITTED,
         ),
         Check(
             f"the thesis's estimate, for {1e3 * ESTIMATE_KG:.2f} g at 7.3 cm",
             THESIS["stability.estimate"],
             Estimate(estimate, None, "Hz"),
+            how=Comparison.FITTED,
         ),
         true,
     ]

@@ -220,7 +220,7 @@ def test_a_table_has_u_between_what_is_in_it_and_what_is_not(found: dict[str, An
     sources = [row.cells[0] for row in table.rows]
     middle = sources.index("combined: u")
     assert not any("(not in u)" in text for text in sources[:middle])
-    assert all("(not in u)" in text for text in sources[middle + 1 :] if text != "u with all of it")
+    assert all("(not in u)" in text for text in sources[middle + 1 :] if text != "u with all that is known")
 
 
 def test_a_field_is_shown_in_the_units_of_the_laboratory(found: dict[str, Any]):

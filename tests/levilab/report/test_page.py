@@ -186,6 +186,7 @@ def test_one_synthetic_run_says_once_how_it_was_made(run: Path) -> None:
 def test_a_mixture_of_real_and_synthetic_runs_is_no_measurement_and_says_so(tmp_path: Path, sample_data: Path) -> None:
     text = text_of(sample_data / "spin-down-1", spin_down_csv(tmp_path / "real.csv"))
     assert "REAL AND SYNTHETIC RUNS MIXED. 1 of 2 runs did not come from a real bench (spin-down-1)." in text
+    assert "MIXED, and so no measurement (1 of 2 inputs are SYNTHETIC): " in text, "the verdict is read alone"
 
 
 def test_each_run_has_its_own_constants_and_the_scatter_stands_beside_the_mean(page: Page) -> None:

@@ -31,6 +31,7 @@ from levilab.present.document.blocks import (
     Warnings,
 )
 from levilab.present.tables import table
+from levilab.report.html.page import page_of
 from levilab.report.page import write_report
 from levilab.report.pdf.renderer import NoTypst, as_pdf, files_of, fonts
 from support.commands import command
@@ -149,6 +150,36 @@ def test_a_heading_and_what_introduces_its_table_stand_on_the_page_of_the_table(
     assert seen == {1, 2}
 
 
+def test_a_tall_figure_stands_between_the_heading_of_its_chapter_and_the_next_one() -> None:
+    def tall() -> Figure:
+        figure = drawn()
+        figure.set_size_inches(7, 4.6)
+        return figure
+
+    def chapter(name: str, lines: int) -> Section:
+        return Section(name, (Paragraph("x"), Picture(name, "", "c", "a", tall), *(Paragraph("x"),) * lines))
+
+    pages = set()
+    for lines in (2, 6, 14, 20, 26, 32):  # the figures fit on the page, or leave it for the next one
+        chapters = tuple(chapter(name, lines) for name in ("one", "two", "three"))
+        headings, figures = map(sorted, said_of(Document("t", "", chapters), "spots"))
+        beyond = [*headings[1:], [99, 0.0]]
+        assert all(h < f < b for h, f, b in zip(headings, figures, beyond, strict=True)), lines
+        assert all(y < 842 - 54 - 70 for _, y in headings), "no heading stands at the end of a page"
+        pages |= {f[0] - h[0] for h, f in zip(headings, figures, strict=True)}
+    assert pages == {0, 1}
+
+
+def test_a_column_of_long_sentences_is_wider_than_one_of_short_words() -> None:
+    reason = "There is no single limit: every top is up to this spin, and the last one is far above it. " * 4
+    rows = [("one mass", "25.285 g, in steps of 0.005 g, which floats", "found here")]
+    rows += [(f"top {k}: upper limit, all tops up to", "70.46 Hz", reason) for k in range(6)]
+    wide = Tabular("t", table("", ("what is compared", "here", "agreement"), rows), wraps=("here", "agreement"))
+    below = Section("Below", (Paragraph("x"),))
+    (_, y) = said_of(Document("t", "", (Section("Many", (wide, below)),)), "spots")[0][1]
+    assert y < 500, "the long column has most of the width"
+
+
 def test_a_first_page_of_several_chapters_says_what_each_found() -> None:
     chapters = tuple(
         Section(name, (Warnings((("mind",),)), Section("Result", (Verdict(f"{name} holds"),))), new_page=new)
@@ -168,6 +199,19 @@ def test_a_first_page_of_several_chapters_says_what_each_found() -> None:
 def test_what_is_synthetic_is_marked_on_every_page() -> None:
     assert data_of(Document("t", "", (), Banner("SYNTHETIC.", "of a model")))["mark"] == "SYNTHETIC"
     assert data_of(Document("t", "", ()))["mark"] == ""
+
+
+def test_where_more_stands_is_said_for_paper_on_paper_and_for_the_screen_on_the_screen() -> None:
+    banner = Banner("SYNTHETIC.", "None is real.", "It stands below its name.", "It stands in its run.json.")
+    document = Document("t", "", (), banner)
+    assert data_of(document)["banner"]["text"] == "None is real. It stands in its run.json."
+    page = page_of(document)
+    assert '<span class="on-screen"> It stands below its name.</span>' in page
+    assert '<span class="on-paper"> It stands in its run.json.</span>' in page
+    before, _, on_paper = page.partition("@media print {")
+    assert ".on-paper { display: none; }" in before
+    assert ".on-paper { display: inline; }" in on_paper
+    assert ".on-screen { display: none; }" in on_paper
 
 
 def test_a_figure_that_stands_alone_below_its_heading_stays_there() -> None:

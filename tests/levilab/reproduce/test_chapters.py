@@ -8,12 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from levilab.motion.lines import AxisLines, NamedLine
 from levilab.present.document.blocks import Picture
 from levilab.present.style import as_svg
-from levilab.reproduce import beyond, dipole, errata, gans, limits, simon, spindown, statistics, windows
-from levilab.reproduce.check import Because, Check, Statement, Verdict, counts
+from levilab.reproduce import beyond, dipole, driven, errata, gans, limits, simon, spindown, statistics, windows
+from levilab.reproduce.check import Because, Check, Comparison, Statement, Verdict, counts
+from levilab.reproduce.table import numbers
 from levilab.reproduce.tops import THESIS, scan, started, survivors
 from levilab.stability.scan import all_up_until, last_up, lower_limit, upper_edges
+from support.paths import ROOT
+
+PAGE = ROOT / "docs/reproduce.md"
 
 #: Chapters that take less than a second together, and how many findings have each verdict.
 QUICK = {
@@ -34,6 +39,26 @@ def test_a_quick_chapter_has_the_verdicts_that_are_expected(quick, name):
     found = quick[name]
     assert {verdict: n for verdict, n in counts(found.findings).items() if n} == QUICK[name][1]
     assert found.said
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_the_page_gives_the_counts_of_a_chapter(quick, name):
+    (row,) = (line for line in PAGE.read_text(encoding="utf-8").splitlines() if line.startswith(f"| `{name}`: "))
+    assert [cell.strip() for cell in row.strip("|").split("|")[1:]] == numbers(quick[name].findings)
+
+
+def test_numbers_that_ours_was_made_for_do_not_count_as_independent(quick):
+    kinds = {one.name: one.comparison for found in quick.values() for one in found.findings}
+    assert kinds["run 1: C₁, straight line"] is Comparison.CONSTRUCTED
+    assert kinds["mean of C₁"] is Comparison.CONSTRUCTED
+    assert kinds["neither model is a perfect fit"] is Comparison.CONSTRUCTED
+    assert kinds["the thesis's estimate, for 25.30 g at 7.3 cm"] is Comparison.FITTED
+    assert kinds["b = 2a: lower region from"] is Comparison.RECOMPUTED
+    assert kinds["mean of ten"] is Comparison.INDEPENDENT
+    near = {name: np.full(limits.MASSES_KG.size, one[0]) for name, one in limits.SIMULATED_HZ.items()}
+    mass, *lower = limits.lower_checks(near, float(limits.MASSES_KG[5]))
+    assert mass.comparison is None
+    assert {one.comparison for one in lower} == {Comparison.FITTED}
 
 
 @pytest.mark.parametrize("name", QUICK)
@@ -122,6 +147,21 @@ def test_an_upper_limit_that_is_torn_differs_for_that_reason_alone():
     assert "1 islands" in found.why
     (found,) = limits.upper_checks({"IC1": replace(torn, until=60.0, last=60.0, edges=np.array([60.01]))})
     assert found.verdict is Verdict.UNEXPECTED
+
+
+def test_the_power_near_named_lines_is_that_of_the_spectrum():
+    rate, time = 64.0, np.arange(0, 64.0, 1 / 64)
+    signal = np.exp(2j * np.pi * 5.0 * time) + 0.5 * np.exp(2j * np.pi * 5.5 * time)
+    lines = AxisLines((NamedLine(5.0, 1.0, "drive"),), 0.03, 64.0, (signal, rate))
+    assert driven.power_near(lines, 0.1) == pytest.approx(0.8, abs=0.01)
+    assert driven.power_near(lines, 1.0) == pytest.approx(1.0, abs=0.01)
+    assert driven.power_near(replace(lines, lines=(NamedLine(5.0, 1.0, ""),)), 1.0) == 0.0
+
+
+def test_the_published_upper_limit_lies_in_the_range_of_starts_and_the_reason_says_so():
+    way = simon._among([331.0, 328.0, 286.0])
+    assert (way.low, way.high, way.step) == (286.0, 331.0, simon.STEP_RAD_S)
+    assert "3 starts between 0.01 mm, 0.1 mrad and 1 mm, 10 mrad give 286 to 331 rad/s" in way.why
 
 
 def test_the_mass_is_that_of_the_least_rms_difference():

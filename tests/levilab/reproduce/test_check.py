@@ -8,7 +8,7 @@ import math
 import pytest
 
 from analysis.uncertainty import Estimate
-from levilab.reproduce.check import Because, Check, Erratum, Statement, Verdict, Within, as_document
+from levilab.reproduce.check import Among, Because, Check, Erratum, Statement, Verdict, Within, as_document
 from levilab.stability.published.printed import Printed, published, several
 from support.paths import ROOT
 
@@ -41,6 +41,14 @@ def test_a_tolerance_has_a_reason_and_an_edge():
     assert check(21.95, Within(0.1, "a step of the scan")).verdict is Verdict.AGREES
     assert check(21.95, Within(0.1, "a step of the scan")).why == "within 0.1: a step of the scan"
     assert check(21.97, Within(0.1, "a step of the scan")).verdict is Verdict.UNEXPECTED
+
+
+def test_a_number_that_the_start_decides_agrees_within_the_range_of_starts():
+    falls = Among(21.6, 22.4, 0.0, "48 starts fall there")
+    assert check(22.2, falls).verdict is Verdict.AGREES
+    assert check(22.2, falls).why == "48 starts fall there"
+    assert check(22.2, Among(21.9, 22.4, 0.0, "")).verdict is Verdict.UNEXPECTED
+    assert check(22.2, Among(21.9, 22.4, 0.04, "")).verdict is Verdict.AGREES
 
 
 def test_a_difference_needs_a_reason_that_gives_the_published_value():

@@ -39,12 +39,21 @@ def test_a_report_has_its_verdicts_and_is_the_same_each_time_and_never_markup():
     assert "<b>one</b>" not in page
     assert page.count("SYNTHETIC.") >= 3
     assert "1 are UNEXPECTED" in page
+    assert "1 values and statements agree with what a source prints or says; 0 more agree" in page
 
 
 def test_the_command_prints_a_table_and_writes_a_report(tmp_path):
     ended = command("reproduce", "--only", "statistics", "-o", str(tmp_path / "deep" / "ten.html"), cwd=tmp_path)
     assert ended.status == 0, ended.err
-    for text in ("published", "here", "agreement", "21.86 Hz", "none is unexpected", "ten.html, in a new folder"):
+    for text in (
+        "compared with",
+        "published",
+        "here",
+        "agreement",
+        "21.86 Hz",
+        "none is unexpected",
+        "ten.html, in a new folder",
+    ):
         assert text in ended.out
     page = (tmp_path / "deep" / "ten.html").read_text(encoding="utf-8")
     assert "Ten measured limits" in page
@@ -59,6 +68,8 @@ def test_json_is_one_document_and_writes_no_report(tmp_path):
     assert document["as_expected"] is True
     (one,) = document["chapters"]
     assert one["findings"][0]["values"]["published"] == 0.45802428
+    kinds = {finding["comparison"] for finding in one["findings"]}
+    assert kinds == {"recomputed", "fitted", "independent"}
     assert not list(tmp_path.iterdir())
 
 
