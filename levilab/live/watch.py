@@ -62,6 +62,7 @@ class Watch:
         followed: the run folder; None while a bench for practice has recorded none.
         state: what the bench said last; None while it has said nothing.
         tick: grows with each change.
+        has_own_bench: whether its bench is one that the run folder names, and not the one for practice.
     """
 
     def __init__(
@@ -77,6 +78,7 @@ class Watch:
         self.followed = Followed(folder, clock) if folder else None
         self.state: State | None = None
         self.tick = 0
+        self.has_own_bench = False
         self.fit: Running | None = None
         self.fit_version = 0
         self._has_fitted = False
@@ -112,18 +114,14 @@ class Watch:
         if folder := followed.continued_in:
             self.turn_to(folder)
 
-    @property
-    def has_own_bench(self) -> bool:
-        """Whether its bench is the one that the run folder names; else it is the one for practice."""
-        if self.followed is None:
-            return False
-        return not self._bench or self.followed.status == "running"  # a killed program leaves its address there
-
     def _subscribe(self) -> None:
         """Listen to the bench that the run folder names; where it names none, to the one for practice."""
-        address = read_address(self.followed.folder) if self.followed and self.has_own_bench else None
-        if not address and self._bench:
-            address = self._bench()
+        practice = self._bench() if self._bench else None
+        # where there is one for practice, a run that is over counts for nothing: a killed program leaves its address
+        named = self.followed and (not self._bench or self.followed.status == "running")
+        own = read_address(self.followed.folder) if self.followed and named else None
+        self.has_own_bench = own is not None and own != practice
+        address = own or practice
         if self._subscriber and address == self._subscriber.address:
             return
         if self._subscriber and address is None:

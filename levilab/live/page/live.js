@@ -143,14 +143,23 @@ function listEvent({time_s, utc}, text, loud) {
   while (list.children.length > MOST_EVENTS) list.lastChild.remove();
 }
 
+async function drawTopOf(about) {
+  try {
+    const parts = await partsNow();
+    if (about === topOf) space.setParts(parts);
+  } catch {
+    if (about === topOf) topOf = "";  // asked for again with the next poses
+  }
+}
+
 function takePoses(pieces, arrays) {
-  const about = `${seen.run} ${data.about?.status}`;  // a run of another program has a top of its own while it is recorded
+  const about = `${seen.run} ${data.about?.status} ${seen.source}`;  // the top of another bench may be another one
   if (!space) {
     topOf = about;
     openTop();
   } else if (about !== topOf && space.setParts) {
     topOf = about;
-    partsNow().then(space.setParts);
+    drawTopOf(about);
   }
   for (const [k, piece] of pieces.entries()) {
     seen.poses = piece.number;

@@ -96,6 +96,12 @@ def test_a_run_that_another_program_records_is_shown_with_its_own_bench(tmp_path
                 watch.step()
             assert watch._subscriber
             assert watch._subscriber.address == expected
+            assert watch.has_own_bench == (expected == own)
+    write_address(run.folder, practice)  # as the bench for practice does for its own runs
+    with run.running(), hall.watching("one") as watch:
+        watch.step()
+        watch.step()
+        assert not watch.has_own_bench
 
 
 def test_a_page_that_chose_no_run_turns_to_that_of_another_program(tmp_path: Path) -> None:
