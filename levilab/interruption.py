@@ -182,8 +182,8 @@ def ignore_interruption() -> None:
 def let_the_status_count() -> None:
     """Let the process end with its own status although a KeyboardInterrupt came.
 
-    Where one passes an exec() of text, as those of dataclasses, Python notes it, and ends by the signal whatever handled
-    it since.  The next exec() of text takes the note back.
+    Where one passes an exec() of text, as those of dataclasses, Python notes it, and ends by the signal although it
+    was handled since.  The next exec() of text takes the note back.
     """
     exec("")  # noqa: S102 - it is empty
 
