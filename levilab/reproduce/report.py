@@ -91,7 +91,7 @@ def _section(chapter: Chapter, found: Found) -> Section:
 
 def _how(found: Reproduction) -> Section:
     names = [chapter.name for chapter, _ in found.chapters]
-    chosen = "" if len(names) == len(CHAPTERS) else f" --only {','.join(names)}"
+    chosen = "" if len(names) == len(CHAPTERS) else f' --only "{",".join(names)}"'
     versions = ", ".join(f"{name} {version}" for name, version in software_versions().items())
     return Section(
         "How to reproduce this",
