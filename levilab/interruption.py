@@ -6,7 +6,7 @@ ends when its event loop has its turn (`watching_for_end`).  Work that must not 
 `ignore_interruption`).  While modules are imported, and after the last word, Ctrl-C ends the process at once
 (`interruption_ends_process`, `end_process_at_interruption`); while Python ends all signals are ignored
 (`ignore_all_signals`).  Elsewhere Ctrl-C is Python's KeyboardInterrupt, which the command line turns into one line and
-an exit status.
+an exit status (`let_the_status_count`).
 """
 
 from __future__ import annotations

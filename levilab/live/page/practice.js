@@ -90,8 +90,8 @@ export function openPractice(about, command, run, isOwn, allowed) {
   by("speed").addEventListener("change", () => send("set the speed", {speed: Number(by("speed").value)}));
 
   /** Change a field by a step, within its limits; what is no number stays, and is refused. */
-  function stepBy(id, by_so_much) {
-    const field = by(id), value = numberIn(field.value) + by_so_much;
+  function stepBy(id, step) {
+    const field = by(id), value = numberIn(field.value) + step;
     const {min, max} = field.dataset;
     if (Number.isFinite(value)) field.value = Math.min(Math.max(value, Number(min)), Number(max)).toFixed(2);
     field.dispatchEvent(new Event("change"));
