@@ -91,6 +91,17 @@ def each_kernel_is_compiled_once(tmp_path_factory: pytest.TempPathFactory):
         yield
 
 
+@pytest.fixture(autouse=True, scope="session")
+def no_test_waits_for_the_disk():
+    """Files are not forced onto the disk, which matters after a loss of power alone and takes a millisecond each time.
+
+    Processes that the tests start force theirs.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda descriptor: None)
+        yield
+
+
 @pytest.fixture(autouse=True)
 def practice_bench_is_fresh():
     """PyVISA keeps one library of a name: without this a test would find the top as the one before has left it."""
