@@ -71,7 +71,7 @@ class Doing:
     Attributes:
         text: what it does; empty while readings come.
         share: of the way to the first reading; None once readings come.
-        end: bench time at which it is expected to end [s]; None where that is not known.
+        end: bench times between which it is expected to end [s]; None where that is not known.
         seen: channel → what an instrument answered last, in a reading or outside of one.
         records: channel → the oscilloscope's latest record, with its number and the bench time [s].
         lost: kinds of instruments that do not answer.
@@ -79,7 +79,7 @@ class Doing:
 
     text: str = "connected"
     share: float | None = 0.0
-    end: float | None = None
+    end: tuple[float, float] | None = None
     seen: dict[str, float] = field(default_factory=dict)
     records: dict[str, tuple[int, float, Trace]] = field(default_factory=dict)
     lost: set[str] = field(default_factory=set)
@@ -253,12 +253,13 @@ class Session(Generic[S]):
             self._write_event("answered", answer)
         return answer
 
-    def keep(self, row: Row, time_left_s: float) -> None:
+    def keep(self, row: Row, time_left_s: float, least_left_s: float | None = None) -> None:
         """Write a reading down, then show it: what was shown is on the disk.
 
         Args:
             row: the reading.
-            time_left_s: expected until the end.
+            time_left_s: expected until the end, at most if `least_left_s` is given.
+            least_left_s: at least; None: as much.
 
         Raises:
             ExperimentFailed: its time does not come after the last one's.
@@ -270,11 +271,13 @@ class Session(Generic[S]):
         self._losses = 0
         self.doing.seen |= row
         self.doing.text, self.doing.share = "", None
-        self.doing.end = self.bench.clock.now() + time_left_s
+        left = (time_left_s if least_left_s is None else least_left_s, time_left_s)
+        now = self.bench.clock.now()
+        self.doing.end = now + left[0], now + left[1]
         if not self._headed:
             self._headed = True
             self.show.message("  ".join(f"{_head(one):>{_width(one)}}" for one in self._shown))
-        self.show.reading(self._in_words(row), row["time_s"], time_left_s)
+        self.show.reading(self._in_words(row), row["time_s"], left)
         self.look()
 
     def keep_trace(self, input_: int, channel: str, time_s: float) -> Trace:

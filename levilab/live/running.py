@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from analysis.errors import AnalysisError, TooFewReadings
 from analysis.precession.sweep import Sweep, fit_sweep
+from analysis.spindown.fall import times_of_fall
 from analysis.spindown.fit import fit_spin_down
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.uncertainty import Estimate
@@ -20,10 +22,6 @@ if TYPE_CHECKING:
     from analysis.spindown.lawfit import LawFit
     from levilab.live.envelope import Array, Groups
 
-#: Counted spins between which a top falls [Hz]: simulated tops with a tilted moment leave the light at 23.3 Hz (scene
-#: practice) to 24.9 Hz (spindown); the ten published limits scatter by 0.25 Hz about 21.86 Hz (thesis §4.2), and the
-#: lower bound lies two standard deviations below.
-FALLS_BETWEEN_HZ = (25.0, 21.36)
 #: Points of a curve.
 _POINTS = 400
 #: A curve goes on beyond the readings, but for no longer than this many times their duration.
@@ -139,10 +137,8 @@ def spin_down(columns: Mapping[str, Array], size: int) -> Running:
 
 def _times_of_fall(best: LawFit, last: float, duration: float) -> tuple[float, float] | None:
     """When a law reaches the spins between which a top falls; None where the later one is far off [s]."""
-    times = np.linspace(last, last + _BEYOND * duration, 4 * _POINTS)
-    spin = best.forecast(times, last)
-    first, latest = (np.flatnonzero(spin <= limit) for limit in FALLS_BETWEEN_HZ)
-    return (float(times[first[0]]), float(times[latest[0]])) if len(latest) else None
+    between = times_of_fall(lambda times: best.forecast(times, last), last, last + _BEYOND * duration)
+    return between if math.isfinite(between[1]) else None
 
 
 def locked_line(columns: Mapping[str, Array], size: int) -> Running:

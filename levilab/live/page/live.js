@@ -243,7 +243,7 @@ function show() {
 function leftOf(about, bench, elapsed) {
   if (about?.status !== "running") return "";
   if (data.end && Number.isFinite(elapsed)) return between(...data.end.map((end) => end - elapsed));
-  return Number.isFinite(bench?.time_left_s) ? `about ${lapse(bench.time_left_s)}` : "";
+  return Number.isFinite(bench?.time_left_s) ? between(bench.least_left_s ?? bench.time_left_s, bench.time_left_s) : "";
 }
 
 /** How a run ended that did not finish: its last event. */

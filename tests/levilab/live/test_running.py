@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.spindown.drag import LAWS
+from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from analysis.spindown.tilt import count
-from levilab.live.running import FALLS_BETWEEN_HZ, spin_down
+from levilab.live.running import spin_down
 
 C32, START_HZ, RESONANCE_HZ, TILT_RAD = 2.3e-4, 34.0, 21.4, 0.025
 

@@ -123,7 +123,7 @@ def test_a_limit_is_kept_though_the_generator_fails_as_it_is_switched_off(
     faults: list[int] = []
 
     class Watchful(Silent):
-        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
             super().reading(text, elapsed, remaining)
             faults.extend([1, 2])
 

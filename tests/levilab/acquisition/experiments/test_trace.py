@@ -182,7 +182,7 @@ def test_a_channel_that_another_program_turns_off_is_turned_on_again(tmp_path: P
     wiring = virtual_wiring(SpinWorld(random_scene(1), VirtualClock()))
 
     class Meddler(Silent):
-        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 1:
                 scope = wiring.library.bench.instruments[VIRTUAL["oscilloscope"].address]
@@ -200,7 +200,7 @@ def watched(tmp_path: Path, message: str, scene: SpinScene | None = None) -> Run
     wiring = virtual_wiring(SpinWorld(scene or SpinScene(), VirtualClock()))
 
     class Meddler(Silent):
-        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 1:
                 wiring.library.bench.instruments[VIRTUAL["generator"].address].execute(message)
