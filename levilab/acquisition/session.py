@@ -353,6 +353,9 @@ class Session(Generic[S]):
 
 # --- the line of a reading ---
 
+#: Unit → how its values are written: with so many decimals that points stand below each other.
+_DIGITS = {"s": ".2f", "Hz": ".4f", "m": ".5f", "T": ".7f", "V": ".4f"}
+
 
 def _head(channel: Channel) -> str:
     """What stands above a channel's values: its name, without the unit, which stands beside each value."""
@@ -367,5 +370,4 @@ def _width(channel: Channel) -> int:
 
 
 def _with_unit(value: float, channel: Channel) -> str:
-    digits = {"s": ".2f", "Hz": ".4f"}.get(channel.unit, ".6g")
-    return f"{value:{digits}} {channel.unit}".rstrip()
+    return f"{value:{_DIGITS.get(channel.unit, '.6g')}} {channel.unit}".rstrip()
