@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,8 @@ _POINTS = 400
 _BEYOND = 4.0
 #: Parameters that no law is known by: the start, and what the counter sees of the wobble.
 _NOT_OF_THE_LAW = {"start_frequency", *WOBBLE}
+#: What a head says while readings come, and no more once the run has ended.
+_SO_FAR = re.compile(r"(, the best)? so far")
 #: Equations as the page sets them: what follows ^ in brackets is raised.
 EQUATIONS = {
     "stokes": "ω̇ = −C₁ ω",
@@ -64,6 +67,7 @@ class Running:
         curve: None where none can be drawn yet.
         end_s: between which times the run is expected to end, on its own clock; None where that is not known [s].
         look: name of its colour, that of a law or "fit".
+        dashed: what the curve is beyond the readings, where that is not what the head names.
     """
 
     head: str
@@ -71,6 +75,7 @@ class Running:
     curve: Curve | None = None
     end_s: tuple[float, float] | None = None
     look: str = "fit"
+    dashed: str = ""
 
 
 Columns = dict[str, "Array"]
@@ -105,7 +110,7 @@ def _without_forecast(found: Running) -> Running:
     if curve is not None and np.isfinite(curve.solid_to):
         x = np.append(curve.x[curve.x < curve.solid_to], curve.solid_to)
         curve = replace(curve, x=x, y=np.interp(x, curve.x, curve.y), solid_to=np.inf)
-    return replace(found, head=found.head.replace(" so far", ""), curve=curve, end_s=None)
+    return replace(found, head=_SO_FAR.sub("", found.head), curve=curve, end_s=None, dashed="")
 
 
 def spin_down(columns: Mapping[str, Array], size: int) -> Running:
@@ -127,11 +132,12 @@ def spin_down(columns: Mapping[str, Array], size: int) -> Running:
         f"excluded: {', '.join(name for name, _ in found.verdict.excluded)}" if found.verdict.excluded else "",
     ]
     return Running(
-        f"{found.best} law so far   {EQUATIONS[found.best]}",
+        f"{found.best} law, the best so far   {EQUATIONS[found.best]}",
         tuple(filter(None, lines)),
         Curve(x, y, solid_to=last),
         end,
         found.best,
+        "dashed: the law alone, without the tilt, which is in the count" if best.has_tilt and end else "",
     )
 
 
