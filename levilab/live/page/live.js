@@ -342,7 +342,7 @@ function showTop(bench) {
 function showAge(bench) {
   const used = Object.keys(data.about?.instruments || {});
   const still = data.about?.status === "running" && used.length && !used.includes("oscilloscope");
-  const why = still ? `a ${data.about.experiment} run does not read the oscilloscope, lest its readings wait${data.records.size ? ": the last record stands still" : ""}` : "";
+  const why = still ? `not read in a ${data.about.experiment} run, whose readings would wait` : "";
   write("scope-key", [data.up === false ? "the top is down" : "", why].filter(Boolean).join("; "));
   for (const one of data.records.values()) {
     const said = ageOf(one, bench);

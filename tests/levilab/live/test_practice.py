@@ -80,8 +80,11 @@ def record_some_readings(page: Page) -> None:
     page.click("#record")
     until(page, f"levilab.data.bench?.busy && levilab.seen.run !== '{OLDER}' && levilab.data.count >= 3")
     until(page, "levilab.data.fit")
-    still = "a spin run does not read the oscilloscope, lest its readings wait"
-    assert page.inner_text("#scope-key").startswith(still)
+    still = "not read in a spin run, whose readings would wait"
+    assert page.inner_text("#scope-key").endswith(still)
+    gap = "document.getElementById('scope-key').getBoundingClientRect().left - range.getBoundingClientRect().right"
+    of_heading = "const range = document.createRange(); range.selectNodeContents(document.getElementById('scope-h'));"
+    assert page.evaluate(f"() => {{ {of_heading} return {gap}; }}") > 0  # beside the heading, not over it
     assert still in (page.get_attribute("#trace", "aria-label") or "")
     page.click("#record")
 
