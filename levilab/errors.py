@@ -26,8 +26,12 @@ def unquoted(text: str) -> str:
     return _QUANTITY.sub(r"\1", text)
 
 
-class UsageError(LevilabError):
-    """A wrong value of a setting. The command line ends with the exit status of wrong usage.
+class WrongUsage(LevilabError):
+    """A request that is wrong in itself, whatever the data are. The command line ends with its own exit status."""
+
+
+class UsageError(WrongUsage):
+    """A wrong value of a setting.
 
     >>> print(UsageError("duration", "a number above 0 is expected", value=-1))
     duration = -1: a number above 0 is expected

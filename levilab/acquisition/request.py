@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import secrets
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,7 +26,7 @@ from levilab.world.bench import VIRTUAL, scene_world, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from levilab.bench.person import Person
     from levilab.bench.wiring import Wiring
@@ -89,8 +88,9 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     run = _resumable(find_run(options.resume, options.out), experiment) if options.resume else None
     virtual = options.mock or bool(run and run.record.seed is not None)
     _check_options(options, run, virtual=virtual)
-    config = _configuration(experiment, options, run, virtual=virtual)
-    _check_given(config, experiment, options.settings)
+    without = _configuration(options, run, virtual=virtual)
+    config = _with_given_settings(without, experiment, options.settings)
+    _check_given(config, without, experiment)
     request = AcquisitionRequest(
         experiment,
         config,
@@ -101,7 +101,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
         resume=run,
     )
     if virtual:
-        request = _on_the_virtual_bench(request, options)
+        request = _on_the_virtual_bench(request, options, without)
     else:
         wiring = described_wiring(config)
         for kind in EXPERIMENTS[experiment].kinds(settings_of(config, experiment)):
@@ -115,7 +115,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
 
 def chosen_settings(experiment: str, options: AcquisitionOptions) -> BenchConfig:
     """The configuration with which a new run on a virtual bench would begin.  Raises ConfigError, UsageError."""
-    return _configuration(experiment, options, None, virtual=True)
+    return _with_given_settings(_configuration(options, None, virtual=True), experiment, options.settings)
 
 
 def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> None:
@@ -128,43 +128,41 @@ def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: boo
         raise UsageError("realtime", "goes with `mock`: a real bench always keeps to the wall clock")
 
 
-def _configuration(experiment: str, options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> BenchConfig:
-    """What the bench file says; a run is resumed as it was begun, only where the instruments are may have changed."""
+def _configuration(options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> BenchConfig:
+    """What the bench file says; a run is resumed as it was begun, only where the instruments are may have changed.
+
+    The settings of `options` are not in it.
+    """
     config = _as_it_was(run) if run else Configuration()
     if options.bench or not virtual:
         instead = "" if virtual else ", or try `mock`"
         described = read_bench(options.bench or Path("bench.toml"), Configuration, instead=instead)
         places = {kind: getattr(described, kind) for kind in ("visa_library", "limits", *VIRTUAL)}
         config = config.model_copy(update=places) if run else described
-    return _with_given_settings(config, experiment, options.settings)
+    return config
 
 
 def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequence[str]) -> BenchConfig:
     """The configuration with some of the experiment's settings changed.  Raises UsageError."""
-    if not settings:
-        return config
-    table = config.model_dump(mode="json")
-    given: dict[str, str] = {}
-    for setting in settings:
-        key, equals, text = setting.partition("=")
-        name, dot, field = key.strip().partition(".")
-        if equals and not field and name in {"", experiment}:
-            raise _wrong_form(experiment, setting, "the key is missing: ")
-        if equals and not dot:
-            refuse_unknown(config, experiment, name)
-            raise _wrong_form(experiment, setting, meant=f", {_suggestion(config, experiment, name, text)}")
-        if not equals or name not in EXPERIMENTS:
-            raise _wrong_form(experiment, setting)
-        if name != experiment:
-            expected = f"is a setting of levilab acquire {name}, this is levilab acquire {experiment}"
-            raise UsageError("settings", expected, value=setting)
-        refuse_unknown(config, experiment, field)
-        table[name][field] = parse_setting(f"{field}={text}")[1]
-        given[field] = text
-    try:
-        return Configuration.model_validate(table)
-    except ValidationError as error:
-        raise refusal(error, given, config, experiment) from error
+    return _with_texts(config, experiment, dict(_key_and_text(config, experiment, setting) for setting in settings))
+
+
+def _key_and_text(config: BenchConfig, experiment: str, setting: str) -> tuple[str, str]:
+    """Split "limit.which=upper" into which and upper.  Raises UsageError for another form or an unknown key."""
+    key, equals, text = setting.partition("=")
+    name, dot, field = key.strip().partition(".")
+    if equals and not field and name in {"", experiment}:
+        raise _wrong_form(experiment, setting, "the key is missing: ")
+    if equals and not dot:
+        refuse_unknown(config, experiment, name)
+        raise _wrong_form(experiment, setting, meant=f", {_suggestion(config, experiment, name, text)}")
+    if not equals or name not in EXPERIMENTS:
+        raise _wrong_form(experiment, setting)
+    if name != experiment:
+        expected = f"is a setting of levilab acquire {name}, this is levilab acquire {experiment}"
+        raise UsageError("settings", expected, value=setting)
+    refuse_unknown(config, experiment, field)
+    return field, text
 
 
 def _wrong_form(experiment: str, setting: str, why: str = "", meant: str = "") -> UsageError:
@@ -174,24 +172,54 @@ def _wrong_form(experiment: str, setting: str, why: str = "", meant: str = "") -
 
 def _suggestion(config: BenchConfig, experiment: str, name: str, text: str) -> str:
     """What was meant by a key without its table; of a value that is refused, what may stand there instead."""
-    whole = f"{experiment}.{name}={text}"
     try:
-        changed = _with_given_settings(config, experiment, [whole])
-        settings_of(changed, experiment).check(experiment, config.limits)
-    except (UsageError, ConfigError):
+        changed = _with_texts(config, experiment, {name: text})
+    except UsageError:
+        changed = None
+    if changed is None or _refused(changed, experiment):
         return f"{experiment}.{name} is {allowed_values(config, experiment, name)}"
-    return f"{whole}?"
+    return f"{experiment}.{name}={text}?"
 
 
-def _check_given(config: BenchConfig, experiment: str, settings: Sequence[str]) -> None:
-    """Raise ConfigError for what the bench does not allow, UsageError if it is about a setting that was given."""
+def _with_texts(config: BenchConfig, experiment: str, texts: Mapping[str, str]) -> BenchConfig:
+    """The configuration with the values at some of the experiment's keys as they were typed.  Raises UsageError."""
+    if not texts:
+        return config
+    table = config.model_dump(mode="json", exclude_unset=True)  # what was not set may still be suited to a scene
+    values = {name: parse_setting(f"{name}={text}")[1] for name, text in texts.items()}
+    table[experiment] = table.get(experiment, {}) | values
+    try:
+        return Configuration.model_validate(table)
+    except ValidationError as error:
+        raise refusal(error, texts, config, experiment) from error
+
+
+def _check_given(config: BenchConfig, without: BenchConfig, experiment: str) -> None:
+    """Check what the bench allows of an experiment.
+
+    Args:
+        config: the configuration.
+        without: the same without the settings that were given.
+        experiment: its name.
+
+    Raises:
+        UsageError: the bench allows the configuration without the given settings, and not with them.
+        ConfigError: it allows neither.
+    """
+    refused = _refused(config, experiment)
+    if refused and not _refused(without, experiment):
+        raise UsageError("settings", str(refused)) from refused
+    if refused:
+        raise refused
+
+
+def _refused(config: BenchConfig, experiment: str) -> ConfigError | None:
+    """Why the bench does not allow the experiment's settings; None if it does."""
     try:
         settings_of(config, experiment).check(experiment, config.limits)
     except ConfigError as error:
-        given = (re.escape(setting.partition("=")[0].strip()) for setting in settings)
-        if any(re.search(rf"\b{key}\b", str(error)) for key in given):
-            raise UsageError("settings", str(error)) from error
-        raise
+        return error
+    return None
 
 
 def _as_it_was(run: Run) -> BenchConfig:
@@ -246,8 +274,16 @@ def _check_readings(run: Run, request: AcquisitionRequest) -> None:
 # --- the virtual bench ---
 
 
-def _on_the_virtual_bench(request: AcquisitionRequest, options: AcquisitionOptions) -> AcquisitionRequest:
-    """The request with the wiring of a virtual bench, whose top spins only or moves as a scene's."""
+def _on_the_virtual_bench(
+    request: AcquisitionRequest, options: AcquisitionOptions, without: BenchConfig
+) -> AcquisitionRequest:
+    """The request with the wiring of a virtual bench, whose top spins only or moves as a scene's.
+
+    Args:
+        request: of a bench that may be real.
+        options: what is asked for.
+        without: the configuration without the settings that were given.
+    """
     run = request.resume
     seed = run.record.seed if run else options.seed
     seed = secrets.randbelow(1 << 31) if seed is None else seed
@@ -261,9 +297,8 @@ def _on_the_virtual_bench(request: AcquisitionRequest, options: AcquisitionOptio
     if scene is None:
         return _with_a_spinning_top(request, random_scene(seed), clock)
     if run is None:
-        settings = settings_of(config, request.experiment).for_scene(scene)
-        config = with_settings(config, request.experiment, settings)
-        _check_given(config, request.experiment, options.settings)
+        config, without = (_for_scene(one, request.experiment, scene) for one in (config, without))
+        _check_given(config, without, request.experiment)
     return replace(
         request,
         config=config,
@@ -271,6 +306,11 @@ def _on_the_virtual_bench(request: AcquisitionRequest, options: AcquisitionOptio
         synthetic_how=HOW.format(what=_IN_MOTION.format(name=scene.name)),
         scene=scene.as_table(),
     )
+
+
+def _for_scene(config: BenchConfig, experiment: str, scene: Scene) -> BenchConfig:
+    """The configuration with an experiment's settings suited to a scene."""
+    return with_settings(config, experiment, settings_of(config, experiment).for_scene(scene))
 
 
 def request_at(wiring: Wiring, scene: Scene, experiment: str, options: AcquisitionOptions) -> AcquisitionRequest:
@@ -288,13 +328,13 @@ def request_at(wiring: Wiring, scene: Scene, experiment: str, options: Acquisiti
     """
     if experiment not in EXPERIMENTS:
         raise UsageError("experiment", f"one of {', '.join(EXPERIMENTS)} is expected", value=experiment)
-    config = _configuration(experiment, options, None, virtual=True)
+    config = chosen_settings(experiment, options)
     config = config.model_copy(update={"visa_library": "@levilab", "limits": wiring.limits, **VIRTUAL})
-    settings = settings_of(config, experiment).for_scene(scene)
-    settings.check(experiment, wiring.limits)
+    config = _for_scene(config, experiment, scene)
+    settings_of(config, experiment).check(experiment, wiring.limits)
     return AcquisitionRequest(
         experiment,
-        with_settings(config, experiment, settings),
+        config,
         lambda: wiring,
         out=options.out,
         note=options.note,

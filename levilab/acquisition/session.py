@@ -71,7 +71,7 @@ class Doing:
     Attributes:
         text: what it does; empty while readings come.
         share: of the way to the first reading; None once readings come.
-        end: bench time at which it is expected to end [s]; None where that is not known.
+        end: bench times between which it is expected to end [s]; None where that is not known.
         seen: channel → what an instrument answered last, in a reading or outside of one.
         records: channel → the oscilloscope's latest record, with its number and the bench time [s].
         lost: kinds of instruments that do not answer.
@@ -79,7 +79,7 @@ class Doing:
 
     text: str = "connected"
     share: float | None = 0.0
-    end: float | None = None
+    end: tuple[float, float] | None = None
     seen: dict[str, float] = field(default_factory=dict)
     records: dict[str, tuple[int, float, Trace]] = field(default_factory=dict)
     lost: set[str] = field(default_factory=set)
@@ -253,12 +253,13 @@ class Session(Generic[S]):
             self._write_event("answered", answer)
         return answer
 
-    def keep(self, row: Row, time_left_s: float) -> None:
+    def keep(self, row: Row, time_left_s: float, least_left_s: float | None = None) -> None:
         """Write a reading down, then show it: what was shown is on the disk.
 
         Args:
             row: the reading.
-            time_left_s: expected until the end.
+            time_left_s: expected until the end, at most if `least_left_s` is given.
+            least_left_s: at least; None: as much.
 
         Raises:
             ExperimentFailed: its time does not come after the last one's.
@@ -270,11 +271,13 @@ class Session(Generic[S]):
         self._losses = 0
         self.doing.seen |= row
         self.doing.text, self.doing.share = "", None
-        self.doing.end = self.bench.clock.now() + time_left_s
+        left = (time_left_s if least_left_s is None else least_left_s, time_left_s)
+        now = self.bench.clock.now()
+        self.doing.end = now + left[0], now + left[1]
         if not self._headed:
             self._headed = True
             self.show.message("  ".join(f"{_head(one):>{_width(one)}}" for one in self._shown))
-        self.show.reading(self._in_words(row), row["time_s"], time_left_s)
+        self.show.reading(self._in_words(row), row["time_s"], left)
         self.look()
 
     def keep_trace(self, input_: int, channel: str, time_s: float) -> Trace:
@@ -350,6 +353,9 @@ class Session(Generic[S]):
 
 # --- the line of a reading ---
 
+#: Unit → how its values are written: with so many decimals that points stand below each other.
+_DIGITS = {"s": ".2f", "Hz": ".4f", "m": ".5f", "T": ".7f", "V": ".4f"}
+
 
 def _head(channel: Channel) -> str:
     """What stands above a channel's values: its name, without the unit, which stands beside each value."""
@@ -364,5 +370,4 @@ def _width(channel: Channel) -> int:
 
 
 def _with_unit(value: float, channel: Channel) -> str:
-    digits = {"s": ".2f", "Hz": ".4f"}.get(channel.unit, ".6g")
-    return f"{value:{digits}} {channel.unit}".rstrip()
+    return f"{value:{_DIGITS.get(channel.unit, '.6g')}} {channel.unit}".rstrip()

@@ -43,9 +43,9 @@ def silence(stream: TextIO) -> None:
         os.dup2(nowhere.fileno(), stream.fileno())
 
 
-def say_where(report: Path, *, in_new_folder: bool) -> None:
-    """The line at the end of a command that wrote a report; a folder that was made may stand for a typing error."""
-    result(f"the report is in {report}{', in a new folder' if in_new_folder else ''}")
+def where(report: Path) -> str:
+    """Return the line about a report that is yet to be written; a folder that it makes may be a typing error."""
+    return f"the report is in {report}{'' if report.parent.exists() else ', in a new folder'}"
 
 
 @contextlib.contextmanager

@@ -7,7 +7,7 @@ import typer
 
 from levilab.cli.analyze import OPTIONS, analysis_options
 from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
-from levilab.cli.output import interruptible, message, print_json, result, say_where
+from levilab.cli.output import interruptible, message, print_json, result, where
 from levilab.cli.quantities import with_options
 
 
@@ -56,7 +56,7 @@ def report(
         "keep_outliers": keep_outliers,
     }
     app = context.find_root().command
-    in_new_folder = not output.parent.exists()
+    place = where(output)
     with interruptible("no report is written"):
         written = write_report(
             paths,
@@ -66,7 +66,7 @@ def report(
             tables=tables,
             crosscheck=crosscheck,
         )
-    say_where(written, in_new_folder=in_new_folder)
+    result(place)
     if tables:
         from levilab.report.tables.folder import folder_of
 

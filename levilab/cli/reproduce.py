@@ -8,7 +8,7 @@ import typer
 
 from levilab.cli import exit_codes
 from levilab.cli.options import Json
-from levilab.cli.output import interruptible, print_json, result, say_where
+from levilab.cli.output import interruptible, print_json, result, where
 
 
 def reproduce(
@@ -47,7 +47,7 @@ def reproduce(
     report = output or (None if as_json else Path("reproduce.html"))
     if report is not None:
         format_of(report)
-    in_new_folder = bool(report and not report.parent.exists())
+    place = where(report) if report is not None else None
     with interruptible("no report is written"):
         with contextlib.closing(ShareBar("reproducing")) as progress:
             found = reproduce(wanted, progress)
@@ -62,7 +62,7 @@ def reproduce(
         for chapter, of_chapter in found.chapters:
             terminal().print(draw(findings_table(chapter.title, of_chapter.findings)))
         result(in_words(found))
-        if report is not None:
-            say_where(report, in_new_folder=in_new_folder)
+        if place is not None:
+            result(place)
     if not found.as_expected:
         raise typer.Exit(exit_codes.FAILED)

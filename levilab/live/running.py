@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -9,6 +11,7 @@ import numpy as np
 
 from analysis.errors import AnalysisError, TooFewReadings
 from analysis.precession.sweep import Sweep, fit_sweep
+from analysis.spindown.fall import times_of_fall
 from analysis.spindown.fit import fit_spin_down
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.uncertainty import Estimate
@@ -20,16 +23,14 @@ if TYPE_CHECKING:
     from analysis.spindown.lawfit import LawFit
     from levilab.live.envelope import Array, Groups
 
-#: Counted spins between which a top falls [Hz]: simulated tops with a tilted moment leave the light at 23.3 Hz (scene
-#: practice) to 24.9 Hz (spindown); the ten published limits scatter by 0.25 Hz about 21.86 Hz (thesis §4.2), and the
-#: lower bound lies two standard deviations below.
-FALLS_BETWEEN_HZ = (25.0, 21.36)
 #: Points of a curve.
 _POINTS = 400
 #: A curve goes on beyond the readings, but for no longer than this many times their duration.
 _BEYOND = 4.0
 #: Parameters that no law is known by: the start, and what the counter sees of the wobble.
 _NOT_OF_THE_LAW = {"start_frequency", *WOBBLE}
+#: What a head says while readings come, and no more once the run has ended.
+_SO_FAR = re.compile(r"(, the best)? so far")
 #: Equations as the page sets them: what follows ^ in brackets is raised.
 EQUATIONS = {
     "stokes": "ω̇ = −C₁ ω",
@@ -66,6 +67,7 @@ class Running:
         curve: None where none can be drawn yet.
         end_s: between which times the run is expected to end, on its own clock; None where that is not known [s].
         look: name of its colour, that of a law or "fit".
+        dashed: what the curve is beyond the readings, where that is not what the head names.
     """
 
     head: str
@@ -73,6 +75,7 @@ class Running:
     curve: Curve | None = None
     end_s: tuple[float, float] | None = None
     look: str = "fit"
+    dashed: str = ""
 
 
 Columns = dict[str, "Array"]
@@ -107,7 +110,7 @@ def _without_forecast(found: Running) -> Running:
     if curve is not None and np.isfinite(curve.solid_to):
         x = np.append(curve.x[curve.x < curve.solid_to], curve.solid_to)
         curve = replace(curve, x=x, y=np.interp(x, curve.x, curve.y), solid_to=np.inf)
-    return replace(found, head=found.head.replace(" so far", ""), curve=curve, end_s=None)
+    return replace(found, head=_SO_FAR.sub("", found.head), curve=curve, end_s=None, dashed="")
 
 
 def spin_down(columns: Mapping[str, Array], size: int) -> Running:
@@ -129,20 +132,19 @@ def spin_down(columns: Mapping[str, Array], size: int) -> Running:
         f"excluded: {', '.join(name for name, _ in found.verdict.excluded)}" if found.verdict.excluded else "",
     ]
     return Running(
-        f"{found.best} law so far   {EQUATIONS[found.best]}",
+        f"{found.best} law, the best so far   {EQUATIONS[found.best]}",
         tuple(filter(None, lines)),
         Curve(x, y, solid_to=last),
         end,
         found.best,
+        "dashed: the law alone, without the tilt, which is in the count" if best.has_tilt and end else "",
     )
 
 
 def _times_of_fall(best: LawFit, last: float, duration: float) -> tuple[float, float] | None:
     """When a law reaches the spins between which a top falls; None where the later one is far off [s]."""
-    times = np.linspace(last, last + _BEYOND * duration, 4 * _POINTS)
-    spin = best.forecast(times, last)
-    first, latest = (np.flatnonzero(spin <= limit) for limit in FALLS_BETWEEN_HZ)
-    return (float(times[first[0]]), float(times[latest[0]])) if len(latest) else None
+    between = times_of_fall(lambda times: best.forecast(times, last), last, last + _BEYOND * duration)
+    return between if math.isfinite(between[1]) else None
 
 
 def locked_line(columns: Mapping[str, Array], size: int) -> Running:

@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 FRAMES_PER_S, PATIENCE_S = 22, 1.0
 #: Time between two looks for runs of other programs [s].
 _OTHERS_EVERY_S = 2.0
+#: What a page asks for that keeps to the bench for practice and its runs, whatever others record; no run has this name.
+OWN_BENCH = "."
 #: The longest question of a page [bytes].
 _LONGEST_ASK = 4096
 PAGE = Path(__file__).parent / "page"
@@ -76,11 +78,17 @@ class Hall:
 
     @contextlib.contextmanager
     def watching(self, name: str) -> Iterator[Watch]:
-        """The watch of a run, shared by all pages that look at it; "" is what the bench for practice recorded last."""
+        """The watch of a run, shared by all pages that look at it.
+
+        Args:
+            name: of the run; "" is what the bench for practice recorded last, or what another program records now;
+                OWN_BENCH the former alone.
+        """
         if name not in self.watches:
+            is_chosen = name not in {"", OWN_BENCH}
             recorded = self.desk.folder if self.desk else None
-            folder = self.root / name if name else recorded
-            self.watches[name] = Watch(folder, self.desk.address if self.desk else None, stays=bool(name))
+            folder = self.root / name if is_chosen else recorded
+            self.watches[name] = Watch(folder, self.desk.address if self.desk else None, stays=is_chosen)
         self.pages[name] = self.pages.get(name, 0) + 1
         try:
             yield self.watches[name]
@@ -231,7 +239,7 @@ class Pages:
         """Send a frame for each question, until the page goes."""
         hall, name = self.hall, socket.query_params.get("run", "")
         await socket.accept()
-        if name and not hall.is_run(name):
+        if not (name in {"", OWN_BENCH if hall.desk else ""} or hall.is_run(name)):
             await socket.close(4404)
             return
         with hall.watching(name) as watch, contextlib.suppress(WebSocketDisconnect, RuntimeError):

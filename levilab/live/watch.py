@@ -233,7 +233,8 @@ class Watch:
         fit = self.fit
         if fit is None:
             return {"version": self.fit_version}
-        about: dict[str, Any] = {"head": fit.head, "lines": fit.lines, "end_s": fit.end_s, "look": fit.look}
+        lines = (*fit.lines, fit.dashed) if fit.dashed else fit.lines
+        about: dict[str, Any] = {"head": fit.head, "lines": lines, "end_s": fit.end_s, "look": fit.look}
         if fit.curve:
             arrays |= {"fit_x": fit.curve.x, "fit_y": fit.curve.y, "fit_band": fit.curve.band}
             about["solid_to"] = fit.curve.solid_to

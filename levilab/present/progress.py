@@ -8,7 +8,7 @@ import time
 from typing import TYPE_CHECKING, Protocol
 
 from levilab.present.characters import for_encoding, printable
-from levilab.present.panel import Trend, bench_lines
+from levilab.present.panel import Trend, bench_lines, time_left
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,8 +31,14 @@ class Display(Protocol):
     def preparing(self, text: str, fraction: float) -> None:
         """Show how far the bench is prepared."""
 
-    def reading(self, text: str, elapsed: float, remaining: float) -> None:
-        """Show a reading that is on the disk, with bench time since the start and expected until the end [s]."""
+    def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
+        """Show a reading that is on the disk.
+
+        Args:
+            text: the reading.
+            elapsed: bench time since the start [s].
+            remaining: expected until the end, at least and at most [s].
+        """
 
     def message(self, text: str) -> None:
         """Show a line of its own."""
@@ -53,7 +59,7 @@ class Mute:
     def preparing(self, text: str, fraction: float) -> None:
         """Nothing."""
 
-    def reading(self, text: str, elapsed: float, remaining: float) -> None:
+    def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
         """Nothing."""
 
     def message(self, text: str) -> None:
@@ -84,9 +90,9 @@ class LineDisplay:
             self._prepared = text
             self.message(text)
 
-    def reading(self, text: str, elapsed: float, remaining: float) -> None:
+    def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
         """A line."""
-        self.message(f"{text}   about {remaining:.0f} s left" if remaining >= 0.5 else text)
+        self.message(f"{text}   {time_left(*remaining)}" if remaining[1] >= 0.5 else text)
 
     def message(self, text: str) -> None:
         """Print a line.  A closed standard error does not end a measurement."""
@@ -166,7 +172,7 @@ class BarDisplay:
     def preparing(self, text: str, fraction: float) -> None:
         """The state of the bench has it."""
 
-    def reading(self, text: str, elapsed: float, remaining: float) -> None:
+    def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
         """A line above; time left stands below."""
         self.message(text)
         self._next = 0.0

@@ -259,7 +259,7 @@ class Erratum:
         by_corrected: what the corrected one gives.
         tolerance: relative, of by_corrected.
         unit: of the numbers.
-        reading: how the correction was read where it says little.
+        reading: how the correction was read where it says little, or what else the print has for the number.
     """
 
     place: str

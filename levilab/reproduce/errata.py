@@ -13,7 +13,7 @@ from analysis.stability import reduced_mass
 from levilab.present.document.blocks import Note
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Erratum
-from levilab.reproduce.tops import MASS_KG, THESIS, many, scan, started
+from levilab.reproduce.tops import ESTIMATE_KG, MASS_KG, THESIS, estimate_hz, many, scan, started
 from levilab.simulator.energy import magnetic_energy
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.field import field_of, flux_density, flux_gradient, on_axis
@@ -162,8 +162,11 @@ def bracket() -> Erratum:
 
 
 def least_spin() -> Erratum:
-    """The spin at which the two fast roots of a top on a fixed point become real, found by looking at the roots."""
-    found = stability_of(preset("undriven").changed({"top.mass_kg": 0.0253}))
+    """The spin at which the two fast roots of a top on a fixed point become real, found by looking at the roots.
+
+    Of the top of the first chapter, where it floats: a heavier one floats lower, in a stronger field, and needs more.
+    """
+    found = stability_of(preset("undriven"))
     top = found.top
     assert found.floating is not None
     p = -top.moment * float(found.field(np.array([found.floating.height]))[0, 0])
@@ -176,12 +179,14 @@ def least_spin() -> Erratum:
         "(2.57)",
         "lacks the factor 2√(I₁/I₃) = 1.55",
         "2√(I₁P)/I₃",
-        "least spin of a sleeping top, 25.30 g; true: where its roots become real",
+        f"least spin of a sleeping top, {1e3 * top.mass:.2f} g at {100 * found.floating.height:.2f} cm; true: where "
+        "its roots become real",
         high,
         found.thesis_estimate,
         found.thesis_estimate * 2 * math.sqrt(top.transverse / top.axial),
         1e-9,
         "Hz",
+        f"the printed {estimate_hz():.3f} Hz are its own equation's for {1e3 * ESTIMATE_KG:.2f} g at 7.3 cm",
     )
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.numbers import digits
+from analysis.stability import sleeping_limit
 from analysis.uncertainty import Estimate
 from levilab.motion.lines import lines_of, rate_for
 from levilab.present.document.blocks import Picture
@@ -23,6 +24,7 @@ from levilab.stability.thesis import STARTS
 
 if TYPE_CHECKING:
     from levilab.reproduce.check import Finding
+    from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Trajectory
 
 #: How long a path is shown [s], and samples per second.
@@ -75,13 +77,31 @@ def modes() -> list[Finding]:
     ]
 
 
+def sleeping_in_words(scene: Scene) -> tuple[float, str, bool]:
+    """The sleeping top's limit of a scene beside that of the first chapter's top, which has another mass.
+
+    Returns:
+        the limit [Hz]; both in words; whether their heights alone make the difference.
+    """
+    own, first = stability_of(scene), stability_of(preset("undriven"))
+    assert own.floating is not None
+    assert first.floating is not None
+    words = (
+        f"{own.sleeping:.2f} Hz for its {1e3 * own.top.mass:.3f} g, which float at {100 * own.floating.height:.2f} cm; "
+        f"the first chapter's {1e3 * first.top.mass:.2f} g float at {100 * first.floating.height:.2f} cm, in a weaker "
+        f"field: {first.sleeping:.2f} Hz"
+    )
+    there = sleeping_limit(own.field, own.top, first.floating.height)
+    return own.sleeping, words, math.isclose(there, first.sleeping, rel_tol=1e-9)
+
+
 def fall() -> tuple[Finding, Trajectory]:
     """A top with drag from 30 Hz: how its tilt grows at the end."""
     scene = started("IC1", "friction", f"escape.height_m={FALL_M}")
     motion = simulate(scene, FALL_S, tolerance=1e-6, rate=FALL_HZ)
     early = motion.time < motion.time[-1] - SHOWN_S
     before, last = float(motion.tilt[early].max()), float(motion.tilt[-1])
-    limit = stability_of(scene).sleeping
+    limit, words, explained = sleeping_in_words(scene)
     return (
         Statement(
             "tilt at the fall, IC1 with drag from 30 Hz",
@@ -89,8 +109,11 @@ def fall() -> tuple[Finding, Trajectory]:
             "the tilt stays small until the spin is too slow, and grows within a second",
             f"up to {math.degrees(before):.1f}° until {SHOWN_S:g} s before the fall, {math.degrees(last):.0f}° when "
             "z is 6 "
-            f"cm, at {motion.spin_hz[-1]:.2f} Hz; the sleeping top's limit is {limit:.2f} Hz",
-            holds=not motion.survived and last > 3 * before and abs(float(motion.spin_hz[-1]) - limit) < 0.5,
+            f"cm, at {motion.spin_hz[-1]:.2f} Hz; the sleeping top's limit is {words}",
+            holds=not motion.survived
+            and last > 3 * before
+            and abs(float(motion.spin_hz[-1]) - limit) < 0.5
+            and explained,
         ),
         motion,
     )

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.stability import thesis_limit
 from levilab.simulator.ensemble import simulate_many
+from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset, with_settings
 from levilab.stability.published.printed import published
 from levilab.stability.thesis import STARTS
@@ -26,6 +28,8 @@ THESIS = published("thesis")
 DURATION_S, TOLERANCE = 30.0, 1e-6
 #: Mass of the thesis's simulations [kg], which it prints as 25.5 g: found by the chapter of the limits.
 MASS_KG = 0.025285
+#: The mass for which the thesis's own estimate of the least spin gives what it prints, at the measured height [kg].
+ESTIMATE_KG = 0.0253
 #: With drag a top counts as fallen at this height [m].
 FALL_M = 0.06
 
@@ -37,6 +41,16 @@ def started(name: str, scene: str = "undriven", *settings: str) -> Scene:
     ((0.003, 0.0, 0.0725), 0.025285)
     """
     return with_settings(preset(scene), [f"top.mass_kg={MASS_KG}", *STARTS[name], *settings])
+
+
+def estimate_hz() -> float:
+    """The thesis's own estimate of the least spin [Hz], of the mass and at the height that give what it prints.
+
+    >>> f"{estimate_hz():.3f}"
+    '14.005'
+    """
+    found = stability_of(preset("undriven").changed({"top.mass_kg": ESTIMATE_KG}))
+    return thesis_limit(found.field, found.top, THESIS["device.height"].value / 100)
 
 
 def many(scene: Scene, over: Mapping[str, ArrayLike], duration: float = DURATION_S, **given: Any) -> Ensemble:

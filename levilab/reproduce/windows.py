@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.stability import floating_mass, reduced_mass, thesis_limit
+from analysis.stability import floating_mass, reduced_mass
 from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Because, Check, Comparison
 from levilab.reproduce.figure import Contours, contour_figure
-from levilab.reproduce.tops import THESIS
+from levilab.reproduce.tops import ESTIMATE_KG, THESIS, estimate_hz
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 #: The base with b = 2a has the inner radius of the thesis's: only the ratio matters.
 TWICE = {"base.outer_radius_m": 0.060}
-#: The mass for which the thesis's own estimate gives what it prints, at the measured height [kg].
-ESTIMATE_KG = 0.0253
 
 
 def heights_and_masses(scene: Scene, prefix: str) -> list[Check]:
@@ -60,9 +58,8 @@ def device() -> list[Check]:
     """What the thesis says of its own top: masses, height, and its estimate of the least spin."""
     found = stability_of(preset("undriven"))
     window = found.lifted[-1]
-    printed = stability_of(preset("undriven").changed({"top.mass_kg": ESTIMATE_KG}))
     assert found.floating is not None
-    estimate = thesis_limit(printed.field, printed.top, THESIS["device.height"].value / 100)
+    estimate = estimate_hz()
     lifted = floating_mass(found.field, found.top, THESIS["device.height"].value / 100)
     factor = 2 * math.sqrt(found.top.transverse / found.top.axial)
     exact = found.floating.spins[0][0]
@@ -71,11 +68,10 @@ def device() -> list[Check]:
         THESIS["stability.estimate"],
         Estimate(exact, None, "Hz"),
         Because(
-            f"the estimate lacks the factor 2√(I₁/I₃) = {factor:.3f}: with it, at the place where the top floats, it "
-            "is "
-            f"{found.sleeping:.2f} Hz, the sleeping top's limit, and the sideways motion moves that to {exact:.2f} "
-            "Hz; without "
-            f"it, for {1e3 * ESTIMATE_KG:.2f} g at 7.3 cm, it is {estimate:.3f} Hz, as printed",
+            f"the estimate lacks the factor 2√(I₁/I₃) = {factor:.3f}: with it, for {found.scene.top.mass_kg * 1e3:.2f} "
+            f"g at {100 * found.floating.height:.2f} cm, where they float, it is {found.sleeping:.2f} Hz, the sleeping "
+            f"top's limit, and the sideways motion moves that to {exact:.2f} Hz; without it, for "
+            f"{1e3 * ESTIMATE_KG:.2f} g at 7.3 cm, it is {estimate:.3f} Hz, as printed",
             estimate,
         ),
     )

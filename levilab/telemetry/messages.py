@@ -91,7 +91,8 @@ class State:
         folder: the run folder, as a path of this machine; empty where no run is recorded.
         text: what the bench does, such as "drive at 31.20 Hz".
         share: of the way to the first reading, from 0 to 1; None once readings come.
-        time_left_s: expected until the end; None where it is not known [s].
+        time_left_s: expected until the end, at most; None where it is not known [s].
+        least_left_s: the same, at least; None: as much [s].
         readings: how many are in the run folder.
         events: how many are in the run folder.
         last: channel, as in readings.csv → what the bench measured last, in a reading or outside of one.
@@ -115,6 +116,7 @@ class State:
     text: str = ""
     share: float | None = None
     time_left_s: float | None = None
+    least_left_s: float | None = None
     readings: int = 0
     events: int = 0
     last: dict[str, float] = field(default_factory=dict)

@@ -41,9 +41,9 @@ class Silent:
 
     def preparing(self, text: str, fraction: float) -> None: ...
 
-    def reading(self, text: str, elapsed: float, remaining: float) -> None:
+    def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
         self.readings.append(text)
-        self.left.append(remaining)
+        self.left.append(remaining[1])
 
     def message(self, text: str) -> None:
         self.messages.append(text)
@@ -63,7 +63,7 @@ class Impatient(Silent):
         super().__init__()
         self.most, self.number = most, number
 
-    def reading(self, text: str, elapsed: float, remaining: float) -> None:
+    def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
         super().reading(text, elapsed, remaining)
         if len(self.readings) == self.most:
             signal.raise_signal(self.number)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from analysis.spindown.fall import times_of_fall
 from levilab.acquisition.counting import FreeTop, prepare_counter
 from levilab.acquisition.driving import DriveSettings, drive_up_and_let_go
 from levilab.acquisition.experiment import Experiment
@@ -13,9 +14,9 @@ from levilab.runs.channel import Channel
 if TYPE_CHECKING:
     from levilab.acquisition.session import Row, Session
 
-#: Spin at which a top falls (mean of the ten published limits) [Hz], and the usual drag of a laminar disc (mean of the
-#: four published runs) [(rad/s)^−½/s]: for the time left while there is one reading.
-_FALL_HZ, _USUAL_DRAG = 21.86, 2.34e-4
+#: The usual drag of a laminar disc (mean of the four published runs) [(rad/s)^−½/s]: for the time left while there is
+#: one reading.
+_USUAL_DRAG = 2.34e-4
 
 
 class SpinSettings(DriveSettings):
@@ -42,24 +43,31 @@ def run(session: Session[SpinSettings]) -> None:
         reading = top.read()
         if reading:
             first = session.rows[0] if session.rows else reading
-            session.keep(reading, time_left(first, reading))
+            least, most = time_left(first, reading, settings.longest_s)
+            session.keep(reading, most, least)
         elif end := top.fall(asked):
             session.event("fell", end)
             return
 
 
-def time_left(first: Row, last: Row) -> float:
-    """Until the usual spin of the fall [s]: under the drag of a laminar disc ω^(−1/2) grows evenly.
+def time_left(first: Row, last: Row, longest_s: float) -> tuple[float, float]:
+    """Until the spins between which a top falls, and no longer than the run goes on, at least and at most [s].
 
-    Its growth is that between two readings, or while they are one that of the usual drag.
+    Under the drag of a laminar disc ω^(−1/2) grows evenly.  Its growth is that between two readings, or while they are
+    one that of the usual drag.
+
+    Args:
+        first: the first reading.
+        last: the last one.
+        longest_s: time at which the run ends if the top is still up [s].
     """
-    start, now, fall = (
-        (2 * math.pi * spin) ** -0.5 for spin in (first["spin_frequency_hz"], last["spin_frequency_hz"], _FALL_HZ)
-    )
-    lapse = last["time_s"] - first["time_s"]
+    start, now = ((2 * math.pi * row["spin_frequency_hz"]) ** -0.5 for row in (first, last))
+    time = last["time_s"]
+    lapse = time - first["time_s"]
     growth = (now - start) / lapse if lapse > 0 and now > start else _USUAL_DRAG / 2
-    left: float = (fall - now) / growth
-    return max(0.0, left)
+    ends = times_of_fall(lambda times: (now + growth * (times - time)) ** -2 / (2 * math.pi), time, longest_s)
+    least, most = (max(0.0, min(end, longest_s) - time) for end in ends)
+    return least, most
 
 
 EXPERIMENT = Experiment(

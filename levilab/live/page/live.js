@@ -19,6 +19,8 @@ const LONGER = {  // what stands beside the state
 };
 /** A record of the oscilloscope that is older is marked with its age [s of bench time; where that is faster, of the wall]: without pulses a count takes 2.5 s. */
 const OLD_S = 3;
+/** What keeps to the bench for practice and to the runs that it records, in the place of a run's name. */
+const OWN_BENCH = ".";
 /** What a practice bench's oscilloscope shows, from above. */
 const CHANNELS = ["tape", "drive", "laser"];
 const PAUSED = "The view is paused, and shows nothing of what the bench would do: “Go on” first.";
@@ -69,7 +71,7 @@ function take(head, arrays) {
   for (const one of head.said) {
     seen.said = one.n;
     practice?.hear(one);
-    follows ||= Boolean(practice) && wanted !== "" && one.kind === "recording";
+    follows ||= Boolean(practice) && wanted !== "" && wanted !== OWN_BENCH && one.kind === "recording";
     if (/message|refused|ended/.test(one.kind) && !one.of_run) listEvent(one, one.text, one.kind === "message" ? "" : "warning");
   }
   if (head.about) {
@@ -233,6 +235,7 @@ function show() {
   write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: "No run yet: the guide says how to record one.", setup: "The bench is being set up."}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
   document.title = `${state === "running" && data.count ? `${data.count} readings · ` : ""}levilab live`;
   practice?.show(bench, about, data.count, down);
+  by("own").hidden = !practice || wanted === OWN_BENCH || !seen.run || listed.practice.runs.includes(seen.run);
   space?.setSpeed?.(bench?.speed, bench?.paused || bench?.silent);
   showTop(bench);
   showAge(bench);
@@ -243,7 +246,7 @@ function show() {
 function leftOf(about, bench, elapsed) {
   if (about?.status !== "running") return "";
   if (data.end && Number.isFinite(elapsed)) return between(...data.end.map((end) => end - elapsed));
-  return Number.isFinite(bench?.time_left_s) ? `about ${lapse(bench.time_left_s)}` : "";
+  return Number.isFinite(bench?.time_left_s) ? between(bench.least_left_s ?? bench.time_left_s, bench.time_left_s) : "";
 }
 
 /** How a run ended that did not finish: its last event. */
@@ -335,9 +338,12 @@ function showTop(bench) {
   by("space").setAttribute("aria-label", `the top over its base in three dimensions: it ${pose.up ? `floats ${height}` : "does not float"}`);
 }
 
-/** Say beside the oscilloscope that no top is up, and of each record how old it is, where it is old. */
+/** Say beside the oscilloscope that no top is up, that the run does not read it, and of each record how old it is, where it is old. */
 function showAge(bench) {
-  write("scope-key", data.up === false ? "the top is down" : "");
+  const used = Object.keys(data.about?.instruments || {});
+  const still = data.about?.status === "running" && used.length && !used.includes("oscilloscope");
+  const why = still ? `not read in a ${data.about.experiment} run, whose readings would wait` : "";
+  write("scope-key", [data.up === false ? "the top is down" : "", why].filter(Boolean).join("; "));
   for (const one of data.records.values()) {
     const said = ageOf(one, bench);
     if (one.said === said) continue;
@@ -440,6 +446,11 @@ by("pause").addEventListener("click", pause);
 by("help").addEventListener("click", () => by("keys").showModal());
 by("latest").addEventListener("change", () => { seen.readings = seen.tick = -1; });
 by("motion").addEventListener("change", () => space?.setRate?.(Number(by("motion").value)));
+by("own").addEventListener("click", () => {
+  open(wanted = OWN_BENCH);
+  by("run").value = OWN_BENCH;
+  by("practice").focus();  // the button goes
+});
 by("run").addEventListener("change", () => {
   wanted = by("run").value;
   history.replaceState(null, "", wanted && !practice ? `?run=${encodeURIComponent(wanted)}` : location.pathname);
@@ -503,9 +514,9 @@ async function listRuns(chosen) {
   }));
   if (listed.practice && !listed.practice.runs.length && listed.runs.length) {  // the runs are older than this bench
     const option = make("option", "no run of this bench yet");
-    option.value = "";
+    option.value = OWN_BENCH;
     select.prepend(option);
-    select.value = "";
+    select.value = OWN_BENCH;
   }
   if (!listed.runs.length) select.append(make("option", "none yet"));
   select.value = chosen || select.value;

@@ -114,7 +114,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     if (elsewhere !== now.elsewhere) {
       now.elsewhere = elsewhere;
       by("controls").disabled = !allowed || elsewhere;
-      if (allowed) write("said", elsewhere ? "Another program records this run: the practice bench rests until it ends, or until another run is chosen above." : "");
+      if (allowed) write("said", elsewhere ? "Another program records this run: the practice bench rests until it ends, or until you go back to it." : "");
     }
     now.bench = elsewhere ? now.bench || bench : bench;
     guide(now.bench, about_run, readings);

@@ -89,6 +89,8 @@ class Conditions:
         top: where the parameters of the top come from, in words.
         waveform, amplitude_vpp, creep_hz_per_s, step_hz: the drive of an upper limit, and how far it goes between two
             looks at the top; None where the data do not say, and of lower limits: a free top falls without a drive.
+        synthetic: whether the runs were simulated or made up, where others under these conditions are not the same;
+            None where none are.
     """
 
     which: Which
@@ -97,6 +99,7 @@ class Conditions:
     amplitude_vpp: float | None = None
     creep_hz_per_s: float | None = None
     step_hz: float | None = None
+    synthetic: bool | None = None
 
     @property
     def text(self) -> str:
@@ -107,7 +110,8 @@ class Conditions:
             "" if self.creep_hz_per_s is None else f"{self.creep_hz_per_s:g} Hz/s",
             "" if self.step_hz is None else f"a look each {self.step_hz:g} Hz",
         ]
-        return ", ".join([*filter(None, drive), self.top])
+        made_up = {None: "", True: "SYNTHETIC", False: "not known to be SYNTHETIC"}[self.synthetic]
+        return ", ".join(filter(None, [*drive, self.top, made_up]))
 
 
 @dataclass(frozen=True)
@@ -185,6 +189,7 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
                 yield from warnings_of(group.statistics)
 
     def _about_tops(self, group: Limits) -> Iterable[str]:
+        """Of a result that an earlier version wrote: it put measured and made-up runs into one group."""
         synthetic = sum(self.sources[k].synthetic for k in group.runs)
         if 0 < synthetic < len(group.runs):
             yield (
@@ -220,7 +225,19 @@ def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
 def together(
     sources: Sequence[Source[LimitReadings]], runs: Sequence[Limits], options: LimitOptions
 ) -> tuple[Limits, ...]:
-    """The limits of each of the conditions, lower ones first, else in the order in which they are given."""
+    """The limits of each of the conditions, lower ones first, else in the order in which they are given.
+
+    What was made up says nothing about a real top: it makes a group of its own.
+    """
+    kinds: dict[tuple[Conditions, Device], set[bool]] = {}
+    for source, run in zip(sources, runs, strict=True):
+        kinds.setdefault((run.conditions, run.device), set()).add(source.synthetic)
+    runs = [
+        replace(run, conditions=replace(run.conditions, synthetic=source.synthetic))
+        if len(kinds[run.conditions, run.device]) > 1
+        else run
+        for source, run in zip(sources, runs, strict=True)
+    ]
     groups: dict[tuple[Conditions, Device], list[int]] = {}
     for k, run in sorted(enumerate(runs), key=lambda one: one[1].which):
         groups.setdefault((run.conditions, run.device), []).append(k)

@@ -42,6 +42,7 @@ class ConditionsPart(Part):
     amplitude_vpp: float | None
     creep_hz_per_s: float | None
     step_hz: float | None
+    synthetic: bool | None = None
 
 
 class ComparisonPart(Part):

@@ -198,10 +198,8 @@ def _draw_weights(axes: Axes, analysis: SpinDownAnalysis) -> None:
         look = LOOKS[name]
         axes.barh(-place, weight or 0.0, height=0.3, color=look.colour, linewidth=0)
         number = "" if weight is None else f"  {weight:.2f}" if weight >= 0.005 else "  <\u20090.01"
-        axes.text(
-            0.03, 0.22 - place, ", ".join(filter(None, (f"{name}{number}", _note(analysis, name)))), fontsize=SMALL,
-            va="bottom", color="black",
-        )  # fmt: skip
+        said = ", ".join(filter(None, (f"{name}{number}", _note(analysis, name, short=True))))
+        axes.text(0.03, 0.22 - place, said, fontsize=SMALL, va="bottom", color="black")
     known = analysis.combined.fit(analysis.combined.best).statistics.weight is not None
     about = "weight of the law" if known else "too few readings to weigh"
     axes.set(xlim=(0, 1), ylim=(-len(SHOWN_LAWS) + 0.6, 0.75), yticks=[], xlabel=about)
@@ -210,8 +208,8 @@ def _draw_weights(axes: Axes, analysis: SpinDownAnalysis) -> None:
     axes.set_title("AICc weights" if analysis.combined.fits[0].statistics.aicc is not None else "weights", pad=3)
 
 
-def _note(analysis: SpinDownAnalysis, name: str) -> str:
-    """The verdict on a law in a word or two."""
+def _note(analysis: SpinDownAnalysis, name: str, *, short: bool = False) -> str:
+    """The verdict on a law in a word or two, or if `short` in the least that says it."""
     verdict, best = analysis.combined.verdict, name == analysis.combined.best
     if name in dict(verdict.excluded):
         return "excluded"
@@ -219,7 +217,9 @@ def _note(analysis: SpinDownAnalysis, name: str) -> str:
         return "best" if verdict.decided else "first" if verdict.describes else "nearest"
     if not verdict.describes:
         return ""
-    return "needless" if name in verdict.needless else "as good" if name in verdict.indistinguishable else ""
+    if name in verdict.needless:
+        return "needless" if short else "needless constants"
+    return "as good" if name in verdict.indistinguishable else ""
 
 
 def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
@@ -283,8 +283,8 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
         axes.plot(t, difference, linewidth=1.3, zorder=2.6, **LOOKS[name].as_line)
         where = "" if np.abs(difference).max() <= most else f", to {_signed(difference)} Hz"
         shaded = ", 2 u shaded" if name == best and u is not None else ""
-        said = _note(analysis, name).replace("needless", "needless constants") + shaded
-        ends.append((float(difference[-1]), name, f"{name}: {said or 'not excluded'}{where}"))
+        said = _note(analysis, name) or "not excluded"
+        ends.append((float(difference[-1]), name, f"{name}: {said}{shaded}{where}"))
     _name_laws(axes, [end for end in ends if math.isfinite(end[0])])
     of = "" if several == 1 else f"; curves of {'the longest run' if several > 1 else 'the run'}"
     axes.set_title(f"Readings and laws less the best law{of}", pad=3)

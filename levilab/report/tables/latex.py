@@ -15,7 +15,7 @@ from levilab.report.tables.widths import PARAGRAPH, SMALL_SEPARATION, fit
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from levilab.present.tables import Row, Table
+    from levilab.present.tables import Table
 
 #: ASCII characters with a meaning of their own in LaTeX, or in a table, or that join with a neighbour.
 _ASCII = {
@@ -43,7 +43,7 @@ _LEVELS = {"high": r"\textsuperscript{%s}", "low": r"\raisebox{-.4ex}{\scriptsiz
 
 
 def as_latex(name: str, table: Table, *, note: str = "", mark: str = "") -> str:
-    """A table as a float with caption and label; folded and in small letters where it is wider than an article.
+    """A table as a float with caption and label; folded, in small letters and in parts where it is wider than a line.
 
     Args:
         name: of the file; the label is ``tab:NAME``.
@@ -56,7 +56,7 @@ def as_latex(name: str, table: Table, *, note: str = "", mark: str = "") -> str:
     caption = escaped(" ".join([*marks, title]))
     fitted = fit(table)
     aligned = ["r" if k in table.numbers else "p" if k in fitted.paragraphs else "l" for k in range(len(table.heads))]
-    head = [rf"{_row(fitted.table.heads, aligned, bold=True)} \\", r"\midrule"] if any(table.heads) else []
+    parts = [_tabular(fitted.table, part, aligned) for part in fitted.parts]
     lines = [
         "% levilab report --tables; in the preamble: \\usepackage{booktabs}",
         r"\begin{table}[htbp]",
@@ -64,12 +64,8 @@ def as_latex(name: str, table: Table, *, note: str = "", mark: str = "") -> str:
         rf"  \caption{{{caption}}}",
         rf"  \label{{tab:{name}}}",
         *([rf"  \footnotesize\setlength{{\tabcolsep}}{{{SMALL_SEPARATION:g}pt}}"] if fitted.small else []),
-        rf"  \begin{{tabular}}{{{''.join(_COLUMNS[one] for one in aligned)}}}",
-        r"    \toprule",
-        *(f"    {line}" for line in head),
-        *(f"    {line}" for line in _body(fitted.table.rows, aligned)),
-        r"    \bottomrule",
-        r"  \end{tabular}",
+        *parts[0],
+        *(line for part in parts[1:] for line in (r"  \par\medskip", *part)),
         *([rf"  \par\smallskip{{\footnotesize {escaped(note)}\par}}"] if note else []),
         r"\end{table}",
     ]
@@ -89,15 +85,23 @@ def title_of(name: str) -> str:
 _COLUMNS = {"r": "r", "l": "l", "p": f"p{{{PARAGRAPH:g}\\linewidth}}"}
 
 
-def _body(rows: Sequence[Row], aligned: Sequence[str]) -> Iterable[str]:
-    for k, row in enumerate(rows):
-        if row.kind == "together" and k and rows[k - 1].kind != "together":
-            yield r"\midrule"
-        yield rf"{_row(row.cells, aligned)} \\"
+def _tabular(table: Table, columns: Sequence[int], aligned: Sequence[str]) -> Iterable[str]:
+    """Some columns of a table, each line indented for the float."""
+    yield rf"  \begin{{tabular}}{{{''.join(_COLUMNS[aligned[k]] for k in columns)}}}"
+    yield r"    \toprule"
+    if any(table.heads):
+        yield rf"    {_row(table.heads, columns, aligned, bold=True)} \\"
+        yield r"    \midrule"
+    for k, row in enumerate(table.rows):
+        if row.kind == "together" and k and table.rows[k - 1].kind != "together":
+            yield r"    \midrule"
+        yield rf"    {_row(row.cells, columns, aligned)} \\"
+    yield r"    \bottomrule"
+    yield r"  \end{tabular}"
 
 
-def _row(cells: Sequence[str], aligned: Sequence[str], *, bold: bool = False) -> str:
-    return " & ".join(_cell(cell, of, bold=bold) for cell, of in zip(cells, aligned, strict=True))
+def _row(cells: Sequence[str], columns: Sequence[int], aligned: Sequence[str], *, bold: bool = False) -> str:
+    return " & ".join(_cell(cells[k], aligned[k], bold=bold) for k in columns)
 
 
 def _cell(cell: str, aligned: str, *, bold: bool) -> str:

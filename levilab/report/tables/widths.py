@@ -1,4 +1,4 @@
-"""How wide a table is in LaTeX, and what makes it fit: units in the heads, smaller letters, folded lines.
+"""How wide a table is in LaTeX, and what makes it fit: units in heads, smaller letters, folded lines, several parts.
 
 Widths are those of Computer Modern, in points of letters of ten; they need to be right to some per cent only, since a
 page has more room than is asked for here.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from levilab.present.document.typesetting import typeset
@@ -38,8 +39,13 @@ _WIDE = 740
 #: A number, and what stands behind it.
 _WITH_UNIT = re.compile(r"(?:< )?[−+-]?\d[\d.]*(?:\([\d.]+\))?(?:×10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)? (?P<behind>.+)")
 #: A blank where a line may end: not between a number and its unit, beside a sign, behind "per", before a single letter
-#: (but for "combined: u"), or in brackets.
-_BLANK = re.compile(r"(?<![\d⁰¹²³⁴⁵⁶⁷⁸⁹)<=±−])(?<!\bper) (?![=±−])(?:(?<=: )|(?![^\W\d_](?:\W|$)))(?![^\[]*\])")
+#: (but for "combined: u"), or in brackets; and behind a dash between words.
+_BREAK = re.compile(
+    r"(?<![\d⁰¹²³⁴⁵⁶⁷⁸⁹)<=±−])(?<!\bper) (?![=±−])(?:(?<=: )|(?![^\W\d_](?:\W|$)))(?![^\[]*\])"
+    r"|(?<=[^\W\d_]–)(?=[^\W\d_])"
+)
+#: Where a line may end only if the table does not fit otherwise: also between a number and a unit that is a fraction.
+_LAST_BREAK = re.compile(rf"{_BREAK.pattern}|(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹)]) (?=\()")
 #: Heads are not folded to less than this [pt].
 _LEAST = 50.0
 
@@ -52,32 +58,65 @@ class Fitted:
         table: with units in heads where a column has one, and folded lines where it would be too wide.
         small: whether in smaller letters, with less space between the columns.
         paragraphs: columns whose texts LaTeX folds.
+        parts: columns of the tables that stand below each other; one unless the table is too wide.
     """
 
     table: Table
     small: bool
     paragraphs: frozenset[int]
+    parts: tuple[tuple[int, ...], ...]
 
 
 def fit(table: Table) -> Fitted:
-    """A table that fits into a line, as far as blanks allow it."""
+    """A table that fits into a line: as it is, or folded, or in parts that stand below each other.
+
+    Only a column that is too wide by itself does not fit.
+    """
     table = units_in_heads(table)
-    paragraphs = frozenset(k for k in range(len(table.heads)) if k not in table.numbers and _longest(table, k) > _LONG)
-    if _width(table, paragraphs) + 2 * _SEPARATION * len(table.heads) <= LINE:
-        return Fitted(table, small=False, paragraphs=paragraphs)
-    room = LINE - 2 * SMALL_SEPARATION * len(table.heads)
-    free = set(range(len(table.heads))) - paragraphs
+    columns = tuple(range(len(table.heads)))
+    paragraphs = frozenset(k for k in columns if k not in table.numbers and _longest(table, k) > _LONG)
+    if _width(table, columns, paragraphs) + 2 * _SEPARATION * len(columns) <= LINE:
+        return Fitted(table, small=False, paragraphs=paragraphs, parts=(columns,))
+    for breaks in (_BREAK, _LAST_BREAK):
+        folded = _folded_to_fit(table, paragraphs, breaks)
+        if _fits(folded, columns, paragraphs):
+            return Fitted(folded, small=True, paragraphs=paragraphs, parts=(columns,))
+    return Fitted(folded, small=True, paragraphs=paragraphs, parts=_parts(folded, paragraphs))
+
+
+def _folded_to_fit(table: Table, paragraphs: frozenset[int], breaks: re.Pattern[str]) -> Table:
+    """A table with its widest columns folded until it fits, or nothing can be folded any more."""
+    columns = tuple(range(len(table.heads)))
+    free = set(columns) - paragraphs
     limits: dict[int, float] = {}
-    folded = _folded(table, limits, paragraphs)
-    while free and _width(folded, paragraphs, _SMALL) > room:
+    folded = _folded(table, limits, paragraphs, breaks)
+    while free and not _fits(folded, columns, paragraphs):
         widest = max(sorted(free), key=lambda k: _column(folded, k))
         before = _column(folded, widest)
-        tried = _folded(table, limits | {widest: _STEP * before}, paragraphs)
+        tried = _folded(table, limits | {widest: _STEP * before}, paragraphs, breaks)
         if _column(tried, widest) < before:
             limits[widest], folded = _STEP * before, tried
         else:
             free.remove(widest)
-    return Fitted(folded, small=True, paragraphs=paragraphs)
+    return folded
+
+
+def _fits(table: Table, columns: Sequence[int], paragraphs: frozenset[int]) -> bool:
+    """Whether columns fit into a line, in small letters."""
+    return _width(table, columns, paragraphs, _SMALL) + 2 * SMALL_SEPARATION * len(columns) <= LINE
+
+
+def _parts(table: Table, paragraphs: frozenset[int]) -> tuple[tuple[int, ...], ...]:
+    """The columns in as few parts as fit, of about as many columns; each begins with the first one, if it is words."""
+    first = () if 0 in table.numbers else (0,)
+    others = range(len(first), len(table.heads))
+    parts: tuple[tuple[int, ...], ...] = ((*first, *others),)
+    for n in range(2, len(others) + 1):
+        ends = [round(k * len(others) / n) for k in range(n + 1)]
+        parts = tuple((*first, *others[low:high]) for low, high in pairwise(ends))
+        if all(_fits(table, part, paragraphs) for part in parts):
+            break
+    return parts
 
 
 def units_in_heads(table: Table) -> Table:
@@ -120,12 +159,13 @@ def _longest(table: Table, k: int) -> int:
     return max((len(line) for row in table.rows for line in row.cells[k].split("\n")), default=0)
 
 
-def _folded(table: Table, limits: Mapping[int, float], paragraphs: frozenset[int]) -> Table:
+def _folded(table: Table, limits: Mapping[int, float], paragraphs: frozenset[int], breaks: re.Pattern[str]) -> Table:
     """Columns folded to their limits [pt], and heads to the width of what stands below them."""
-    rows = tuple(
-        replace(row, cells=tuple(_fold(cell, limits[k]) if k in limits else cell for k, cell in enumerate(row.cells)))
-        for row in table.rows
-    )
+
+    def folded(cells: Sequence[str]) -> tuple[str, ...]:
+        return tuple(_fold(cell, limits[k], breaks) if k in limits else cell for k, cell in enumerate(cells))
+
+    rows = tuple(replace(row, cells=folded(row.cells)) for row in table.rows)
     found = replace(table, rows=rows)
     heads = (
         head if k in paragraphs else _fold(head, max(_of_cells(found, k) / _BOLD, _LEAST))
@@ -134,7 +174,7 @@ def _folded(table: Table, limits: Mapping[int, float], paragraphs: frozenset[int
     return replace(found, heads=tuple(heads))
 
 
-def _fold(cell: str, limit: float) -> str:
+def _fold(cell: str, limit: float, breaks: re.Pattern[str] = _BREAK) -> str:
     r"""A cell whose lines are as wide as the limit, or as a word [pt].
 
     >>> _fold("clock of the readings", 60)
@@ -143,23 +183,27 @@ def _fold(cell: str, limit: float) -> str:
     'ln ω\nagainst t'
     >>> _fold("0.97(3) (rad/s)^−½/s per Hz", 10)
     '0.97(3) (rad/s)^−½/s\nper Hz'
+    >>> _fold("0.97(3) (rad/s)^−½/s per Hz", 10, _LAST_BREAK), _fold("Durbin–Watson", 50)
+    ('0.97(3)\n(rad/s)^−½/s\nper Hz', 'Durbin–\nWatson')
     """
     lines: list[str] = []
     for line in cell.split("\n"):
-        first, *words = _BLANK.split(line)
-        lines.append(first)
-        for word in words:
-            together = f"{lines[-1]} {word}"
-            if width(together) <= limit:
+        begin, between = 0, ""
+        for k, found in enumerate([*breaks.finditer(line), None]):
+            piece = line[begin : found.start() if found else None]
+            together = f"{lines[-1]}{between}{piece}" if k else piece
+            if k and width(together) <= limit:
                 lines[-1] = together
             else:
-                lines.append(word)
+                lines.append(piece)
+            if found:
+                begin, between = found.end(), found[0]
     return "\n".join(lines)
 
 
-def _width(table: Table, paragraphs: frozenset[int], size: float = 1.0) -> float:
-    """Width without the space between the columns [pt]; that of a paragraph does not depend on the size of letters."""
-    return sum(PARAGRAPH * LINE if k in paragraphs else size * _column(table, k) for k in range(len(table.heads)))
+def _width(table: Table, columns: Sequence[int], paragraphs: frozenset[int], size: float = 1.0) -> float:
+    """Width of columns without the space between them [pt]; that of a paragraph is the same in small letters."""
+    return sum(PARAGRAPH * LINE if k in paragraphs else size * _column(table, k) for k in columns)
 
 
 def _column(table: Table, k: int) -> float:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import pytest
 
+from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from instruments.clock import VirtualClock
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
@@ -361,7 +362,7 @@ def test_a_full_disk_in_the_middle_leaves_outputs_off_and_the_shown_readings(
     tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Filling(Silent):
-        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 7:
                 monkeypatch.setattr("levilab.runs.writer.os.fsync", full)
@@ -399,11 +400,29 @@ def test_the_first_time_left_is_right_within_a_third(tmp_path: Path, highest: fl
 
 
 def test_the_time_left_follows_the_drag_that_is_seen() -> None:
-    """A disc's drag of half the usual constant, from 40 to 35 Hz: the rest to 21.86 Hz by the same law."""
+    """A disc's drag of half the usual constant, from 40 to 35 Hz: the rest to 25 and 21.36 Hz by the same law."""
     c, first = 1.17e-4, {"time_s": 0.0, "spin_frequency_hz": 40.0}
-    to = {hz: 2 / c * ((2 * np.pi * hz) ** -0.5 - (2 * np.pi * 40.0) ** -0.5) for hz in (35.0, 21.86)}
+    to = {hz: 2 / c * ((2 * np.pi * hz) ** -0.5 - (2 * np.pi * 40.0) ** -0.5) for hz in (35.0, *FALLS_BETWEEN_HZ)}
     last = {"time_s": to[35.0], "spin_frequency_hz": 35.0}
-    assert time_left(first, last) == pytest.approx(to[21.86] - to[35.0], rel=1e-9)
+    expected = [to[hz] - to[35.0] for hz in FALLS_BETWEEN_HZ]
+    assert time_left(first, last, 1800.0) == pytest.approx(expected, rel=1e-5)  # interpolated
+    assert time_left(first, last, to[35.0] + 20.0) == (20.0, 20.0)
+
+
+def test_the_practice_benchs_top_falls_within_the_time_left_that_is_shown(tmp_path: Path) -> None:
+    """A tilted moment brings it down at 23.3 Hz, long before the published tops' 21.86 Hz."""
+
+    class Watching(Silent):
+        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
+            super().reading(text, elapsed, remaining)
+            between.append((elapsed + remaining[0], elapsed + remaining[1]))
+
+    between: list[tuple[float, float]] = []
+    run = acquire(mock(tmp_path, 3, scene="practice"), Watching())
+    (fell,) = [event["time_s"] for event in run.events() if event["kind"] == "fell"]
+    for earliest, latest in between[len(between) // 2 :]:
+        assert earliest < fell < latest
+        assert latest - earliest > 30.0
 
 
 def test_a_resume_that_fails_keeps_the_run_and_its_readings(tmp_path: Path) -> None:

@@ -112,6 +112,14 @@ def test_a_reading_is_shown_with_its_units_and_the_time_left(request_of_a_scan: 
     assert [text.split()[3::2] for text in show.readings] == [["m", "T", "V"]] * 3
 
 
+def test_the_points_of_a_scans_values_stand_below_each_other(tmp_path: Path) -> None:
+    show = Silent()
+    options = AcquisitionOptions(mock=True, out=tmp_path, seed=1, settings=("field.lowest_m=0.06",))
+    acquire(request_for("field", options), show)
+    assert len(show.readings) > 5
+    assert len({tuple(k for k, c in enumerate(text) if c == ".") for text in show.readings}) == 1
+
+
 def test_records_are_kept_raw_and_come_back_in_volts(request_of_a_scan: AcquisitionRequest) -> None:
     run = acquire(request_of_a_scan, Silent())
     stored = run.traces()

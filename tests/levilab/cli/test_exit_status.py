@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import errno
+import inspect
 import re
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -229,6 +231,13 @@ def test_an_interrupted_analysis_says_in_one_line_what_is_lost(
         assert (ended.status, ended.out) == (exit_codes.INTERRUPTED, "")
         assert len(ended.err.splitlines()) == 1
         assert says in ended.err
+
+
+def test_the_exit_statuses_know_only_the_trees_of_errors() -> None:
+    """A class of another room needs no row of its own: it says what it is by its base."""
+    tree = ast.parse(inspect.getsource(exit_codes))
+    imported = {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    assert imported <= {"__future__", "analysis.errors", "instruments.errors", "levilab.errors"}
 
 
 def test_a_defect_of_the_program_stays_loud(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

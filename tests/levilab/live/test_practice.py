@@ -61,9 +61,32 @@ def see_another_program_record(page: Page, served: Hall, older: GrowingRun) -> N
         assert page.inner_text("#said").startswith("Another program records this run")
         assert page.evaluate(DONE) == "drive"  # as before: the guide is of the bench for practice
         until(page, "levilab.space.parts.base.outer === 0.07")  # the top and the base of that program
+        page.get_by_role("button", name="To the practice bench").press("Enter")
+        until(page, "levilab.seen.run === '' && !document.getElementById('controls').disabled")
+        until(page, f"levilab.space.parts.base.outer === {outer} && document.getElementById('own').hidden")
+        assert page.evaluate("document.activeElement.id") == "practice"
+        assert page.inner_text("#run option:checked") == "no run of this bench yet"
+        page.select_option("#run", OLDER)
+        until(page, f"levilab.seen.run === '{OLDER}' && levilab.seen.source === 1")
+        publish(served.watches[OLDER], State(8.0, folder=str(older.folder)), pose)
+        until(page, "document.getElementById('controls').disabled")
     older.say(status="finished")
     until(page, "!document.getElementById('controls').disabled && document.getElementById('said').textContent === ''")
     until(page, f"levilab.space.parts.base.outer === {outer}")  # and those of the bench for practice
+
+
+def record_some_readings(page: Page) -> None:
+    """Meanwhile the oscilloscope stands still, and the page says why."""
+    page.click("#record")
+    until(page, f"levilab.data.bench?.busy && levilab.seen.run !== '{OLDER}' && levilab.data.count >= 3")
+    until(page, "levilab.data.fit")
+    still = "not read in a spin run, whose readings would wait"
+    assert page.inner_text("#scope-key").endswith(still)
+    gap = "document.getElementById('scope-key').getBoundingClientRect().left - range.getBoundingClientRect().right"
+    of_heading = "const range = document.createRange(); range.selectNodeContents(document.getElementById('scope-h'));"
+    assert page.evaluate(f"() => {{ {of_heading} return {gap}; }}") > 0  # beside the heading, not over it
+    assert still in (page.get_attribute("#trace", "aria-label") or "")
+    page.click("#record")
 
 
 def type_into_the_fields(page: Page) -> None:
@@ -115,7 +138,7 @@ def test_a_student_drives_records_and_analyzes(
     page.keyboard.press(".")  # from a spin that was counted, which lies between the steps of the field
     until(page, "Math.abs(levilab.data.bench.drive.frequency_hz - levilab.data.before - 0.05) < 0.006")
     type_into_the_fields(page)
-    assert page.evaluate("[levilab.seen.run, document.getElementById('run').value, levilab.data.count]") == ["", "", 0]
+    assert page.evaluate("[levilab.seen.run, document.getElementById('run').value, levilab.data.count]") == ["", ".", 0]
     can_be_analyzed = "!document.getElementById('analyze').disabled"
     page.select_option("#run", OLDER)  # of another bench, and it is there like one of this
     until(page, f"levilab.data.count === 19 && levilab.data.bench && {can_be_analyzed}")
@@ -129,10 +152,7 @@ def test_a_student_drives_records_and_analyzes(
     until(page, f"levilab.frames > {frames}")
     assert page.evaluate(DONE) == "drive"  # this bench has recorded nothing
     see_another_program_record(page, served, older)
-    page.click("#record")
-    until(page, f"levilab.data.bench?.busy && levilab.seen.run !== '{OLDER}' && levilab.data.count >= 3")
-    until(page, "levilab.data.fit")
-    page.click("#record")
+    record_some_readings(page)
     until(page, "document.body.dataset.state === 'interrupted'")
     until(page, "document.getElementById('speed').value === '1'")  # after a run
     name = page.input_value("#run")

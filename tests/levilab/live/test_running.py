@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.spindown.drag import LAWS
+from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from analysis.spindown.tilt import count
-from levilab.live.running import FALLS_BETWEEN_HZ, spin_down
+from levilab.live.running import _without_forecast, spin_down
 
 C32, START_HZ, RESONANCE_HZ, TILT_RAD = 2.3e-4, 34.0, 21.4, 0.025
 
@@ -18,6 +19,8 @@ def test_the_forecast_is_of_the_law_and_does_not_run_into_the_resonance() -> Non
     noise = np.random.default_rng(2).normal(0, 0.005, time.size)
     found = spin_down({"time_s": time, "spin_frequency_hz": spin + noise}, 1)
     curve, last = found.curve, float(time[-1])
+    assert found.head.startswith(f"{found.look} law, the best so far   ω̇ = ")
+    assert found.dashed == "dashed: the law alone, without the tilt, which is in the count"
     assert curve is not None
     assert found.end_s is not None
     # under the drag of a disc ω^(−1/2) grows evenly, by C/2; 1 s: the fit's C is good to 1 %, of 25 to 30 s
@@ -29,4 +32,7 @@ def test_the_forecast_is_of_the_law_and_does_not_run_into_the_resonance() -> Non
     assert curve.x[-1] == found.end_s[1]  # the line goes as far as the head of the page says
     steps = -np.diff(curve.y)
     assert steps.min() > 0
+    ended = _without_forecast(found)
+    assert ended.head.startswith(f"{found.look} law   ω̇ = ")
+    assert not ended.dashed
     assert steps.max() < 2 * steps.min() * (START_HZ / FALLS_BETWEEN_HZ[1]) ** 1.5  # no kink at the last reading

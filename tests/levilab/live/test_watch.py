@@ -14,7 +14,7 @@ import pytest
 from levilab.live.desk import Desk
 from levilab.live.doors import Doors
 from levilab.live.running import Curve, Running
-from levilab.live.server import Hall
+from levilab.live.server import OWN_BENCH, Hall
 from levilab.live.watch import Watch
 from levilab.telemetry.address import Address, write_address
 from levilab.telemetry.messages import State
@@ -126,6 +126,20 @@ def test_a_page_that_chose_no_run_turns_to_that_of_another_program(tmp_path: Pat
             assert shown() == "2-other"
             desk.is_recording = True
             assert shown() == "1-own"
+
+
+def test_a_page_that_went_back_to_its_own_bench_stays_there(tmp_path: Path) -> None:
+    own, other = (GrowingRun(tmp_path, name) for name in ("1-own", "2-other"))
+    desk = SimpleNamespace(address=lambda: Address.at(1), folder=None, folders=[], is_recording=False)
+    hall = Hall(tmp_path, "", Doors(1), desk)  # type: ignore[arg-type]
+    with other.running(), hall.watching("") as watch, hall.watching(OWN_BENCH) as kept:
+        asyncio.run(hall.turn_to_another())
+        assert watch.followed
+        assert watch.followed.folder == other.folder
+        assert kept.followed is None
+        publish(kept, State(0.0, folder=str(own.folder)))  # what the bench itself records is followed
+        assert kept.followed
+        assert kept.followed.folder == own.folder
 
 
 def test_a_page_that_waits_is_sent_a_fit_when_it_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -40,6 +40,13 @@ def test_a_person_sees_value_trend_instruments_and_time_left() -> None:
     ]
 
 
+def test_a_top_that_may_fall_earlier_has_the_least_time_left_beside_the_most() -> None:
+    *_, bar = texts(replace(LOCKED, least_left_s=42.0), 84)
+    assert bar.endswith("  1:00 min done, about 42 s to 1:35 min left")
+    *_, bar = texts(replace(LOCKED, least_left_s=0.0), 84)
+    assert bar.endswith("  1:00 min done, at most 1:35 min left")
+
+
 def test_a_field_of_zero_has_no_sign() -> None:
     assert "field 0.0000 mT" in texts(replace(LOCKED, last={"flux_density_t": -1e-9}))[0]
 

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -133,6 +134,35 @@ def test_a_paragraph_is_as_wide_in_small_letters() -> None:
     assert fitted.paragraphs == {1}
     assert fitted.table.rows[0].cells[1] == remark
     assert set_width(fitted) < LINE
+
+
+def test_a_table_that_cannot_be_folded_stands_in_parts_each_with_its_first_column() -> None:
+    heads = ("run", "readings used", "C₁ [s⁻¹]", "C₂ [rad⁻¹]", "C₃/₂ [(rad/s)^−½/s]", "ν₀ [Hz]", "fit [(rad/s)^−½/s]")
+    row = ("spin-down-1", "20", "3.199(33)×10⁻³", "1.760(16)×10⁻⁵", "2.367(5)×10⁻⁴", "39.941(16)", "2.3687(35)×10⁻⁴")
+    shown = table("", heads, [row, Row(("mean", *row[1:]), "together")], numbers=heads[1:])
+    fitted = fit(shown)
+    assert fitted.parts == ((0, 1, 2, 3), (0, 4, 5, 6))
+    for part in fitted.parts:
+        rows = tuple(replace(one, cells=tuple(one.cells[k] for k in part)) for one in fitted.table.rows)
+        cut = replace(fitted.table, heads=tuple(fitted.table.heads[k] for k in part), rows=rows)
+        assert set_width(replace(fitted, table=cut)) < LINE
+    text = as_latex("runs", shown)
+    assert text.count(r"\toprule") == text.count(r"\bottomrule") == 2
+    assert text.count(r"\textbf{run}") == 2
+    assert text.count(r"\caption") == text.count(r"\label") == 1
+
+
+def test_a_number_leaves_its_unit_only_where_the_table_would_not_fit() -> None:
+    heads = ("source", "type", "u of it", "sensitivity", "adds to u", "share of u²")
+    unit = "(rad/s)^−½/s"
+    wide = ("last digit of the readings", "B", f"1.9×10⁻⁷ {unit}", f"9.9×10⁻⁶ {unit} per Hz", f"3×10⁻⁷ {unit}", "70 %")
+    rows = [wide, ("readings, by their stated u", "B", "0.03 Hz", "1", f"2.9×10⁻⁸ {unit}", "0.66 %")]
+    fitted = fit(table("", heads, rows, numbers=heads[2:]))
+    assert len(fitted.parts) == 1
+    assert set_width(fitted) < LINE
+    assert fitted.table.rows[1].cells[2] == "0.03 Hz"
+    roomy = fit(table("", heads[1:4], [row[1:4] for row in rows], numbers=heads[2:4]))
+    assert roomy.table.rows[0].cells[1] == wide[2]
 
 
 def set_width(fitted: Fitted) -> float:

@@ -11,10 +11,12 @@ import pytest
 from levilab.motion.lines import AxisLines, NamedLine
 from levilab.present.document.blocks import Picture
 from levilab.present.style import as_svg
-from levilab.reproduce import beyond, dipole, driven, errata, gans, limits, simon, spindown, statistics, windows
+from levilab.reproduce import beyond, dipole, driven, errata, gans, limits, paths, simon, spindown, statistics, windows
 from levilab.reproduce.check import Because, Check, Comparison, Statement, Verdict, counts
 from levilab.reproduce.table import numbers
 from levilab.reproduce.tops import THESIS, scan, started, survivors
+from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.scene import preset
 from levilab.stability.scan import all_up_until, last_up, lower_limit, upper_edges
 from support.paths import ROOT
 
@@ -89,6 +91,22 @@ def test_made_up_readings_are_marked_in_the_chapter_and_its_figure(quick):
     (picture,) = (block for block in found.blocks if isinstance(block, Picture))
     assert "SYNTHETIC" in picture.caption
     assert not quick["statistics"].synthetic
+
+
+def test_the_least_spin_is_one_number_or_has_the_mass_that_changes_it_beside_it(quick):
+    (estimate,) = (one for one in quick["stability"].findings if one.name.startswith("least spin"))
+    assert "for 25.26 g at 7.30 cm, where they float, it is 21.69 Hz" in estimate.why
+    slip = errata.least_spin()
+    assert slip.truth == pytest.approx(stability_of(preset("undriven")).sleeping, rel=1e-9)
+    assert "25.26 g at 7.30 cm" in slip.name
+    assert "the printed 14.005 Hz are its own equation's for 25.30 g at 7.3 cm" in slip.why
+    limit, words, explained = paths.sleeping_in_words(started("IC1", "friction"))
+    assert limit == pytest.approx(21.729, abs=0.001)
+    assert "21.73 Hz for its 25.285 g, which float at 7.28 cm" in words
+    assert "25.26 g float at 7.30 cm, in a weaker field: 21.69 Hz" in words
+    assert explained
+    _, _, explained = paths.sleeping_in_words(started("IC1", "friction", "top.inertia_axial_kg_m2=1.8e-6"))
+    assert not explained
 
 
 def test_the_errata_are_true_by_a_third_way():

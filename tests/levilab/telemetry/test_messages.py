@@ -25,6 +25,7 @@ states = st.builds(
     text=texts,
     share=maybe,
     time_left_s=maybe,
+    least_left_s=maybe,
     readings=st.integers(0, 10**9),
     events=st.integers(0, 10**9),
     last=st.dictionaries(texts, numbers, max_size=5),

@@ -127,7 +127,7 @@ def test_a_magnetometer_that_is_reset_on_the_way_is_set_up_anew(tmp_path: Path) 
     meter: Any = bus.instruments["ASRLmagnetometer.levilab::INSTR"]
 
     class Resets(Silent):
-        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 2:
                 meter.reset()

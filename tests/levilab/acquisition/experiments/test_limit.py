@@ -19,6 +19,7 @@ from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration, settings_of, with_settings
+from levilab.bench.config import ConfigError
 from levilab.errors import UsageError
 from levilab.pipelines.limit.analysis import LimitOptions, analyze_limits
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
@@ -122,7 +123,7 @@ def test_a_limit_is_kept_though_the_generator_fails_as_it_is_switched_off(
     faults: list[int] = []
 
     class Watchful(Silent):
-        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
             super().reading(text, elapsed, remaining)
             faults.extend([1, 2])
 
@@ -305,6 +306,21 @@ def test_a_drive_beyond_the_bench_is_refused_before_it_begins(tmp_path: Path) ->
         mock(tmp_path, "limit.which=upper", "limit.highest_hz=120")
     with pytest.raises(UsageError, match=r"limit\.highest_hz = 25: more than limit\.drive_frequency_hz = 30"):
         mock(tmp_path, "limit.which=upper", "limit.highest_hz=25")
+
+
+def test_a_setting_that_the_bench_files_do_not_allow_is_wrong_usage(tmp_path: Path) -> None:
+    """The bench's limit is lower than the default highest_hz, which counts once the upper limit is asked for."""
+    bench = tmp_path / "bench.toml"
+    bench.write_text("[limits]\ndrive_frequency_hz = 60.0\n", encoding="utf-8")
+    with pytest.raises(UsageError, match=r"limit\.highest_hz = 100 is more than this bench allows"):
+        mock(tmp_path, "limit.which=upper", bench=bench)
+
+
+def test_a_bench_file_that_is_wrong_without_the_given_settings_is_named(tmp_path: Path) -> None:
+    bench = tmp_path / "bench.toml"
+    bench.write_text("[limits]\ndrive_frequency_hz = 20.0\n[limit]\ndrive_frequency_hz = 30\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"limit\.drive_frequency_hz = 30 is more than this bench allows"):
+        mock(tmp_path, "limit.repetitions=5", bench=bench)
 
 
 def test_settings_on_the_command_line_go_before_the_bench_files(tmp_path: Path) -> None:

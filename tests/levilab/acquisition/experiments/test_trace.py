@@ -16,6 +16,7 @@ from instruments.virtual.core.trigger import crossings
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
+from levilab.acquisition.table import settings_of
 from levilab.bench.config import ConfigError
 from levilab.runs.listing import list_runs
 from levilab.runs.run import Run
@@ -45,10 +46,10 @@ CALM = """
 """
 
 
-def mock_trace(folder: Path, settings: str = "", **options: Any) -> AcquisitionRequest:
+def mock_trace(folder: Path, lines: str = "", **options: Any) -> AcquisitionRequest:
     """Records on the virtual bench, with lines of the bench file's table [trace]."""
     bench = folder / "bench.toml"
-    bench.write_text(f"[trace]\n{settings}\n", encoding="utf-8")
+    bench.write_text(f"[trace]\n{lines}\n", encoding="utf-8")
     return request_for("trace", AcquisitionOptions(mock=True, bench=bench, out=folder / "runs", **options))
 
 
@@ -80,6 +81,18 @@ def test_the_tape_is_recorded_raw_with_what_reads_it(tmp_path: Path) -> None:
     assert readings.column("highest_v").max() == pytest.approx(1.2, abs=0.05)
     [listed] = list_runs(run.folder)
     assert (listed.size, listed.experiment) == ("3 records", "trace")
+
+
+def test_a_given_setting_leaves_the_others_to_the_scene(tmp_path: Path) -> None:
+    (tmp_path / "calm.toml").write_text(CALM, encoding="utf-8")
+    scene = str(tmp_path / "calm.toml")
+    plain, given = (
+        settings_of(mock_trace(tmp_path, scene=scene, seed=1, settings=some).config, "trace")
+        for some in ((), ("trace.records=2",))
+    )
+    assert given.records == 2
+    assert given.shows == plain.shows == ("tape", "laser")
+    assert given.drive_frequency_hz == plain.drive_frequency_hz
 
 
 def test_with_a_scene_the_laser_is_recorded_beside_the_tape(tmp_path: Path) -> None:
@@ -169,7 +182,7 @@ def test_a_channel_that_another_program_turns_off_is_turned_on_again(tmp_path: P
     wiring = virtual_wiring(SpinWorld(random_scene(1), VirtualClock()))
 
     class Meddler(Silent):
-        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 1:
                 scope = wiring.library.bench.instruments[VIRTUAL["oscilloscope"].address]
@@ -187,7 +200,7 @@ def watched(tmp_path: Path, message: str, scene: SpinScene | None = None) -> Run
     wiring = virtual_wiring(SpinWorld(scene or SpinScene(), VirtualClock()))
 
     class Meddler(Silent):
-        def reading(self, text: str, elapsed: float, remaining: float) -> None:
+        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 1:
                 wiring.library.bench.instruments[VIRTUAL["generator"].address].execute(message)

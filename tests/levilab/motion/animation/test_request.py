@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +94,7 @@ def test_a_page_of_too_long_a_span_names_the_longest_one(tmp_path: Path, monkeyp
     assert "a page of at most 1.5 MB holds" in ended.err
     assert "choose a span of at most 6" in ended.err
     assert "compiling for this kind of scene" in ended.err
+    assert re.search(r"\ncompiled in \d+\.\d s\n", ended.err)
     assert not list(tmp_path.iterdir())
 
 

@@ -104,6 +104,34 @@ def test_groups_of_the_same_mean_are_told_apart(sample_data: Path, tmp_path: Pat
         ANALYSES["limit"].recall([tmp_path], LimitOptions())
 
 
+def test_measured_and_made_up_runs_are_never_one_mean(sample_data: Path, tmp_path: Path) -> None:
+    """Three runs of one top, of which the second is made up and lies 10 Hz higher; the third is the first, reversed."""
+    for name, synthetic in (("a", False), ("b", True), ("c", False)):
+        folder = shutil.copytree(sample_data / "lower-limits", tmp_path / name)
+        record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        record |= {"synthetic": synthetic, "synthetic_how": "made up" if synthetic else None}
+        (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
+        head, *limits = (folder / "readings.csv").read_text(encoding="utf-8").split()
+        limits = {"a": limits, "b": [f"{32.0 + 0.1 * k:.1f}" for k in range(10)], "c": limits[::-1]}[name]
+        (folder / "readings.csv").write_text("\n".join([head, *limits, ""]), encoding="utf-8")
+    analysis = ANALYSES["limit"].analyze([tmp_path], LimitOptions())
+    assert sorted(group.runs for group in analysis.groups) == [(0, 2), (1,)]
+    (measured,) = (group for group in analysis.groups if group.runs == (0, 2))
+    assert measured.statistics.mean.value == pytest.approx(21.86)
+    assert "not known to be SYNTHETIC" in measured.text
+    assert any("are of 2 conditions and are not put together" in text for text in analysis.all_warnings)
+    assert not any("says nothing about a real top" in text for text in analysis.all_warnings)
+    document = ANALYSES["limit"].document(analysis, tmp_path)
+    assert [group["conditions"]["synthetic"] for group in document["groups"]] == [False, True]
+    save(ANALYSES["limit"], analysis)
+    assert ANALYSES["limit"].recall([tmp_path], LimitOptions()).groups == analysis.groups
+    page = write_report([tmp_path], tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "MIXED" not in page
+    (alone,) = ANALYSES["limit"].analyze([tmp_path / "a", tmp_path / "c"], LimitOptions()).groups
+    assert alone.statistics == measured.statistics
+    assert alone.conditions.synthetic is None  # nothing to be told apart from
+
+
 def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(sample_data / "loose-washers", tmp_path / "run")
     analysis = analyze_limits([folder], LimitOptions())
