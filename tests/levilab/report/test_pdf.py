@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from datetime import UTC, datetime
+from functools import cache
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,7 @@ from levilab.present.document.blocks import (
     Verdict,
     Warnings,
 )
+from levilab.present.style import as_pdf as as_pdf_page
 from levilab.present.tables import table
 from levilab.report.html.page import page_of
 from levilab.report.page import write_report
@@ -150,10 +152,14 @@ def test_a_heading_and_what_introduces_its_table_stand_on_the_page_of_the_table(
     assert seen == {1, 2}
 
 
-def test_a_tall_figure_stands_between_the_heading_of_its_chapter_and_the_next_one() -> None:
+def test_a_tall_figure_stands_between_the_heading_of_its_chapter_and_the_next_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    figure = drawn()
+    figure.set_size_inches(7, 4.6)
+    monkeypatch.setattr("levilab.present.style.as_pdf", cache(as_pdf_page))  # all figures are this one
+
     def tall() -> Figure:
-        figure = drawn()
-        figure.set_size_inches(7, 4.6)
         return figure
 
     def chapter(name: str, lines: int) -> Section:
