@@ -56,7 +56,7 @@ def _edges(highest: int, z: Array, radii: tuple[float, ...]) -> Array:
     found[0] = x
     scale = np.array([radius**2 for radius in radii]).reshape(shape) / u**3  # with the sign and the factorial
     found[1] = scale
-    before, polynomial = 1.0, 3 * x
+    before, polynomial = np.ones(()), 3 * x
     for n in range(1, highest):
         scale = -n * scale / u
         found[n + 1] = scale * polynomial

@@ -104,6 +104,7 @@ def test_groups_of_the_same_mean_are_told_apart(sample_data: Path, tmp_path: Pat
         ANALYSES["limit"].recall([tmp_path], LimitOptions())
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(sample_data / "loose-washers", tmp_path / "run")
     analysis = analyze_limits([folder], LimitOptions())
