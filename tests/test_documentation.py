@@ -14,8 +14,10 @@ import pytest
 from support.commands import command
 from support.figures import without_drawing
 from support.paths import ROOT
+from support.trials import with_few_trials
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 PAGES = [
@@ -39,7 +41,7 @@ def blocks(language: str) -> list[tuple[str, str]]:
 def test_python_in_the_pages_prints_what_it_says(page: str, code: str, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "sample_data", tmp_path / "sample_data")
     shown = io.StringIO()
-    with contextlib.chdir(tmp_path), contextlib.redirect_stdout(shown):
+    with contextlib.chdir(tmp_path), contextlib.redirect_stdout(shown), in_full_on(page):
         exec(compile(code, page, "exec"), {"__name__": "__main__"})
     assert shown.getvalue().splitlines() == re.findall(r"print\(.*\)  # (.*)", code)
 
@@ -72,14 +74,25 @@ def as_pattern(shown: str) -> str:
     return "".join(lines) + r"\Z"
 
 
-#: The page whose figures are drawn: those of every analysis.  No test looks at those of the others.
-DRAWN = "README.md"
+#: The page whose figures are drawn, and whose reports have all of their trials: those of every analysis.  No test looks
+#: at those of the others.
+IN_FULL = "README.md"
+
+
+@contextlib.contextmanager
+def in_full_on(page: str) -> Iterator[None]:
+    """Draw figures and make all trials for one page alone."""
+    if page == IN_FULL:
+        yield
+    else:
+        with without_drawing(), with_few_trials():
+            yield
 
 
 @pytest.mark.parametrize("page", steps())
 def test_the_commands_of_a_page_work_one_after_another(tmp_path: Path, page: str) -> None:
     shutil.copytree(ROOT / "sample_data", tmp_path / "sample_data")
-    with contextlib.nullcontext() if page == DRAWN else without_drawing():
+    with in_full_on(page):
         follow(steps()[page], tmp_path)
 
 

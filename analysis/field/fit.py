@@ -329,7 +329,7 @@ class _Problem:
         return [(index, prior) for index, prior in found if prior]
 
     def model(self, values: Array) -> Array:
-        return np.asarray(on_axis(_ring(values), self.z)[0] + values[3])
+        return np.asarray(on_axis(_ring(values), self.z, orders=1)[0] + values[3])
 
     def slopes(self, values: Array) -> Array:
         """Return the slopes of the model by all parameters, shape (6, n)."""
@@ -338,7 +338,7 @@ class _Problem:
 
     def sigma(self, values: Array) -> Array:
         """Return u of each reading against the model [T], shape (n,)."""
-        by_height = on_axis(_ring(values), self.z)[1] * self.u_z
+        by_height = on_axis(_ring(values), self.z, orders=2)[1] * self.u_z
         u_b = self._scatter(values) if self.u_b is None else self.u_b
         return np.asarray(np.hypot(u_b, by_height))
 
@@ -358,7 +358,7 @@ class _Problem:
         radii = known.inner_radius.value, known.outer_radius.value
         best = (math.inf, np.zeros(6))
         for origin in origins:
-            unit = on_axis(Ring(1.0, origin, thickness, *radii), self.z)[0]
+            unit = on_axis(Ring(1.0, origin, thickness, *radii), self.z, orders=1)[0]
             strength = float(unit @ self.b / (unit @ unit))
             left = self.b - strength * unit
             values = np.array([strength, origin, thickness, known.background.value, *radii])

@@ -35,40 +35,62 @@ class Ring:
     outer_radius: float
 
 
-def _edges(highest: int, z: Array, radius: float) -> Array:
-    """Return the derivatives of F = z/√(R² + z²), orders 0 to highest ≥ 1, at z of shape (n,): shape (highest + 1, n).
+def _edges(highest: int, z: Array, radii: tuple[float, ...]) -> Array:
+    """Return the derivatives of F = z/√(R² + z²) for each radius, orders 0 to highest ≥ 1.
 
     F′ = R²/u³ with u² = R² + z², and dⁿu⁻³/dzⁿ = (−1)ⁿ n! C_n(z/u)/uⁿ⁺³ with Gegenbauer's polynomials of λ = 3/2 (their
     generating function; Abramowitz & Stegun 22.9.3), which follow from one another by 22.7.3.
+
+    Args:
+        highest: order.
+        z: any shape.
+        radii: all at once, since on short arrays a call of numpy costs more than its arithmetic.
+
+    Returns:
+        Shape (highest + 1, radii, *shape of z).
     """
-    u = np.sqrt(radius * radius + z * z)
+    shape = (len(radii), *[1] * z.ndim)
+    u = np.sqrt(np.array([radius * radius for radius in radii]).reshape(shape) + z * z)
     x = z / u
-    found = [x]
-    before, polynomial = np.zeros_like(x), np.ones_like(x)
-    scale = radius**2 / u**3  # with the sign and the factorial
-    for n in range(highest):
-        found.append(scale * polynomial)
-        scale = -(n + 1) * scale / u
-        before, polynomial = polynomial, ((2 * n + 3) * x * polynomial - (n + 2) * before) / (n + 1)
-    return np.array(found)
+    found = np.empty((highest + 1, *x.shape))
+    found[0] = x
+    scale = np.array([radius**2 for radius in radii]).reshape(shape) / u**3  # with the sign and the factorial
+    found[1] = scale
+    before, polynomial = np.ones(()), 3 * x
+    for n in range(1, highest):
+        scale = -n * scale / u
+        found[n + 1] = scale * polynomial
+        if n + 1 < highest:
+            before, polynomial = polynomial, ((2 * n + 3) * x * polynomial - (n + 2) * before) / (n + 1)
+    return found
 
 
 def _sheet(highest: int, z: Array, ring: Ring) -> Array:
-    return _edges(highest, z, ring.inner_radius) - _edges(highest, z, ring.outer_radius)
+    of_radii = _edges(highest, z, (ring.inner_radius, ring.outer_radius))
+    return np.asarray(of_radii[:, 0] - of_radii[:, 1])
 
 
 def _is_thin(ring: Ring) -> bool:
     return abs(ring.thickness) < _THIN * ring.inner_radius
 
 
+def _faces(highest: int, z: Array, ring: Ring) -> Array:
+    """Return F of a sheet and its derivatives at the upper and at the lower face: shape (highest + 1, 2, n)."""
+    at, h = z - ring.origin, ring.thickness
+    return _sheet(highest, np.array([at + h / 2, at - h / 2]), ring)
+
+
 def _mean(orders: int, z: Array, ring: Ring) -> Array:
     """Return F′ of a sheet and its derivatives, averaged over the thickness: shape (orders, n)."""
-    at, h = z - ring.origin, ring.thickness
     if _is_thin(ring):
-        sheet = _sheet(orders + 2, at, ring)
+        sheet, h = _sheet(orders + 2, z - ring.origin, ring), ring.thickness
         return sheet[1 : orders + 1] + h * h / 24 * sheet[3:]
-    last = max(orders - 1, 1)
-    return (_sheet(last, at + h / 2, ring) - _sheet(last, at - h / 2, ring))[:orders] / h
+    return _between(_faces(max(orders - 1, 1), z, ring)[:orders], ring)
+
+
+def _between(faces: Array, ring: Ring) -> Array:
+    """Return the means over the thickness of what has these integrals, shape (orders, 2, n) → (orders, n)."""
+    return np.asarray((faces[:, 0] - faces[:, 1]) / ring.thickness)
 
 
 def on_axis(ring: Ring, z: Array, orders: int = 3) -> Array:
@@ -84,12 +106,13 @@ def on_axis(ring: Ring, z: Array, orders: int = 3) -> Array:
 def slopes(ring: Ring, z: Array) -> Array:
     """Return ∂B_z by strength, origin, thickness, inner and outer radius; shape (5, n) [T per unit of each]."""
     at, h, k = z - ring.origin, ring.thickness, -2 * math.pi * ring.strength
-    mean, bend = _mean(2, z, ring)
     if _is_thin(ring):
+        mean, bend = _mean(2, z, ring)
         with_thickness = h / 12 * _sheet(3, at, ring)[3]
     else:
-        faces = (_sheet(1, at + h / 2, ring) + _sheet(1, at - h / 2, ring))[1] / 2
-        with_thickness = (faces - mean) / h
+        faces = _faces(1, z, ring)
+        mean, bend = _between(faces, ring)
+        with_thickness = ((faces[1, 0] + faces[1, 1]) / 2 - mean) / h
     radii = ring.inner_radius, ring.outer_radius
     inner, outer = (_with_radius(at, radius, ring) for radius in radii)
     return np.array([-2 * math.pi * mean, -k * bend, k * with_thickness, k * inner, -k * outer])

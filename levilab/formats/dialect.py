@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import takewhile
 from typing import Literal
 
@@ -160,6 +160,11 @@ def find_dialect(lines: Sequence[str], first: Sequence[str] = ()) -> Dialect | N
         lines: those that are rows, if there are any.
         first: the first ones of the file, where titles stand above all rows.
     """
+    return _find_dialect(tuple(lines), tuple(first))
+
+
+@lru_cache(maxsize=64)  # each analysis reads the files of a folder anew, to see which of them suit it
+def _find_dialect(lines: tuple[str, ...], first: tuple[str, ...]) -> Dialect | None:
     scores = {d: _score(content_lines(lines, d), SEPARATORS.index(d.separator)) for d in DIALECTS}
     best = max(DIALECTS, key=scores.__getitem__)
     if scores[best][1]:

@@ -140,12 +140,6 @@ class Analysis(Generic[A]):
 
         return as_png(self.figure(found))
 
-    def svg(self, found: A) -> str:
-        """The figure."""
-        from levilab.present.style import as_svg  # with matplotlib
-
-        return as_svg(self.figure(found))
-
 
 #: What a scan's quantities are called.
 FIELD_WORDS = MappingProxyType({name: one.words for name, one in SHOWN.items()})

@@ -374,6 +374,7 @@ def test_a_run_whose_readings_are_damaged_is_still_shown(tmp_path: Path) -> None
 # --- simulate ---
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_simulated_motion_has_the_states_that_were_asked_for(tmp_path: Path) -> None:
     motion = levilab.simulate("undriven", 2, rate=50, settings={"start.spin_hz": 31.0}, out=tmp_path)
     states = motion.to_dataframe()

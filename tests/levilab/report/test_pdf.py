@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import subprocess
-import sys
 from datetime import UTC, datetime
-from hashlib import sha256
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from levilab.present.document.blocks import (
     Banner,
-    Bullets,
-    Code,
-    Details,
     Document,
-    Fact,
-    Facts,
-    Listing,
     Note,
     Paragraph,
     Picture,
@@ -30,13 +21,14 @@ from levilab.present.document.blocks import (
     Verdict,
     Warnings,
 )
+from levilab.present.style import as_pdf as as_pdf_page
 from levilab.present.tables import table
 from levilab.report.html.page import page_of
 from levilab.report.page import write_report
 from levilab.report.pdf.renderer import NoTypst, as_pdf, files_of, fonts
 from support.commands import command
+from support.documents import drawn, of_all_blocks
 from support.paths import ROOT
-from support.waiting import HANG_GUARD_S
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -51,27 +43,6 @@ HOSTILE = " ".join([
     "w" * 300,
     "runs/" + "/".join(["20261120T101500Z-spin-7f3a"] * 12),
 ])  # fmt: skip
-
-
-def drawn() -> Figure:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7, 2))
-    figure.add_axes((0.1, 0.2, 0.8, 0.7)).plot([0, 1], [1, 0])
-    return figure
-
-
-def of_all_blocks(text: str, **changes: Any) -> Document:
-    """A document with every kind of block, all texts of which are this one."""
-    shown = table(text, (text, "n"), [(text, "1"), (f"{text}\n{text}", "2")], numbers=["n"])
-    blocks = (
-        Verdict(text), Banner(text, text), Warnings(((text,), (text,) * 5)), Paragraph(text, text), Note(text),
-        Bullets((text,)), Code(f"{text}\n{text}"), Facts((Fact(text, (text, text)), Fact(text, (text,), code=True))),
-        Tabular("t", shown, text, wraps=(text,)), Listing("l", shown, text), Picture("p", text, text, text, drawn),
-        Details(text, (Paragraph(text),), text), Details(text, (Paragraph("left out"),), on_paper="out"),
-    )  # fmt: skip
-    whole = Document(text, text, (Section(text, blocks, "a", text),), Banner(text, text), footer=text)
-    return Document(**(vars(whole) | changes))
 
 
 def said_of(document: Document, label: str) -> Any:
@@ -100,21 +71,6 @@ def test_no_text_becomes_markup_or_ends_the_setting() -> None:
     assert files["main.typ"] == template, "the template is the same whatever the text is"
     assert b"@preview" not in template
     assert b"eval(" not in template
-
-
-def test_two_processes_write_the_same_bytes() -> None:
-    """The other one takes its own time, and begins with another hash of texts."""
-    paths = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
-    environment = os.environ | {"PYTHONPATH": paths, "PYTHONHASHSEED": "7", "TZ": "Asia/Tokyo"}
-    ended = subprocess.run(
-        [sys.executable, __file__], check=True, timeout=HANG_GUARD_S, env=environment, capture_output=True, text=True
-    )
-    assert ended.stdout.strip() == digest()
-
-
-def digest() -> str:
-    """Of a document with all kinds of blocks."""
-    return sha256(as_pdf(of_all_blocks("ν = 3.2(1)×10⁻³ s⁻¹"))).hexdigest()
 
 
 def test_the_date_is_that_of_the_data_and_never_the_present_one() -> None:
@@ -150,10 +106,14 @@ def test_a_heading_and_what_introduces_its_table_stand_on_the_page_of_the_table(
     assert seen == {1, 2}
 
 
-def test_a_tall_figure_stands_between_the_heading_of_its_chapter_and_the_next_one() -> None:
+def test_a_tall_figure_stands_between_the_heading_of_its_chapter_and_the_next_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    figure = drawn()
+    figure.set_size_inches(7, 4.6)
+    monkeypatch.setattr("levilab.present.style.as_pdf", cache(as_pdf_page))  # all figures are this one
+
     def tall() -> Figure:
-        figure = drawn()
-        figure.set_size_inches(7, 4.6)
         return figure
 
     def chapter(name: str, lines: int) -> Section:
@@ -242,7 +202,3 @@ def test_another_ending_is_wrong_usage_and_says_which_two_work(tmp_path: Path) -
     ended = command("report", ROOT / "sample_data/spin-down-1", "-o", "x.docx", cwd=tmp_path)
     assert ended.status == 2
     assert ".html or .pdf" in ended.err
-
-
-if __name__ == "__main__":
-    print(digest())  # noqa: T201

@@ -1,4 +1,4 @@
-"""The same input gives the same bytes, in another process, with other hashes, at another time."""
+"""The same input gives the same bytes, in another process, with other hashes, in another zone, at another time."""
 
 from __future__ import annotations
 
@@ -6,23 +6,35 @@ import os
 import subprocess
 import sys
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
+from pathlib import Path
 
+from levilab.report.pdf.renderer import as_pdf
 from support.commands import command
-from support.paths import SAMPLE_DATA
+from support.documents import of_all_blocks
+from support.paths import ROOT, SAMPLE_DATA
 from support.waiting import HANG_GUARD_S
 
-if TYPE_CHECKING:
-    from pathlib import Path
+
+def write_into(folder: Path) -> None:
+    """Write the page of a run, and a document with all kinds of blocks as PDF."""
+    assert command("report", SAMPLE_DATA / "upper-limits", "-o", folder / "page.html", cwd=folder).status == 0
+    (folder / "all.pdf").write_bytes(as_pdf(of_all_blocks("ν = 3.2(1)×10⁻³ s⁻¹")))
 
 
-def test_two_processes_write_the_same_page(tmp_path: Path) -> None:
-    words = ["report", str(SAMPLE_DATA / "upper-limits"), "-o"]
-    assert command(*words, tmp_path / "here.html", cwd=tmp_path).status == 0
+def test_two_processes_write_the_same_page_and_the_same_pdf(tmp_path: Path) -> None:
+    here, there = tmp_path / "here", tmp_path / "there"
+    for folder in (here, there):
+        folder.mkdir()
+    write_into(here)
+    paths = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+    environment = os.environ | {"PYTHONPATH": paths, "PYTHONHASHSEED": "7", "TZ": "Asia/Tokyo"}
     subprocess.run(
-        [sys.executable, "-m", "levilab", *words, str(tmp_path / "there.html")],
-        env=os.environ | {"PYTHONHASHSEED": "7"}, check=True, capture_output=True, timeout=HANG_GUARD_S, cwd=tmp_path,
-    )  # fmt: skip
-    here, there = ((tmp_path / name).read_bytes() for name in ("here.html", "there.html"))
-    assert here == there
-    assert f"{datetime.now(UTC):%Y-%m-%d}" not in here.decode()
+        [sys.executable, __file__, str(there)], env=environment, check=True, capture_output=True, timeout=HANG_GUARD_S
+    )
+    for name in ("page.html", "all.pdf"):
+        assert (here / name).read_bytes() == (there / name).read_bytes(), name
+    assert f"{datetime.now(UTC):%Y-%m-%d}" not in (here / "page.html").read_text(encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_into(Path(sys.argv[1]))

@@ -13,7 +13,7 @@ import pytest
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.device import Device, DeviceError, read_device
 from levilab.formats.table import parse_columns
-from levilab.pipelines.catalogue import ANALYSES, Analysis
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.field.analysis import NEEDS, FieldAnalysis, analyze_scans
 from levilab.pipelines.field.device import FieldOptions, known_of
 from levilab.pipelines.field.document import DOCUMENT
@@ -25,7 +25,7 @@ from levilab.pipelines.sources import collect
 from levilab.pipelines.top import calculate_top
 from levilab.report.page import render
 from levilab.world.base import Base
-from support.figures import faults
+from support.figures import faults, without_drawing
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -127,9 +127,7 @@ def test_a_gain_that_no_gauss_meter_has_is_taken_for_none(scan: Path, said: obje
     assert known_of(source, None).gain_u == 0
 
 
-def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, scan: Path
-) -> None:
+def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp_path: Path, scan: Path) -> None:
     other = shutil.copytree(scan, tmp_path / "other")
     text = (other / "readings.csv").read_text(encoding="utf-8").replace(",0.035,", ",0.0352,")
     (other / "readings.csv").write_text(text, encoding="utf-8")
@@ -140,8 +138,8 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(
     assert mean.u is not None
     assert alone[0].u is not None
     assert mean.u > 0.99 * alone[0].u
-    monkeypatch.setattr(Analysis, "svg", lambda *_: "<svg/>")
-    page = render([(ANALYSES["field"], found)])
+    with without_drawing():
+        page = render([(ANALYSES["field"], found)])
     assert "None of these 2 runs came from a real bench" in page
     assert ANALYSES["field"].document(found, tmp_path)["values"]["strength"]["runs"] == 2
     figure = field_figure(found)
@@ -260,6 +258,7 @@ def test_a_hole_larger_than_its_part_is_named(tmp_path: Path) -> None:
 # --- the commands ---
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_the_commands_print_and_refuse_in_one_line(
     levilab: Callable[..., object], tmp_path: Path, scan: Path, device: Path
 ) -> None:

@@ -104,6 +104,7 @@ def test_groups_of_the_same_mean_are_told_apart(sample_data: Path, tmp_path: Pat
         ANALYSES["limit"].recall([tmp_path], LimitOptions())
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_measured_and_made_up_runs_are_never_one_mean(sample_data: Path, tmp_path: Path) -> None:
     """Three runs of one top, of which the second is made up and lies 10 Hz higher; the third is the first, reversed."""
     for name, synthetic in (("a", False), ("b", True), ("c", False)):
@@ -132,6 +133,7 @@ def test_measured_and_made_up_runs_are_never_one_mean(sample_data: Path, tmp_pat
     assert alone.conditions.synthetic is None  # nothing to be told apart from
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(sample_data / "loose-washers", tmp_path / "run")
     analysis = analyze_limits([folder], LimitOptions())

@@ -21,7 +21,7 @@ from levilab.runs.gates import COUNTED, gates_event
 from levilab.runs.run import RunRecord, utc_now
 from levilab.runs.writer import RunWriter
 from support.commands import command
-from support.figures import faults
+from support.figures import faults, without_drawing
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -160,7 +160,8 @@ def test_figure_and_page_show_what_was_found(tmp_path: Path) -> None:
     found = analysis.analyze(
         [sweep_csv(tmp_path / "mine.csv", half=3), run_with_records(tmp_path / "runs", 0.0)], PrecessionOptions()
     )
-    page = render([(analysis, found)])
+    with without_drawing():
+        page = render([(analysis, found)])
     assert found.text.split(". ")[0].replace("−", "-") in page.replace("−", "-")
     assert "mean vector" in page
     assert "half the frequency was counted" in page
