@@ -184,6 +184,7 @@ class Parser:
         commands: its table.
         queue_size: how many entries the error queue has.
         no_error: the answer of an empty queue.
+        on_unit: called before each command or query.
         on_error: called with the number of each error.
         path_memory: see `message.read_units`.
         errors: the error queue.
@@ -193,6 +194,7 @@ class Parser:
     commands: Table
     queue_size: int = 20
     no_error: str = '+0,"No error"'
+    on_unit: Callable[[], None] = lambda: None
     on_error: Callable[[int], None] = lambda _: None
     path_memory: bool = True
     errors: deque[str] = field(default_factory=deque)
@@ -210,6 +212,7 @@ class Parser:
                 yield
                 continue
             header, parameters = unit
+            self.on_unit()
             try:
                 answer = self.commands.find(header)(self.device, parameters)
                 if answer is not None and not isinstance(answer, str):
