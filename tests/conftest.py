@@ -7,6 +7,10 @@ import signal
 import sys
 from pathlib import Path
 
+# before numpy is imported, here and in the processes that tests start: each of them would have a thread of OpenBLAS for
+# each processor, which wait for each other busily; twenty-fold time for the eigenvalues of 200 readings
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 from hypothesis import settings
 

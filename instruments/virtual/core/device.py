@@ -87,7 +87,7 @@ class VirtualInstrument:
     Args:
         clock: of the bench.
         identity: the answer to ``*IDN?`` of another model of the family.
-        pace: time for one command or query; a message takes as long as all that are in it [s].
+        pace: time for one message [s].
         numbered: the numbers of the channels, where they are not those of the class.
     """
 
@@ -127,7 +127,7 @@ class VirtualInstrument:
             self.commands,
             queue_size=self.queue_size,
             no_error=self.no_error,
-            on_unit=self._take_time,
+            on_next=self.begin_next,
             on_error=self.status.note_error,
             path_memory=self.path_memory,
         )
@@ -138,7 +138,7 @@ class VirtualInstrument:
 
     def steps(self, message: str) -> Steps[Answer | None]:
         """As execute(), in steps."""
-        self._ready = max(self._ready, self.clock.now())
+        self._ready = max(self._ready, self.clock.now()) + self.pace
         return self._answer((yield from self.parser.steps(message)))
 
     def is_abort(self, message: str) -> bool:
@@ -149,9 +149,8 @@ class VirtualInstrument:
         """Work out what has happened in the instrument since the last message; by default nothing happens."""
         yield from ()
 
-    def _take_time(self) -> None:
-        """Take the time for one command or query."""
-        self._ready += self.pace
+    def begin_next(self) -> None:
+        """Called before each further command or query of a message; by default it takes no time of its own."""
 
     def _answer(self, text: str | None) -> Answer | None:
         if text is None:

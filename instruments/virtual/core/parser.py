@@ -201,7 +201,7 @@ class Parser:
         commands: its table.
         queue_size: how many entries the error queue has.
         no_error: the answer of an empty queue.
-        on_unit: called before each command or query.
+        on_next: called before each command or query of a message but the first.
         on_error: called with the number of each error.
         path_memory: see `message.read_units`.
         errors: the error queue.
@@ -211,7 +211,7 @@ class Parser:
     commands: Table
     queue_size: int = 20
     no_error: str = '+0,"No error"'
-    on_unit: Callable[[], None] = lambda: None
+    on_next: Callable[[], None] = lambda: None
     on_error: Callable[[int], None] = lambda _: None
     path_memory: bool = True
     errors: deque[str] = field(default_factory=deque)
@@ -223,13 +223,15 @@ class Parser:
     def steps(self, message: str) -> Steps[str | None]:
         """As run(), in steps: other work may come between two units of the message."""
         answers: list[str] = []
-        length = 0
+        length, begun = 0, False
         for unit in read_units(message, path_memory=self.path_memory):
             if unit is None:
                 yield
                 continue
             header, parameters = unit
-            self.on_unit()
+            if begun:
+                self.on_next()
+            begun = True
             try:
                 answer = self.commands.find(header)(self.device, parameters)
                 if answer is not None and not isinstance(answer, str):

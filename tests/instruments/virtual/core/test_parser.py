@@ -290,6 +290,6 @@ def test_an_answer_takes_its_time_on_the_clock_of_the_bench(generator):
     assert generator.clock.now() == pytest.approx(generator.pace, abs=1e-12)
 
 
-def test_questions_in_one_message_take_as_long_as_one_after_the_other(generator):
-    assert ask(generator, "FREQ?;:VOLT?;*OPC?").count(";") == 2
-    assert generator.clock.now() == pytest.approx(3 * generator.pace, abs=1e-12)
+def test_a_counters_questions_in_one_message_take_as_long_as_one_after_the_other(counter):
+    assert ask(counter, "INP1:COUP?;:INP1:IMP?;*OPC?").count(";") == 2
+    assert counter.clock.now() == pytest.approx(3 * counter.pace, abs=1e-12)
