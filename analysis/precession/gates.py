@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 FEWEST = 7
 #: The swing's frequency is searched from so many periods in the series, in steps of so many, up to so many in a gate.
 _LEAST_PERIODS, _STEP_PERIODS, _MOST_IN_A_GATE = 1.5, 0.1, 0.9
-#: So many gates times frequencies are worked out at once: a megabyte for each of the numbers in between.
+#: Gates times frequencies that are worked out at once, at most: a megabyte for each of the numbers in between.
 _AT_ONCE = 40_000
 #: A gate has miscounted if it is off by whole pulses to within this, and by so many standard deviations; at most this
 #: share of the gates is left out.
