@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 FEWEST = 7
 #: The swing's frequency is searched from so many periods in the series, in steps of so many, up to so many in a gate.
 _LEAST_PERIODS, _STEP_PERIODS, _MOST_IN_A_GATE = 1.5, 0.1, 0.9
+#: Gates times frequencies that are worked out at once, at most: a megabyte for each of the numbers in between.
+_AT_ONCE = 40_000
 #: A gate has miscounted if it is off by whole pulses to within this, and by so many standard deviations; at most this
 #: share of the gates is left out.
 _OF_A_PULSE, _STANDS_OUT, _MOST_WRONG = 0.25, 5.0, 0.25
@@ -179,11 +181,20 @@ def _columns(gates: Gates, frequency: float | None) -> Array:
     return np.column_stack([gates.length, np.cos(end) - np.cos(begin), np.sin(end) - np.sin(begin)])
 
 
-def _residual_sum(gates: Gates, frequency: float) -> float:
-    """Σ residual² [turns²]."""
-    columns = _columns(gates, frequency)
-    found, *_ = np.linalg.lstsq(columns, gates.periods, rcond=None)
-    return float(np.sum((gates.periods - columns @ found) ** 2))
+def _residual_sums(gates: Gates, frequencies: Array) -> Array:
+    """Σ residual² with a swing of each of these frequencies, shape (f,) [turns²].
+
+    By least squares as `numpy.linalg.lstsq` does it, with its limit for columns that depend on each other, but for all
+    frequencies at once.
+    """
+    begin, end = (2 * np.pi * frequencies[:, None] * (times - gates.begin[0]) for times in (gates.begin, gates.end))
+    length = np.broadcast_to(gates.length, begin.shape)
+    columns = np.stack([length, np.cos(end) - np.cos(begin), np.sin(end) - np.sin(begin)], axis=-1)
+    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    limit = np.finfo(np.float64).eps * max(columns.shape[1:])
+    basis *= (sizes > limit * sizes[:, :1])[:, None, :]
+    rest = gates.periods - (basis @ (gates.periods @ basis)[:, :, None])[:, :, 0]
+    return np.asarray(np.sum(rest**2, axis=1))
 
 
 def _swing_frequency(series: Sequence[Gates]) -> float | None:
@@ -198,8 +209,13 @@ def _swing_frequency(series: Sequence[Gates]) -> float | None:
     most = _MOST_IN_A_GATE / max(float(gates.length.mean()) for gates in series)
     tried = np.arange(_LEAST_PERIODS / span, most, _STEP_PERIODS / span)
     least = _LEAST_SCATTER**2
-    totals = [sum(len(gates) * math.log(_residual_sum(gates, f) + least) for gates in series) for f in tried.tolist()]
-    return float(tried[int(np.argmin(totals))]) if totals else None
+    if not tried.size:
+        return None
+    totals = np.zeros(tried.size)
+    for gates in series:
+        pieces = np.array_split(tried, 1 + tried.size * len(gates) // _AT_ONCE)
+        totals += len(gates) * np.log(np.concatenate([_residual_sums(gates, piece) for piece in pieces]) + least)
+    return float(tried[int(np.argmin(totals))])
 
 
 def _rate(gates: Gates, frequency: float | None, wrong: tuple[tuple[int, int], ...], count: int) -> Rate:

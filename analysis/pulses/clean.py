@@ -305,21 +305,21 @@ def _blend(
 ) -> Array:
     """The hum at places [bins], each piece, of twice `half` bins, with a weight that falls to 0 at its ends.
 
-    waves: frequency [1/bin], and what amplitude is divided by, of each line.
+    place: rising; waves: frequency [1/bin], and what amplitude is divided by, of each line.
     """
-    count = len(fits)
     total = np.zeros(place.size)
-    position = np.clip(place / half - 1, 0, count - 1)  # the middle of piece i is at i
-    lower = np.minimum(position.astype(np.intp), max(count - 2, 0))
-    share = position - lower
-    upper = np.minimum(lower + 1, count - 1)
-    array = np.array(fits)
-    for line, (frequency, gain) in enumerate(waves):
-        amplitude = np.zeros(place.size, dtype=complex)
-        for index, weight in ((lower, 1 - share), (upper, share)):
-            u = place / half - 1 - index
-            amplitude += weight * (array[index, line, 0] + array[index, line, 1] * u)
-        total += (amplitude * np.exp(2j * np.pi * frequency * place)).real / gain
+    position = place / half - 1  # the middle of piece i is at i
+    last = len(fits) - 1
+    ends = [0, *np.searchsorted(position, np.arange(1, last)).tolist(), place.size]
+    for k in range(last):  # between the middles of two pieces, and beyond those of the first and the last one
+        part = slice(ends[k], ends[k + 1])
+        u = position[part] - k
+        share = np.clip(u, 0.0, 1.0)
+        for before, after, (frequency, gain) in zip(fits[k], fits[k + 1], waves, strict=True):
+            angle = (2 * np.pi * frequency) * place[part]
+            for wave, a, b in ((np.cos(angle), before.real, after.real), (-np.sin(angle), before.imag, after.imag)):
+                here = a[0] + a[1] * u
+                total[part] += (here + share * (b[0] + b[1] * (u - 1) - here)) * wave / gain
     return total
 
 

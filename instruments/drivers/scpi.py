@@ -45,6 +45,8 @@ class ScpiInstrument:
         MODELS: regular expression that the whole model field of ``*IDN?`` must match.
         SERIAL: the factory settings of its serial line; empty where it has none.
         NUMBER: the form in which it prints numbers, where a setting or a question has none of its own.
+        ANSWERS_JOINED: whether one message may have several questions, and is answered with semicolons between the
+            answers (IEEE 488.2, 8.4.1).
         transport: the link.
         clock: of the bench.
         last_set: the last value set of each declared setting, since the last reset.
@@ -56,6 +58,7 @@ class ScpiInstrument:
     MODELS: ClassVar[str] = ".*"
     SERIAL: ClassVar[Mapping[str, Any]] = {}
     NUMBER: ClassVar[Form] = NUMERIC
+    ANSWERS_JOINED: ClassVar[bool] = False
 
     transport: Transport
     clock: Clock
@@ -217,8 +220,23 @@ class ScpiInstrument:
             raise
 
     def settings(self) -> dict[str, bool | float | str]:
-        """Ask the instrument for all declared settings, with the unit at the end of each name."""
-        return {setting.name_with_unit: getattr(self, setting.name) for setting in self.declared()}
+        """Ask the instrument for all declared settings, with the unit at the end of each name.
+
+        Where it joins answers, all are asked for in one message: one exchange instead of a dozen.
+        """
+        rows = self.declared()
+        if not self.ANSWERS_JOINED:
+            return {row.name_with_unit: getattr(self, row.name) for row in rows}
+        questions = [row.question(self) for row in rows]
+        message = ";:".join(questions)
+        answer = self.transport.query(message)
+        answers = answer.split(";")
+        if len(answers) != len(rows):
+            self.reject(message, answer, f"{len(rows)} answers with semicolons between them")
+        return {
+            row.name_with_unit: row.read(self, question, one)
+            for row, question, one in zip(rows, questions, answers, strict=True)
+        }
 
     def changed_settings(
         self,
@@ -379,8 +397,15 @@ class Setting(Generic[T]):
         """Ask the instrument.  Raises BadAnswer."""
         if instrument is None:
             return self
-        question = f"{instrument.header_in_use(self.header)}?"
-        answer = instrument.transport.query(question)
+        question = self.question(instrument)
+        return self.read(instrument, question, instrument.transport.query(question))
+
+    def question(self, instrument: ScpiInstrument) -> str:
+        """The question for it, as it is sent."""
+        return f"{instrument.header_in_use(self.header)}?"
+
+    def read(self, instrument: ScpiInstrument, question: str, answer: str) -> T:
+        """The value in the answer to its question.  Raises BadAnswer."""
         form = self.form or instrument.NUMBER
         try:
             return cast("T", self._parse(instrument.field_of(answer, self.header, self.key), form))

@@ -74,6 +74,9 @@ class Timeline(Generic[T]):
             return
         low = max(bisect_right(self._starts, float(times.min())) - 1, 0)
         high = bisect_right(self._starts, float(times.max()))
+        if high <= low + 1:  # mostly
+            yield self._items[low], slice(0, times.size)
+            return
         index = np.searchsorted(np.array(self._starts[low + 1 : high]), times, side="right")
         ends = [*(np.flatnonzero(np.diff(index)) + 1).tolist(), times.size]
         for begin, end in zip([0, *ends[:-1]], ends, strict=True):

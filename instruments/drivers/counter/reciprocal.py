@@ -33,6 +33,7 @@ class ReciprocalCounter(ScpiInstrument):
 
     MOST: ClassVar[int] = 1_000_000
     EMPTY_IS_NONE: ClassVar[bool] = False
+    ANSWERS_JOINED = True
 
     #: The input in use, which prepare() chooses.
     channel = 1

@@ -127,6 +127,7 @@ class VirtualInstrument:
             self.commands,
             queue_size=self.queue_size,
             no_error=self.no_error,
+            on_next=self.begin_next,
             on_error=self.status.note_error,
             path_memory=self.path_memory,
         )
@@ -137,7 +138,7 @@ class VirtualInstrument:
 
     def steps(self, message: str) -> Steps[Answer | None]:
         """As execute(), in steps."""
-        self._begin_message()
+        self._ready = max(self._ready, self.clock.now()) + self.pace
         return self._answer((yield from self.parser.steps(message)))
 
     def is_abort(self, message: str) -> bool:
@@ -148,8 +149,8 @@ class VirtualInstrument:
         """Work out what has happened in the instrument since the last message; by default nothing happens."""
         yield from ()
 
-    def _begin_message(self) -> None:
-        self._ready = max(self._ready, self.clock.now()) + self.pace
+    def begin_next(self) -> None:
+        """Called before each further command or query of a message; by default it takes no time of its own."""
 
     def _answer(self, text: str | None) -> Answer | None:
         if text is None:

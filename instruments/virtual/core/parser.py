@@ -44,6 +44,9 @@ ERRORS = {
     -430: "Query DEADLOCKED",
 }
 
+#: A word of a printed header, what of it the short form leaves out, and the beginning of a word on the wire.
+_MNEMONIC, _LOWER, _BEGINNING = re.compile(r"[A-Za-z*_]+"), re.compile("[a-z]+"), re.compile("[^0-9]{0,2}")
+
 #: The output buffer: the longest answer to one message (IEEE 488.2, 6.3.1.7) [bytes].
 LONGEST_ANSWER = 1 << 26
 
@@ -142,7 +145,10 @@ class Table:
 
     def _search(self, header: str) -> Action:
         plain = header.removesuffix("?").upper()
-        rows = [row for row in self.rows if header_pattern(row.header).fullmatch(plain)]
+        beginnings = {_BEGINNING.match(word)[0] for word in plain.split(":") if word}  # type: ignore[index]
+        # few rows are left, so few regular expressions are compiled
+        near = [row for row in self.rows if beginnings <= _beginnings(row.header)]
+        rows = [row for row in near if header_pattern(row.header).fullmatch(plain)]
         if not rows:
             raise ScpiError(-113, plain[:40])
         for row in rows:
@@ -151,6 +157,17 @@ class Table:
             if not header.endswith("?") and row.settable:
                 return row.set
         raise ScpiError(-113, header)
+
+
+@cache
+def _beginnings(pattern: str) -> frozenset[str]:
+    """The first two letters of each word of a printed header, in its long and its short form.
+
+    >>> sorted(_beginnings("[SOURce[1]:]FREQuency[:CW|:FIXed]")), sorted(_beginnings("C1:BaSic_WaVe"))
+    (['CW', 'FI', 'FR', 'SO'], ['BA', 'BS', 'C'])
+    """
+    words = _MNEMONIC.findall(pattern)
+    return frozenset({word[:2].upper() for word in words} | {_LOWER.sub("", word)[:2] for word in words})
 
 
 @cache
@@ -184,6 +201,7 @@ class Parser:
         commands: its table.
         queue_size: how many entries the error queue has.
         no_error: the answer of an empty queue.
+        on_next: called before each command or query of a message but the first.
         on_error: called with the number of each error.
         path_memory: see `message.read_units`.
         errors: the error queue.
@@ -193,6 +211,7 @@ class Parser:
     commands: Table
     queue_size: int = 20
     no_error: str = '+0,"No error"'
+    on_next: Callable[[], None] = lambda: None
     on_error: Callable[[int], None] = lambda _: None
     path_memory: bool = True
     errors: deque[str] = field(default_factory=deque)
@@ -204,12 +223,15 @@ class Parser:
     def steps(self, message: str) -> Steps[str | None]:
         """As run(), in steps: other work may come between two units of the message."""
         answers: list[str] = []
-        length = 0
+        length, begun = 0, False
         for unit in read_units(message, path_memory=self.path_memory):
             if unit is None:
                 yield
                 continue
             header, parameters = unit
+            if begun:
+                self.on_next()
+            begun = True
             try:
                 answer = self.commands.find(header)(self.device, parameters)
                 if answer is not None and not isinstance(answer, str):

@@ -114,6 +114,10 @@ class VirtualCounter(VirtualInstrument):
         yield from self.catch_up()
         return (yield from super().steps(message))
 
+    def begin_next(self) -> None:
+        """See the base; all settings in one message take as long as one after the other."""
+        self._ready += self.pace
+
     def status_byte(self, *, message_available: bool = False) -> int:
         """The status byte; see the base."""
         run_to_end(self.catch_up())

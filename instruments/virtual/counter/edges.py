@@ -140,7 +140,7 @@ class EdgeFinder:
         wish = math.ceil((wanted - self._start) * RATE) + 1 - self._samples
         left = math.floor((until - self._start) * RATE) + 1 - self._samples
         count = min(max(wish, self._stride), _LONGEST, left)
-        if count <= 0:
+        if count <= (0 if self._samples else 1):  # the first sample alone has no edge
             return False
         times = self._crossings(count)
         if times is None:

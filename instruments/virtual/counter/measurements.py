@@ -52,12 +52,25 @@ class Inputs:
         self._finders.clear()
 
 
-def first_edge(finder: EdgeFinder, instant: float, before: float) -> Generator[Wanted, None, Edge | None]:
-    """Wait for the first edge at this time or later; None where there is none before the deadline."""
+#: A gate opens within a period, and closes within another one: at 20 Hz and above so much later than its length [s].
+_TWO_PERIODS = 0.1
+
+
+def first_edge(
+    finder: EdgeFinder, instant: float, before: float, *, ahead: float = 0.0
+) -> Generator[Wanted, None, Edge | None]:
+    """Wait for the first edge at this time or later; None where there is none before the deadline.
+
+    Args:
+        finder: of the edges.
+        instant: [s].
+        before: the deadline [s].
+        ahead: how far behind the instant later edges will be needed, which are searched for at once [s].
+    """
     while (edge := finder.find(instant)) is None:
         if finder.reached >= before:
             return None
-        yield finder, min(instant, before)
+        yield finder, min(instant + ahead, before)
     return edge if edge.time < before else None
 
 
@@ -78,7 +91,7 @@ def frequency(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
     """Count the periods from the first edge to the first one after the gate, and divide by their time [Hz]."""
     finder = inputs.finder(channel, gate.begin)
     finder.refresh(gate.begin)
-    opened = yield from first_edge(finder, gate.begin, gate.deadline)
+    opened = yield from first_edge(finder, gate.begin, gate.deadline, ahead=gate.length + _TWO_PERIODS)
     if opened is None:
         return gate.without_result()
     due = max(opened.time + gate.length, math.nextafter(opened.time, math.inf))

@@ -172,9 +172,15 @@ def test_another_instrument_raises_with_its_identity(driver, identity):
     assert "check the address" in str(wrong.value)
 
 
+#: The one message that asks for all settings, and its answer.
+ALL_OF_A_COUNTER = (
+    ";:".join(sent.split()[0] + "?" for driver, *_, sent, _ in WIRE if driver is Keysight53230A),
+    ";".join(answer for driver, *_, answer in WIRE if driver is Keysight53230A),
+)
+
+
 def test_the_snapshot_names_settings_with_their_units():
-    questions = [(sent.split()[0] + "?", answer) for driver, *_, sent, answer in WIRE if driver is Keysight53230A]
-    with conversation(Keysight53230A, *questions) as counter:
+    with conversation(Keysight53230A, ALL_OF_A_COUNTER) as counter:
         snapshot = counter.settings()
     assert snapshot == {
         "gate_s": 0.1,
@@ -187,6 +193,23 @@ def test_the_snapshot_names_settings_with_their_units():
         "slope": "NEG",
         "measurement_timeout_s": 3.0,
     }
+
+
+@pytest.mark.parametrize("wrong", [";DC", ";NEG", ";"])
+def test_a_snapshot_with_an_answer_too_few_or_too_many_is_refused(wrong):
+    message, answers = ALL_OF_A_COUNTER
+    answers = answers.replace(";DC", "") if wrong == ";DC" else answers + wrong
+    with conversation(Keysight53230A, (message, answers), (CLEAR, None)) as counter, pytest.raises(BadAnswer) as bad:
+        counter.settings()
+    assert bad.value.expected == "9 answers with semicolons between them"
+
+
+def test_a_snapshot_with_an_answer_of_another_form_names_its_question():
+    message, answers = ALL_OF_A_COUNTER
+    wrong = answers.replace(";NEG;", ";NG;")
+    with conversation(Keysight53230A, (message, wrong), (CLEAR, None)) as counter, pytest.raises(BadAnswer) as bad:
+        counter.settings()
+    assert bad.value.question == "INP1:SLOP1?"
 
 
 def test_a_variant_of_a_driver_keeps_the_settings_of_its_model():

@@ -288,3 +288,8 @@ def test_clear_drops_a_half_sent_message_and_unread_answers(generator):
 def test_an_answer_takes_its_time_on_the_clock_of_the_bench(generator):
     assert ask(generator, "*OPC?") == "1"
     assert generator.clock.now() == pytest.approx(generator.pace, abs=1e-12)
+
+
+def test_a_counters_questions_in_one_message_take_as_long_as_one_after_the_other(counter):
+    assert ask(counter, "INP1:COUP?;:INP1:IMP?;*OPC?").count(";") == 2
+    assert counter.clock.now() == pytest.approx(3 * counter.pace, abs=1e-12)
