@@ -102,7 +102,7 @@ def no_test_waits_for_the_disk():
     Processes that the tests start force theirs.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(os, "fsync", lambda descriptor: None)
+        patch.setattr(os, "fsync", lambda _: None)
         yield
 
 
