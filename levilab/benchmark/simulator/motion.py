@@ -164,7 +164,8 @@ def euler_rate(t: float, s: Array) -> Array:
     td, pd, sd = s[9], s[10], s[11]
     w3 = sd + pd * ct
     d = np.empty(12)
-    d[:6] = s[6:]
+    for k in range(6):  # a slice would take five times as long to compile, with numba's text of shapes that differ
+        d[k] = s[k + 6]
     d[6], d[7] = q * (nx * p2 / 2 + nz * p3 * x / 2), q * (ny * p2 / 2 + nz * p3 * y / 2)
     d[8] = q * ((nx * x + ny * y) * p3 / 2 + nz * (p4 * r2 / 4 - p2)) - G
     # generalised torques ∂(M·B)/∂θ and ∂(M·B)/∂φ
