@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import PurePath
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -171,8 +171,8 @@ def _data(sources: Sequence[Source[Any]]) -> Tabular:
 
 
 def _recorded(sources: Sequence[Source[Any]]) -> tuple[Block, ...]:
-    """The commands by which the runs were recorded, and the versions that did."""
-    facts = []
+    """The commands by which the runs were recorded, and the versions that did, said once if they are the same."""
+    facts: list[Fact] = []
     for source in sources:
         record = source.run.record if source.run else None
         texts = [
@@ -181,6 +181,8 @@ def _recorded(sources: Sequence[Source[Any]]) -> tuple[Block, ...]:
         ]
         if texts:
             facts.append(Fact(source.name, tuple(texts), code=True))
+    if len(facts) > 1 and len({fact.texts for fact in facts}) == 1:
+        facts = [replace(facts[0], name=f"all {len(facts)} runs")]
     return (Section("Recorded by", (Facts(tuple(facts)),)),) if facts else ()
 
 

@@ -77,3 +77,26 @@ def test_commands_hashes_seeds_and_what_recorded_it_are_there(tmp_path: Path) ->
     (facts,) = recorded.blocks
     assert isinstance(facts, Facts)
     assert facts.facts[0].texts == ("""levilab acquire limit --note 'it'"'"'s'""",)
+
+
+def test_what_recorded_all_runs_alike_is_said_once(tmp_path: Path) -> None:
+    for k in range(3):
+        run = shutil.copytree(SAMPLE_DATA / "lower-limits", tmp_path / f"run-{k}")
+        with (run / "readings.csv").open("a", encoding="utf-8") as file:
+            file.write(f"21.{k}\n")  # the same readings would be one run that was copied
+        record = json.loads((run / "run.json").read_text(encoding="utf-8")) | {"software": {}}
+        record["command_line"] = ["levilab", "acquire", "limit", *(["--note", "late"] if k == 2 else [])]
+        (run / "run.json").write_text(json.dumps(record), encoding="utf-8")
+    limit = ANALYSES["limit"]
+
+    def recorded(*runs: Path) -> list[tuple[str, tuple[str, ...]]]:
+        found = limit.analyze(list(runs), limit.options_from({}))
+        (section,) = (
+            one for one in reproduction([(limit, found)]).blocks if getattr(one, "title", "") == "Recorded by"
+        )
+        (facts,) = section.blocks
+        return [(fact.name, fact.texts) for fact in facts.facts]
+
+    one, two, late = (tmp_path / f"run-{k}" for k in range(3))
+    assert recorded(one, two) == [("all 2 runs", ("levilab acquire limit",))]
+    assert [name for name, _ in recorded(one, late)] == ["run-0", "run-2"]
