@@ -14,6 +14,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
+from support.one_compiler import compile_each_kernel_once
+
 #: The fixtures of tests of pages.
 pytest_plugins = ["support.browser"]
 
@@ -79,6 +81,18 @@ def signals_as_at_a_terminal():
         number = getattr(signal, name, None)
         if number and signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler if name == "SIGINT" else signal.SIG_DFL)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def each_kernel_is_compiled_once(tmp_path_factory: pytest.TempPathFactory):
+    """The processes of xdist have folders of their own in one folder."""
+    is_one_of_several = "PYTEST_XDIST_WORKER" in os.environ
+    if is_one_of_several:
+        with pytest.MonkeyPatch.context() as patch:
+            compile_each_kernel_once(tmp_path_factory.getbasetemp().parent, patch)
+            yield
+    else:
+        yield
 
 
 @pytest.fixture(autouse=True, scope="session")

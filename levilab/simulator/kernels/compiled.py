@@ -22,10 +22,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numba
 import numba.core
-from filelock import FileLock, Timeout
 from numba.core import types
 from numba.core.caching import IndexDataCacheFile, UserProvidedCacheLocator
-from numba.core.compiler_lock import global_compiler_lock
 from numba.core.event import Event, Listener, register
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic, overload
@@ -155,31 +153,6 @@ def _inside_of_kernels(function: F, options: Any) -> F:
     return made
 
 
-#: The longest time that a process waits for another one to compile the same kernel [s]: that one may have been stopped.
-LONGEST_WAIT_S = 60.0
-
-
-class _CompiledOnce(CPUDispatcher):
-    """A kernel that is kept on disk: of processes that need it at once one compiles it, and the others wait for it."""
-
-    _cache: Any
-
-    def compile(self, sig: Any) -> Any:
-        """As numba, which looks for the code on the disk first.
-
-        Args:
-            sig: types of the arguments.
-        """
-        lock: Any = global_compiler_lock
-        if lock.is_locked():  # one that is compiled inside of another is waited for with that
-            return super().compile(sig)
-        kind = hashlib.sha256(f"{self.py_func.__qualname__} {sig}".encode()).hexdigest()[:16]
-        with contextlib.ExitStack() as held:
-            with contextlib.suppress(OSError, NotImplementedError, Timeout):  # then both compile
-                held.enter_context(FileLock(Path(self._cache.cache_path) / f"{kind}.lock", LONGEST_WAIT_S))
-            return super().compile(sig)
-
-
 def kernel(function: F) -> F:
     """An entry point: compiled once for each kind of scene, kept on disk, run without the interpreter's lock."""
     config: Any = numba.core.config
@@ -193,7 +166,6 @@ def kernel(function: F) -> F:
     kept: Any = getattr(compiled, "_cache", None)  # none where NUMBA_DISABLE_JIT is set
     if kept is not None and folder and not before:
         kept._cache_file.__class__ = FilesOfTheirOwn
-        compiled.__class__ = _CompiledOnce  # type: ignore[assignment]
     return compiled
 
 

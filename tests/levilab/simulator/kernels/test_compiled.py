@@ -9,13 +9,12 @@ from pathlib import Path
 
 import numba
 import pytest
-from filelock import FileLock, Timeout
 
 from levilab.simulator.kernels import compiled
 from support.parts import callable_part
 
 KERNELS = Path(compiled.__file__).parent
-ALLOWED = {"filelock", "numba", "numpy", "platformdirs", *sys.stdlib_module_names}
+ALLOWED = {"numba", "numpy", "platformdirs", *sys.stdlib_module_names}
 
 
 @pytest.fixture
@@ -63,55 +62,19 @@ def test_the_code_on_the_disk_lies_under_the_key_of_the_room(monkeypatch, tmp_pa
     assert folder.is_dir()
 
 
-@pytest.fixture
-def kernel_in(monkeypatch, tmp_path):
-    """Make a kernel from a source of its own, in a folder of this name, kept on disk with those of the others."""
+def test_a_copy_of_the_sources_compiles_nothing_anew(monkeypatch, tmp_path):
+    # a second environment, or the same version installed anew: another place, another time of its files
     monkeypatch.setattr(numba.core.config, "CACHE_DIR", "")
     monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
-
-    def make(name, written=1e9):
+    stats = []
+    for k, name in enumerate(("one", "two")):
         (tmp_path / name).mkdir()
         source = tmp_path / name / "motion.py"
         source.write_text("def advance(x):\n    return x + 1\n", encoding="utf-8")
-        os.utime(source, (written, written))
+        os.utime(source, (1e9 + k, 1e9 + k))
         scope = {"__name__": compiled.__name__}  # numba imports the module of code from the disk
         exec(compile(source.read_text(encoding="utf-8"), source, "exec"), scope)
-        return compiled.kernel(scope["advance"])
-
-    return make
-
-
-def test_a_kernel_that_another_process_compiles_meanwhile_is_read_from_the_disk(monkeypatch, kernel_in):
-    here, in_the_other_process = kernel_in("here"), kernel_in("other")
-
-    class Lock(compiled.FileLock):
-        def acquire(self, *arguments, **named):
-            monkeypatch.setattr(compiled, "FileLock", FileLock)
-            assert in_the_other_process(1) == 2
-            return super().acquire(*arguments, **named)
-
-    monkeypatch.setattr(compiled, "FileLock", Lock)
-    assert here(1) == 2
-    hits = [sum(kernel.stats.cache_hits.values()) for kernel in (in_the_other_process, here)]
-    assert hits == [0, 1]
-
-
-@pytest.mark.parametrize("failure", [Timeout("x"), PermissionError(), NotImplementedError()], ids=repr)
-def test_a_kernel_is_compiled_where_no_lock_is_to_be_had(monkeypatch, kernel_in, failure):
-    def acquire(*_, **__):
-        raise failure
-
-    monkeypatch.setattr(FileLock, "acquire", acquire)
-    kernel = kernel_in("here")
-    assert kernel(1) == 2
-    assert sum(kernel.stats.cache_misses.values()) == 1
-
-
-def test_a_copy_of_the_sources_compiles_nothing_anew(tmp_path, kernel_in):
-    # a second environment, or the same version installed anew: another place, another time of its files
-    stats = []
-    for k, name in enumerate(("one", "two")):
-        kernel = kernel_in(name, 1e9 + k)
+        kernel = compiled.kernel(scope["advance"])
         assert kernel(1) == 2
         stats.append(kernel.stats)
     assert {str(one.cache_path) for one in stats} == {str(tmp_path)}
