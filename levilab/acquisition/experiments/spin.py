@@ -61,10 +61,10 @@ def run(session: Session[SpinSettings]) -> None:
 def time_left(first: Row, middle: Row, last: Row, longest_s: float) -> tuple[float, float]:
     """Until the spins between which a top falls, and no longer than the run goes on, at least and at most [s].
 
-    Drag slows the spin by dν/dt ∝ −νᵖ, with p from 1 (Stokes) to 2 (Newton).  The fall from the first reading to the
-    last one measures its rate, and what part of it is done in the middle measures p.  Until the readings differ by much
-    more than their noise, the rate is the usual one, and p any of these powers.  The range holds both ends of the spins,
-    of p, and of the readings, by about two standard uncertainties: a few microseconds, where a fit takes milliseconds.
+    Drag slows the spin by dν/dt ∝ −νᵖ, with p from 1 (Stokes) to 2 (Newton).  The first and the last reading show the
+    rate, the one in the middle shows p.  Until readings differ by much more than their noise, the rate is the usual one
+    and p may be any of these powers.  The range allows for about two standard uncertainties of the readings and of p.
+    It takes some microseconds, a fit takes milliseconds.
 
     Args:
         first: the first reading.
@@ -78,7 +78,7 @@ def time_left(first: Row, middle: Row, last: Row, longest_s: float) -> tuple[flo
     seen = lapse > 0 and start - now > _CLEAR * u
     powers = _powers(first, middle, last, u) if seen else _POWERS
     ends = []
-    # √2 u in each of the two readings, so that they move the end alike, is about two standard uncertainties of their sum
+    # √2 u off in both readings, so that both move the end to one side, is about two standard uncertainties of the end
     for power, falls_hz, sign in zip(powers, FALLS_BETWEEN_HZ, (1, -1), strict=True):
         off = sign * math.sqrt(2) * u
         usual = _USUAL_HZ_PER_S * _USUAL_HZ**-power
