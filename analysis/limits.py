@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError, NotFinite, NotPositive, TooFewReadings
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import ROUNDING, Estimate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -166,7 +166,7 @@ def summarize(sample: Sample) -> Statistics:
     if n < FEWEST:
         own = None if sample.u is None else float(sample.u[0])
         return Statistics(Estimate(mean, own, "Hz"), None, n, None, None, (), sample.step / math.sqrt(12))
-    scatter = float(limits.std(ddof=1))
+    scatter = _scatter(limits)
     by_scatter = scatter**2 / n
     step = _common_error(scatter, sample.step)
     variance = max(by_scatter, sample.least) + step**2
@@ -210,7 +210,7 @@ def combine(runs: Sequence[Sample]) -> Statistics:
         found = summarize(Sample(np.concatenate(limits), u, widths))
         return replace(found, trend=None, trend_p=None, runs=len(runs))
     means = np.array([one.mean() for one in limits])
-    square = sum(float(np.sum((one - one.mean()) ** 2)) for one in limits) / within
+    square = sum((one.size - 1) * _scatter(one) ** 2 for one in limits if one.size > 1) / within
     own = np.maximum(square / numbers, [run.least for run in runs])
     between = _between(means, own)
     weights = _weights(own + between)
@@ -244,6 +244,16 @@ def _checked(limits: Array) -> Array:
     return limits
 
 
+def _scatter(values: Array) -> float:
+    """Standard deviation; 0 of values that differ by no more than rounding."""
+    return _beyond_rounding(float(values.std(ddof=1)), values)
+
+
+def _beyond_rounding(scatter: float, values: Array) -> float:
+    """A scatter of values about what they are compared with; 0 where rounding of the values makes it."""
+    return scatter if scatter > ROUNDING * float(np.abs(values).max()) else 0.0
+
+
 def _with_own_u(scatter: float, freedom: int) -> Estimate:
     """A standard deviation and its uncertainty (GUM E.4.3)."""
     return Estimate(scatter, scatter / math.sqrt(2 * freedom), "Hz")
@@ -257,10 +267,12 @@ def _freedom(variance: float, by_scatter: float, freedom: int) -> float:
 def _between(means: Array, own: Array) -> float:
     """The variance between runs [Hz²], from the runs' means and the variances that their tops leave to them."""
     wanted = means.size - 1
+    if not _scatter(means):
+        return 0.0
 
     def excess(between: float) -> float:
         if not (own + between > 0).all():
-            return math.inf if np.ptp(means) > 0 else -1.0
+            return math.inf
         weights = _weights(own + between)
         return float(np.sum((means - weights @ means) ** 2 / (own + between))) - wanted
 
@@ -314,7 +326,7 @@ def _trend(limits: Array) -> tuple[Estimate, float]:
     square = float(number @ number)
     slope = float(number @ limits) / square
     left = limits - limits.mean() - slope * number
-    u = math.sqrt(float(left @ left) / (limits.size - 2) / square)
+    u = _beyond_rounding(math.sqrt(float(left @ left) / (limits.size - 2)), limits) / math.sqrt(square)
     return Estimate(slope, u, "Hz"), 0.0 if u == 0 else _by_chance(slope / u, limits.size - 2)
 
 
@@ -336,7 +348,7 @@ def outliers_of(limits: Array) -> tuple[int, ...]:
     found: list[int] = []
     while len(left) >= FEWEST_FOR_SHAPE and len(found) < limits.size // 3:
         values, n = limits[left], len(left)
-        scatter = float(values.std(ddof=1))
+        scatter = _scatter(values)
         if scatter == 0:
             break
         off = np.abs(values - values.mean())

@@ -7,8 +7,8 @@ import signal
 import sys
 from pathlib import Path
 
-# for the processes of xdist and those that tests start: each would have a thread of OpenBLAS for each processor, which
-# wait for each other busily: twenty-fold time for the eigenvalues of 200 readings; this process may have them already
+# before numpy is loaded, for this process, those of xdist and those that tests start: OpenBLAS has a thread for each
+# processor otherwise, and these wait for each other busily (docs/speed.md)
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest

@@ -22,10 +22,10 @@ from analysis.spindown.fit import (
     correlation_warnings,
     is_correlated,
 )
-from analysis.spindown.lawfit import ROUNDING, LawFit
+from analysis.spindown.lawfit import LawFit
 from analysis.spindown.selection import NO_FIT, Statistics, statistics, weigh
 from analysis.spindown.verdict import Verdict, verdict
-from analysis.uncertainty import Estimate, curvature
+from analysis.uncertainty import ROUNDING, Estimate, curvature
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,6 @@ from analysis.residuals import Correlation, Jump, correlation, gross_errors, lar
 from analysis.spindown.drag import LAWS
 from analysis.spindown.hidden import bends, hidden_tilt
 from analysis.spindown.lawfit import (
-    ROUNDING,
     UNCERTAINTIES,
     HiddenTilt,
     LawFit,
@@ -28,7 +27,7 @@ from analysis.spindown.readings import Readings, checked
 from analysis.spindown.selection import NO_FIT, Statistics, weigh
 from analysis.spindown.tilt import AFTER_DRIVE, LAST_GAP, LAST_GAP_U, UNKNOWN_ORIGIN, CountedLaw, Wobble
 from analysis.spindown.verdict import EXCLUDED, Verdict, verdict
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import ROUNDING, Estimate
 
 __all__ = ["Estimate", "LawFit", "SpinDown", "Statistics", "Verdict", "fit_spin_down"]
 

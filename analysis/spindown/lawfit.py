@@ -16,7 +16,7 @@ from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.readings import Readings
 from analysis.spindown.selection import Statistics, statistics
 from analysis.spindown.tilt import MORE, UNKNOWN_PART, UNKNOWN_TILT, CountedLaw, Law, counted
-from analysis.uncertainty import Curvature, Estimate, bootstrap, curvature, propagate
+from analysis.uncertainty import ROUNDING, Curvature, Estimate, bootstrap, curvature, propagate
 
 Array = NDArray[np.float64]
 Uncertainty = Literal["covariance", "profile", "bootstrap"]
@@ -26,7 +26,6 @@ MOST_WITH_TILT = 60  # a law that the readings suit needs 5 to 15
 # Its slopes are differences, good to 1e-7: a closer search creeps.  Parameters are within 1e-4 u of the minimum.
 TOLERANCE_WITH_TILT = 1e-9
 MAX_STATED_FACTOR = 3.0  # u(ln c) above which "known to a factor" says nothing
-ROUNDING = 64 * float(np.finfo(float).eps)  # relative: residuals below it are the computer's, not the top's
 
 
 @dataclass(frozen=True, eq=False)

@@ -230,7 +230,8 @@ def benchmark() -> typer.Typer:
 def main() -> None:
     """The console script: known failures become one line and an exit status, everything else stays loud."""
     _prepare_output()
-    # before numpy is loaded: matrices of a few hundred rows are too small for threads, which wait for each other busily
+    # before numpy is loaded: matrices of a few hundred rows gain nothing by threads, which wait for each other busily
+    # where another program has a core (docs/speed.md)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         app()

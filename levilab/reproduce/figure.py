@@ -301,7 +301,7 @@ def tilted_figure(motions: tuple[Trajectory, Trajectory]) -> Figure:
 @_styled
 def driven_figure(motion: Trajectory) -> Figure:
     """The spin of the driven top."""
-    figure, panels = _figure(4.2, (0.085, 0.62, 0.89, 0.31), (0.085, 0.11, 0.89, 0.31))
+    figure, panels = _figure(3.6, (0.085, 0.63, 0.89, 0.29), (0.085, 0.13, 0.89, 0.29))
     drive = motion.scene.drive.frequency_hz
     early = motion.time <= 20.0
     _band(panels[0], motion.time, motion.spin_hz, LOOKS["top"].colour)
@@ -347,7 +347,7 @@ _SLOW_HZ = 2.0
 @_styled
 def azimuth_figure(motion: Trajectory, found: Azimuth, lines: AxisLines) -> Figure:
     """The azimuth's rate, and the spectrum of the axis."""
-    figure, panels = _figure(5.2, (0.085, 0.62, 0.5, 0.31), (0.68, 0.62, 0.305, 0.31), (0.085, 0.1, 0.9, 0.36))
+    figure, panels = _figure(4.6, (0.085, 0.63, 0.5, 0.3), (0.68, 0.63, 0.305, 0.3), (0.085, 0.11, 0.9, 0.35))
     early = motion.time <= 5.0
     rate = np.where(np.abs(found.rate) > _CUT_HZ, np.nan, found.rate)
     panels[0].plot(motion.time[early], rate[early], color=LOOKS["precession"].colour, linewidth=0.7)

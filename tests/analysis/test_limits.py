@@ -118,6 +118,35 @@ def test_limits_that_go_down_top_by_top_drift() -> None:
     assert found.trend.value == pytest.approx(-0.1, abs=0.01)
 
 
+@pytest.mark.parametrize("first", [0.1, 21.3, 60.0, 21.86])
+def test_an_even_series_has_a_trend_without_rounding_noise(first: float) -> None:
+    found = summarize(Sample(first + 0.1 * np.arange(10)))
+    assert found.trend
+    assert found.trend.value == pytest.approx(0.1, rel=1e-12)
+    assert (found.trend.u, found.trend_p, found.outliers) == (0.0, 0.0, ())
+
+
+@pytest.mark.parametrize("limit", [0.1, 21.86, 67.1])
+def test_equal_limits_have_no_scatter_however_their_mean_is_rounded(limit: float) -> None:
+    found = summarize(Sample(np.full(10, limit)))
+    assert found.scatter
+    assert (found.mean.u, found.scatter.value, found.trend, found.outliers) == (0.0, 0.0, None, ())
+    several = combine([Sample(np.full(10, limit)), Sample(np.full(7, limit))])
+    assert several.scatter
+    assert several.between
+    assert (several.mean.u, several.scatter.value, several.between.value) == (0.0, 0.0, 0.0)
+    apart = combine([Sample(np.full(10, limit)), Sample(np.full(7, limit + 0.1))])
+    assert apart.between
+    assert apart.between.value == pytest.approx(0.1 / math.sqrt(2))
+
+
+def test_a_scatter_just_above_rounding_counts() -> None:
+    random = np.random.default_rng(1)
+    found = summarize(Sample(21.86 * (1 + 1e-12 * random.standard_normal(10))))
+    assert found.scatter
+    assert found.scatter.value == pytest.approx(21.86e-12, rel=0.6)  # ten tell a scatter to a quarter
+
+
 def test_a_mean_two_standard_errors_off_of_ten_is_no_chance_by_students_t() -> None:
     """Student's table: of 9 degrees of freedom 2.262 has 5 %."""
     found = summarize(Sample(THESIS))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from analysis.spindown.fall import times_of_fall
+from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from levilab.acquisition.counting import FreeTop, prepare_counter
 from levilab.acquisition.driving import DriveSettings, drive_up_and_let_go
 from levilab.acquisition.experiment import Experiment
@@ -14,9 +14,17 @@ from levilab.runs.channel import Channel
 if TYPE_CHECKING:
     from levilab.acquisition.session import Row, Session
 
-#: The usual drag of a laminar disc (mean of the four published runs) [(rad/s)^−½/s]: for the time left while there is
-#: one reading.
-_USUAL_DRAG = 2.34e-4
+#: The usual deceleration at a spin, the mean of the four published runs, whichever law: 2.34e-4 (rad/s)^−½/s of a disc
+#: is 3.2e-3 1/s of Stokes [Hz/s, Hz].
+_USUAL_HZ_PER_S, _USUAL_HZ = 0.0964, 30.0
+#: The standard uncertainty of a reading over 1 s, where the configuration gives none [Hz].
+_USUAL_U_HZ = 0.03
+#: Of the spin: a larger uncertainty counts as this.
+_MOST_U = 0.1
+#: Readings that differ by so many of their standard uncertainties show the rate of the fall.
+_CLEAR = 8.0
+#: The drag of every law is between these powers of the spin.
+_POWERS = (1.0, 2.0)
 
 
 class SpinSettings(DriveSettings):
@@ -42,32 +50,64 @@ def run(session: Session[SpinSettings]) -> None:
     for asked in session.readings_every(settings.interval_s, settings.longest_s):
         reading = top.read()
         if reading:
-            first = session.rows[0] if session.rows else reading
-            least, most = time_left(first, reading, settings.longest_s)
+            rows = session.rows or [reading]
+            least, most = time_left(rows[0], rows[len(rows) // 2], reading, settings.longest_s)
             session.keep(reading, most, least)
         elif end := top.fall(asked):
             session.event("fell", end)
             return
 
 
-def time_left(first: Row, last: Row, longest_s: float) -> tuple[float, float]:
+def time_left(first: Row, middle: Row, last: Row, longest_s: float) -> tuple[float, float]:
     """Until the spins between which a top falls, and no longer than the run goes on, at least and at most [s].
 
-    Under the drag of a laminar disc ω^(−1/2) grows evenly.  Its growth is that between two readings, or while they are
-    one that of the usual drag.
+    Drag slows the spin by dν/dt ∝ −νᵖ, with p from 1 (Stokes) to 2 (Newton).  The first and the last reading show the
+    rate, the one in the middle shows p.  Until readings differ by much more than their noise, the rate is the usual one
+    and p may be any of these powers.  The range allows for about two standard uncertainties of the readings and of p.
+    It takes some microseconds, a fit takes milliseconds.
 
     Args:
         first: the first reading.
-        last: the last one.
+        middle: one about half way in time, where there are three.
+        last: the last reading.
         longest_s: time at which the run ends if the top is still up [s].
     """
-    start, now = ((2 * math.pi * row["spin_frequency_hz"]) ** -0.5 for row in (first, last))
-    time = last["time_s"]
-    lapse = time - first["time_s"]
-    growth = (now - start) / lapse if lapse > 0 and now > start else _USUAL_DRAG / 2
-    ends = times_of_fall(lambda times: (now + growth * (times - time)) ** -2 / (2 * math.pi), time, longest_s)
+    start, now = first["spin_frequency_hz"], last["spin_frequency_hz"]
+    time, lapse = last["time_s"], last["time_s"] - first["time_s"]
+    u = min(last.get("spin_frequency_u_hz", _USUAL_U_HZ), _MOST_U * now)
+    seen = lapse > 0 and start - now > _CLEAR * u
+    powers = _powers(first, middle, last, u) if seen else _POWERS
+    ends = []
+    # √2 u off in both readings, so that both move the end to one side, is about two standard uncertainties of the end
+    for power, falls_hz, sign in zip(powers, FALLS_BETWEEN_HZ, (1, -1), strict=True):
+        off = sign * math.sqrt(2) * u
+        usual = _USUAL_HZ_PER_S * _USUAL_HZ**-power
+        per_second = _passed(start + off, now - off, power) / lapse if seen else usual
+        ends.append(time + _passed(now - off, falls_hz, power) / per_second)
     least, most = (max(0.0, min(end, longest_s) - time) for end in ends)
     return least, most
+
+
+def _powers(first: Row, middle: Row, last: Row, u: float) -> tuple[float, float]:
+    """Between which powers of the spin the drag is, from three readings of standard uncertainty u [Hz].
+
+    The part of ∫ dν/νᵖ that is passed in the middle is that of the time, and goes nearly evenly with p from 1 to 2.
+    """
+    start, half, now = (row["spin_frequency_hz"] for row in (first, middle, last))
+    if not (start - half > _CLEAR * u and half - now > _CLEAR * u):
+        return _POWERS
+    of_time = (middle["time_s"] - first["time_s"]) / (last["time_s"] - first["time_s"])
+    least, most = (_passed(start, half, power) / _passed(start, now, power) for power in _POWERS)
+    power = 1 + (of_time - least) / (most - least)
+    # the middle reading counts once, the two others by parts whose sum is 1: √1.5 u in all, at half time
+    u_power = math.sqrt(1.5) * u * half**-1.5 / _passed(start, now, 1.5) / abs(most - least)
+    low, high = (min(max(end, _POWERS[0]), _POWERS[1]) for end in (power - 2 * u_power, power + 2 * u_power))
+    return low, high
+
+
+def _passed(start: float, end: float, power: float) -> float:
+    """∫ dν/νᵖ from one spin down to another, which time increases evenly."""
+    return math.log(start / end) if power == 1 else (end ** (1 - power) - start ** (1 - power)) / (power - 1)
 
 
 EXPERIMENT = Experiment(

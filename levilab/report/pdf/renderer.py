@@ -48,8 +48,10 @@ LONGEST_WORD = 24
 SHORT_TITLE = 90
 #: Entries up to which an outline has those of the second depth.
 MOST_ENTRIES = 20
+#: The file with the names of the figures that move.
+MOVED = "moved.json"
 #: Height over width from which a figure may leave its place in the text for the top of a page.
-TALL = 0.62
+TALL = 0.4
 #: Height over the width of the text beyond which a figure with its caption does not fit on a page.
 TALLEST = 1.2
 #: Of alike warnings so many are printed like the first.
@@ -89,8 +91,32 @@ def as_pdf(document: Document) -> bytes:
             "pip install --force-reinstall typst, or name the report report.html"
         ) from error
 
-    files: Any = files_of(document)  # a dictionary of files is missing in the types that typst declares
+    files: Any = with_places(files_of(document))  # a dictionary of files is missing in the types that typst declares
     return typst.compile(files, format="pdf", font_paths=fonts(), ignore_system_fonts=True)
+
+
+def with_places(files: dict[str, bytes]) -> dict[str, bytes]:
+    """The files, with the figures that go to the top of the next page: those that do not fit where they are called.
+
+    The document is set anew after each of them, since one that moves makes room for the text behind it.  Where the
+    template queries each figure's own place, typst's five attempts do not suffice for several figures.
+    """
+    import typst
+
+    moved: list[str] = []
+    while True:
+        files = files | {MOVED: json.dumps(moved).encode()}
+        if b'"floats": true' not in files["document.json"]:
+            return files
+        given: Any = files
+        found = typst.query(
+            given, "<places-of-figures>", field="value", one=True, font_paths=fonts(), ignore_system_fonts=True
+        )
+        places: list[tuple[str, int, int]] = json.loads(found)
+        away = [file for file, called, stands in places if stands > called and file not in moved]
+        if not away:
+            return files
+        moved.append(away[0])
 
 
 def fonts() -> list[Path]:
@@ -106,7 +132,7 @@ def files_of(document: Document) -> dict[str, bytes]:
     content = _content(document, drawing)
     template = (resources.files("levilab.report.pdf") / TEMPLATE).read_bytes()
     data = json.dumps(content, allow_nan=False, ensure_ascii=True, sort_keys=True).encode()
-    return {"main.typ": template, "document.json": data, **drawing.files}
+    return {"main.typ": template, "document.json": data, MOVED: b"[]", **drawing.files}
 
 
 @dataclass(frozen=True)
