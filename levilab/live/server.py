@@ -98,6 +98,20 @@ class Hall:
                 del self.pages[name]
                 self.watches.pop(name).close()
 
+    def scene(self, name: str) -> dict[str, Any] | None:
+        """The scene of the bench that pages see with a run; None where it is not known.
+
+        Args:
+            name: of the run that is shown, also where no page chose it; "" is none, beside the bench for practice.
+        """
+        of_other_program = any(
+            watch.has_own_bench and watch.followed and watch.followed.folder.name == name
+            for watch in self.watches.values()
+        )
+        if self.desk and not of_other_program:
+            return self.desk.scene
+        return scene_of_run(self.root / name) if self.is_run(name) else None
+
     async def read_on(self) -> None:
         """Read what is new for all pages, for ever."""
         fitting: set[asyncio.Task[None]] = set()
@@ -206,12 +220,7 @@ class Pages:
 
     async def parts(self, request: Request) -> Response:
         """What is drawn of the top."""
-        hall, name = self.hall, request.query_params.get("run", "")
-        watch, scene = hall.watches.get(name), None
-        if hall.desk and not (watch and watch.has_own_bench):
-            scene = hall.desk.scene
-        elif hall.is_run(name):
-            scene = scene_of_run(hall.root / name)
+        scene = self.hall.scene(request.query_params.get("run", ""))
         return self._json(await asyncio.to_thread(parts_for, scene))
 
     async def of_run(self, request: Request) -> Response:

@@ -16,6 +16,7 @@ from levilab.live.doors import Doors
 from levilab.live.running import Curve, Running
 from levilab.live.server import OWN_BENCH, Hall
 from levilab.live.watch import Watch
+from levilab.simulator.scene import preset
 from levilab.telemetry.address import Address, write_address
 from levilab.telemetry.messages import State
 from support.live_pages import GrowingRun, publish, spin_down
@@ -140,6 +141,22 @@ def test_a_page_that_went_back_to_its_own_bench_stays_there(tmp_path: Path) -> N
         publish(kept, State(0.0, folder=str(own.folder)))  # what the bench itself records is followed
         assert kept.followed
         assert kept.followed.folder == own.folder
+
+
+def test_the_top_of_another_program_is_drawn_also_where_no_page_chose_its_run(tmp_path: Path) -> None:
+    scene = preset("practice").as_table()
+    other = GrowingRun(tmp_path, "2-other", configuration={"scene": scene | {"base": {"outer_radius_m": 0.07}}})
+    write_address(other.folder, Address.at(2))
+    desk = SimpleNamespace(address=lambda: Address.at(1), folder=None, folders=[], is_recording=False, scene=scene)
+    hall = Hall(tmp_path, "", Doors(1), desk)  # type: ignore[arg-type]
+    with other.running(), hall.watching("") as watch, hall.watching(OWN_BENCH) as kept:
+        asyncio.run(hall.turn_to_another())
+        looking(watch).step()
+        kept.step()
+        assert [one.has_own_bench for one in (watch, kept)] == [True, False]
+        assert hall.scene("2-other") == other.record["configuration"]["scene"]
+        assert hall.scene("") == scene  # what a page sees that keeps to the bench for practice
+    assert hall.scene("2-other") == scene  # the run is over, or no page sees it: its bench is not listened to
 
 
 def test_a_page_that_waits_is_sent_a_fit_when_it_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
