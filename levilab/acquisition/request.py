@@ -65,7 +65,7 @@ class AcquisitionOptions:
         resume: the run to go on with.
         wire_log: keeps all bytes on the wire.
         person: carries out what the experiment asks of a person at a real bench.
-        tell: called with a line about what takes long before it begins.
+        tell: called with a line when code begins to be compiled for a scene, and with one when it is.
         settings: of experiments, as "limit.which=upper"; they go before those of the bench file.
     """
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @contextlib.contextmanager
 def announce_compilation(message: Callable[[str], None]) -> Iterator[None]:
-    """Send a message when the kernel begins to be compiled, and one at the end; one that lies on the disk is not."""
+    """Send a message when the kernel begins to be compiled, and one when it is; one that lies on the disk is not."""
     with install_listener("numba:compile", _Announcement(message)):
         yield
 
@@ -26,15 +26,18 @@ class _Announcement(Listener):
 
     def __init__(self, message: Callable[[str], None]) -> None:
         self._message = message
-        self._began: float | None = None
+        self._start: tuple[Event, float] | None = None  # with its time [s]
         self._ended = False
 
     def on_start(self, event: Event) -> None:
-        if event.data["dispatcher"] is advance and self._began is None:
-            self._began = time.monotonic()
+        if event.data["dispatcher"] is advance and self._start is None:
+            self._start = event, time.monotonic()
             self._message("compiling for this kind of scene: a few seconds, once")
 
     def on_end(self, event: Event) -> None:
-        if event.data["dispatcher"] is advance and self._began is not None and not self._ended:
+        if event.data["dispatcher"] is not advance or self._start is None or self._ended:
+            return
+        start, began = self._start
+        if event.is_failed == start.is_failed:  # numba 0.68 returns False for a failure alone; no start is one
             self._ended = True
-            self._message(f"compiled in {time.monotonic() - self._began:.1f} s")
+            self._message(f"compiled in {time.monotonic() - began:.1f} s")

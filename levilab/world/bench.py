@@ -168,7 +168,7 @@ def scene_world(
     Args:
         scene: with the top that moves.
         clock: makes the clock, once all code is compiled.
-        tell: called with a message before code is compiled.
+        tell: called with a message when code begins to be compiled, and with one when it is.
         put_back_after_s: time from a fall until the top floats again [s]; None: it stays down.
         seed: of the light's noise, and of the place of the tape.
 
