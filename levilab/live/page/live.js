@@ -235,7 +235,7 @@ function show() {
   write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: "No run yet: the guide says how to record one.", setup: "The bench is being set up."}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
   document.title = `${state === "running" && data.count ? `${data.count} readings · ` : ""}levilab live`;
   practice?.show(bench, about, data.count, down);
-  by("own").hidden = !practice || wanted === OWN_BENCH || !seen.run || listed.practice.runs.includes(seen.run);
+  by("own").hidden = !practice || wanted === OWN_BENCH || !seen.run || (isOwn(seen.run) ?? !wanted);  // a run that begins is listed in a moment
   space?.setSpeed?.(bench?.speed, bench?.paused || bench?.silent);
   showTop(bench);
   showAge(bench);
@@ -342,7 +342,7 @@ function showTop(bench) {
 function showAge(bench) {
   const used = Object.keys(data.about?.instruments || {});
   const still = data.about?.status === "running" && used.length && !used.includes("oscilloscope");
-  const why = still ? `not read in a ${data.about.experiment} run, whose readings would wait` : "";
+  const why = still ? `a ${data.about.experiment} run does not read it` : "";
   write("scope-key", [data.up === false ? "the top is down" : "", why].filter(Boolean).join("; "));
   for (const one of data.records.values()) {
     const said = ageOf(one, bench);
@@ -502,6 +502,8 @@ function open(run) {
 }
 
 let listed = null;
+/** Whether the bench for practice recorded a run; undefined where it is not among the runs that are listed. */
+const isOwn = (run) => listed.practice.runs.includes(run) || (listed.runs.some(({name}) => name === run) ? false : undefined);
 async function listRuns(chosen) {
   const response = await fetch("runs");
   listed = await response.json();
@@ -530,7 +532,7 @@ async function begin() {
   document.body.classList.add("no-top");
   if (bench) {
     document.body.classList.remove("no-top");
-    practice = openPractice(bench, (wanted) => paused && wanted.do !== "analyze" ? PAUSED : command(wanted, token), () => seen.run, (run) => listed.practice.runs.includes(run), Boolean(token));
+    practice = openPractice(bench, (wanted) => paused && wanted.do !== "analyze" ? PAUSED : command(wanted, token), () => seen.run, isOwn, Boolean(token));
   }
   by("keys").classList.toggle("for-practice", Boolean(bench));
   for (const row of document.querySelectorAll(".practice-key")) row.hidden = !bench;

@@ -17,7 +17,7 @@ from support.live_pages import GrowingRun, address, publish, serving, spin_down,
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from playwright.sync_api import Page
+    from playwright.sync_api import Page, Route
 
     from levilab.live.server import Hall
 
@@ -42,6 +42,8 @@ def served(older: GrowingRun) -> Iterator[Hall]:
 #: A run that is up soon: a student's is at 34 Hz, a minute of the bench later.
 QUICK = ("spin.drive_frequency_hz=31", "spin.drive_waveform=SQU", "spin.ramp_hz_per_s=0.1", "spin.hold_s=2",
          "spin.interval_s=2")  # fmt: skip
+#: A top that another program's bench publishes.
+POSE = Poses(7.0, 1 / 400, np.full((1, 3), 0.1), np.array([[0.0, 0.0, 0.0, 1.0]]), np.ones(1, dtype=bool))
 #: The steps of the guide that are ticked.
 DONE = "[...document.querySelectorAll('#guide .done')].map((one) => one.dataset.step).join()"
 
@@ -55,8 +57,7 @@ def see_another_program_record(page: Page, served: Hall, older: GrowingRun) -> N
     with older.running():
         write_address(older.folder, Address.at(1))
         until(page, "levilab.data.about.status === 'running' && levilab.seen.source === 1")  # it listens to that bench
-        pose = Poses(7.0, 1 / 400, np.full((1, 3), 0.1), np.array([[0.0, 0.0, 0.0, 1.0]]), np.ones(1, dtype=bool))
-        publish(served.watches[OLDER], State(7.0, folder=str(older.folder)), pose)
+        publish(served.watches[OLDER], State(7.0, folder=str(older.folder)), POSE)
         until(page, "document.getElementById('controls').disabled && levilab.data.bench.time_s === 7")
         assert page.inner_text("#said").startswith("Another program records this run")
         assert page.evaluate(DONE) == "drive"  # as before: the guide is of the bench for practice
@@ -68,19 +69,41 @@ def see_another_program_record(page: Page, served: Hall, older: GrowingRun) -> N
         assert page.inner_text("#run option:checked") == "no run of this bench yet"
         page.select_option("#run", OLDER)
         until(page, f"levilab.seen.run === '{OLDER}' && levilab.seen.source === 1")
-        publish(served.watches[OLDER], State(8.0, folder=str(older.folder)), pose)
+        publish(served.watches[OLDER], State(8.0, folder=str(older.folder)), POSE)
         until(page, "document.getElementById('controls').disabled")
     older.say(status="finished")
     until(page, "!document.getElementById('controls').disabled && document.getElementById('said').textContent === ''")
     until(page, f"levilab.space.parts.base.outer === {outer}")  # and those of the bench for practice
 
 
+def turn_by_itself(page: Page, served: Hall, older: GrowingRun) -> None:
+    """A page that chose no run turns to that of another program, with the top of that program."""
+    assert page.evaluate("levilab.space.parts.base.outer") != 0.07
+    with older.running():
+        served.watches[""].turn_to(older.folder)  # as the server does within two seconds
+        until(page, f"levilab.seen.run === '{OLDER}' && levilab.seen.source === 1")
+        publish(served.watches[""], State(9.0, folder=str(older.folder)), POSE)
+        until(page, "levilab.space.parts.base.outer === 0.07")
+        assert page.evaluate("!document.getElementById('own').hidden")
+    older.say(status="finished")
+
+
 def record_some_readings(page: Page) -> None:
     """Meanwhile the oscilloscope stands still, and the page says why."""
+    own = page.get_by_role("button", name="To the practice bench")
+    assert own.is_visible()  # an older run is shown
+    listings: list[Route] = []
+    page.route("**/runs", lambda route: listings.append(route))  # noqa: PLW0108 - Playwright takes no method of a list
     page.click("#record")
+    until(page, f"levilab.seen.run && levilab.seen.run !== '{OLDER}'")
+    assert not own.is_visible()  # also while the run that has begun is not listed
+    for listing in listings:
+        listing.continue_()
+    page.unroute("**/runs")
     until(page, f"levilab.data.bench?.busy && levilab.seen.run !== '{OLDER}' && levilab.data.count >= 3")
     until(page, "levilab.data.fit")
-    still = "not read in a spin run, whose readings would wait"
+    assert listings
+    still = "a spin run does not read it"
     assert page.inner_text("#scope-key").endswith(still)
     gap = "document.getElementById('scope-key').getBoundingClientRect().left - range.getBoundingClientRect().right"
     of_heading = "const range = document.createRange(); range.selectNodeContents(document.getElementById('scope-h'));"
@@ -166,6 +189,7 @@ def test_a_student_drives_records_and_analyzes(
     until(page, f"{DONE} === 'drive,record,analyze'")  # the drive was not tuned up by hand
     assert sorted(path.name for path in served.root.iterdir()) == [OLDER, name]
     assert (served.root / name / "result.json").exists()
+    turn_by_itself(page, served, older)
 
 
 def test_a_page_without_the_token_may_only_look(served: Hall, page: Page) -> None:
