@@ -120,7 +120,8 @@ def runs() -> Callable[..., None]:
 def simulate() -> Callable[..., None]:
     """Simulate the motion: does the top stay up, where and how fast does it turn, which frequencies are in it.
 
-    The first run for a kind of scene compiles for 4 to 7 s.  Ctrl-C ends it, and nothing is written then.
+    The first run for a kind of scene compiles for about 2 s of processor time.  Ctrl-C ends it, and nothing is
+    written then.
     """
     from levilab.cli.simulate import simulate
 
