@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -29,6 +30,32 @@ def interrupt(*_: Any) -> None:
 def test_the_console_script_starts_the_application() -> None:
     scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]
     assert EntryPoint("levilab", scripts["levilab"], "console_scripts").load() is main
+
+
+#: Prints the number of threads when numpy begins to be loaded, and ends there.
+AT_NUMPY = """
+import os, sys
+from levilab.cli.start import main
+
+class Finder:
+    def find_spec(self, name, *_):
+        if name == "numpy":
+            print(os.environ.get("OPENBLAS_NUM_THREADS"))
+            raise SystemExit
+
+sys.meta_path.insert(0, Finder())
+sys.argv = ["levilab", "analyze", "x.csv"]
+main()
+"""
+
+
+@pytest.mark.parametrize(("given", "taken"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "2"}, "2")])
+def test_numpy_is_loaded_with_one_thread_for_its_matrices(given: dict[str, str], taken: str) -> None:
+    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"} | given
+    ended = subprocess.run(
+        [sys.executable, "-c", AT_NUMPY], env=environment, capture_output=True, text=True, check=True
+    )
+    assert ended.stdout.split() == [taken]
 
 
 def test_ctrl_c_at_the_start_ends_in_one_line(
