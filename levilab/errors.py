@@ -26,12 +26,12 @@ def unquoted(text: str) -> str:
     return _QUANTITY.sub(r"\1", text)
 
 
-class WrongUsage(LevilabError):
+class RequestError(LevilabError):
     """A request that is wrong in itself, whatever the data are. The command line ends with its own exit status."""
 
 
-class UsageError(WrongUsage):
-    """A wrong value of a setting.
+class UsageError(RequestError):
+    """A wrong value of an argument or of a setting, which the error names.
 
     >>> print(UsageError("duration", "a number above 0 is expected", value=-1))
     duration = -1: a number above 0 is expected

@@ -41,7 +41,7 @@ def blocks(language: str) -> list[tuple[str, str]]:
 def test_python_in_the_pages_prints_what_it_says(page: str, code: str, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "sample_data", tmp_path / "sample_data")
     shown = io.StringIO()
-    with contextlib.chdir(tmp_path), contextlib.redirect_stdout(shown), in_full_on(page):
+    with contextlib.chdir(tmp_path), contextlib.redirect_stdout(shown), reduce_work(page):
         exec(compile(code, page, "exec"), {"__name__": "__main__"})
     assert shown.getvalue().splitlines() == re.findall(r"print\(.*\)  # (.*)", code)
 
@@ -80,8 +80,8 @@ IN_FULL = "README.md"
 
 
 @contextlib.contextmanager
-def in_full_on(page: str) -> Iterator[None]:
-    """Draw figures and make all trials for one page alone."""
+def reduce_work(page: str) -> Iterator[None]:
+    """Draw no figures and make few trials, on all pages but one."""
     if page == IN_FULL:
         yield
     else:
@@ -92,7 +92,7 @@ def in_full_on(page: str) -> Iterator[None]:
 @pytest.mark.parametrize("page", steps())
 def test_the_commands_of_a_page_work_one_after_another(tmp_path: Path, page: str) -> None:
     shutil.copytree(ROOT / "sample_data", tmp_path / "sample_data")
-    with in_full_on(page):
+    with reduce_work(page):
         follow(steps()[page], tmp_path)
 
 

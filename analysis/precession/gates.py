@@ -31,7 +31,7 @@ FEWEST = 7
 #: The swing's frequency is searched from so many periods in the series, in steps of so many, up to so many in a gate.
 _LEAST_PERIODS, _STEP_PERIODS, _MOST_IN_A_GATE = 1.5, 0.1, 0.9
 #: Gates times frequencies that are worked out at once, at most: a megabyte for each of the numbers in between.
-_AT_ONCE = 40_000
+_MOST_GATES_TIMES_FREQUENCIES = 40_000
 #: A gate has miscounted if it is off by whole pulses to within this, and by so many standard deviations; at most this
 #: share of the gates is left out.
 _OF_A_PULSE, _STANDS_OUT, _MOST_WRONG = 0.25, 5.0, 0.25
@@ -213,7 +213,7 @@ def _swing_frequency(series: Sequence[Gates]) -> float | None:
         return None
     totals = np.zeros(tried.size)
     for gates in series:
-        pieces = np.array_split(tried, 1 + tried.size * len(gates) // _AT_ONCE)
+        pieces = np.array_split(tried, 1 + tried.size * len(gates) // _MOST_GATES_TIMES_FREQUENCIES)
         totals += len(gates) * np.log(np.concatenate([_residual_sums(gates, piece) for piece in pieces]) + least)
     return float(tried[int(np.argmin(totals))])
 

@@ -12,11 +12,11 @@ def exit_status(error: Exception) -> int | None:
     """The exit status of a known failure, which is printed in one line; None for what is a defect of this program."""
     from analysis.errors import AnalysisError
     from instruments.errors import InstrumentError
-    from levilab.errors import LevilabError, NoInstrument, WrongUsage
+    from levilab.errors import LevilabError, NoInstrument, RequestError
 
     # of several that fit the first one counts
     statuses: tuple[tuple[type[Exception], int], ...] = (
-        (WrongUsage, WRONG_USAGE),
+        (RequestError, WRONG_USAGE),
         (InstrumentError, INSTRUMENT),
         (NoInstrument, INSTRUMENT),
         (LevilabError, FAILED),

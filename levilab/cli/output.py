@@ -43,8 +43,8 @@ def silence(stream: TextIO) -> None:
         os.dup2(nowhere.fileno(), stream.fileno())
 
 
-def where(report: Path) -> str:
-    """Return the line about a report that is yet to be written; a folder that it makes may be a typing error."""
+def place_of_report(report: Path) -> str:
+    """Return where a report will be, as a line; a folder that it makes may be a typing error."""
     return f"the report is in {report}{'' if report.parent.exists() else ', in a new folder'}"
 
 

@@ -7,7 +7,7 @@ import typer
 
 from levilab.cli.analyze import OPTIONS, analysis_options
 from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
-from levilab.cli.output import interruptible, message, print_json, result, where
+from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.cli.quantities import with_options
 
 
@@ -56,7 +56,7 @@ def report(
         "keep_outliers": keep_outliers,
     }
     app = context.find_root().command
-    place = where(output)
+    place = place_of_report(output)
     with interruptible("no report is written"):
         written = write_report(
             paths,

@@ -8,7 +8,7 @@ import typer
 
 from levilab.cli import exit_codes
 from levilab.cli.options import Json
-from levilab.cli.output import interruptible, print_json, result, where
+from levilab.cli.output import interruptible, place_of_report, print_json, result
 
 
 def reproduce(
@@ -47,7 +47,7 @@ def reproduce(
     report = output or (None if as_json else Path("reproduce.html"))
     if report is not None:
         format_of(report)
-    place = where(report) if report is not None else None
+    place = place_of_report(report) if report is not None else None
     with interruptible("no report is written"):
         with contextlib.closing(ShareBar("reproducing")) as progress:
             found = reproduce(wanted, progress)

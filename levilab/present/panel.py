@@ -155,13 +155,13 @@ def _progress(state: State) -> tuple[float, str]:
         return 0.0, f"{_clock(elapsed)} so far"
     share = elapsed / (elapsed + left) if elapsed + left > 0 else 0.0
     least = left if state.least_left_s is None else state.least_left_s
-    return share, f"{_clock(elapsed)} done, {time_left(least, left)}"
+    return share, f"{_clock(elapsed)} done, {time_left_in_words(least, left)}"
 
 
-def time_left(least: float, most: float) -> str:
+def time_left_in_words(least: float, most: float) -> str:
     """Return the time that is left, at least and at most [s], in words.
 
-    >>> [time_left(*left) for left in ((95.0, 95.2), (42.0, 95.0), (75.0, 95.0), (0.0, 20.0))]
+    >>> [time_left_in_words(*left) for left in ((95.0, 95.2), (42.0, 95.0), (75.0, 95.0), (0.0, 20.0))]
     ['about 1:35 min left', 'about 42 s to 1:35 min left', 'about 1:15 to 1:35 min left', 'at most 20 s left']
     """
     first, last = _clock(least), _clock(most)

@@ -8,7 +8,7 @@ import time
 from typing import TYPE_CHECKING, Protocol
 
 from levilab.present.characters import for_encoding, printable
-from levilab.present.panel import Trend, bench_lines, time_left
+from levilab.present.panel import Trend, bench_lines, time_left_in_words
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -92,7 +92,7 @@ class LineDisplay:
 
     def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
         """A line."""
-        self.message(f"{text}   {time_left(*remaining)}" if remaining[1] >= 0.5 else text)
+        self.message(f"{text}   {time_left_in_words(*remaining)}" if remaining[1] >= 0.5 else text)
 
     def message(self, text: str) -> None:
         """Print a line.  A closed standard error does not end a measurement."""

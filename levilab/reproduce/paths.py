@@ -77,8 +77,8 @@ def modes() -> list[Finding]:
     ]
 
 
-def sleeping_in_words(scene: Scene) -> tuple[float, str, bool]:
-    """The sleeping top's limit of a scene beside that of the first chapter's top, which has another mass.
+def compare_sleeping_limits(scene: Scene) -> tuple[float, str, bool]:
+    """Compare the sleeping top's limit of a scene with that of the first chapter's top, which has another mass.
 
     Returns:
         the limit [Hz]; both in words; whether their heights alone make the difference.
@@ -101,7 +101,7 @@ def fall() -> tuple[Finding, Trajectory]:
     motion = simulate(scene, FALL_S, tolerance=1e-6, rate=FALL_HZ)
     early = motion.time < motion.time[-1] - SHOWN_S
     before, last = float(motion.tilt[early].max()), float(motion.tilt[-1])
-    limit, words, explained = sleeping_in_words(scene)
+    limit, words, explained = compare_sleeping_limits(scene)
     return (
         Statement(
             "tilt at the fall, IC1 with drag from 30 Hz",

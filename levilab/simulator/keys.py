@@ -7,7 +7,7 @@ import json
 import tomllib
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import LevilabError, WrongUsage
+from levilab.errors import LevilabError, RequestError
 from levilab.files import parse_toml
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class SceneError(LevilabError):
     """A scene that cannot be simulated as it is described."""
 
 
-class UnknownScene(SceneError, WrongUsage):
+class UnknownScene(SceneError, RequestError):
     """A name that none of the scenes has that come with levilab."""
 
 

@@ -53,7 +53,7 @@ class Inputs:
 
 
 #: A gate opens within a period, and closes within another one: at 20 Hz and above so much later than its length [s].
-_TWO_PERIODS = 0.1
+_TWO_PERIODS_AT_20_HZ = 0.1
 
 
 def first_edge(
@@ -65,7 +65,7 @@ def first_edge(
         finder: of the edges.
         instant: [s].
         before: the deadline [s].
-        ahead: how far behind the instant later edges will be needed, which are searched for at once [s].
+        ahead: time after the instant for which edges will be needed, too, and are searched for at once [s].
     """
     while (edge := finder.find(instant)) is None:
         if finder.reached >= before:
@@ -91,7 +91,7 @@ def frequency(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
     """Count the periods from the first edge to the first one after the gate, and divide by their time [Hz]."""
     finder = inputs.finder(channel, gate.begin)
     finder.refresh(gate.begin)
-    opened = yield from first_edge(finder, gate.begin, gate.deadline, ahead=gate.length + _TWO_PERIODS)
+    opened = yield from first_edge(finder, gate.begin, gate.deadline, ahead=gate.length + _TWO_PERIODS_AT_20_HZ)
     if opened is None:
         return gate.without_result()
     due = max(opened.time + gate.length, math.nextafter(opened.time, math.inf))

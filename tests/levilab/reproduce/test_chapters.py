@@ -100,12 +100,12 @@ def test_the_least_spin_is_one_number_or_has_the_mass_that_changes_it_beside_it(
     assert slip.truth == pytest.approx(stability_of(preset("undriven")).sleeping, rel=1e-9)
     assert "25.26 g at 7.30 cm" in slip.name
     assert "the printed 14.005 Hz are its own equation's for 25.30 g at 7.3 cm" in slip.why
-    limit, words, explained = paths.sleeping_in_words(started("IC1", "friction"))
+    limit, words, explained = paths.compare_sleeping_limits(started("IC1", "friction"))
     assert limit == pytest.approx(21.729, abs=0.001)
     assert "21.73 Hz for its 25.285 g, which float at 7.28 cm" in words
     assert "25.26 g float at 7.30 cm, in a weaker field: 21.69 Hz" in words
     assert explained
-    _, _, explained = paths.sleeping_in_words(started("IC1", "friction", "top.inertia_axial_kg_m2=1.8e-6"))
+    _, _, explained = paths.compare_sleeping_limits(started("IC1", "friction", "top.inertia_axial_kg_m2=1.8e-6"))
     assert not explained
 
 
