@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NoReturn, Self, TypeVar, cast, overload
 
 from instruments.clock import WallClock
-from instruments.errors import BadAnswer, CommandRefused, OutOfRange, WrongInstrument
+from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
 from instruments.ieee488 import IDENTITY_FIELDS, INFINITY, NOT_A_NUMBER, NUMERIC, Form, identity_fields
 from instruments.links.opening import open_link
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from instruments.clock import Clock
     from instruments.links.transport import TrafficLog, Transport
@@ -46,7 +46,7 @@ class ScpiInstrument:
         SERIAL: the factory settings of its serial line; empty where it has none.
         NUMBER: the form in which it prints numbers, where a setting or a question has none of its own.
         ANSWERS_JOINED: whether one message may have several questions, and is answered with semicolons between the
-            answers (IEEE 488.2, 8.4.1).
+            answers (IEEE 488.2, 8.4.1).  One that answers in another way is asked one by one; see `settings`.
         transport: the link.
         clock: of the bench.
         last_set: the last value set of each declared setting, since the last reset.
@@ -64,6 +64,8 @@ class ScpiInstrument:
     clock: Clock
     last_set: dict[str, bool | float | str]
     _fields: tuple[str, ...] = ()
+    #: Whether this instrument has joined answers; None while it was not asked to.
+    _joins: bool | None = None
 
     def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
         """Drive the instrument at this link.
@@ -222,21 +224,41 @@ class ScpiInstrument:
     def settings(self) -> dict[str, bool | float | str]:
         """Ask the instrument for all declared settings, with the unit at the end of each name.
 
-        Where it joins answers, all are asked for in one message: one exchange instead of a dozen.
+        Where it joins answers, all are asked for in one message: one exchange instead of a dozen.  An instrument that
+        gives another number of answers is asked one by one, then and from then on.
         """
         rows = self.declared()
-        if not self.ANSWERS_JOINED:
-            return {row.name_with_unit: getattr(self, row.name) for row in rows}
         questions = [row.question(self) for row in rows]
-        message = ";:".join(questions)
-        answer = self.transport.query(message)
-        answers = answer.split(";")
-        if len(answers) != len(rows):
-            self.reject(message, answer, f"{len(rows)} answers with semicolons between them")
-        return {
-            row.name_with_unit: row.read(self, question, one)
-            for row, question, one in zip(rows, questions, answers, strict=True)
-        }
+        if self.ANSWERS_JOINED and self._joins is not False and (answers := self._joined_answers(questions)):
+            self._joins = True
+            return {
+                row.name_with_unit: row.read(self, question, answer)
+                for row, question, answer in zip(rows, questions, answers, strict=True)
+            }
+        found = {row.name_with_unit: getattr(self, row.name) for row in rows}
+        self._joins = False
+        return found
+
+    def _joined_answers(self, questions: Sequence[str]) -> list[str]:
+        """Ask these questions in one message.
+
+        Returns:
+            As many answers; none where there came fewer or more, and then the link is cleared.
+
+        Raises:
+            NoAnswer: nothing came in time, from an instrument that has joined answers before.
+        """
+        answers: list[str] = []
+        try:
+            answers = [answer.strip() for answer in self.transport.query(";:".join(questions)).split(";")]
+        except NoAnswer:
+            if self._joins:  # then it is a fault of the link
+                raise
+        if len(answers) == len(questions):
+            return answers
+        self.transport.clear()  # the other answers may still come
+        self.forget_errors()  # questions that were cut off leave errors behind
+        return []
 
     def changed_settings(
         self,

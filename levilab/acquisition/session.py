@@ -253,13 +253,12 @@ class Session(Generic[S]):
             self._write_event("answered", answer)
         return answer
 
-    def keep(self, row: Row, time_left_s: float, least_left_s: float | None = None) -> None:
+    def keep(self, row: Row, time_left_s: float | tuple[float, float]) -> None:
         """Write a reading down, then show it: what was shown is on the disk.
 
         Args:
             row: the reading.
-            time_left_s: expected until the end, at most if `least_left_s` is given.
-            least_left_s: at least; None: as much.
+            time_left_s: expected until the end, or how much at least and at most.
 
         Raises:
             ExperimentFailed: its time does not come after the last one's.
@@ -271,13 +270,13 @@ class Session(Generic[S]):
         self._losses = 0
         self.doing.seen |= row
         self.doing.text, self.doing.share = "", None
-        left = (time_left_s if least_left_s is None else least_left_s, time_left_s)
+        least, most = time_left_s if isinstance(time_left_s, tuple) else (time_left_s, time_left_s)
         now = self.bench.clock.now()
-        self.doing.end = now + left[0], now + left[1]
+        self.doing.end = now + least, now + most
         if not self._headed:
             self._headed = True
             self.show.message("  ".join(f"{_head(one):>{_width(one)}}" for one in self._shown))
-        self.show.reading(self._in_words(row), row["time_s"], left)
+        self.show.reading(self._in_words(row), row["time_s"], (least, most))
         self.look()
 
     def keep_trace(self, input_: int, channel: str, time_s: float) -> Trace:

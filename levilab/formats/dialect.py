@@ -3,13 +3,15 @@
 The dialect is found by trying each row of a table on the file's lines and counting what comes out as numbers.
 """
 
+import contextlib
 import csv
+import hashlib
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import takewhile
 from typing import Literal
 
@@ -160,15 +162,8 @@ def find_dialect(lines: Sequence[str], first: Sequence[str] = ()) -> Dialect | N
         lines: those that are rows, if there are any.
         first: the first ones of the file, where titles stand above all rows.
     """
-    return _find_dialect(tuple(lines), tuple(first))
-
-
-@lru_cache(maxsize=64)  # each analysis reads the files of a folder anew, to see which of them suit it
-def _find_dialect(lines: tuple[str, ...], first: tuple[str, ...]) -> Dialect | None:
-    scores = {d: _score(content_lines(lines, d), SEPARATORS.index(d.separator)) for d in DIALECTS}
-    best = max(DIALECTS, key=scores.__getitem__)
-    if scores[best][1]:
-        return best
+    if found := _dialect_of_rows(lines):
+        return found
 
     def titles(dialect: Dialect) -> int:
         candidates = (*_above_rows(first, dialect), *content_lines(lines, dialect))
@@ -176,6 +171,27 @@ def _find_dialect(lines: tuple[str, ...], first: tuple[str, ...]) -> Dialect | N
 
     best = max(DIALECTS, key=titles)
     return best if titles(best) else None
+
+
+#: Digest of some lines → the dialect of their rows.  Each analysis reads all files of a folder anew, in the same order,
+#: to see which of them suit it.  Where there are too many, the newest entry goes: the next pass finds the older ones.
+_DIALECTS_OF_ROWS: dict[bytes, Dialect | None] = {}
+_MOST_DIALECTS = 1 << 14  # in 1.4 MB
+
+
+def _dialect_of_rows(lines: Sequence[str]) -> Dialect | None:
+    """The dialect in which the most lines are rows; None where none is a row in any."""
+    text = "\0".join(lines).encode("utf-8", errors="surrogatepass")
+    digest = hashlib.blake2b(text, digest_size=16).digest()
+    with contextlib.suppress(KeyError):
+        return _DIALECTS_OF_ROWS[digest]
+    scores = {d: _score(content_lines(lines, d), SEPARATORS.index(d.separator)) for d in DIALECTS}
+    best = max(DIALECTS, key=scores.__getitem__)
+    found = best if scores[best][1] else None
+    if len(_DIALECTS_OF_ROWS) >= _MOST_DIALECTS:
+        _DIALECTS_OF_ROWS.popitem()
+    _DIALECTS_OF_ROWS[digest] = found
+    return found
 
 
 def _above_rows(lines: Sequence[str], dialect: Dialect) -> Iterator[Line]:

@@ -51,8 +51,7 @@ def run(session: Session[SpinSettings]) -> None:
         reading = top.read()
         if reading:
             rows = session.rows or [reading]
-            least, most = time_left(rows[0], rows[len(rows) // 2], reading, settings.longest_s)
-            session.keep(reading, most, least)
+            session.keep(reading, time_left(rows[0], rows[len(rows) // 2], reading, settings.longest_s))
         elif end := top.fall(asked):
             session.event("fell", end)
             return

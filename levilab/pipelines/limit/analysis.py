@@ -89,8 +89,7 @@ class Conditions:
         top: where the parameters of the top come from, in words.
         waveform, amplitude_vpp, creep_hz_per_s, step_hz: the drive of an upper limit, and how far it goes between two
             looks at the top; None where the data do not say, and of lower limits: a free top falls without a drive.
-        synthetic: whether the runs were simulated or made up, where others under these conditions are not the same;
-            None where none are.
+        synthetic: whether the runs were simulated or made up; None where that is not known, as of a data file.
     """
 
     which: Which
@@ -103,15 +102,14 @@ class Conditions:
 
     @property
     def text(self) -> str:
-        """In words."""
+        """In words, without whether they are SYNTHETIC."""
         drive = [
             "" if self.waveform is None else _WAVEFORMS.get(self.waveform, self.waveform),
             "" if self.amplitude_vpp is None else f"{self.amplitude_vpp:g} Vpp",
             "" if self.creep_hz_per_s is None else f"{self.creep_hz_per_s:g} Hz/s",
             "" if self.step_hz is None else f"a look each {self.step_hz:g} Hz",
         ]
-        made_up = {None: "", True: "SYNTHETIC", False: "not known to be SYNTHETIC"}[self.synthetic]
-        return ", ".join(filter(None, [*drive, self.top, made_up]))
+        return ", ".join([*filter(None, drive), self.top])
 
 
 @dataclass(frozen=True)
@@ -126,6 +124,7 @@ class Limits:
         device: that theory is of.
         ends: kind of event → how often a top was lost so.
         runs: of a group, the numbers of the inputs, from 0.
+        told_apart: whether another group differs from this one only in what is SYNTHETIC, so that the text says it.
     """
 
     which: Which
@@ -135,6 +134,13 @@ class Limits:
     device: Device
     ends: Mapping[str, int]
     runs: tuple[int, ...] = ()
+    told_apart: bool = False
+
+    @property
+    def conditions_text(self) -> str:
+        """The conditions in words."""
+        made_up = "SYNTHETIC" if self.conditions.synthetic else "not known to be SYNTHETIC"
+        return f"{self.conditions.text}, {made_up}" if self.told_apart else self.conditions.text
 
     @property
     def text(self) -> str:
@@ -179,7 +185,7 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
     def about_all(self) -> Iterable[str]:
         """What to know of the limits of the same conditions, and of conditions that differ."""
         for which in ("lower", "upper"):
-            texts = [group.conditions.text for group in self.groups if group.which == which]
+            texts = [group.conditions_text for group in self.groups if group.which == which]
             if len(texts) > 1:
                 listed = "; ".join(texts)
                 yield f"the {which} limits are of {len(texts)} conditions and are not put together: {listed}"
@@ -229,24 +235,34 @@ def together(
 
     What was made up says nothing about a real top: it makes a group of its own.
     """
-    kinds: dict[tuple[Conditions, Device], set[bool]] = {}
-    for source, run in zip(sources, runs, strict=True):
-        kinds.setdefault((run.conditions, run.device), set()).add(source.synthetic)
-    runs = [
-        replace(run, conditions=replace(run.conditions, synthetic=source.synthetic))
-        if len(kinds[run.conditions, run.device]) > 1
-        else run
-        for source, run in zip(sources, runs, strict=True)
-    ]
     groups: dict[tuple[Conditions, Device], list[int]] = {}
     for k, run in sorted(enumerate(runs), key=lambda one: one[1].which):
-        groups.setdefault((run.conditions, run.device), []).append(k)
-    return tuple(
+        made_up = replace(run.conditions, synthetic=sources[k].synthetic)
+        groups.setdefault((made_up, run.device), []).append(k)
+    return tell_apart(
         replace(runs[numbers[0]], runs=tuple(numbers))
         if len(numbers) == 1
         else _combined(tuple(numbers), sources, runs, options)
         for numbers in groups.values()
     )
+
+
+def tell_apart(groups: Iterable[Limits]) -> tuple[Limits, ...]:
+    """The groups; those that differ only in what is SYNTHETIC say it in their text."""
+    keyed = [((replace(group.conditions, synthetic=None), group.device), group) for group in groups]
+    alike = Counter(key for key, _ in keyed)
+    return tuple(replace(group, told_apart=alike[key] > 1) for key, group in keyed)
+
+
+def synthetic_source(source: Source[LimitReadings]) -> bool | None:
+    """Whether an input was simulated or made up; None of a data file, which does not say it."""
+    return source.synthetic if source.run else None
+
+
+def synthetic_runs(runs: Iterable[Limits]) -> bool | None:
+    """Whether runs were simulated or made up; None where that is not known of all, or not alike."""
+    kinds = {run.conditions.synthetic for run in runs}
+    return kinds.pop() if len(kinds) == 1 else None
 
 
 def _combined(
@@ -260,7 +276,8 @@ def _combined(
     statistics = combine([_sample(sources[k], which, options) for k in numbers])
     ends = sum((Counter(runs[k].ends) for k in numbers), Counter[str]())
     comparisons = _comparisons(statistics, device, which)
-    return replace(first, statistics=statistics, comparisons=comparisons, ends=dict(ends), runs=numbers)
+    conditions = replace(first.conditions, synthetic=synthetic_runs(runs[k] for k in numbers))
+    return Limits(which, conditions, statistics, comparisons, device, dict(ends), numbers)
 
 
 def _sample(source: Source[LimitReadings], which: Which, options: LimitOptions) -> Sample:
@@ -273,10 +290,10 @@ def _sample(source: Source[LimitReadings], which: Which, options: LimitOptions) 
 
 
 def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> Conditions:
-    """As the run's configuration says."""
+    """As the run's configuration and its record say."""
     said = _settings_of(source)
     if which == "lower" or not said:
-        return Conditions(which, device.name)
+        return Conditions(which, device.name, synthetic=synthetic_source(source))
     creep, interval = (_number(said.get(name)) for name in ("creep_hz_per_s", "interval_s"))
     waveform = said.get("drive_waveform")
     return Conditions(
@@ -286,6 +303,7 @@ def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> 
         amplitude_vpp=_number(said.get("drive_amplitude_vpp")),
         creep_hz_per_s=creep,
         step_hz=None if creep is None or interval is None else round(creep * interval, 9),
+        synthetic=synthetic_source(source),
     )
 
 
@@ -386,7 +404,7 @@ def _sentences(limits: Limits) -> Iterable[str]:
     many = f"{found.n} {limits.which} limits have the mean" if found.n > 1 else f"one {limits.which} limit,"
     scatter = f" and scatter by {with_uncertainty(found.scatter)}" if found.scatter and found.scatter.value else ""
     scatter = scatter or " and do not scatter" * (found.scatter is not None)
-    yield f"{many} {with_uncertainty(found.mean)}{scatter} ({limits.conditions.text})."
+    yield f"{many} {with_uncertainty(found.mean)}{scatter} ({limits.conditions_text})."
     if found.between:
         beyond = with_uncertainty(found.between) if found.between.value else "no more than their tops do"
         yield f"They are of {found.runs} runs, which differ by {beyond}."

@@ -10,7 +10,17 @@ from pydantic import Field, model_validator
 
 from analysis.limits import Comparison, Statistics
 from levilab.pipelines.document import Document, Settings, number, value_of, values_of
-from levilab.pipelines.limit.analysis import METHOD, Conditions, Device, LimitAnalysis, Limits, Which
+from levilab.pipelines.limit.analysis import (
+    METHOD,
+    Conditions,
+    Device,
+    LimitAnalysis,
+    Limits,
+    Which,
+    synthetic_runs,
+    synthetic_source,
+    tell_apart,
+)
 from levilab.pipelines.limit.budget import budget_of_all, budget_of_run
 from levilab.pipelines.result import Part, Result, RunPart, Value
 
@@ -34,7 +44,10 @@ class DevicePart(Part):
 
 
 class ConditionsPart(Part):
-    """Under which the limits were measured; see `levilab.pipelines.limit.analysis.Conditions`."""
+    """Under which the limits were measured; see `levilab.pipelines.limit.analysis.Conditions`.
+
+    synthetic: not in results of earlier versions; the inputs say it then.
+    """
 
     which: Which
     top: str
@@ -180,19 +193,23 @@ def _limits(limits: Limits) -> dict[str, Any]:
 # --- reading -------------------------------------------------------------------------------------------
 
 
-def _run(part: LimitRunPart, *_: object) -> Limits:
-    return _restored(part, part.values)
+def _run(part: LimitRunPart, source: Source[LimitReadings], _: object) -> Limits:
+    return _restored(part, part.values, synthetic=synthetic_source(source))
 
 
-def _groups(result: LimitResult, _: object, order: Sequence[int]) -> tuple[Limits, ...]:
+def _groups(result: LimitResult, runs: Sequence[Limits], order: Sequence[int]) -> tuple[Limits, ...]:
     """Those of the same conditions; order: the number in the result of each of our runs."""
-    return tuple(
-        replace(_restored(group, group.values, len(group.numbers)), runs=tuple(order.index(k) for k in group.numbers))
-        for group in result.groups
-    )
+
+    def restored(group: GroupPart) -> Limits:
+        numbers = tuple(order.index(k) for k in group.numbers)
+        synthetic = synthetic_runs(runs[k] for k in numbers)
+        return replace(_restored(group, group.values, synthetic=synthetic, runs=len(numbers)), runs=numbers)
+
+    return tell_apart(restored(group) for group in result.groups)
 
 
-def _restored(part: _WithLimits, values: Mapping[str, Value], runs: int = 1) -> Limits:
+def _restored(part: _WithLimits, values: Mapping[str, Value], *, synthetic: bool | None, runs: int = 1) -> Limits:
+    """Limits as they were found; synthetic: as the inputs say, for a result that does not."""
     known = {name: value.estimate for name, value in values.items()}
     step = known["step_error"].value if "step_error" in known else None
     statistics = Statistics(
@@ -213,7 +230,10 @@ def _restored(part: _WithLimits, values: Mapping[str, Value], runs: int = 1) -> 
     said = part.device
     device = Device(said.name, said.linear_lower_hz, said.linear_upper_hz, said.resonance_hz)
     ends = {str(kind): n for kind, n in part.ends.items()}
-    return Limits(part.which, Conditions(**vars(part.conditions)), statistics, comparisons, device, ends)
+    conditions = Conditions(**vars(part.conditions))
+    if conditions.synthetic is None:
+        conditions = replace(conditions, synthetic=synthetic)
+    return Limits(part.which, conditions, statistics, comparisons, device, ends)
 
 
 DOCUMENT = Document(

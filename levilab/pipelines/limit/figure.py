@@ -109,8 +109,8 @@ def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
     title = ("Lower limit: the spin at which a free top falls", _upper_title(group))[group.which == "upper"]
     made_up = {bool(source.synthetic) for source in analysis.sources}
     own = all(analysis.sources[number].synthetic for number in group.runs)
-    title += "  (SYNTHETIC)" if len(made_up) > 1 and own and group.conditions.synthetic is None else ""
-    axes.set_title(title + "\n" + group.conditions.text, loc="left", fontsize=8)
+    title += "  (SYNTHETIC)" if len(made_up) > 1 and own and not group.told_apart else ""
+    axes.set_title(title + "\n" + group.conditions_text, loc="left", fontsize=8)
     axes.legend(
         loc="upper left", bbox_to_anchor=(-0.09, -0.2), ncols=2, fontsize=SMALL, borderaxespad=0, columnspacing=1.2
     )

@@ -14,6 +14,7 @@ from pydantic import Field, create_model
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiment import Experiment, ExperimentSettings
 from levilab.acquisition.loop import AcquisitionRequest, acquire
+from levilab.acquisition.onlooker import state_of
 from levilab.acquisition.request import AcquisitionOptions, CannotResume, request_for
 from levilab.acquisition.session import ExperimentFailed, Session
 from levilab.acquisition.table import EXPERIMENTS
@@ -110,6 +111,27 @@ def test_a_reading_is_shown_with_its_units_and_the_time_left(request_of_a_scan: 
     acquire(request_of_a_scan, show)
     assert show.left == [4.0, 2.0, 0.0]
     assert [text.split()[3::2] for text in show.readings] == [["m", "T", "V"]] * 3
+
+
+def test_what_is_left_at_least_and_at_most_is_kept_shown_and_seen_as_a_pair(
+    request_of_a_scan: AcquisitionRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Watching(Silent):
+        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
+            shown.append(remaining)
+
+    def uncertain(session: Session[ScanSettings]) -> None:
+        session.begin(lambda: None)
+        session.keep(dict.fromkeys([channel.name for channel in CHANNELS], session.now()), (10.0, 30.0))
+        state = state_of(session, virtual=True)
+        seen.append((state.least_left_s, state.time_left_s))
+
+    shown: list[tuple[float, float]] = []
+    seen: list[tuple[float | None, float | None]] = []
+    monkeypatch.setitem(EXPERIMENTS, "scan", dataclasses.replace(SCAN, run=uncertain))
+    assert acquire(request_of_a_scan, Watching()).status == "finished"
+    assert shown == [(10.0, 30.0)]
+    assert seen == [(pytest.approx(10.0), pytest.approx(30.0))]
 
 
 def test_the_points_of_a_scans_values_stand_below_each_other(tmp_path: Path) -> None:

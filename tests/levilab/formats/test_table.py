@@ -12,9 +12,10 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from levilab.errors import DataError, UsageError
+from levilab.formats import dialect
 from levilab.formats.columns import Column, NoSuchColumn, NoTable, TableError, quoted, shorten
-from levilab.formats.dialect import Dialect
-from levilab.formats.layout import Layout
+from levilab.formats.dialect import DIALECTS, Dialect
+from levilab.formats.layout import Layout, sniff
 from levilab.formats.rows import FEW, _read_at_once, _read_lines
 from levilab.formats.table import ColumnsError, parse_columns, read_run_readings, read_table
 from levilab.formats.titles import read_title, unit_factor
@@ -612,3 +613,20 @@ def test_a_title_of_many_blanks_or_brackets_is_read_at_once(tmp_path: Path, titl
 
 def test_a_text_that_is_cut_is_as_long_as_it_may_be():
     assert [shorten("precession", most) for most in (5, 9, 10)] == ["prec…", "precessi…", "precession"]
+
+
+@pytest.mark.parametrize(("most", "worked_out"), [(1000, 100), (60, 100 + 41 + 41)])
+def test_passes_over_many_files_work_out_each_dialect_once(tmp_path, monkeypatch, most, worked_out):
+    """Of more files than are kept, all but the last one kept are found again."""
+    monkeypatch.setattr(dialect, "_DIALECTS_OF_ROWS", {})
+    monkeypatch.setattr(dialect, "_MOST_DIALECTS", most)
+    scored = []
+    score = dialect._score
+    monkeypatch.setattr(dialect, "_score", lambda lines, rank: (scored.append(rank), score(lines, rank))[1])
+    files = [tmp_path / f"{k}.csv" for k in range(100)]
+    for k, file in enumerate(files):
+        file.write_text(f"t;f\n0;{k},5\n1;24,9\n2;24,8\n", encoding="utf-8")
+    for _ in range(3):
+        assert {sniff(file).dialect for file in files} == {Dialect(";", ",")}
+    assert len(scored) == worked_out * len(DIALECTS)
+    assert len(dialect._DIALECTS_OF_ROWS) == min(most, 100)

@@ -349,6 +349,41 @@ def test_the_settings_can_all_be_asked_for(bench):
     assert NOT_A_NUMBER not in settings.values()
 
 
+#: What becomes of joined answers in counters that IEEE 488.2, 8.4.1, does not describe; None: no answer at all.
+JOINS = {
+    "one answer a line": lambda text: text.replace(";", "\n"),
+    "the last answer only": lambda text: text.rpartition(";")[2],
+    "a blank behind the semicolon": lambda text: text.replace(";", "; "),
+    "no answer": lambda text: None if ";" in text else text,
+}
+
+
+@pytest.mark.parametrize("address", [ADDRESS, "TCPIP0::counter::5025::SOCKET", "ASRLcounter::INSTR"])
+@pytest.mark.parametrize("join", JOINS)
+@pytest.mark.parametrize(("driver", "virtual"), PAIRS, ids=["53230A", "CNT-91"])
+def test_a_counter_that_joins_answers_in_another_way_counts_as_well(driver, virtual, join, address):
+    class Other(virtual):
+        def _answer(self, text):
+            return super()._answer(text if text is None else JOINS[join](text))
+
+    def record(where, direction, data):
+        if direction == ">" and b";:" in data:
+            joined.append(data)
+
+    joined, found = [], []
+    for model in (virtual, Other):
+        library = library_for(VirtualBench({address: model(VirtualClock(), signal=light)}))
+        counter = driver(VisaTransport(address, library=library, log=record))
+        counter.prepare(gate_s=0.1, trigger_level_v=0.6)
+        found.append(counter.settings())
+        assert not counter.changed_settings(counter.settings())
+        assert counter.frequency() == pytest.approx(25.0, rel=1e-4)
+        counter.raise_errors("a test")
+        counter.close()
+    assert found[0] == found[1]
+    assert len(joined) == (4 if join == "a blank behind the semicolon" else 3)  # the other one is asked once
+
+
 def interrupted(clock, monkeypatch, act, after):
     """Ctrl-C in the middle of a wait, after so many others."""
     sleep, waits = clock.sleep, iter(range(after))

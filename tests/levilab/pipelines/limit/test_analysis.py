@@ -124,13 +124,44 @@ def test_measured_and_made_up_runs_are_never_one_mean(sample_data: Path, tmp_pat
     assert not any("says nothing about a real top" in text for text in analysis.all_warnings)
     document = ANALYSES["limit"].document(analysis, tmp_path)
     assert [group["conditions"]["synthetic"] for group in document["groups"]] == [False, True]
+    assert [run["conditions"]["synthetic"] for run in document["runs"]] == [False, True, False]
     save(ANALYSES["limit"], analysis)
     assert ANALYSES["limit"].recall([tmp_path], LimitOptions()).groups == analysis.groups
     page = write_report([tmp_path], tmp_path / "page.html").read_text(encoding="utf-8")
     assert "MIXED" not in page
     (alone,) = ANALYSES["limit"].analyze([tmp_path / "a", tmp_path / "c"], LimitOptions()).groups
     assert alone.statistics == measured.statistics
-    assert alone.conditions.synthetic is None  # nothing to be told apart from
+    assert alone.conditions.synthetic is False
+    assert "SYNTHETIC" not in alone.text  # nothing to be told apart from
+
+
+@pytest.mark.usefixtures("undrawn_figures")
+@pytest.mark.parametrize(
+    ("name", "synthetic"),
+    [("upper-limits", True), ("lower-limits", False), ("my.csv", None), ("my.csv and a run", None)],
+)
+def test_what_is_made_up_is_said_of_each_run_and_group(
+    sample_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, synthetic: bool | None
+) -> None:
+    """A data file does not say it; of a result of an earlier version, without the key, the inputs do."""
+    monkeypatch.chdir(tmp_path)  # where the result of several inputs goes
+    paths = [tmp_path / "my.csv"] if "my.csv" in name else [shutil.copytree(sample_data / name, tmp_path / name)]
+    (tmp_path / "my.csv").write_text("f [Hz]\n21.9\n21.8\n22.0\n", encoding="utf-8")
+    if "and a run" in name:
+        paths.append(shutil.copytree(sample_data / "lower-limits", tmp_path / "lower-limits"))
+    analysis = ANALYSES["limit"].analyze(paths, LimitOptions())
+    assert "SYNTHETIC" not in analysis.text  # nothing to be told apart from
+    (file, *_) = save(ANALYSES["limit"], analysis)
+    document = json.loads(file.read_text(encoding="utf-8"))
+    (group,) = document["groups"]
+    assert group["conditions"]["synthetic"] is synthetic
+    assert document["runs"][0]["conditions"]["synthetic"] is synthetic
+    assert [run["conditions"]["synthetic"] for run in document["runs"][1:]] == [False] * (len(paths) - 1)
+    for part in (group, *document["runs"]):
+        del part["conditions"]["synthetic"]
+    file.write_text(json.dumps(document), encoding="utf-8")
+    recalled = ANALYSES["limit"].recall(paths, LimitOptions())
+    assert (recalled.runs, recalled.groups) == (analysis.runs, analysis.groups)
 
 
 @pytest.mark.usefixtures("undrawn_figures")
