@@ -1,5 +1,7 @@
 // The connection to the server: the page asks for a frame, draws it, and asks for the next. Nothing queues.
 
+export const GONE = "the server is gone: start levilab live again";
+
 /** Head and arrays of a frame, as frame.py packs them. */
 export function unpack(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
@@ -61,6 +63,15 @@ export function connect({run, ask, show, changed}) {
   };
 }
 
+/** What the server answers at a path, or null while it is gone or the page is left. */
+export async function read(path) {
+  try {
+    return await (await fetch(path)).json();
+  } catch {
+    return null;
+  }
+}
+
 /** Send a command to the bench for practice. Returns what is wrong with it, or "". */
 export async function command(wanted, token) {
   try {
@@ -69,6 +80,6 @@ export async function command(wanted, token) {
     });
     return (await answer.json()).error || "";
   } catch {
-    return "the server is gone: start levilab live again";
+    return GONE;
   }
 }

@@ -1,6 +1,6 @@
 // The live view: asks for frames and shows them. A view only: it may be closed and opened again at any time.
 
-import {command, connect} from "./connection.js";
+import {command, connect, read} from "./connection.js";
 import {drawReadings, drawRecords, saidOf, sheet} from "./plot.js";
 import {openPractice} from "./practice.js";
 import {between, by, fixed, lapse, make, short, typeset, write} from "./words.js";
@@ -501,12 +501,13 @@ function open(run) {
   });
 }
 
-let listed = null;
+let listed = {runs: []};
 /** Whether the bench for practice recorded a run; undefined where it is not among the runs that are listed. */
-const isOwn = (run) => listed.practice.runs.includes(run) || (listed.runs.some(({name}) => name === run) ? false : undefined);
+const isOwn = (run) => listed.practice?.runs.includes(run) || (listed.runs.some(({name}) => name === run) ? false : undefined);
 async function listRuns(chosen) {
-  const response = await fetch("runs");
-  listed = await response.json();
+  const answer = await read("runs");
+  if (!answer) return listed;  // the server is gone: the list stays
+  listed = answer;
   const select = by("run");
   select.replaceChildren(...listed.runs.map((run) => {
     const when = run.started_utc.slice(0, 16).replace("T", " ");
@@ -546,7 +547,7 @@ async function begin() {
 function waitForRun() {
   show();
   const timer = setInterval(async () => {
-    const {first} = await listRuns("").catch(() => ({first: ""}));
+    const {first} = await listRuns("");
     if (!first) return;
     clearInterval(timer);
     by("run").value = first;

@@ -1,5 +1,6 @@
 // The bench for practice: controls that send commands, and the guide that shows how far one is.
 
+import {GONE, read} from "./connection.js";
 import {by, make, numberIn, write} from "./words.js";
 
 /** A slider that is moved sends at most so often [ms]. */
@@ -165,8 +166,12 @@ export function openPractice(about, command, run, isOwn, allowed) {
     if (wrong) by("verdict").replaceChildren(make("p", wrong));
     while (!wrong) {
       await new Promise((go) => { setTimeout(go, 400); });
-      const found = await (await fetch(`run/${encodeURIComponent(name)}/analysis`)).json();
+      const found = await read(`run/${encodeURIComponent(name)}/analysis`);
       if (!by("result").open) return;
+      if (!found) {
+        by("verdict").replaceChildren(make("p", GONE));
+        return;
+      }
       if (found.running && !found.verdict?.length) continue;
       now.analyzed = found.failed ? "" : name;
       const texts = found.failed ? [found.failed] : found.verdict || [];

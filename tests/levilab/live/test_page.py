@@ -208,6 +208,17 @@ def test_two_views_of_a_run_one_closed_and_opened_again_and_the_folder_deleted(
         assert page.evaluate("levilab.data.count") == 5  # what was read stays
 
 
+def test_while_the_server_is_gone_the_list_of_runs_stays(served: Hall, page: Page, tmp_path: Path) -> None:
+    """And no promise is rejected without a handler: Firefox reports one of a page that is left, too."""
+    GrowingRun(tmp_path)
+    page.goto(address(served))
+    until(page, "levilab.frames > 0 && document.querySelectorAll('#run option').length === 1")
+    page.evaluate("void (window.fetch = async () => { document.body.dataset.asked = '1'; throw TypeError('gone'); })")
+    page.evaluate("document.getElementById('run').dispatchEvent(new Event('focus'))")
+    until(page, "document.body.dataset.asked")
+    assert page.locator("#run option").count() == 1
+
+
 def test_what_the_bench_publishes_is_drawn(served: Hall, page: Page, tmp_path: Path) -> None:
     run = GrowingRun(tmp_path)
     page.goto(address(served, run.folder.name))
