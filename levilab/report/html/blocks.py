@@ -125,7 +125,7 @@ def _texts(fact: Fact) -> list[Html]:
 
 def _tabular(_: Writer, block: Tabular, __: int) -> Html:
     classes = _classes(block.table, block.wraps, names=block.first_column_wraps)
-    drawn = _table(block.table, block.table.rows, classes)
+    drawn = _table(block.table, block.table.rows, classes, block.narrow)
     named = block.table.title or block.name.replace("-", " ")
     return element("div", _moved_sideways(drawn, named), _small_print(block.note), class_="table")
 
@@ -153,19 +153,23 @@ def _classes(table: Table, wraps: Iterable[str] = (), *, names: bool = False) ->
     )
 
 
-def _table(table: Table, rows: Iterable[Row], classes: tuple[str | None, ...]) -> Html:
+def _table(table: Table, rows: Iterable[Row], classes: tuple[str | None, ...], narrow: str = "scroll") -> Html:
     title = element("caption", words(table.title)) if table.title else ""
     heads = [
         element("th", lines(head), class_="n" if kind == "n" else None, scope="col")
         for head, kind in zip(table.heads, classes, strict=True)
     ]
     head = element("thead", element("tr", heads)) if any(table.heads) else ""
-    body = [(_row(row, classes), "\n") for row in rows]
-    return element("table", title, head, element("tbody", body))
+    named = table.heads if narrow == "stack" else ("",) * len(table.heads)
+    body = [(_row(row, classes, named), "\n") for row in rows]
+    return element("table", title, head, element("tbody", body), class_=None if narrow == "scroll" else narrow)
 
 
-def _row(row: Row, classes: tuple[str | None, ...]) -> Html:
-    cells = [element("td", lines(cell), class_=kind) for cell, kind in zip(row.cells, classes, strict=True)]
+def _row(row: Row, classes: tuple[str | None, ...], heads: Iterable[str]) -> Html:
+    cells = [
+        element("td", lines(cell), class_=kind, data_head=head or None)
+        for cell, kind, head in zip(row.cells, classes, heads, strict=True)
+    ]
     return element("tr", cells, class_=row.kind or None)
 
 
