@@ -127,7 +127,9 @@ export function buildScene(THREE, parts, theme = "light") {
     },
 
     setPose(position, quaternion, {washers: slipped = 0, drive: share = 0} = {}) {
-      top.position.set(position[0] * scale, position[1] * scale, position[2] * scale);
+      const n = along(quaternion), aside = Math.hypot(n.x, n.y);  // a simulated fall knows no ground
+      const lower = points.reduce((least, [r, z]) => Math.min(least, n.z * z - aside * r), Infinity);
+      top.position.set(position[0] * scale, position[1] * scale, Math.max(position[2], bottom - lower) * scale);
       top.quaternion.set(...quaternion);
       washers.rotation.z = slipped;
       leaning.position.copy(top.position);
