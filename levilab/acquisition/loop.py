@@ -83,6 +83,7 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
         except Interrupted as interruption:
             text = f"interrupted by {interruption.by}, outputs are off"
             writer.event(None, "interrupted", text)
+            show.close()  # what it shows of the bench is from before the outputs went off
             show.message(text)
             status = "interrupted"
         except Exception as error:

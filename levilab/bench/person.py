@@ -8,9 +8,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Task:
-    """What a person is to do or to answer.  text: as the person reads it."""
+    """What a person is to do or to answer.  text: as the events of the run have it."""
 
     text: str
+
+    @property
+    def prompt(self) -> str:
+        """The text as a person with a keyboard reads it."""
+        return self.text
 
 
 @dataclass(frozen=True)
@@ -18,6 +23,11 @@ class PlaceProbe(Task):
     """The magnetometer's probe is to stand on the axis.  height_m: above the base [m]."""
 
     height_m: float
+
+    @property
+    def prompt(self) -> str:
+        """With what can be typed."""
+        return f"{self.text} Put the probe there, on the axis, or type the height in mm at which it stands."
 
 
 @dataclass(frozen=True)

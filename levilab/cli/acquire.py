@@ -140,7 +140,7 @@ def _ask(task: "Task") -> str:
     """Ask the person at the bench, on the terminal."""
     from levilab.acquisition.session import ExperimentFailed
 
-    message(f"{task.text}  [Enter]")
+    message(f"{task.prompt}  [Enter]")
     answer = sys.stdin.readline()
     if not answer:
         raise ExperimentFailed(

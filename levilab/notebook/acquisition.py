@@ -51,7 +51,7 @@ def _typed(value: Any) -> str:
 def ask_with_input(task: Task) -> str:
     """Ask the person at the bench where Python asks.  Raises ExperimentFailed where that cannot be answered."""
     try:
-        return input(f"{task.text}  [Enter] ")
+        return input(f"{task.prompt}  [Enter] ")
     except EOFError:
         raise ExperimentFailed(
             f"{task.text!r} cannot be answered: standard input is closed; give `person`, a function that answers"

@@ -86,36 +86,6 @@ def as_svg(figure: Figure, prefix: str = "", title: str = "", description: str =
     return _for_a_page(buffer.getvalue(), prefix, title, description)
 
 
-#: A figure is divided where so much is empty from edge to edge; a heading stays with the panels below it [pt].
-_LEAST_GAP, _LEAST_PIECE = 6.0, 60.0
-
-
-def places_to_divide(figure: Figure) -> list[float]:
-    """Where a figure may be divided between two pages: between two rows of panels.
-
-    Returns:
-        Distances from its top [pt], in their order.
-    """
-    # imported here, since commands that draw nothing must not pay for it
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
-    with mpl.rc_context(STYLE):
-        boxes = [
-            found
-            for one in (*figure.axes, *figure.texts, *figure.legends)
-            if one.get_visible() and (found := one.get_tightbbox(renderer)) is not None
-        ]
-    scale, height = 72 / figure.dpi, 72 * figure.get_figheight()
-    places, begun, end = [], 0.0, 0.0
-    for top, bottom in sorted((height - scale * box.y1, height - scale * box.y0) for box in boxes):
-        if top - end >= _LEAST_GAP and end - begun >= _LEAST_PIECE:
-            places.append((top + end) / 2)
-            begun = top
-        end = max(end, bottom)
-    return places
-
-
 #: Of matplotlib's SVG: texts as comments, a rule for all elements of the page, and the places where an id stands.
 _COMMENT = re.compile(r"\s*<!--.*?-->", re.DOTALL)
 _RULE = re.compile(r"\s*<defs>\s*<style type=\"text/css\">\*\{[^}]*\}</style>\s*</defs>")

@@ -66,7 +66,8 @@ def write(found: Reproduction, output: Path) -> Path:
 def document_of(found: Reproduction) -> Document:
     """The report; the same findings always make the same."""
     unexpected = tuple(f"{chapter.title}: {finding.name}: {finding.why}" for chapter, finding in found.unexpected)
-    summary: list[Block] = [Verdict(in_words(found)), Tabular("overview", overview(found)), Paragraph(HOW_TO_READ)]
+    counted = Tabular("overview", overview(found), first_column_wraps=True, narrow="turn")
+    summary: list[Block] = [Verdict(in_words(found)), counted, Paragraph(HOW_TO_READ)]
     if unexpected:
         summary.insert(1, Warnings((unexpected,)))
     return Document(
@@ -85,7 +86,7 @@ def document_of(found: Reproduction) -> Document:
 
 def _section(chapter: Chapter, found: Found) -> Section:
     marks = (Banner("SYNTHETIC.", found.synthetic),) if found.synthetic else ()
-    findings = Tabular(chapter.name, findings_table("", found.findings), wraps=HEADS)
+    findings = Tabular(chapter.name, findings_table("", found.findings), wraps=HEADS, narrow="stack")
     return Section(chapter.title, (*marks, Paragraph(found.said), *found.blocks, findings), anchor=chapter.name)
 
 

@@ -38,6 +38,8 @@ class Silent:
         self.readings: list[str] = []
         self.messages: list[str] = []
         self.left: list[float] = []
+        self.closed = False
+        self.after_close: list[str] = []
 
     def preparing(self, text: str, fraction: float) -> None: ...
 
@@ -47,13 +49,16 @@ class Silent:
 
     def message(self, text: str) -> None:
         self.messages.append(text)
+        if self.closed:
+            self.after_close.append(text)
 
     def is_due(self) -> bool:
         return False
 
     def state(self, state: object) -> None: ...
 
-    def close(self) -> None: ...
+    def close(self) -> None:
+        self.closed = True
 
 
 class Impatient(Silent):

@@ -34,7 +34,6 @@ def without_drawing() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("levilab.present.style.as_png", lambda *_, **__: b"\x89PNG\r\n\x1a\n")
         patch.setattr("levilab.present.style.as_svg", lambda *_, **__: "<svg/>")
-        patch.setattr("levilab.present.style.places_to_divide", lambda _: [])
         yield
 
 

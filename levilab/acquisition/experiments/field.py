@@ -160,10 +160,7 @@ def _zero(session: Session[FieldSettings]) -> None:
 
 def _place(session: Session[FieldSettings], height: float, which: str) -> float:
     """Have the probe put at a height; returns the one at which it stands [m]."""
-    text = (
-        f"Height {which}: put the probe on the axis at {1e3 * height:.1f} mm "
-        "(if it stands at another height, type that one in mm)."
-    )
+    text = f"Height {which}: {1e3 * height:.1f} mm."
     while True:
         answer = session.ask(PlaceProbe(text, height))
         if not answer:

@@ -136,10 +136,10 @@ function takeEvents(events) {
 function listEvent({time_s, utc}, text, loud) {
   const list = by("event-list"), item = make("li", "", loud);
   const ofRun = typeof time_s === "number", clock = ofRun ? "" : /T(\d\d:\d\d:\d\d)/.exec(utc)?.[1] || "";
-  const when = make("time", ofRun ? lapse(time_s).replace(" min", "") : clock);
+  const when = make("time", ofRun ? `at ${lapse(time_s).replace(" min", "")}` : clock && `${clock} UTC`);
   if (clock) when.dateTime = utc;
-  by("events-key").hidden &&= !clock;
-  item.append(when, make("span", text));
+  by("events-key").hidden &&= !ofRun;
+  item.append(when, " ", make("span", text));
   item.dataset.utc = utc || list.firstChild?.dataset.utc || "";  // one that is damaged comes with the last
   list.insertBefore(item, [...list.children].find((other) => other.dataset.utc <= item.dataset.utc) || null);
   while (list.children.length > MOST_EVENTS) list.lastChild.remove();
@@ -249,9 +249,9 @@ function leftOf(about, bench, elapsed) {
   return Number.isFinite(bench?.time_left_s) ? between(bench.least_left_s ?? bench.time_left_s, bench.time_left_s) : "";
 }
 
-/** How a run ended that did not finish: its last event. */
+/** How a run ended that did not finish: its last event, less the word that is its state. */
 function ended(about) {
-  return /failed|interrupted/.test(about?.status) ? data.ended || "" : "";
+  return /failed|interrupted/.test(about?.status) ? (data.ended || "").replace(/^interrupted /, "") : "";
 }
 
 function showBar(about, bench) {

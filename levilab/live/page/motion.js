@@ -4,7 +4,7 @@
 // them, so that it moves evenly however often messages come. Slower than the bench, it plays what it has kept, and
 // goes on from the newest when that is at its end.
 
-import {buildCamera, buildScene, placeCamera} from "./top.js";
+import {buildCamera, buildScene, pixelOf, placeCamera} from "./top.js";
 import {SOFTWARE} from "./plot.js";
 
 /** Poses that are kept: at most 20 s of the bench's time. */
@@ -91,6 +91,7 @@ export async function openSpace(canvas, description) {
     if (!width || !height) return;
     renderer.setSize(width, height, false);
     placeCamera(THREE, camera, parts, width / height);
+    view.setPixel(pixelOf(camera, height * renderer.getPixelRatio()));
     moved = true;
   }
   new ResizeObserver(resize).observe(canvas);

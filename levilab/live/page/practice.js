@@ -161,6 +161,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     by("verdict").replaceChildren(make("p", "Analyzing…"));
     by("figures").replaceChildren();
     by("report").hidden = true;
+    write("writing", "");
     by("result").showModal();
     const wrong = await command({do: "analyze", run: name});
     if (wrong) by("verdict").replaceChildren(make("p", wrong));
@@ -187,7 +188,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
         by("report").href = `run/${encodeURIComponent(name)}/${found.report}`;
         by("report").hidden = false;
       }
-      write("writing", found.running && !found.report ? "The report is being written…" : "");
+      write("writing", found.running && !found.report ? "The report is being written; its link appears here." : "");
       if (!found.running) return;
     }
   }

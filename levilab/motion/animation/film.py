@@ -151,24 +151,21 @@ def _artist(film: Film, *, with_words: bool = True) -> Callable[[int], Image]:
     poses, parts = film.poses, parts_of(film.poses.scene, height_for_camera(film.poses))
     painter = Painter(parts, film.size, film.theme)
     turns = matrices(poses.quaternions)
-    ends = poses.positions + parts["axis"]["up"] * poses.axes
+    positions = painter.above_ground(poses.positions, poses.axes)
+    ends = positions + parts["axis"]["up"] * poses.axes
     before = max(round(film.trail_s / (poses.times[1] - poses.times[0])), 1) if len(poses.times) > 1 else 1
     words = _Words(film, painter)
 
     def draw(k: int) -> Image:
         sense = int(np.sign(round(float(poses.spins[k]), 3)))
         trail = ends[max(0, k - before) : k + 1]
-        pose = Pose(poses.positions[k], turns[k], float(poses.slips[k]), float(poses.drive[k]), sense, trail)
+        pose = Pose(positions[k], turns[k], float(poses.slips[k]), float(poses.drive[k]), sense, trail)
         picture = painter.picture(pose)
         if with_words:
             words.write(picture, k)
         return picture
 
     return draw
-
-
-#: How much a veil hides, of 255: a path behind it shows where it goes on, and numbers before it can be read.
-_VEIL = 225
 
 
 class _Words:
@@ -220,14 +217,14 @@ class _Words:
         self._inset.draw(pen, k, self._colours, self._small)
 
     def _veil_behind(self, size: tuple[int, int], rows: list[tuple[float, float]]) -> Image:
-        """What hides most of a path behind lines of text, of these heights and widths, and behind the inset's frame."""
+        """What hides a path behind lines of text, of these heights and widths, and behind the inset's frame."""
         from PIL import Image, ImageDraw
 
         veil, edge, line = Image.new("L", size), self._line, self._line
         pen = ImageDraw.Draw(veil)
         for y, width in rows:
-            pen.rectangle((edge - line / 3, y - line / 4, edge + width + line / 3, y + line), fill=_VEIL)
-        pen.rectangle(self._inset.frame, fill=_VEIL)
+            pen.rectangle((edge - line / 3, y - line / 4, edge + width + line / 3, y + line), fill=255)
+        pen.rectangle(self._inset.frame, fill=255)
         return veil
 
 

@@ -136,8 +136,8 @@ class Painter:
         self._reach: float = parts["view"]["reach"]
         self._camera = _camera(parts, size)
         self._solids = self._make_solids()
-        points = [point for part in parts["parts"] for point in part["outline"]]
-        self._lowest, self._widest = min(z for _, z in points), max(r for r, _ in points)
+        self._outline = np.array([point for part in parts["parts"] for point in part["outline"]])
+        self._lowest, self._widest = float(self._outline[:, 1].min()), float(self._outline[:, 0].max())
 
     def picture(self, pose: Pose) -> Image:
         """Draw the top over its base, without words."""
@@ -162,6 +162,20 @@ class Painter:
         """Where a point [m] lies in the picture [pixels]."""
         x, y = self._camera.project(np.array(point, dtype=np.float64)) / _FINER
         return float(x), float(y)
+
+    def above_ground(self, positions: Array, axes: Array) -> Array:
+        """Return places at which no part of the top is below the ground: a simulated fall knows no ground.
+
+        Args:
+            positions: of the centre of mass, shape (n, 3) [m].
+            axes: of the top, shape (n, 3).
+        """
+        across = np.hypot(axes[:, 0], axes[:, 1])
+        r, z = self._outline.T
+        lowest = (axes[:, 2, None] * z - across[:, None] * r).min(axis=1)
+        raised = positions.copy()
+        raised[:, 2] = np.maximum(positions[:, 2], self.parts["base"]["bottom"] - lowest)
+        return raised
 
     # --- what stays ---
 

@@ -31,11 +31,11 @@
   const place = Object.fromEntries(columns.map((name, k) => [name, k]));
   const column = (name, k) => (name in place ? values[k * wide + place[name]] : 0);
 
-  let THREE, OrbitControls, buildScene, buildCamera, placeCamera, renderer;
+  let THREE, OrbitControls, buildScene, buildCamera, pixelOf, placeCamera, renderer;
   const canvas = document.createElement("canvas");
   try {
     ({THREE, OrbitControls} = await load(await inflate(bytes(by("three").textContent))));
-    ({buildScene, buildCamera, placeCamera} = await load(by("top").textContent));
+    ({buildScene, buildCamera, pixelOf, placeCamera} = await load(by("top").textContent));
     const soft = drawnBySoftware();
     renderer = new THREE.WebGLRenderer({canvas, antialias: !soft});
     renderer.setPixelRatio(soft ? 1 : Math.min(window.devicePixelRatio, 2));
@@ -266,6 +266,7 @@
     } else {
       camera.updateProjectionMatrix();
     }
+    view.setPixel(pixelOf(camera, height * renderer.getPixelRatio()));
     draw();
   }).observe(stage);
 

@@ -11,7 +11,10 @@
 
 const REACH = 5.5;          // drawn units from the axis to the base's rim
 const TURN = 2 * Math.PI;
-const RIBBON = 0.028;       // half of the path's width
+const RIBBON = 0.028;       // half of the path's width, at least
+const THINNEST = 1.6;       // pixels: a line that is thinner breaks into dashes
+const AXIS = 0.022, PLUMB = 0.012, END = 0.075;  // radii of the lines and of the axis' end, at least
+const SPIN = 0.05;          // half of the arrow's thickness, as a part of its radius
 const AROUND = 96;          // facets around a part
 
 /**
@@ -26,6 +29,7 @@ const AROUND = 96;          // facets around a part
  *   setPath(points, count): the line that the axis' end has drawn, a Float32Array of x, y, z [m];
  *   setSpin(sense): which way the arrow turns, 1, −1 or 0;
  *   setTheme(theme); show({path, axis, spin, drive}): what is seen, each true or false;
+ *   setPixel(size): lines are drawn no thinner than pixels of this size, as pixelOf returns it;
  *   axisEnd(position, quaternion): where the end of the drawn axis is then [m]; dispose(): free the graphics' memory.
  */
 export function buildScene(THREE, parts, theme = "light") {
@@ -84,10 +88,10 @@ export function buildScene(THREE, parts, theme = "light") {
   // the axis, a line through it all; the arrow of the spin, which leans with the axis and does not turn with the top
   const leaning = new THREE.Group();
   const {up, down} = parts.axis;
-  const axis = new THREE.Mesh(new THREE.CylinderGeometry(0.022, 0.022, (up + down) * scale, 8), plain("axis"));
+  const axis = new THREE.Mesh(new THREE.CylinderGeometry(AXIS, AXIS, (up + down) * scale, 8), plain("axis"));
   axis.rotation.x = Math.PI / 2;
   axis.position.z = (up - down) / 2 * scale;
-  const end = new THREE.Mesh(new THREE.SphereGeometry(0.075, 16, 12), plain("path"));
+  const end = new THREE.Mesh(new THREE.SphereGeometry(END, 16, 12), plain("path"));
   end.position.z = up * scale;
   const spin = spinArrow(THREE, parts.spin.radius * scale, plain("spin"));
   spin.position.z = parts.spin.height * scale;
@@ -95,7 +99,7 @@ export function buildScene(THREE, parts, theme = "light") {
   scene.add(leaning);
 
   // the line from the top straight down
-  const plumb = new THREE.Mesh(new THREE.CylinderGeometry(0.012, 0.012, 1, 6), plain("faint"));
+  const plumb = new THREE.Mesh(new THREE.CylinderGeometry(PLUMB, PLUMB, 1, 6), plain("faint"));
   plumb.rotation.x = Math.PI / 2;
   scene.add(plumb);
   const points = parts.parts.flatMap((part) => part.outline);
@@ -118,8 +122,18 @@ export function buildScene(THREE, parts, theme = "light") {
   const turned = new THREE.Quaternion(), axisNow = new THREE.Vector3(), upright = new THREE.Vector3(0, 0, 1);
   const along = (quaternion) => axisNow.set(0, 0, 1).applyQuaternion(turned.set(...quaternion));
 
+  let ribbon = RIBBON;
   const view = {
     scene, top, washers, base,
+
+    setPixel(size) {
+      const radius = THINNEST / 2 * size;
+      axis.scale.x = axis.scale.z = Math.max(1, radius / AXIS);
+      plumb.scale.x = plumb.scale.z = Math.max(1, 0.7 * radius / PLUMB);
+      end.scale.setScalar(Math.max(1, 2.5 * radius / END));
+      spin.scale.z = Math.max(1, radius / (SPIN * parts.spin.radius * scale));  // seen from the side it is thinnest
+      ribbon = Math.max(RIBBON, radius);
+    },
 
     axisEnd(position, quaternion) {
       const n = along(quaternion);
@@ -127,7 +141,9 @@ export function buildScene(THREE, parts, theme = "light") {
     },
 
     setPose(position, quaternion, {washers: slipped = 0, drive: share = 0} = {}) {
-      top.position.set(position[0] * scale, position[1] * scale, position[2] * scale);
+      const n = along(quaternion), aside = Math.hypot(n.x, n.y);  // a simulated fall knows no ground
+      const lower = points.reduce((least, [r, z]) => Math.min(least, n.z * z - aside * r), Infinity);
+      top.position.set(position[0] * scale, position[1] * scale, Math.max(position[2], bottom - lower) * scale);
       top.quaternion.set(...quaternion);
       washers.rotation.z = slipped;
       leaning.position.copy(top.position);
@@ -148,8 +164,8 @@ export function buildScene(THREE, parts, theme = "light") {
       const places = geometry.getAttribute("position"), colours = geometry.getAttribute("color");
       for (let k = 0; k < count; k += 1) {
         const x = points[3 * k] * scale, y = points[3 * k + 1] * scale, z = points[3 * k + 2] * scale, share = (k + 1) / count;
-        places.setXYZ(2 * k, x, y, z - RIBBON);
-        places.setXYZ(2 * k + 1, x, y, z + RIBBON);
+        places.setXYZ(2 * k, x, y, z - ribbon);
+        places.setXYZ(2 * k + 1, x, y, z + ribbon);
         colours.setW(2 * k, share);
         colours.setW(2 * k + 1, share);
       }
@@ -228,6 +244,11 @@ export function placeCamera(THREE, camera, parts, aspect) {
   camera.updateProjectionMatrix();
 }
 
+/** How large a pixel is at what the camera looks at, in drawn units, of a picture with so many pixels in height. */
+export function pixelOf(camera, height) {
+  return 2 * camera.position.distanceTo(camera.userData.target) * Math.tan(camera.fov / 2 * TURN / 360) / height;
+}
+
 /**
  * The surface that an outline of points (radius, height) [m] sweeps as it turns about z: smooth around, with its edges.
  *
@@ -272,7 +293,7 @@ function makeRibbon(THREE, geometry, points) {
 /** Three quarters of a circle with a head, in the plane across the axis, counterclockwise seen from above. */
 function spinArrow(THREE, radius, material) {
   const arrow = new THREE.Group();
-  const length = 0.72 * TURN, thick = 0.05 * radius;
+  const length = 0.72 * TURN, thick = SPIN * radius;
   arrow.add(new THREE.Mesh(new THREE.TorusGeometry(radius, thick, 10, 64, length), material));
   const head = new THREE.Mesh(new THREE.ConeGeometry(3.4 * thick, 9 * thick, 20), material);
   head.position.set(radius * Math.cos(length), radius * Math.sin(length), 0);

@@ -135,6 +135,8 @@ class Tabular:
         note: explains the columns, small print below it.
         first_column_wraps: whether the first column holds names, which may be long and are folded.
         wraps: heads of columns of sentences, which are folded and take the width that others leave.
+        narrow: on a narrow screen: "scroll": it is moved sideways; "stack": each row is a block, and its cells stand
+            below each other with their heads before them; "turn": heads of numbers are written upwards.
         mark: what of it is synthetic, for formats that take it out of the document: "SYNTHETIC.", or empty where
             nothing is; None: as the banner of the section or document around it says.
     """
@@ -144,6 +146,7 @@ class Tabular:
     note: str = ""
     first_column_wraps: bool = False
     wraps: tuple[str, ...] = ()
+    narrow: Literal["scroll", "stack", "turn"] = "scroll"
     mark: str | None = None
 
 

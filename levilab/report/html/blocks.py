@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import itertools
 import re
 from collections import Counter
 from dataclasses import dataclass, field, replace
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
     from levilab.present.document.blocks import Block, Fact
-    from levilab.present.style import Figure
     from levilab.present.tables import Row, Table
 
 #: Warnings of a group that are shown without opening it.
@@ -125,7 +123,7 @@ def _texts(fact: Fact) -> list[Html]:
 
 def _tabular(_: Writer, block: Tabular, __: int) -> Html:
     classes = _classes(block.table, block.wraps, names=block.first_column_wraps)
-    drawn = _table(block.table, block.table.rows, classes)
+    drawn = _table(block.table, block.table.rows, classes, block.narrow)
     named = block.table.title or block.name.replace("-", " ")
     return element("div", _moved_sideways(drawn, named), _small_print(block.note), class_="table")
 
@@ -153,19 +151,23 @@ def _classes(table: Table, wraps: Iterable[str] = (), *, names: bool = False) ->
     )
 
 
-def _table(table: Table, rows: Iterable[Row], classes: tuple[str | None, ...]) -> Html:
+def _table(table: Table, rows: Iterable[Row], classes: tuple[str | None, ...], narrow: str = "scroll") -> Html:
     title = element("caption", words(table.title)) if table.title else ""
     heads = [
         element("th", lines(head), class_="n" if kind == "n" else None, scope="col")
         for head, kind in zip(table.heads, classes, strict=True)
     ]
     head = element("thead", element("tr", heads)) if any(table.heads) else ""
-    body = [(_row(row, classes), "\n") for row in rows]
-    return element("table", title, head, element("tbody", body))
+    named = table.heads if narrow == "stack" else ("",) * len(table.heads)
+    body = [(_row(row, classes, named), "\n") for row in rows]
+    return element("table", title, head, element("tbody", body), class_=None if narrow == "scroll" else narrow)
 
 
-def _row(row: Row, classes: tuple[str | None, ...]) -> Html:
-    cells = [element("td", lines(cell), class_=kind) for cell, kind in zip(row.cells, classes, strict=True)]
+def _row(row: Row, classes: tuple[str | None, ...], heads: Iterable[str]) -> Html:
+    cells = [
+        element("td", lines(cell), class_=kind, data_head=head or None)
+        for cell, kind, head in zip(row.cells, classes, heads, strict=True)
+    ]
     return element("tr", cells, class_=row.kind or None)
 
 
@@ -175,11 +177,6 @@ def _small_print(text: str) -> Html | str:
 
 # --- figures -------------------------------------------------------------------------------------------
 
-#: A figure that is taller may be divided between pages [pt].
-_TALL = 400.0
-#: Height of a figure on paper at most, and width of the text there [mm], as in style.css.
-_MOST_HEIGHT, _TEXT_WIDTH = 205.0, 180.0
-
 
 def _picture(writer: Writer, block: Picture, _: int) -> Html:
     from levilab.present.style import as_png, as_svg  # with matplotlib
@@ -188,7 +185,7 @@ def _picture(writer: Writer, block: Picture, _: int) -> Html:
     figure = block.draw()
     if block.raster:
         source = f"data:image/png;base64,{base64.b64encode(as_png(figure)).decode()}"
-        drawn, printed = element("img", src=source, alt=block.alt), joined([])
+        drawn = element("img", src=source, alt=block.alt)
     else:
         svg = as_svg(figure, prefix, title=block.alt)
         drawn = Html(svg)
@@ -198,27 +195,8 @@ def _picture(writer: Writer, block: Picture, _: int) -> Html:
             for points in block.points
             if _count_marks(svg, f"{prefix}-{points.gid}") == len(points.texts)
         }
-        printed = _divided(figure, prefix)
     caption = element("figcaption", element("strong", words(block.title)), " ", words(block.caption))
-    return element("figure", element("div", drawn, class_="card", tabindex="0"), printed, caption, id=prefix)
-
-
-def _divided(figure: Figure, prefix: str) -> Html:
-    """A tall figure for paper, in pieces that are not split: windows on the drawing that the page has, row by row."""
-    from levilab.present.style import places_to_divide
-
-    width, height = (72 * float(inches) for inches in figure.get_size_inches())
-    places = places_to_divide(figure) if height > _TALL else []
-    if not places:
-        return joined([])
-    # a window inherits nothing from the drawing's own <svg>: neither do its lines their joins
-    pieces = [
-        f'<svg viewBox="0 {top:.2f} {width:.2f} {bottom - top:.2f}" stroke-linejoin="round">'
-        f'<use href="#{prefix}-figure_1"/></svg>'
-        for top, bottom in itertools.pairwise([0.0, *places, height])
-    ]
-    share = f"width:{min(100.0, 100 * _MOST_HEIGHT * width / height / _TEXT_WIDTH):.1f}%"
-    return element("div", Html("".join(pieces)), class_="printed", aria_hidden="true", style=share)
+    return element("figure", element("div", drawn, class_="card", tabindex="0"), caption, id=prefix)
 
 
 def _count_marks(svg: str, group: str) -> int:

@@ -196,11 +196,13 @@ def test_a_top_that_never_falls_ends_at_the_longest_time(tmp_path: Path) -> None
 def test_a_signal_ends_the_run_with_outputs_off_and_all_readings(
     tmp_path: Path, outputs: list[bool], number: signal.Signals
 ) -> None:
-    run = acquire(mock(tmp_path), Impatient(5, number))
+    show = Impatient(5, number)
+    run = acquire(mock(tmp_path), show)
     assert run.status == "interrupted"
     assert len(run.readings().frame) == 5
     assert outputs[-1] is False
     assert run.events()[-1]["text"] == f"interrupted by {number.name}, outputs are off"
+    assert show.after_close == [run.events()[-1]["text"]], "not above a bench whose drive was on"
 
 
 def test_ctrl_c_twice_breaks_through_an_exchange_and_outputs_go_off(

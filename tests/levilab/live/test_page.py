@@ -73,8 +73,8 @@ def test_nothing_that_a_run_contains_becomes_markup(shown: Page) -> None:
 
 def test_events_before_the_start_have_the_time_of_the_clock(shown: Page) -> None:
     times = shown.evaluate("[...document.querySelectorAll('#event-list time')].map((one) => one.textContent)")
-    assert times == ["2:10", "09:00:05", "08:00:00"]  # the latest first, also where it came before
-    assert shown.inner_text("#events-key") == "clock times are UTC"
+    assert times == ["at 2:10", "09:00:05 UTC", "08:00:00 UTC"]  # the latest first, also where it came before
+    assert shown.inner_text("#events-key") == "“at”: time of the run"
 
 
 def test_on_a_desk_nothing_scrolls(shown: Page) -> None:

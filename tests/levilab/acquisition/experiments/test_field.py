@@ -76,7 +76,15 @@ def test_the_probe_is_zeroed_in_its_chamber_first(tmp_path: Path) -> None:
 
 def test_a_height_that_is_typed_is_the_one_that_is_kept(tmp_path: Path) -> None:
     answers = iter(["", "41,5", "high", "4.9 cm", "", "", ""])
-    run = acquire(request_of(tmp_path, person=lambda _: next(answers)), Silent())
+    asked: list[Task] = []
+
+    def person(task: Task) -> str:
+        asked.append(task)
+        return next(answers)
+
+    run = acquire(request_of(tmp_path, person=person), Silent())
+    assert asked[1].text.startswith("Height 1 of ")
+    assert "type the height in mm" in asked[1].prompt
     assert run.readings().column("height_m").tolist() == [0.0415, 0.049, 0.06, 0.07, 0.08]
     texts = [event["text"] for event in run.events()]
     assert "'high' is no height: a number in mm is expected, as 61.5" in texts

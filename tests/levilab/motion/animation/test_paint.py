@@ -88,6 +88,15 @@ def test_the_near_half_of_the_base_hides_a_top_in_its_hole(painter: Painter) -> 
     assert kind(painter, low, around(0.16 * RADIUS, 0.001 + HALF + 1.15 * RADIUS)) == "stem"
 
 
+def test_a_top_that_fell_lies_on_the_ground_and_one_that_floats_stays(painter: Painter) -> None:
+    axes = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    positions = np.array([[0.001, 0.0, 0.073], [0.002, 0.0, -0.05], [0.0, 0.003, -0.05]])
+    raised = painter.above_ground(positions, axes)
+    ground, tip = PARTS["base"]["bottom"], HALF + 0.34 * RADIUS
+    assert raised[:, :2].tolist() == positions[:, :2].tolist()
+    assert raised[:, 2] == pytest.approx([0.073, ground + tip, ground + RADIUS], abs=1e-9)
+
+
 def test_what_floats_is_drawn_before_the_base(painter: Painter) -> None:
     empty, full = (np.asarray(painter.picture(pose(height=z)), dtype=int) for z in (0.3, 0.055))
     x, y = painter.where([0.0, 0.0, 0.055])

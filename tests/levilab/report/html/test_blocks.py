@@ -48,14 +48,22 @@ def blocks(text: str) -> tuple[Any, ...]:
     return (
         Paragraph(text, lead=text), Note(text), Verdict(text), Banner(text, text), Bullets((text,)), Code(text),
         Warnings(((text,) * 5, (text,))), Facts((Fact(text, (text, text)), Fact(text, (text,), code=True))),
-        Tabular("table", cells, text, first_column_wraps=True, wraps=("n",)), Listing("listing", cells, text), picture,
-        Details(text, (Paragraph(text),), more=text),
+        Tabular("table", cells, text, first_column_wraps=True, wraps=("n",), narrow="stack"),
+        Listing("listing", cells, text), picture, Details(text, (Paragraph(text),), more=text),
     )  # fmt: skip
 
 
 def document(text: str) -> Document:
     sections = tuple(Section(text, blocks(text), anchor="result", lead=text) for _ in range(2))
     return Document(text, text, sections, Banner(text, text), contents=True, footer=text, subject=text)
+
+
+def test_cells_of_a_table_that_stacks_have_their_heads() -> None:
+    rows = [("a", "b")]
+    stacked = Page(page_of(Document("t", "", (Tabular("one", table("", ("", "here"), rows), narrow="stack"),))))
+    moved = Page(page_of(Document("t", "", (Tabular("one", table("", ("", "here"), rows)),))))
+    assert [given for tag, given in stacked.tags if tag == "td"] == [{}, {"data-head": "here"}]
+    assert [given for tag, given in moved.tags if tag == "td"] == [{}, {}]
 
 
 def test_no_text_of_any_block_becomes_markup() -> None:
