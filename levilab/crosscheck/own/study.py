@@ -320,7 +320,7 @@ def in_words(found: OwnCheck, shown: Mapping[str, str] | None = None) -> str:
 def _about_tails(freedom: int) -> str:
     """Why the standard deviation of pulls is not judged."""
     degree = f"{freedom} degree{'s' * (freedom > 1)} of freedom"
-    if freedom <= 2:  # noqa: PLR2004, the variance n/(n − 2) of Student's t
+    if freedom <= 2:  # the variance of Student's t is n/(n − 2)
         return f"Student's t with {degree} has no finite standard deviation, so that of these pulls is not judged."
     return f"Student's t with {degree} has long tails, so the standard deviation of these pulls is not judged."
 
@@ -328,11 +328,11 @@ def _about_tails(freedom: int) -> str:
 def own_blocks(found: OwnCheck, shown: Mapping[str, str] | None = None) -> tuple[Block, ...]:
     """The trials as blocks of a report."""
     note = (
-        "A pull is (estimate − truth)/u. Wanted is a mean of 0; the wanted standard deviation and share within 1 u stand "
-        "in parentheses: 1 and 68 %, or what Student's t gives where u comes from few values. Behind ± stands what "
-        "chance leaves to so many pulls, one standard error. Yes: mean and standard deviation miss what is wanted by a "
-        "tenth at most and three standard errors, the share by 5 % and three; a smaller standard deviation and a larger "
-        "share mean that u is on the safe side."
+        "A pull is (estimate − truth)/u. Wanted is a mean of 0; the wanted standard deviation and share within 1 u "
+        "stand in parentheses: 1 and 68 %, or what Student's t gives where u comes from few values. Behind ± stands "
+        "what chance leaves to so many pulls, one standard error. Yes: mean and standard deviation miss what is wanted "
+        "by a tenth at most and three standard errors, the share by 5 % and three; a smaller standard deviation and a "
+        "larger share mean that u is on the safe side."
     )
     return (
         Paragraph(in_words(found, shown)),
