@@ -173,8 +173,9 @@ SLOWEST_SPIN_HZ, FASTEST_HZ = 5.0, 200.0
 
 
 def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[str]:
-    """A spin that no such top has, as in turns per minute, or in turns per second taken for these; readings closer than
-    a turn, as of seconds named ms.
+    """Doubts about units: a spin that no such top has, readings closer than a turn.
+
+    Turns per minute and per second may be confused, and seconds be named ms.
     """
     middle, step = float(np.median(frequency)), float(np.median(np.diff(time)))
     if not SLOWEST_SPIN_HZ <= middle <= FASTEST_HZ:
