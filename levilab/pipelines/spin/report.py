@@ -68,8 +68,8 @@ def _used(analysis: SpinAnalysis) -> str:
 
 _FREQUENCIES = (
     "value(u): the digits in parentheses are the standard uncertainty of the last digits. The spin is that at the time "
-    "given, its slope the change of the spin in a second. bound: no method does better with this noise (Cramér–Rao). Of "
-    "several records or windows this table, that of the pulses and the budgets are of the one in the middle; the "
+    "given, its slope the change of the spin in a second. bound: no method does better with this noise (Cramér–Rao). "
+    "Of several records or windows this table, that of the pulses and the budgets are of the one in the middle; the "
     "text gives the slope through all."
 )
 _PULSES = (

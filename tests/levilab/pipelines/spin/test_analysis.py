@@ -135,7 +135,7 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> Non
     assert series.time == pytest.approx([-0.2, 9.8, 19.8], abs=0.05)  # the middles of 0.4 s before they were complete
     by_start = 0.1 * 0.02 / np.sqrt(3)  # the slope, and how often a driver asks whether a record is complete
     assert series.u[1] == pytest.approx(np.hypot(analysis.runs[0].spin.frequency.u, by_start), rel=0.01)
-    assert "It loses 0.34 % of its spin a second, as a free top does in air." in meaning(analysis)[0]
+    assert "It loses 0.34459(33) % of its spin a second, as a free top does in air." in meaning(analysis)[0]
     alone = Series(series.time[1:2], series.frequency[1:2], series.u[1:2])  # of 0.4 s
     (text,) = meaning(replace(analysis, runs=(replace(analysis.runs[0], series=alone),)))
     assert "In 0.38 s no change of its spin shows beyond the uncertainty: it loses or gains less than" in text
