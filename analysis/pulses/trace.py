@@ -177,11 +177,17 @@ def _found(trace: Trace, method: Choice, degree: int | None, *, near: Fit | None
 def _one_by_one(trace: Trace, train: Train) -> Found:
     """The result by pulses that were placed one by one."""
     edges = Edges(train.fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0)
-    return Found(edges, train.doubled, "edges", 0.0, (_scatters(train, "each was placed by itself"), *trace.notes))
+    return Found(
+        edges,
+        train.doubled,
+        "edges",
+        0.0,
+        (_scatters(train, "each was timed by itself, without a mean pulse"), *trace.notes),
+    )
 
 
 def _scatters(train: Train, text: str) -> Finding:
-    return Finding("scattered", f"the pulses scatter by {digits(_scatter(train), 2)} turns: {text}")
+    return Finding("scattered", f"the pulses come early or late by {digits(_scatter(train), 2)} turns (rms): {text}")
 
 
 def _events(trace: Trace, degree: int | None = None) -> tuple[Events, Train]:

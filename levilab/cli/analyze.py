@@ -244,7 +244,7 @@ COMMANDS = {
         ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "clock_u"),
     ),
     "spin": Command(
-        "Spin frequency and chirp from traces of a detector (WAV, scopes' CSV, .npy), lists of pulse times, runs with "
+        "Spin frequency and slope from traces of a detector (WAV, scopes' CSV, .npy), lists of pulse times, runs with "
         "traces.",
         ("columns", "channel", "rate", "method", "clock_u"),
     ),

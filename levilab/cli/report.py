@@ -27,8 +27,8 @@ def report(
         bool,
         typer.Option(
             "--tables",
-            help="Write the tables of results, too, into a folder beside the report, FILE.tables: CSV with all digits, "
-            "LaTeX as shown.",
+            help="Write the tables of results, too, into a folder beside the report, report.tables for report.html: "
+            "CSV with all digits, LaTeX as shown.",
         ),
     ] = False,
     columns: Columns = "",

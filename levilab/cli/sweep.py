@@ -96,9 +96,10 @@ def sweep(
         raise UsageError("cores", "a cluster has its own workers: leave it out, or leave out `scheduler`")
     shown = _is_store(scene)
     store = _open_store(Path(scene), given, resume=resume) if shown else _begin_store(scene, given, resume=resume)
-    if resume or not shown:
-        _compute(store, cores, scheduler)
-    _show(store, as_json=as_json)
+    computed = (resume or not shown) and _compute(store, cores, scheduler)
+    pictures = _show(store, as_json=as_json)
+    for path in [store.path, *pictures] if computed else pictures:
+        message(f"wrote {path}")
 
 
 def _is_store(scene: str) -> bool:
@@ -130,8 +131,8 @@ def _begin_store(name: str, given: dict[str, Any], *, resume: bool) -> Store:
         return store_for(request, out, message, resume=resume)
 
 
-def _compute(store: Store, cores: int | None, scheduler: str | None) -> None:
-    """Compute the chunks that are missing."""
+def _compute(store: Store, cores: int | None, scheduler: str | None) -> bool:
+    """Compute the chunks that are missing; return whether any was."""
     from levilab.present.progress import ShareBar
     from levilab.simulator.compilation import announce_compilation
     from levilab.sweeps.adaptive import is_adaptive, run_adaptive
@@ -140,7 +141,7 @@ def _compute(store: Store, cores: int | None, scheduler: str | None) -> None:
     total = store.plan.chunk_count
     if store.done == total:
         message(f"{store.path} is complete: nothing is left to compute")
-        return
+        return False
     if store.done:
         message(f"going on: {store.done} of {total} chunks are done")
     for note in store.notes():
@@ -162,20 +163,21 @@ def _compute(store: Store, cores: int | None, scheduler: str | None) -> None:
                 run(store, workers, bar)
         except WorkersLost as lost:
             raise WorkersLost(f"{lost}; {what_is_kept()}") from lost
-    message(f"wrote {store.path}")
+    return True
 
 
-def _show(store: Store, *, as_json: bool) -> None:
-    """Print the summary and draw the figures."""
+def _show(store: Store, *, as_json: bool) -> list[Path]:
+    """Print the summary; draw the figures and return their paths."""
     from levilab.sweeps.adaptive import report_in
+    from levilab.sweeps.drawing import draw_figures
     from levilab.sweeps.summary import as_document, summarise
 
     summary, report = summarise(store), report_in(store)
-    pictures = _draw(store)
+    pictures = draw_figures(store)
     if as_json:
         figures = [str(picture) for picture in pictures]
         print_json(as_document(summary) | {"adaptive": report, "store": str(store.path), "figures": figures})
-        return
+        return pictures
     from levilab.present.terminal import draw, terminal
     from levilab.sweeps.adaptive import in_words
     from levilab.sweeps.table import FEW_POINTS, axes_lines, columns_table, headline, points_table
@@ -191,13 +193,4 @@ def _show(store: Store, *, as_json: bool) -> None:
         console.print(f"• {sentence}", markup=False)
     if summary.points < store.plan.size:
         message(f"{summary.points} of {store.plan.size} points are known; levilab sweep {store.path} --resume goes on")
-
-
-def _draw(store: Store) -> list[Path]:
-    """Draw a figure of each column beside the store, where the plan is a map."""
-    from levilab.sweeps.drawing import draw_figures
-
-    pictures = draw_figures(store)
-    for picture in pictures:
-        message(f"wrote {picture}")
     return pictures

@@ -79,8 +79,9 @@ def print_like(checked: Sequence[tuple[OwnCheck, Place]]) -> None:
     """The table of each result, and what it says."""
     console = terminal()
     for one, _ in checked:
-        console.print(draw(replace(own_table(one), title=f"{one.analysis}: pulls, (estimate − truth)/u")))
-        console.print(escape(in_words(one)))
+        shown = ANALYSES[one.analysis].symbols
+        console.print(draw(replace(own_table(one, shown), title=f"{one.analysis}: pulls, (estimate − truth)/u")))
+        console.print(escape(in_words(one, shown)))
 
 
 def store_like(checked: Sequence[tuple[OwnCheck, Place]], out: Path | None) -> list[Path]:

@@ -255,11 +255,12 @@ def nearly_a_frequency(text: str) -> str | None:
     """How a frequency follows from what a column holds, None if none does.
 
     >>> nearly_a_frequency("Drehzahl")
-    'say its unit in the title, or `columns` = "f=Drehzahl [rpm]"'
+    'say its unit in the title, or `columns` = "f=Drehzahl [Hz]" or "f=Drehzahl [rpm]", whichever it is in'
     """
     name = _plain_name(text)
     if name in NEED_UNITS:
-        return f'say its unit in the title, or `columns` = "f={text.strip()} [rpm]"'
+        title = text.strip()
+        return f'say its unit in the title, or `columns` = "f={title} [Hz]" or "f={title} [rpm]", whichever it is in'
     return next((how for word, how in NEARLY_FREQUENCIES.items() if name.startswith(word)), None)
 
 

@@ -144,9 +144,12 @@ class Analysis(Generic[A]):
 #: What a scan's quantities are called.
 FIELD_WORDS = MappingProxyType({name: one.words for name, one in SHOWN.items()})
 
+#: The chirp of result.json is the slope of the tables.
+SPIN_WORDS = MappingProxyType({"chirp": "slope"})
+
 _TABLE: tuple[Analysis[Any], ...] = (
     Analysis(SPINDOWN, spindown_tables, spindown_part, spindown_columns, SPINDOWN_ROW, SYMBOLS),
-    Analysis(SPIN, spin_tables, spin_part, spin_columns, SPIN_ROW),
+    Analysis(SPIN, spin_tables, spin_part, spin_columns, SPIN_ROW, SPIN_WORDS),
     Analysis(FIELD, field_tables, field_part, field_columns, FIELD_ROW, FIELD_WORDS),
     Analysis(LIMIT, limit_tables, limit_part, limit_columns, LIMIT_ROW),
     Analysis(PRECESSION, precession_tables, precession_part, precession_columns, PRECESSION_ROW),

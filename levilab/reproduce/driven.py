@@ -12,6 +12,7 @@ from analysis.uncertainty import Estimate
 from levilab.motion.lines import lines_of, rate_for
 from levilab.motion.lock import is_locked
 from levilab.present.document.blocks import Note, Picture
+from levilab.present.numbers import with_decimals
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Check, Statement, Within
 from levilab.reproduce.figure import Azimuth, azimuth_figure, driven_figure
@@ -133,7 +134,8 @@ def of_azimuth(found: Azimuth, lines: AxisLines) -> list[Finding]:
             "φ̇ of the driven top",
             "figure of the driven precession",
             "φ̇ looks chaotic",
-            f"φ̇/2π from {found.rate.min():.0f} to {found.rate.max():.0f} Hz, far beyond any frequency of the axis",
+            f"φ̇/2π from {with_decimals(float(found.rate.min()), 0)} to {found.rate.max():.0f} Hz, far beyond any "
+            "frequency of the axis",
             holds=bool(found.rate.max() > 100 and found.rate.min() < -20),
         ),
         Statement(

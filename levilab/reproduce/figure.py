@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from levilab.present.looks import BLACK, BLUE, GREEN, GREY, LOOKS, ORANGE, SERIES, VERMILION
+from levilab.present.numbers import with_decimals
 from levilab.present.style import STYLE, WIDE
 from levilab.reproduce.tops import MASS_KG
 from levilab.stability.thesis import SIMULATED_HZ, WITH_DRAG_HZ
@@ -176,7 +177,7 @@ class Scans:
 def limits_figure(shown: Scans) -> Figure:
     """Scans of the upper limit, and what the lower ones depend on."""
     figure, panels = _figure(
-        5.2, (0.085, 0.63, 0.9, 0.26), (0.085, 0.1, 0.28, 0.37), (0.475, 0.1, 0.22, 0.37), (0.785, 0.1, 0.2, 0.37)
+        5.2, (0.085, 0.63, 0.9, 0.26), (0.085, 0.1, 0.26, 0.37), (0.49, 0.1, 0.205, 0.37), (0.785, 0.1, 0.2, 0.37)
     )
     _draw_scans(panels[0], shown)
     figure.legend(handles=[_UP, _LOST, Line2D([], [], **_THESIS, label="thesis")], loc="upper right", ncols=3)
@@ -371,9 +372,17 @@ def azimuth_figure(motion: Trajectory, found: Azimuth, lines: AxisLines) -> Figu
                 textcoords="offset points", ha="center", fontsize=7,
             )  # fmt: skip
     slow = sorted(line.frequency for line in named if abs(line.frequency) <= _SLOW_HZ)
-    axes.text(-2.6, 0.2 * highest, "swings sideways\n" + ", ".join(f"{f:.2f}" for f in slow), ha="right", fontsize=7)
+    if slow:  # to the left of the precession's name
+        most = 1e3 * max(line.amplitude for line in named if abs(line.frequency) <= _SLOW_HZ)
+        axes.annotate(
+            "swings sideways\n" + ", ".join(with_decimals(f, 2) for f in slow), (slow[-1] + 1, most), (0, 5),
+            textcoords="offset points", ha="right", fontsize=7,
+        )  # fmt: skip
     axes.set(
-        xlim=(-13, 60), ylim=(1e-4 * highest, 8 * highest), xlabel="frequency  [Hz]", ylabel="|n_x + i n_y|  [mrad]"
+        xlim=(-13, 60),
+        ylim=(1e-4 * highest, 8 * highest),
+        xlabel="frequency  [Hz]",
+        ylabel="|n$_{\\rm x}$ + i n$_{\\rm y}$|  [mrad]",
     )
     axes.set_title("The axis itself: lines")
     return figure

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.errors import AnalysisError
+from analysis.numbers import digits
 from analysis.pulses.regression import student
 from levilab.crosscheck.own import field, limit, precession, spin, spindown
 from levilab.crosscheck.own.model import OF_ONE_RUN
 from levilab.crosscheck.study import CHANCE, COVERAGE, Spread, by_reason, spreads_of
 from levilab.errors import LevilabError
 from levilab.present.document.blocks import Note, Paragraph, Tabular
-from levilab.present.numbers import signed
+from levilab.present.numbers import enumeration, signed
 from levilab.present.tables import Table, table
 
 if TYPE_CHECKING:
@@ -217,11 +218,11 @@ def _median(values: Sequence[float]) -> float | None:
 
 # --- how people are shown it ---------------------------------------------------------------------------
 
-_NUMBERS = ("pulls", "mean pull", "s.d. of pulls", "within 1 u")
+_NUMBERS = ("pulls", "mean pull", "s.d. of pulls\n(wanted)", "within 1 u\n(wanted)")
 
 
 def own_table(found: OwnCheck, shown: Mapping[str, str] | None = None) -> Table:
-    """A row a quantity; behind ± stands what chance leaves to so many pulls, one standard error.
+    """A row a quantity; behind ± stands what chance leaves to so many pulls, one standard error, then what is wanted.
 
     Args:
         found: the trials.
@@ -232,13 +233,28 @@ def own_table(found: OwnCheck, shown: Mapping[str, str] | None = None) -> Table:
             _in_words(one.quantity, shown or {}),
             str(one.n),
             f"{signed(one.mean, 2)} ± {1 / math.sqrt(one.n):.2f}",
-            "–" if math.isnan(one.deviation) else f"{one.deviation:.2f} ± {1 / math.sqrt(2 * one.n):.2f}",
-            f"{100 * one.coverage:.0f} ± {100 * math.sqrt(COVERAGE * (1 - COVERAGE) / one.n):.0f} %",
+            _deviation(one, wanted_deviation(found.freedom.get(one.quantity), found.widened)),
+            _coverage(one, wanted_coverage(found.freedom.get(one.quantity))),
             "yes" if found.is_right(one) else "NO",
         )
         for one in found.spreads
     ]
     return table("", ("quantity", *_NUMBERS, "as wanted"), rows, numbers=_NUMBERS)
+
+
+def _deviation(spread: Spread, wanted: float) -> str:
+    """The standard deviation of pulls, and the wanted one; without a judgement where tails are long."""
+    if math.isnan(spread.deviation):
+        return "–"
+    if math.isinf(wanted):
+        return f"{spread.deviation:.2f} (not judged)"
+    return f"{spread.deviation:.2f} ± {wanted / math.sqrt(2 * spread.n):.2f} ({digits(wanted, 3)})"
+
+
+def _coverage(spread: Spread, wanted: float) -> str:
+    """The share within 1 u, and the wanted one."""
+    by_chance = math.sqrt(wanted * (1 - wanted) / spread.n)
+    return f"{100 * spread.coverage:.0f} ± {100 * by_chance:.0f} % ({100 * wanted:.0f} %)"
 
 
 def _in_words(quantity: str, shown: Mapping[str, str]) -> str:
@@ -251,8 +267,13 @@ def _in_words(quantity: str, shown: Mapping[str, str]) -> str:
     return shown.get(name, name.replace("_", " ")) + quantity[len(name) :].replace("_", " ")
 
 
-def in_words(found: OwnCheck) -> str:
-    """What the trials say."""
+def in_words(found: OwnCheck, shown: Mapping[str, str] | None = None) -> str:
+    """What the trials say.
+
+    Args:
+        found: the trials.
+        shown: quantity → its symbol.
+    """
     texts = [f"{found.trials} times anew: {found.about}."]
     if not found.spreads:
         texts.append("No trial came to an estimate.")
@@ -283,7 +304,10 @@ def in_words(found: OwnCheck) -> str:
     few = {n for n in found.freedom.values() if n < _MANY}
     if few:
         share = f"{100 * wanted_coverage(min(few)):.0f} %"
-        texts.append(f"As u comes from the scatter of few values, {share} within 1 u are right (Student's t).")
+        of = enumeration([_in_words(name, shown or {}) for name, n in found.freedom.items() if n < _MANY])
+        texts.append(f"As u of {of} comes from the scatter of few values, {share} within 1 u are right (Student's t).")
+        if min(few) <= _LONG_TAILS:
+            texts.append(_about_tails(min(few)))
     if found.widened is not None and found.widened < _MANY:
         wanted = wanted_deviation(None, found.widened)
         pulls = f"pulls have a standard deviation of {wanted:.2f}" if math.isfinite(wanted) else "pulls have long tails"
@@ -293,15 +317,25 @@ def in_words(found: OwnCheck) -> str:
     return " ".join(texts)
 
 
+def _about_tails(freedom: int) -> str:
+    """Why the standard deviation of pulls is not judged."""
+    degree = f"{freedom} degree{'s' * (freedom > 1)} of freedom"
+    if freedom <= 2:  # the variance of Student's t is n/(n − 2)
+        return f"Student's t with {degree} has no finite standard deviation, so that of these pulls is not judged."
+    return f"Student's t with {degree} has long tails, so the standard deviation of these pulls is not judged."
+
+
 def own_blocks(found: OwnCheck, shown: Mapping[str, str] | None = None) -> tuple[Block, ...]:
     """The trials as blocks of a report."""
     note = (
-        "A pull is (estimate − truth)/u; wanted are a mean of 0, a standard deviation of 1, and 68 % within 1 u. "
-        "Behind ± stands what chance leaves to so many pulls, one standard error. As wanted is what misses this by a "
-        "tenth at most and three standard errors; smaller deviations mean that u is on the safe side."
+        "A pull is (estimate − truth)/u. Wanted is a mean of 0; the wanted standard deviation and share within 1 u "
+        "stand in parentheses: 1 and 68 %, or what Student's t gives where u comes from few values. Behind ± stands "
+        "what chance leaves to so many pulls, one standard error. Yes: mean and standard deviation miss what is wanted "
+        "by a tenth at most and three standard errors, the share by 5 % and three; a smaller standard deviation and a "
+        "larger share mean that u is on the safe side."
     )
     return (
-        Paragraph(in_words(found)),
+        Paragraph(in_words(found, shown)),
         # the readings of the trials are made up, whatever the result is of
         Tabular(f"crosscheck-{found.analysis}", own_table(found, shown), mark="SYNTHETIC."),
         Note(note),

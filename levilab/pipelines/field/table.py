@@ -13,6 +13,9 @@ from levilab.present.tables import Row, Table, table
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from analysis.field.fit import FieldScan
     from analysis.uncertainty import Estimate
     from levilab.pipelines.field.analysis import FieldAnalysis
@@ -39,8 +42,8 @@ def scans_table(analysis: FieldAnalysis) -> Table:
             (
                 short_name(source.name),
                 str(statistics.n),
-                " … ".join(with_decimals(1e2 * scan.height[k], 2) for k in (0, -1)),
-                " → ".join(with_decimals(1e3 * scan.flux_density[k], 3) for k in (0, -1)),
+                _range(1e2 * scan.height, 2),
+                _range(1e3 * scan.flux_density, 3),
                 plain(1e6 * statistics.rms_residual),
                 plain(statistics.reduced_chi_square),
                 plain(statistics.runs_test_p, 2),
@@ -49,6 +52,11 @@ def scans_table(analysis: FieldAnalysis) -> Table:
     heads = ("scan", "readings", "heights [cm]", "field [mT]", "rms [µT]", "χ²/dof", "order p")
     numbers = ("readings", "rms [µT]", "χ²/dof", "order p")
     return table(f"Field of the base, {total} scan{'s' * (total > 1)}{made_up}", heads, rows, numbers=numbers)
+
+
+def _range(values: NDArray[np.float64], decimals: int) -> str:
+    """The least and the greatest value, which need not be the first and the last."""
+    return " … ".join(with_decimals(float(end), decimals) for end in (values.min(), values.max()))
 
 
 def base_table(scan: FieldScan) -> Table:

@@ -11,6 +11,7 @@ import numpy as np
 from analysis.budget import rest
 from analysis.errors import AnalysisError
 from analysis.pulses import Finding, phases, spin_of_times, spin_of_trace, track_of_blocks, track_of_times
+from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.sources import InputOptions, Needs
@@ -114,6 +115,32 @@ class SpinRun:
     notes: tuple[Finding, ...]
     parts: Mapping[str, UParts] = field(default_factory=dict)
     code: float | None = None
+
+    @property
+    def which(self) -> str:
+        """Of several records or windows the one that `spin` is of, as "record 3 of 5"; empty of a single one."""
+        if len(self.series) < 2:
+            return ""
+        place = int(np.abs(self.series.time - self.spin.reference_time).argmin()) + 1
+        return f"{self.series.of} {place} of {len(self.series)}"
+
+    @property
+    def trend(self) -> Estimate | None:
+        """The slope of a straight line through several records [Hz/s]; None of a single one, and where phases differ.
+
+        Records far apart show a slope that is far too small for one of them.  A record in which a drive was switched
+        has several slopes.  Where they scatter about the line by more than their u, u grows by as much.
+        """
+        series = self.series
+        if len(series) < 2 or len(series.phases) > 1 or not np.all(series.u > 0):
+            return None
+        weight = series.u**-2
+        late = series.time - np.average(series.time, weights=weight)
+        u = float(np.sum(weight * late**2)) ** -0.5
+        slope = float(np.sum(weight * late * series.frequency)) * u**2
+        left = series.frequency - np.average(series.frequency, weights=weight) - slope * late
+        scatter = math.sqrt(float(np.sum(weight * left**2)) / max(len(series) - 2, 1))
+        return Estimate(slope, u * max(1.0, scatter), "Hz/s")
 
 
 class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
@@ -279,7 +306,10 @@ def _by_record(spins: Mapping[int, SpinFrequency], all_of_them: int) -> tuple[Fi
     notes = []
     for name, texts in found.items():
         first, text = next(iter(texts.items()))
-        where = f"{len(texts)} of {all_of_them} records, number {first} first" if len(texts) > 1 else f"record {first}"
+        where = f"record {first}"
+        if len(texts) > 1:
+            which = f"all {all_of_them}" if len(texts) == all_of_them else f"{len(texts)} of {all_of_them}"
+            where = f"in {which} records, as in record {first}"
         notes.append(Finding(name, text if all_of_them == 1 else f"{where}: {text}"))
     return tuple(notes)
 
@@ -314,4 +344,8 @@ def in_a_sentence(run: SpinRun) -> str:
     ends = f"{series.frequency[0]:.3f} Hz at {series.time[0]:.1f} s to {series.frequency[-1]:.3f} Hz"
     phases = ", ".join(f"{kind} {start:.1f} to {end:.1f} s" for kind, start, end in series.phases[:6])
     in_phases = f"; {phases}" if phases else ""
-    return f"The spin goes from {ends} at {series.time[-1]:.1f} s ({len(series)} {series.of}s{in_phases}); {at}."
+    slope = f" Its slope through all {series.of}s is {with_uncertainty(run.trend)}." if run.trend else ""
+    return (
+        f"The spin goes from {ends} at {series.time[-1]:.1f} s ({len(series)} {series.of}s{in_phases}); {at}, "
+        f"{run.which}.{slope}"
+    )

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.numbers import digits
+from analysis.uncertainty import Estimate
 from levilab.present.numbers import with_uncertainty
 
 if TYPE_CHECKING:
@@ -51,19 +51,10 @@ class _Change:
 
 
 def _change(run: SpinRun) -> _Change | None:
-    """The slope over all records, or over the one; None where it is not known.
-
-    Several records show a slope that is far too small for one of them: it is that of the straight line through all.  A
-    record in which a drive was switched has several slopes: there the one of the window in the middle counts.
-    """
-    spin, series = run.spin, run.series
-    if len(series) > 1 and len(series.phases) < 2 and np.all(series.u > 0):
-        weight, late = series.u**-2, series.time - np.average(series.time, weights=series.u**-2)
-        u = float(np.sum(weight * late**2)) ** -0.5
-        slope = float(np.sum(weight * late * series.frequency)) * u**2
-        left = series.frequency - np.average(series.frequency, weights=weight) - slope * late
-        scatter = math.sqrt(float(np.sum(weight * left**2)) / max(len(series) - 2, 1))
-        return _Change(slope, u * max(1.0, scatter), float(np.ptp(series.time)))
+    """The slope through all records, or of the one; None where it is not known."""
+    spin, trend = run.spin, run.trend
+    if trend and trend.value is not None and trend.u is not None:
+        return _Change(trend.value, trend.u, float(np.ptp(run.series.time)))
     if spin.chirp.value is None or not spin.chirp.u or not spin.frequency.value:
         return None
     turns = spin.pulses + spin.missing - spin.doubled
@@ -94,6 +85,7 @@ def _sentences(run: SpinRun) -> Iterator[str]:
 def _about_change(change: _Change, frequency: float) -> Iterator[str]:
     """What the change of a spin [Hz] means."""
     share = change.slope / frequency
+    lost = with_uncertainty(Estimate(100 * abs(share), 100 * change.u / frequency, "%"))
     if abs(change.slope) < _SEEN * change.u:
         most = (abs(change.slope) + 2 * change.u) / frequency
         yield (
@@ -106,11 +98,11 @@ def _about_change(change: _Change, frequency: float) -> Iterator[str]:
             else "That is less than air takes from a free top: does a drive hold it?"
         )
     elif share > 0:
-        yield f"It gains {digits(100 * share)} % of its spin a second: something drives it."
+        yield f"It gains {lost} of its spin a second: something drives it."
     elif _AIR[0] < -share < _AIR[1]:
-        yield f"It loses {digits(-100 * share)} % of its spin a second, as a free top does in air."
+        yield f"It loses {lost} of its spin a second, as a free top does in air."
     else:
         why = "more than air takes: does it touch something, or does a drive brake it?" if -share > _AIR[1] else (
             "less than air takes from a free top: does a drive hold it?"
         )  # fmt: skip
-        yield f"It loses {digits(-100 * share)} % of its spin a second, {why}"
+        yield f"It loses {lost} of its spin a second, {why}"

@@ -12,7 +12,7 @@ from levilab.pipelines.spin.analysis import MOST_DRAWN, in_a_sentence
 from levilab.pipelines.spin.meaning import meaning
 from levilab.pipelines.spin.table import frequency_table, pulse_table, series_table
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
-from levilab.present.numbers import with_uncertainty
+from levilab.present.numbers import enumeration, with_uncertainty
 
 if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
@@ -28,11 +28,10 @@ MOST_POINTS = 300
 
 def spin_part(analysis: SpinAnalysis) -> ReportPart:
     """Frequencies, pulses, and frequency against time."""
-    total = sum(run.spin.pulses for run in analysis.runs)
     return ReportPart(
         subject="spin frequency",
         heading="Spin frequency of a top",
-        lead=f"{total} pulses used",
+        lead=_used(analysis),
         verdict=analysis.text,
         result=(
             Paragraph(" ".join(meaning(analysis)), "What it means."),
@@ -56,9 +55,22 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
     )
 
 
+def _used(analysis: SpinAnalysis) -> str:
+    """What the results come from: pulses of single records, else records or windows, of which each has its pulses."""
+    pulses = sum(run.spin.pulses for run in analysis.runs if not run.which)
+    counts = {"pulse": pulses} if pulses else {}
+    for run in analysis.runs:
+        if run.which:
+            counts[run.series.of] = counts.get(run.series.of, 0) + len(run.series)
+    said = [f"{count} {name}{'s' * (count > 1)}" for name, count in counts.items()]
+    return f"{enumeration(said)} used"
+
+
 _FREQUENCIES = (
     "value(u): the digits in parentheses are the standard uncertainty of the last digits. The spin is that at the time "
-    "given, its slope the change of the spin in a second. bound: no method does better with this noise (Cramér–Rao)."
+    "given, its slope the change of the spin in a second. bound: no method does better with this noise (Cramér–Rao). "
+    "Of several records or windows this table, that of the pulses and the budgets are of the one in the middle; the "
+    "text gives the slope through all."
 )
 _PULSES = (
     "missing: turns without a pulse; doubled: pulses beyond one a turn; scatter: standard deviation of one pulse's "
@@ -68,8 +80,9 @@ _PULSES = (
 
 def _in_words(source: Source[Records], run: SpinRun) -> tuple[str, ...]:
     records, count = source.readings, len(source.readings)
+    of = f"{run.which}: " if run.which else ""
     what = "pulse times" if records.pulses else f"samples of {records.channel}"
-    return f"{records.kind}; {count} {what}", f"{run.spin.pulses} pulses, {run.spin.missing} missing"
+    return f"{records.kind}; {count} {what}", f"{of}{run.spin.pulses} pulses, {run.spin.missing} missing"
 
 
 def _series(source: Source[Records], run: SpinRun) -> tuple[Block, ...]:

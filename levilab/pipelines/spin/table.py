@@ -30,18 +30,20 @@ def frequency_table(analysis: SpinAnalysis) -> Table:
     total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
     made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
     spins, slopes = (column(getattr(run.spin, name) for run in analysis.runs) for name in ("frequency", "chirp"))
+    several = any(run.which for run in analysis.runs)
     rows = [
         (
             short_name(source.name),
             spin,
             slope,
+            *([run.which or "all"] * several),
             with_decimals(run.spin.reference_time, 4),
             run.spin.method,
             plain(None if run.spin.bound is None else 1e3 * run.spin.bound, 2),
         )
         for source, run, spin, slope in zip(analysis.sources, analysis.runs, spins, slopes, strict=True)
     ]
-    heads = ("input", "spin [Hz]", "slope [Hz/s]", "at [s]", "method", "bound\n[mHz]")
+    heads = ("input", "spin [Hz]", "slope [Hz/s]", *(["of"] * several), "at [s]", "method", "bound\n[mHz]")
     return table(
         f"Spin frequency, {total} input{'s' * (total > 1)}{made_up}", heads, rows, numbers=["at [s]", heads[-1]]
     )
@@ -49,6 +51,7 @@ def frequency_table(analysis: SpinAnalysis) -> Table:
 
 def pulse_table(analysis: SpinAnalysis) -> Table:
     """How good the pulses are."""
+    several = any(run.which for run in analysis.runs)
     rows = [
         (
             short_name(source.name),
@@ -61,8 +64,9 @@ def pulse_table(analysis: SpinAnalysis) -> Table:
         )
         for source, run in zip(analysis.sources, analysis.runs, strict=True)
     ]
-    heads = ("input", "what it is", "pulses", "missing", "doubled", "scatter\n[µs]", "S/N\n[dB]")
-    return table("The pulses", heads, rows, numbers=heads[2:])
+    numbers = ("pulses", "missing", "doubled", "scatter\n[µs]", "S/N\n[dB]")
+    title = "The pulses" + (", of several records or windows those of the one above" if several else "")
+    return table(title, ("input", "what it is", *numbers), rows, numbers=numbers)
 
 
 def series_table(source: Source[Records], run: SpinRun, most: int) -> Table:

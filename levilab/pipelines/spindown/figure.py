@@ -48,8 +48,8 @@ MOST_POINTS, MOST_BARS, MEANS = 600, 200, 40
 #: A bar longer than the marker's radius, as part of the panel's height, is seen; outliers with their value written.
 _SEEN, _MOST_NAMED = 1 / 120, 6
 #: Of the residuals: the common scale shows at least so many units, a law whose residuals reach this much further than
-#: it does has a scale of its own.
-_LEAST_SCALE, _BEYOND = 3.2, 1.1
+#: it does has a scale of its own; a scale is so many times as long as the residuals reach, for the markers.
+_LEAST_SCALE, _BEYOND, _ROOM = 3.2, 1.1, 1.12
 #: Places [inch]: left edge and width of the panels; height of the figure.
 _LEFT, _FULL, _HEIGHT = 0.66, 6.26, 9.15
 
@@ -61,7 +61,7 @@ class _Unit:
     Attributes:
         of: for each run what its residuals are divided by [Hz].
         usual: of a reading [Hz].
-        symbol: for axes.
+        symbol: for axes, which say residual / symbol.
         words: what it is.
     """
 
@@ -112,8 +112,8 @@ def _unit(analysis: SpinDownAnalysis) -> _Unit:
     residuals = [run.fit(analysis.combined.best).residuals for run in analysis.runs]
     floor = 1e-12 * float(analysis.runs[0].frequency[0])  # readings that a law describes exactly
     scatter = max(float(np.sqrt(np.mean(np.concatenate(residuals) ** 2))), floor)
-    words = f"the best law's scatter, s = {digits(scatter)} Hz"
-    return _Unit([np.full(len(one), scatter) for one in residuals], scatter, "s", words)
+    words = f"the best law's scatter ({digits(scatter)} Hz)"
+    return _Unit([np.full(len(one), scatter) for one in residuals], scatter, "scatter", words)
 
 
 # --- readings and laws ---------------------------------------------------------------------------------
@@ -324,12 +324,14 @@ def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit
     reach = {name: max(float(np.abs(one).max()) for one in of) for name, of in values.items()}
     excluded = dict(analysis.combined.verdict.excluded)
     good = [reach[name] for name in SHOWN_LAWS if name not in excluded] or [reach[analysis.combined.best]]
-    common = max(_LEAST_SCALE, 1.12 * max(good))
+    common = max(_LEAST_SCALE, _ROOM * max(good))
+    far = {name for name in SHOWN_LAWS if reach[name] > _BEYOND * common}
+    common = max(common, _ROOM * max((reach[name] for name in SHOWN_LAWS if name not in far), default=0.0))
     width, gap = 1.02, (_FULL - 5 * 1.02) / 4
     for place, name in enumerate(SHOWN_LAWS):
         axes = panel(figure, _LEFT + place * (width + gap), top, width, 1.05)
-        own = reach[name] > _BEYOND * common
-        most = 1.12 * reach[name] if own else common
+        own = name in far
+        most = _ROOM * reach[name] if own else common
         sigma_bands(axes)
         for k, one in enumerate(values[name]):
             _draw_tilt(axes, analysis, k, name, most)
@@ -346,7 +348,7 @@ def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit
             axes.set_title("own scale", loc="right", color="black", fontsize=SMALL, fontstyle="italic", pad=3)
             axes.set_facecolor("#F4F4F4")
         if place == 0:
-            axes.set_ylabel(f"residual  [{unit.symbol}]")
+            axes.set_ylabel(f"residual / {unit.symbol}")
 
 
 def _draw_tilt(axes: Axes, analysis: SpinDownAnalysis, k: int, name: str, limit: float) -> None:

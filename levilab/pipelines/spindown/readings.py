@@ -167,16 +167,21 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
     return Readings(time, frequency, u, (*table.warnings, *_doubts(table, time, frequency)))
 
 
-#: A Levitron spins at 20 to 60 Hz, driven to about 60 Hz; far above that the unit is in doubt [Hz].
-FASTEST_HZ = 200.0
+#: A Levitron spins at 20 to 60 Hz, driven to about 60 Hz; far below or above that the unit is in doubt [Hz].  60 turns
+#: per second read as turns per minute are 1 Hz.
+SLOWEST_SPIN_HZ, FASTEST_HZ = 5.0, 200.0
 
 
 def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[str]:
-    """A spin that no such top has, as in turns per minute; readings closer than a turn, as of seconds named ms."""
+    """Doubts about units: a spin that no such top has, readings closer than a turn.
+
+    Turns per minute and per second may be confused, and seconds be named ms.
+    """
     middle, step = float(np.median(frequency)), float(np.median(np.diff(time)))
-    if middle > FASTEST_HZ:
+    if not SLOWEST_SPIN_HZ <= middle <= FASTEST_HZ:
         doubt = f"{table.path.name}: the spin is about {middle:.4g} Hz, a Levitron spins at 20 to 60 Hz"
-        return [f"{doubt}; if these are turns per minute, say so with their column, as f=NAME [rpm]"]
+        per, unit = ("minute", "rpm") if middle > FASTEST_HZ else ("second", "Hz")
+        return [f"{doubt}; if these are turns per {per}, say so with their column, as f=NAME [{unit}]"]
     if step * middle < 1:  # nor does a counter give a reading in less
         doubt = f"{table.path.name}: the readings lie {1e3 * step:.3g} ms apart, the top needs {1e3 / middle:.3g} ms"
         return [f"{doubt} for a turn; if the times are in seconds, say so with their column, as t=NAME [s]"]

@@ -30,6 +30,7 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     ended = command(*MAP, cwd=folder)
     assert ended.status == 0, ended.err
     assert "wrote map.zarr\n" in ended.err
+    assert ended.err.splitlines()[-1].startswith("wrote map")  # as the last lines, in one terminal with the table
     return folder, ended.out
 
 

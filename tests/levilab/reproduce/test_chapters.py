@@ -198,6 +198,20 @@ def test_the_lock_is_tested_jointly_and_the_printed_slope_is_not():
     assert found.ours.value == pytest.approx(1.0, abs=1e-4)
 
 
+def test_a_limit_of_the_thesis_beyond_the_exact_window_differs_for_a_computed_reason(monkeypatch):
+    low, high = beyond.about_window()
+    assert isinstance(low, Statement)
+    assert isinstance(high, Statement)
+    assert low.verdict is Verdict.AGREES
+    assert high.verdict is Verdict.DIFFERS
+    assert high.found.startswith("80.34 Hz")  # as the chapter on limits says
+    assert "IC1, IC3 and IC4 lie below it; IC2 lies 1.39 Hz above it" in high.found
+    assert "from IC2 at 81 Hz" in high.why
+    assert "is still up after 30 s; at 81.73 Hz it is lost after 6.2 s" in high.why
+    monkeypatch.setattr(beyond, "BEYOND_HZ", 80.0)  # where small motions do not grow: no reason
+    assert beyond.about_window()[1].verdict is Verdict.UNEXPECTED
+
+
 def test_a_scan_has_limits_edges_and_gaps():
     spins, up = np.arange(5.0), np.array([False, True, True, False, True])
     assert lower_limit(spins, up) == 4.0
@@ -206,4 +220,3 @@ def test_a_scan_has_limits_edges_and_gaps():
     assert math.isnan(all_up_until(spins, up))
     assert all_up_until(spins, ~up) == 0.0
     assert math.isnan(lower_limit(spins, ~up & False))
-    assert all(isinstance(one, Statement) for one in beyond.about_window())

@@ -131,6 +131,21 @@ def test_a_record_of_few_pulses_says_by_how_much_pulls_scatter(sample_data: Path
     assert {round(one.deviation, 1) for one in checked.spreads} <= {0.9, 1.0, 1.1}
 
 
+def test_the_table_says_what_is_wanted_of_each_row(runs: Any):
+    found = check_own("spindown", runs, {}, 6)
+    assert found.freedom == {"c32": 1}  # two runs that differ by more than their readings explain
+    one_run, together, exponent = (row.cells for row in own_table(found).rows)
+    assert one_run[3].endswith(" (1)")
+    assert one_run[4].endswith(" % (68 %)")
+    assert together[3].endswith(" (not judged)")
+    assert together[4].endswith(" % (50 %)")  # Student's t with one degree of freedom: 2 arctan(1)/π
+    assert exponent[4].endswith(" % (68 %)")
+    assert "Student's t with 1 degree of freedom has no finite standard deviation" in in_words(found)
+    few = replace(found, freedom={"c32": 6})
+    assert "Student's t with 6 degrees of freedom has long tails" in in_words(few)
+    assert "not judged" not in in_words(replace(found, freedom={"c32": 20}))
+
+
 def test_a_wrong_analysis_is_named(monkeypatch: pytest.MonkeyPatch, sample_data: Path):
     def off(random: np.random.Generator) -> Trial:
         trial = real.trial(random)

@@ -95,9 +95,11 @@ def test_a_result_holds_what_was_found_and_is_read_not_computed(
     for name in ("height", "flux_density", "u", "residuals", "covariance"):  # all that is drawn comes from these
         assert np.array_equal(getattr(recalled.runs[0].scan, name), getattr(found.runs[0].scan, name)), name
     assert recalled.all_warnings == found.all_warnings
-    zero = replace(found.runs[0].scan, height=np.array([-1e-5, 0.05]), flux_density=np.array([-2e-7, 0.03]))
+    zero = replace(
+        found.runs[0].scan, height=np.array([-1e-5, 0.02, 0.05]), flux_density=np.array([-2e-7, 0.045, 0.03])
+    )
     (row,) = scans_table(replace(found, runs=(replace(found.runs[0], scan=zero),))).rows
-    assert row.cells[2:4] == ("0.00 … 5.00", "0.000 → 30.000"), "zero has no sign"
+    assert row.cells[2:4] == ("0.00 … 5.00", "0.000 … 45.000"), "ranges, not first and last; zero has no sign"
 
 
 def test_other_options_are_computed_anew_with_those_of_the_result(scan: Path) -> None:

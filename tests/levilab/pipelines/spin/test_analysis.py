@@ -18,6 +18,8 @@ from levilab.pipelines.catalogue import save as save_found
 from levilab.pipelines.spin.analysis import Series, SpinOptions, analyze_spins
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spin.meaning import meaning
+from levilab.pipelines.spin.report import spin_part
+from levilab.pipelines.spin.table import spin_tables
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
 from levilab.runs.run import Run, RunRecord, utc_now
 from levilab.runs.waveforms import run_waveforms
@@ -133,7 +135,7 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> Non
     assert series.time == pytest.approx([-0.2, 9.8, 19.8], abs=0.05)  # the middles of 0.4 s before they were complete
     by_start = 0.1 * 0.02 / np.sqrt(3)  # the slope, and how often a driver asks whether a record is complete
     assert series.u[1] == pytest.approx(np.hypot(analysis.runs[0].spin.frequency.u, by_start), rel=0.01)
-    assert "It loses 0.34 % of its spin a second, as a free top does in air." in meaning(analysis)[0]
+    assert "It loses 0.34459(33) % of its spin a second, as a free top does in air." in meaning(analysis)[0]
     alone = Series(series.time[1:2], series.frequency[1:2], series.u[1:2])  # of 0.4 s
     (text,) = meaning(replace(analysis, runs=(replace(analysis.runs[0], series=alone),)))
     assert "In 0.38 s no change of its spin shows beyond the uncertainty: it loses or gains less than" in text
@@ -327,4 +329,29 @@ def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_
     squares = float((((straight - line(found.series.time)) * weight) ** 2).sum())
     assert squares == pytest.approx(48 * 1.16, abs=2 * 14)
     (note,) = [note.text for note in found.notes if note.name == "scattered"]
-    assert note.startswith("50 of 50 records")  # a mean pulse was fitted to two, of which one was 6 u off
+    assert note.startswith(
+        "in all 50 records, as in record 1: the pulses come early or late by 0.0"
+    )  # a mean pulse was fitted to two, of which one was 6 u off
+
+
+def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data: Path) -> None:
+    found = analyze_spins([sample_data / "trace-tape"], SpinOptions())
+    (run,) = found.runs
+    assert run.which == "record 3 of 5"
+    assert run.trend
+    assert (run.trend.value, run.trend.u) == pytest.approx((-0.0878, 0.0017), abs=5e-5)  # single ones: u of 0.4 Hz/s
+    frequencies, pulses, _ = spin_tables(found)
+    assert dict(zip(frequencies.heads, frequencies.rows[0].cells, strict=True))["of"] == "record 3 of 5"
+    assert pulses.title.endswith("those of the one above")
+    assert "28.111(30) Hz at 20.32 s, record 3 of 5. Its slope through all records is −0.0878(17) Hz/s." in found.text
+    part = spin_part(found)
+    assert part.lead == "5 records used"
+    assert "It loses 0.312(6) % of its spin a second" in part.result[0].text
+    assert found.runs[0].notes[0].text.startswith("in all 5 records, as in record 1: the pulses come early or late")
+
+
+def test_of_a_single_record_the_slope_is_its_own(sample_data: Path) -> None:
+    found = analyze_spins([sample_data / "scope-files"], SpinOptions())
+    single = [run for run in found.runs if not run.which]
+    assert single
+    assert all(run.trend is None for run in single)

@@ -175,6 +175,24 @@ def test_turns_per_minute_taken_for_hertz_are_doubted(tmp_path: Path) -> None:
     assert stated.runs[0].frequency[0] == pytest.approx(40, abs=0.1)
 
 
+def test_turns_per_second_taken_for_turns_per_minute_are_doubted(tmp_path: Path) -> None:
+    path = spin_down_csv(tmp_path / "my.csv", u=False)
+    path.write_text(path.read_text("utf-8").replace(path.read_text("utf-8").split("\n", 1)[0], "time,speed"), "utf-8")
+    (source,) = analyze_spindowns([path], SpinDownOptions(columns={"f": "speed [rpm]"})).sources
+    assert source.warnings[0].startswith("my.csv: the spin is about 0.")
+    assert "a Levitron spins at 20 to 60 Hz; if these are turns per second" in source.warnings[0]
+    assert "f=NAME [Hz]" in source.warnings[0]
+    (right,) = analyze_spindowns([path], SpinDownOptions(columns={"f": "speed [Hz]"})).sources
+    assert not right.warnings
+
+
+def test_a_speed_without_unit_may_be_in_hertz_or_turns_per_minute(tmp_path: Path) -> None:
+    path = tmp_path / "speed.csv"
+    path.write_text("time,speed\n0,39.9\n10,38\n20,36\n30,34\n", "utf-8")
+    with pytest.raises(DataError, match=r'"f=speed \[Hz\]" or "f=speed \[rpm\]"'):
+        analyze_spindowns([path], SpinDownOptions())
+
+
 def test_a_stated_reading_uncertainty_takes_the_place_of_the_scatter(tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     without = analyze_spindowns([path], SpinDownOptions()).runs[0].fit("disc")

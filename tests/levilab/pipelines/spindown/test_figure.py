@@ -79,6 +79,20 @@ def with_readings(path: Path, rows: Sequence[tuple[int, str]]) -> Path:
     return path
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_residuals_lie_inside_their_panels_in_units_that_are_not_seconds(tmp_path: Path, seed: int) -> None:
+    path = spin_down_csv(tmp_path / "a.csv", u=False, seed=seed)
+    figure = spindown_figure(analysis_of(path))
+    _, residuals, _, _ = panels(figure)
+    assert residuals[0].get_ylabel() == "residual / scatter"
+    for axes in residuals:
+        low, high = axes.get_ylim()
+        shown = np.concatenate([line.get_ydata() for line in axes.get_lines() if line.get_linestyle() == "None"])
+        assert low < 0.95 * shown.min()
+        assert 0.95 * shown.max() < high
+        assert max(abs(shown)) * 1.1 < high
+
+
 def test_every_axis_says_quantity_and_unit(figure: Figure) -> None:
     spin, residuals, lines, strips = panels(figure)
     assert "Hz" in spin.get_ylabel()
@@ -111,7 +125,7 @@ def test_good_laws_share_a_scale_and_a_bad_one_says_that_it_has_its_own(figure: 
 def test_residuals_are_in_units_of_u_or_of_the_scatter_with_bands(tmp_path: Path, known: bool) -> None:
     analysis = analysis_of(spin_down_csv(tmp_path / "a.csv", u=known))
     residuals = panels(spindown_figure(analysis))[1]
-    assert residuals[0].get_ylabel() == f"residual  [{'u' if known else 's'}]"
+    assert residuals[0].get_ylabel() == f"residual / {'u' if known else 'scatter'}"
     for axes in residuals:
         bands = [patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches]
         assert [(band.y0, band.y1) for band in bands] == [pytest.approx((-2, 2)), pytest.approx((-1, 1))]
