@@ -176,13 +176,22 @@ def test_a_top_that_is_not_there_is_an_error_that_says_what_to_look_at(tmp_path:
 
 def test_a_top_that_does_not_follow_the_drive_is_an_error(tmp_path: Path, outputs: list[bool]) -> None:
     weak = SpinSettings(drive_amplitude_vpp=0.5)
-    with pytest.raises(ExperimentFailed, match="did not follow"):
+    with pytest.raises(ExperimentFailed, match=r"did not follow .*: ramp slower \(.* or drive harder"):
         acquire(of_scene(tmp_path, SpinScene(), weak), Silent())
     (run,) = [Run.load(path) for path in tmp_path.iterdir()]
     # once more and once more, until the top has fallen meanwhile
     assert [event["kind"] for event in run.events()][:5] == [*2 * ["drive on", "not held"], "drive on"]
     assert True in outputs
     assert outputs[-1] is False
+
+
+@pytest.mark.parametrize("frequency", [5.0, 100.0])
+def test_a_drive_beyond_the_window_is_answered_with_the_window(tmp_path: Path, frequency: float) -> None:
+    """No ramp and no amplitude brings a top to where it does not float."""
+    asked = SpinSettings(drive_frequency_hz=frequency, ramp_hz_per_s=0.5)
+    with pytest.raises(ExperimentFailed, match=r"floats only between 21\.65 and 80\.60 Hz: ask for") as failed:
+        acquire(of_scene(tmp_path, SpinScene(), asked), Silent())
+    assert "ramp slower" not in str(failed.value)
 
 
 def test_a_top_that_never_falls_ends_at_the_longest_time(tmp_path: Path) -> None:
