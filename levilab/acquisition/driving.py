@@ -22,6 +22,7 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.bench.person import FloatTop
 from levilab.present.numbers import signed
+from levilab.present.panel import clock
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -266,11 +267,18 @@ def _ramp(session: Session[D], start: float, target: float) -> float:
         session.stop.check()
         drive = start + (target - start) * k / steps
         session.bench.generator.frequency = drive
-        session.progress(f"drive at {drive:.2f} Hz", k / steps)
+        session.progress(f"drive at {drive:.2f} Hz{_until(session, target, (steps - k) * RAMP_STEP_S)}", k / steps)
         session.wait(RAMP_STEP_S)
         if k % round(_LOOK_EVERY_S / RAMP_STEP_S) == 0 and k < steps:
             held_spin(session, drive)
     return held_spin(session, target)
+
+
+def _until(session: Session[D], target: float, left_s: float) -> str:
+    """When a ramp reaches its end, in words; empty at the end, and on a clock that does not keep to the wall's."""
+    if left_s <= 0 or not math.isfinite(session.bench.clock.speed):
+        return ""
+    return f", {target:.2f} Hz in {clock(left_s)}"
 
 
 def held_spin(session: Session[D], drive: float) -> float:
