@@ -22,6 +22,7 @@ from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from levilab.acquisition.counting import is_plausible
 from levilab.acquisition.experiments.spin import SpinSettings, time_left
 from levilab.acquisition.loop import AcquisitionRequest, acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration
 from levilab.bench.config import InstrumentSettings
@@ -33,7 +34,7 @@ from levilab.runs.writer import RunWriter
 from levilab.simulator.spin import DECAYS
 from levilab.world.bench import VIRTUAL, virtual_bus
 from levilab.world.spin_world import Phase, SpinScene, SpinWorld, random_scene
-from support.acquisitions import BEFORE, Impatient, Silent, in_world, mock, of_scene
+from support.acquisitions import BEFORE, LET_GO_AT_ONCE, Impatient, Silent, in_world, mock, of_scene
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -199,6 +200,25 @@ def test_a_top_that_never_falls_ends_at_the_longest_time(tmp_path: Path) -> None
     run = acquire(of_scene(tmp_path, scene, SpinSettings(longest_s=100.0)), Silent())
     assert run.status == "finished"
     assert len(run.readings().frame) == 11
+
+
+def test_a_top_that_keeps_its_spin_is_noticed_once_while_it_is_read(tmp_path: Path, usual: Run) -> None:
+    """After a minute, in which air takes a sixth of the spin; a top that spins down is not noticed."""
+    scene = SpinScene(fall_hz=1.0, constants=(1e-6,))
+    run = acquire(of_scene(tmp_path, scene, SpinSettings(longest_s=150.0)), Silent())
+    (seen,) = [event for event in run.events() if event["kind"] == "does not fall"]
+    assert seen["time_s"] == pytest.approx(66.0, abs=6.0)  # at the first reading after
+    assert seen["text"].startswith("the spin does not fall: 4")
+    assert seen["text"].endswith("is the drive still on, or does something else drive the top?")
+    assert "does not fall" not in {event["kind"] for event in usual.events()}
+
+
+def test_a_scene_without_drag_is_named_as_the_reason(tmp_path: Path) -> None:
+    settings = (*LET_GO_AT_ONCE, "longest_s=80")
+    options = AcquisitionOptions(mock=True, out=tmp_path, seed=1, scene="driven", settings=settings)
+    run = acquire(request_for("spin", options), Silent())
+    (text,) = [event["text"] for event in run.events() if event["kind"] == "does not fall"]
+    assert "the scene has no drag (drag.law); take one with drag" in text
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
