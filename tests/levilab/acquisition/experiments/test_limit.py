@@ -60,7 +60,9 @@ def test_the_lower_limits_are_those_of_the_world_within_their_uncertainty(tmp_pa
     assert kinds(run).count("fell") == 10
     said = [event["text"] for event in run.events() if event["kind"] == "fell"]
     above = (frame["spin_seen_hz"] < frame["spin_frequency_hz"]).tolist()
-    assert [text.endswith("Hz, by its scatter") for text in said] == above  # a count below the line is no contradiction
+    assert [
+        text.endswith("Hz, below the line by its scatter") for text in said
+    ] == above  # a count below the line is no contradiction
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
 
