@@ -1,11 +1,30 @@
-"""The versions of what a result may depend on."""
+"""The versions of what a result may depend on, and how an extra is installed."""
 
 import platform
+import sys
 from functools import cache
 from importlib.metadata import version
+from pathlib import Path
 
 #: The libraries that compute or speak to instruments.
 LIBRARIES = ("levilab", "numpy", "numba", "scipy", "pandas", "lmfit", "pyvisa", "pyvisa-py")
+
+
+#: What uv writes into the environment of an installed tool, and the extras that README installs: uv installs the tool
+#: anew with those that are named.
+_UV_RECEIPT, _USUAL_EXTRAS = "uv-receipt.toml", ("live", "pdf")
+
+
+def how_to_install(extra: str) -> str:
+    """Return how an extra is installed, as levilab itself was: out of its clone, since no package index has it.
+
+    Double quotes are those of every shell, of Windows, too.
+    """
+    if Path(sys.prefix, _UV_RECEIPT).is_file():
+        command = f'uv tool install ".[{",".join(sorted({*_USUAL_EXTRAS, extra}))}]"'
+    else:
+        command = f'pip install ".[{extra}]"'
+    return f"type {command} in the folder of levilab's clone"
 
 
 def software_versions() -> dict[str, str]:

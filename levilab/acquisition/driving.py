@@ -22,6 +22,7 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.bench.person import FloatTop
 from levilab.present.numbers import signed
+from levilab.present.panel import clock
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -34,6 +35,9 @@ RAMP_STEP_S = 1.0
 #: A ramp that takes longer from standstill to the drive's frequency is refused [s]: at 40 Hz one of 0.0019 Hz/s.  The
 #: top's mass fits its place for as long as the room keeps its temperature, which is no longer than some hours.
 _LONGEST_RAMP_S = 6 * 3600.0
+#: Where the usual top floats [Hz]: the window of small motions of the thesis's top 7.30 cm above its base
+#: (docs/physics.md; `levilab stability` computes it).  Beyond it no drive keeps a top up.
+_USUAL_WINDOW_HZ = (21.65, 80.60)
 #: A held top swings about the drive's frequency by what the drive can hold at most, 0.5 Hz at 0.4 mT [Hz].
 HELD_WITHIN_HZ = 1.0
 #: The halves of a hold differ by no more than this where the top is held [Hz], the beginning and the end of a swing of
@@ -202,8 +206,15 @@ def drive_up(session: Session[D], to: float | None = None) -> None:
 
 def _did_not_follow(session: Session[D], target: float, seen: str) -> DidNotFollow:
     name = session.writer.record.experiment
+    observed = f"the top did not follow the drive to {target:g} Hz ({seen})"
+    lowest, highest = _USUAL_WINDOW_HZ
+    if not lowest <= target <= highest:
+        return DidNotFollow(
+            f"{observed}; a Levitron of the usual kind floats only between {lowest:.2f} and {highest:.2f} Hz",
+            f"ask for a spin between these ({name}.drive_frequency_hz); levilab stability computes them for a top",
+        )
     return DidNotFollow(
-        f"the top did not follow the drive to {target:g} Hz ({seen})",
+        observed,
         f"ramp slower ({name}.ramp_hz_per_s) or drive harder ({name}.drive_amplitude_vpp)",
     )
 
@@ -256,11 +267,18 @@ def _ramp(session: Session[D], start: float, target: float) -> float:
         session.stop.check()
         drive = start + (target - start) * k / steps
         session.bench.generator.frequency = drive
-        session.progress(f"drive at {drive:.2f} Hz", k / steps)
+        session.progress(f"drive at {drive:.2f} Hz{_until(session, target, (steps - k) * RAMP_STEP_S)}", k / steps)
         session.wait(RAMP_STEP_S)
         if k % round(_LOOK_EVERY_S / RAMP_STEP_S) == 0 and k < steps:
             held_spin(session, drive)
     return held_spin(session, target)
+
+
+def _until(session: Session[D], target: float, left_s: float) -> str:
+    """When a ramp reaches its end, in words; empty at the end, and on a clock that does not keep to the wall's."""
+    if left_s <= 0 or not math.isfinite(session.bench.clock.speed):
+        return ""
+    return f", {target:.2f} Hz in {clock(left_s)}"
 
 
 def held_spin(session: Session[D], drive: float) -> float:

@@ -11,13 +11,13 @@ from pydantic import ValidationError
 
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiment import CounterSettings
-from levilab.acquisition.keys import allowed_values, refusal, refuse_unknown
+from levilab.acquisition.keys import refusal, refuse_unknown
 from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
 from levilab.bench.config import BenchConfig, ConfigError, read_bench
 from levilab.bench.person import ask_no_person
 from levilab.bench.wiring import described_wiring
-from levilab.errors import LevilabError, UsageError
+from levilab.errors import DataError, LevilabError, UsageError
 from levilab.runs.run import Run, find_run
 from levilab.settings import in_one_line
 from levilab.simulator.keys import parse_setting
@@ -85,7 +85,7 @@ class AcquisitionOptions:
 
 def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequest:
     """What is to be acquired.  Raises ConfigError, CannotResume, UsageError, DataError, SceneError."""
-    run = _resumable(find_run(options.resume, options.out), experiment) if options.resume else None
+    run = _resumable(_run_folder(options.resume, options.out), experiment) if options.resume else None
     virtual = options.mock or bool(run and run.record.seed is not None)
     _check_options(options, run, virtual=virtual)
     without = _configuration(options, run, virtual=virtual)
@@ -148,14 +148,15 @@ def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequenc
 
 
 def _key_and_text(config: BenchConfig, experiment: str, setting: str) -> tuple[str, str]:
-    """Split "limit.which=upper" into which and upper.  Raises UsageError for another form or an unknown key."""
+    """Split "limit.which=upper" into which and upper; a key without its table is one of the experiment's.
+
+    Raises UsageError for another form or an unknown key.
+    """
     key, equals, text = setting.partition("=")
-    name, dot, field = key.strip().partition(".")
-    if equals and not field and name in {"", experiment}:
+    name, dot, field = key.strip().rpartition(".")
+    if equals and (not field or (field == experiment and not dot)) and name in {"", experiment}:
         raise _wrong_form(experiment, setting, "the key is missing: ")
-    if equals and not dot:
-        refuse_unknown(config, experiment, name)
-        raise _wrong_form(experiment, setting, meant=f", {_suggestion(config, experiment, name, text)}")
+    name = name if dot else experiment
     if not equals or name not in EXPERIMENTS:
         raise _wrong_form(experiment, setting)
     if name != experiment:
@@ -165,20 +166,9 @@ def _key_and_text(config: BenchConfig, experiment: str, setting: str) -> tuple[s
     return field, text
 
 
-def _wrong_form(experiment: str, setting: str, why: str = "", meant: str = "") -> UsageError:
-    what = f"{why}{experiment}.KEY=VALUE is expected{meant}; levilab acquire {experiment} --settings lists all"
+def _wrong_form(experiment: str, setting: str, why: str = "") -> UsageError:
+    what = f"{why}{experiment}.KEY=VALUE is expected; levilab acquire {experiment} --settings lists all"
     return UsageError("settings", what, value=setting)
-
-
-def _suggestion(config: BenchConfig, experiment: str, name: str, text: str) -> str:
-    """What was meant by a key without its table; of a value that is refused, what may stand there instead."""
-    try:
-        changed = _with_texts(config, experiment, {name: text})
-    except UsageError:
-        changed = None
-    if changed is None or _refused(changed, experiment):
-        return f"{experiment}.{name} is {allowed_values(config, experiment, name)}"
-    return f"{experiment}.{name}={text}?"
 
 
 def _with_texts(config: BenchConfig, experiment: str, texts: Mapping[str, str]) -> BenchConfig:
@@ -229,6 +219,20 @@ def _as_it_was(run: Run) -> BenchConfig:
         return Configuration.model_validate(bench)
     except ValidationError as error:
         raise ConfigError(f"{run.folder}/run.json: configuration: {in_one_line(error)}") from error
+
+
+def _run_folder(name: Path, root: Path) -> Path:
+    """The folder of the run that is to be gone on with, by its path or its name.  Raises DataError."""
+    folder = find_run(name, root)
+    if folder.exists():
+        return folder
+    if name.name != str(name):
+        raise DataError(f"{name}: there is no such run; levilab runs lists those of a folder")
+    if not root.is_dir():
+        raise DataError(f"no run {name}, there is no folder {root} here: go to the folder that holds {root}")
+    if any(run.name.endswith(f"Z-{name}") for run in root.iterdir()):
+        raise DataError(f"more than one run in {root} is called {name}: say its whole name; levilab runs lists them")
+    raise DataError(f"no run {name} in {root}: levilab runs lists those that are there")
 
 
 def _resumable(folder: Path, experiment: str) -> Run:

@@ -102,7 +102,7 @@ def acquire_experiment(
         return
     request = request_for(experiment, options)
     with watching_for_end():  # `acquire` takes the signals; after it the run is kept, and one more changes nothing
-        run = acquire(request, to_stderr())
+        run = acquire(request, to_stderr(bench_time=bool(request.synthetic_how) and not realtime))
         readings = run.count()
         if as_json:
             print_json({"run": str(run.folder), "status": run.status, "readings": readings}, indent=None)

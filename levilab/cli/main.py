@@ -213,7 +213,7 @@ def live() -> Callable[..., None]:
     r"""The bench in a web browser: a run as it grows, a finished one, or with --mock a bench to play with.
 
     A view only, in a process of its own: a run goes on when it is closed, and it can be opened again at any time.  No
-    program of another machine reaches it.  Needs the extra live: pip install "levilab\[live]".
+    program of another machine reaches it.  Needs the extra live: pip install ".\[live]" in the clone.
     """
     from levilab.cli.live import live
 

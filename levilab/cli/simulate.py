@@ -230,8 +230,8 @@ def benchmark_simulator(
 ) -> None:
     r"""Speed against error of the simulator, with scipy's and heyoka's integrators on the same motion.
 
-    heyoka takes part if it is installed: pip install 'levilab\[peers]', in a clone
-    pip install -e '.\[peers]'.  Leave the machine alone meanwhile.
+    heyoka takes part if it is installed: pip install ".\[peers]" in the
+    clone.  Leave the machine alone meanwhile.
     """
     from levilab.benchmark.simulator.command import run_and_tell
 

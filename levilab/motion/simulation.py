@@ -145,7 +145,8 @@ def _simulated(
     motion = simulate(
         request.scene, request.duration, tolerance=request.tolerance, rate=factor * request.rate, progress=progress
     )
-    return summarise(motion, request.duration, request.rate, time.perf_counter() - begin)
+    computing = time.perf_counter() - begin
+    return summarise(motion, request.duration, request.rate, computing, writes_states=request.out is not None)
 
 
 # --- the run folder ---

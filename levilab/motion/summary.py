@@ -109,7 +109,9 @@ class Summary:
         return "" if self.lines.lines else _why_no_lines(self.motion, self.lines)
 
 
-def summarise(motion: Trajectory, duration: float, rate: float, computing: float) -> Summary:
+def summarise(
+    motion: Trajectory, duration: float, rate: float, computing: float, *, writes_states: bool = True
+) -> Summary:
     """Summarise a motion.
 
     Args:
@@ -117,11 +119,13 @@ def summarise(motion: Trajectory, duration: float, rate: float, computing: float
         duration: as the user wants it [s].
         rate: states kept per second [1/s].
         computing: the time that the computation took [s].
+        writes_states: whether the states go to states.csv, where too low a rate would show lines elsewhere.
     """
     energy = motion.energies
     change = float(np.max(np.abs(energy - energy[0]))) / (abs(float(energy[0])) or 1.0)
     lines = lines_of(motion)
-    return Summary(motion, duration, rate, computing, lines, change, tuple(_notes(motion, lines, rate)))
+    notes = _notes(motion, lines, rate if writes_states else math.inf)
+    return Summary(motion, duration, rate, computing, lines, change, tuple(notes))
 
 
 def height_range(motion: Trajectory) -> tuple[float, float]:
@@ -161,10 +165,11 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
         notes.extend(_cannot_float(motion.scene))
     highest = max((abs(line.frequency) for line in lines.lines), default=0.0)
     if highest > rate / 2:
+        enough = math.ceil(3 * highest / 10) * 10
         notes.append(
             f"{rate:g} states per second are less than twice the highest line, {highest:.3g} Hz: the lines here come "
-            "from more of them, but states.csv would show it elsewhere; "
-            f"take a rate of {math.ceil(3 * highest / 10) * 10}"
+            "from more of them, but states.csv shows it elsewhere; "
+            f"take a rate of {enough} (--rate {enough})"
         )
     if not lines.lines and motion.scene.observed == "motion":
         notes.append(f"no lines of the axis: {_why_no_lines(motion, lines)}")

@@ -17,8 +17,11 @@ if TYPE_CHECKING:
 
 #: Answers of an instrument that the trend is of; so many are needed for a rate.
 _KEPT, _FEWEST = 24, 3
-#: Heights of a spark line.
+#: Heights of a spark line, which spans at least this share of the value: noise stays flat.
 _SPARKS = "▁▂▃▄▅▆▇█"
+_LEAST_SPAN = 0.01
+#: A value that has been the same for longer than this is shown with its age [s].
+_FRESH_S = 5.0
 #: What is measured, by channel: name, unit, decimals, and the factor to that unit; the first that is known has a trend.
 _SHOWN = {
     "spin_frequency_hz": ("spin", "Hz", 3, 1.0),
@@ -48,16 +51,22 @@ class Trend:
         channel: as in readings.csv.
         answers: times on the clock of the bench [s], and values.
         driven: whether the drive was on then: what a driven top does is no part of the trend of a free one.
+        changed_s: when the latest answer came, on the clock of the bench [s]; one that equals the last one is not seen.
     """
 
     channel: str = ""
     answers: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=_KEPT))
     driven: bool = False
+    changed_s: float = 0.0
+    _latest: float | None = None
 
     def take(self, state: State) -> None:
         """Take in what the bench says; another channel, or none, or a drive that was switched begins anew."""
         channel = next((name for name in _SHOWN if name in state.last), "")
         driven = state.drive is not None and state.drive.output
+        latest = state.last.get(channel)
+        if (channel, latest) != (self.channel, self._latest):
+            self.changed_s, self._latest = state.time_s, latest
         if (channel, driven) != (self.channel, self.driven):
             self.channel, self.driven = channel, driven
             self.answers.clear()
@@ -83,12 +92,16 @@ class Trend:
         >>> trend.answers.extend([(0.0, 25.0), (10.0, 24.5), (20.0, 24.0)])
         >>> trend.spark, trend.rate
         ('█▅▁', -0.05)
+        >>> trend.answers.extend([(30.0, 24.01), (40.0, 24.0)])
+        >>> trend.spark
+        '█▅▁▁▁'
         """
         values = [value for _, value in self.answers]
         if len(values) < _FEWEST:
             return ""
         low, high = min(values), max(values)
-        steps = (len(_SPARKS) - 1) / (high - low) if high > low else 0.0
+        span = max(high - low, _LEAST_SPAN * max(abs(low), abs(high)))
+        low, steps = (low + high - span) / 2, (len(_SPARKS) - 1) / span if span else 0.0
         return "".join(_SPARKS[math.floor((value - low) * steps + 0.5)] for value in values)
 
 
@@ -113,6 +126,8 @@ def _measured(state: State, trend: Trend, *, plain: bool) -> Iterator[Piece]:
     for name, word, unit, decimals, factor in shown:
         style = "strong" if name == trend.channel else "plain"
         yield Piece(f"{word} {with_decimals(state.last[name] * factor, decimals)} {unit}", style)
+        if name == trend.channel and (age := state.time_s - trend.changed_s) > _FRESH_S:
+            yield Piece(f"{clock(age)} ago", "off")
         if name == trend.channel and trend.rate is not None:
             yield Piece(f"{_signed(trend.rate * factor)} {unit}/s")
             if not plain:
@@ -152,25 +167,34 @@ def _progress(state: State) -> tuple[float, str]:
         return state.share, printable(state.text)
     elapsed, left = state.elapsed_s or 0.0, state.time_left_s
     if left is None:
-        return 0.0, f"{_clock(elapsed)} so far"
+        return 0.0, f"{clock(elapsed)} so far"
     share = elapsed / (elapsed + left) if elapsed + left > 0 else 0.0
     least = left if state.least_left_s is None else state.least_left_s
-    return share, f"{_clock(elapsed)} done, {time_left_in_words(least, left)}"
+    jumps = state.virtual and state.speed is None
+    return share, f"{clock(elapsed)} done, {time_left_in_words(least, left, bench_time=jumps)}"
 
 
-def time_left_in_words(least: float, most: float) -> str:
-    """Return the time that is left, at least and at most [s], in words.
+def time_left_in_words(least: float, most: float, *, bench_time: bool = False) -> str:
+    """Return the time that is left, in words.
+
+    Args:
+        least: it is no shorter [s].
+        most: it is no longer [s].
+        bench_time: whether it is the time of a bench that does not keep to the wall clock, which the words then say.
 
     >>> [time_left_in_words(*left) for left in ((95.0, 95.2), (42.0, 95.0), (75.0, 95.0), (0.0, 20.0))]
     ['about 1:35 min left', 'about 42 s to 1:35 min left', 'about 1:15 to 1:35 min left', 'at most 20 s left']
+    >>> time_left_in_words(95.0, 95.2, bench_time=True)
+    'about 1:35 min of bench time left'
     """
-    first, last = _clock(least), _clock(most)
+    first, last = clock(least), clock(most)
+    left = "of bench time left" if bench_time else "left"
     if first == last:
-        return f"about {last} left"
+        return f"about {last} {left}"
     if least < 0.5:
-        return f"at most {last} left"
+        return f"at most {last} {left}"
     number, unit = first.split()
-    return f"about {number if last.endswith(f' {unit}') else first} to {last} left"
+    return f"about {number if last.endswith(f' {unit}') else first} to {last} {left}"
 
 
 def _flow(pieces: Sequence[Piece], width: int) -> Iterator[Line]:
@@ -201,10 +225,10 @@ def _signed(value: float) -> str:
     return signed(value, decimals)
 
 
-def _clock(seconds: float) -> str:
+def clock(seconds: float) -> str:
     """Return a duration.
 
-    >>> [_clock(seconds) for seconds in (7.2, 95.0, 4000.0)]
+    >>> [clock(seconds) for seconds in (7.2, 95.0, 4000.0)]
     ['7 s', '1:35 min', '1:06 h']
     """
     whole = round(seconds)

@@ -77,10 +77,14 @@ class Mute:
 
 
 class LineDisplay:
-    """One line a reading, for logs, pipes and tests."""
+    """One line a reading, for logs, pipes and tests.
 
-    def __init__(self) -> None:
-        self._gone = False
+    Args:
+        bench_time: whether the bench does not keep to the wall clock, so that its time left is not that of a person.
+    """
+
+    def __init__(self, *, bench_time: bool = False) -> None:
+        self._gone, self._bench_time = False, bench_time
         self._fifths, self._prepared = 0, ""
 
     def preparing(self, text: str, fraction: float) -> None:
@@ -92,7 +96,8 @@ class LineDisplay:
 
     def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
         """A line."""
-        self.message(f"{text}   {time_left_in_words(*remaining)}" if remaining[1] >= 0.5 else text)
+        left = time_left_in_words(*remaining, bench_time=self._bench_time)
+        self.message(f"{text}   {left}" if remaining[1] >= 0.5 else text)
 
     def message(self, text: str) -> None:
         """Print a line.  A closed standard error does not end a measurement."""
@@ -197,9 +202,9 @@ class BarDisplay:
         self._draw(self._live.stop)
 
 
-def to_stderr() -> Display:
-    """A bar on a terminal, lines elsewhere."""
-    return BarDisplay() if sys.stderr.isatty() else LineDisplay()
+def to_stderr(*, bench_time: bool = False) -> Display:
+    """A bar on a terminal, lines elsewhere.  bench_time: see LineDisplay."""
+    return BarDisplay() if sys.stderr.isatty() else LineDisplay(bench_time=bench_time)
 
 
 def time_in_words(seconds: float) -> str:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError, WorkersLost
+from levilab.software import how_to_install
 from levilab.workers.ways import Workers
 
 if TYPE_CHECKING:
@@ -75,7 +76,8 @@ class Cluster(Executor):
             from distributed.comm.addressing import get_address_host_port
         except ImportError as error:
             raise LevilabError(
-                "a Dask cluster needs the library distributed, which is not installed: pip install 'levilab[cluster]'"
+                "a Dask cluster needs the extra cluster (distributed, which is not installed): "
+                f"{how_to_install('cluster')}"
             ) from error
         is_file = Path(self._scheduler).suffix == ".json"
         if is_file and not Path(self._scheduler).is_file():

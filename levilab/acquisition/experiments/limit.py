@@ -203,9 +203,9 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_sinc
     assert limit.value is not None
     assert limit.u is not None
     lowest = float(spins.min())
-    words = f"{with_uncertainty(limit)} by a line through the last counts, the lowest of which is {lowest:.2f} Hz"
+    words = f"a line through the last counts gives {with_uncertainty(limit)}; the lowest count is {lowest:.2f} Hz"
     if lowest < limit.value:  # not the bound that it seems to be
-        words += ", by its scatter"
+        words += ", below the line by its scatter"
     session.event("fell", f"{text}; {words}", spin_frequency_hz=limit.value)
     return {
         "time_s": session.now(),

@@ -23,6 +23,9 @@ _USUAL_U_HZ = 0.03
 _MOST_U = 0.1
 #: Readings that differ by so many of their standard uncertainties show the rate of the fall.
 _CLEAR = 8.0
+#: Air takes a thousandth of a free top's spin a second at least (0.3 %/s is usual) [1/s]; half of it, after so long a
+#: time [s], is much more than the noise of a reading.
+_LEAST_LOSS_PER_S, _SEEN_TO_FALL_S = 1e-3, 60.0
 #: The drag of every law is between these powers of the spin.
 _POWERS = (1.0, 2.0)
 
@@ -47,14 +50,38 @@ def run(session: Session[SpinSettings]) -> None:
     prepare_counter(session)
     session.begin(lambda: drive_up_and_let_go(session))
     top = FreeTop(session, session.rows[-3:])
+    said = False
     for asked in session.readings_every(settings.interval_s, settings.longest_s):
         reading = top.read()
         if reading:
             rows = session.rows or [reading]
             session.keep(reading, time_left(rows[0], rows[len(rows) // 2], reading, settings.longest_s))
+            if not said and keeps_its_spin(rows[0], reading):
+                said = True
+                session.event("does not fall", _why_it_keeps_its_spin(session, rows[0], reading))
         elif end := top.fall(asked):
             session.event("fell", end)
             return
+
+
+def keeps_its_spin(first: Row, last: Row) -> bool:
+    """Whether a top has lost much less of its spin than air takes from a free one, after a while."""
+    lapse = last["time_s"] - first["time_s"]
+    return lapse >= _SEEN_TO_FALL_S and last["spin_frequency_hz"] > first["spin_frequency_hz"] * math.exp(
+        -_LEAST_LOSS_PER_S / 2 * lapse
+    )
+
+
+def _why_it_keeps_its_spin(session: Session[SpinSettings], first: Row, last: Row) -> str:
+    """What was seen of a top that keeps its spin, and what may be the reason."""
+    seen = (
+        f"the spin does not fall: {first['spin_frequency_hz']:.2f} Hz, and {last['spin_frequency_hz']:.2f} Hz "
+        f"{last['time_s'] - first['time_s']:.0f} s later"
+    )
+    scene = session.writer.record.configuration.get("scene") or {}
+    if scene.get("drag", {}).get("law") == "none":
+        return f"{seen}: the scene has no drag (drag.law); take one with drag, such as spindown, or end the run"
+    return f"{seen}: is the drive still on, or does something else drive the top?"
 
 
 def time_left(first: Row, middle: Row, last: Row, longest_s: float) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from levilab.benchmark.found import give, tell
 from levilab.benchmark.simulator.work_precision import PARTS, Comparison, as_document, compare
 from levilab.errors import UsageError
 from levilab.present.terminal import Terminal, new_table, terminal
+from levilab.software import how_to_install
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -54,7 +55,8 @@ def print_comparison(found: Comparison) -> None:
     if found.overheads:
         print_overheads(console, found.overheads)
     for package in found.missing:
-        console.print(f"[yellow]note:[/yellow] {escape(package)} is not installed: pip install 'levilab\\[peers]'")
+        how = escape(how_to_install("peers"))
+        console.print(f"[yellow]note:[/yellow] {escape(package)} is not installed: {how}", soft_wrap=True)
 
 
 def print_kernels(console: Terminal, found: Comparison) -> None:

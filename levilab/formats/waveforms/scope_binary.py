@@ -11,6 +11,7 @@ import numpy as np
 
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.waveform import Signal, Waveform, check_count, check_step
+from levilab.software import how_to_install
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,8 +40,8 @@ def read_scope_binary(path: Path) -> Waveform:
     except ImportError as error:
         raise TableError(
             path,
-            "is a scope's binary file, and RigolWFM, which reads it, is not installed: pip install "
-            "'levilab[scope]', or export CSV",
+            "is a scope's binary file, which needs the extra scope (RigolWFM, which is not installed): "
+            f"{how_to_install('scope')}, or export CSV",
         ) from error
     try:
         with warnings.catch_warnings(action="ignore"), contextlib.redirect_stdout(io.StringIO()) as _, \

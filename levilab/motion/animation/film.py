@@ -18,6 +18,7 @@ from levilab.motion.animation.paint import Painter, Pose, font
 from levilab.motion.animation.parts import COLOURS, parts_of
 from levilab.motion.animation.poses import height_for_camera, matrices
 from levilab.motion.animation.words import readout, span_in_words, speed_in_words
+from levilab.software import how_to_install
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -110,8 +111,8 @@ def check_encoder() -> None:
     """Raise MissingEncoder where no MP4 can be encoded."""
     if find_spec("imageio_ffmpeg") is None:
         raise MissingEncoder(
-            "an animation as .mp4 needs imageio-ffmpeg, which is not installed: pip install 'levilab[video]', "
-            "or name a file that ends in .gif or .html"
+            "an animation as .mp4 needs the extra video (imageio-ffmpeg, which is not installed): "
+            f"{how_to_install('video')}, or name a file that ends in .gif or .html"
         )
 
 

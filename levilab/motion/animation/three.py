@@ -6,6 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from levilab.errors import LevilabError
+from levilab.software import how_to_install
 
 
 class MissingThree(LevilabError):
@@ -28,4 +29,5 @@ def three_js(what: str, instead: str = "") -> Path:
         if path.is_file():
             return path
     seen = "which is not installed" if found is None else "which is installed in a version that does not hold it"
-    raise MissingThree(f'{what} needs three.js out of nicegui, {seen}: pip install "levilab[live]"{instead}')
+    what += f" needs the extra live (three.js out of nicegui, {seen})"
+    raise MissingThree(f"{what}: {how_to_install('live')}{instead}")

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Self
 from levilab.errors import DataError, UsageError
 from levilab.files import locked, parse_json, replace_atomically, replacing, writing
 from levilab.pipelines.row import text_of, value_of_text
+from levilab.software import how_to_install
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -38,7 +39,8 @@ def check_name(table: Path) -> None:
     if kind not in {CSV, PARQUET}:
         raise UsageError("table", "a name that ends in .csv or .parquet is expected", value=table)
     if kind == PARQUET and find_spec("pyarrow") is None:
-        what = "Parquet needs pyarrow: pip install 'levilab[parquet]', or name a table that ends in .csv"
+        needs = "Parquet needs the extra parquet (pyarrow, which is not installed)"
+        what = f"{needs}: {how_to_install('parquet')}, or name a table that ends in .csv"
         raise UsageError("table", what, value=table)
     if table.is_dir():
         raise UsageError("table", "is a folder; the name of a file is expected", value=table)

@@ -32,6 +32,7 @@ from levilab.present.document.blocks import (
     Warnings,
 )
 from levilab.present.document.typesetting import typeset
+from levilab.software import how_to_install
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -72,7 +73,8 @@ def check_typst() -> None:
     """Raise NoTypst if PDF cannot be set here."""
     if find_spec("typst") is None:
         raise NoTypst(
-            'a PDF is set by typst, which is not installed: pip install "levilab[pdf]", or name the report report.html'
+            f"a PDF needs the extra pdf (typst, which is not installed): {how_to_install('pdf')}, "
+            "or name the report report.html"
         )
 
 

@@ -13,7 +13,16 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.errors import NoAnswer
 from levilab.acquisition.counting import prepare_counter
-from levilab.acquisition.driving import DriveSettings, FailedPoint, NotHeld, _hold, has_drifted, held_spin, sweep_drive
+from levilab.acquisition.driving import (
+    DriveSettings,
+    FailedPoint,
+    NotHeld,
+    _hold,
+    _until,
+    has_drifted,
+    held_spin,
+    sweep_drive,
+)
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.table import EXPERIMENTS, Configuration, with_settings
@@ -70,6 +79,13 @@ def measured(run: Run) -> list[float]:
 
 def events(run: Run, kind: str) -> list[str]:
     return [event["text"] for event in run.events() if event["kind"] == kind]
+
+
+@pytest.mark.parametrize(("speed", "says"), [(1.0, ", 40.00 Hz in 3:20 min"), (math.inf, "")])
+def test_a_ramp_that_a_person_waits_for_says_when_it_ends(speed: float, says: str) -> None:
+    session: Any = SimpleNamespace(bench=SimpleNamespace(clock=SimpleNamespace(speed=speed)))
+    assert _until(session, 40.0, 200.0) == says
+    assert _until(session, 40.0, 0.0) == ""
 
 
 def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

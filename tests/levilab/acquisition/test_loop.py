@@ -22,6 +22,7 @@ from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from levilab.acquisition.counting import is_plausible
 from levilab.acquisition.experiments.spin import SpinSettings, time_left
 from levilab.acquisition.loop import AcquisitionRequest, acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration
 from levilab.bench.config import InstrumentSettings
@@ -33,7 +34,7 @@ from levilab.runs.writer import RunWriter
 from levilab.simulator.spin import DECAYS
 from levilab.world.bench import VIRTUAL, virtual_bus
 from levilab.world.spin_world import Phase, SpinScene, SpinWorld, random_scene
-from support.acquisitions import BEFORE, Impatient, Silent, in_world, mock, of_scene
+from support.acquisitions import BEFORE, LET_GO_AT_ONCE, Impatient, Silent, in_world, mock, of_scene
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -176,7 +177,7 @@ def test_a_top_that_is_not_there_is_an_error_that_says_what_to_look_at(tmp_path:
 
 def test_a_top_that_does_not_follow_the_drive_is_an_error(tmp_path: Path, outputs: list[bool]) -> None:
     weak = SpinSettings(drive_amplitude_vpp=0.5)
-    with pytest.raises(ExperimentFailed, match="did not follow"):
+    with pytest.raises(ExperimentFailed, match=r"did not follow .*: ramp slower \(.* or drive harder"):
         acquire(of_scene(tmp_path, SpinScene(), weak), Silent())
     (run,) = [Run.load(path) for path in tmp_path.iterdir()]
     # once more and once more, until the top has fallen meanwhile
@@ -185,11 +186,39 @@ def test_a_top_that_does_not_follow_the_drive_is_an_error(tmp_path: Path, output
     assert outputs[-1] is False
 
 
+@pytest.mark.parametrize("frequency", [5.0, 100.0])
+def test_a_drive_beyond_the_window_is_answered_with_the_window(tmp_path: Path, frequency: float) -> None:
+    """No ramp and no amplitude brings a top to where it does not float."""
+    asked = SpinSettings(drive_frequency_hz=frequency, ramp_hz_per_s=0.5)
+    with pytest.raises(ExperimentFailed, match=r"floats only between 21\.65 and 80\.60 Hz: ask for") as failed:
+        acquire(of_scene(tmp_path, SpinScene(), asked), Silent())
+    assert "ramp slower" not in str(failed.value)
+
+
 def test_a_top_that_never_falls_ends_at_the_longest_time(tmp_path: Path) -> None:
     scene = SpinScene(fall_hz=1.0, constants=(1e-6,))
     run = acquire(of_scene(tmp_path, scene, SpinSettings(longest_s=100.0)), Silent())
     assert run.status == "finished"
     assert len(run.readings().frame) == 11
+
+
+def test_a_top_that_keeps_its_spin_is_noticed_once_while_it_is_read(tmp_path: Path, usual: Run) -> None:
+    """After a minute, in which air takes a sixth of the spin; a top that spins down is not noticed."""
+    scene = SpinScene(fall_hz=1.0, constants=(1e-6,))
+    run = acquire(of_scene(tmp_path, scene, SpinSettings(longest_s=150.0)), Silent())
+    (seen,) = [event for event in run.events() if event["kind"] == "does not fall"]
+    assert seen["time_s"] == pytest.approx(66.0, abs=6.0)  # at the first reading after
+    assert seen["text"].startswith("the spin does not fall: 4")
+    assert seen["text"].endswith("is the drive still on, or does something else drive the top?")
+    assert "does not fall" not in {event["kind"] for event in usual.events()}
+
+
+def test_a_scene_without_drag_is_named_as_the_reason(tmp_path: Path) -> None:
+    settings = (*LET_GO_AT_ONCE, "longest_s=80")
+    options = AcquisitionOptions(mock=True, out=tmp_path, seed=1, scene="driven", settings=settings)
+    run = acquire(request_for("spin", options), Silent())
+    (text,) = [event["text"] for event in run.events() if event["kind"] == "does not fall"]
+    assert "the scene has no drag (drag.law); take one with drag" in text
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import shutil
 import signal
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,7 +31,6 @@ from support.acquisitions import Silent
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from levilab.bench.person import Person, Task
 
@@ -284,3 +284,17 @@ def test_a_run_whose_time_zero_is_not_known_is_not_called_empty(sample_data: Pat
     (folder / "run.json").write_text(record.model_copy(update={"status": "interrupted"}).as_json(), encoding="utf-8")
     with pytest.raises(CannotResume, match=r"has no time_zero_utc.* they are kept and can be analyzed"):
         request_for("spin", AcquisitionOptions(resume=folder))
+
+
+def test_a_run_that_is_not_there_is_looked_for_in_words(tmp_path: Path) -> None:
+    def refused(name: str) -> str:
+        with pytest.raises(DataError) as caught:
+            request_for("spin", AcquisitionOptions(resume=Path(name), out=tmp_path / "runs"))
+        return str(caught.value)
+
+    assert "go to the folder that holds" in refused("spin-567a")
+    for day in (1, 2):
+        (tmp_path / f"runs/2026110{day}T101500Z-spin-12ab").mkdir(parents=True)
+    assert refused("spin-567a").endswith("levilab runs lists those that are there")
+    assert "is called spin-12ab: say its whole name" in refused("spin-12ab")
+    assert "there is no such run" in refused("elsewhere/spin-567a")

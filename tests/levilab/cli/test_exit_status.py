@@ -100,7 +100,8 @@ NOT_UNDERSTOOD = (
 )
 FAILURES = {
     "acquire spin --bench other.toml": "other.toml: there is no such file",
-    "acquire spin --mock --resume nowhere": "nowhere/run.json: cannot be read",
+    "acquire spin --mock --resume spin-567a": "no run spin-567a, there is no folder runs here",
+    "acquire spin --mock --resume elsewhere/spin-567a": "elsewhere/spin-567a: there is no such run; levilab runs lists",
     f"acquire spin --mock --resume {SAMPLE}": "is finished",
     "acquire spin --mock --out file": "choose another place with --out",
     f"analyze spindown {LIMITS}": f"spindown needs a spin run; levilab analyze limit {LIMITS} reads it",

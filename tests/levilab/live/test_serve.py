@@ -54,10 +54,10 @@ def test_a_run_and_a_bench_for_practice_exclude_each_other(tmp_path: Path) -> No
 
 def test_without_the_extra_the_message_names_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("levilab.motion.animation.three.find_spec", lambda _: None)
-    with pytest.raises(MissingThree, match=r'pip install "levilab\[live\]"'):
+    with pytest.raises(MissingThree, match=r'pip install "\.\[live\]"'):
         three_js("the live view")
     ended = command("live", "--no-open", cwd=tmp_path)
-    assert (ended.status, "levilab[live]" in ended.err) == (1, True)
+    assert (ended.status, ".[live]" in ended.err) == (1, True)
 
 
 def test_the_help_loads_no_server() -> None:

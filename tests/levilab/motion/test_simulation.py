@@ -134,9 +134,12 @@ def test_a_chaotic_motion_is_reported_to_be_one() -> None:
     assert "nodes it is averaged over leave an error of 4e-07" in note
 
 
-def test_too_low_a_rate_for_the_lines_is_reported(levilab: Command) -> None:
-    document = json.loads(levilab("simulate", "undriven", "--duration", "5", "--rate", "50", "--json").stdout)
-    assert any("take a rate of 1" in note for note in document["notes"])  # three times the 42 to 43 Hz of the nutation
+def test_too_low_a_rate_for_the_lines_is_reported_where_states_are_written(levilab: Command, tmp_path: Path) -> None:
+    words = ("simulate", "undriven", "--duration", "5", "--rate", "50", "--json")
+    written = json.loads(levilab(*words, "--out", str(tmp_path)).stdout)
+    assert any("take a rate of 1" in note for note in written["notes"])  # three times the 42 to 43 Hz of the nutation
+    assert any("(--rate 1" in note for note in written["notes"])
+    assert not any("take a rate" in note for note in json.loads(levilab(*words).stdout)["notes"])
 
 
 def test_a_fall_and_a_drift_are_told_as_what_they_are() -> None:

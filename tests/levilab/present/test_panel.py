@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from levilab.present.panel import Trend, bench_lines
+from levilab.present.panel import Piece, Trend, bench_lines
 from levilab.telemetry.messages import Counting, Drive, State
 
 LOCKED = State(
@@ -45,6 +45,42 @@ def test_a_top_that_may_fall_earlier_has_the_least_time_left_beside_the_most() -
     assert bar.endswith("  1:00 min done, about 42 s to 1:35 min left")
     *_, bar = texts(replace(LOCKED, least_left_s=0.0), 84)
     assert bar.endswith("  1:00 min done, at most 1:35 min left")
+
+
+def test_the_time_left_of_a_bench_that_jumps_is_bench_time_and_of_others_is_not() -> None:
+    *_, bar = texts(replace(LOCKED, virtual=True, speed=None), 84)
+    assert bar.endswith("1:00 min done, about 1:35 min of bench time left")
+    for state in (LOCKED, replace(LOCKED, virtual=True, speed=1.0)):
+        assert texts(state, 84)[-1].endswith("1:00 min done, about 1:35 min left")
+
+
+def test_a_value_that_is_old_has_its_age() -> None:
+    trend = Trend()
+    shown = []
+    for time_s, spin in ((0.0, 29.9), (4.0, 29.9), (12.0, 29.9), (13.0, 30.0)):
+        state = State(time_s, last={"spin_frequency_hz": spin})
+        trend.take(state)
+        shown.append(bench_lines(state, trend, 84, plain=True)[0][1:])
+    assert shown == [(), (), (Piece("  12 s ago", "off"),), ()]
+
+
+def test_a_drive_that_is_switched_makes_no_value_younger() -> None:
+    trend = Trend()
+    trend.take(replace(LOCKED, time_s=0.0))
+    trend.take(replace(LOCKED, time_s=9.0, drive=Drive()))
+    assert trend.changed_s == 0.0
+
+
+def test_noise_stays_flat_in_the_spark_line_and_a_spin_down_fills_it() -> None:
+    """0.05 Hz of noise at 30 Hz is a sixth of the least span, one of eight heights."""
+    noise, fall = Trend("spin_frequency_hz"), Trend("spin_frequency_hz")
+    for k in range(10):
+        noise.answers.append((float(k), 30.0 + 0.025 * (-1) ** k))
+        fall.answers.append((float(k), 30.0 - 0.1 * k))
+    assert len(set(noise.spark)) <= 2
+    assert (fall.spark[0], fall.spark[-1]) == ("█", "▁")
+    noise.answers.extend((float(k), 0.0) for k in range(30))
+    assert len(set(noise.spark)) == 1  # of values that are all zero
 
 
 def test_a_field_of_zero_has_no_sign() -> None:

@@ -12,3 +12,12 @@ def test_a_log_has_a_line_each_fifth_of_each_part_and_none_twice(capsys) -> None
     for k in range(1, 11):
         display.preparing("held", k / 10)
     assert capsys.readouterr().err.splitlines() == [*(f"raised by {k} Hz" for k in (2, 4, 6, 8, 10)), "held"]
+
+
+def test_a_log_calls_the_time_left_of_a_bench_that_jumps_bench_time(capsys) -> None:
+    for bench_time in (False, True):
+        LineDisplay(bench_time=bench_time).reading("25 Hz", 10.0, (95.0, 95.0))
+    assert capsys.readouterr().err.splitlines() == [
+        "25 Hz   about 1:35 min left",
+        "25 Hz   about 1:35 min of bench time left",
+    ]

@@ -196,11 +196,11 @@ def test_a_figure_that_stands_alone_below_its_heading_stays_there() -> None:
 
 def test_without_the_extra_the_message_says_how_to_install_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("levilab.report.pdf.renderer.find_spec", lambda _: None)
-    with pytest.raises(NoTypst, match=r'pip install "levilab\[pdf\]"'):
+    with pytest.raises(NoTypst, match=r'pip install "\.\[pdf\]"'):
         write_report([tmp_path / "nothing is read before"], tmp_path / "x.pdf")
     ended = command("report", ROOT / "sample_data/spin-down-1", "-o", "x.pdf", "--no-crosscheck", cwd=tmp_path)
     assert ended.status == 1
-    assert 'pip install "levilab[pdf]"' in ended.err
+    assert 'pip install ".[pdf]"' in ended.err
     assert not (tmp_path / "x.pdf").exists()
 
 

@@ -60,7 +60,9 @@ def test_the_lower_limits_are_those_of_the_world_within_their_uncertainty(tmp_pa
     assert kinds(run).count("fell") == 10
     said = [event["text"] for event in run.events() if event["kind"] == "fell"]
     above = (frame["spin_seen_hz"] < frame["spin_frequency_hz"]).tolist()
-    assert [text.endswith("Hz, by its scatter") for text in said] == above  # a count below the line is no contradiction
+    assert [
+        text.endswith("Hz, below the line by its scatter") for text in said
+    ] == above  # a count below the line is no contradiction
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
 
@@ -282,9 +284,11 @@ def test_a_series_ends_when_its_time_is_over(tmp_path: Path) -> None:
         ("limit.wich=upper", "there is no such setting, did you mean limit.which? levilab acquire limit --settings"),
         ("limit.colour=red", "there is no such setting; levilab acquire limit --settings lists all"),
         ("limit.gate_s=3", "gate_s = 3 must be shorter than interval_s = 2"),
-        ("which=upper", "limit.KEY=VALUE is expected, limit.which=upper?"),
-        ("gate_s=fast", "limit.KEY=VALUE is expected, limit.gate_s is a number above 0 [s]; "),
-        ("drive_frequency_hz=500", "limit.drive_frequency_hz is a number above 0 up to 100 [Hz]; "),
+        ("gate_s=fast", "limit.gate_s=fast: a number above 0 [s] is expected; levilab acquire limit --settings"),
+        ("gate_s=0,5", "limit.gate_s=0,5: a number above 0 [s] is expected; write a decimal point, not a comma"),
+        ("drive_frequency_hz=500", "limit.drive_frequency_hz = 500 is more than this bench allows"),
+        ("wich=upper", "limit.wich: there is no such setting, did you mean limit.which?"),
+        ("which", "limit.KEY=VALUE is expected"),
         ("=3", "the key is missing: limit.KEY=VALUE is expected"),
         ("limit.=3", "the key is missing: limit.KEY=VALUE is expected"),
         ("limit=3", "the key is missing: limit.KEY=VALUE is expected"),
@@ -299,6 +303,11 @@ def test_settings_on_the_command_line_that_cannot_be_are_refused(tmp_path: Path,
         mock(tmp_path, settings)
     assert caught.value.name == "settings"
     assert says in str(caught.value)
+
+
+def test_a_key_without_its_experiment_is_of_the_one_that_is_carried_out(tmp_path: Path) -> None:
+    bare, full = (mock(tmp_path, f"{table}which=upper", f"{table}hold_s=7") for table in ("", "limit."))
+    assert settings_of(bare.config, "limit") == settings_of(full.config, "limit")
 
 
 def test_a_drive_beyond_the_bench_is_refused_before_it_begins(tmp_path: Path) -> None:

@@ -370,7 +370,7 @@ def test_a_damaged_header_is_read_or_refused_in_one_line(
 
 def test_binary_files_need_the_extra(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "RigolWFM.wfm", None)
-    with pytest.raises(TableError, match=r"pip install 'levilab\[scope\]'"):
+    with pytest.raises(TableError, match=r'pip install "\.\[scope\]"'):
         read_record(write(b"\xa5\xa5\0\0", "a.wfm"))
 
 

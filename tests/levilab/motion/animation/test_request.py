@@ -100,7 +100,7 @@ def test_a_page_of_too_long_a_span_names_the_longest_one(tmp_path: Path, monkeyp
 
 @pytest.mark.parametrize(
     ("name", "library", "extra"),
-    [("a.html", "nicegui", "levilab[live]"), ("a.mp4", "imageio_ffmpeg", "levilab[video]")],
+    [("a.html", "nicegui", ".[live]"), ("a.mp4", "imageio_ffmpeg", ".[video]")],
 )
 def test_a_missing_library_is_named_before_anything_is_simulated(
     name: str, library: str, extra: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -254,7 +254,7 @@ def test_a_missing_parquet_library_is_named_before_the_work(runs: Path, monkeypa
     monkeypatch.setattr("levilab.pipelines.many.file.find_spec", lambda _: None)
     ended = command("analyze", "spindown", "runs", "--table", "t.parquet", cwd=runs.parent)
     assert ended.status == 2
-    assert "pip install 'levilab[parquet]'" in ended.err
+    assert 'pip install ".[parquet]"' in ended.err
 
 
 def test_a_table_without_any_sound_run_ends_with_a_failure(runs: Path) -> None:
