@@ -1,6 +1,7 @@
 """The commands of the simulator: simulate, stability, benchmark.  Heavy imports happen where they are needed."""
 
 import contextlib
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -93,18 +94,20 @@ def simulate(
         done = run_simulation(request, message, share)
     if done.folder:
         message(f"wrote {done.folder}")
+    app = context.find_root().command
+    summary = replace(done.summary, notes=tuple(with_options(note, app) for note in done.summary.notes))
     if not as_json:  # at once: what explains it takes longer
         from levilab.motion.table import print_motion
 
-        print_motion(done.summary)
+        print_motion(summary)
     if film:
-        _animate(film, done.summary, partial(with_options, app=context.find_root().command))
+        _animate(film, done.summary, partial(with_options, app=app))
     with interruptible("the effects are not known"):
         effects = _explained(chosen, duration) if explain else ()
     if as_json:
         from dataclasses import asdict
 
-        document = as_document(done.summary) | {"run": str(done.folder) if done.folder else None}
+        document = as_document(summary) | {"run": str(done.folder) if done.folder else None}
         document |= {"animation": str(film.path)} if film else {}
         document |= {"effects": [finite(asdict(effect)) for effect in effects]} if explain else {}
         print_json(document)

@@ -86,7 +86,11 @@ class Simulation:
 
 
 def run_simulation(
-    request: SimulationRequest, message: Callable[[str], None], progress: Callable[[float], None] | None = None
+    request: SimulationRequest,
+    message: Callable[[str], None],
+    progress: Callable[[float], None] | None = None,
+    *,
+    uses_states: bool = False,
 ) -> Simulation:
     """Simulate, look at the motion, and write it down; what does not come to its end leaves nothing behind.
 
@@ -94,6 +98,7 @@ def run_simulation(
         request: what is simulated, and how.
         message: called with what takes a moment.
         progress: called with the share that is done.
+        uses_states: whether the states at this rate are used without a folder, too: too low a rate is then noted.
 
     Raises:
         UsageError, SimulationError: for what cannot be simulated.
@@ -101,14 +106,14 @@ def run_simulation(
     """
     factor = _samples_per_state(request)
     if request.out is None:
-        return Simulation(_simulated(request, factor, message, progress), None, factor)
+        return Simulation(_simulated(request, factor, message, progress, uses_states=uses_states), None, factor)
     with (
         interruption_postponed() as admit_interruption,
         RunWriter.create(request.out, _record(request), STATES) as writer,
     ):
         try:
             admit_interruption()  # from here on the folder is taken away again
-            summary = _simulated(request, factor, message, progress)
+            summary = _simulated(request, factor, message, progress, uses_states=True)
             _write(summary, factor, writer)
         except BaseException:
             writer.discard()
@@ -138,6 +143,8 @@ def _simulated(
     factor: int,
     message: Callable[[str], None],
     progress: Callable[[float], None] | None,
+    *,
+    uses_states: bool,
 ) -> Summary:
     with announce_compilation(message), interruption_postponed():
         simulate(request.scene, min(_FIRST_S, request.duration), rate=None)
@@ -146,7 +153,7 @@ def _simulated(
         request.scene, request.duration, tolerance=request.tolerance, rate=factor * request.rate, progress=progress
     )
     computing = time.perf_counter() - begin
-    return summarise(motion, request.duration, request.rate, computing, writes_states=request.out is not None)
+    return summarise(motion, request.duration, request.rate, computing, uses_states=uses_states)
 
 
 # --- the run folder ---

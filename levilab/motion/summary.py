@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from levilab.errors import unquoted
 from levilab.files import finite
 from levilab.motion.lines import LONGEST_S, AxisLines, lines_of, rate_for
 from levilab.motion.lock import is_locked
@@ -110,7 +111,7 @@ class Summary:
 
 
 def summarise(
-    motion: Trajectory, duration: float, rate: float, computing: float, *, writes_states: bool = True
+    motion: Trajectory, duration: float, rate: float, computing: float, *, uses_states: bool = True
 ) -> Summary:
     """Summarise a motion.
 
@@ -119,12 +120,12 @@ def summarise(
         duration: as the user wants it [s].
         rate: states kept per second [1/s].
         computing: the time that the computation took [s].
-        writes_states: whether the states go to states.csv, where too low a rate would show lines elsewhere.
+        uses_states: whether the states at this rate are used, where too low a rate shows lines elsewhere.
     """
     energy = motion.energies
     change = float(np.max(np.abs(energy - energy[0]))) / (abs(float(energy[0])) or 1.0)
     lines = lines_of(motion)
-    notes = _notes(motion, lines, rate if writes_states else math.inf)
+    notes = _notes(motion, lines, rate if uses_states else math.inf)
     return Summary(motion, duration, rate, computing, lines, change, tuple(notes))
 
 
@@ -165,11 +166,10 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
         notes.extend(_cannot_float(motion.scene))
     highest = max((abs(line.frequency) for line in lines.lines), default=0.0)
     if highest > rate / 2:
-        enough = math.ceil(3 * highest / 10) * 10
         notes.append(
             f"{rate:g} states per second are less than twice the highest line, {highest:.3g} Hz: the lines here come "
-            "from more of them, but states.csv shows it elsewhere; "
-            f"take a rate of {enough} (--rate {enough})"
+            "from more of them, but the states show it elsewhere; "
+            f"take `rate` = {math.ceil(3 * highest / 10) * 10}"
         )
     if not lines.lines and motion.scene.observed == "motion":
         notes.append(f"no lines of the axis: {_why_no_lines(motion, lines)}")
@@ -244,7 +244,7 @@ def as_document(summary: Summary) -> dict[str, Any]:
         "steps": accuracy.steps,
         "computing_time_s": summary.computing,
         "times_real_time": summary.speed,
-        "notes": list(summary.notes),
+        "notes": [unquoted(note) for note in summary.notes],
     }
     return {key: finite(value) for key, value in document.items()}
 

@@ -96,7 +96,7 @@ def simulate_motion(
     """Simulate a scene with changes at dotted keys.  Raises SceneError, UsageError, SimulationError, CannotWrite."""
     chosen = (scene if isinstance(scene, Scene) else read_scene(Path(scene))).changed(settings)
     request = SimulationRequest(chosen, duration, tolerance, rate, None if out is None else Path(out))
-    done = run_simulation(request, lambda _: None)
+    done = run_simulation(request, lambda _: None, uses_states=True)
     motion = done.summary.motion
     rows = kept_rows(motion, done.samples_per_state)
     own = {one.name: getattr(motion, one.name) for one in fields(motion)}

@@ -34,7 +34,7 @@ WRONG_USAGE = {
     "acquire trace --mock --set trace.points=1.5": "--set trace.points=1.5: a whole number above 0 is expected",
     "acquire trace --mock --set trace.volts_per_division=50": "a number from 0.001 to 10 [V] is expected",
     "acquire trace --mock --set trace.trigger_level_v=5": "beyond what the oscilloscope records, -0.35 to 1.65 V",
-    "acquire trace --mock --set records=2": "trace.records=2?; levilab acquire trace --settings lists all",
+    "acquire trace --mock --set records=two": "--set trace.records=two: a whole number above 0 is expected",
     f"analyze spindown {SAMPLE} --reading-u 0": "--reading-u 0: ",
     f"analyze spindown {SAMPLE} --reading-u -0.1": "--reading-u -0.1: ",
     f"analyze spindown {SAMPLE} --reading-u nan": "--reading-u nan: ",

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +28,6 @@ from support.figures import faults
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from levilab.motion.summary import Summary
     from levilab.simulator.scene import Scene
@@ -137,9 +137,10 @@ def test_a_chaotic_motion_is_reported_to_be_one() -> None:
 def test_too_low_a_rate_for_the_lines_is_reported_where_states_are_written(levilab: Command, tmp_path: Path) -> None:
     words = ("simulate", "undriven", "--duration", "5", "--rate", "50", "--json")
     written = json.loads(levilab(*words, "--out", str(tmp_path)).stdout)
-    assert any("take a rate of 1" in note for note in written["notes"])  # three times the 42 to 43 Hz of the nutation
-    assert any("(--rate 1" in note for note in written["notes"])
-    assert not any("take a rate" in note for note in json.loads(levilab(*words).stdout)["notes"])
+    assert any("take --rate 1" in note for note in written["notes"])  # three times the 42 to 43 Hz of the nutation
+    kept = json.loads(Path(written["run"], "run.json").read_text(encoding="utf-8"))["simulation"]["notes"]
+    assert any("take rate = 1" in note for note in kept)
+    assert not any("take --rate" in note for note in json.loads(levilab(*words).stdout)["notes"])
 
 
 def test_a_fall_and_a_drift_are_told_as_what_they_are() -> None:
