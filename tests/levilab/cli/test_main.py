@@ -67,7 +67,7 @@ def test_acquire_analyze_report_and_list_from_an_empty_folder(
         (tmp_path / decoy).write_text("raise SystemExit('the decoy was imported')", encoding="utf-8")
     acquired = levilab_process("acquire", "spin", "--mock", *QUICKLY, "--note", "one")
     assert acquired.stdout.startswith("finished: ")
-    assert "s left" in acquired.stderr
+    assert "of bench time left" in acquired.stderr
     analyzed = levilab("analyze", "spindown", "runs")
     assert "What the data say" in analyzed.stdout
     (run,) = (tmp_path / "runs").iterdir()
