@@ -18,7 +18,7 @@ from levilab.bench.config import BenchConfig, ConfigError, read_bench
 from levilab.bench.person import ask_no_person
 from levilab.bench.wiring import described_wiring
 from levilab.errors import DataError, LevilabError, UsageError
-from levilab.runs.run import Run, find_run
+from levilab.runs.run import Run, find_run, runs_named
 from levilab.settings import in_one_line
 from levilab.simulator.keys import parse_setting
 from levilab.simulator.scene import SceneError, read_scene, scene_of
@@ -230,7 +230,7 @@ def _run_folder(name: Path, root: Path) -> Path:
         raise DataError(f"{name}: there is no such run; levilab runs lists those of a folder")
     if not root.is_dir():
         raise DataError(f"no run {name}, there is no folder {root} here: go to the folder that holds {root}")
-    if any(run.name.endswith(f"Z-{name}") for run in root.iterdir()):
+    if runs_named(name.name, root):
         raise DataError(f"more than one run in {root} is called {name}: say its whole name; levilab runs lists them")
     raise DataError(f"no run {name} in {root}: levilab runs lists those that are there")
 

@@ -272,8 +272,13 @@ def find_run(name: Path, root: Path = Path("runs")) -> Path:
     """The run folder that is meant: a path, or the name of a run in a folder, its time left out or not."""
     if name.name != str(name) or name.exists() or not root.is_dir():
         return name
-    named = [folder for folder in root.iterdir() if name.name in {folder.name, folder.name.split("Z-", 1)[-1]}]
+    named = runs_named(name.name, root)
     return named[0] if len(named) == 1 else name
+
+
+def runs_named(name: str, root: Path) -> list[Path]:
+    """The runs in a folder that have this name, their time left out or not."""
+    return [folder for folder in root.iterdir() if name in {folder.name, folder.name.split("Z-", 1)[-1]}]
 
 
 def find_runs(root: Path) -> list[Path]:
