@@ -136,6 +136,10 @@ class DragLaw:
     gradient: Callable[[Array, Array], Array]
     slowing: Callable[[Array, Array], Array]
 
+    def contains(self, other: "DragLaw") -> bool:
+        """Return whether the other law is this one with some constants at fixed values."""
+        return set(other.orders) < set(self.orders) or (not self.orders and len(other.orders) == 1)
+
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of all parameters: start_frequency and the constants."""
