@@ -104,6 +104,47 @@ def choose_columns(
     """
     titles = _with_periods(header)
     chosen, stated = _wanted_columns(path, header, wanted)
+    offered, warnings = _offered_columns(path, header, titles, chosen, quantities)
+    chosen |= {name: _only_one(path, header, name, indices) for name, indices in offered.items()}
+    written = {name: _written_unit(path, name, index, header, units) for name, index in chosen.items()} | stated
+    columns = []
+    for name, index in chosen.items():
+        quantity = COMPANIONS.get(name, name)
+        period = titles[chosen.get(quantity, index)]
+        if period.inverse and name not in stated and not written[name]:
+            # an uncertainty without a unit has that of its period
+            unit = (titles[index] if _is_of_a_period(titles[index], titles) else period).unit
+            columns.append(Column(name, index, header[index], unit_factor(unit or "s", "time") or 1, inverse=True))
+            continue
+        # An uncertainty without a unit has that of its quantity: "rpm,u" gives both in 1/min.
+        unit = written[name] or written.get(quantity)
+        if titles[index].counts_radians(unit) or period.counts_radians(unit):
+            warnings += [_angular(path, header[index])] * (name == quantity)
+            unit = "rad/s"
+        columns.append(Column(name, index, header[index], _factor(path, name, header[index], unit)))
+    return tuple(sorted(columns, key=lambda c: CANONICAL.index(c.name))), tuple(warnings)
+
+
+def _factor(path: Path, name: str, label: str, unit: str | None) -> float:
+    """Return the factor to SI of a column.
+
+    Raises:
+        TableError: no unit of its dimension is known, and its title has one of another dimension.
+    """
+    other = None if unit else foreign_unit(label, dimension(name))
+    if other:
+        raise TableError(
+            path,
+            f"column '{shorten(label)}' is to be {name} and has the unit {other}, which is none of "
+            f"{dimension(name)}: {how_else(label, name)}",
+        )
+    return (unit_factor(unit, dimension(name)) if unit else None) or 1
+
+
+def _offered_columns(
+    path: Path, header: Sequence[str], titles: Sequence[Title], chosen: Mapping[str, int], quantities: Collection[str]
+) -> tuple[dict[str, list[int]], list[str]]:
+    """Return the indices of the columns that could be each quantity not chosen yet, and warnings."""
     offered: dict[str, list[int]] = {}
     warnings = []
     for index, title in enumerate(titles):
@@ -116,28 +157,7 @@ def choose_columns(
             warnings.append(_unknown_unit(path, header[index], title))
         else:
             offered.setdefault(title.column, []).append(index)
-    chosen |= {name: _only_one(path, header, name, indices) for name, indices in offered.items()}
-    written = {name: _written_unit(path, name, index, header, units) for name, index in chosen.items()} | stated
-    columns = []
-    for name, index in chosen.items():
-        period = titles[chosen.get(COMPANIONS.get(name, name), index)]
-        if period.inverse and name not in stated and not written[name]:
-            # an uncertainty without a unit has that of its period
-            unit = (titles[index] if _is_of_a_period(titles[index], titles) else period).unit
-            columns.append(Column(name, index, header[index], unit_factor(unit or "s", "time") or 1, inverse=True))
-            continue
-        # An uncertainty without a unit has that of its quantity: "rpm,u" gives both in 1/min.
-        unit = written[name] or written.get(COMPANIONS.get(name, ""))
-        other = None if unit else foreign_unit(header[index], dimension(name))
-        if other:
-            raise TableError(
-                path,
-                f"column '{shorten(header[index])}' is to be {name} and has the unit {other}, which is none of "
-                f"{dimension(name)}: {how_else(header[index], name)}",
-            )
-        factor = unit_factor(unit, dimension(name)) if unit else 1
-        columns.append(Column(name, index, header[index], factor or 1))
-    return tuple(sorted(columns, key=lambda c: CANONICAL.index(c.name))), tuple(warnings)
+    return offered, warnings
 
 
 def _with_periods(header: Sequence[str]) -> list[Title]:
@@ -251,6 +271,11 @@ def _written_unit(path: Path, name: str, index: int, header: Sequence[str], unit
             "correct one of them",
         )
     return beneath or in_title
+
+
+def _angular(path: Path, label: str) -> str:
+    what = f"{shorten(str(path), 200)}: column '{shorten(label)}' is an angular frequency, read in rad/s"
+    return f"{what}; if it counts turns, say so with its column, as f=NAME [Hz]"
 
 
 def _unknown_unit(path: Path, label: str, title: Title) -> str:
