@@ -6,7 +6,7 @@ A file is sniffed (`layout`), its titles are understood (`columns`), its rows re
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -53,7 +53,8 @@ class Table:
     """A table of readings.
 
     `columns` are canonical (`time_s`, `spin_frequency_hz`, …): SI, float64, shape (rows,), all finite; `lines`, shape
-    (rows,), is the 1-based line of `path` that each row stands in; `header` are the titles in the file.
+    (rows,), is the 1-based line of `path` that each row stands in; `header` are the titles in the file; `factors` are
+    those to SI that the file's numbers were multiplied by.
     """
 
     path: Path
@@ -61,6 +62,7 @@ class Table:
     warnings: tuple[str, ...]
     header: tuple[str, ...]
     lines: "NDArray[np.int64]"
+    factors: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """How many readings there are."""
@@ -303,7 +305,7 @@ def _table(
         columns[name] = 1 / columns[name]
         if any(c.inverse and c.name == companion(name) for c in kept):
             columns[companion(name)] = columns[companion(name)] * columns[name] ** 2  # u(1/T) = u(T)/T²
-    return Table(path, columns, tuple(notes), header, lines)
+    return Table(path, columns, tuple(notes), header, lines, {c.name: c.factor for c in kept if not c.inverse})
 
 
 def _missed(name: str, lines: "NDArray[np.int64]", rows: int, *, periods: bool) -> str:
