@@ -94,6 +94,8 @@ def _at_once(text: str, dialect: Dialect, used: Sequence[int]) -> Array | None:
 def _line_by_line(path: Path, text: str, first: int, dialect: Dialect, used: Sequence[int], *, last: bool) -> Block:
     rows, torn = [], None
     lines = text.split("\n")
+    while last and lines and not lines[-1].strip(f"{dialect.separator or ''} \t"):  # programs end with empty rows
+        lines.pop()
     for number, line in enumerate(lines, first):
         if dialect.skips(line):
             continue
