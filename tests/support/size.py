@@ -1,4 +1,4 @@
-"""How many lines the program and its tests have; `make lint` prints it, and a test holds the limits in pyproject.toml."""
+"""Lines of the program and of its tests: `make lint` prints them, and a test holds the limits in pyproject.toml."""
 
 import tomllib
 from pathlib import Path
