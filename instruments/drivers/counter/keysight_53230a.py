@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from instruments.drivers.counter.reciprocal import IMPEDANCES, IMPEDANCES_OHM, READINGS_AT_ONCE, ReciprocalCounter
-from instruments.drivers.scpi import Setting
-from instruments.ieee488 import Form
+from instruments.drivers.setting import Setting
+from instruments.ieee488 import INFINITY, Form
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,16 +35,19 @@ class Keysight53230A(ReciprocalCounter):
     _PROBE: ClassVar[Form] = Form(NUMBER.pattern + r"|\+?(10?|1\.0{1,9}E\+0[01])", "10")
     _RANGE: ClassVar[Form] = Form(NUMBER.pattern + r"|\+?(50?|5\.0{1,9}E\+0[01])", "50")
 
-    gate = Setting("SENS:FREQ:GATE:TIME", float, unit="s", low=100e-6, high=1000.0)
+    #: A 53230A has gates from 1 µs on, which other programs may set.
+    gate = Setting("SENS:FREQ:GATE:TIME", float, unit="s", low=100e-6, high=1000.0, span=(1e-6, 1000.0))
     coupling = Setting("INP1:COUP", str, choices=("AC", "DC"))
     impedance = Setting("INP1:IMP", float, unit="ohm", values=IMPEDANCES_OHM, form=_IMPEDANCE)
     probe_factor = Setting("INP1:PROB", float, values=(1.0, 10.0), form=_PROBE)
     input_range = Setting("INP1:RANG", float, unit="V", values=(5.0, 50.0), form=_RANGE)
-    #: Resolution: data sheet, for the range of 5 V.
-    trigger_level = Setting("INP1:LEV1", float, unit="V", low=-5.125, high=5.125, resolution=2.5e-3)
+    #: Resolution: data sheet, for the range of 5 V; the range of 50 V and a probe of 10:1 multiply the level by 100.
+    trigger_level = Setting(
+        "INP1:LEV1", float, unit="V", low=-5.125, high=5.125, resolution=2.5e-3, span=(-512.5, 512.5)
+    )
     automatic_level = Setting("INP1:LEV:AUTO", bool)
     slope = Setting("INP1:SLOP1", str, choices=("POSitive", "NEGative"))
-    measurement_timeout = Setting("SYST:TIM", float, unit="s", low=0.01, high=2000.0)
+    measurement_timeout = Setting("SYST:TIM", float, unit="s", low=0.01, high=2000.0, span=(0.01, INFINITY))
 
     def prepare(self, *, gate_s: float, trigger_level_v: float, channel: int = 1) -> None:
         """Set the counter up; see :class:`Counter`.

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, cast
 
 from instruments.drivers.generator import NO_LIMITS, OPEN_V, Limits, check_peak
-from instruments.drivers.scpi import ScpiInstrument, Setting
+from instruments.drivers.scpi import ScpiInstrument
+from instruments.drivers.setting import Setting
 from instruments.errors import CommandRefused, OutOfRange
 from instruments.ieee488 import INFINITY
 
@@ -66,8 +67,17 @@ def frequency_setting(high: float, digits: int) -> LimitedSetting:
 
 
 def amplitude_setting(low: float) -> LimitedSetting:
-    """The amplitude of the output, four digits (data sheets), from the lowest of the family on [V, peak to peak]."""
-    return LimitedSetting("VOLT", float, "Vpp", low, 20.0, digits=4, quantity="amplitude_vpp", partner="offset_v")
+    """Return the amplitude, of four digits (data sheets), from the lowest of the family on [V, peak to peak].
+
+    With a load other than an open circuit the lowest amplitude is smaller.
+    """
+    return LimitedSetting(
+        *("VOLT", float, "Vpp", low, 20.0),
+        span=(0.0, 20.0),
+        digits=4,
+        quantity="amplitude_vpp",
+        partner="offset_v",
+    )
 
 
 def offset_setting(digits: int) -> LimitedSetting:
