@@ -1,11 +1,6 @@
-"""Every row of every virtual instrument: it is found by its header, set, asked, and reset.
-
-``headers/`` holds what each model understands in its shortest form, a header a line: ``?`` where it can only be asked,
-``[?]`` where it can be set, too: a row that is lost is missed there.  A new model may do without.
-"""
+"""Every row of every virtual instrument: it is found by its header, set, asked, and reset."""
 
 import re
-from pathlib import Path
 
 import pytest
 
@@ -17,7 +12,6 @@ from support import hostile
 from support.models import FAMILIES, KIND_OF, SERIAL
 from support.wire import ask, errors, send
 
-HEADERS = Path(__file__).parent / "headers"
 #: Rows that are no settings: what they answer is no parameter, or changes by itself, or ends what goes on.
 NO_SETTING = ("*OPC", "CONFigure", "MEASure", "DISPlay:DATA", "C1:(BSWV", "C2:(BSWV")
 #: What ``*RST`` leaves as it is, by model; the time-out of a 53230A and the form of a Siglent's answers are in memory
@@ -124,18 +118,6 @@ def settings_of(name):
         if not reported(device) and answer is not None and "#" not in answer:
             found[header] = row
     return found
-
-
-@pytest.mark.parametrize("path", sorted(HEADERS.glob("*.txt")), ids=lambda path: path.stem)
-def test_a_model_understands_its_list_of_headers(path):
-    found = {}
-    for row in hostile.instrument(path.stem).commands.rows:
-        header = hostile.spellings(row.header)[0]
-        command, query = found.get(header, (False, False))
-        found[header] = command or row.settable, query or row.askable
-    marks = {(True, False): "", (False, True): "?", (True, True): "[?]"}
-    listed = path.read_text(encoding="utf-8")
-    assert "".join(sorted(f"{header}{marks[ways]}\n" for header, ways in found.items())) == listed
 
 
 @pytest.mark.parametrize("name", FAMILIES)
