@@ -6,14 +6,14 @@ import contextlib
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Generic, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, Generic, NoReturn, Protocol, TypeVar, cast, overload
 
 from instruments.errors import OutOfRange
 from instruments.ieee488 import NOT_A_NUMBER
 
 if TYPE_CHECKING:
-    from instruments.drivers.scpi import ScpiInstrument
     from instruments.ieee488 import Form
+    from instruments.links.transport import Transport
 
 T = TypeVar("T", bound=bool | float | str)
 #: How instruments print a switch (SCPI-1999, vol. 1, 7.3).
@@ -21,6 +21,32 @@ _SWITCH = {"0": False, "1": True}
 #: Instruments round a setting by this fraction of it at most.  Where their resolution is known, and the number of
 #: digits in their answers is not, these digits are four at least.
 _ROUNDING, _PRINTED = 0.01, 1e-4
+
+
+class Owner(Protocol):
+    """The instrument of a setting; see :class:`instruments.drivers.scpi.ScpiInstrument`."""
+
+    transport: Transport
+    last_set: dict[str, bool | float | str]
+
+    @property
+    def NUMBER(self) -> Form:  # noqa: N802 - a constant of the class
+        """The form of its numbers."""
+
+    def header_in_use(self, header: str) -> str:
+        """Return the header as it is sent."""
+
+    def field_of(self, answer: str, header: str, key: str) -> str:
+        """Return the part of an answer that is one setting.  Raises ValueError."""
+
+    def command(self, message: str) -> None:
+        """Send a command.  Raises CommandRefused."""
+
+    def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
+        """Check a setting that was sent.  Raises OutOfRange, CommandRefused."""
+
+    def reject(self, question: str, answer: str, expected: str) -> NoReturn:
+        """Raise BadAnswer."""
 
 
 @dataclass(eq=False)
@@ -100,19 +126,19 @@ class Setting(Generic[T]):
     @overload
     def __get__(self, instrument: None, owner: type) -> Setting[T]: ...
     @overload
-    def __get__(self, instrument: ScpiInstrument, owner: type) -> T: ...
-    def __get__(self, instrument: ScpiInstrument | None, owner: type) -> Setting[T] | T:
+    def __get__(self, instrument: Owner, owner: type) -> T: ...
+    def __get__(self, instrument: Owner | None, owner: type) -> Setting[T] | T:
         """Ask the instrument.  Raises BadAnswer."""
         if instrument is None:
             return self
         question = self.question(instrument)
         return self.read(instrument, question, instrument.transport.query(question))
 
-    def question(self, instrument: ScpiInstrument) -> str:
+    def question(self, instrument: Owner) -> str:
         """The question for it, as it is sent."""
         return f"{instrument.header_in_use(self.header)}?"
 
-    def read(self, instrument: ScpiInstrument, question: str, answer: str) -> T:
+    def read(self, instrument: Owner, question: str, answer: str) -> T:
         """The value in the answer to its question.  Raises BadAnswer."""
         form = self.form or instrument.NUMBER
         try:
@@ -120,7 +146,7 @@ class Setting(Generic[T]):
         except ValueError:
             instrument.reject(question, answer, self._expected(form))
 
-    def __set__(self, instrument: ScpiInstrument, value: T) -> None:
+    def __set__(self, instrument: Owner, value: T) -> None:
         """Check, send, and read the error queue."""
         self._check(instrument.transport.address, value)
         key = f"{self.key}," if self.key else ""
