@@ -26,7 +26,7 @@ def test_the_page_of_commands_has_each_command_with_its_options() -> None:
 
 
 @pytest.mark.parametrize(("page", "written", "led"), [
-    ("first-steps", "[a](../README.md)", "[a](index.md)"),
+    ("tutorial", "[a](../README.md)", "[a](index.md)"),
     ("experiments/field", "[a](../../sample_data/README.md#x)", "[a](../sample-data.md#x)"),
     ("data", "[a](../sample_data/device.toml)", "[a](../sample_data/device.toml)"),
     ("data", "[a](speed.md#b)", "[a](speed.md#b)"),
