@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Generic, Self, TypeVar
 
 from pydantic import BeforeValidator, PlainSerializer
 
-from levilab.errors import unquoted
+from levilab.errors import DataError, unquoted
 from levilab.files import finite
 from levilab.pipelines.analyzed import FOR_THIS_PAGE, A, Method, Opt, Origin, R, S
-from levilab.pipelines.result import SCHEMA, Archive, BudgetPart, Earlier, Part, Result, budgets_of, relative
+from levilab.pipelines.result import ANEW, SCHEMA, Archive, Earlier, Part, Result, relative
 from levilab.pipelines.sources import collect
 from levilab.runs.run import find_run
 from levilab.software import software_versions
@@ -82,20 +82,18 @@ class Document(Generic[S, R, Opt, A, D]):
     Attributes:
         method: of the analysis.
         result: all that is in it, with the parts of which it is made.
-        entries: its own entries at the top.
-        run_entries: those of one input; `warnings` are added to the source's.
-        run: what was found of one input, from its part of the result, with the options of that time; raises ValueError
-            for what does not go with the readings.
-        combined: what was found of all together, from the result, the runs, and the number of each of them in the
-            result; raises ValueError.
+        entries: its own entries at the top, for people: `values`, `models`.
+        run_entries: likewise those of one input.
+        check: raises ValueError for what was read of one input and cannot have been found.
+        renumber: what was found of all together, for inputs in another order: the number of each in the result.
     """
 
     method: Method[S, R, Opt, A]
     result: type[D]
     entries: Callable[[A], dict[str, Any]]
-    run_entries: Callable[[Source[S], R], dict[str, Any]]
-    run: Callable[[Any, Source[S], Opt], R]
-    combined: Callable[[D, Sequence[R], Sequence[int]], Any] = lambda *_: None
+    run_entries: Callable[[R], dict[str, Any]]
+    check: Callable[[R], None] = lambda _: None
+    renumber: Callable[[Any, Sequence[int]], Any] = lambda combined, _: combined
 
     # --- writing ---
 
@@ -108,20 +106,23 @@ class Document(Generic[S, R, Opt, A, D]):
             "synthetic": any(source.synthetic for source in found.sources),
             "software": software_versions(),
             "settings": self.settings(found.options),
-            "values": {},
             "models": [],
             "runs": [
-                self._part(source, run, origin, place.folder)
+                {
+                    "path": relative(source.path, place.folder),
+                    "synthetic": source.synthetic,
+                    "warnings": [unquoted(text) for text in (*source.warnings, *found.about_run(run))],
+                    "models": [],
+                    "result": run,
+                }
+                | _budget(origin.budget or ())
+                | self.run_entries(run)
                 for source, run, origin in zip(found.sources, found.runs, found.origins, strict=True)
             ],
             "warnings": [unquoted(text) for text in found.all_warnings],
+            "combined": found.combined,
         }
         return self.result.model_validate(finite(document | _budget(found.budget) | self.entries(found)))
-
-    def _part(self, source: Source[S], run: R, origin: Origin[Opt], folder: Path) -> dict[str, Any]:
-        head = {"path": relative(source.path, folder), "synthetic": source.synthetic, "values": {}, "models": []}
-        own = self.run_entries(source, run) | _budget(origin.budget or ())
-        return head | own | {"warnings": [unquoted(text) for text in (*source.warnings, *own.get("warnings", ()))]}
 
     def settings(self, options: Opt) -> Settings:
         """The options as they stand in the file."""
@@ -158,15 +159,14 @@ class Document(Generic[S, R, Opt, A, D]):
         found, archive, given = looked.found, looked.archive, looked.given
         whole = archive.whole(found.sources)
         if whole and all(self._holds(whole.of(source), given, source) for source in found.sources):
-            found = replace(found, warnings=(*whole.result.warnings, *map(unquoted, found.warnings)))
             numbers = [whole.of(source).number for source in found.sources]
             return self.method.gather(
                 looked.paths,
                 found,
                 looked.options,
-                lambda source: self._restored(source, whole.of(source)),
-                lambda runs: whole.restore(lambda: self.combined(whole.result, runs, numbers)),
-                budget=budgets_of(whole.result.budget),
+                lambda source: self._of_result(source, whole.of(source)),
+                lambda _: self.renumber(whole.result.combined, numbers),
+                budget=whole.result.budget,
             )
         return self.method.gather(
             looked.paths, found, looked.options, lambda source: self._recalled(source, archive, given)
@@ -198,19 +198,34 @@ class Document(Generic[S, R, Opt, A, D]):
         elif not self._holds(earlier, given, source):
             options, why = replace(self._options(earlier), **own), f"other options than those of {earlier.file}"
         else:
-            return self._restored(source, earlier)
+            return self._of_result(source, earlier)
         return source, self.method.fit(source, options), Origin(options, f"{FOR_THIS_PAGE}: {why}")
 
-    def _restored(self, source: Source[S], earlier: Earlier[D]) -> tuple[Source[S], R, Origin[Opt]]:
-        """One input as it was found; its warnings are those of that time."""
-        options, part = self._options(earlier), earlier.part
-        run = earlier.restore(lambda: self.run(part, source, options))
-        return replace(source, warnings=part.warnings), run, Origin(options, earlier.text, budgets_of(part.budget))
+    def _of_result(self, source: Source[S], earlier: Earlier[D]) -> tuple[Source[S], R, Origin[Opt]]:
+        """One input as it was found.  Raises DataError."""
+        part = earlier.part
+        try:
+            self.check(part.result)
+        except ValueError as error:
+            raise DataError(f"{earlier.file}: {error}: {ANEW}") from error
+        return source, part.result, Origin(self._options(earlier), earlier.text, part.budget)
 
 
 def _budget(budgets: Sequence[Budget]) -> dict[str, Any]:
     """The entry of budgets, where there are any."""
-    return {"budget": [BudgetPart.of(one).model_dump(exclude_unset=True) for one in budgets]} if budgets else {}
+    return {"budget": tuple(budgets)} if budgets else {}
+
+
+#: Statistics that a result has of each model; None where a model has no such number.
+_STATISTICS = (
+    "n", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson", "runs_test_p", "difference",
+    "n_effective",
+)  # fmt: skip
+
+
+def statistics_of(statistics: Any) -> dict[str, Any]:
+    """Return how well a model fits, as a result has it."""
+    return {name: getattr(statistics, name, None) for name in _STATISTICS}
 
 
 def values_of(estimates: Mapping[str, Estimate]) -> dict[str, dict[str, Any]]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import os
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -15,12 +15,13 @@ from analysis.budget import Budget, Component
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.files import parse_json, replace_atomically, writing
+from levilab.pipelines.dump import Dump
 from levilab.runs.run import RECORD
 from levilab.settings import in_one_line
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from levilab.pipelines.sources import Source
 
@@ -36,7 +37,8 @@ _ANEW_OR_AWAY = f"{ANEW}, or move the file away"
 class Part(BaseModel):
     """A part of a result.  Keys that are not known here are of a newer version, and passed over."""
 
-    model_config = ConfigDict(frozen=True, validate_by_name=True, validate_by_alias=True, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, validate_by_name=True, validate_by_alias=True, allow_inf_nan=False,
+                              arbitrary_types_allowed=True)  # fmt: skip
 
 
 class Value(Part):
@@ -72,66 +74,45 @@ class Input(Part):
     sha256: str
 
 
-class ComponentPart(Part):
-    """A row of a budget; see `analysis.budget.Component`."""
+#: Rows of a budget with what they contribute, and what is known beside u.
+Budgets = Annotated[tuple[Budget, ...], Dump({Budget: ("u_with_all",), Component: ("contribution",)})]
+
+
+class Open(Part):
+    """A part whose further entries are written for people and other programs alone: levilab does not read them."""
+
+    model_config = ConfigDict(extra="allow")
+
+
+class Model(Open):
+    """A model that was fitted."""
 
     name: str
-    source: str
-    kind: Literal["A", "B"]
-    u: float | None = Field(ge=0)
-    unit: str
-    sensitivity: float
-    contribution: float | None = Field(ge=0)
-    included: bool
-    note: str
-    remedy: str
+    parameters: dict[str, Value]
+    covariance: tuple[tuple[float | None, ...], ...] | None
+    statistics: dict[str, Any]
 
 
-class BudgetPart(Part):
-    """What u of a quantity is made of; see `analysis.budget.Budget`."""
+class RunPart(Open):
+    """One input by itself.
 
-    quantity: str
-    model: str
-    value: float
-    u: float = Field(ge=0)
-    u_with_all: float = Field(ge=0)
-    unit: str
-    components: tuple[ComponentPart, ...]
-    group: int | None = Field(default=None, ge=0)
-
-    @classmethod
-    def of(cls, budget: Budget) -> Self:
-        """From a budget."""
-        rows = [asdict(one) | {"contribution": one.contribution} for one in budget.components]
-        entries = asdict(budget) | {"u_with_all": budget.u_with_all, "components": rows}
-        if budget.group is None:
-            del entries["group"]
-        return cls.model_validate(entries)
-
-    @property
-    def budget(self) -> Budget:
-        """The budget, but for what follows from the rest of it."""
-        rows = (Component(**one.model_dump(exclude={"contribution"})) for one in self.components)
-        return Budget(self.quantity, self.value, self.u, self.unit, tuple(rows), self.model, self.group)
-
-
-def budgets_of(parts: Sequence[BudgetPart]) -> tuple[Budget, ...]:
-    """The budgets that a result holds; none, if an earlier version wrote it."""
-    return tuple(one.budget for one in parts)
-
-
-class RunPart(Part):
-    """One input by itself."""
+    result: the dataclass of the analysis; an analysis says which.
+    """
 
     path: str
     synthetic: bool
     values: dict[str, Value]
+    models: tuple[Model, ...] = ()
     warnings: tuple[str, ...]
-    budget: tuple[BudgetPart, ...] = ()
+    budget: Budgets = ()
+    result: Any
 
 
-class Result(Part):
-    """What results of all analyses have in common."""
+class Result(Open):
+    """What results of all analyses have in common.
+
+    combined: what was found of all inputs together; None where the analysis combines nothing.
+    """
 
     schema_: Literal["levilab-result/1"] = Field(alias="schema")
     analysis: str
@@ -140,9 +121,11 @@ class Result(Part):
     software: dict[str, str]
     settings: Any
     values: dict[str, Value]
+    models: tuple[Model, ...] = ()
     runs: tuple[Any, ...]
     warnings: tuple[str, ...]
-    budget: tuple[BudgetPart, ...] = ()
+    budget: Budgets = ()
+    combined: Any = None
 
     @model_validator(mode="after")
     def _one_run_an_input(self) -> Self:
@@ -365,13 +348,6 @@ class Earlier(Generic[R]):
         """The same of another input of the result."""
         number = next(k for k, given in enumerate(self.result.inputs) if given.sha256 == source.sha256)
         return replace(self, number=number)
-
-    def restore(self, read: Callable[[], T]) -> T:
-        """What is read from the result.  Raises DataError, which names the file, where that raises ValueError."""
-        try:
-            return read()
-        except ValueError as error:
-            raise DataError(f"{self.file}: {error}: {ANEW}") from error
 
 
 class Archive(Generic[R]):
