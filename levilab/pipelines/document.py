@@ -85,6 +85,7 @@ class Document(Generic[S, R, Opt, A, D]):
         entries: its own entries at the top, for people: `values`, `models`.
         run_entries: likewise those of one input.
         check: raises ValueError for what was read of one input and cannot have been found.
+        outdated: why this version cannot use what was read of one input, so that it is analyzed again; empty: it can.
         renumber: what was found of all together, for inputs in another order: the number of each in the result.
     """
 
@@ -93,6 +94,7 @@ class Document(Generic[S, R, Opt, A, D]):
     entries: Callable[[A], dict[str, Any]]
     run_entries: Callable[[R], dict[str, Any]]
     check: Callable[[R], None] = lambda _: None
+    outdated: Callable[[R], str] = lambda _: ""
     renumber: Callable[[Any, Sequence[int]], Any] = lambda combined, _: combined
 
     # --- writing ---
@@ -158,7 +160,7 @@ class Document(Generic[S, R, Opt, A, D]):
         """
         found, archive, given = looked.found, looked.archive, looked.given
         whole = archive.whole(found.sources)
-        if whole and all(self._holds(whole.of(source), given, source) for source in found.sources):
+        if whole and not any(self._problem(whole.of(source), given, source) for source in found.sources):
             numbers = [whole.of(source).number for source in found.sources]
             return self.method.gather(
                 looked.paths,
@@ -176,10 +178,14 @@ class Document(Generic[S, R, Opt, A, D]):
         settings: Settings = earlier.result.settings
         return self.method.options(**settings.arguments())
 
-    def _holds(self, earlier: Earlier[D], given: Mapping[str, Any], source: Source[S]) -> bool:
-        """Whether a result was made with the given options, as far as they matter to the input."""
+    def _problem(self, earlier: Earlier[D], given: Mapping[str, Any], source: Source[S]) -> str:
+        """Return why an input has to be analyzed again; empty where its result holds."""
+        if earlier.sha256 != source.sha256:
+            return f"the readings are others than in {earlier.file}"
         made_with = self._options(earlier)
-        return self.settings(replace(made_with, **self._own(given, source))) == self.settings(made_with)
+        if self.settings(replace(made_with, **self._own(given, source))) != self.settings(made_with):
+            return f"other options than those of {earlier.file}"
+        return self.outdated(earlier.part.result)
 
     def _own(self, given: Mapping[str, Any], source: Source[S]) -> dict[str, Any]:
         """Those of the given options that matter to an input."""
@@ -193,10 +199,8 @@ class Document(Generic[S, R, Opt, A, D]):
         earlier, own = archive.earlier(source.path, source.data, source.sha256), self._own(given, source)
         if earlier is None:
             options, why = self.method.options(**own), NO_RESULT
-        elif earlier.sha256 != source.sha256:
-            options, why = replace(self._options(earlier), **own), f"the readings are others than in {earlier.file}"
-        elif not self._holds(earlier, given, source):
-            options, why = replace(self._options(earlier), **own), f"other options than those of {earlier.file}"
+        elif why := self._problem(earlier, given, source):
+            options = replace(self._options(earlier), **own)
         else:
             return self._of_result(source, earlier)
         return source, self.method.fit(source, options), Origin(options, f"{FOR_THIS_PAGE}: {why}")

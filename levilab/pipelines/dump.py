@@ -28,6 +28,7 @@ class Dump:
 
     Attributes:
         extra: class → properties that are written for people, and not read.
+        pairs: whether the order of mappings counts; a mapping is a table where it does not.
 
     >>> from pydantic import BaseModel
     >>> from typing import Annotated
@@ -40,6 +41,7 @@ class Dump:
     """
 
     extra: Mapping[type, tuple[str, ...]] = field(default_factory=dict)
+    pairs: bool = True
 
     def __get_pydantic_core_schema__(self, kind: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
         """Return the schema of the type, for JSON before and behind it."""
@@ -54,7 +56,8 @@ class Dump:
             names = (*(one.name for one in fields(value)), *self.extra.get(type(value), ()))
             return {name: self._as_json(getattr(value, name)) for name in names}
         if isinstance(value, Mapping):
-            return [[name, self._as_json(one)] for name, one in value.items()]
+            items = {name: self._as_json(one) for name, one in value.items()}
+            return list(map(list, items.items())) if self.pairs else items
         if isinstance(value, list | tuple):
             return [self._as_json(one) for one in value]
         return finite(value.tolist() if isinstance(value, np.ndarray | np.generic) else value)

@@ -37,8 +37,7 @@ _ANEW_OR_AWAY = f"{ANEW}, or move the file away"
 class Part(BaseModel):
     """A part of a result.  Keys that are not known here are of a newer version, and passed over."""
 
-    model_config = ConfigDict(frozen=True, validate_by_name=True, validate_by_alias=True, allow_inf_nan=False,
-                              arbitrary_types_allowed=True)  # fmt: skip
+    model_config = ConfigDict(frozen=True, validate_by_name=True, validate_by_alias=True, arbitrary_types_allowed=True)
 
 
 class Value(Part):

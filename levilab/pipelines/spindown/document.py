@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from analysis.spindown.combine import Combined  # noqa: TC001 - pydantic reads the type when it runs
+from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown  # noqa: TC001 - as above
 from levilab.pipelines.document import Document, Settings, number, statistics_of, value_of, values_of
 from levilab.pipelines.dump import Dump
@@ -152,10 +153,15 @@ def _check(run: SpinDown) -> None:
         try:
             with np.errstate(all="ignore"):
                 drawn = fit.spin_frequency(run.time)
-        except (IndexError, KeyError, ValueError) as error:
+        except (IndexError, ValueError) as error:
             raise ValueError(f"the solution of {fit.name} is of another law") from error
         if drawn.shape != fit.residuals.shape or not np.isfinite(drawn).all():
             raise ValueError(f"the curve of {fit.name} is not one of its readings")
+
+
+def _outdated(run: SpinDown) -> str:
+    unknown = [fit.name for fit in run.fits if fit.name not in LAWS]
+    return f"its result has a drag law that this version lacks, {unknown[0]}" if unknown else ""
 
 
 DOCUMENT = Document(
@@ -164,4 +170,5 @@ DOCUMENT = Document(
     entries=_entries,
     run_entries=_run_entries,
     check=_check,
+    outdated=_outdated,
 )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from analysis.spindown import drag
 from analysis.spindown.drag import LAWS
 from analysis.spindown.tilt import count
 from levilab.errors import DataError
@@ -201,7 +202,6 @@ def test_a_file_of_that_name_above_the_input_may_be_anything(tmp_path: Path) -> 
     ("solution", [1.0]),
     ("solution", [1e308, 1e308]),
     ("residuals", [0.0]),
-    ("name", "cubic"),
 ])  # fmt: skip
 def test_a_fit_whose_curve_cannot_be_drawn_is_an_error(tmp_path: Path, key: str, value: object) -> None:
     analyzed(spin_down_csv(tmp_path / "my.csv"))
@@ -212,6 +212,31 @@ def test_a_fit_whose_curve_cannot_be_drawn_is_an_error(tmp_path: Path, key: str,
     with pytest.raises(DataError) as caught:
         recall_spindowns([tmp_path / "my.csv"], SpinDownOptions())
     assert str(caught.value).startswith(f"{file}: ")
+
+
+def test_a_result_is_read_with_the_laws_of_its_day(
+    tmp_path: Path, fitted: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = analyzed(spin_down_csv(tmp_path / "my.csv"))
+    with monkeypatch.context() as later:
+        later.setattr(drag, "LAWS", dict(LAWS))
+        later.setitem(drag.LAWS, "turbulent", replace(LAWS["disc"], name="turbulent"))
+        later.setattr("levilab.pipelines.spindown.document.LAWS", drag.LAWS)
+        after = recall_spindowns([tmp_path / "my.csv"], SpinDownOptions())
+    assert fitted == []
+    assert differences(after.runs, before.runs) == []
+    assert [table.title for table in SPINDOWN.tables(after)] == [table.title for table in SPINDOWN.tables(before)]
+
+
+def test_a_result_with_a_law_that_is_gone_is_analyzed_again(
+    tmp_path: Path, fitted: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    analyzed(spin_down_csv(tmp_path / "my.csv"))
+    fewer = {name: law for name, law in LAWS.items() if name != "newton"}
+    monkeypatch.setattr("levilab.pipelines.spindown.document.LAWS", fewer)
+    after = recall_spindowns([tmp_path / "my.csv"], SpinDownOptions())
+    assert fitted == ["my.csv"]
+    assert after.origins[0].text.endswith("its result has a drag law that this version lacks, newton")
 
 
 @pytest.mark.parametrize("text", ['{"mine": 1}', "[1, 2]", "mine", '{"schema": "mine/1"}'])
