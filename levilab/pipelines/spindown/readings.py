@@ -235,7 +235,7 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
 
 #: What the analysis calls a column, in the words of a file, and what to do.
 _ABOVE_0 = {
-    "spin frequency": ("the frequency", "Hz, but a spinning top is above 0: remove the reading"),
+    "spin frequency": ("the frequency", "Hz; above 0 is expected: give the magnitude, for a sign is the sense of the spin"),
     "standard uncertainty": ("the uncertainty", "Hz, but must be above 0: correct it or remove the column"),
 }
 
