@@ -15,7 +15,8 @@ from levilab.crosscheck.study import as_document, crosscheck
 from levilab.crosscheck.table import crosscheck_table, failures_in_words
 from levilab.errors import UsageError
 from levilab.files import replace_atomically, writing
-from levilab.pipelines.catalogue import ANALYSES, recall_suiting
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.suits import recall_suiting
 from levilab.present.progress import ShareBar
 from levilab.present.terminal import draw, terminal
 

@@ -53,29 +53,6 @@ NO_RESULT = "there was no result yet"
 
 
 @dataclass(frozen=True)
-class Looked(Generic[S, Opt, D]):
-    """Inputs as they lie there, and the results that were written of them.
-
-    Attributes:
-        paths: where they were looked for.
-        found: the inputs.
-        archive: the results.
-        options: as given.
-        given: those of them that are not at their defaults.
-    """
-
-    paths: Sequence[Path]
-    found: Found[S]
-    archive: Archive[D]
-    options: Opt
-    given: Mapping[str, Any]
-
-    def has_result(self, source: Source[S]) -> bool:
-        """Whether there is a result of an input, of earlier readings or with other options perhaps."""
-        return self.archive.earlier(source.path, source.data, source.sha256) is not None
-
-
-@dataclass(frozen=True)
 class Document(Generic[S, R, Opt, A, D]):
     """result.json of an analysis.
 
@@ -133,46 +110,48 @@ class Document(Generic[S, R, Opt, A, D]):
 
     # --- reading ---
 
-    def look(self, paths: Sequence[Path], options: Opt, results: Sequence[Path] = ()) -> Looked[S, Opt, D]:
-        """What lies at the paths, and the results that were written of it.  Raises DataError.
+    def archive(self, paths: Sequence[Path], results: Sequence[Path] = ()) -> Archive[D]:
+        """The results that were written before of inputs at the paths; results: files that lie elsewhere."""
+        return Archive(paths, self.result, results)
 
-        Args:
-            paths: run folders, data files, folders to search.
-            options: as given; those at their defaults are not given, and those of an earlier result count.
-            results: files of results that do not lie beside their inputs.
-        """
-        paths = [find_run(path) for path in paths]
-        archive = Archive(paths, self.result, results)
-        given = {one.name: value for one in fields(options) if (value := getattr(options, one.name)) != one.default}
+    def reading(self, archive: Archive[D], options: Opt) -> Callable[[Path], Opt]:
+        """How an input is read: with the given options, else those of its earlier result."""
+        given = _given(options)
 
         def reading(path: Path) -> Opt:
             earlier = archive.earlier(path, path)
             return replace(self._options(earlier), **given) if earlier else options
 
-        return Looked(paths, collect(paths, self.method.needs, reading), archive, options, given)
+        return reading
 
-    def recall(self, looked: Looked[S, Opt, D]) -> A:
-        """What `analyze` found, from its result.json; analyzed anew is only what has none that holds.
+    def recall(self, paths: Sequence[Path], options: Opt) -> A:
+        """What `analyze` found, from its result.json; analyzed again is only what has none that holds.
 
-        A result holds as long as the readings are the same bytes, and it was made with the given options.
+        A result holds as long as the readings are the same bytes, and it was made with the given options.  Those at
+        their defaults are not given.
 
         Raises DataError for what cannot be used, a damaged result.json included.
         """
-        found, archive, given = looked.found, looked.archive, looked.given
+        paths = [find_run(path) for path in paths]
+        archive = self.archive(paths)
+        found = collect(paths, self.method.needs, self.reading(archive, options))
+        return self.recall_found(paths, found, archive, options)
+
+    def recall_found(self, paths: Sequence[Path], found: Found[S], archive: Archive[D], options: Opt) -> A:
+        """The same of what was found at the paths already."""
+        given = _given(options)
         whole = archive.whole(found.sources)
         if whole and not any(self._problem(whole.of(source), given, source) for source in found.sources):
             numbers = [whole.of(source).number for source in found.sources]
             return self.method.gather(
-                looked.paths,
+                paths,
                 found,
-                looked.options,
+                options,
                 lambda source: self._of_result(source, whole.of(source)),
                 lambda _: self.renumber(whole.result.combined, numbers),
                 budget=whole.result.budget,
             )
-        return self.method.gather(
-            looked.paths, found, looked.options, lambda source: self._recalled(source, archive, given)
-        )
+        return self.method.gather(paths, found, options, lambda source: self._recalled(source, archive, given))
 
     def _options(self, earlier: Earlier[D]) -> Opt:
         settings: Settings = earlier.result.settings
@@ -213,6 +192,11 @@ class Document(Generic[S, R, Opt, A, D]):
         except ValueError as error:
             raise DataError(f"{earlier.file}: {error}: {ANEW}") from error
         return source, part.result, Origin(self._options(earlier), earlier.text, part.budget)
+
+
+def _given(options: Any) -> dict[str, Any]:
+    """Return the options that are not at their defaults."""
+    return {one.name: value for one in fields(options) if (value := getattr(options, one.name)) != one.default}
 
 
 def _budget(budgets: Sequence[Budget]) -> dict[str, Any]:

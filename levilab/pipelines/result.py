@@ -77,14 +77,14 @@ class Input(Part):
 Budgets = Annotated[tuple[Budget, ...], Dump({Budget: ("u_with_all",), Component: ("contribution",)})]
 
 
-class Open(Part):
-    """A part whose further entries are written for people and other programs alone: levilab does not read them."""
-
-    model_config = ConfigDict(extra="allow")
+#: Further entries are written for people and other programs: levilab does not read them.
+_FOR_OTHERS = ConfigDict(extra="allow")
 
 
-class Model(Open):
+class Model(Part):
     """A model that was fitted."""
+
+    model_config = _FOR_OTHERS
 
     name: str
     parameters: dict[str, Value]
@@ -92,11 +92,13 @@ class Model(Open):
     statistics: dict[str, Any]
 
 
-class RunPart(Open):
+class RunPart(Part):
     """One input by itself.
 
     result: the dataclass of the analysis; an analysis says which.
     """
+
+    model_config = _FOR_OTHERS
 
     path: str
     synthetic: bool
@@ -107,11 +109,13 @@ class RunPart(Open):
     result: Any
 
 
-class Result(Open):
+class Result(Part):
     """What results of all analyses have in common.
 
     combined: what was found of all inputs together; None where the analysis combines nothing.
     """
+
+    model_config = _FOR_OTHERS
 
     schema_: Literal["levilab-result/1"] = Field(alias="schema")
     analysis: str
@@ -218,14 +222,18 @@ R = TypeVar("R", bound=Result)
 T = TypeVar("T")
 
 
-class NoResult(DataError):
+class ResultError(DataError):
+    """A result that cannot be used."""
+
+
+class NoResult(ResultError):
     """A file of that name that no levilab wrote."""
 
 
 def read_result(path: Path, model: type[R]) -> R | None:
     """A result that was written before; None where there is none, or one of another analysis.
 
-    Raises DataError when it is damaged or of another schema.
+    Raises ResultError when it is damaged or of another schema.
     """
     if not path.is_file():
         return None
@@ -235,30 +243,30 @@ def read_result(path: Path, model: type[R]) -> R | None:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise DataError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
+        raise ResultError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
 
 
 def is_of_another(path: Path, analysis: str) -> bool:
     """Whether a file holds the result of another analysis than this."""
     try:
         return path.is_file() and _read(path).get("analysis") != analysis
-    except DataError:
+    except ResultError:
         return False
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """A result as it stands in the file.  Raises NoResult for another program's file, else DataError."""
+    """A result as it stands in the file.  Raises NoResult for another program's file, else ResultError."""
     try:
         data = parse_json(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); {_ANEW_OR_AWAY}") from error
+        raise ResultError(f"{path}: cannot be read ({error.strerror}); {_ANEW_OR_AWAY}") from error
     except ValueError as error:
         raise NoResult(f"{path}: is cut off or not JSON ({error}); {_ANEW_OR_AWAY}") from error
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         seen = data.get("schema") if isinstance(data, dict) else type(data).__name__
         ours = isinstance(seen, str) and seen.startswith("levilab-result/")
         text = f"{path}: schema is {repr(seen)[:60]}, expected {SCHEMA!r} of this version; {_ANEW_OR_AWAY}"
-        raise DataError(text) if ours else NoResult(text)
+        raise ResultError(text) if ours else NoResult(text)
     return data
 
 
@@ -278,17 +286,17 @@ class Written:
 def read_inputs(path: Path) -> Written:
     """Of what a result is.
 
-    Raises NoResult for another program's file, DataError for damage or an input that is gone.
+    Raises NoResult for another program's file, ResultError for damage or an input that is gone.
     """
     data = _read(path)
     try:
         written = _Head.model_validate(data)
     except ValidationError as error:
-        raise DataError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
+        raise ResultError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
     inputs = tuple(path.parent / run.path for run in written.runs)
     for one in inputs:
         if not one.exists():
-            raise DataError(f"{path}: is of {one}, which is not there: name the run or data file where it lies now")
+            raise ResultError(f"{path}: is of {one}, which is not there: name the run or data file where it lies now")
     return Written(path, written.analysis, inputs)
 
 
@@ -304,7 +312,7 @@ class _Head(Part):
 
 
 def results_in(folder: Path) -> list[Written]:
-    """The results that lie in a folder, by name; files of other programs are passed over.  Raises DataError."""
+    """The results that lie in a folder, by name; files of other programs are passed over.  Raises ResultError."""
     found = []
     for file in sorted(folder.glob("*.json")):
         if "result" in file.name.split("."):
@@ -363,7 +371,7 @@ class Archive(Generic[R]):
         self._analysis: str = model.model_fields["analysis"].default
         self._read: dict[Path, R | None] = {}
         self._known: dict[Path, dict[str | Path, int]] = {}
-        several = len(paths) > 1 or (paths[0].is_dir() and not (paths[0] / RECORD).exists())
+        several = len(paths) > 1 or any(path.is_dir() and not (path / RECORD).exists() for path in paths)
         self._named = tuple(files)
         self._together = _together(paths).results(self._analysis) if several else ()
         if len(paths) > 1:
@@ -428,5 +436,5 @@ class Archive(Generic[R]):
         """A file of that name above a run, or beside a data file, may as well be another program's."""
         try:
             return self._result(file)
-        except DataError:
+        except ResultError:
             return self._read.setdefault(file, None)

@@ -32,6 +32,7 @@ NEEDS = Needs(
     experiments=frozenset({"field"}),
     read_file=read_scan_file,
     read_run=read_scan_run,
+    particular=True,
 )
 #: Correlations above this are worth a word.
 _STRONG = 0.9

@@ -205,7 +205,7 @@ METHOD = Method(
     options=SpinOptions,
     fit=spin_of_source,
     of_files=frozenset({"columns", "rate"}),  # a run may have records of several channels
-    passes_over=True,
+    skips=True,
 )
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
-from levilab.pipelines.catalogue import ANALYSES, analyze_suiting, save
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.limit.analysis import (
     LOWER_EDGE,
     RESONANCE,
@@ -22,7 +22,8 @@ from levilab.pipelines.limit.analysis import (
 )
 from levilab.pipelines.limit.report import limit_part
 from levilab.pipelines.limit.table import limit_tables
-from levilab.pipelines.sources import mark_of
+from levilab.pipelines.sources import SkippedRuns, mark_of
+from levilab.pipelines.suits import analyze_suiting, save
 from levilab.present.document.blocks import Listing
 from levilab.report.page import write_report
 from levilab.report.tables.values import of_analysis
@@ -62,7 +63,7 @@ def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Pa
     assert "the upper limits are of 2 conditions" in conditions
     assert "LOOSE WASHERS" in warning
     assert warning.endswith("(the first of 16 such warnings)")
-    assert "passed over: 4 spin runs" in analysis.remarks
+    assert SkippedRuns("spin", 4) in analysis.remarks
     assert limit_tables(analysis)[1].title == "Beside theory, for 3 kinds of top"  # of 26 tops
     # the lower limits are real, so nothing that is made of them alone bears the mark
     assert marks_of_budgets(analysis) == ["", "SYNTHETIC.", "SYNTHETIC."]

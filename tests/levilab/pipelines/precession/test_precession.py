@@ -10,11 +10,12 @@ import pytest
 
 from analysis.precession.gates import Gates, rates_at_point
 from instruments.drivers.oscilloscope import Trace
-from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionOptions, analyze_precessions
 from levilab.pipelines.precession.document import DOCUMENT
 from levilab.pipelines.precession.figure import precession_figure
 from levilab.pipelines.result import save
+from levilab.pipelines.suits import analyze_suiting
 from levilab.report.page import render
 from levilab.runs.gates import COUNTED, gates_event
 from levilab.runs.run import RunRecord, utc_now
