@@ -96,7 +96,7 @@ class Sample:
 
     @classmethod
     def within_steps(cls, limits: Array, u: Array) -> Sample:
-        """Return limits that are known to a step of the drive each, of which u is the standard uncertainty, step/√12."""
+        """Return limits that are known to a step of the drive each; u is the standard uncertainty, step/√12."""
         return cls(limits, u, u * math.sqrt(12))
 
     @property
