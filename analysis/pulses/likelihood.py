@@ -75,7 +75,8 @@ def _apart(y: Array, rate: float, lowest: float, highest: float) -> tuple[float,
     middle = (np.arange(count) + 0.5) * size / rate - 0.5 * count * size / rate
     slopes = np.zeros(1)
     if count > 1:
-        slopes = np.arange(-STEEPEST, STEEPEST, 2 * step / (count * size / rate))
+        steepest = min(STEEPEST, 0.5 * (highest - lowest) / (count * size / rate))  # stays within the trials
+        slopes = np.arange(-steepest, steepest, 2 * step / (count * size / rate))
     best = (-np.inf, 0.0, 0.0)
     for slope in slopes:
         total = np.zeros(trial.size)

@@ -31,6 +31,8 @@ EVIDENCE = 160.0
 NOISY = 3.0
 #: Flanks that climb more than this part of the height from one sample to the next lie where the samples are.
 SHARP = 0.25
+#: A piece has three parameters, height, shift and a constant: so few samples leave two for the noise.
+FEWEST_SAMPLES = 5
 #: A turn with less of a pulse than this part of the mean one counts as missing.
 FAINT = 0.3
 
@@ -173,6 +175,8 @@ def _improve(
         return None
     middle = np.rint(times * rate).astype(np.intp)
     reach = int(np.ceil(window.half * rate / frequency.min()))
+    if reach < FEWEST_SAMPLES // 2:
+        return None
     inside = (middle - reach >= 0) & (middle + reach < samples.size)
     times, numbers, frequency, middle = times[inside], numbers[inside], frequency[inside], middle[inside]
     if times.size < 4:

@@ -27,7 +27,7 @@ class Finding:
     """A remark for the user: a short name, the same in all versions, and a sentence.
 
     Names: fell-back, missing, doubled, wrong, half, double, mains, hum, clipped, gap, not-finite, spikes, wander,
-    curved, correlated, scattered, few-pulses, unsteady; no-pulses of a run with several records.
+    curved, correlated, scattered, few-pulses, unsteady, coarse; no-pulses of a run with several records.
     """
 
     name: str

@@ -52,6 +52,8 @@ BY_NOISE, BY_BINS, MOST_ODD = 3.2, 0.25, 0.1
 MOST_DOUBLINGS = 2
 #: Two frequencies that differ by no more than this part count the same turns.
 SAME = 0.1
+#: With fewer samples a turn, a line at 1/k of the frequency or beyond half the rate leaves samples that look the same.
+COARSE = 12.0
 #: And not where every second pulse lies so many standard deviations from the others.
 APART = 4.0
 
@@ -99,7 +101,7 @@ def spin_of_trace(
         own = own_lines(cleaned.lines, cleaned.before, rate / (x.size // bins.size), found.match.fit)
         if own:
             found = _found(Trace(clean(x, rate, bins, bad, own=own), rate), method, degree, near=found.match.fit)
-    return _result(found, start)
+    return _result(found, start, rate)
 
 
 class Trace:
@@ -368,7 +370,7 @@ def _checked(samples: ArrayLike, rate: float) -> tuple[Array, Array, NDArray[np.
     return x, shorten(x, factor), bad if bad.any() else None
 
 
-def _result(pulses: Found, start: float) -> SpinFrequency:
+def _result(pulses: Found, start: float, rate: float) -> SpinFrequency:
     found = pulses.match
     fit = found.fit
     frequency, chirp, reference = fit.frequency_and_chirp()
@@ -382,6 +384,8 @@ def _result(pulses: Found, start: float) -> SpinFrequency:
     more = [*pulses.notes, *traps.mains(frequency, chirp)]
     if isinstance(found, Match) and found.flat:
         more.append(Finding("clipped", "the tops of the pulses are flat: the detector or the converter is saturated"))
+    if (each := rate / frequency.value) < COARSE:
+        more.append(Finding("coarse", f"a turn has {digits(each, 2)} samples only: a faster top may look the same"))
     if found.missing:
         have = "s have" if found.missing > 1 else " has"
         more.append(Finding("missing", f"{found.missing} turn{have} no pulse"))

@@ -215,6 +215,17 @@ def test_the_start_moves_the_reference_time_alone():
     assert a.snr_db == pytest.approx(20, abs=0.5)
 
 
+@pytest.mark.parametrize("rate", [60.0, 100.0, 101.0, 430.0])
+def test_slow_records_have_a_frequency(rate):
+    """As of a phone's magnetometer: multiples of the mains lie beyond half the rate."""
+    time = np.arange(int(12 * rate)) / rate
+    samples = np.cos(2 * np.pi * (7.3 * time + 0.1)) + noise(0.05)[: time.size]
+    found = spin_of_trace(samples, rate)
+    assert abs(found.frequency.value - 7.3) < 4 * found.frequency.u
+    assert found.frequency.u < 1e-3
+    assert ("coarse" in names(found)) == (rate < 12 * 7.3)
+
+
 def test_traces_without_pulses_are_refused():
     for samples in (np.zeros(5000), noise(), np.full(5000, np.nan), np.zeros(3)):
         with pytest.raises(TooFewPulses):
