@@ -219,7 +219,7 @@ def test_the_start_moves_the_reference_time_alone():
 def test_slow_records_have_a_frequency(rate):
     """As of a phone's magnetometer: multiples of the mains lie beyond half the rate."""
     time = np.arange(int(12 * rate)) / rate
-    samples = np.cos(2 * np.pi * (7.3 * time + 0.1)) + noise(0.05)[: time.size]
+    samples = np.exp(1.5 * np.cos(2 * np.pi * 7.3 * time)) + noise(0.05)[: time.size]
     found = spin_of_trace(samples, rate)
     assert abs(found.frequency.value - 7.3) < 4 * found.frequency.u
     assert found.frequency.u < 1e-3
