@@ -35,7 +35,7 @@ def estimates(case, trials, seed, method="auto"):
     random, rows = np.random.default_rng(seed), []
     for _ in range(trials):
         trace = make(case, random)
-        found = spin_of_trace(trace.samples, RATE, method=method)
+        found = spin_of_trace(trace.samples, RATE, method=method, degree=2)  # the slope stays
         error = found.frequency.value - trace.truth(found.reference_time)
         rows.append((error, found.frequency.u, found.bound))
     return np.array(rows).T
@@ -211,7 +211,7 @@ def test_the_start_moves_the_reference_time_alone():
     a, b = spin_of_trace(samples, RATE), spin_of_trace(samples, RATE, start=100.0)
     assert b.reference_time == a.reference_time + 100
     assert (a.frequency, a.chirp, a.phase) == (b.frequency, b.chirp, b.phase)
-    assert a.at(a.reference_time + 1).value == a.frequency.value + a.chirp.value
+    assert a.at(a.reference_time + 1).value == pytest.approx(a.frequency.value + a.chirp.value + a.bend.value / 2)
     assert a.snr_db == pytest.approx(20, abs=0.5)
 
 
@@ -222,7 +222,7 @@ def test_slow_records_have_a_frequency(rate):
     samples = np.exp(1.5 * np.cos(2 * np.pi * 7.3 * time)) + noise(0.05)[: time.size]
     found = spin_of_trace(samples, rate)
     assert abs(found.frequency.value - 7.3) < 4 * found.frequency.u
-    assert found.frequency.u < 1e-3
+    assert found.frequency.u < 2e-3
     assert ("coarse" in names(found)) == (rate < 12 * 7.3)
 
 
@@ -294,6 +294,6 @@ def test_hum_that_was_cut_off_with_the_pulses_is_not_the_top(seed, number):
     random = np.random.default_rng(seed)
     for _ in range(number + 1):
         trace = make(HARD["all together"], random)
-    found = spin_of_trace(trace.samples, RATE)
+    found = spin_of_trace(trace.samples, RATE, degree=2)
     assert abs(found.frequency.value - trace.truth(found.reference_time)) < 5 * found.frequency.u
     assert found.frequency.u < 5e-5
