@@ -429,8 +429,9 @@ def scatter_of(residuals: Array, turns: Array, parameters: int, *, absolute: boo
     freedom = float(max(n - parameters, 1))
     variance = float(residuals @ residuals) / freedom
     if absolute:
-        variance = (freedom * variance + PRIOR_FREEDOM) / (freedom + PRIOR_FREEDOM)
-        freedom += PRIOR_FREEDOM
+        weight = PRIOR_FREEDOM / max(variance, 1.0)  # pulses that scatter beyond the noise say nothing of the noise
+        variance = (freedom * variance + weight) / (freedom + weight)
+        freedom += weight
     place = np.floor((turns - turns[0]) / max(BLOCK, -(-n // BLOCKS)))
     starts = np.concatenate([[0], np.flatnonzero(place[1:] != place[:-1]) + 1])
     blocks = starts.size - parameters

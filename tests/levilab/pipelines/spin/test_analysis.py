@@ -345,7 +345,7 @@ def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data: Pat
     assert "28.111(31) Hz at 20.32 s, record 3 of 5. Its slope through all records is −0.0879(17) Hz/s." in found.text
     part = spin_part(found)
     assert part.lead == "5 records used"
-    assert "It loses 0.312(6) % of its spin a second" in part.result[0].text
+    assert "It loses 0.313(6) % of its spin a second" in part.result[0].text
     assert found.runs[0].notes[0].text.startswith("in all 5 records, as in record 1: the pulses come early or late")
 
 
