@@ -26,6 +26,8 @@ SWINGS_U = np.array([2.0, 0.2, 0.02, 0.002])
 SWING = 0.5
 #: With fewer turns the bend is that of the prior: five parameters and the scatter leave too few.
 FEWEST_FOR_BEND = 8
+#: Turns on each side of a jump.
+FEWEST_BESIDE = 2
 #: Scatter over long times is about that from one turn to the next, within a factor of 2, before it is seen; and so is
 #: the scatter of pulses about the noise of the samples: a variance known to a factor of 2 has four degrees of freedom.
 PRIOR_FREEDOM = 4.0
@@ -264,6 +266,8 @@ def fit_turns(
         grid: of the samples that the phases come from.
         absolute: whether weights are 1/variance by the noise of the samples, or relative.
     """
+    if jump is not None and not FEWEST_BESIDE <= np.count_nonzero(times > jump.at) <= times.size - FEWEST_BESIDE:
+        jump = None
     model = _Model(degree, jump, grid, absolute)
     for _ in range(1 if jump is None else 3):  # the second is right to the change of the frequency in what was lost
         fit, step = _fit(times, turns, weight, model)

@@ -198,7 +198,7 @@ def _events(trace: Trace, degree: int | None) -> tuple[Events, Train]:
     if events.times.size < FEWEST:
         raise trace.too_few(events.times.size)
     if degree not in trace.trains:  # a bin's centre is that of its samples
-        trace.trains[degree] = fit_train(events.times - 0.5 / trace.rate, degree=degree)
+        trace.trains[degree] = fit_train(events.times - 0.5 / trace.rate, degree=degree, step=1 / trace.rate)
     return events, trace.trains[degree]
 
 

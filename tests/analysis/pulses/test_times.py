@@ -167,6 +167,45 @@ def test_the_frequency_at_another_time_follows_the_whole_polynomial(missing):
     assert ratios[0] == pytest.approx(1, abs=0.3)  # of the scatter over long times, by 45 blocks: 3 standard errors
 
 
+def sound_lists(random):
+    """Lists without a jump: swings about a drive, coloured jitter, rounded times, a drive that is switched."""
+    time = np.linspace(0, (length := random.choice([0.6, 2.0, 12.0])), round(2000 * length) + 1)
+    spin, start, jitter = random.uniform(22, 45), random.uniform(), 10 ** random.uniform(-6, -3)
+
+    def passes(turns, noise=jitter):
+        number = np.arange(np.ceil(turns[0] + start), np.floor(turns[-1] + start))
+        return np.interp(number, turns + start, time) + noise * random.standard_normal(number.size)
+
+    coasting = spin * time - random.uniform(0.03, 0.2) * time**2 / 2
+    swing = 10 ** random.uniform(-3, -0.5) * np.sin(2 * np.pi * 0.33 * time + random.uniform(0, 6))
+    switched = random.uniform(0.1, 0.9) * length
+    yield passes(coasting)
+    yield passes(spin * time + swing)
+    walk = np.cumsum(1e-5 * random.standard_normal((times := passes(coasting)).size))
+    yield times + walk
+    yield np.round(passes(coasting, 0.0) / 1e-4) * 1e-4
+    yield passes(spin * time - 0.05 * np.maximum(time - switched, 0) ** 2)
+    yield passes(spin * time - 0.1 * np.maximum(switched - time, 0) ** 2)
+
+
+def test_sound_lists_have_no_jump():
+    jumps = 0
+    for seed in range(100):
+        for times in sound_lists(np.random.default_rng([seed, 9])):
+            jumps += "jump" in names(spin_of_times(np.unique(times)))
+    assert jumps <= 3  # of 600; 7 of 10 600 in a longer study, most where a drive is switched
+
+
+def test_a_jump_takes_turns_that_were_lost_with_it():
+    """46 ms, a buffer of 2048 samples, are 1.4 turns: a slope of -0.3 Hz/s shows the whole one."""
+    times = pulse_times(chirp=-0.3) + 1e-5 * np.random.default_rng(1).standard_normal(pulse_times(chirp=-0.3).size)
+    late = times > 4.0 + 0.046
+    found = spin_of_times(np.concatenate([times[times <= 4.0], times[late] - 0.046]))
+    assert "jump" in names(found)
+    assert found.missing in {1, 2}
+    assert abs(found.frequency.value - 30.3 + 0.3 * found.reference_time) < 4 * found.frequency.u
+
+
 def test_wrong_lists_are_refused_with_the_reason():
     with pytest.raises(TooFewPulses, match=r"3 pulses in 0\.2 s, at least 4 are needed"):
         spin_of_times([0.0, 0.1, 0.2])
