@@ -342,7 +342,7 @@ def _parts(found: Solution, slopes: Array, u: Array, gate: float | None) -> dict
         moved = None if gate is None else _moved_by_gate(found, slopes, gate)
     rows = np.array([scatter, excess, more, of_tilt]).T
     return {
-        name: Parts(*row.tolist(), gate=None if moved is None or not np.isfinite(moved[k]) else float(moved[k]))
+        name: Parts(*map(float, row[:4]), None if moved is None or not np.isfinite(moved[k]) else float(moved[k]))
         for k, (name, row) in enumerate(zip(found.form.parameters, rows, strict=True))
         if np.isfinite(row).all()
     }

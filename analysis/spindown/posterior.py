@@ -1,18 +1,18 @@
 """What readings say of a model that is linear near its best point, with all that is uncertain beside it averaged over.
 
-The readings differ from the model by noise of the standard deviation s (in units of their u, or of ν_ref where u is not
-stated), whose neighbours are correlated: ρ = exp(−Δt/τ) after the time Δt (J. Durbin & G. S. Watson, Biometrika 37, 409
-(1950); P. J. Brockwell & R. A. Davis, Time Series (1991), §3).  Nothing is decided beforehand: u may be wrong, noise may
-be correlated, the tilt may be there, and each is a parameter with a prior.
+The readings differ from the model by noise of the standard deviation s (in units of their u, or of ν_ref where u is
+not stated), whose neighbours are correlated: ρ = exp(−Δt/τ) after the time Δt (P. J. Brockwell & R. A. Davis, Time
+Series (1991), §3).  Nothing is decided beforehand: u may be wrong, noise may be correlated, the tilt may be there, and
+each is a parameter with a prior.
 
-- s: a stated u is taken to be known to a quarter (8 degrees of freedom, GUM G.4.2), so readings and statement both count;
-  not stated, s has Jeffreys's prior.
-- τ: its logarithm is evenly distributed from a tenth of the usual interval of the readings (separate gates share nothing
-  but drifts) to ten intervals, half of a usual run: what lasts longer cannot be told from the curve.
+- s: a stated u is taken to be known to a quarter (8 degrees of freedom, GUM G.4.2), so that readings and statement
+  both count; not stated, s has Jeffreys's prior.
+- τ: its logarithm is evenly distributed from a tenth of the usual interval of the readings (separate gates share
+  nothing but drifts) to ten intervals, half of a usual run: what lasts longer cannot be distinguished from the curve.
 - the parameters beside those of the law (`analysis.spindown.tilt`) are normal.  The law's own have flat priors.
 
-For each ρ all is closed form: generalised least squares with a ridge, s at its mode.  The mean over ρ, with the evidence
-as weights, has the u that covers (A. Gelman et al., Bayesian Data Analysis (2013), §14.7).
+For each ρ all is closed form: generalised least squares with a ridge, s at its mode.  Mean and covariance are those of
+the mixture over ρ, with the evidence as weights (A. Gelman et al., Bayesian Data Analysis (2013), §14.7).
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What to know before using the numbers of a spin-down: kinds and values; `levilab.pipelines.spindown` has the words."""
+"""What to know before using the numbers of a spin-down: kinds and values, without words."""
 
 from dataclasses import dataclass
 from typing import Literal

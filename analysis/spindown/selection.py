@@ -82,8 +82,8 @@ def statistics(
 ) -> Statistics:
     """Return the statistics of one fit, its weight not yet among them.
 
-    AICc = misfit + 2K + 2K(K+1)/(n−K−1), BIC = misfit + K ln n, with K one more than the parameters for each of the runs:
-    the size of the noise.
+    AICc = misfit + 2K + 2K(K+1)/(n−K−1), BIC = misfit + K ln n; to the parameters K adds the size of the noise of each
+    of the runs.
     """
     freedom, k = n - n_parameters, n_parameters + runs
     return Statistics(

@@ -37,9 +37,9 @@ MORE = len(PARAMETERS)
 #: The same, and κ and β: what the model has beside the law's own parameters.
 UNCERTAIN = MORE + 2
 
-#: ln(x − 1) and tan²θ at the last reading of a top that is read until it falls, by the equations above.  It falls where
-#: x(η) or Ω(1 − κ sin²θ) has its minimum; makers of magnets give 3° as the largest error of direction (95 % of a Rayleigh
-#: distribution), and the last reading lies up to 1.25 Hz above the fall, which is what a top loses in 10 s.
+#: ln(x − 1) and tan²θ at the last reading of a top that is read until it falls, by the equations above.  It falls
+#: where x(η) or Ω(1 − κ sin²θ) has its minimum; makers of magnets give 3° as the largest error of direction (95 % of a
+#: Rayleigh distribution), and the last reading lies up to 1.25 Hz above the fall, which is what a top loses in 10 s.
 LAST_GAP, LAST_GAP_U = -1.25, 0.4
 LAST_TILT2, LAST_TILT2_U = 0.0072, 0.0034
 

@@ -66,16 +66,24 @@ def verdict(
     probabilities = changes or ((change.p,) if change else ())
     changed = tuple(k for k, p in enumerate(probabilities) if p * len(probabilities) < CHANGED)  # Bonferroni
     describes = 2 * len(changed) <= len(probabilities) - (len(probabilities) == 1)
-    simple = [n for n in (*listed["tied"], *listed["weak"]) if not any(LAWS[n].contains(o) for o in LAWS.values())]
+    simple = [name for name in (*listed["tied"], *listed["weak"]) if is_simple(name)]
     simpler = min(fits[name].n_parameters for name in listed["tied"]) < fits[best].n_parameters
     return Verdict(
         best,
         telling and len(simple) <= 1 and describes and not simpler,
-        *listed.values(),
+        indistinguishable=listed["tied"],
+        needless=listed["needless"],
+        weak=listed["weak"],
+        excluded=listed["excluded"],
         change=change,
         changed=changed,
         describes=describes,
     )
+
+
+def is_simple(name: str) -> bool:
+    """Return whether a law contains no other one."""
+    return not any(LAWS[name].contains(other) for other in LAWS.values())
 
 
 def _kind(fits: Mapping[str, Statistics], name: str, best: str) -> str:

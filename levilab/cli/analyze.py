@@ -56,14 +56,6 @@ class AnalyzeGroup(typer.core.TyperGroup):
 analyze_app = typer.Typer(cls=AnalyzeGroup, no_args_is_help=True, add_completion=False)
 
 
-class Uncertainty(StrEnum):
-    """How the uncertainties of the fitted constants are found."""
-
-    COVARIANCE = "covariance"
-    PROFILE = "profile"
-    BOOTSTRAP = "bootstrap"
-
-
 class Tilt(StrEnum):
     """Whether the count of a spin-down holds the tilt of the top's moment."""
 
@@ -142,22 +134,14 @@ OPTIONS = {
         ReadingU,
         read=_positive("reading_u", "a standard uncertainty above 0 [Hz] is expected"),
     ),
-    "uncertainty": Option(
-        Annotated[
-            Uncertainty,
-            typer.Option("--uncertainty", help="profile and bootstrap add 68 % intervals, and take longer."),
-        ],
-        Uncertainty.COVARIANCE,
-        str,
-    ),
     "keep_outliers": Option(KeepOutliers, False),
     "tilt": Option(
         Annotated[
             Tilt,
             typer.Option(
                 "--tilt",
-                help="Whether counts hold the tilt of the top's moment.  auto: fitted if the counts demand it; u "
-                "covers a tilt that noise may hide.  none: a top that only spins.",
+                help="Whether counts hold the tilt of the top's moment.  auto: as fitted, but for a mock run whose top "
+                "only spins.  none: a top that only spins.",
             ),
         ],
         Tilt.AUTO,
@@ -241,7 +225,7 @@ _EACH = "each"
 COMMANDS = {
     "spindown": Command(
         "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude.",
-        ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "clock_u"),
+        ("columns", "channel", "rate", "reading_u", "keep_outliers", "tilt", "device", "clock_u"),
     ),
     "spin": Command(
         "Spin frequency and slope from traces of a detector (WAV, scopes' CSV, .npy), lists of pulse times, runs with "
@@ -262,7 +246,7 @@ COMMANDS = {
     ),
     _EACH: Command(
         "Each analysis that suits the runs or data files; --json prints a list where several suit.",
-        ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "method", "clock_u"),
+        ("columns", "channel", "rate", "reading_u", "keep_outliers", "tilt", "device", "method", "clock_u"),
     ),
 }
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from levilab.cli.analyze import OPTIONS, analysis_options
+from levilab.cli.analyze import analysis_options
 from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.cli.quantities import with_options
@@ -52,7 +52,6 @@ def report(
         "channel": channel,
         "rate": rate,
         "reading_u": reading_u,
-        "uncertainty": OPTIONS["uncertainty"].default,
         "keep_outliers": keep_outliers,
     }
     app = context.find_root().command

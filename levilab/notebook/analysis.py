@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     One: TypeAlias = "Run | str | PathLike[str] | pd.DataFrame"
 
 _CHOICES = {
-    "uncertainty": ("covariance", "profile", "bootstrap"),
     "tilt": ("auto", "none", "fitted"),
     "method": ("auto", "edges", "matched", "likelihood"),
 }

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _MOST_NAMED = 12
 #: Options of analyses that the command line gives as they are.
 SAME_IN_COMMANDS = (
-    "columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "method", "orthogonal",
+    "columns", "channel", "rate", "reading_u", "keep_outliers", "tilt", "method", "orthogonal",
     "clock_u", "free_radii"
 )  # fmt: skip
 #: Those of them that `levilab report` has, too.
