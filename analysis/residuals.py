@@ -134,6 +134,8 @@ def gross_errors(t: Array, n_parameters: int, p: float = 1e-3) -> NDArray[np.int
 NOISE = 0.8
 #: Up to so many places every stretch between two of them is tried; of more readings so many, evenly distributed.
 _PLACES = 40
+#: Up to so many readings a jump between any two neighbours is tried, too.
+_EVERY_JUMP = 300
 
 
 @dataclass(frozen=True)
@@ -178,8 +180,9 @@ def largest_change(time: Array, residuals: Array, slopes: Array) -> Change | Non
         return None
     places = np.unique(np.linspace(1, n - 1, min(n - 1, _PLACES)).round().astype(int))
     first, last = np.array([(i, j) for i in places for j in places if i < j and i < n - 2]).T
-    jumps = np.arange(1, n - 2)
-    first, last = np.concatenate([first, jumps]), np.concatenate([last, jumps + 1])
+    if n <= _EVERY_JUMP:
+        jumps = np.arange(1, n - 2)
+        first, last = np.concatenate([first, jumps]), np.concatenate([last, jumps + 1])
     pairs = np.unique(np.stack([first, last]), axis=1)
     first, last = pairs
     at = np.arange(n)

@@ -138,7 +138,9 @@ class DragLaw:
 
     def contains(self, other: "DragLaw") -> bool:
         """Return whether the other law is this one with some constants at fixed values."""
-        return set(other.orders) < set(self.orders) or (not self.orders and len(other.orders) == 1)
+        if not self.orders:
+            return len(other.orders) == 1
+        return bool(other.orders) and set(other.orders) < set(self.orders)
 
     @property
     def parameters(self) -> tuple[str, ...]:

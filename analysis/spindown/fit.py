@@ -10,6 +10,7 @@ from analysis.errors import UnknownName
 from analysis.residuals import Change, gross_errors, largest_change, studentised
 from analysis.spindown.drag import LAWS
 from analysis.spindown.lawfit import LawFit, Solution, fit_law, solution
+from analysis.spindown.posterior import INDEPENDENT, RHO
 from analysis.spindown.readings import Readings, checked
 from analysis.spindown.remarks import Remark
 from analysis.spindown.selection import NO_FIT, Statistics, weigh
@@ -82,8 +83,8 @@ class _Model:
     top: Top
     nutation: Nutation
 
-    def fit(self, law: str, readings: Readings) -> Solution:
-        return solution(LAWS[law], readings, tilt=self.tilt, top=self.top, nutation=self.nutation)
+    def fit(self, law: str, readings: Readings, rho: Array = RHO) -> Solution:
+        return solution(LAWS[law], readings, tilt=self.tilt, top=self.top, nutation=self.nutation, rho=rho)
 
 
 def fit_spin_down(
@@ -128,15 +129,13 @@ def fit_spin_down(
     chosen = _known("drag law", laws, LAWS)
     given = checked(time, spin_frequency, u)
     model = _Model(tilt, top, DRIVEN if driven else CALM)
-    search = _search_outliers(given, model)
-    left_out = search.indices[:0] if keep_outliers else search.indices
-    readings = given.without(left_out) if len(left_out) else given
-    solved = {"power": search.power} if search.power and len(search.power.readings) == len(readings) else {}
-    found = {name: solved.get(name) or model.fit(name, readings) for name in chosen}
+    outliers = _search_outliers(given, model)
+    readings = given if keep_outliers or not len(outliers) else given.without(outliers)
+    found = {name: model.fit(name, readings) for name in chosen}
     stats, criterion = weigh({name: each.statistics for name, each in found.items()})
     fits = {name: fit_law(each, gate) for name, each in found.items()}
     best = next(iter(stats))
-    decision = verdict(stats, criterion, change=_change(found[best], (solved | found).get("power")))
+    decision = verdict(stats, criterion, change=_change(found[best], found.get("power")))
     return SpinDown(
         fits=tuple(replace(fits[name], statistics=stats[name]) for name in chosen),
         best=best,
@@ -144,10 +143,10 @@ def fit_spin_down(
         time=readings.time,
         frequency=readings.frequency,
         u=readings.u,
-        outliers=tuple(search.indices.tolist()),
+        outliers=tuple(outliers.tolist()),
         start_time=readings.start_time,
         remarks=(
-            *_about_outliers(given, search.indices, fits[best], kept=keep_outliers),
+            *_about_outliers(given, outliers, fits[best], kept=keep_outliers),
             *_too_good(best, stats[best], fits[best].reference[0]),
             *comparison_remarks(stats, best),
             *correlation_remarks(fits[best].rho, len(readings)),
@@ -191,34 +190,27 @@ def _known(kind: str, names: Iterable[str], known: Iterable[str]) -> tuple[str, 
     return seen
 
 
-@dataclass(frozen=True, eq=False)
-class _Search:
-    """Gross outliers: their indices, and the power law fitted to the others."""
-
-    indices: NDArray[np.intp]
-    power: Solution | None
-
-
-def _search_outliers(readings: Readings, model: _Model) -> _Search:
+def _search_outliers(readings: Readings, model: _Model) -> NDArray[np.intp]:
     """Return readings that lie too far from a power law fitted to the others, at most a tenth beside the miscounts.
 
-    The worst goes first, then all is fitted again: one at a time, or a hundredth of very many.
+    The worst goes first, then all is fitted again: one at a time, or a hundredth of very many.  The noise counts as
+    independent here: correlated noise could follow a reading that lies off.
     """
     n = len(readings)
     if n < FEWEST_FOR_OUTLIERS:
-        return _Search(np.empty(0, dtype=np.intp), None)
+        return np.empty(0, dtype=np.intp)
     left_out = _miscounts(readings)
     allowed = len(left_out) + max(1, n // 10)
     while True:
         kept = np.delete(np.arange(n), left_out)
-        found = model.fit("power", readings.without(left_out) if len(left_out) else readings)
+        found = model.fit("power", readings.without(left_out) if len(left_out) else readings, INDEPENDENT)
         most, worst = min(allowed - len(left_out), max(1, n // 100)), kept[:0]
         if found.degrees_of_freedom > 1 and found.posterior is not None:
             floor = 1.0 if readings.sigma_known else ROUNDING  # a stated uncertainty is a scatter to be expected
             t = studentised(found.residuals, found.leverage, len(found.law.parameters), floor)
             worst = gross_errors(t, len(found.law.parameters))[:most]
         if not len(worst):
-            return _Search(np.sort(left_out), found)
+            return np.sort(left_out)
         left_out = np.append(left_out, kept[worst])
 
 
@@ -239,7 +231,7 @@ def _miscounts(readings: Readings) -> NDArray[np.intp]:
     far = np.abs(readings.x / smooth - 1) > MISCOUNT / 2
     if not far.any():
         return np.flatnonzero(far)
-    found = solution(LAWS["power"], replace(readings, x=smooth))
+    found = solution(LAWS["power"], replace(readings, x=smooth), rho=INDEPENDENT)
     for _ in range(10):
         # of an exponent below 1 the fitted top may have stopped: what is read then is far off, not infinitely so
         off = np.abs(readings.x / np.maximum(LAWS["power"].spin(readings.tau, found.q), ROUNDING) - 1)
@@ -250,7 +242,7 @@ def _miscounts(readings: Readings) -> NDArray[np.intp]:
         if (now == far).all():
             break
         far = now
-        found = solution(LAWS["power"], readings.without(np.flatnonzero(far)))
+        found = solution(LAWS["power"], readings.without(np.flatnonzero(far)), rho=INDEPENDENT)
     return np.flatnonzero(far)
 
 

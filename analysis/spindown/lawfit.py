@@ -11,7 +11,7 @@ from analysis.budget import gate_bias
 from analysis.least_squares import solve
 from analysis.residuals import durbin_watson, runs_test_p
 from analysis.spindown.drag import LAWS, DragLaw
-from analysis.spindown.posterior import Posterior, posterior
+from analysis.spindown.posterior import RHO, Posterior, posterior
 from analysis.spindown.readings import Readings
 from analysis.spindown.remarks import Remark
 from analysis.spindown.selection import Statistics, statistics
@@ -214,7 +214,13 @@ class Solution:
 
 
 def solution(
-    law: DragLaw, readings: Readings, *, tilt: bool = False, top: Top = THESIS_TOP, nutation: Nutation = CALM
+    law: DragLaw,
+    readings: Readings,
+    *,
+    tilt: bool = False,
+    top: Top = THESIS_TOP,
+    nutation: Nutation = CALM,
+    rho: Array = RHO,
 ) -> Solution:
     """Return the best point of one law: the mean of what is known after the readings.
 
@@ -224,6 +230,7 @@ def solution(
         tilt: whether the count has the tilt of the top.
         top: whose count it is.
         nutation: as expected.
+        rho: correlations of neighbouring readings' noise that are possible.
     """
     tau, weight, p = readings.tau, readings.weight, len(law.parameters)
     q, converged = solve(
@@ -249,7 +256,7 @@ def solution(
                 found = None
                 break
             found = posterior(
-                readings.time, left, slopes, (expected - q[p:], u), stated=readings.sigma_known, least=least
+                readings.time, left, slopes, (expected - q[p:], u), stated=readings.sigma_known, least=least, rho=rho
             )
             if found is None:
                 break

@@ -29,6 +29,7 @@ STATED_FREEDOM = 8
 #: Correlation times of the noise, in intervals between readings, and the correlation of neighbours.
 _TIMES = 10 ** np.linspace(-1.0, 1.0, 9)
 RHO = np.exp(-1 / _TIMES)
+INDEPENDENT = np.zeros(1)
 #: Columns whose own part is smaller than this cannot be told from the others.
 _ALIKE = 1e-12
 _ROUNDS = 6
@@ -45,7 +46,7 @@ class Posterior:
             the parameters with a prior, whose squares add up, shape (k, p).
         independent: covariance by the noise alone, if it were not correlated, shape (p, p).
         rho, rho_u: correlation of neighbours, and its standard uncertainty.
-        variance: s² as the mean over ρ.
+        variance: s², if the noise were not correlated.
         misfit: −2 ln of the likelihood of the law's parameters at its maximum, all else averaged over.
     """
 
@@ -67,6 +68,7 @@ def posterior(
     *,
     stated: bool,
     least: float,
+    rho: Array = RHO,
 ) -> Posterior | None:
     """Average over the noise and all parameters but those that are asked for.
 
@@ -77,6 +79,7 @@ def posterior(
         priors: of the last k parameters: expected value less the present one, and its standard uncertainty.
         stated: whether u was.
         least: of s: the rounding of numbers.
+        rho: correlations of neighbours, equally probable beforehand.
 
     Returns:
         None where the readings do not separate the parameters.
@@ -89,14 +92,14 @@ def posterior(
         return None
     order = np.r_[p - k : p, : p - k]  # those with priors first: a corner of the triangle is theirs alone
     columns = np.vstack([slopes[order] / scale[order, None], residuals])
-    maps = [whitening(time, rho) for rho in RHO]
-    triangles = np.zeros((len(RHO), p + 1, p + 1))
+    maps = [whitening(time, each) for each in rho]
+    triangles = np.zeros((len(rho), p + 1, p + 1))
     for j, white in enumerate(maps):
         rows = np.linalg.qr(white(columns).T, mode="r")
         triangles[j, : len(rows)] = rows
     steps = np.diff(time)
-    log_det = np.log1p(-(RHO[:, None] ** (2 * steps / np.median(steps)))).sum(axis=1)
-    ridge = np.zeros((len(RHO), k, p + 1))
+    log_det = np.log1p(-(rho[:, None] ** (2 * steps / np.median(steps)))).sum(axis=1)
+    ridge = np.zeros((len(rho), k, p + 1))
     ridge[:, np.arange(k), np.arange(k)] = 1 / (u * scale[p - k :])
     ridge[:, :, p] = expected / u
 
@@ -139,8 +142,8 @@ def posterior(
         covariance=(spread / np.outer(units, units))[np.ix_(back, back)],
         beforehand=(of_priors / units)[:, back],
         independent=(alone / np.outer(units, units))[np.ix_(back, back)],
-        rho=float(weight @ RHO),
-        rho_u=float(np.sqrt(weight @ RHO**2 - (weight @ RHO) ** 2)),
-        variance=float(weight @ s2),
+        rho=float(weight @ rho),
+        rho_u=float(np.sqrt(max(weight @ rho**2 - (weight @ rho) ** 2, 0.0))),
+        variance=float(s2[0]),
         misfit=float(misfits.min() - 2 * np.log(chance)),
     )

@@ -58,7 +58,7 @@ class AcquisitionRequest:
     wiring: Callable[[], Wiring]
     out: Path = Path("runs")
     synthetic_how: str | None = None
-    world: Literal[spin] | None = None
+    world: Literal["spin"] | None = None
     scene: dict[str, Any] | None = None
     seed: int | None = None
     note: str = ""
