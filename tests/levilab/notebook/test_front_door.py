@@ -40,7 +40,7 @@ RECORD = SAMPLE_DATA / "scope-files" / "rigol-ds1000z.csv"
 
 #: Analysis → a run, options for its bare readings, a value, and the truth: what made the readings, or was published.
 CASES = {
-    "spindown": ("spin-down-1", {}, "c32", 2.3711e-4),
+    "spindown": ("spin-down-1", {"tilt": "none"}, "c32", 2.3711e-4),
     "field": ("field-scan", {"device": DEVICE}, "strength", 1.409299e-3),
     "limit": ("lower-limits", {}, "mean", 21.86),
     "precession": ("precession-sweep", {}, "slope", 1.0),
@@ -283,7 +283,7 @@ WRONG = {
     ),
     "no file": (lambda: levilab.analyze("nowhere.csv"), DataError, "nowhere.csv: there is no such file"),
     "foreign option": (lambda: levilab.analyze(spin_down(), method="edges"), UsageError, "method: is no option of"),
-    "no such word": (lambda: levilab.analyze(spin_down(), uncertainty="x"), UsageError, "uncertainty = x: covariance,"),
+    "no such word": (lambda: levilab.analyze(spin_down(), tilt="x"), UsageError, "tilt = x: auto,"),
     "no positive u": (lambda: levilab.analyze(spin_down(), reading_u=-1.0), UsageError, "reading_u = -1: a standard"),
     "u alone": (lambda: levilab.analyze(spin_down(), height_u_m=1e-3), UsageError, "goes with `height_m` alone"),
     "height alone": (
