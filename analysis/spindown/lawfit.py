@@ -348,11 +348,13 @@ def _parts(found: Solution, slopes: Array, u: Array, gate: float | None) -> dict
         excess, more = np.sqrt(alone**2 - scatter**2), np.sqrt(noise**2 - alone**2)
         moved = None if gate is None else _moved_by_gate(found, slopes, gate)
     rows = np.array([scatter, excess, more, of_tilt]).T
-    return {
-        name: Parts(*map(float, row[:4]), None if moved is None or not np.isfinite(moved[k]) else float(moved[k]))
-        for k, (name, row) in enumerate(zip(found.form.parameters, rows, strict=True))
-        if np.isfinite(row).all()
-    }
+    found_parts = {}
+    for k, name in enumerate(found.form.parameters):
+        if np.isfinite(rows[k]).all():
+            bias = None if moved is None or not np.isfinite(moved[k]) else float(moved[k])
+            one, two, three, four = rows[k].tolist()
+            found_parts[name] = Parts(one, two, three, four, bias)
+    return found_parts
 
 
 def _moved_by_gate(found: Solution, slopes: Array, gate: float) -> Array:

@@ -147,14 +147,12 @@ def test_the_nutation_that_a_drive_leaves_is_expected_after_a_drive():
 
 
 def test_a_top_of_another_shape_is_described_by_its_file():
-    other = Top(kappa=0.3, kappa_u=0.01, resonance_hz=18.0)
-    fits = [
-        fit_spin_down(T, COUNTS, 0.01, laws=["disc"], keep_outliers=True, top=top).fit("disc")
-        for top in (THESIS_TOP, other)
-    ]
-    assert [fit.top for fit in fits] == [THESIS_TOP, other]
+    fits = []
+    for top in (THESIS_TOP, Top(kappa=0.3, kappa_u=0.01, resonance_hz=18.0)):
+        fits.append(fit_spin_down(T, COUNTS, 0.01, laws=["disc"], keep_outliers=True, top=top).fit("disc"))
+        assert fits[-1].top == top
+        assert fits[-1].spin_frequency(T) == pytest.approx(COUNTS - fits[-1].residuals, abs=1e-9)
     assert fits[0].parameters["c32"].value != fits[1].parameters["c32"].value
-    assert fits[1].spin_frequency(T) == pytest.approx(COUNTS - fits[1].residuals, abs=1e-9)
 
 
 SIMULATED = json.loads((Path(__file__).parent / "counts.json").read_text(encoding="utf-8"))

@@ -222,7 +222,9 @@ def test_the_report_shows_what_analyze_found(run: Path, tmp_path: Path) -> None:
     analysis = analyze_spindowns([run], SpinDownOptions(tilt="none"))
     save(ANALYSES["spindown"], analysis)
     text = reported(run, output=tmp_path / "report.html")
-    assert with_uncertainty(analysis.runs[0].fit("disc").parameters["c32"]).split()[0] in text  # as the terminal shows it
+    assert (
+        with_uncertainty(analysis.runs[0].fit("disc").parameters["c32"]).split()[0] in text
+    )  # as the terminal shows it
     assert f"as levilab analyze found it: {run / 'result.json'}" in text
 
 

@@ -215,7 +215,7 @@ def test_a_stated_reading_uncertainty_takes_the_place_of_the_scatter(tmp_path: P
     assert without.statistics.reduced_chi_square is None
     assert with_u.statistics.reduced_chi_square == pytest.approx(1, abs=1)
     ratio = without.parameters["c32"].u / with_u.parameters["c32"].u  # type: ignore[operator]
-    # what is stated counts as 8 readings beside the 18 that scatter; 0.15: the correlation is known a little better with u
+    # what is stated counts as 8 readings beside the 18 that scatter; 0.15: u tells more of the correlation
     expected = with_u.statistics.reduced_chi_square / with_u.statistics.variance_factor  # type: ignore[operator]
     assert ratio**2 == pytest.approx(expected, rel=0.15)
 

@@ -273,9 +273,8 @@ def test_a_run_with_a_tilt_of_its_own_is_recalled_with_its_curves(tmp_path: Path
     """Counts good to 5 mHz show the tilt; its curves, tables and words come back from result.json."""
     t, law = np.arange(0, 160, 10.0), LAWS["disc"]
     q = law.dimensionless(np.array([40.0, 2.34e-4]), 29.0, 160.0)
-    counts = 29.0 * counted(law, t / 160.0, np.array([*q, 0.03**2, 21.6 / 29.0, 0.0])) + np.random.default_rng(
-        6
-    ).normal(0, 0.005, t.size)
+    solution = np.array([*q, 0.03**2, 21.6 / 29.0, 0.0])
+    counts = 29.0 * counted(law, t / 160.0, solution) + np.random.default_rng(6).normal(0, 0.005, t.size)
     rows = [f"{time:g},{spin:.4f}" for time, spin in zip(t, counts, strict=True)]
     (tmp_path / "run.csv").write_text("\n".join(["time_s,spin_frequency_hz", *rows, ""]), encoding="utf-8")
     analysis = analyzed(tmp_path / "run.csv")
