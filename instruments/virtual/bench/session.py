@@ -164,9 +164,11 @@ class Session:
         return not work.done
 
     def cancel(self, work: Work[None]) -> None:
-        """End this work before its end."""
+        """End this work on a message, and what the message has asked for."""
         with self.lock:
-            work.cancel()
+            if not work.done:
+                work.cancel()
+                self.device.end_since(self.device.begun)
 
     def _run(self, message: str, before: Work[None] | None) -> Steps[None]:
         if before and not before.done:
@@ -279,8 +281,13 @@ class Session:
                 self.device.parser.report(error)
 
     def close(self) -> None:
-        """End the session, and release its lock."""
-        self.client_lock.release(self)
+        """End the session: release its lock, and end the instrument's work on a question of its program."""
+        with self.lock:
+            self.client_lock.release(self)
+            now, epoch = self.device.clock.now(), self.device.epoch
+            for answer in self._answers:
+                if answer.epoch == epoch and answer.begun <= now < answer.ready:
+                    self.device.end_since(answer.begun)
 
     def _report_unterminated(self, ready: float | None) -> None:
         """Queue error −420 where a program reads and has asked nothing (IEEE 488.2, 6.3.2.2)."""

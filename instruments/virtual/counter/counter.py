@@ -129,6 +129,12 @@ class VirtualCounter(VirtualInstrument):
         super().abandon()
         self._stop()
 
+    def end_since(self, begun: float) -> None:
+        """See the base: end a measurement that began since then."""
+        super().end_since(begun)
+        if self._run and self._run.begin >= begun:
+            self._stop()
+
     def reset(self) -> None:
         """*RST: go idle, with an empty memory."""
         self.choose("FREQ", (1,))

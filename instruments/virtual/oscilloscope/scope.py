@@ -309,6 +309,11 @@ class VirtualOscilloscope(VirtualInstrument):
         super().abandon()
         self.acquisition.unblock()
 
+    def end_since(self, begun: float) -> None:
+        """See the base: end an acquisition that blocks."""
+        super().end_since(begun)
+        self.acquisition.unblock()
+
     def record(self) -> Record:
         """The latest record; the answer waits for it if one is under way.  Raises ScpiError if there is none."""
         acquisition = self.acquisition
