@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fnmatch
 import itertools
 import math
 from typing import TYPE_CHECKING, Any, TypeVar, cast
@@ -36,6 +35,8 @@ _DEFAULT_ATTRIBUTES: dict[int, Any] = {
     ResourceAttribute.termchar_enabled: False,
     ResourceAttribute.send_end_enabled: True,
     ResourceAttribute.resource_lock_state: constants.AccessModes.no_lock,
+    ResourceAttribute.resource_manufacturer_name: "levilab",
+    ResourceAttribute.interface_number: 0,
 }
 #: The same for a serial line (VPP-4.3, 5.1.2): 9600 baud, 8N1.
 _SERIAL_ATTRIBUTES: dict[int, Any] = {
@@ -79,9 +80,8 @@ class LevilabVisaLibrary(VisaLibraryBase):
         return cast("VISARMSession", next(_numbers)), self.handle_return_value(None, StatusCode.success)
 
     def list_resources(self, session: VISARMSession, query: str = "?*::INSTR") -> tuple[str, ...]:
-        """ViFindRsrc; the query's ``?*`` is ``*`` here."""
-        pattern = query.upper().replace("?*", "*")
-        return tuple(name for name in self._bench().instruments if fnmatch.fnmatch(name.upper(), pattern))
+        """ViFindRsrc."""
+        return rname.filter(self._bench().instruments, query)
 
     def parse_resource_extended(self, session: VISARMSession, resource_name: str) -> tuple[ResourceInfo, StatusCode]:
         """ViParseRsrcEx; resource names know no case (VPP-4.3, 4.3.1), pyvisa's parser knows INSTR only."""

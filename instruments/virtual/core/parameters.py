@@ -33,6 +33,25 @@ def parameter(parameters: list[str]) -> str:
     return only
 
 
+def quoted(parameters: list[str]) -> str:
+    """Return the text of the only parameter, a string in quotes (IEEE 488.2, 7.7.5).
+
+    Raises:
+        ScpiError: it is no string, or something follows the string.
+
+    >>> quoted(["'it''s'"])
+    "it's"
+    """
+    given = parameter(parameters)
+    quote = given[0]
+    if len(given) < 2 or quote not in "\"'" or given[-1] != quote:
+        raise ScpiError(-104, given[:20])
+    text = given[1:-1].replace(quote * 2, "\0")
+    if quote in text:
+        raise ScpiError(-103, given[:20])
+    return text.replace("\0", quote)
+
+
 def no_parameters(parameters: list[str]) -> None:
     """Check that there are no parameters, a channel list aside.  Raises ScpiError."""
     if optional_parameter(parameters):

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 ERRORS = {
     -102: "Syntax error",
+    -103: "Invalid separator",
     -104: "Data type error",
     -108: "Parameter not allowed",
     -109: "Missing parameter",
@@ -88,8 +89,8 @@ class Row:
         """Whether the row has a query."""
         return True
 
-    def set(self, device: Any, parameters: list[str]) -> Steps[None] | None:
-        """Execute the command.  Raises ScpiError."""
+    def set(self, device: Any, parameters: list[str]) -> Steps[Any] | str | None:
+        """Execute the command, and return the answer where it has one.  Raises ScpiError."""
         raise NotImplementedError
 
     def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:

@@ -23,6 +23,7 @@ from instruments.virtual.core.parameters import (
     one_of,
     optional_parameter,
     parameter,
+    quoted,
 )
 from instruments.virtual.core.parser import Row, ScpiError, Value
 
@@ -226,10 +227,7 @@ class Text(Row):
 
     def set(self, device: Device, parameters: list[str]) -> None:
         """See the base."""
-        given = parameter(parameters)
-        if len(given) < 2 or given[0] not in "\"'" or given[-1] != given[0]:
-            raise ScpiError(-104)
-        _put(device, self.name, given[1:-1].translate(_NOT_IN_TEXTS)[: self.longest].upper())
+        _put(device, self.name, quoted(parameters).translate(_NOT_IN_TEXTS)[: self.longest].upper())
 
     def ask(self, device: Device, parameters: list[str]) -> str:
         """See the base."""
@@ -279,6 +277,20 @@ class Ask(Row):
         """See the base."""
         no_parameters(parameters)
         return self.answer(device)
+
+
+@dataclass(frozen=True)
+class Tell(Ask):
+    """A command that is answered, without parameters; its query is the same."""
+
+    @property
+    def settable(self) -> bool:
+        """See the base."""
+        return True
+
+    def set(self, device: Any, parameters: list[str]) -> Steps[str] | str:
+        """See the base."""
+        return self.ask(device, parameters)
 
 
 @dataclass(frozen=True)

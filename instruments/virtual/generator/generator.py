@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.core.device import VirtualInstrument
-from instruments.virtual.core.parameters import choice, limit, nr3, optional_parameter, parameter
+from instruments.virtual.core.parameters import choice, limit, nr3, optional_parameter, parameter, quoted
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.generator.arbitrary import DeviceError, attribute, plain_name, samples
 from instruments.virtual.generator.channel import INFINITE, Channel, Output, quantity_of
@@ -114,14 +114,11 @@ class VirtualGenerator(VirtualInstrument):
 
     def set_text(self, parameters: list[str]) -> None:
         """DISPlay:TEXT: a string in quotes.  Raises ScpiError."""
-        given = parameter(parameters)
-        if len(given) < 2 or given[0] not in "\"'" or given[-1] != given[0]:
-            raise ScpiError(-104, given[:20])
-        self._text = given[1:-1][:_LONGEST_TEXT]
+        self._text = quoted(parameters)[:_LONGEST_TEXT]
 
     def text(self) -> str:
         """DISPlay:TEXT?: in quotes."""
-        return f'"{self._text}"'
+        return '"{}"'.format(self._text.replace('"', '""'))
 
     def clear_text(self) -> None:
         """DISPlay:TEXT:CLEar: none."""

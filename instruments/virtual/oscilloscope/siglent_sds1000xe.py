@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from instruments.virtual.core.parameters import choice, parameter
 from instruments.virtual.core.parser import Row, ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Word, short_header
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Tell, Word, short_header
 from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, one_two_five
 from instruments.virtual.oscilloscope.screenshot import bmp24, draw
 
@@ -99,8 +99,8 @@ _REST: tuple[Row, ...] = (
     Both("(SANU|SAMPLE_NUM)", answer=lambda s, p: s.sample_number(p)),
     Ask("(SAST|SAMPLE_STATUS)", lambda s: s.reply("SAST", s.state())),
     Ask("INR", lambda s: s.reply("INR", str(s.internal_state()))),
-    Ask("(SCDP|SCREEN_DUMP)", lambda s: s.picture()),
-    Do("(BUZZ|BUZZER)"),
+    Tell("(SCDP|SCREEN_DUMP)", lambda s: s.picture()),
+    Switch("(BUZZ|BUZZER)", "buzzer", default=True, words=("OFF", "ON")),
 )
 
 
