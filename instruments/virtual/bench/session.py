@@ -81,7 +81,7 @@ class AnswerFault(Protocol):
         """Whether the fault changes the answer to this message."""
 
     def act(self, session: Session, answer: Answer) -> Answer | None:
-        """The answer as the fault leaves it, None where it is lost."""
+        """Return the answer as the fault leaves it, None where it is lost."""
 
 
 @dataclass(eq=False)
@@ -132,7 +132,7 @@ class Session:
                     run_to_end(self._run(message, self.device.work))
 
     def messages(self, data: bytes, *, end: bool) -> Iterator[str]:
-        """The messages that these bytes complete, for begin().
+        """Yield the messages that these bytes complete, for begin().
 
         Empty ones among them are pauses for other work: to split a million line feeds takes a second.
         """
@@ -313,7 +313,7 @@ class Session:
             self.device.abandon()
 
     def status_byte(self) -> int:
-        """The status byte, as a serial poll reads it."""
+        """Return the status byte, as a serial poll reads it."""
         with self.lock:
             ready = self.ready()
             there = ready is not None and ready <= self.device.clock.now()

@@ -66,7 +66,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
         self._sessions = {}
 
     def _bench(self) -> VirtualBench:
-        """The bench of this library; the default one, made at the first use, where none was given."""
+        """Return the bench of this library; the default one, made at the first use, where none was given."""
         if self.bench is None:
             self.bench = self.default_bench()
         return self.bench
@@ -118,7 +118,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
         return number, self.handle_return_value(number, StatusCode.success)
 
     def _name_on_bench(self, resource_name: str) -> str:
-        """The bench's own spelling of a name: PyVISA fills in what is left out (USB's interface, boards)."""
+        """Return the bench's own spelling of a name: PyVISA fills in what is left out (USB's interface, boards)."""
         wanted = _canonical(resource_name)
         return next((name for name in self._bench().instruments if _canonical(name) == wanted), resource_name)
 
@@ -258,7 +258,7 @@ def _seconds(timeout: int) -> float:
 
 
 def _line_settings(attributes: Attributes) -> LineSettings:
-    """The program's end of a serial line; VISA counts stop bits in tenths and parities from none to space."""
+    """Return the program's end of a serial line; VISA counts stop bits in tenths and parities from none to space."""
     return LineSettings(
         int(attributes[ResourceAttribute.asrl_baud_rate]),
         int(attributes[ResourceAttribute.asrl_data_bits]),
@@ -268,7 +268,7 @@ def _line_settings(attributes: Attributes) -> LineSettings:
 
 
 def _termchar(attributes: Attributes) -> bytes:
-    """The character that ends a read, or none; a serial line has one by default (VPP-4.3, VI_ATTR_ASRL_END_IN)."""
+    """Return the character that ends a read, or none; a serial line has one by default (VI_ATTR_ASRL_END_IN)."""
     serial = attributes.get(ResourceAttribute.asrl_end_in) == constants.SerialTermination.termination_char
     wanted = attributes[ResourceAttribute.termchar_enabled] or serial
     return bytes([attributes[ResourceAttribute.termchar]]) if wanted else b""

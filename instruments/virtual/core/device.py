@@ -163,7 +163,7 @@ class VirtualInstrument:
         yield from ()
 
     def begin_next(self) -> None:
-        """Called before each further command or query of a message; by default it takes no time of its own."""
+        """Begin a further command or query of a message; by default it takes no time of its own."""
 
     def _answer(self, text: str | None) -> Answer | None:
         if text is None:
@@ -195,27 +195,27 @@ class VirtualInstrument:
     # --- what the rows need ---
 
     def value(self, name: str) -> float:
-        """A setting that is a number."""
+        """Return a setting that is a number."""
         return float(self.settings[name])
 
     def read_boolean(self, text: str) -> bool:
-        """The value of a switch, from its text on the wire.  Raises ScpiError."""
+        """Return the value of a switch, from its text on the wire.  Raises ScpiError."""
         return boolean(text)
 
     def spell(self, value: float) -> str:
-        """A number as this instrument prints it."""
+        """Return a number as this instrument prints it."""
         return nr3(value)
 
     def reply(self, header: str, text: str, unit: str = "") -> str:
-        """An answer to the query of a row: the text alone."""
+        """Return an answer to the query of a row: the text alone."""
         return text
 
     def on_number_change(self, name: str, before: float) -> None:
-        """Called after a setting has changed.  before: its former value, 0 where that was no number."""
+        """React to a setting that has changed.  before: its former value, 0 where that was no number."""
         self.on_change(name)
 
     def on_change(self, name: str) -> None:
-        """Called after a setting has changed."""
+        """React to a setting that has changed."""
 
     @contextlib.contextmanager
     def all_or_none(self) -> Iterator[None]:
@@ -236,7 +236,7 @@ class VirtualInstrument:
     # --- status ---
 
     def status_byte(self, *, message_available: bool = False) -> int:
-        """The status byte (IEEE 488.2, 11.2)."""
+        """Return the status byte (IEEE 488.2, 11.2)."""
         return self.status.byte(errors_waiting=bool(self.parser.errors), message_available=message_available)
 
     def clear_status(self) -> None:

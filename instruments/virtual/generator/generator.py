@@ -46,7 +46,7 @@ class VirtualGenerator(VirtualInstrument):
         )
 
     def channel(self, n: int) -> Channel:
-        """The channel of this number."""
+        """Return the channel of this number."""
         return self.channels[n - 1]
 
     # --- what happens ---
@@ -69,11 +69,11 @@ class VirtualGenerator(VirtualInstrument):
                 self._listener(instant, self.channels[0].signal(instant))
 
     def signal(self, channel: int = 1) -> Output:
-        """What stands at the terminals of a channel."""
+        """Return the signal at the terminals of a channel."""
         return self.channel(channel).signal(self.clock.now())
 
     def reset(self) -> None:
-        """The state after ``*RST``: all outputs off."""
+        """Go to the state after ``*RST``: all outputs off."""
         for channel in self.channels:
             channel.stop()
         self.settings |= self.commands.defaults
@@ -144,7 +144,7 @@ class VirtualGenerator(VirtualInstrument):
 
     @staticmethod
     def _amplitude(channel: Channel, text: str) -> float:
-        """An amplitude as it is sent, with a unit or in the one that is set, as peak to peak [V], within its limits."""
+        """Return the peak-to-peak voltage of an amplitude that was sent, in its unit or the one that is set [V]."""
         least, most = channel.amplitude_limits()
         unit = str(channel["voltage_unit"])
         if text[:1].isalpha():

@@ -57,7 +57,7 @@ class Quantity(Row):
         return {} if self.alias else {self.name: self.default}
 
     def range(self, channel: Channel) -> tuple[float, float]:
-        """The lowest and the highest number allowed now."""
+        """Return the lowest and the highest number allowed now."""
         return self.limits(channel) if callable(self.limits) else self.limits
 
     def _is_infinite(self, text: str) -> bool:
@@ -88,7 +88,7 @@ class Quantity(Row):
         return device.spell(self.value_or_limit(device.channel(self.channel), parameters))
 
     def value_or_limit(self, channel: Channel, parameters: list[str]) -> float:
-        """The number, or the limit that the query asks for.  Raises ScpiError."""
+        """Return the number, or the limit that the query asks for.  Raises ScpiError."""
         if text := optional_parameter(parameters):
             low, high = self.range(channel)
             return limit(text, low=low, high=high, default=self.default)
@@ -257,7 +257,7 @@ SHARED: tuple[Row, ...] = (
 
 
 def waveforms(family: Family) -> tuple[Row, ...]:
-    """The rows that know the waveforms of a family."""
+    """Return the rows that know the waveforms of a family."""
     return (
         Word("[SOURce[n]:]FUNCtion[:SHAPe]", "{n}:waveform", " ".join(waveform.word for waveform in family.waveforms)),
         *(
@@ -268,7 +268,7 @@ def waveforms(family: Family) -> tuple[Row, ...]:
 
 
 def pulses(periods: tuple[float, float], edges: tuple[float, float], edge: float) -> tuple[Row, ...]:
-    """The rows of the times of pulses.  periods, edges: their limits [s]; edge: after ``*RST`` [s]."""
+    """Return the rows of the times of pulses.  periods, edges: their limits [s]; edge: after ``*RST`` [s]."""
     edge_of = f"{_PULSE}TRANsition"
     return (
         Quantity(
@@ -284,7 +284,7 @@ def pulses(periods: tuple[float, float], edges: tuple[float, float], edge: float
 
 
 def burst_cycles(most: float) -> Row:
-    """The row of the cycles of a burst."""
+    """Return the row of the cycles of a burst."""
     return Quantity(
         *("[SOURce[n]:]BURSt:NCYCles", "{n}:burst_cycles", 1.0, (1, most)), put=Channel.set_burst_cycles, endless=True
     )

@@ -101,7 +101,7 @@ def _only_off(parameters: list[str]) -> None:
 
 
 def _key(n: int, name: str) -> str:
-    """The name of a channel's setting."""
+    """Return the name of a channel's setting."""
     return f"{n}:{name}"
 
 
@@ -148,7 +148,7 @@ class VirtualSDG1000X(VirtualInstrument):
             self._listener(self.clock.now(), self.signal())
 
     def reset(self) -> None:
-        """The state after ``*RST``: all outputs off."""
+        """Go to the state after ``*RST``: all outputs off."""
         self.settings |= self.commands.defaults
         self.on_change("1:output")
 
@@ -284,7 +284,7 @@ class VirtualSDG1000X(VirtualInstrument):
     # --- the terminals ---
 
     def signal(self, n: int = 1) -> Output:
-        """What stands at the open terminals of a channel."""
+        """Return the signal at the open terminals of a channel."""
         on, short = bool(self.settings[_key(n, "output")]), _WAVEFORMS[str(self.settings[_key(n, "waveform")])][0]
         return Output(
             waveform=short,

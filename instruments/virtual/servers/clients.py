@@ -121,7 +121,7 @@ class ServedInstrument:
         self._give_turn()
 
     def jobs(self) -> Iterator[Job]:
-        """The job that the instrument works on, then those that wait."""
+        """Yield the job that the instrument works on, then those that wait."""
         if self._current:
             yield self._current
         yield from self._jobs
@@ -154,7 +154,7 @@ class ServedInstrument:
             self._next_turn = asyncio.get_running_loop().call_later(wait, self._give_turn)
 
     def _choose(self) -> Job | None:
-        """The job to work on: the first that may have its turn, which may abort the one under way; else that one."""
+        """Return the job to work on: the first that may have its turn, or the one under way if none may."""
         job = next((job for job in self._jobs if job.may_have_turn()), None)
         if job:
             self._jobs.remove(job)
@@ -307,7 +307,7 @@ class Link:
             await asyncio.sleep(0)  # the others' turn
 
     def trigger(self) -> None:
-        """The interface's trigger message."""
+        """Send the interface's trigger message."""
         self.session.trigger()
         self.instrument.notify()
 
@@ -383,7 +383,7 @@ class Link:
         return not self.is_busy() and self.seconds_until_ready() is None
 
     def status_byte(self, *, unread: bool = False) -> int:
-        """The status byte, as a serial poll reads it.  unread: whether the client has not read an answer sent to it."""
+        """Return the status byte of a serial poll.  unread: whether the client has not read an answer sent to it."""
         with self.session.lock:
             return self.instrument.device.status_byte(message_available=True) if unread else self.session.status_byte()
 

@@ -267,7 +267,7 @@ class Client:
 
 
 async def _next(channel: Channel) -> Message:
-    """The next message, once the client has read its replies, so that unread replies do not pile up."""
+    """Return the next message, once the client has read its replies, so that unread replies do not pile up."""
     await channel.drain()
     await asyncio.sleep(0)  # many messages may have come at once: let the other clients have their turn
     return await channel.receive()
