@@ -188,7 +188,7 @@ class VisaPort:
             raise NotConnected(self._address, f"it could not be locked ({error!r})") from error
 
     def failure(self, error: Exception) -> Failure:
-        """Return what an error means: a time-out has VISA's number, pyvisa-py's protocols raise OSError and others, too."""
+        """Return what an error means; a time-out has VISA's number, pyvisa-py's protocols raise OSError, too."""
         import pyvisa
 
         time_out = pyvisa.constants.StatusCode.error_timeout
