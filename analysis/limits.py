@@ -94,6 +94,11 @@ class Sample:
     u: Array | None = None
     steps: Array | None = None
 
+    @classmethod
+    def within_steps(cls, limits: Array, u: Array) -> Sample:
+        """Return limits that are known to a step of the drive each; u is the standard uncertainty, step/√12."""
+        return cls(limits, u, u * math.sqrt(12))
+
     @property
     def step(self) -> float:
         """The width of a step [Hz], 0 where there was none."""

@@ -277,8 +277,9 @@ def _sample(source: Source[LimitReadings], which: Which, options: LimitOptions) 
     readings = source.readings
     if options.reading_u is not None:
         return Sample(readings.limit, np.full(len(readings), options.reading_u))
-    stepped = which == "upper" and source.run is not None and readings.u is not None
-    return Sample(readings.limit, readings.u, readings.u * 12**0.5 if stepped and readings.u is not None else None)
+    if which == "upper" and source.run is not None and readings.u is not None:
+        return Sample.within_steps(readings.limit, readings.u)
+    return Sample(readings.limit, readings.u)
 
 
 def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> Conditions:
