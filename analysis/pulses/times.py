@@ -240,7 +240,10 @@ def findings_of(train: Train) -> tuple[Finding, ...]:
     """The findings about a train."""
     notes = []
     if train.missing:
-        notes.append(Finding("missing", f"{train.missing} turn{'s have' if train.missing > 1 else ' has'} no pulse"))
+        rare = ", more than have one: is the spin a part of this?" if train.missing > train.used.size else ""
+        notes.append(
+            Finding("missing", f"{train.missing} turn{'s have' if train.missing > 1 else ' has'} no pulse{rare}")
+        )
     if train.doubled:
         notes.append(Finding("doubled", f"{train.doubled} pulses lie beside the turns' own and were left out"))
     return (*notes, *findings_of_fit(train.fit, "pulses"))
