@@ -66,7 +66,7 @@ def power_of(line: Line, range_hz: float, u_hz: float) -> Power | None:
     from scipy.special import stdtr, stdtrit
 
     def quantiles(points: float) -> tuple[float, float]:
-        freedom = line.freedom + points - line.n
+        freedom = max(line.freedom + points - line.n, 1.0)
         return float(stdtrit(freedom, (1 + CONFIDENCE) / 2)), float(stdtrit(freedom, POWER))
 
     difference = OTHER_SLOPE - 1
