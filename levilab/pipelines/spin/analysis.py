@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping  # noqa: TC003 - pydantic reads the types of a result when it runs
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.budget import rest
 from analysis.errors import AnalysisError
-from analysis.pulses import Finding, phases, spin_of_times, spin_of_trace, track_of_blocks, track_of_times
+from analysis.pulses import (
+    Finding,
+    SpinFrequency,
+    phases,
+    spin_of_times,
+    spin_of_trace,
+    track_of_blocks,
+    track_of_times,
+)
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
@@ -21,16 +31,14 @@ from levilab.runs.traces import INDEX
 from levilab.runs.waveforms import has_traces
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
-    from analysis.pulses import Phase, SpinFrequency, Track
+    from analysis.pulses import Phase, Track
     from levilab.formats.waveforms.waveform import Waveform
     from levilab.pipelines.sources import Source
 
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 SPIN = "spin"
 #: The runs and files that suit.
@@ -197,7 +205,7 @@ METHOD = Method(
     options=SpinOptions,
     fit=spin_of_source,
     of_files=frozenset({"columns", "rate"}),  # a run may have records of several channels
-    passes_over=True,
+    skips=True,
 )
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from analysis.pulses.regression import student
 from levilab.crosscheck.own.model import Own, Trial
-from levilab.crosscheck.own.stored import as_part, file_of, read_own, restored, store
+from levilab.crosscheck.own.stored import file_of, read_own, store
 from levilab.crosscheck.own.study import (
     ENOUGH,
     FEWEST,
@@ -170,7 +170,7 @@ def test_trials_are_kept_beside_the_run_and_read_for_just_this_result(sample_dat
     assert file == tmp_path / "run" / "crosscheck.json"
     assert json.loads(file.read_text(encoding="utf-8"))["schema"] == "levilab-crosscheck-own/1"
     inputs = list(checked.inputs)
-    assert read_own(found.place, "limit", inputs, settings) == checked == restored(as_part(checked))
+    assert read_own(found.place, "limit", inputs, settings) == checked
     assert read_own(found.place, "limit", ["other readings"], settings) is None
     assert read_own(found.place, "limit", inputs, settings | {"reading_u_hz": 0.1}) is None
     file.write_text('{"schema": "levilab-crosscheck-own/1", "checks": [{}]}', encoding="utf-8")

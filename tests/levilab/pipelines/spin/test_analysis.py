@@ -13,14 +13,15 @@ import pytest
 import levilab
 from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError, DoesNotSuit
-from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
-from levilab.pipelines.catalogue import save as save_found
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.spin.analysis import Series, SpinOptions, analyze_spins
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spin.meaning import meaning
 from levilab.pipelines.spin.report import spin_part
 from levilab.pipelines.spin.table import spin_tables
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+from levilab.pipelines.suits import analyze_suiting
+from levilab.pipelines.suits import save as save_found
 from levilab.runs.run import Run, RunRecord, utc_now
 from levilab.runs.waveforms import run_waveforms
 from levilab.runs.writer import RunWriter
@@ -46,7 +47,7 @@ def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data: Pat
         assert frequency.value == pytest.approx(truth, abs=4 * frequency.u), source.name
         assert chirp.value == pytest.approx(-0.095, abs=4 * chirp.u), source.name
         assert frequency.u < 1.2 * 3e-3, source.name
-    assert [remark for remark in analysis.remarks if "samples-4000hz.npy" in remark]
+    assert [remark for remark in analysis.remarks if "samples-4000hz.npy" in str(remark)]
 
 
 def test_a_laser_and_a_drive_are_no_spin(sample_data: Path) -> None:
@@ -230,7 +231,7 @@ def test_a_record_without_pulses_among_others_is_passed_over(find: Any, tmp_path
     write_wav(tmp_path / "spins.wav", pulses(30.0 * np.arange(4000) / 1000), 1000)
     found = find([tmp_path], SpinOptions())
     assert [source.name for source in found.sources] == ["spins.wav"]
-    assert [text for text in found.warnings if "passed over: " in text and "dark.wav: 0 pulses" in text]
+    assert [text for text in found.warnings if "skipped " in text and "dark.wav: 0 pulses" in text]
 
 
 def test_each_analysis_takes_its_own_out_of_a_folder(sample_data: Path, tmp_path: Path) -> None:
@@ -247,9 +248,9 @@ def test_each_analysis_takes_its_own_out_of_a_folder(sample_data: Path, tmp_path
     assert [source.name for source in down.sources][:2] == ["spin-down-1", "spin-down-2"]
     assert [source.name for source in down.sources][4:] == ["long.wav"]
     assert len(spin.sources) == 14  # eleven files, the long one, two runs with traces of a tape
-    quiet = [text for each in (down, spin) for text in (*each.warnings, *each.remarks)]
+    quiet = [text for each in (down, spin) for text in (*each.warnings, *map(str, each.remarks))]
     assert not [text for text in quiet if any(name in text for name in ("notes", "field.csv", "no titles"))]
-    assert [text for text in down.remarks if "npy" in text] == []
+    assert [remark for remark in down.remarks if "npy" in str(remark)] == []
 
 
 def test_what_is_damaged_is_a_note_of_the_analysis_that_it_belongs_to(sample_data: Path, tmp_path: Path) -> None:
