@@ -1,4 +1,4 @@
-"""The project stays small enough for a newcomer to hold in the head: the commit that raises a limit says why."""
+"""The project stays small enough for a newcomer; a commit that raises a limit says why."""
 
 from support.size import count_lines, read_limits
 

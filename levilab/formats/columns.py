@@ -86,7 +86,7 @@ def choose_columns(
     wanted: Mapping[str, str],
     quantities: Collection[str] = CANONICAL,
 ) -> tuple[tuple[Column, ...], tuple[str, ...]]:
-    """The columns of a file that hold something we know, and warnings about those that nearly do.
+    """Return the columns of a file that hold something we know, and warnings about those that nearly do.
 
     Args:
         path: the file, for messages.
@@ -161,7 +161,7 @@ def _offered_columns(
 
 
 def _with_periods(header: Sequence[str]) -> list[Title]:
-    """What the titles say, with T for a period beside a time; periods do not count beside a frequency."""
+    """Return the titles' meanings, with T for a period beside a time; periods do not count beside a frequency."""
     titles = [read_title(text) for text in header]
     if sum(title.column == "time_s" for title in titles) > 1:
         titles = [as_a_period(text) or title for text, title in zip(header, titles, strict=True)]
@@ -173,7 +173,7 @@ def _with_periods(header: Sequence[str]) -> list[Title]:
 
 
 def _of_the_period(text: str, title: Title) -> Title:
-    """An uncertainty of a T, as u_T, is that of the period, where T is one."""
+    """Return the title of u_T as that of the period's uncertainty, where T is a period."""
     if title.column == companion("time_s") and re.search(r"T(?![A-Za-z])", text):
         return Title(companion("spin_frequency_hz"), title.unit)
     return title
@@ -186,7 +186,7 @@ def _is_of_a_period(title: Title, titles: Sequence[Title]) -> bool:
 
 
 def how_else(title: str, name: str) -> str:
-    """What to do with a column that is not the quantity of this canonical name."""
+    """Return advice for a column that is not the quantity of this canonical name."""
     kind = dimension(name)
     own = f"say which unit it is, as NAME [{next(iter(UNITS[kind]))}]"
     if kind != "frequency":
@@ -244,7 +244,7 @@ def _find(header: Sequence[str], title: str) -> int | None:
 
 
 def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) -> int:
-    """The column for a quantity: the canonical title, else the only one that could be."""
+    """Return the column for a quantity: the canonical title, else the only one that could be."""
     exact = [index for index in indices if header[index] == name]
     if len(exact or indices) == 1:
         return (exact or indices)[0]
@@ -258,7 +258,7 @@ def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) 
 
 
 def _written_unit(path: Path, name: str, index: int, header: Sequence[str], units: Sequence[str]) -> str | None:
-    """The unit that the title or the row of units gives a column, if it is one of the quantity's."""
+    """Return the unit that the title or the row of units gives a column, if it is one of the quantity's."""
     title = read_title(header[index])
     kind = dimension(name)
     in_title = title.unit if title.unit and unit_factor(title.unit, kind) is not None else None

@@ -76,7 +76,7 @@ class Table:
         return pd.DataFrame(dict(self.columns), dtype=np.float64)
 
     def column(self, name: str) -> "NDArray[np.float64]":
-        """A canonical column in SI, shape (rows,).
+        """Return a canonical column in SI, shape (rows,).
 
         Raises:
             TableError: the file has no such column.
@@ -180,7 +180,7 @@ class ColumnsError(UsageError):
 
 
 def parse_columns(text: str) -> dict[str, str]:
-    """What `columns` says, as `read_table` takes it; titles may hold commas and equals signs.
+    """Return the parsed option `columns`, as `read_table` takes it; titles may hold commas and equals signs.
 
     >>> parse_columns("t=Zeit, s,f=3")
     {'t': 'Zeit, s', 'f': '3'}
@@ -207,7 +207,7 @@ def _in_one_word(columns: Iterable[str]) -> str:
 
 
 def _key(name: str) -> str:
-    """What `columns` calls a canonical column."""
+    """Return the key of a canonical column in the option `columns`."""
     return next((short for short, long in SHORTHANDS.items() if long == name), name)
 
 
@@ -252,7 +252,7 @@ def file_errors(path: Path) -> Iterator[None]:
 def _titles(
     path: Path, layout: Layout, wanted: Mapping[str, str], *, guess: bool
 ) -> tuple[tuple[str, ...], Mapping[str, str], list[str]]:
-    """The file's titles, or numbers in their place; what to take for what; a warning where that is a guess."""
+    """Return the file's titles, or numbers in their place; what to take for what; a warning where that is a guess."""
     if layout.header:
         return layout.header, wanted, []
     numbers = tuple(str(n + 1) for n in range(layout.width))
@@ -309,7 +309,7 @@ def _table(
 
 
 def _missed(name: str, lines: "NDArray[np.int64]", rows: int, *, periods: bool) -> str:
-    """The warning of rows that are left out, with all that counts as missed; periods: whether there is one of them."""
+    """Return the warning about rows left out, with all that counts as missed, a period of 0 with `periods`."""
     kinds = ("empty", *MISSING_WORDS, "inf", *(["a period of 0"] if periods else []))
     places = ", ".join(str(line) for line in lines[:5]) + (", …" if lines.size > 5 else "")
     return (

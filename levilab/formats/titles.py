@@ -112,7 +112,7 @@ class Title:
 
 
 def companion(column: str) -> str:
-    """The column of a column's standard uncertainty.
+    """Return the column of a column's standard uncertainty.
 
     >>> companion("spin_frequency_hz")
     'spin_frequency_u_hz'
@@ -152,7 +152,7 @@ def dimension(column: str) -> str:
 
 
 def plain_unit(text: str) -> str:
-    """A unit as the table spells it: µ as μ, ⁻¹ as -1, without blanks, dots, carets and brackets."""
+    """Return a unit as the table spells it: µ as μ, ⁻¹ as -1, without blanks, dots, carets and brackets."""
     return re.sub(r"[\s^·*()\[\]]", "", unicodedata.normalize("NFKC", text).replace("−", "-"))
 
 
@@ -201,7 +201,7 @@ LONGEST_TITLE = 200
 
 
 def without_runs_of_blanks(text: str) -> str:
-    """A title with a blank where there are many: a program that lays out columns writes thousands."""
+    """Return a title with a blank where there are many: a program that lays out columns writes thousands."""
     return " ".join(text.split())
 
 
@@ -234,7 +234,7 @@ def read_title(text: str) -> Title:
 
 
 def _named(label: str, unit: str) -> Title | None:
-    """What a name says together with what may be its unit; None where we do not know the name."""
+    """Return the title that a name gives together with a possible unit; None for an unknown name."""
     name = _plain_name(label)
     if (name in TURNS or label == "U") and unit_factor(f"/{unit}", "frequency"):
         return Title("spin_frequency_hz", f"/{unit}")
@@ -262,7 +262,7 @@ def nearly_a_frequency(text: str) -> str | None:
 
 
 def as_a_period(text: str) -> Title | None:
-    """The title of a T as that of a period, where it says its unit; beside a time it is one, with a capital letter.
+    """Return the title of a T with a unit of time as that of a period, which it is beside a time.
 
     >>> as_a_period("T [ms]").inverse, as_a_period("T")
     (True, None)
@@ -273,7 +273,7 @@ def as_a_period(text: str) -> Title | None:
 
 
 def foreign_unit(text: str, kind: str) -> str | None:
-    """The unit in a title, if it is one of another dimension.
+    """Return the unit in a title, if it is one of another dimension.
 
     >>> foreign_unit("period_ms", "frequency")
     'ms'
@@ -289,5 +289,5 @@ def foreign_unit(text: str, kind: str) -> str | None:
 
 
 def implied_unit(text: str) -> str | None:
-    """The unit that a name says itself: rpm, omega."""
+    """Return the unit that a name says itself: rpm, omega."""
     return IMPLIED_UNITS.get(_plain_name(text))

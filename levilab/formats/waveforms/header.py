@@ -143,7 +143,7 @@ def read_header(head: Head, dialect: Dialect, columns: Mapping[str, str]) -> Hea
 
 
 def printed(text: str, dialect: Dialect) -> Printed | None:
-    """A number and how finely it is printed; None if it is none.
+    """Return a number and how finely it is printed; None if it is none.
 
     >>> printed("-250.0000E-03", Dialect(",", "."))
     Printed(value=-0.25, resolution=1e-07)
@@ -179,7 +179,7 @@ def dialect_of(head: Head) -> Dialect:
 
 
 def _unit(text: str) -> tuple[str, float]:
-    """The unit of a channel and the factor to it: V for all kinds of volts, else what stands there."""
+    """Return the unit of a channel and the factor to it: V for all kinds of volts, else what stands there."""
     plain = plain_unit(text)
     if not plain or plain.casefold() in _UNIT_WORDS:
         return _UNIT_WORDS.get(plain.casefold(), "V"), 1.0
@@ -233,7 +233,7 @@ def _with_samples(
 
 
 def _rigol(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
-    """Start and increment in the second row, below their titles; the samples numbered or not."""
+    """Recognise start and increment in the second row, below their titles; the samples numbered or not."""
     title = [text.casefold() for text in rows[0]] if len(rows) > 1 else []
     if "start" not in title or "increment" not in title:
         return None
@@ -267,7 +267,7 @@ def _from_unit(units: Sequence[str], index: int) -> tuple[str, int, float]:
 
 
 def _titled(_: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
-    """A row of names above one of units, "second" first, as Keysight, Rigol and UltraScope write; no increment."""
+    """Recognise names above a row of units, "second" first, as Keysight, Rigol and UltraScope write; no increment."""
     k = next((k for k, row in enumerate(rows) if k and _are_units(row) and len(rows[k - 1]) >= filled_count(row)), None)
     names = rows[k - 1] if k else rows[0]
     if k is None and not re.fullmatch(r"(time|x)\(.+\)", names[0], re.IGNORECASE):
@@ -293,7 +293,7 @@ def _are_units(row: Sequence[str]) -> bool:
 
 
 def _beside(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
-    """Tektronix TDS: the header stands beside the first rows, time and samples in the last columns."""
+    """Recognise Tektronix TDS: the header stands beside the first rows, time and samples in the last columns."""
     if len(rows) < 2 or rows[0][0].casefold() != "record length" or len(rows[0]) < 5:
         return None
     time = filled_count(rows[0]) - 2
@@ -318,7 +318,7 @@ _KEYS = frozenset({"record length", "sample interval", "sample rate", "source"})
 
 
 def _keyed(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
-    """A key and its value a line, then the titles, time first: Siglent; Tektronix MDO, MSO, TBS."""
+    """Recognise a key and its value a line, then the titles, time first: Siglent; Tektronix MDO, MSO, TBS."""
     titles = next((k for k, row in enumerate(rows) if len(row) > 1 and row[0].casefold() in {"time", "second"}), None)
     if titles is None:
         return None
@@ -351,7 +351,7 @@ def _keyed(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Heade
 
 
 def _stepped(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
-    """Samples without times, numbered or not, below keys that give their interval: OWON, Hantek."""
+    """Recognise samples without times, numbered or not, below keys that give their interval: OWON, Hantek."""
     first = _first_row(rows, 0, 0, dialect)
     keys = _keys(rows[:first]) if first is not None else {}
     step = _interval(head, keys, dialect)
@@ -384,13 +384,13 @@ def _keys(rows: Sequence[Sequence[str]]) -> dict[str, Sequence[str]]:
 
 
 def _value(keys: Mapping[str, Sequence[str]], key: str) -> str:
-    """The value of a key, without the word before a colon: Analog:140000."""
+    """Return the value of a key, without the word before a colon: Analog:140000."""
     cells = keys.get(key, ())
     return cells[0].rpartition(":")[2].strip() if cells else ""
 
 
 def _interval(head: Head, keys: Mapping[str, Sequence[str]], dialect: Dialect) -> Printed | None:
-    """The sampling interval [s]."""
+    """Return the sampling interval [s]."""
     interval = next((one for key in _INTERVALS if (one := _printed_time(_value(keys, key), dialect))), None)
     rate = printed(_value(keys, "sample rate"), dialect)
     if interval is None and rate is not None and rate.value > 0:
@@ -419,7 +419,7 @@ def _count(keys: Mapping[str, Sequence[str]], dialect: Dialect) -> int | None:
 
 
 def _plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) -> Header:
-    """A column of times and others beside it, with titles or without."""
+    """Recognise a column of times and others beside it, with titles or without."""
     layout = lay_out(list(head.lines), head.encoding, dialect, b"")
     titles = [read_title(text) for text in layout.header]
     readings = [title.column for title in titles if title.column in QUANTITIES and title.column not in _NO_READINGS]
@@ -458,7 +458,7 @@ _NO_READINGS = ("time_s", "drive_amplitude_v")
 
 
 def _bare(title: str) -> str:
-    """A title without its unit."""
+    """Return a title without its unit."""
     bare = re.sub(r" ?/? ?[\[(][^\[\]()]*[\])]$| ?/ ?\S+$", "", without_runs_of_blanks(title)[:LONGEST_TITLE])
     return shorten(bare.strip() or title)
 
