@@ -221,7 +221,7 @@ def test_a_file_of_something_else_does_not_suit(tmp_path: Path, sample_data: Pat
 
 
 def test_a_moment_needs_the_mass(scan: Path) -> None:
-    with pytest.raises(DataError, match=r"`height` tells the moment of a top only if its mass is known"):
+    with pytest.raises(DataError, match=r"`height_m` tells the moment of a top only if its mass is known"):
         analyze_scans([scan], FieldOptions(height_m=0.073))
 
 
