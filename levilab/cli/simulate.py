@@ -78,11 +78,9 @@ def simulate(
     chosen = chosen_scene(scene, settings)
     film = _animation_request(animate, animate_from, animate_to, animate_speed)
     if film:
-        from levilab.motion.animation.request import check_request, check_span
+        from levilab.motion.animation.request import check_request
 
         check_request(film, chosen, duration)
-        with interruptible("nothing was written"):
-            check_span(film, chosen, duration, message)
 
     from levilab.files import finite
     from levilab.motion.simulation import SimulationRequest, run_simulation
