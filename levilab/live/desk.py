@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from levilab.animation.parts import parts_of
 from levilab.errors import LevilabError
 from levilab.live.practice.commands import RecordRun, command_of
-from levilab.motion.animation.parts import parts_of
 from levilab.runs.run import read_record, utc_now
 from levilab.simulator.scene import read_scene, scene_of
 

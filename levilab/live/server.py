@@ -19,13 +19,13 @@ from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
+from levilab.animation.three import three_js
 from levilab.errors import LevilabError
 from levilab.live.analyzed import FIGURES, REPORT, Analyses
 from levilab.live.choice import choices, newest, recorded_now
 from levilab.live.desk import parts_for, scene_of_run
 from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
 from levilab.live.watch import Watch
-from levilab.motion.animation.three import three_js
 from levilab.runs.run import RECORD
 
 if TYPE_CHECKING:
@@ -201,7 +201,7 @@ class Pages:
 
     def __init__(self, hall: Hall) -> None:
         self.hall = hall
-        top = Path(__file__).parents[1] / "motion" / "animation" / "top.js"
+        top = Path(__file__).parents[1] / "animation" / "top.js"
         self.files = {path.name: path for path in PAGE.iterdir()} | {
             "three.js": three_js("the live view"),
             "top.js": top,

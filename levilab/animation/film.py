@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from levilab.animation.paint import Painter, Pose, font
+from levilab.animation.parts import COLOURS, parts_of
+from levilab.animation.poses import height_for_camera, matrices
+from levilab.animation.words import readout, span_in_words, speed_in_words
 from levilab.errors import LevilabError
-from levilab.motion.animation.paint import Painter, Pose, font
-from levilab.motion.animation.parts import COLOURS, parts_of
-from levilab.motion.animation.poses import height_for_camera, matrices
-from levilab.motion.animation.words import readout, span_in_words, speed_in_words
 from levilab.software import how_to_install
 
 if TYPE_CHECKING:
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
     from PIL.ImageFont import FreeTypeFont, ImageFont
 
-    from levilab.motion.animation.paint import Colour
-    from levilab.motion.animation.poses import Poses
+    from levilab.animation.paint import Colour
+    from levilab.animation.poses import Poses
 
     BaseFont = FreeTypeFont | ImageFont
     Progress = Callable[[float], None]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from levilab.present.numbers import with_decimals
 
 if TYPE_CHECKING:
-    from levilab.motion.animation.poses import Poses
+    from levilab.animation.poses import Poses
 
 
 #: The space between a number and its unit, or within a unit.
