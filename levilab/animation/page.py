@@ -223,7 +223,7 @@ def _legend(poses: Poses) -> list[tuple[str, str]]:
 
 
 def _swatches(poses: Poses) -> str:
-    """The colours of the legend, by day and by night."""
+    """Return the colours of the legend, by day and by night."""
     names = [name for name, _ in _legend(poses)]
     rules = {
         theme: "".join(f".colour-{name} span{{background:{COLOURS[theme][name]}}}" for name in names)
@@ -233,7 +233,7 @@ def _swatches(poses: Poses) -> str:
 
 
 def _numbers(page: Page) -> list[tuple[str, str]]:
-    """The table of numbers."""
+    """Return the table of numbers."""
     poses, motion = page.poses, page.summary.motion
     scene, accuracy = poses.scene, page.summary.motion.accuracy
     tilts, heights = np.degrees(poses.tilts), 100 * poses.positions[:, 2]
@@ -261,7 +261,7 @@ def _numbers(page: Page) -> list[tuple[str, str]]:
 
 
 def _licence(three: bytes) -> str:
-    """The licence's lines at the head of three.js."""
+    """Return the licence's lines at the head of three.js."""
     head = re.match(rb"/\*\*?(.*?)\*/", three, re.DOTALL)
     if head is None:
         raise MissingThree("three.js out of nicegui has no licence at its head: install nicegui 3.18 or a later one")

@@ -233,7 +233,7 @@ def _count_for_page(scene: Scene, span: float, turns: float) -> int:
 
 
 def _stroboscopic(turns: float, speed: float, pictures_per_s: float) -> str:
-    """What to know of a film that shows too few pictures of a turn; empty for others."""
+    """Return what to know of a film that shows too few pictures of a turn; empty for others."""
     if turns * speed * _PICTURES_A_TURN <= pictures_per_s:
         return ""
     seen, slower = pictures_per_s / turns / speed, pictures_per_s / turns / _PICTURES_A_TURN

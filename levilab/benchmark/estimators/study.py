@@ -43,7 +43,7 @@ AIMS = (
 
 
 def bound(snr: float) -> float:
-    """The Cramér–Rao bound of the frequency at the middle [Hz] of the study's traces: PHYSICS §5, closed form.
+    """Return the Cramér–Rao bound of the frequency at the middle [Hz] of the study's traces: PHYSICS §5, closed form.
 
     σ_f² = 12 σ²/(N G T²), G = A²√π/(2 s), s = duty/2.3548.
     """
@@ -164,7 +164,7 @@ def _at(snr: float, trials: int, seed: int = SEED) -> list[Score]:
 
 
 def hard_case(name: str, case: Case, trials: int, seed: int = SEED) -> Score:
-    """The default on one kind of hard trace."""
+    """Return the default on one kind of hard trace."""
     found = Trials()
     random = np.random.default_rng([seed, list(HARD).index(name) + 100])
     for number in range(-1, trials):
