@@ -30,13 +30,13 @@ class Clock(Protocol):
     meanwhile: Callable[[], None] | None
 
     def now(self) -> float:
-        """The time [s]."""
+        """Return the time [s]."""
 
     def sleep(self, duration: float) -> None:
         """Let time pass [s]."""
 
     def wall_duration(self, duration: float) -> float:
-        """How long the wall's clock runs until so much time may have passed here [s].
+        """Return how long the wall's clock runs until this time may have passed here [s].
 
         An event loop waits for that long.  On a clock that jumps `sleep` then returns without waiting.
         """
@@ -64,11 +64,11 @@ class WallClock:
             self._start = time.monotonic()
 
     def now(self) -> float:
-        """The time [s]."""
+        """Return the time [s]."""
         return 0.0 if self._start is None else self.speed * (time.monotonic() - self._start)
 
     def sleep(self, duration: float) -> None:
-        """Wait until so much time has passed on the bench [s]."""
+        """Wait until this time has passed on the bench [s]."""
         if self.meanwhile is None:
             time.sleep(self.wall_duration(duration))
             return
@@ -100,7 +100,7 @@ class VirtualClock:
         self.speed = 1.0 if realtime else math.inf
 
     def now(self) -> float:
-        """The time [s]."""
+        """Return the time [s]."""
         return self._now
 
     def sleep(self, duration: float) -> None:

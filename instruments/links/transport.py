@@ -114,7 +114,7 @@ class Port(Protocol):
 
     Attributes:
         resynchronising: how to get rid of late answers.
-        text: what an answer is expected to be, in words.
+        text: the expected answer, as text.
         silence: the error of a question without an answer.
     """
 
@@ -150,7 +150,7 @@ class Port(Protocol):
         """Lock the instrument against other programs, where that is possible.  Raises Occupied, NotConnected."""
 
     def failure(self, error: Exception) -> Failure:
-        """The meaning of an error of the library."""
+        """Return the meaning of an error of the library."""
 
 
 class MessageLink:

@@ -50,7 +50,7 @@ class Fault:
         return self.after < self.seen <= self.after + self.times
 
     def act(self, session: Session, answer: Answer) -> Answer | None:
-        """The answer as the fault leaves it, None where it is lost."""
+        """Return the answer as the fault leaves it, None where it is lost."""
         return FAULTS[self.what](session, answer)
 
 
@@ -59,7 +59,7 @@ LATE, AWAY = 10.0, 5.0
 
 
 def _change_bytes(change: Callable[[bytes], bytes]) -> Act:
-    """A fault that changes only the bytes."""
+    """Return a fault that changes nothing but the bytes."""
     return lambda _, answer: answer._replace(data=change(answer.data))
 
 
@@ -108,7 +108,7 @@ def _head_says_less(data: bytes) -> bytes:
 
 
 def _change_head(data: bytes, more: int) -> bytes:
-    """Let the head of a block state a length that is off by so many bytes; bytes that are no block stay."""
+    """Let the head of a block state a length that is off by this number of bytes; bytes that are no block stay."""
     head = re.match(rb"#([1-9])", data)
     if not head:
         return data

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from instruments.virtual.core.parameters import choice, parameter
 from instruments.virtual.core.parser import Row, ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Word, short_header
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Tell, Word, short_header
 from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, one_two_five
 from instruments.virtual.oscilloscope.screenshot import bmp24, draw
 
@@ -99,8 +99,8 @@ _REST: tuple[Row, ...] = (
     Both("(SANU|SAMPLE_NUM)", answer=lambda s, p: s.sample_number(p)),
     Ask("(SAST|SAMPLE_STATUS)", lambda s: s.reply("SAST", s.state())),
     Ask("INR", lambda s: s.reply("INR", str(s.internal_state()))),
-    Ask("(SCDP|SCREEN_DUMP)", lambda s: s.picture()),
-    Do("(BUZZ|BUZZER)"),
+    Tell("(SCDP|SCREEN_DUMP)", lambda s: s.picture()),
+    Switch("(BUZZ|BUZZER)", "buzzer", default=True, words=("OFF", "ON")),
 )
 
 
@@ -121,7 +121,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         super().__init__(clock, signals=signals, channels=channels, identity=identity)
 
     def reset(self) -> None:
-        """The state after ``*RST``; how answers look stays."""
+        """Go to the state after ``*RST``; the form of answers stays."""
         header = self.settings["header"]
         super().reset()
         self.settings["header"] = header
@@ -224,10 +224,10 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     # --- time base and memory ---
 
     def delays(self) -> tuple[float, float]:
-        """The limits of TRDL [s]."""
+        """Return the limits of TRDL [s]."""
         return -max(5.0, 7 * self.value("time_scale")), 7 * self.value("time_scale")
 
-    def _halved(self) -> bool:
+    def _is_halved(self) -> bool:
         """Whether a pair of channels, 1 and 2 or 3 and 4, shares its converter and memory."""
         shown = self.shown()
         return {1, 2} <= set(shown) or {3, 4} <= set(shown)
@@ -243,11 +243,11 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     def depth(self) -> str:
         """MSIZ?: of one channel, or of each of two that share the memory."""
         word = str(self.settings["depth"])
-        return self.reply("MSIZ", list(_HALVES)[list(_DEPTHS).index(word)] if self._halved() else word)
+        return self.reply("MSIZ", list(_HALVES)[list(_DEPTHS).index(word)] if self._is_halved() else word)
 
     def full_scale(self) -> tuple[float, int]:
-        """The record fills the screen and nothing else."""
-        share = 2 if self._halved() else 1
+        """Return rate and points of a record that fills the screen and nothing else."""
+        share = 2 if self._is_halved() else 1
         length = _COLUMNS * self.value("time_scale")
         rate = min(_FASTEST / share, _DEPTHS[str(self.settings["depth"])] / share / length)
         return rate, max(2, round(rate * length))
@@ -260,7 +260,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     # --- reading the record ---
 
     def set_waveform(self, parameters: list[str]) -> None:
-        """WFSU SP,4,NP,1000,FP,0: every fourth point, so many, from this one on.  Raises ScpiError."""
+        """WFSU SP,4,NP,1000,FP,0: every fourth point, 1000 of them, from the first on.  Raises ScpiError."""
         if not parameters or len(parameters) % 2:
             raise ScpiError(-109)
         given = dict(zip((name.upper() for name in parameters[::2]), parameters[1::2], strict=True))
@@ -275,7 +275,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         return self.reply("WFSU", ",".join(f"{name},{value}" for name, value in self._setup.items()))
 
     def _places(self, record: Record) -> range:
-        """The points of a record that are sent."""
+        """Return the points of a record that are sent."""
         step, most, first = max(1, self._setup["SP"]), self._setup["NP"], min(self._setup["FP"], record.points)
         places = range(first, record.points, step)
         return places[:most] if most else places

@@ -76,7 +76,7 @@ def _verdict(best: str, verdict: Verdict, text: str) -> dict[str, Any]:
 
 
 def _combined_values(combined: Combined) -> dict[str, Any]:
-    """The favoured law's constants, and by how much they differ from run to run."""
+    """Return the constants of the favoured law, and their scatter from run to run."""
     best = combined.fit(combined.best)
     scatter = {
         f"{name}_scatter": number(mean.scatter, mean.unit) | {"runs": mean.degrees_of_freedom + 1}

@@ -102,8 +102,17 @@ class Trace:
     middle: float
 
     def truth(self, time: float) -> float:
-        """The frequency at a time [Hz]."""
+        """Return the frequency at a time [Hz]."""
         return self.frequency + CHIRP * (time - self.middle)
+
+
+def bound(snr: float) -> float:
+    """Return the Cramér–Rao bound of the frequency at the middle [Hz] of a trace with a snr [dB].
+
+    σ_f² = 12 σ²/(N G T²), G = A²√π/(2 s), s = duty/2.3548.
+    """
+    steepness = np.sqrt(np.pi) / (2 * DUTY / np.sqrt(8 * np.log(2)))
+    return float(np.sqrt(12 / (RATE * DURATION * steepness * DURATION**2)) * 10 ** (-snr / 20))
 
 
 def make(case: Case, random: Random) -> Trace:
@@ -178,7 +187,7 @@ def _lose(share: float, samples: Array, random: Random) -> None:
 
 
 def _switch(frequency: float, duration: float, first: float, random: Random) -> Array:
-    """Times of a switch with a jitter of 1e-4 s: at 45 % of the turns it bounces up to four times, 8 % it misses."""
+    """Return times of a switch with a jitter of 1e-4 s, which bounces at 45 % of the turns and misses 8 %."""
     turn = np.arange(1, int(frequency * duration) - 1)
     since = duration / 2
     start = frequency - CHIRP * since  # at time 0

@@ -114,7 +114,6 @@ class _Solid:
     """A part with its marks, between two heights on the axis [m]."""
 
     surface: _Surface
-    caps: tuple[tuple[Array, Array], ...]  # polygons across the axis, shape (n, 3), and their normals
     low: float
     high: float
     marks: tuple[tuple[_Surface, str], ...]
@@ -254,7 +253,7 @@ class Painter:
         self._draw_arrow(pen, np.array([start, tip]), self.colours["drive"], thick)
 
     def _draw_arrow(self, pen: ImageDraw, points: Array, colour: Colour, thick: float) -> None:
-        """A line along points [m] with a head at its end."""
+        """Draw a line along points [m] with a head at its end."""
         flat = self._camera.project(points)
         width = max(round(thick * self._camera.size_at(points[-1])), _FINER)
         pen.line(_flat(flat), fill=colour, width=width, joint="curve")
@@ -312,8 +311,6 @@ class Painter:
             solid.surface.corners @ lean.T + pose.position, solid.surface.normals @ lean.T, solid.surface.colour
         )
         self._draw_facets(pen, surface)
-        for polygon, normal in solid.caps:
-            self._draw_polygon(pen, polygon @ lean.T + pose.position, lean @ normal, surface.colour)
         for mark, turns in solid.marks:
             turn = pose.matrix @ _about_z(pose.slip) if turns == "washers" else pose.matrix
             self._draw_facets(pen, _Surface(mark.corners @ turn.T + pose.position, mark.normals @ turn.T, mark.colour))
@@ -350,12 +347,8 @@ class Painter:
         ):
             pen.polygon(polygon, fill=tuple(colour))
 
-    def _draw_polygon(self, pen: ImageDraw, polygon: Array, normal: Array, colour: Colour) -> None:
-        if (self._camera.place - polygon[0]) @ normal > 0:
-            pen.polygon(_flat(self._camera.project(polygon)), fill=tuple(self._lit(normal[None], colour)[0]))
-
     def _lit(self, normals: Array, colour: Colour) -> list[list[int]]:
-        """The colour under the lights, for facets with these normals, shape (n, 3)."""
+        """Return the colour under the lights, for facets with these normals, shape (n, 3)."""
         bright = np.full(len(normals), _EVERYWHERE) + 0.10 * normals[:, 2]
         for direction, strength in _LIGHTS:
             bright += strength * np.clip(normals @ direction / np.linalg.norm(direction), 0, 1)
@@ -366,11 +359,7 @@ class Painter:
         solids = []
         for part in self.parts["parts"]:
             outline = part["outline"]
-            sides = [[r, z] for r, z in outline if r > 0]
-            corners, normals = _revolve(sides, _AROUND)
-            caps = []
-            for (r, z), sign in ((sides[0], -1.0), (sides[-1], 1.0)):
-                caps.append((_circle(r, z, _AROUND), np.array([0.0, 0.0, sign])))
+            corners, normals = _revolve(outline, _AROUND)
             marks = [
                 (_Surface(*_patch(mark, _OUT * self._reach), colour=self.colours[mark["colour"]]), mark["turns"])
                 for mark in self.parts["marks"]
@@ -378,7 +367,7 @@ class Painter:
             ]
             heights = [z for _, z in outline]
             surface = _Surface(corners, normals, self.colours[part["colour"]])
-            solids.append(_Solid(surface, tuple(caps), min(heights), max(heights), tuple(marks), part["name"]))
+            solids.append(_Solid(surface, min(heights), max(heights), tuple(marks), part["name"]))
         return solids
 
 
@@ -388,7 +377,7 @@ class Painter:
 def _revolve(
     outline: Sequence[Sequence[float]], around: int, start: float = 0.0, width: float = 2 * math.pi
 ) -> tuple[Array, Array]:
-    """The facets that an outline of points (radius, height) sweeps about z: corners (n, 4, 3), normals (n, 3)."""
+    """Return the facets that an outline (radius, height) sweeps about z: corners (n, 4, 3), normals (n, 3)."""
     angles = start + width * np.arange(around + 1) / around
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     middle = start + width * (np.arange(around) + 0.5) / around
@@ -405,7 +394,7 @@ def _revolve(
 
 
 def _patch(mark: dict[str, Any], out: float) -> tuple[Array, Array]:
-    """The facets of a mark, a little outside of its part."""
+    """Return the facets of a mark, a little outside of its part."""
     outline = np.array(mark["outline"])
     steps = np.diff(outline, axis=0)
     outwards = np.stack([steps[:, 1], -steps[:, 0]], axis=1) / np.linalg.norm(steps, axis=1)[:, None]
@@ -419,7 +408,7 @@ def _circle(radius: float, height: float, around: int) -> Array:
 
 
 def _lean(axis: Array) -> Array:
-    """The shortest turn that takes z to an axis, shape (3, 3): it leans and does not twist."""
+    """Return the shortest turn that takes z to an axis, shape (3, 3): it leans and does not twist."""
     x, y, z = axis
     if z < -0.999999:
         return np.diag([1.0, -1.0, -1.0])
