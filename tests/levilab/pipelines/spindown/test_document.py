@@ -252,30 +252,3 @@ def test_a_warning_about_an_input_is_recalled_once_however_it_is_named(
     about = [text for text in after.all_warnings if "no header" in text]
     assert len(about) == 2
     assert [text.count("one.csv") + text.count("two.csv") for text in about] == [1, 1]  # named once
-
-
-def test_a_run_with_a_tilt_of_its_own_is_recalled_with_its_curves(tmp_path: Path) -> None:
-    """Counts good to 5 mHz show the tilt; its curves, tables and words come back from result.json."""
-    t, law = np.arange(0, 160, 10.0), LAWS["disc"]
-    q = law.dimensionless(np.array([40.0, 2.34e-4]), 29.0, 160.0)
-    solution = np.array([*q, 0.03**2, 21.6 / 29.0, 0.0])
-    counts = 29.0 * counted(law, t / 160.0, solution) + np.random.default_rng(6).normal(0, 0.005, t.size)
-    rows = [f"{time:g},{spin:.4f}" for time, spin in zip(t, counts, strict=True)]
-    (tmp_path / "run.csv").write_text("\n".join(["time_s,spin_frequency_hz", *rows, ""]), encoding="utf-8")
-    analysis = analyzed(tmp_path / "run.csv")
-    recalled = recall_spindowns([tmp_path / "run.csv"], SpinDownOptions())
-    (before,), (after,) = analysis.runs, recalled.runs
-    assert before.has_tilt
-    assert after.fit("disc").parameters == before.fit("disc").parameters
-    assert after.fit("disc").residuals == pytest.approx(before.fit("disc").residuals, abs=1e-9)
-    found = count_table(recalled)
-    assert found is not None
-    assert found == count_table(analysis)
-    shown = [table for table in SPINDOWN.tables(recalled) if table.title.startswith("What the counter sees")]
-    assert "δ: tilt of the moment; ν_r: resonance" in shown[0].title
-    assert after.fit("stokes").has_tilt
-    assert "stokes" in recalled.combined.verdict.excluded
-    assert {"stokes": False, "disc": True}.items() <= {
-        name: "moment_tilt" in law_constants(recalled, name) for name in LAWS
-    }.items()  # an excluded law says nothing of the wobble
-    assert tilt_part(after.fit("disc"), after.time)[-1] == pytest.approx(0.2, abs=0.1)
