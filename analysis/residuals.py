@@ -5,7 +5,7 @@ start of the next.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import comb, sqrt
 
@@ -134,8 +134,8 @@ def gross_errors(t: Array, n_parameters: int, p: float = 1e-3) -> NDArray[np.int
 NOISE = 0.8
 #: Up to so many places every stretch between two of them is tried; of more readings so many, evenly distributed.
 _PLACES = 40
-#: Up to so many readings a jump between any two neighbours is tried, too.
-_EVERY_JUMP = 300
+#: More readings than this are judged by means over neighbours.
+_MOST_MEANS = 300
 
 
 @dataclass(frozen=True)
@@ -175,14 +175,17 @@ def largest_change(time: Array, residuals: Array, slopes: Array) -> Change | Non
     """
     from scipy.special import stdtr
 
+    size_of_block = -(-len(residuals) // _MOST_MEANS)
+    if size_of_block > 1:
+        means = (_means(rows, size_of_block) for rows in (time, residuals, slopes))
+        return _of_blocks(largest_change(*means), size_of_block)
     n, freedom = len(residuals), len(residuals) - len(slopes) - 1
     if freedom < 4:
         return None
     places = np.unique(np.linspace(1, n - 1, min(n - 1, _PLACES)).round().astype(int))
     first, last = np.array([(i, j) for i in places for j in places if i < j and i < n - 2]).T
-    if n <= _EVERY_JUMP:
-        jumps = np.arange(1, n - 2)
-        first, last = np.concatenate([first, jumps]), np.concatenate([last, jumps + 1])
+    jumps = np.arange(1, n - 2)
+    first, last = np.concatenate([first, jumps]), np.concatenate([last, jumps + 1])
     pairs = np.unique(np.stack([first, last]), axis=1)
     first, last = pairs
     at = np.arange(n)
@@ -201,6 +204,17 @@ def largest_change(time: Array, residuals: Array, slopes: Array) -> Change | Non
         return None
     p = 2 * len(gain) * float(stdtr(freedom, -sqrt(float(gain[k]) / rest)))
     return Change(int(first[k]), int(last[k]), float(along[k] / size[k]), min(p, 1.0))
+
+
+def _means(rows: Array, size: int) -> Array:
+    """Return means over neighbours along the last axis; what is left at the end, less than one of them, is dropped."""
+    n = rows.shape[-1] // size
+    return np.asarray(rows[..., : n * size].reshape(*rows.shape[:-1], n, size).mean(axis=-1))
+
+
+def _of_blocks(found: Change | None, size: int) -> Change | None:
+    """Return a change of means with the indices of the readings in the middle of them."""
+    return found and replace(found, first=found.first * size + size // 2, last=found.last * size + size // 2)
 
 
 def whitening(time: Array, rho: float) -> Callable[[Array], Array]:

@@ -21,8 +21,10 @@ from analysis.uncertainty import ROUNDING, Estimate, propagate
 Array = NDArray[np.float64]
 
 #: A search ends where a step moves no parameter by more of its u; the answer is within the square of that.
-_CLOSE = 0.02
+_CLOSE = 0.05
 _MOST_STEPS = 30
+#: Of more readings means over neighbours are fitted, for which a spin-down is straight within the noise.
+_MOST = 3000
 #: Of a step: the longest in a, and in A in units of its prior u.  The tilt bends more than linearly beyond.
 _LONGEST_GAP, _LONGEST_TILT = 0.5, 2.0
 MAX_STATED_FACTOR = 3.0  # u(ln c) above which "known to a factor" says nothing
@@ -232,31 +234,24 @@ def solution(
         nutation: as expected.
         rho: correlations of neighbouring readings' noise that are possible.
     """
-    tau, weight, p = readings.tau, readings.weight, len(law.parameters)
+    few, p = readings.means(_MOST), len(law.parameters)
+    tau, weight = few.tau, few.weight
     q, converged = solve(
-        lambda q: (law.spin(tau, q) - readings.x) * weight,
-        lambda q: law.gradient(tau, q) * weight,
-        _start(law, readings),
+        lambda q: (law.spin(tau, q) - few.x) * weight, lambda q: law.gradient(tau, q) * weight, _start(law, few)
     )
     least = ROUNDING * float(np.max(weight))
     with_tilt = CountedLaw(law, float(readings.x[-1]), readings.reference_hz, top, nutation) if tilt else None
     form: DragLaw | CountedLaw = with_tilt or law
     expected, u = with_tilt.expected if with_tilt else (np.empty(0), np.empty(0))
     q = np.concatenate([q, expected])
-
-    def residual(at: Array) -> Array:
-        return (readings.x - form.spin(tau, at)) * weight
-
-    left = residual(q)
-    found, slopes, close = None, np.zeros((len(q), len(tau))), False
+    found, close, left, slopes = None, False, *_of_readings(form, few, q)
     with np.errstate(all="ignore"):
         for _ in range(_MOST_STEPS):
-            slopes = form.gradient(tau, q) * weight
             if not (np.isfinite(slopes).all() and np.isfinite(left).all()):
                 found = None
                 break
             found = posterior(
-                readings.time, left, slopes, (expected - q[p:], u), stated=readings.sigma_known, least=least, rho=rho
+                few.time, left, slopes, (expected - q[p:], u), stated=readings.sigma_known, least=least, rho=rho
             )
             if found is None:
                 break
@@ -271,8 +266,18 @@ def solution(
                     _LONGEST_GAP / max(abs(float(step[p + 1])), _LONGEST_GAP),
                     _LONGEST_TILT * u[0] / max(abs(float(step[p])), _LONGEST_TILT * u[0]),
                 )
-            q, left = q + step, residual(q + step)
+            q = q + step
+            left, slopes = _of_readings(form, few, q)
+        if few is not readings:
+            left, slopes = _of_readings(form, readings, q)
     return Solution(law, with_tilt, readings, q, converged and close, left, slopes, found)
+
+
+def _of_readings(form: DragLaw | CountedLaw, readings: Readings, q: Array) -> tuple[Array, Array]:
+    """Return residuals and slopes in units of the readings' u, shapes (n,) and (p, n)."""
+    with np.errstate(all="ignore"):
+        left = (readings.x - form.spin(readings.tau, q)) * readings.weight
+        return np.asarray(left), np.asarray(form.gradient(readings.tau, q) * readings.weight)
 
 
 def fit_law(found: Solution, gate: float | None = None) -> LawFit:

@@ -8,12 +8,10 @@ import shutil
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pytest
 
 from analysis.spindown import drag
 from analysis.spindown.drag import LAWS
-from analysis.spindown.tilt import counted
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.result import save
