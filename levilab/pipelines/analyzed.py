@@ -38,11 +38,13 @@ class Origin(Generic[Opt]):
         text: for people.
         budget: what the uncertainties of the input's numbers are made of; None: to be worked out from what was found,
             empty: the result that was read holds none.
+        lacks_result: whether it was analyzed since no result of it was found.
     """
 
     options: Opt
     text: str = NOW
     budget: tuple[Budget, ...] | None = None
+    lacks_result: bool = False
 
 
 @dataclass(frozen=True)

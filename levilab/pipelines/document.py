@@ -48,8 +48,6 @@ class Settings(Part):
 
 
 D = TypeVar("D", bound=Result)
-#: Why an input was analyzed for a page.
-NO_RESULT = "there was no result yet"
 
 
 @dataclass(frozen=True)
@@ -177,12 +175,13 @@ class Document(Generic[S, R, Opt, A, D]):
         """Read the result of one input, or analyze it."""
         earlier, own = archive.earlier(source.path, source.data, source.sha256), self._own(given, source)
         if earlier is None:
-            options, why = self.method.options(**own), NO_RESULT
+            options, why = self.method.options(**own), "there was no result yet"
         elif why := self._problem(earlier, given, source):
             options = replace(self._options(earlier), **own)
         else:
             return self._read_one(source, earlier)
-        return source, self.method.fit(source, options), Origin(options, f"{FOR_THIS_PAGE}: {why}")
+        origin = Origin(options, f"{FOR_THIS_PAGE}: {why}", lacks_result=earlier is None)
+        return source, self.method.fit(source, options), origin
 
     def _read_one(self, source: Source[S], earlier: Earlier[D]) -> tuple[Source[S], R, Origin[Opt]]:
         """Read the result of one input.  Raises DataError."""
