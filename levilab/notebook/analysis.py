@@ -121,7 +121,7 @@ def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
 
 
 def _options(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Options as analyses take them, those that are None left out.  Raises UsageError, DataError."""
+    """Return options as analyses take them, without those that are None.  Raises UsageError, DataError."""
     options = {name: value for name, value in given.items() if value is not None}
     for name, choices in _CHOICES.items():
         if options.get(name, choices[0]) not in choices:
@@ -138,7 +138,7 @@ def _options(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _columns(given: Mapping[str, str | int] | str) -> dict[str, str]:
-    """As text or as a mapping.  Raises UsageError."""
+    """Return names of columns, given as text or as a mapping.  Raises UsageError."""
     return parse_columns(given) if isinstance(given, str) else {name: str(title) for name, title in given.items()}
 
 

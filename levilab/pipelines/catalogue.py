@@ -122,7 +122,7 @@ class Analysis(Generic[A]):
         return budgets_of_result(found, self.symbols)
 
     def figure(self, found: A) -> Figure:
-        """The figure."""
+        """Draw the figure."""
         from levilab.pipelines.figures import FIGURES  # with matplotlib
 
         figure: Figure = FIGURES[self.name](found)

@@ -14,7 +14,7 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.device import Device, DeviceError, read_device
 from levilab.formats.table import parse_columns
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.field.analysis import NEEDS, FieldAnalysis, analyze_scans
+from levilab.pipelines.field.analysis import METHOD, NEEDS, FieldAnalysis
 from levilab.pipelines.field.device import FieldOptions, known_of
 from levilab.pipelines.field.document import DOCUMENT
 from levilab.pipelines.field.figure import field_figure
@@ -69,7 +69,7 @@ def csv(path: Path, header: str, *columns: np.ndarray) -> Path:
 
 def test_the_sample_scan_gives_its_truth_back(sample_data: Path, device: Path) -> None:
     """As make.py prints it; 3 u, where the seed was chosen before this was seen."""
-    found = analyze_scans([sample_data / "field-scan"], FieldOptions(device=read_device(device)))
+    found = METHOD.analyze([sample_data / "field-scan"], FieldOptions(device=read_device(device)))
     for name, truth in (("strength", 1.409299e-3), ("origin", 0.811e-3), ("thickness", 14.79e-3)):
         estimate = found.values[name]
         assert estimate.value is not None
@@ -79,7 +79,7 @@ def test_the_sample_scan_gives_its_truth_back(sample_data: Path, device: Path) -
 
 def test_a_result_holds_what_was_found(scan: Path, device: Path) -> None:
     options = FieldOptions(device=read_device(device), height_m=0.0735)
-    found = analyze_scans([scan], options)
+    found = METHOD.analyze([scan], options)
     document = json.loads(keep(found).read_text(encoding="utf-8"))
     assert document["values"]["strength"]["unit"] == "T m"
     assert {"origin", "thickness", "moment", "mass_to_set"} <= set(document["values"])
@@ -106,7 +106,7 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp
     other = shutil.copytree(scan, tmp_path / "other")
     text = (other / "readings.csv").read_text(encoding="utf-8").replace(",0.035,", ",0.0352,")
     (other / "readings.csv").write_text(text, encoding="utf-8")
-    found = analyze_scans([tmp_path], FieldOptions())
+    found = METHOD.analyze([tmp_path], FieldOptions())
     alone = [run.values["strength"] for run in found.runs]
     mean = found.values["strength"]
     assert mean.value == pytest.approx(np.mean([one.value for one in alone]))
@@ -124,7 +124,7 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp
 
 
 def test_the_windows_of_spin_are_drawn_from_the_lightest_top_to_the_heaviest(sample_data: Path) -> None:
-    found = analyze_scans([sample_data / "field-scan"], FieldOptions())
+    found = METHOD.analyze([sample_data / "field-scan"], FieldOptions())
     slow, fast = field_figure(found).axes[3].get_lines()[:2]
     ends = [1e3 * (found.values[name].value or 0.0) for name in ("lightest_mass", "heaviest_mass")]
     for line in (slow, fast):
@@ -151,7 +151,7 @@ def test_files_of_users_are_read_in_their_units(
 ) -> None:
     path = csv(tmp_path / "hall.csv", titles[0], z, b)
     options = FieldOptions(columns=parse_columns(titles[1]), device=CALLIPER)
-    found = analyze_scans([path], options)
+    found = METHOD.analyze([path], options)
     strength = found.values["strength"].value
     assert strength == pytest.approx(
         BASE.strength_t_m, rel=1e-3
@@ -174,7 +174,7 @@ def test_files_of_users_are_read_in_their_units(
 def test_bad_scans_are_refused_in_one_line(tmp_path: Path, z: np.ndarray, b: np.ndarray, says: str) -> None:
     path = csv(tmp_path / "hall.csv", "z [mm],B [mT]", z, b)
     with pytest.raises(DataError) as caught:
-        analyze_scans([path], FieldOptions(device=CALLIPER))
+        METHOD.analyze([path], FieldOptions(device=CALLIPER))
     assert says in str(caught.value)
     assert str(path) in str(caught.value)
 
@@ -182,20 +182,20 @@ def test_bad_scans_are_refused_in_one_line(tmp_path: Path, z: np.ndarray, b: np.
 def test_a_file_without_its_base_says_what_is_missing(tmp_path: Path) -> None:
     path = csv(tmp_path / "hall.csv", "z [mm],B [mT]", HEIGHTS_MM, FIELD_MT)
     with pytest.raises(DataError, match=r"the radii of the base are not known.*`device`"):
-        analyze_scans([path], FieldOptions())
+        METHOD.analyze([path], FieldOptions())
 
 
 def test_a_file_of_something_else_does_not_suit(tmp_path: Path, sample_data: Path) -> None:
     with pytest.raises(DoesNotSuit, match="needs a field run"):
-        analyze_scans([sample_data / "spin-down-1"], FieldOptions())
+        METHOD.analyze([sample_data / "spin-down-1"], FieldOptions())
     path = csv(tmp_path / "spin.csv", "t,f", HEIGHTS_MM, FIELD_MT)
     with pytest.raises(DoesNotSuit, match=r"no title is known \(height_m, flux_density_t.*z=NAME,b=NAME"):
-        analyze_scans([path], FieldOptions())
+        METHOD.analyze([path], FieldOptions())
 
 
 def test_a_moment_needs_the_mass(scan: Path) -> None:
     with pytest.raises(DataError, match=r"`height_m` tells the moment of a top only if its mass is known"):
-        analyze_scans([scan], FieldOptions(height_m=0.073))
+        METHOD.analyze([scan], FieldOptions(height_m=0.073))
 
 
 # --- the device file ---
