@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.pulses.jump import Jump
 from analysis.uncertainty import Estimate
 
 Array = NDArray[np.float64]
@@ -38,29 +39,6 @@ BLOCK, BLOCKS = 6, 50
 UNLIKE, UNSEEN = 1.2, 0.05
 #: Rounded times of turns shift the phase gained in half the record by no more than this part of their rounding.
 GRID_AT_MOST = 0.6
-
-
-@dataclass(frozen=True)
-class Jump:
-    """A place where the record's time jumps.
-
-    Attributes:
-        at: the record's time there [s].
-        lost: time that is missing there, below 0 where samples were repeated [s]; whole turns cannot be seen.
-        u: its standard uncertainty [s].
-    """
-
-    at: float
-    lost: float
-    u: float = 0.0
-
-    def mend(self, times: Array) -> Array:
-        """Return what a clock would have shown at times of the record."""
-        return times + self.lost * (times > self.at)
-
-    def spoil(self, times: Array) -> Array:
-        """Return the record's times of what passed at times of the clock."""
-        return times - self.lost * (times > self.at + max(self.lost, 0.0))
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from analysis.pulses.jump import Jump  # noqa: TC001 - results are read by the types of their fields
 from analysis.uncertainty import Estimate
 
 Method = Literal["edges", "matched", "likelihood"]
@@ -46,6 +47,7 @@ class SpinFrequency:
         u_of_pulses: standard uncertainties of frequency [Hz] and slope [Hz/s], had the bend been known; None: not
             known.
         freedom: degrees of freedom of the scatter that u comes from; u has Student's factor for them.  None: not known.
+        jump: of the record's time; None: there is none.
     """
 
     frequency: Estimate
@@ -64,6 +66,7 @@ class SpinFrequency:
     correlations: tuple[float, float, float] = (0.0, 0.0, 0.0)
     u_of_pulses: tuple[float, float] | None = None
     freedom: float | None = None
+    jump: Jump | None = None
 
     def at(self, time: float) -> Estimate:
         """The frequency at another time [s], along the slope and its bend."""

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewPulses
 from analysis.numbers import digits
-from analysis.pulses.regression import Fit, Jump, fit_turns, median, student
+from analysis.pulses.jump import Jump
+from analysis.pulses.regression import Fit, fit_turns, median, student
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.turns import Numbering, number_turns
 
@@ -29,7 +30,7 @@ SELDOM = 1e-3
 CERTAIN = 8.0
 #: Pulses between a jump and the ends of the list, at least.
 FROM_ENDS = 8
-#: The smallest buffer of a sound card, 64 samples at 48 kHz, lasts longer [s]; and a rounding has fewer steps of a clock.
+#: The smallest buffer of a sound card, 64 samples at 48 kHz, lasts longer [s]; roundings have fewer steps.
 LEAST_LOST, STEPS = 1e-3, 2.5
 #: The place of a jump is looked for again with the fit that has one, until it stays: that many times at most.
 TRIES = 4
@@ -94,6 +95,7 @@ def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None) -> SpinF
         correlations=fit.correlations(fit.reference),
         u_of_pulses=fit.u_of_pulses(fit.reference),
         freedom=fit.scatter.freedom,
+        jump=fit.jump,
     )
 
 
@@ -249,13 +251,13 @@ def findings_of(train: Train) -> tuple[Finding, ...]:
     return (*notes, *findings_of_fit(train.fit, "pulses"))
 
 
-def findings_of_fit(fit: Fit, what: str) -> tuple[Finding, ...]:
+def findings_of_fit(fit: Fit, what: str, start: float = 0.0) -> tuple[Finding, ...]:
     """Return what is to be said of a fit to turns or pulses."""
     notes = []
     if (jump := fit.jump) is not None:
         size = f"{digits(abs(1e3 * jump.lost), 3)} ms, or that and whole turns,"
         did = "misses" if jump.lost > 0 else "repeats"
-        notes.append(Finding("jump", f"the record {did} {size} at {jump.at:.5g} s: allowed for"))
+        notes.append(Finding("jump", f"the record {did} {size} at {start + jump.at:.5g} s: allowed for"))
     if fit.scatter.correlated_p < SELDOM:
         alike = "resemble each other" if fit.scatter.inflation > 1 else "differ from each other, which averages out"
         notes.append(Finding("correlated", f"neighbouring {what} {alike}: variance x {digits(fit.scatter.inflation)}"))

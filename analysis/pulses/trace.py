@@ -369,7 +369,7 @@ def _result(pulses: Found, start: float, rate: float, degree: int | None) -> Spi
         more.append(Finding("missing", f"{found.missing} turn{have} no pulse"))
     if found.wrong:
         more.append(Finding("wrong", f"{found.wrong} pulses are not at their place and were left out"))
-    more += findings_of_fit(fit, "turns")
+    more += findings_of_fit(fit, "turns", start)
     return SpinFrequency(
         frequency=frequency,
         chirp=chirp,
@@ -387,6 +387,7 @@ def _result(pulses: Found, start: float, rate: float, degree: int | None) -> Spi
         correlations=(own or fit).correlations(reference),
         u_of_pulses=u_of_pulses,
         freedom=(own or fit).scatter.freedom,
+        jump=None if fit.jump is None else replace(fit.jump, at=start + fit.jump.at),
     )
 
 
