@@ -17,11 +17,11 @@ from analysis.pulses.turns import Numbering, number_turns
 Array = NDArray[np.float64]
 
 FEWEST = 4
-#: A pulse farther from its place than this many standard deviations of the others is no pulse of the top; than more of
-#: them by few pulses, which say little of their standard deviation.
+#: A pulse farther from its place than this number of standard deviations of the others is no pulse of the top; with
+#: few pulses the limit is the quantile of Student's t of the same probability.
 GROSS = 4.5
 ROUNDS = 12
-#: Independent residuals that differ as much over long times from those over short ones are as seldom as this.
+#: `correlated` is reported where independent residuals would do it with less than this probability.
 SELDOM = 1e-3
 
 
@@ -32,7 +32,7 @@ CERTAIN = 8.0
 FROM_ENDS = 8
 #: The smallest buffer of a sound card, 64 samples at 48 kHz, lasts longer [s]; roundings have fewer steps.
 LEAST_LOST, STEPS = 1e-3, 2.5
-#: The place of a jump is looked for again with the fit that has one, until it stays: that many times at most.
+#: The place of a jump is looked for again with the fit that has one, until it stays: four times at most.
 TRIES = 4
 #: Pulses on each side that show a jump by themselves, to a quarter of its size and twice their uncertainty.
 BESIDE = 12
@@ -100,7 +100,7 @@ def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None) -> SpinF
 
 
 def checked_times(pulse_times: ArrayLike) -> Array:
-    """The times as an array of floats.  Raises what is wrong with them."""
+    """Return the times as an array of floats.  Raises what is wrong with them."""
     times = np.asarray(pulse_times, dtype=np.float64)
     if times.ndim != 1:
         raise ShapesDiffer(quantity="pulse times", seen=times.shape, expected=(times.size,))
@@ -115,7 +115,7 @@ def checked_times(pulse_times: ArrayLike) -> Array:
 
 
 def fit_train(times: Array, *, degree: int | None = None, step: float = 0.0) -> Train:
-    """Number the turns and fit the phase, leaving out what does not belong.
+    """Find the turns of pulses and fit the phase, without the pulses that belong to none.
 
     Args:
         times: shape (n,), increasing [s].
@@ -156,7 +156,7 @@ def _is_sudden(times: Array, train: Train, jump: Jump) -> bool:
 
 
 def _with_whole_turns(times: Array, train: Train, degree: int | None) -> Train:
-    """Return the train with as many turns lost at its jump as fit best: the slope shows it."""
+    """Return the train with the number of turns lost at its jump that fits best: the slope shows it."""
     jump = train.fit.jump
     assert jump is not None
     behind = (times[train.used] > jump.at).astype(np.int64)
@@ -226,7 +226,7 @@ def _fit_numbered(times: Array, numbering: Numbering, degree: int | None, jump: 
 
 
 def _one_a_turn(numbering: Numbering, away: Array | None = None) -> NDArray[np.intp]:
-    """Indices of the pulses that belong, the nearest of each turn."""
+    """Return indices of the pulses that belong, the nearest of each turn."""
     index = np.flatnonzero(numbering.belongs)
     turns = numbering.turns[index]
     if index.size < 2 or np.all(np.diff(turns) > 0):
@@ -239,7 +239,7 @@ def _one_a_turn(numbering: Numbering, away: Array | None = None) -> NDArray[np.i
 
 
 def findings_of(train: Train) -> tuple[Finding, ...]:
-    """The findings about a train."""
+    """Return the findings about a train."""
     notes = []
     if train.missing:
         rare = ", more than have one: is the spin a part of this?" if train.missing > train.used.size else ""

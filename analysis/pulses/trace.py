@@ -31,9 +31,9 @@ Choice = Literal["auto", "edges", "matched", "likelihood"]
 
 #: Samples per second of the shortened trace in which pulses are searched for.
 SEARCH_RATE = 2500.0
-#: A trace that moves by no more than this part of its values is constant: sums of them are rounded by as much.
+#: A trace that moves by no more than this part of its values is constant: that is the rounding of their sums.
 ROUNDING = 1e-12
-#: Fewer edges than this have to stand out of the noise so many times, or they may be noise.
+#: Fewer edges than this may be noise, unless they are higher than this multiple of it.
 FEW, CLEAR = 16, 3.0
 #: Pulses that last longer than this part of a turn are placed by their edges alone.
 WIDE = 0.2
@@ -41,14 +41,13 @@ WIDE = 0.2
 MOST_MISSING, MOST_WRONG = 0.5, 0.15
 #: Nor where the frequency would change by more than this part of it.
 MOST_SWEPT = 1.0
-#: Nor where so many times as many pulses lie beside the turns as at them: a reflection is one of them for each turn.
+#: Nor where the pulses beside the turns outnumber those at them by this factor: a reflection is one for each turn.
 MOST_DOUBLED = 1.5
-#: Pulses that scatter by more than this part of their width are placed one by one, and so are those that scatter by so
-#: many times what the match leaves: a mean pulse that is learnt from few of them fits each where it happens to be.
+#: Pulses are placed one by one if they scatter by more than this part of their width, or by this multiple of the
+#: residuals of the match: a mean pulse that is learnt from few of them fits each where it happens to be.
 SCATTERED, UNDERSTATED = 0.25, 3.0
-#: But only where noise would move each by no more than a quarter of that (0.8 widths over the contrast, by simulation),
-#: where they scatter by more than this part of a bin, which the bins themselves do not, and where no more than this
-#: part of the turns is without its own pulse.
+#: But only if they scatter by more than four times the shift by noise (0.8 widths over the contrast, by simulation) and
+#: by more than this part of a bin, and if no more than this part of the turns lacks its pulse.
 BY_NOISE, BY_BINS, MOST_ODD = 3.2, 0.25, 0.1
 #: A likelihood that is as great at half the frequency may be so at a quarter.
 MOST_DOUBLINGS = 2
@@ -56,7 +55,7 @@ MOST_DOUBLINGS = 2
 SAME = 0.1
 #: With fewer samples a turn, a line at 1/k of the frequency or beyond half the rate leaves samples that look the same.
 COARSE = 12.0
-#: And not where every second pulse lies so many standard deviations from the others.
+#: Standard deviations between every second pulse and the others from which on they are two marks.
 APART = 4.0
 
 
@@ -68,7 +67,7 @@ def spin_of_trace(
     method: Choice = "auto",
     degree: int | None = None,
 ) -> SpinFrequency:
-    """Frequency and chirp of a top from evenly sampled light pulses.
+    """Return frequency and chirp of a top from evenly sampled light pulses.
 
     Args:
         samples: shape (n,), any unit; NaN where there is none.
@@ -127,11 +126,11 @@ class Trace:
         return (np.arange(self.bins.size, dtype=np.float64) + 0.5) / self.bin_rate - 0.5 / self.rate
 
     def too_few(self, seen: int) -> TooFewPulses:
-        """The error of a trace without enough pulses."""
+        """Return the error of a trace without enough pulses."""
         return TooFewPulses(seen=seen, needed=FEWEST, duration=self.duration)
 
     def match(self, fit: Fit, degree: int | None) -> Match | None:
-        """The matched filter from a phase that is about right; None where there are no pulses."""
+        """Return the matched filter from a phase that is about right; None where there are no pulses."""
         window = window_of(self.bins, fit.phase(self.middles))
         if window is None:
             return None
@@ -185,7 +184,7 @@ def _scatters(train: Train, text: str) -> Finding:
 
 
 def _events(trace: Trace, degree: int | None) -> tuple[Events, Train]:
-    """The pulses that stand out of the noise, numbered.  Raises TooFewPulses."""
+    """Return the pulses that stand out of the noise, numbered.  Raises TooFewPulses."""
     events = trace.events
     if events.times.size < FEWEST:
         raise trace.too_few(events.times.size)
@@ -195,7 +194,7 @@ def _events(trace: Trace, degree: int | None) -> tuple[Events, Train]:
 
 
 def _scattered(trace: Trace, left: float, degree: int | None) -> Train | None:
-    """The pulses numbered, if they stand out but not at their places: a mean pulse cannot show how far they are off.
+    """Return the train if pulses stand out but are not at their places: a mean pulse does not show how far they are.
 
     left: how far a match leaves them from their places, as a standard deviation [turns].
     None where the match is to be trusted: at noise, at gaps, and where every second pulse is off by the same, which is
@@ -221,17 +220,17 @@ def _scattered(trace: Trace, left: float, degree: int | None) -> Train | None:
 
 
 def _scatter(train: Train) -> float:
-    """Standard deviation of the pulses about their fit [turns]."""
+    """Return standard deviation of the pulses about their fit [turns]."""
     return float(np.sqrt(train.fit.scatter.variance))
 
 
 def _same(one: Fit, other: Fit) -> bool:
-    """Whether two fits count the same turns."""
+    """Return whether two fits count the same turns."""
     return abs(one.middle_frequency - other.middle_frequency) < SAME * other.middle_frequency
 
 
 def _by_edges(trace: Trace, degree: int | None) -> tuple[Edges, int]:
-    """The edges, and the number of pulses beside the turns' own.  Raises TooFewPulses."""
+    """Return the edges, and the number of pulses beside the turns' own.  Raises TooFewPulses."""
     events, train = _events(trace, degree)
     if events.width * train.fit.middle_frequency > WIDE:
         times = events.times[train.used] - 0.5 / trace.rate
@@ -300,7 +299,7 @@ def _doubt(found: Match) -> str:
 
 
 def _without_trap(trace: Trace, found: Match, degree: int | None) -> tuple[Match, tuple[Finding, ...]]:
-    """The match at half or twice the frequency where that is the top's, and the findings about it."""
+    """Return the match at half or twice the frequency where that is the top's, and the findings about it."""
     notes: tuple[Finding, ...] = ()
     for _ in range(MOST_DOUBLINGS):
         if not traps.repeats(found):
@@ -327,7 +326,7 @@ def _constant(values: Array) -> bool:
 
 
 def _checked(samples: ArrayLike, rate: float) -> tuple[Array, Array, NDArray[np.bool_] | None]:
-    """The samples, their shortened trace, and which of them are no finite numbers (None: all are)."""
+    """Return the samples, their shortened trace, and which of them are no finite numbers (None: all are)."""
     x = np.ascontiguousarray(samples, dtype=np.float64)
     if x.ndim != 1:
         raise ShapesDiffer(quantity="samples", seen=x.shape, expected=(x.size,))
@@ -392,7 +391,7 @@ def _result(pulses: Found, start: float, rate: float, degree: int | None) -> Spi
 
 
 def _wider(found: Estimate, own: Estimate) -> Estimate:
-    """The estimate of a method, with the scatter of the pulses' own places, and the distance to them, in its u."""
+    """Return the estimate of a method with the scatter of the pulses' own places, and the distance to them, in u."""
     assert found.value is not None
     assert found.u is not None
     assert own.value is not None

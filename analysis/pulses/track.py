@@ -141,7 +141,7 @@ def track_of_blocks(
 
 
 def _pieces(blocks: Iterable[ArrayLike], size: int) -> Iterator[Array]:
-    """The same samples in pieces of one size; the last has up to one and a half."""
+    """Yield the same samples in pieces of one size; the last has up to one and a half."""
     held: list[Array] = []
     count = 0
     for block in blocks:
