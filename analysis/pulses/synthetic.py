@@ -187,7 +187,7 @@ def _lose(share: float, samples: Array, random: Random) -> None:
 
 
 def _switch(frequency: float, duration: float, first: float, random: Random) -> Array:
-    """Return times of a switch with 1e-4 s of jitter that bounces, up to four times, at 45 % of turns and misses 8 %."""
+    """Return times of a switch with 1e-4 s of jitter; it bounces, up to four times, at 45 % of turns and misses 8 %."""
     turn = np.arange(1, int(frequency * duration) - 1)
     since = duration / 2
     start = frequency - CHIRP * since  # at time 0

@@ -134,7 +134,7 @@ def test_half_the_frequency_of_a_weak_trace_is_seen_and_named(part):
     samples = light(PHASE) + noise(0.3)
     trace = Trace(clean(samples, RATE, shorten(samples, 8), None), RATE)
     fit = fit_turns(TIME[::400], part * PHASE[::400])
-    found, notes = _without_trap(trace, trace.match(fit, None), None)
+    found, notes = _without_trap(trace, trace.match(fit))
     assert found.fit.frequency(np.array([2.0]))[0] == pytest.approx(29.8, abs=0.001)
     assert [note.text for note in notes] == [
         "two equal pulses a turn: half the frequency fitted too, and was not taken"
