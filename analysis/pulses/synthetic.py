@@ -21,11 +21,11 @@ class Case:
 
     Attributes:
         frequency: at the middle [Hz]; each trial's lies up to 0.5 Hz beside it.
-        duration: [s]; turns: length in turns, in the place of the duration.
+        duration: [s]; turns: if given, so many turns instead.
         snr: pulse height over noise [dB].
         missing: share of turns without a pulse.
         reflection: height of a second pulse 0.1 turn later.
-        spikes: number of short bursts of 1 to 5 pulse heights.
+        spikes: so many samples or short bursts of 1 to 5 pulse heights.
         bobbing: amplitude of the pulse height's modulation at 0.8 Hz.
         hum: (frequency [Hz], amplitude in pulse heights), each.
         wander: amplitude of a wandering baseline, a sine of 0.3 Hz and a random walk.
@@ -89,7 +89,7 @@ HARD = {
 
 @dataclass(frozen=True)
 class Trace:
-    """A synthetic record, with its truth.
+    """A record that is made up, with its truth.
 
     Attributes:
         samples: shape (n,), or, of a switch, times [s].
@@ -187,7 +187,7 @@ def _lose(share: float, samples: Array, random: Random) -> None:
 
 
 def _switch(frequency: float, duration: float, first: float, random: Random) -> Array:
-    """Return times of a switch with 1e-4 s of jitter; it bounces, up to four times, at 45 % of turns and misses 8 %."""
+    """Return times of a switch with a jitter of 1e-4 s, which bounces at 45 % of the turns and misses 8 %."""
     turn = np.arange(1, int(frequency * duration) - 1)
     since = duration / 2
     start = frequency - CHIRP * since  # at time 0
