@@ -46,7 +46,7 @@ _FRAME = "DataFrame"
 
 
 def analyze_data(data: One | Sequence[One], kind: str | None, given: Mapping[str, Any]) -> AnalysisResult:
-    """The result of one analysis.
+    """Analyze data by one analysis.
 
     Args:
         data: a run, a path, a DataFrame, or several of them.
@@ -105,7 +105,7 @@ def _is_one(data: object) -> bool:
 
 
 def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
-    """Where the data lie; a DataFrame is written into the folder."""
+    """Return where the data lie; a DataFrame is written into the folder."""
     if isinstance(item, Run):
         return item.folder
     if isinstance(item, str | PathLike):
@@ -121,7 +121,7 @@ def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
 
 
 def _options(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Options as analyses take them, those that are None left out.  Raises UsageError, DataError."""
+    """Return options as analyses take them, without those that are None.  Raises UsageError, DataError."""
     options = {name: value for name, value in given.items() if value is not None}
     for name, choices in _CHOICES.items():
         if options.get(name, choices[0]) not in choices:
@@ -138,7 +138,7 @@ def _options(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _columns(given: Mapping[str, str | int] | str) -> dict[str, str]:
-    """As text or as a mapping.  Raises UsageError."""
+    """Return names of columns, given as text or as a mapping.  Raises UsageError."""
     return parse_columns(given) if isinstance(given, str) else {name: str(title) for name, title in given.items()}
 
 
@@ -161,7 +161,7 @@ def _refuse_foreign(analysis: Analysis[Any], options: Mapping[str, Any]) -> None
 
 
 def _only_suiting(paths: Sequence[Path], options: Mapping[str, Any]) -> Suiting:
-    """The one analysis that suits what lies at all of the paths.
+    """Return the one analysis that suits the inputs at all of the paths.
 
     Raises:
         UsageError: there are several.
@@ -184,19 +184,19 @@ def _only_suiting(paths: Sequence[Path], options: Mapping[str, Any]) -> Suiting:
 
 
 def _in_rows(text: str, folder: Path, titles: int) -> str:
-    """A message about a DataFrame with rows in the place of a file's lines."""
+    """Return a message about a DataFrame with rows in the place of a file's lines."""
     return in_rows(text, folder, titles=titles) if _FRAME in text else text
 
 
 def _with_words(found: Any, in_words: Callable[[str], str]) -> Any:
-    """What was found, with the warnings about its inputs in other words."""
+    """Replace the warnings about inputs by the caller's words."""
     sources = [replace(source, warnings=tuple(map(in_words, source.warnings))) for source in found.sources]
     return replace(found, sources=tuple(sources), warnings=tuple(map(in_words, found.warnings)))
 
 
 @contextmanager
 def _errors(in_words: Callable[[str], str]) -> Iterator[None]:
-    """Errors as the caller reads them: the same error with another text."""
+    """Give errors the text that the caller reads."""
     try:
         yield
     except LevilabError as error:
