@@ -33,7 +33,7 @@ FROM_ENDS = 8
 LEAST_LOST, STEPS = 1e-3, 2.5
 #: The place of a jump is looked for again with the fit that has one, until it stays: that many times at most.
 TRIES = 4
-#: Pulses on each side that show a jump by themselves, to a quarter of its size and twice their uncertainty.
+#: Pulses on each side that show a jump alone: to a quarter of its size and twice their uncertainty.
 BESIDE = 12
 #: Turns that may be lost or repeated at a jump besides, and the natural logarithm of the odds from which they are.
 MORE_TURNS, LOG_ODDS = (-3, -2, -1, 1, 2, 3), 10.0
