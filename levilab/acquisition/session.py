@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from instruments.errors import InstrumentError, SettingsLost
 from levilab.bench.person import ask_no_person
 from levilab.errors import LevilabError
+from levilab.present.units import unit
 from levilab.runs.run import WARNING, utc_now
 from levilab.settings import Settings
 
@@ -352,9 +353,6 @@ class Session(Generic[S]):
 
 # --- the line of a reading ---
 
-#: Unit → how its values are written: with so many decimals that points stand below each other.
-_DIGITS = {"s": ".2f", "Hz": ".4f", "m": ".5f", "T": ".7f", "V": ".4f"}
-
 
 def _head(channel: Channel) -> str:
     """What stands above a channel's values: its name, without the unit, which stands beside each value."""
@@ -369,4 +367,5 @@ def _width(channel: Channel) -> int:
 
 
 def _with_unit(value: float, channel: Channel) -> str:
-    return f"{value:{_DIGITS.get(channel.unit, '.6g')}} {channel.unit}".rstrip()
+    decimals = unit(channel.unit).decimals  # so many that points stand below each other
+    return f"{value:{'.6g' if decimals is None else f'.{decimals}f'}} {channel.unit}".rstrip()

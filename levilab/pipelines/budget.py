@@ -12,8 +12,9 @@ from analysis.uncertainty import Estimate
 from instruments.time_bases import TIME_BASES
 from levilab.pipelines.sources import mark_of
 from levilab.present.document.blocks import Bullets, Details, Note, Paragraph, Tabular
-from levilab.present.numbers import enumeration, in_words, with_uncertainty
+from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.tables import Row, Table, table
+from levilab.present.units import unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -108,13 +109,10 @@ def setting_of(source: Source[Any], experiment: str, name: str) -> float | None:
 
 # --- how people are shown it ---------------------------------------------------------------------------
 
-#: Unit of results → the one in which people of this laboratory read it, and how many of them make one.
-_SHOWN_UNITS = {"T m": ("mT cm", 1e5), "m": ("mm", 1e3), "T": ("mT", 1e3)}
-
 #: Heads of the table, of which the numbers stand to the right.
 HEADS = ("source", "type", "u of it", "sensitivity", "adds to u", "share of u²")
-#: Unit of a sensitivity where the input has no unit, or the result.
-_NO_UNIT = "1"
+#: Shown unit of a sensitivity where the input has no unit, or the result.
+_NO_UNIT = ""
 
 
 def budget_table(budget: Budget, shown: Mapping[str, str] | None = None) -> Table:
@@ -125,25 +123,26 @@ def budget_table(budget: Budget, shown: Mapping[str, str] | None = None) -> Tabl
         shown: quantity → its symbol; by default its name.
     """
     budget = _in_shown_units(budget)
-    unit = in_words(budget.unit)
     rows = [Row(_cells(budget, one)) for one in budget.included]
-    rows.append(Row(("combined: u", "", "", "", _number(budget.u, unit), "100 %"), "together"))
+    rows.append(Row(("combined: u", "", "", "", _number(budget.u, budget.unit), "100 %"), "together"))
     left_out = budget.left_out
     rows += [Row((f"{cells[0]} (not in u)", *cells[1:])) for one in left_out if (cells := _cells(budget, one))]
     if any(one.contribution for one in left_out):
-        rows.append(Row(("u with all that is known", "", "", "", _number(budget.u_with_all, unit), ""), "together"))
+        rows.append(
+            Row(("u with all that is known", "", "", "", _number(budget.u_with_all, budget.unit), ""), "together")
+        )
     return table(title_of(budget, shown), HEADS, rows, numbers=HEADS[2:])
 
 
 def _in_shown_units(budget: Budget) -> Budget:
     """The same in the units that people read."""
-    unit, factor = _SHOWN_UNITS.get(budget.unit, (budget.unit, 1.0))
+    shown, factor = unit(budget.unit).fine
     rows = []
     for one in budget.components:
-        of_input, times = _SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+        of_input, times = unit(one.unit).fine
         u = None if one.u is None else one.u * times
         rows.append(replace(one, u=u, unit=of_input, sensitivity=one.sensitivity * factor / times))
-    return replace(budget, value=budget.value * factor, u=budget.u * factor, unit=unit, components=tuple(rows))
+    return replace(budget, value=budget.value * factor, u=budget.u * factor, unit=shown, components=tuple(rows))
 
 
 def title_of(budget: Budget, shown: Mapping[str, str] | None = None) -> str:
@@ -158,9 +157,9 @@ def _cells(budget: Budget, one: Component) -> tuple[str, ...]:
     return (
         one.source,
         one.kind,
-        "not known" if one.u is None else _number(one.u, in_words(one.unit)),
+        "not known" if one.u is None else _number(one.u, one.unit),
         _number(abs(one.sensitivity), _ratio(budget.unit, one.unit)),
-        "—" if one.contribution is None else _number(one.contribution, in_words(budget.unit)),
+        "—" if one.contribution is None else _number(one.contribution, budget.unit),
         _percent(share) if one.included else "",
     )
 
@@ -175,8 +174,8 @@ def _ratio(above: str, below: str) -> str:
     if above == below:
         return ""
     if below == _NO_UNIT:
-        return in_words(above)
-    return f"per {in_words(below)}" if above == _NO_UNIT else f"{in_words(above)} per {in_words(below)}"
+        return above
+    return f"per {below}" if above == _NO_UNIT else f"{above} per {below}"
 
 
 def _percent(share: float | None) -> str:
@@ -200,7 +199,7 @@ def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str
         texts.append(f"{text}. It gets smaller with {largest.remedy}." if largest.remedy else f"{text}.")
     known = [one for one in budget.left_out if one.contribution]
     if known and not budget.misses_nothing:
-        whole = _number(budget.u_with_all, in_words(budget.unit))
+        whole = _number(budget.u_with_all, budget.unit)
         texts.append(f"Not in u: {enumeration([one.source for one in known])}; with all that is known u is {whole}.")
     elif known:
         texts.append(f"Not in u, and negligible: {enumeration([one.source for one in known])}.")
@@ -208,7 +207,7 @@ def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str
     clocks = [one for one in unknown if one.unit == _NO_UNIT]
     if clocks:
         most = max(abs(one.sensitivity) for one in clocks) * _TEN_PPM
-        size = "less than 1 % of u" if most < 0.01 * budget.u else _number(most, in_words(budget.unit))
+        size = "less than 1 % of u" if most < 0.01 * budget.u else _number(most, budget.unit)
         texts.append(f"Not known: {enumeration([one.source for one in clocks])}; an error of 10⁻⁵ would add {size}.")
     texts += [f"Not known: {one.source}; it takes {one.remedy}." for one in unknown if one not in clocks]
     return " ".join(texts)

@@ -6,8 +6,9 @@ A column is read from the input's part of result.json, so that the table and the
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
+
+from levilab.present.units import name_with_unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -16,13 +17,6 @@ if TYPE_CHECKING:
 Kind = Literal["number", "count", "truth", "text"]
 
 Cell = str | float | int | bool | None
-
-#: Units of results → the end of a column's name.
-UNITS_IN_NAMES = MappingProxyType({
-    "Hz": "hz", "s": "s", "1": "", "1/s": "per_s", "1/rad": "per_rad", "(rad/s)^-1/2/s": "per_sqrt_rad_s",
-    "(rad/s)^(1-exponent)/s": "si", "Hz/s": "hz_per_s", "Hz/s^2": "hz_per_s2", "turns": "turns", "dB": "db",
-    "T": "t", "T m": "t_m", "m": "m", "m/kg": "m_per_kg", "kg": "kg", "rad": "rad",
-})  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -39,15 +33,6 @@ class Column:
     kind: Kind
     meaning: str
     read: Callable[[Mapping[str, Any]], Any]
-
-
-def name_with_unit(name: str, unit: str) -> str:
-    """A quantity's name with its unit.
-
-    >>> name_with_unit("newton_c2_u", "1/rad"), name_with_unit("slope", "1")
-    ('newton_c2_u_per_rad', 'slope')
-    """
-    return f"{name}_{UNITS_IN_NAMES[unit]}".removesuffix("_")
 
 
 def estimate(

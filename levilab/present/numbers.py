@@ -7,28 +7,12 @@ import re
 from typing import TYPE_CHECKING
 
 from analysis.numbers import digits, with_minus
+from levilab.present.units import unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from analysis.uncertainty import Estimate
-
-#: Units as people write them, where the files' plain text is harder to read.
-UNITS = {
-    "1": "",
-    "1/s": "s⁻¹",
-    "Hz/s^2": "Hz/s²",
-    "1/rad": "rad⁻¹",
-    "(rad/s)^-1/2/s": "(rad/s)^−½/s",
-    "(rad/s)^(1-exponent)/s": "(rad/s)^(1−n)/s",
-}
-
-#: Units that people are shown; no other text behind a number is a unit.
-KNOWN_UNITS = frozenset({
-    *filter(None, UNITS.values()), "%", "°", "dB", "rad", "mrad", "s", "ms", "µs", "min", "h",
-    "Hz", "kHz", "MHz", "mHz", "µHz", "Hz/s", "mHz/s", "m", "cm", "mm", "µm", "m/s", "m/kg", "kg", "g", "mg",
-    "T", "mT", "µT", "T m", "mT cm", "A m²", "V", "mV", "µV", "Vpp", "A", "Ω", "kΩ", "MΩ", "K", "J", "turns",
-})  # fmt: skip
 
 #: Names that a sentence lists at most.
 MOST_NAMES = 4
@@ -48,7 +32,7 @@ def with_uncertainty(estimate: Estimate) -> str:
     >>> with_uncertainty(Estimate(1.047e-5, None, "1/rad"))
     '1.047×10⁻⁵ rad⁻¹, u not determined'
     """
-    text = f"{without_unit(estimate)} {in_words(estimate.unit)}".strip()
+    text = f"{without_unit(estimate)} {unit(estimate.unit).text}".strip()
     return text if estimate.u is not None or estimate.value is None else f"{text}, u not determined"
 
 
@@ -103,23 +87,6 @@ def ends(estimate: Estimate) -> tuple[str, str] | None:
         return None
     low, high = (re.sub(r"\(.*?\)", "", _number(end, estimate.u)) for end in estimate.interval)
     return low, high
-
-
-def in_words(unit: str) -> str:
-    """A unit as people write it."""
-    return UNITS.get(unit, unit)
-
-
-def is_unit(text: str) -> bool:
-    """Whether a text is a unit that people are shown, or such units with "per" between them or before one.
-
-    >>> [is_unit(text) for text in ("mT cm", "Hz per s", "per Hz", "%")]
-    [True, True, True, True]
-    >>> [is_unit(text) for text in ("s ago", "Hz (u not known)", "of 120", "Hz per", "")]
-    [False, False, False, False, False]
-    """
-    above, per, below = f" {text}".rpartition(" per ")
-    return below.strip() in KNOWN_UNITS and (not per or above.strip() in {"", *KNOWN_UNITS})
 
 
 def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> str:

@@ -28,8 +28,9 @@ from levilab.present.drawing import (
     write,
 )
 from levilab.present.looks import GREY, LOOKS, MARKERS
-from levilab.present.numbers import enumeration, in_words, short_name
+from levilab.present.numbers import enumeration, short_name
 from levilab.present.style import STYLE, WIDE
+from levilab.present.units import unit as unit_row
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -242,7 +243,7 @@ def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
     few = len(found) <= MOST_BARS
     axes.errorbar(number, value, u if few else None, color="black", linestyle="none", elinewidth=0.6)
     axes.plot(number, value, color="black", linestyle="none", marker="o", markersize=2.5 if few else 1.2)
-    unit = in_words(mean.unit).replace("^−½", "$^{−1/2}$").replace("^(1−n)", "$^{1−n}$")
+    unit = unit_row(mean.unit).text.replace("^−½", "$^{−1/2}$").replace("^(1−n)", "$^{1−n}$")
     times = f"$10^{{{power}}}$ ".replace("-", "−") if power else ""
     axes.set(xlabel="run", ylabel=f"{SYMBOLS[name]}  [{times}{unit}]")
     axes.set_title(f"{SYMBOLS[name]}, {best.name}: mean, ±s", pad=3, fontsize=8)

@@ -21,8 +21,9 @@ from levilab.pipelines.spindown.table import (
 )
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Details, Listing, Note, Paragraph, Points, Tabular
-from levilab.present.numbers import column, ends, in_words, off, reading, short_name, with_decimals, with_uncertainty
+from levilab.present.numbers import column, ends, off, reading, short_name, with_decimals, with_uncertainty
 from levilab.present.tables import Row, Table, table
+from levilab.present.units import unit as unit_row
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -248,7 +249,7 @@ def _of_law(of: str, means: Mapping[str, Mean], runs: Sequence[Mapping[str, Esti
 
 
 def _head(of: str, name: str, unit: str) -> str:
-    shown = in_words(unit)
+    shown = unit_row(unit).text
     return f"{of}\n{SYMBOLS[name]}" + (f" [{shown}]" if shown else "")
 
 

@@ -11,7 +11,6 @@ from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
 from levilab.present.numbers import (
     column,
     ends,
-    in_words,
     plain,
     share,
     short_name,
@@ -20,6 +19,7 @@ from levilab.present.numbers import (
     without_unit,
 )
 from levilab.present.tables import Row, Table, table
+from levilab.present.units import unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -200,7 +200,7 @@ def _interval(estimate: Estimate) -> str:
 
 def _head(estimates: Mapping[str, Estimate]) -> str:
     name, estimate = next(iter(estimates.items()))
-    return f"{SYMBOLS[name]} [{in_words(estimate.unit)}]"
+    return f"{SYMBOLS[name]} [{unit(estimate.unit).text}]"
 
 
 def _first(estimates: Mapping[str, Estimate]) -> Estimate:

@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from levilab.present.document.typesetting import typeset
-from levilab.present.numbers import is_unit
+from levilab.present.units import is_unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -13,12 +13,9 @@ import pytest
 
 from levilab.errors import LevilabError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.field.quantities import SHOWN as FIELD
-from levilab.pipelines.row import UNITS_IN_NAMES
 from levilab.present.document.blocks import Banner, Details, Document, Section, Tabular
-from levilab.present.numbers import in_words
 from levilab.present.tables import Row, table
-from levilab.present.words import UNITS as WORDS
+from levilab.present.units import UNITS
 from levilab.report.tables.folder import CONTENTS, folder_of, write_tables
 from levilab.report.tables.latex import as_latex, escaped
 from levilab.report.tables.values import Values, as_csv, of_analysis
@@ -183,8 +180,8 @@ def test_only_units_go_to_the_head() -> None:
     for behind in ("Hz (u not known)", "s ago", "tops", "of 120", "per"):
         shown = table("", ("x",), [(f"1.2 {behind}",), (f"3 {behind}",)], numbers=["x"])
         assert units_in_heads(shown) == shown
-    of_results = {in_words(unit) for unit in UNITS_IN_NAMES} | {shown.unit for shown in FIELD.values()}
-    for unit in of_results - {""} | set(WORDS.values()) | {"mT cm per K", "per Hz"}:
+    of_results = {text for unit in UNITS for text in (unit.text, unit.shown.unit, unit.fine.unit)} - {""}
+    for unit in of_results | {"(rad/s)^−4/5/s", "mT cm per K", "per Hz"}:
         found = units_in_heads(table("", ("x",), [(f"< −1.2(3)×10⁻³ {unit}",)], numbers=["x"]))
         assert found.heads == (f"x\n[{unit}]",)
 
