@@ -240,7 +240,7 @@ _EACH = "each"
 #: The catalogue itself takes too long to import for a help page.
 COMMANDS = {
     "spindown": Command(
-        "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude.",
+        "Drag laws from spin-downs: the constants of each, and which laws the data exclude.",
         ("columns", "channel", "rate", "reading_u", "uncertainty", "keep_outliers", "tilt", "clock_u"),
     ),
     "spin": Command(

@@ -21,7 +21,7 @@ from levilab.pipelines.document import Document, Settings, number, value_of, val
 from levilab.pipelines.result import Part, Result, RunPart, Value
 from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis, SpinDownOptions
 from levilab.pipelines.spindown.budget import budget_of_all, budget_of_run
-from levilab.pipelines.spindown.laws import SHOWN_LAWS
+from levilab.pipelines.spindown.laws import STRAIGHT_LINES
 from levilab.pipelines.spindown.readings import EARLIEST_S, HIGHEST_HZ, SLOWEST_HZ
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class ModelPart(Part):
         size = len(law.parameters) + (len(PARAMETERS) if set(PARAMETERS) <= set(self.parameters) else 0)
         if self.covariance is not None and [len(row) for row in self.covariance] != [size] * size:
             raise ValueError(f"{self.name}: its covariance is not {size} × {size}")
-        lines = set(law.constants) if SHOWN_LAWS[self.name].straight else set()
+        lines = set(law.constants) if self.name in STRAIGHT_LINES else set()
         if set(self.linearised or ()) != lines:
             seen, expected = (", ".join(names) or "nothing" for names in (self.linearised or (), lines))
             raise ValueError(f"{self.name}: linearised has {seen}, expected {expected}")

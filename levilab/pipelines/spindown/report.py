@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
-from levilab.pipelines.spindown.laws import SYMBOLS
+from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
 from levilab.pipelines.spindown.meaning import meaning
 from levilab.pipelines.spindown.table import (
     QUALITY_IN_WORDS,
@@ -17,7 +17,6 @@ from levilab.pipelines.spindown.table import (
     is_best,
     law_constants,
     quality_table,
-    straight_quantity,
 )
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Details, Listing, Note, Paragraph, Points, Tabular
@@ -236,7 +235,7 @@ def _columns(analysis: SpinDownAnalysis) -> list[_Column]:
     for law in combined.fits:
         if law.linearised:
             lines = [run.fit(law.name).linearised or {} for run in analysis.runs]
-            columns += _of_law(f"{straight_quantity(law.name)} against t", law.linearised, lines)
+            columns += _of_law(f"{STRAIGHT_LINES[law.name].quantity} against t", law.linearised, lines)
     best = combined.fit(combined.best)
     fits = [run.fit(best.name).parameters for run in analysis.runs]
     starts = tuple(fit["start_frequency"] for fit in fits)

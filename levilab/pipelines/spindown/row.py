@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from analysis.spindown.drag import LAWS, DragLaw
-from levilab.pipelines.row import Column, entry, estimate, name_with_unit, value
+from levilab.pipelines.row import Column, entry, estimate, value
+from levilab.present.units import name_with_unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
+from analysis.spindown.drag import LAWS
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.tilt import counted
-from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
+from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
 from levilab.present.numbers import (
     column,
     ends,
@@ -76,6 +77,12 @@ def _laws_table(analysis: SpinDownAnalysis) -> Table:
         for fit in analysis.combined.fits
     ]
     return table(f"Drag laws{of}", ("law", "", "constants"), rows)
+
+
+def laws_of(analysis: SpinDownAnalysis) -> list[str]:
+    """Return the laws that were fitted, in the order of their table; a result of earlier may lack some."""
+    fitted = {fit.name for fit in analysis.combined.fits}
+    return [name for name in LAWS if name in fitted]
 
 
 def is_best(analysis: SpinDownAnalysis, law: str) -> bool:
@@ -162,7 +169,7 @@ def _lines_table(analysis: SpinDownAnalysis) -> Table:
     """The thesis's straight lines, run by run, beside the fit of the favoured law."""
     best = analysis.combined.fit(analysis.combined.best)
     lines = [fit for fit in analysis.combined.fits if fit.linearised]
-    heads = [f"{straight_quantity(fit.name)}\n{_head(fit.linearised or {})}" for fit in lines]
+    heads = [f"{STRAIGHT_LINES[fit.name].quantity}\n{_head(fit.linearised or {})}" for fit in lines]
     means = [_first(fit.linearised or {}) for fit in lines] + [_first(best.constants)]
     of_runs = [
         [_first(run.fit(fit.name).linearised or {}) for fit in lines]
@@ -178,12 +185,6 @@ def _lines_table(analysis: SpinDownAnalysis) -> Table:
     ]
     title = "Run by run: unweighted straight lines, and the fit of the best law"
     return table(title, ("run", *heads, f"{best.name} fit\n{_head(best.constants)}"), rows)
-
-
-def straight_quantity(law: str) -> str:
-    """What is drawn against time to make a law a straight line."""
-    straight = SHOWN_LAWS[law].straight
-    return straight.quantity if straight else ""
 
 
 def _equations(estimates: Mapping[str, Estimate]) -> list[str]:
