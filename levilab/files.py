@@ -31,7 +31,7 @@ LARGEST = 10**300
 
 
 def parse_json(text: str) -> Any:
-    """What a JSON text says.
+    """Return the content of a JSON text.
 
     Raises:
         ValueError: it is not JSON, or it holds what no program of ours writes and much of Python stumbles over:
@@ -63,7 +63,7 @@ def _finite_number(text: str) -> float:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """What a TOML text says.
+    """Return the content of a TOML text.
 
     Raises:
         ValueError: it is not TOML, or it holds nesting beyond DEEPEST or a whole number beyond LARGEST.
@@ -82,7 +82,7 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 def _hint(text: str, said: str) -> str:
-    """What is wrong with a number at which TOML was left, as the rest of a sentence; empty for anything else."""
+    """Return the fault of a number at which TOML stopped, as the rest of a sentence; empty for anything else."""
     place = re.search(r"line (\d+)", said)
     line = text.splitlines()[int(place[1]) - 1] if place and int(place[1]) <= len(text.splitlines()) else ""
     if re.search(r"=\s*[+-]?\d+,\d", line):
@@ -98,7 +98,7 @@ _TOO_LARGE = "a whole number in it has more than 300 digits"
 
 
 def finite(value: Any) -> Any:
-    """A value for JSON: what no number can say becomes null, in tables and lists too.
+    """Return a value for JSON: what no number can say becomes null, in tables and lists too.
 
     >>> finite({"mean": 1.0, "spread": [math.inf, math.nan]})
     {'mean': 1.0, 'spread': [None, None]}
@@ -169,7 +169,7 @@ def check_writable(path: Path) -> None:
 
 
 def stamp(path: Path) -> tuple[int, int, int] | None:
-    """What changes when a file is written or replaced: its time [ns], size and inode; None where there is none."""
+    """Return a stamp that changes when a file is written or replaced: time [ns], size, inode; None without one."""
     try:
         found = os.stat(path)  # noqa: PTH116 - some 20 times a second
     except OSError:
@@ -233,7 +233,7 @@ def locked(path: Path, busy: str) -> Iterator[None]:
 
 
 def sync_folder(folder: Path) -> None:
-    """A new name is on the disk only with its folder; Windows keeps names without being asked."""
+    """Put a new name onto the disk, which happens only with its folder; Windows keeps names without being asked."""
     if os.name != "posix":
         return
     descriptor = os.open(folder, os.O_RDONLY)

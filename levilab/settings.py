@@ -20,7 +20,7 @@ class Settings(BaseModel):
 
 
 def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> str:
-    """The first thing that is wrong, with its path and what is allowed, and how many more there are.
+    """Return the first thing that is wrong, with its path and what is allowed, and how many more there are.
 
     Args:
         error: of the table.
@@ -46,7 +46,7 @@ _IN_PLAIN_WORDS = {
 
 
 def expected(text: str) -> str:
-    """What pydantic says of a wrong value, in plain words.
+    """Return pydantic's message about a wrong value in plain words.
 
     >>> expected("Input should be a valid number, unable to parse string as a number")
     'a number is expected'
@@ -67,7 +67,7 @@ def expected(text: str) -> str:
 
 
 def _meant(where: tuple[int | str, ...], of: type[BaseModel] | None) -> str:
-    """The key that an unknown one is most like, or those that there are."""
+    """Return the key that an unknown one is most like, or those that there are."""
     *tables, key = where
     for name in tables:
         field = of.model_fields.get(str(name)) if of else None
@@ -79,7 +79,7 @@ def _meant(where: tuple[int | str, ...], of: type[BaseModel] | None) -> str:
 
 
 def _kinds(annotation: Any) -> list[type]:
-    """The classes of an annotation such as ``Counter | None``."""
+    """Return the classes of an annotation such as ``Counter | None``."""
     return [kind for kind in (annotation, *get_args(annotation)) if isinstance(kind, type)]
 
 
@@ -94,7 +94,7 @@ _NUMBERS = (
 
 
 def hint_about(seen: object, unit: str = "which is in the key's name") -> str:
-    """What is wrong with a text that was nearly a number, as the rest of a sentence; empty for any other.
+    """Return the fault of a text that is nearly a number, as the rest of a sentence; empty for any other.
 
     Args:
         seen: what was given.

@@ -55,7 +55,7 @@ def crosscheck(
 
 
 def _like(paths: list[Path], names: list[str], trials: int | None, out: Path | None, *, as_json: bool) -> None:
-    """The trials with the parameters of results, stored beside these."""
+    """Return the trials with the parameters of results, stored beside these."""
     from levilab.crosscheck import command
 
     checked = command.check_like(names, paths, trials)

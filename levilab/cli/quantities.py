@@ -43,7 +43,7 @@ def _parameters(command: Any) -> Iterator[Any]:
 
 
 def in_options(error: Exception, app: Any) -> str:
-    """The text of an error with options in the place of quantities: "duration = -1: …" is "--duration -1: …"."""
+    """Return the text of an error with options in the place of quantities: "duration = -1: …" is "--duration -1: …"."""
     if not isinstance(error, UsageError):
         return with_options(str(error), app)
     head = option_names(app).get(error.name, (error.name, ""))[0]
@@ -52,7 +52,7 @@ def in_options(error: Exception, app: Any) -> str:
 
 
 def with_options(text: str, app: Any) -> str:
-    """A text with options in the place of quantities.
+    """Return a text with options in the place of quantities.
 
     Args:
         text: a message.

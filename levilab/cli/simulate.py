@@ -26,7 +26,7 @@ benchmark_app = typer.Typer(no_args_is_help=True, add_completion=False)
 
 
 def chosen_scene(name: str, settings: list[str] | None) -> "Scene":
-    """The scene with the changes; a wrong name or key raises before anything heavy is loaded."""
+    """Return the scene with the changes; a wrong name or key raises before anything heavy is loaded."""
     from levilab.simulator.scene import SceneError, read_scene, with_settings
 
     scene = read_scene(name)
