@@ -67,7 +67,7 @@ UNITS = (
     _row("m", "m", shown=("cm", 1e2), fine=("mm", 1e3), decimals=5),
     _row("m/s", "m_s", shown=("cm/s", 1e2)),
     _row("m/s^2", "m_s2", "m/s²"),
-    _row("m/kg", "m_per_kg"),
+    _row("m/kg", "m_per_kg", shown=("mm/g", 1.0)),
     _row("kg", "kg", shown=("g", 1e3)),
     _row("kg m^2", "kg_m2", "kg m²", shown=("g cm²", 1e7)),
     _row("N m s", "n_m_s"),

@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from analysis.field.fit import LEARNS_NOTHING
-from levilab.pipelines.field.quantities import SHOWN
+from levilab.pipelines.field.quantities import OF_TOPS, QUANTITIES
 from levilab.present.numbers import plain, short_name, with_decimals, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     import numpy as np
     from numpy.typing import NDArray
@@ -65,12 +67,19 @@ def base_table(scan: FieldScan) -> Table:
     for name, estimate in scan.parameters.items():
         prior = scan.known.prior(name)
         before = "" if prior is None else _prior(name, prior.value, prior.u, estimate)
-        rows.append((SHOWN[name].words, with_uncertainty(SHOWN[name].of(estimate)), before, _learned(scan, name)))
+        rows.append(
+            (
+                QUANTITIES[name].shown_symbol,
+                with_uncertainty(QUANTITIES[name].show(estimate)),
+                before,
+                _learned(scan, name),
+            )
+        )
     return table("The base", ("", "found", "known before", "what the scan adds"), rows)
 
 
 def _prior(name: str, value: float, u: float, like: Estimate) -> str:
-    return with_uncertainty(SHOWN[name].of(replace(like, value=value, u=u)))
+    return with_uncertainty(QUANTITIES[name].show(replace(like, value=value, u=u)))
 
 
 def _learned(scan: FieldScan, name: str) -> str:
@@ -85,17 +94,14 @@ def _learned(scan: FieldScan, name: str) -> str:
 
 def follows_table(values: Mapping[str, Estimate]) -> Table:
     """What follows for the tops that float there."""
-    names = [name for name in SHOWN if name in values and name not in _OF_BASE]
-    rows = [(SHOWN[name].words, with_uncertainty(SHOWN[name].of(values[name]))) for name in names]
+    names = [name for name in OF_TOPS if name in values]
+    rows = [(QUANTITIES[name].shown_symbol, with_uncertainty(QUANTITIES[name].show(values[name]))) for name in names]
     return table("What follows for a top", ("", ""), rows or [("no top floats above this base", "")])
-
-
-_OF_BASE = ("strength", "origin", "thickness", "background", "inner_radius", "outer_radius")
 
 
 def by_run_table(analysis: FieldAnalysis) -> Table:
     """The main results, scan by scan, and their means."""
-    heads = ["scan", *(f"{SHOWN[name].words}\n[{SHOWN[name].unit}]" for name in _BY_RUN)]
+    heads = ["scan", *(QUANTITIES[name].head.replace(" [", "\n[") for name in _BY_RUN)]
     rows = [
         Row((short_name(source.name), *_cells(run.values)))
         for source, run in zip(analysis.sources, analysis.runs, strict=True)
@@ -106,4 +112,19 @@ def by_run_table(analysis: FieldAnalysis) -> Table:
 
 
 def _cells(values: Mapping[str, Estimate]) -> list[str]:
-    return [without_unit(SHOWN[name].of(values[name])) if name in values else "—" for name in _BY_RUN]
+    return [without_unit(QUANTITIES[name].show(values[name])) if name in values else "—" for name in _BY_RUN]
+
+
+# --- readings as columns of tables for programs ---
+
+
+def field_columns(analysis: FieldAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
+    """Yield the readings of each scan by rising height; flux_density_u_t contains the uncertainty of the height."""
+    for run in analysis.runs:
+        scan = run.scan
+        yield {
+            "height_m": scan.height,
+            "flux_density_t": scan.flux_density,
+            "flux_density_u_t": scan.u,
+            "residual_t": scan.residuals,
+        }

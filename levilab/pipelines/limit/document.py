@@ -22,7 +22,9 @@ from levilab.pipelines.limit.analysis import (
     tell_apart,
 )
 from levilab.pipelines.limit.budget import budget_of_all, budget_of_run
+from levilab.pipelines.limit.quantities import QUANTITIES
 from levilab.pipelines.result import Part, Result, RunPart, Value
+from levilab.pipelines.row import find_all
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -153,12 +155,7 @@ def _top_values(analysis: LimitAnalysis) -> dict[str, Any]:
 
 
 def _values(found: Statistics) -> dict[str, Any]:
-    named = {"mean": found.mean, "scatter": found.scatter, "trend": found.trend, "between_runs": found.between}
-    plain = {"standard_error": found.mean.u if found.scatter else None} | (
-        {"step_error": found.step} if found.step else {}
-    )
-    known = {name: estimate for name, estimate in named.items() if estimate}
-    return values_of(known) | {name: number(value, "Hz") for name, value in plain.items()}
+    return values_of(find_all(QUANTITIES, found))
 
 
 def _limits(limits: Limits) -> dict[str, Any]:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from levilab.present.numbers import share, short_name, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
     from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
 
 HEADS = ("limits", "tops", "mean [Hz]", "scatter [Hz]", "trend [Hz/top]", "outliers")
@@ -72,3 +76,21 @@ def _group(analysis: LimitAnalysis, run: int) -> str:
     group = next(group for group in analysis.groups if run in group.runs)
     number = analysis.number(group)
     return group.which if number is None else f"{group.which} {number}"
+
+
+# --- readings as columns of tables for programs ---
+
+
+def limit_columns(analysis: LimitAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
+    """Yield the tops of each run; residual_hz: limit less the mean of the run, which includes outliers."""
+    for source, run in zip(analysis.sources, analysis.runs, strict=True):
+        limit, n = source.readings.limit, len(source.readings)
+        given, found = analysis.options.reading_u, run.statistics
+        u = np.full(n, np.nan) if source.readings.u is None else source.readings.u
+        yield {
+            "top": np.arange(1, n + 1),
+            "spin_frequency_hz": limit,
+            "spin_frequency_u_hz": u if given is None else np.full(n, given),
+            "residual_hz": limit - (np.nan if found.mean.value is None else found.mean.value),
+            "outlier": np.isin(np.arange(n), found.outliers),
+        }

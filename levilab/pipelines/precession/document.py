@@ -22,7 +22,9 @@ from levilab.pipelines.precession.analysis import (
     verdict,
 )
 from levilab.pipelines.precession.budget import budget_of_all, budget_of_run
+from levilab.pipelines.precession.quantities import QUANTITIES
 from levilab.pipelines.result import Part, Result, RunPart, Value
+from levilab.pipelines.row import find_all
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,16 +32,6 @@ if TYPE_CHECKING:
     from analysis.precession.line import Line
     from levilab.pipelines.precession.readings import Readings
     from levilab.pipelines.sources import Source
-
-#: Attribute of SweepFit.power → name and unit of the value.
-_POWER_VALUES = {
-    "now": ("power", "1"),
-    "smallest_difference": ("smallest_slope_difference", "1"),
-    "points_needed": ("points_needed", "1"),
-    "range_needed_hz": ("range_needed", "Hz"),
-    "u_needed_hz": ("u_needed", "Hz"),
-}
-
 
 # --- what is in it -------------------------------------------------------------------------------------
 
@@ -132,18 +124,12 @@ def _run_entries(_: Source[Readings], run: PrecessionRun) -> dict[str, Any]:
 
 def _about(fit: SweepFit) -> dict[str, Any]:
     """What a fit says, for people and programs; then all of it."""
-    return {"values": _values(fit), "models": [_line(fit), _robust(fit)], "verdict": verdict(fit), "fit": asdict(fit)}
-
-
-def _values(fit: SweepFit) -> dict[str, Any]:
-    robust = {"robust_slope": fit.robust.slope, "robust_intercept": fit.robust.intercept}
-    values = values_of({"slope": slope_of(fit), "intercept": intercept_of(fit)} | robust)
-    values["p_locked"] = number(fit.p_locked, "1")
-    if fit.spin_offset is not None:
-        values["spin_offset"] = number(fit.spin_offset, "Hz", fit.u_spin_offset)
-    if fit.power:
-        values |= {name: number(getattr(fit.power, key), unit) for key, (name, unit) in _POWER_VALUES.items()}
-    return values
+    return {
+        "values": values_of(find_all(QUANTITIES, fit)),
+        "models": [_line(fit), _robust(fit)],
+        "verdict": verdict(fit),
+        "fit": asdict(fit),
+    }
 
 
 def _line(fit: SweepFit) -> dict[str, Any]:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from analysis.uncertainty import Estimate
 from levilab.pipelines.precession.analysis import at_most, intercept_of, slope_of
 from levilab.present.numbers import column, plain, short_name, signed, with_decimals, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from analysis.precession.sweep import Point, SweepFit
     from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
@@ -153,3 +155,24 @@ def coherence_table(run: PrecessionRun, name: str = "") -> Table:
     ]
     heads = ("ν_d [Hz]", "pulses", "mean vector", "phase [°]", "drift [mHz]", "turns", "locked")
     return table(f"Phase of the laser's pulses on the drive{name}", heads, rows, numbers=heads[:6])
+
+
+# --- readings as columns of tables for programs ---
+
+#: Name of the column → attribute of a point.
+_COLUMNS = {
+    "drive_frequency_hz": "drive",
+    "drive_frequency_u_hz": "u_drive",
+    "precession_frequency_hz": "precession",
+    "precession_frequency_u_hz": "u",
+    "spin_frequency_hz": "spin",
+    "spin_frequency_u_hz": "u_spin",
+    "residual_hz": "residual",
+}
+
+
+def precession_columns(analysis: PrecessionAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
+    """Yield the points of each sweep; residual_hz: point less the sweep's own line, of unused points too."""
+    for run in analysis.runs:
+        used = np.array([point.used for point in run.fit.points])
+        yield {name: run.fit.column(attribute) for name, attribute in _COLUMNS.items()} | {"used": used}

@@ -10,10 +10,12 @@ from pydantic import Field, model_validator
 
 from analysis.pulses import Finding, SpinFrequency
 from analysis.uncertainty import Estimate
-from levilab.pipelines.document import Document, Settings, number
+from levilab.pipelines.document import Document, Settings, values_of
 from levilab.pipelines.result import Part, Result, RunPart, Value
+from levilab.pipelines.row import find_all
 from levilab.pipelines.spin.analysis import METHOD, Series, SpinAnalysis, SpinRun, UParts
 from levilab.pipelines.spin.budget import budget_of_run
+from levilab.pipelines.spin.quantities import CORRELATIONS, QUANTITIES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -55,16 +57,6 @@ class SeriesPart(Part):
         if not len(self.time_s) == len(self.frequency_hz) == len(self.frequency_u_hz):
             raise ValueError("the columns of a series have different lengths")
         return self
-
-
-#: Values that a run has, and their units.
-_UNITS = {
-    "frequency": "Hz", "chirp": "Hz/s", "bend": "Hz/s^2", "phase": "1", "reference_time": "s", "bound": "Hz",
-    "scatter": "s", "snr": "dB", "correlation_frequency_chirp": "1", "correlation_frequency_bend": "1",
-    "correlation_chirp_bend": "1",
-}  # fmt: skip
-#: With a bend: what the frequency at another time needs for its uncertainty.
-_CORRELATIONS = ("correlation_frequency_chirp", "correlation_frequency_bend", "correlation_chirp_bend")
 
 
 class SpinPart(RunPart):
@@ -117,23 +109,13 @@ class SpinResult(Result):
 
 def _entries(analysis: SpinAnalysis) -> dict[str, Any]:
     one = analysis.runs[0].spin if len(analysis.runs) == 1 else None
-    return {"values": _values(one) if one else {}, "method": one.method if one else None}
-
-
-def _values(spin: SpinFrequency) -> dict[str, Any]:
-    estimates = {"frequency": spin.frequency, "chirp": spin.chirp, "phase": spin.phase}
-    estimates |= {"bend": spin.bend} if spin.bend else {}
-    plain = {"reference_time": spin.reference_time, "bound": spin.bound, "scatter": spin.scatter, "snr": spin.snr_db}
-    if spin.bend:
-        plain |= dict(zip(_CORRELATIONS, spin.correlations, strict=True))
-    values = {name: number(one.value, _UNITS[name], one.u) for name, one in estimates.items()}
-    return values | {name: number(value, _UNITS[name]) for name, value in plain.items()}
+    return {"values": values_of(find_all(QUANTITIES, one)) if one else {}, "method": one.method if one else None}
 
 
 def _run_entries(_: Source[Records], run: SpinRun) -> dict[str, Any]:
     spin, series = run.spin, run.series
     return {
-        "values": _values(spin),
+        "values": values_of(find_all(QUANTITIES, spin)),
         "method": spin.method,
         "pulses": int(spin.pulses),
         "missing": int(spin.missing),
@@ -183,7 +165,7 @@ def _run(part: SpinPart, *_: object) -> SpinRun:
 
 def _correlations(values: Mapping[str, Value]) -> tuple[float, float, float]:
     """Of result.json; 0 where it has none, as without a bend, and from earlier versions."""
-    of_two, of_ends, of_last = ((values[name].value or 0.0) if name in values else 0.0 for name in _CORRELATIONS)
+    of_two, of_ends, of_last = ((values[name].value or 0.0) if name in values else 0.0 for name in CORRELATIONS)
     return of_two, of_ends, of_last
 
 

@@ -9,6 +9,10 @@ from levilab.present.numbers import column, plain, short_name, with_decimals
 from levilab.present.tables import Table, table
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    import numpy as np
+
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spin.analysis import SpinAnalysis, SpinRun
     from levilab.pipelines.spin.readings import Records
@@ -80,3 +84,16 @@ def series_table(source: Source[Records], run: SpinRun, most: int) -> Table:
     ]
     which = "each" if step == 1 else f"every {step}th"
     return table(f"Frequency against time, {which} of {len(series)} {series.of}s", heads, rows, numbers=heads)
+
+
+# --- readings as columns of tables for programs ---
+
+
+def spin_columns(analysis: SpinAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
+    """Yield the series of each input: a row for each window of a long record, or for each of several records."""
+    for run in analysis.runs:
+        yield {
+            "time_s": run.series.time,
+            "spin_frequency_hz": run.series.frequency,
+            "spin_frequency_u_hz": run.series.u,
+        }

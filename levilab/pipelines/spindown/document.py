@@ -19,9 +19,11 @@ from analysis.spindown.verdict import Verdict
 from levilab.formats.table import FEWEST
 from levilab.pipelines.document import Document, Settings, number, value_of, values_of
 from levilab.pipelines.result import Part, Result, RunPart, Value
+from levilab.pipelines.row import find_all
 from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis, SpinDownOptions
 from levilab.pipelines.spindown.budget import budget_of_all, budget_of_run
 from levilab.pipelines.spindown.laws import STRAIGHT_LINES
+from levilab.pipelines.spindown.quantities import CORRELATION, QUANTITIES
 from levilab.pipelines.spindown.readings import EARLIEST_S, HIGHEST_HZ, SLOWEST_HZ
 
 if TYPE_CHECKING:
@@ -269,11 +271,7 @@ def _combined_values(combined: Combined) -> dict[str, Any]:
         if mean.scatter is not None
     }
     tilt = {"moment_tilt": _mean_value(combined.tilt)} if combined.tilt else {}
-    return _means(best.constants) | scatter | tilt | _residual_correlation(combined.correlation)
-
-
-def _residual_correlation(found: Correlation | None) -> dict[str, Any]:
-    return {"residual_correlation": number(found.value, "1", found.u)} if found else {}
+    return _means(best.constants) | scatter | tilt | values_of(find_all([CORRELATION], combined))
 
 
 def _combined_models(analysis: SpinDownAnalysis) -> list[dict[str, Any]]:
@@ -312,12 +310,7 @@ def _model(fit: LawFit) -> dict[str, Any]:
 def _run_entries(source: Source[Readings], run: SpinDown) -> dict[str, Any]:
     frequency, duration = run.fits[0].reference
     return {
-        "values": {
-            "start_time": number(run.start_time, "s"),
-            "duration": number(float(run.time[-1] - run.time[0]), "s"),
-        }
-        | values_of(run.fit(run.best).parameters)
-        | _residual_correlation(run.correlation),
+        "values": values_of(run.fit(run.best).parameters | find_all(QUANTITIES, run)),
         "tilt_gain": run.tilt_gain,
         "models": [_model(fit) for fit in run.fits],
         "reference": {"frequency_hz": frequency, "time_s": duration},

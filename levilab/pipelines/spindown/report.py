@@ -11,6 +11,7 @@ from analysis.uncertainty import Estimate
 from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
 from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
 from levilab.pipelines.spindown.meaning import meaning
+from levilab.pipelines.spindown.quantities import OF_RUN
 from levilab.pipelines.spindown.table import (
     QUALITY_IN_WORDS,
     count_table,
@@ -198,7 +199,7 @@ class _Column:
     """A constant, run by run.  head: where it comes from, its symbol and unit; estimates: one a run."""
 
     head: str
-    estimates: tuple[Estimate, ...]
+    estimates: tuple[Estimate | None, ...]
     mean: Mean | None = None
 
     @property
@@ -206,7 +207,7 @@ class _Column:
         """The runs, with their intervals; of several runs mean and scatter, empty where there is none."""
         together = [self.mean, scatter(self.mean) if self.mean else None] if len(self.estimates) > 1 else []
         shown = column([*self.estimates, *together])
-        intervals = [interval(one) for one in self.estimates] + [""] * len(together)
+        intervals = [interval(one) if one else "" for one in self.estimates] + [""] * len(together)
         return [
             f"{cell}\n{more}".rstrip() if cell != "—" or more else ""
             for cell, more in zip(shown, intervals, strict=True)
@@ -231,7 +232,8 @@ def _by_run_table(analysis: SpinDownAnalysis) -> Table:
 
 def _columns(analysis: SpinDownAnalysis) -> list[_Column]:
     """The straight lines' constants and those of the best law's fit."""
-    combined, columns = analysis.combined, []
+    combined = analysis.combined
+    columns = [_Column(one.head, one.show_all(analysis.runs)) for one in OF_RUN]
     for law in combined.fits:
         if law.linearised:
             lines = [run.fit(law.name).linearised or {} for run in analysis.runs]

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.tilt import counted
+from levilab.pipelines.row import cells_of
 from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
+from levilab.pipelines.spindown.quantities import OF_RUN
 from levilab.present.numbers import (
     column,
     ends,
     plain,
     share,
     short_name,
-    with_decimals,
     with_uncertainty,
     without_unit,
 )
@@ -23,9 +26,8 @@ from levilab.present.tables import Row, Table, table
 from levilab.present.units import unit
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from analysis.spindown.lawfit import LawFit
@@ -56,13 +58,13 @@ def _runs_table(analysis: SpinDownAnalysis) -> Table:
         (
             source.name,
             str(len(run.time)),
-            f"{with_decimals(run.time[0], 1)} … {with_decimals(run.time[-1], 1)}",
+            *cells,
             f"{run.frequency[0]:.2f} → {run.frequency[-1]:.2f}",
             run.best if run.verdict.decided else "undecided",
         )
-        for source, run in zip(analysis.sources, analysis.runs, strict=True)
+        for source, run, *cells in zip(analysis.sources, analysis.runs, *cells_of(OF_RUN, analysis.runs), strict=True)
     ]
-    heads = ("run", "readings", "time [s]", "spin [Hz]", "best law")
+    heads = ("run", "readings", *(one.head for one in OF_RUN), "spin [Hz]", "best law")
     return table(f"Spin-down, {total} run{'s' * (total > 1)}{made_up}", heads, rows, numbers=["readings"])
 
 
@@ -206,3 +208,24 @@ def _head(estimates: Mapping[str, Estimate]) -> str:
 
 def _first(estimates: Mapping[str, Estimate]) -> Estimate:
     return next(iter(estimates.values()))
+
+
+# --- readings as columns of tables for programs ---
+
+
+def spindown_columns(analysis: SpinDownAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
+    """Yield the readings of each run; residual_hz: reading less the best law of all runs, NaN for unused readings."""
+    for source, run in zip(analysis.sources, analysis.runs, strict=True):
+        readings, n = source.readings, len(source.readings)
+        used = np.isin(readings.time, run.time)
+        residual = np.full(n, np.nan)
+        residual[used] = run.fit(analysis.combined.best).residuals
+        given = analysis.options.reading_u
+        own = np.full(n, np.nan) if readings.u is None else readings.u
+        yield {
+            "time_s": readings.time,
+            "spin_frequency_hz": readings.frequency,
+            "spin_frequency_u_hz": own if given is None else np.full(n, given),
+            "residual_hz": residual,
+            "used": used,
+        }
