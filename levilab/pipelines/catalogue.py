@@ -51,10 +51,11 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from levilab.pipelines.document import Document, Looked
+    from levilab.pipelines.options import InputOptions
     from levilab.pipelines.part import ReportPart
     from levilab.pipelines.result import Written
     from levilab.pipelines.row import Column
-    from levilab.pipelines.sources import InputOptions, Needs, Source
+    from levilab.pipelines.sources import Needs, Source
     from levilab.present.document.blocks import Block
     from levilab.present.style import Figure
     from levilab.present.tables import Table

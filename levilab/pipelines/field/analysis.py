@@ -13,9 +13,10 @@ from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
-from levilab.pipelines.field.device import FieldOptions, known_of, known_top, usual
+from levilab.pipelines.field.device import known_of, known_top, usual
 from levilab.pipelines.field.quantities import QUANTITIES
 from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
+from levilab.pipelines.options import FieldOptions
 from levilab.pipelines.sources import Needs
 from levilab.present.numbers import enumeration, with_uncertainty
 

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from analysis.field.fit import FieldScan, UPart
     from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun
-    from levilab.pipelines.field.device import FieldOptions
     from levilab.pipelines.field.readings import FieldReadings
+    from levilab.pipelines.options import FieldOptions
     from levilab.pipelines.sources import Source
 
 EXPERIMENT = "field"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,29 +14,13 @@ from analysis.top import Cylinder, Top, top_of
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.formats.device import BaseTable, Device
-from levilab.pipelines.sources import InputOptions
 from levilab.settings import in_one_line
 
 if TYPE_CHECKING:
     from levilab.formats.device import TopTable
     from levilab.pipelines.field.readings import FieldReadings
+    from levilab.pipelines.options import FieldOptions
     from levilab.pipelines.sources import Source
-
-
-@dataclass(frozen=True)
-class FieldOptions(InputOptions):
-    """How scans are analyzed.
-
-    Attributes:
-        device: what calliper and data sheet say.
-        height_m, height_u_m: where the top was seen to float.
-        free_radii: let the scan move the radii.
-    """
-
-    device: Device | None = None
-    height_m: float | None = None
-    height_u_m: float | None = None
-    free_radii: bool = False
 
 
 #: The thesis's top: what is taken where nothing is known, with a warning.

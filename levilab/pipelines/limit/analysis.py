@@ -15,7 +15,8 @@ from analysis.numbers import digits
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.limit.readings import LimitReadings, read_limit_file, read_limit_run
-from levilab.pipelines.sources import InputOptions, Needs
+from levilab.pipelines.options import LimitOptions
+from levilab.pipelines.sources import Needs
 from levilab.present.numbers import with_uncertainty
 from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import Scene, scene_of
@@ -43,19 +44,6 @@ _WAVEFORMS = {"SIN": "sine", "SQU": "square", "TRI": "triangle"}
 #: Names of what theory says, of each limit.
 LOWER_EDGE, UPPER_EDGE = "lower edge of the linear window", "upper edge of the linear window"
 RESONANCE = "resonance of the wobble"
-
-
-@dataclass(frozen=True)
-class LimitOptions(InputOptions):
-    """How limits are analyzed.
-
-    Attributes:
-        reading_u: of every limit [Hz], in the place of what the data say.
-        clock_u: of the counter's clock, relative; budgets say what it does, it is in no u.
-    """
-
-    reading_u: float | None = None
-    clock_u: float | None = None
 
 
 @dataclass(frozen=True)

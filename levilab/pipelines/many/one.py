@@ -16,7 +16,7 @@ from levilab.runs.run import Run
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from levilab.pipelines.sources import InputOptions
+    from levilab.pipelines.options import InputOptions
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,9 @@ from analysis.precession.sweep import EXCLUDED_P, Sweep, SweepFit, fit_sweep
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.options import PrecessionOptions
 from levilab.pipelines.precession.readings import Readings, read_sweep_file, read_sweep_run
-from levilab.pipelines.sources import InputOptions, Needs
+from levilab.pipelines.sources import Needs
 from levilab.present.numbers import plain, with_uncertainty
 
 if TYPE_CHECKING:
@@ -38,23 +39,6 @@ NEEDS = Needs(
     read_file=read_sweep_file,
     read_run=read_sweep_run,
 )
-
-
-@dataclass(frozen=True)
-class PrecessionOptions(InputOptions):
-    """How sweeps are analyzed.
-
-    Attributes:
-        reading_u: of every count of the precession [Hz], in the place of what the data say.
-        keep_outliers: points that miscounted are kept.
-        orthogonal: the uncertainty of the drive's frequency counts, too.
-        clock_u: of the counter's clock, relative; budgets say what it does, it is in no u.
-    """
-
-    reading_u: float | None = None
-    keep_outliers: bool = False
-    orthogonal: bool = False
-    clock_u: float | None = None
 
 
 #: A record that is kept at the moment of a reading is that reading's [s].

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from analysis.precession.sweep import SweepFit
-    from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionOptions, PrecessionRun
+    from levilab.pipelines.options import PrecessionOptions
+    from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
     from levilab.pipelines.precession.readings import Readings
     from levilab.pipelines.sources import Source
 

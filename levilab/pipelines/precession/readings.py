@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from analysis.precession.gates import Gates, Rate
     from levilab.formats.table import Table
-    from levilab.pipelines.sources import InputOptions
+    from levilab.pipelines.options import InputOptions
     from levilab.runs.run import Run
 
     Array = NDArray[np.float64]

@@ -20,7 +20,8 @@ from levilab.present.numbers import off, short_name, with_uncertainty
 if TYPE_CHECKING:
     from analysis.precession.sweep import Point
     from levilab.pipelines.analyzed import Origin
-    from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionOptions, PrecessionRun
+    from levilab.pipelines.options import PrecessionOptions
+    from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
     from levilab.pipelines.precession.readings import Readings
     from levilab.pipelines.sources import Source
     from levilab.present.document.blocks import Block

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +14,8 @@ from analysis.pulses import Finding, phases, spin_of_times, spin_of_trace, track
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
-from levilab.pipelines.sources import InputOptions, Needs
+from levilab.pipelines.options import SpinOptions
+from levilab.pipelines.sources import Needs
 from levilab.pipelines.spin.readings import Records, read_spin_file, read_spin_run
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.traces import INDEX
@@ -48,17 +49,6 @@ NEEDS = Needs(
 LONGEST_WHOLE_S = 12.0
 #: Length of a window of a longer record [s].
 WINDOW_S = 2.0
-
-
-@dataclass(frozen=True)
-class SpinOptions(InputOptions):
-    """How pulses are found, see `analysis.pulses.spin_of_trace`.
-
-    clock_u: of the clock of the oscilloscope or sound card, relative; budgets say what it does, it is in no u.
-    """
-
-    method: Literal["auto", "edges", "matched", "likelihood"] = "auto"
-    clock_u: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 
     from analysis.pulses import SpinFrequency
     from analysis.uncertainty import Estimate
+    from levilab.pipelines.options import SpinOptions
     from levilab.pipelines.sources import Source
-    from levilab.pipelines.spin.analysis import SpinOptions, SpinRun, UParts
+    from levilab.pipelines.spin.analysis import SpinRun, UParts
     from levilab.pipelines.spin.readings import Records
 
 #: Powers of the record's length by which u falls, with as much noise, and pulses as often.

@@ -17,7 +17,7 @@ from levilab.runs.waveforms import run_waveforms
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from levilab.pipelines.sources import InputOptions
+    from levilab.pipelines.options import InputOptions
     from levilab.runs.run import Run
 
 

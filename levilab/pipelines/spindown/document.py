@@ -18,9 +18,10 @@ from analysis.spindown.tilt import PARAMETERS, counted
 from analysis.spindown.verdict import Verdict
 from levilab.formats.table import FEWEST
 from levilab.pipelines.document import Document, Settings, number, value_of, values_of
+from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Part, Result, RunPart, Value
 from levilab.pipelines.row import find_all
-from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis, SpinDownOptions
+from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
 from levilab.pipelines.spindown.budget import budget_of_all, budget_of_run
 from levilab.pipelines.spindown.laws import STRAIGHT_LINES
 from levilab.pipelines.spindown.quantities import CORRELATION, QUANTITIES
@@ -29,7 +30,8 @@ from levilab.pipelines.spindown.readings import EARLIEST_S, HIGHEST_HZ, SLOWEST_
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from levilab.pipelines.sources import InputOptions, Source
+    from levilab.pipelines.options import InputOptions
+    from levilab.pipelines.sources import Source
     from levilab.pipelines.spindown.readings import Readings
 
 

@@ -30,8 +30,9 @@ if TYPE_CHECKING:
 
     from analysis.spindown.combine import CombinedLaw, Mean
     from analysis.spindown.fit import SpinDown
+    from levilab.pipelines.options import SpinDownOptions
     from levilab.pipelines.sources import Source
-    from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions
+    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
     from levilab.pipelines.spindown.readings import Readings
     from levilab.present.document.blocks import Block
 

@@ -14,8 +14,9 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines import catalogue
 from levilab.pipelines.catalogue import ANALYSES, Analysis, analyze_suiting, recall_suiting
 from levilab.pipelines.catalogue import save as save_found
+from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Archive
-from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+from levilab.pipelines.spindown.analysis import analyze_spindowns
 from levilab.pipelines.spindown.document import SpinDownResult
 from support.spin_downs import spin_down_csv
 

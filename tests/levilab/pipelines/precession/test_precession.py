@@ -12,7 +12,8 @@ from analysis.precession.gates import Gates, rates_at_point
 from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
-from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionOptions, analyze_precessions
+from levilab.pipelines.options import PrecessionOptions
+from levilab.pipelines.precession.analysis import PrecessionAnalysis, analyze_precessions
 from levilab.pipelines.precession.document import DOCUMENT
 from levilab.pipelines.precession.figure import precession_figure
 from levilab.pipelines.result import save

@@ -15,12 +15,13 @@ from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
 from levilab.pipelines.catalogue import save as save_found
-from levilab.pipelines.spin.analysis import Series, SpinOptions, analyze_spins
+from levilab.pipelines.options import SpinDownOptions, SpinOptions
+from levilab.pipelines.spin.analysis import Series, analyze_spins
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spin.meaning import meaning
 from levilab.pipelines.spin.report import spin_part
 from levilab.pipelines.spin.table import spin_tables
-from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+from levilab.pipelines.spindown.analysis import analyze_spindowns
 from levilab.runs.run import Run, RunRecord, utc_now
 from levilab.runs.waveforms import run_waveforms
 from levilab.runs.writer import RunWriter

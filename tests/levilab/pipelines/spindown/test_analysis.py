@@ -13,7 +13,8 @@ import pytest
 from levilab.errors import DataError, LevilabError
 from levilab.files import CannotWrite
 from levilab.pipelines.catalogue import ANALYSES, save
-from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+from levilab.pipelines.options import SpinDownOptions
+from levilab.pipelines.spindown.analysis import analyze_spindowns
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
 from levilab.present.document.blocks import Tabular

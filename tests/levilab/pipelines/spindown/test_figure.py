@@ -10,7 +10,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_hex
 
 from analysis.spindown.drag import LAWS
-from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
+from levilab.pipelines.options import SpinDownOptions
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
 from levilab.pipelines.spindown.figure import MOST_POINTS, spindown_figure
 from levilab.present.looks import LOOKS
 from levilab.present.style import as_svg
