@@ -65,7 +65,7 @@ def late_imports(tree: ast.Module) -> Iterator[tuple[int, list[str]]]:
 
 
 def is_a_door(name: str) -> bool:
-    """Whether a module imports inside of functions, to open at once: front door, command line, the options they show."""
+    """Whether a module imports inside of functions, to open at once: front door, command line, their options."""
     return name in {"levilab", "levilab.pipelines.options"} or name.startswith("levilab.cli")
 
 

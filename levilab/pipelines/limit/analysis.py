@@ -18,6 +18,7 @@ from levilab.pipelines.limit.readings import LimitReadings, read_limit_file, rea
 from levilab.pipelines.options import LimitOptions
 from levilab.pipelines.sources import Needs
 from levilab.present.numbers import with_uncertainty
+from levilab.runs.events import RunEvent
 from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import Scene, scene_of
 
@@ -38,7 +39,11 @@ NEEDS = Needs(
     read_run=read_limit_run,
 )
 #: Kinds of events that say how a top was lost, in words.
-ENDS = {"fell": "fell freely", "lock lost": "was lost by the drive", "top lost": "fell under the drive"}
+ENDS: Mapping[str, str] = {
+    RunEvent.FELL: "fell freely",
+    RunEvent.LOCK_LOST: "was lost by the drive",
+    RunEvent.TOP_LOST: "fell under the drive",
+}
 #: Waveforms of a drive in words.
 _WAVEFORMS = {"SIN": "sine", "SQU": "square", "TRI": "triangle"}
 #: Names of what theory says, of each limit.
@@ -205,7 +210,7 @@ def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error
     kinds = Counter(str(event["kind"]) for event in source.run.events()) if source.run else Counter[str]()
-    ends = {kind: kinds[kind] for kind in ENDS if kinds[kind]}
+    ends = {str(kind): kinds[kind] for kind in ENDS if kinds[kind]}
     return Limits(
         which,
         _conditions(source, which, device),

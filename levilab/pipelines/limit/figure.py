@@ -14,6 +14,7 @@ from levilab.present.drawing import SMALL, headline, panel, synthetic_mark
 from levilab.present.looks import BLACK, GREEN, GREY, LOOKS, MARKERS, ORANGE, PURPLE, SKY, VERMILION, YELLOW
 from levilab.present.numbers import with_uncertainty
 from levilab.present.style import STYLE, WIDE, label_of_run
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -167,7 +168,7 @@ def _shade_beyond_window(axes: Axes, group: Limits) -> None:
 
 
 def _upper_title(group: Limits) -> str:
-    lock, top = group.ends.get("lock lost", 0), group.ends.get("top lost", 0)
+    lock, top = group.ends.get(RunEvent.LOCK_LOST, 0), group.ends.get(RunEvent.TOP_LOST, 0)
     how = f" (lost by the drive {lock} ×, fell {top} ×)" if lock or top else ""
     return f"Upper limit of a driven top{how}"
 

@@ -24,6 +24,7 @@ from levilab.present.document.blocks import Details, Listing, Note, Paragraph, P
 from levilab.present.numbers import column, ends, off, reading, short_name, with_decimals, with_uncertainty
 from levilab.present.tables import Row, Table, table
 from levilab.present.units import unit as unit_row
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -44,8 +45,6 @@ MOST_POINTS = 300
 MOST_COUNTS = 12
 #: Most falls that are listed; of more the range is given.
 MOST_FALLS = 8
-#: The event that says when the top fell.
-FELL = "fell"
 
 
 def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
@@ -342,7 +341,7 @@ def _points_of_run(k: int, name: str, run: SpinDown, analysis: SpinDownAnalysis)
 def _fall(source: Source[Readings], fit: SpinDown) -> str:
     """What was seen of the fall."""
     events = source.run.events() if source.run else []
-    text = next((str(event["text"]) for event in reversed(events) if event["kind"] == FELL), None)
+    text = next((str(event["text"]) for event in reversed(events) if event["kind"] == RunEvent.FELL), None)
     if text is None:
         return ""
     return f"{text}; last reading that was fitted {fit.frequency[-1]:.2f} Hz at {fit.time[-1]:.1f} s"
