@@ -9,6 +9,7 @@ import numpy as np
 
 from analysis.field.fit import LEARNS_NOTHING
 from levilab.pipelines.field.quantities import OF_TOPS, QUANTITIES
+from levilab.pipelines.part import title_of
 from levilab.present.numbers import plain, short_name, with_decimals, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table
 
@@ -35,8 +36,6 @@ def field_tables(analysis: FieldAnalysis) -> tuple[Table, ...]:
 
 def scans_table(analysis: FieldAnalysis) -> Table:
     """What was measured, and how well the model fits."""
-    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
-    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
     rows = []
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
         scan, statistics = run.scan, run.scan.statistics
@@ -53,7 +52,7 @@ def scans_table(analysis: FieldAnalysis) -> Table:
         )
     heads = ("scan", "readings", "heights [cm]", "field [mT]", "rms [µT]", "χ²/dof", "order p")
     numbers = ("readings", "rms [µT]", "χ²/dof", "order p")
-    return table(f"Field of the base, {total} scan{'s' * (total > 1)}{made_up}", heads, rows, numbers=numbers)
+    return table(title_of("Field of the base", analysis.sources, "scan"), heads, rows, numbers=numbers)
 
 
 def _range(values: NDArray[np.float64], decimals: int) -> str:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from levilab.pipelines.part import title_of
 from levilab.present.numbers import share, short_name, without_unit
 from levilab.present.tables import Row, Table, table
 
@@ -24,8 +25,6 @@ def limit_tables(analysis: LimitAnalysis) -> tuple[Table, ...]:
 
 def runs_table(analysis: LimitAnalysis) -> Table:
     """The statistics, run by run and of each kind together."""
-    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
-    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
     rows = [
         Row((f"{short_name(source.name)} ({_group(analysis, k)})", *_cells(run)))
         for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
@@ -35,7 +34,7 @@ def runs_table(analysis: LimitAnalysis) -> Table:
         for group in analysis.groups
         if len(group.runs) > 1
     ]
-    return table(f"Limits of the spin, {total} run{'s' * (total > 1)}{made_up}", HEADS, rows, numbers=["tops"])
+    return table(title_of("Limits of the spin", analysis.sources), HEADS, rows, numbers=["tops"])
 
 
 def _cells(limits: Limits) -> tuple[str, ...]:

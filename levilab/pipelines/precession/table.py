@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.uncertainty import Estimate
+from levilab.pipelines.part import title_of
 from levilab.pipelines.precession.analysis import at_most, intercept_of, slope_of
 from levilab.present.numbers import column, plain, short_name, signed, with_decimals, without_unit
 from levilab.present.tables import Row, Table, table
@@ -42,8 +43,7 @@ def _names(analysis: PrecessionAnalysis) -> list[tuple[PrecessionRun, str]]:
 
 def lines_table(analysis: PrecessionAnalysis) -> Table:
     """The line of each run and of all together, and the median line beside it."""
-    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
-    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
+    total = len(analysis.runs)
     rows = []
     if total > 1:
         for run, source in zip(analysis.runs, analysis.sources, strict=True):
@@ -59,7 +59,7 @@ def lines_table(analysis: PrecessionAnalysis) -> Table:
     rows.append(Row(("median line, robust", without_unit(robust.slope), without_unit(robust.intercept), "—", "—")))
     rows.append(Row(("locked top", "1", "0", "—", "—")))
     heads = ("line", "slope", "intercept [Hz]", "χ²/dof", "p locked")
-    title = f"Precession against drive, {total} sweep{'s' * (total > 1)}{made_up}"
+    title = title_of("Precession against drive", analysis.sources, "sweep")
     return table(title, heads, rows, numbers=heads[1:])
 
 

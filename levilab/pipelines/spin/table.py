@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from levilab.pipelines.part import title_of
 from levilab.present.clock import with_clock
 from levilab.present.numbers import column, plain, short_name, with_decimals
 from levilab.present.tables import Table, table
@@ -31,8 +32,6 @@ def spin_tables(analysis: SpinAnalysis) -> tuple[Table, ...]:
 
 def frequency_table(analysis: SpinAnalysis) -> Table:
     """The result."""
-    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
-    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
     spins, slopes = (column(getattr(run.spin, name) for run in analysis.runs) for name in ("frequency", "chirp"))
     several = any(run.which for run in analysis.runs)
     rows = [
@@ -48,9 +47,7 @@ def frequency_table(analysis: SpinAnalysis) -> Table:
         for source, run, spin, slope in zip(analysis.sources, analysis.runs, spins, slopes, strict=True)
     ]
     heads = ("input", "spin [Hz]", "slope [Hz/s]", *(["of"] * several), "at [s]", "method", "bound\n[mHz]")
-    return table(
-        f"Spin frequency, {total} input{'s' * (total > 1)}{made_up}", heads, rows, numbers=["at [s]", heads[-1]]
-    )
+    return table(title_of("Spin frequency", analysis.sources, "input"), heads, rows, numbers=["at [s]", heads[-1]])
 
 
 def pulse_table(analysis: SpinAnalysis) -> Table:

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
-from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
+from levilab.pipelines.part import (
+    VALUE_U,
+    FigureText,
+    ReportPart,
+    first_of,
+    input_parts,
+    labels_of,
+    origin_of_u,
+    size_of_u,
+)
 from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
 from levilab.pipelines.spindown.meaning import meaning
 from levilab.pipelines.spindown.quantities import OF_RUN
@@ -68,14 +77,11 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
         ),
         runs_title="Run by run",
         runs=_run_by_run(analysis),
-        inputs=tuple(
-            InputPart(
-                _in_words(source, run, origin.options),
-                origin.text,
-                run.verdict.text,
-                (_readings(source, run, origin.options, combined.best),),
-            )
-            for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
+        inputs=input_parts(
+            analysis,
+            _in_words,
+            lambda source, run, options: (_readings(source, run, options, combined.best),),
+            lambda run: run.verdict.text,
         ),
     )
 
@@ -110,10 +116,7 @@ def _laws(analysis: SpinDownAnalysis) -> tuple[Tabular, Tabular]:
     n = analysis.combined.fit(analysis.combined.best).statistics.n
     low, high = max(2 - 4 / math.sqrt(n), 0), min(2 + 4 / math.sqrt(n), 4)
     u = "Of a mean it comes from the scatter s of the runs, u = s/√N." if several else "ν₀: the spin at first."
-    constants = (
-        "value(u): the digits in parentheses are the standard uncertainty of the last digits. "
-        f"{u}{'' if several else _intervals(analysis)}"
-    )
+    constants = f"{VALUE_U} {u}{'' if several else _intervals(analysis)}"
     quality = (
         "constants: how many were fitted, beside the start of each run; the exponent is common to all runs, and the "
         "tilt δ counts where the readings show it. χ²/dof is near 1 where a law leaves nothing but the readings' own "
@@ -278,13 +281,7 @@ def _uncertainty(source: Source[Readings], fit: SpinDown, options: SpinDownOptio
     """How large u of a reading is, and where it comes from."""
     if fit.u is None:
         return "u of a reading: not known, taken from the scatter about each law"
-    low, high = float(fit.u.min()), float(fit.u.max())
-    size = f"{digits(low)} Hz" if low == high else f"{digits(low)} Hz to {digits(high)} Hz"
-    if options.reading_u is not None:
-        return f"u of a reading: {size}, as given to the analysis"
-    channels = source.run.record.channels if source.run else []
-    origin = next((c.get("source") for c in channels if c.get("name") == "spin_frequency_u_hz"), None)
-    return f"u of a reading: {size}, {origin or 'from a column of the data'}"
+    return f"u of a reading: {size_of_u(fit.u)}, {origin_of_u(source, 'spin_frequency_u_hz', options)}"
 
 
 def _residuals(source: Source[Readings], fit: SpinDown, law: str) -> dict[int, float]:
@@ -317,9 +314,9 @@ def _points(analysis: SpinDownAnalysis) -> tuple[Points, ...]:
     """What each reading of the figure answers: of run k, its readings, and what every law leaves over."""
     return tuple(
         points
-        for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
+        for k, (name, run) in enumerate(zip(labels_of(analysis.sources), analysis.runs, strict=True))
         if len(run.time) <= MOST_POINTS
-        for points in _points_of_run(k, short_name(source.name) if len(analysis.runs) > 1 else "", run, analysis)
+        for points in _points_of_run(k, name, run, analysis)
     )
 
 

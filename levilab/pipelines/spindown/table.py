@@ -10,6 +10,7 @@ from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.tilt import counted
+from levilab.pipelines.part import title_of
 from levilab.pipelines.row import cells_of
 from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
 from levilab.pipelines.spindown.quantities import OF_RUN
@@ -52,8 +53,6 @@ def spindown_tables(analysis: SpinDownAnalysis) -> tuple[Table, ...]:
 
 
 def _runs_table(analysis: SpinDownAnalysis) -> Table:
-    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
-    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
     rows = [
         (
             source.name,
@@ -65,7 +64,7 @@ def _runs_table(analysis: SpinDownAnalysis) -> Table:
         for source, run, *cells in zip(analysis.sources, analysis.runs, *cells_of(OF_RUN, analysis.runs), strict=True)
     ]
     heads = ("run", "readings", *(one.head for one in OF_RUN), "spin [Hz]", "best law")
-    return table(f"Spin-down, {total} run{'s' * (total > 1)}{made_up}", heads, rows, numbers=["readings"])
+    return table(title_of("Spin-down", analysis.sources), heads, rows, numbers=["readings"])
 
 
 def _laws_table(analysis: SpinDownAnalysis) -> Table:
