@@ -94,6 +94,11 @@ class Sample:
     u: Array | None = None
     steps: Array | None = None
 
+    @classmethod
+    def within_steps(cls, limits: Array, u: Array) -> Sample:
+        """Return limits that are known to a step of the drive each; u is the standard uncertainty, step/√12."""
+        return cls(limits, u, u * math.sqrt(12))
+
     @property
     def step(self) -> float:
         """The width of a step [Hz], 0 where there was none."""
@@ -119,7 +124,7 @@ class Statistics:
         trend_p: how probable so large a trend is by chance.
         outliers: numbers of those that chance would hardly put there, from 0; they stay in the statistics.
         step: the part of the standard error that the drive's steps leave, however many repetitions there are [Hz].
-        freedom: degrees of freedom of the standard error; infinite where it does not rest on a scatter.
+        freedom: degrees of freedom of the standard error; None where it does not rest on a scatter.
         runs: of how many runs.
         between: standard deviation of a run's mean from another's, beyond what their tops explain, with its u [Hz];
             None of one run, and of runs with a single repetition each, where it is part of the scatter.
@@ -132,7 +137,7 @@ class Statistics:
     trend_p: float | None
     outliers: tuple[int, ...]
     step: float = 0.0
-    freedom: float = math.inf
+    freedom: float | None = None
     runs: int = 1
     between: Estimate | None = None
 
@@ -259,9 +264,9 @@ def _with_own_u(scatter: float, freedom: int) -> Estimate:
     return Estimate(scatter, scatter / math.sqrt(2 * freedom), "Hz")
 
 
-def _freedom(variance: float, by_scatter: float, freedom: int) -> float:
+def _freedom(variance: float, by_scatter: float, freedom: int) -> float | None:
     """Of a variance of which only a part is from a scatter (Welch and Satterthwaite, GUM G.4)."""
-    return math.inf if by_scatter == 0 else freedom * (variance / by_scatter) ** 2
+    return None if by_scatter == 0 else freedom * (variance / by_scatter) ** 2
 
 
 def _between(means: Array, own: Array) -> float:
@@ -330,11 +335,11 @@ def _trend(limits: Array) -> tuple[Estimate, float]:
     return Estimate(slope, u, "Hz"), 0.0 if u == 0 else _by_chance(slope / u, limits.size - 2)
 
 
-def _by_chance(t: float, freedom: float) -> float:
-    """How probable |t| or more is under Student's law, the normal one where freedom is infinite."""
+def _by_chance(t: float, freedom: float | None) -> float:
+    """Return how probable |t| or more is under Student's law, the normal one where freedom is None."""
     from scipy.special import ndtr, stdtr  # scipy.stats takes a second to load
 
-    return float(2 * (ndtr(-abs(t)) if math.isinf(freedom) else stdtr(freedom, -abs(t))))
+    return float(2 * (ndtr(-abs(t)) if freedom is None else stdtr(freedom, -abs(t))))
 
 
 def outliers_of(limits: Array) -> tuple[int, ...]:

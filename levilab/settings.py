@@ -40,6 +40,10 @@ def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> st
 
 #: How pydantic begins and ends what it says of a wrong value, and its words for what it expects.
 _SHOULD_BE = re.compile(r"Input should be (a valid )?(.*?)(, unable to .*|, got .*)?")
+_WHOLE = {
+    "Field required": "is missing",
+    "Input should be an instance of ndarray": "numbers in lists of one length are expected",
+}
 _IN_PLAIN_WORDS = {
     "integer": "whole number", "string": "text", "dictionary": "table", "tuple": "list", "array": "list",
 }  # fmt: skip
@@ -55,9 +59,9 @@ def expected(text: str) -> str:
     >>> expected("Input should be a valid boolean, unable to interpret input"), expected("Field required")
     ('true or false is expected', 'is missing')
     """
-    found = _SHOULD_BE.fullmatch(text)
+    found = None if text in _WHOLE else _SHOULD_BE.fullmatch(text)
     if not found:
-        return {"Field required": "is missing"}.get(text, text.removeprefix("Value error, "))
+        return _WHOLE.get(text, text.removeprefix("Value error, "))
     is_kind, what = bool(found[1]), found[2]
     if what == "boolean":
         return "true or false is expected"

@@ -206,9 +206,11 @@ def mains_lines(bins: Array, rate: float) -> list[tuple[float, float]]:
         return slice(max(round((frequency - reach) / width), 1), round((frequency + reach) / width) + 1)
 
     found: list[tuple[float, float]] = []
+    top = thin_rate / 2 - 4 * width  # of the spectrum; a line has neighbours on both sides
     for mains in MAINS:
         hum: set[int] = set()
-        for multiple in range(int(HIGHEST / mains), 0, -1):  # from above: hum is no measure of what is below it
+        highest = int(min(HIGHEST, top) / (mains + STRAYS))
+        for multiple in range(highest, 0, -1):  # from above: hum is no measure of what is below it
             nominal = mains * multiple
             reach = max(STRAYS * multiple, 2 * width)
             band = near(nominal, reach)
@@ -218,7 +220,7 @@ def mains_lines(bins: Array, rate: float) -> list[tuple[float, float]]:
             further = sorted(
                 float(amplitude[near(k * nominal, k * reach)].max())
                 for k in (2, 3, 4)
-                if k * nominal < 2 * HIGHEST and k * multiple not in hum
+                if k * (nominal + reach) < min(2 * HIGHEST, top) and k * multiple not in hum
             )
             height, place = float(amplitude[peak]), _peak(amplitude, peak) * width
             alone = not further or height > SINGLE * further[len(further) // 2]

@@ -189,7 +189,8 @@ def _connect(found: Iterable[SpinFrequency | tuple[float, float]], seen: int, du
     )
     fraction = np.diff(phase)
     off = ahead - fraction - np.rint(ahead - fraction)
-    certain = (ahead_u < CERTAIN) & (np.abs(off) < 0.25)
+    sound = np.array([all(note.name != "jump" for note in spin.notes) for spin in spins[:-1]], dtype=bool)
+    certain = sound & (ahead_u < CERTAIN) & (np.abs(off) < 0.25)
     turns = phase[0] + np.concatenate([[0.0], np.cumsum(np.rint(ahead - fraction) + fraction)])
     return Track(
         time, frequency, u, chirp, chirp_u, turns, phase_u, np.concatenate([[False], certain]),

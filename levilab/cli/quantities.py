@@ -64,9 +64,10 @@ def with_options(text: str, app: Any) -> str:
 
     def option(match: re.Match[str]) -> str:
         name, setting = match[1], match[2] or ""
-        if name not in names:
+        found = names.get(name) or names.get(name.rpartition("_")[0])  # `height_m` is --height, which takes a number
+        if found is None:
             return match[0]
-        on, off = names[name]
+        on, off = found
         if setting == " = False" and off:
             return off
         return on if setting in {"", " = True"} else on + " "

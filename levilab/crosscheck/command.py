@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from levilab.crosscheck.catalogue import SUBJECTS
-from levilab.crosscheck.own.stored import SCHEMA, as_part, store
+from levilab.crosscheck.own.stored import as_text, store
 from levilab.crosscheck.own.study import OWN, TRIALS, check_own, in_words, own_table
 from levilab.crosscheck.study import as_document, crosscheck
 from levilab.crosscheck.table import crosscheck_table, failures_in_words
 from levilab.errors import UsageError
 from levilab.files import replace_atomically, writing
-from levilab.pipelines.catalogue import ANALYSES, recall_suiting
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.suits import recall_suiting
 from levilab.present.progress import ShareBar
 from levilab.present.terminal import draw, terminal
 
@@ -71,8 +72,7 @@ def check_like(names: Sequence[str], paths: Sequence[Path], trials: int | None) 
 
 def like_as_json(checked: Sequence[tuple[OwnCheck, Place]]) -> str:
     """What was found, as a document."""
-    parts = [as_part(one).model_dump(mode="json") for one, _ in checked]
-    return json.dumps({"schema": SCHEMA, "checks": parts}, indent=2, allow_nan=False)
+    return as_text([one for one, _ in checked])
 
 
 def print_like(checked: Sequence[tuple[OwnCheck, Place]]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections import deque
 from dataclasses import asdict, dataclass
@@ -20,7 +21,7 @@ from levilab.telemetry.messages import Poses, Record, State
 from levilab.telemetry.subscriber import Subscriber
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from levilab.telemetry.address import Address
     from levilab.telemetry.messages import Message
@@ -35,6 +36,8 @@ _FIT_EVERY_S, _FIT_PAUSE_S, _FIT_SHARE = 1.5, 10.0, 0.05
 _FEWEST_COLUMNS, _MOST_COLUMNS = 50, 2000
 #: The latest readings alone, where the page asks for them.
 LATEST = 200
+#: Longest description of a failure that is sent to the page.
+_LONGEST_FAILURE = 300
 _INSTRUMENT = {"identity", "driver", "address"}
 _SETTINGS = {"frequency_hz", "amplitude_vpp", "waveform", "offset_v", "gate_s", "trigger_level_v"}
 
@@ -91,8 +94,20 @@ class Watch:
         self._pose_number = 0
         self._subscriber: Subscriber | None = None
         self._silent = True
+        self._failure = ""  # what went wrong while this run was read
 
     # --- what is new ---
+
+    @contextlib.contextmanager
+    def failing_alone(self) -> Iterator[None]:
+        """Let an error here, as of a damaged file, end neither the other watches nor this one: the page names it."""
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001 - whatever it is, the other runs are read on
+            failure = f"this run cannot be read in full: {type(error).__name__}: {error}"[:_LONGEST_FAILURE]
+            if failure != self._failure:
+                self._failure = failure
+                self.tick += 1
 
     def step(self) -> None:
         """Read what is new; `tick` says whether there was anything."""
@@ -155,6 +170,7 @@ class Watch:
         if self.followed is None or folder != self.followed.folder:
             self.followed = Followed(folder, self.clock)
             self.fit, self._fitted, self._fit_again = None, (-1, False), 0.0
+            self._failure = ""
             self.fit_version += 1
             self.tick += 1
 
@@ -173,11 +189,12 @@ class Watch:
         ):
             return None
         self._fitted = (followed.version, ended)
-        experiment, columns, readings = followed.record.experiment, followed.columns, followed.readings
-        groups = readings.groups()
+        experiment, columns, groups = followed.record.experiment, followed.columns, followed.readings.groups()
+        settings = followed.record.configuration.get(experiment)
+        settings = settings if isinstance(settings, dict) else {}
 
         def compute() -> Running | None:
-            return fit_so_far(experiment, columns, groups, ended=ended)
+            return fit_so_far(experiment, columns, groups, settings, ended=ended)
 
         return FitTask(followed.folder, compute)
 
@@ -213,7 +230,7 @@ class Watch:
         head["source"] = self._subscriber.address.port if self._subscriber else None
         arrays: dict[str, Any] = {}
         if followed:
-            head["about"] = _about(followed)
+            head["about"] = _about(followed, self._failure)
             if ask.get("readings") != followed.version or ask.get("changed"):
                 head["readings"] = _readings(followed, ask, arrays)
             seen = _whole(ask.get("events"))
@@ -274,11 +291,10 @@ def _whole(value: Any) -> int:
     return value if type(value) is int and value >= 0 else 0
 
 
-def _about(followed: Followed) -> dict[str, Any]:
-    """The run's record, in the few words that the page shows."""
-    about: dict[str, Any] = {
-        "status": followed.status, "problem": followed.problem, "event_count": followed.event_count
-    }  # fmt: skip
+def _about(followed: Followed, failure: str) -> dict[str, Any]:
+    """Return the part of the run's record that the page shows.  failure: of the watch, empty without one."""
+    problem = followed.problem or failure
+    about: dict[str, Any] = {"status": followed.status, "problem": problem, "event_count": followed.event_count}
     record = followed.record
     if record is None:
         return about

@@ -11,8 +11,8 @@ from analysis.uncertainty import Estimate
 from levilab.errors import UsageError, unquoted
 from levilab.files import CannotWrite, replace_atomically
 from levilab.pipelines.catalogue import print_analysis
-from levilab.pipelines.catalogue import save as save_result
 from levilab.pipelines.result import Place
+from levilab.pipelines.suits import save as save_result
 from levilab.present.numbers import in_one_line
 from levilab.report.page import render_part
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from levilab.errors import DataError
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.result import Place, place_of
-from levilab.pipelines.sources import Needs, Readings, Source, collect
+from levilab.pipelines.sources import Needs, Readings, Remark, Skipped, Source, collect
 from levilab.runs.run import find_run
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class Analyzed(Generic[S, R, T, Opt]):
     options: Opt
     place: Place
     warnings: tuple[str, ...]
-    remarks: tuple[str, ...]
+    remarks: tuple[Remark, ...]
     origins: tuple[Origin[Opt], ...]
     budget: tuple[Budget, ...] = ()
 
@@ -146,7 +146,7 @@ class Method(Generic[S, R, Opt, A]):
         combine: all inputs together.
         mixed: what is wrong with numbers over real and synthetic inputs; empty where there are none.
         of_files: names of options that say nothing about runs, whose columns are known.
-        passes_over: whether of several inputs one that cannot be used is passed over with a warning.
+        skips: whether of several inputs one that cannot be used is skipped with a warning.
         refit: number of each input to analyze once more, for what only all together show → what is found then.
         refit_text: why, in words.
         budget_of_run: what the uncertainties of one input's numbers are made of.
@@ -160,7 +160,7 @@ class Method(Generic[S, R, Opt, A]):
     combine: Callable[[Sequence[Source[S]], Sequence[R], Opt], Any] = lambda *_: None
     mixed: str = ""
     of_files: frozenset[str] = frozenset({"columns", "channel", "rate"})
-    passes_over: bool = False
+    skips: bool = False
     refit: Callable[[Sequence[Source[S]], Sequence[R], Sequence[Opt]], Mapping[int, R]] = lambda *_: {}
     refit_text: str = ""
     budget_of_run: Callable[[Source[S], R, Opt], tuple[Budget, ...]] = lambda *_: ()
@@ -169,7 +169,10 @@ class Method(Generic[S, R, Opt, A]):
     def analyze(self, paths: Sequence[Path], options: Opt) -> A:
         """What is found of the inputs at the paths.  Raises DataError for what cannot be used; it names the file."""
         paths = [find_run(path) for path in paths]
-        found = collect(paths, self.needs, lambda _: options)
+        return self.analyze_found(paths, collect(paths, self.needs, lambda _: options), options)
+
+    def analyze_found(self, paths: Sequence[Path], found: Found[S], options: Opt) -> A:
+        """The same of what was found at the paths already."""
         return self.gather(
             paths, found, options, lambda source: (source, self.fit(source, options), Origin(options, NOW))
         )
@@ -224,18 +227,19 @@ class Method(Generic[S, R, Opt, A]):
     def _each(
         self, sources: Sequence[Source[S]], one: Callable[[Source[S]], tuple[Source[S], R, Origin[Opt]]]
     ) -> tuple[list[tuple[Source[S], R, Origin[Opt]]], list[str]]:
-        """What is found of each input, and warnings about those that are passed over."""
-        if not self.passes_over or len(sources) == 1:
+        """What is found of each input, and warnings about those that are skipped."""
+        if not self.skips or len(sources) == 1:
             return [one(source) for source in sources], []
-        done, warnings = [], []
+        done: list[tuple[Source[S], R, Origin[Opt]]] = []
+        errors: list[DataError] = []
         for source in sources:
             try:
                 done.append(one(source))
             except DataError as error:
-                warnings.append(f"passed over: {error}")
+                errors.append(error)
         if not done:
-            raise DataError(warnings[-1].removeprefix("passed over: "))
-        return done, warnings
+            raise errors[-1]
+        return done, [str(Skipped(str(error))) for error in errors]
 
     def about_inputs(self, sources: Sequence[Source[S]], options: Opt) -> Iterable[str]:
         """What to know of the inputs before using the numbers."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import os
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -15,12 +15,13 @@ from analysis.budget import Budget, Component
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.files import parse_json, replace_atomically, writing
+from levilab.pipelines.dump import Dump
 from levilab.runs.run import RECORD
 from levilab.settings import in_one_line
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from levilab.pipelines.sources import Source
 
@@ -36,7 +37,7 @@ _ANEW_OR_AWAY = f"{ANEW}, or move the file away"
 class Part(BaseModel):
     """A part of a result.  Keys that are not known here are of a newer version, and passed over."""
 
-    model_config = ConfigDict(frozen=True, validate_by_name=True, validate_by_alias=True, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, validate_by_name=True, validate_by_alias=True, arbitrary_types_allowed=True)
 
 
 class Value(Part):
@@ -72,66 +73,49 @@ class Input(Part):
     sha256: str
 
 
-class ComponentPart(Part):
-    """A row of a budget; see `analysis.budget.Component`."""
+#: Rows of a budget with what they contribute, and what is known beside u.
+Budgets = Annotated[tuple[Budget, ...], Dump({Budget: ("u_with_all",), Component: ("contribution",)})]
+
+
+#: Further entries are written for people and other programs: levilab does not read them.
+_FOR_OTHERS = ConfigDict(extra="allow")
+
+
+class Model(Part):
+    """A model that was fitted."""
+
+    model_config = _FOR_OTHERS
 
     name: str
-    source: str
-    kind: Literal["A", "B"]
-    u: float | None = Field(ge=0)
-    unit: str
-    sensitivity: float
-    contribution: float | None = Field(ge=0)
-    included: bool
-    note: str
-    remedy: str
-
-
-class BudgetPart(Part):
-    """What u of a quantity is made of; see `analysis.budget.Budget`."""
-
-    quantity: str
-    model: str
-    value: float
-    u: float = Field(ge=0)
-    u_with_all: float = Field(ge=0)
-    unit: str
-    components: tuple[ComponentPart, ...]
-    group: int | None = Field(default=None, ge=0)
-
-    @classmethod
-    def of(cls, budget: Budget) -> Self:
-        """From a budget."""
-        rows = [asdict(one) | {"contribution": one.contribution} for one in budget.components]
-        entries = asdict(budget) | {"u_with_all": budget.u_with_all, "components": rows}
-        if budget.group is None:
-            del entries["group"]
-        return cls.model_validate(entries)
-
-    @property
-    def budget(self) -> Budget:
-        """The budget, but for what follows from the rest of it."""
-        rows = (Component(**one.model_dump(exclude={"contribution"})) for one in self.components)
-        return Budget(self.quantity, self.value, self.u, self.unit, tuple(rows), self.model, self.group)
-
-
-def budgets_of(parts: Sequence[BudgetPart]) -> tuple[Budget, ...]:
-    """The budgets that a result holds; none, if an earlier version wrote it."""
-    return tuple(one.budget for one in parts)
+    parameters: dict[str, Value]
+    covariance: tuple[tuple[float | None, ...], ...] | None
+    statistics: dict[str, Any]
 
 
 class RunPart(Part):
-    """One input by itself."""
+    """One input by itself.
+
+    result: the dataclass of the analysis; an analysis says which.
+    """
+
+    model_config = _FOR_OTHERS
 
     path: str
     synthetic: bool
     values: dict[str, Value]
+    models: tuple[Model, ...] = ()
     warnings: tuple[str, ...]
-    budget: tuple[BudgetPart, ...] = ()
+    budget: Budgets = ()
+    result: Any
 
 
 class Result(Part):
-    """What results of all analyses have in common."""
+    """What results of all analyses have in common.
+
+    combined: what was found of all inputs together; None where the analysis combines nothing.
+    """
+
+    model_config = _FOR_OTHERS
 
     schema_: Literal["levilab-result/1"] = Field(alias="schema")
     analysis: str
@@ -140,9 +124,11 @@ class Result(Part):
     software: dict[str, str]
     settings: Any
     values: dict[str, Value]
+    models: tuple[Model, ...] = ()
     runs: tuple[Any, ...]
     warnings: tuple[str, ...]
-    budget: tuple[BudgetPart, ...] = ()
+    budget: Budgets = ()
+    combined: Any = None
 
     @model_validator(mode="after")
     def _one_run_an_input(self) -> Self:
@@ -236,14 +222,18 @@ R = TypeVar("R", bound=Result)
 T = TypeVar("T")
 
 
-class NoResult(DataError):
+class ResultError(DataError):
+    """A result that cannot be used."""
+
+
+class NoResult(ResultError):
     """A file of that name that no levilab wrote."""
 
 
 def read_result(path: Path, model: type[R]) -> R | None:
     """A result that was written before; None where there is none, or one of another analysis.
 
-    Raises DataError when it is damaged or of another schema.
+    Raises ResultError when it is damaged or of another schema.
     """
     if not path.is_file():
         return None
@@ -253,30 +243,30 @@ def read_result(path: Path, model: type[R]) -> R | None:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise DataError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
+        raise ResultError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
 
 
 def is_of_another(path: Path, analysis: str) -> bool:
     """Whether a file holds the result of another analysis than this."""
     try:
         return path.is_file() and _read(path).get("analysis") != analysis
-    except DataError:
+    except ResultError:
         return False
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """A result as it stands in the file.  Raises NoResult for another program's file, else DataError."""
+    """A result as it stands in the file.  Raises NoResult for another program's file, else ResultError."""
     try:
         data = parse_json(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); {_ANEW_OR_AWAY}") from error
+        raise ResultError(f"{path}: cannot be read ({error.strerror}); {_ANEW_OR_AWAY}") from error
     except ValueError as error:
         raise NoResult(f"{path}: is cut off or not JSON ({error}); {_ANEW_OR_AWAY}") from error
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         seen = data.get("schema") if isinstance(data, dict) else type(data).__name__
         ours = isinstance(seen, str) and seen.startswith("levilab-result/")
         text = f"{path}: schema is {repr(seen)[:60]}, expected {SCHEMA!r} of this version; {_ANEW_OR_AWAY}"
-        raise DataError(text) if ours else NoResult(text)
+        raise ResultError(text) if ours else NoResult(text)
     return data
 
 
@@ -296,17 +286,17 @@ class Written:
 def read_inputs(path: Path) -> Written:
     """Of what a result is.
 
-    Raises NoResult for another program's file, DataError for damage or an input that is gone.
+    Raises NoResult for another program's file, ResultError for damage or an input that is gone.
     """
     data = _read(path)
     try:
         written = _Head.model_validate(data)
     except ValidationError as error:
-        raise DataError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
+        raise ResultError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
     inputs = tuple(path.parent / run.path for run in written.runs)
     for one in inputs:
         if not one.exists():
-            raise DataError(f"{path}: is of {one}, which is not there: name the run or data file where it lies now")
+            raise ResultError(f"{path}: is of {one}, which is not there: name the run or data file where it lies now")
     return Written(path, written.analysis, inputs)
 
 
@@ -322,7 +312,7 @@ class _Head(Part):
 
 
 def results_in(folder: Path) -> list[Written]:
-    """The results that lie in a folder, by name; files of other programs are passed over.  Raises DataError."""
+    """The results that lie in a folder, by name; files of other programs are passed over.  Raises ResultError."""
     found = []
     for file in sorted(folder.glob("*.json")):
         if "result" in file.name.split("."):
@@ -366,13 +356,6 @@ class Earlier(Generic[R]):
         number = next(k for k, given in enumerate(self.result.inputs) if given.sha256 == source.sha256)
         return replace(self, number=number)
 
-    def restore(self, read: Callable[[], T]) -> T:
-        """What is read from the result.  Raises DataError, which names the file, where that raises ValueError."""
-        try:
-            return read()
-        except ValueError as error:
-            raise DataError(f"{self.file}: {error}: {ANEW}") from error
-
 
 class Archive(Generic[R]):
     """The results that were written before, where the paths of a command lead to them.
@@ -388,7 +371,7 @@ class Archive(Generic[R]):
         self._analysis: str = model.model_fields["analysis"].default
         self._read: dict[Path, R | None] = {}
         self._known: dict[Path, dict[str | Path, int]] = {}
-        several = len(paths) > 1 or (paths[0].is_dir() and not (paths[0] / RECORD).exists())
+        several = len(paths) > 1 or any(path.is_dir() and not (path / RECORD).exists() for path in paths)
         self._named = tuple(files)
         self._together = _together(paths).results(self._analysis) if several else ()
         if len(paths) > 1:
@@ -453,5 +436,5 @@ class Archive(Generic[R]):
         """A file of that name above a run, or beside a data file, may as well be another program's."""
         try:
             return self._result(file)
-        except DataError:
+        except ResultError:
             return self._read.setdefault(file, None)

@@ -176,11 +176,13 @@ def statistic(name: str, unit: str, meaning: str, heading: str = "", *, kind: Ki
     )
 
 
-def entry(name: str, kind: Kind, meaning: str) -> Column:
-    """Return the column of what stands beside the values, by its key; of a list its length."""
+def entry(name: str, kind: Kind, meaning: str, key: str = "") -> Column:
+    """Return the column of what stands beside the values, by its dotted key or its name; of a list its length."""
 
     def read(part: Mapping[str, Any]) -> Any:
-        found = part.get(name)
+        found: Any = part
+        for one in (key or name).split("."):
+            found = found.get(one)
         return len(found) if isinstance(found, list | tuple) else found
 
     return Column(name, kind, meaning, read)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, cast
 
 from instruments.drivers.generator import NO_LIMITS, OPEN_V, Limits, check_peak
-from instruments.drivers.scpi import ScpiInstrument, Setting
+from instruments.drivers.scpi import ScpiInstrument
+from instruments.drivers.setting import Owner, Setting
 from instruments.errors import CommandRefused, OutOfRange
 from instruments.ieee488 import INFINITY
 
@@ -25,7 +26,7 @@ class LimitedSetting(Setting[float]):
     quantity: str = ""
     partner: str = ""
 
-    def __set__(self, instrument: ScpiInstrument, value: float) -> None:
+    def __set__(self, instrument: Owner, value: float) -> None:
         address = instrument.transport.address
         cast("DriveGenerator", instrument).limits.check(address, **{self.quantity: value})
         self._check(address, value)
@@ -39,7 +40,7 @@ class LimitedSetting(Setting[float]):
 class LoadSetting(Setting[float]):
     """The load that the display is for.  Where the coil has limits they are those of the open terminals."""
 
-    def __set__(self, instrument: ScpiInstrument, value: float) -> None:
+    def __set__(self, instrument: Owner, value: float) -> None:
         if cast("DriveGenerator", instrument).limits != NO_LIMITS and not value >= INFINITY:
             allowed = f"{INFINITY:g}: limits.drive_amplitude_vpp in the bench file is that of the open terminals"
             raise OutOfRange(instrument.transport.address, self.name, value, allowed)
@@ -50,7 +51,7 @@ class LoadSetting(Setting[float]):
 class OutputSwitch(Setting[bool]):
     """The output.  Where the coil has limits, nothing goes on that was not set under them."""
 
-    def __set__(self, instrument: ScpiInstrument, value: bool) -> None:  # noqa: FBT001 - it is what is assigned
+    def __set__(self, instrument: Owner, value: bool) -> None:  # noqa: FBT001 - it is what is assigned
         drive = cast("DriveGenerator", instrument)
         if value and drive.limits != NO_LIMITS and not drive.prepared_here:
             allowed = "prepare() first: what stands there may be beyond limits.drive_amplitude_vpp in the bench file"
@@ -66,8 +67,17 @@ def frequency_setting(high: float, digits: int) -> LimitedSetting:
 
 
 def amplitude_setting(low: float) -> LimitedSetting:
-    """The amplitude of the output, four digits (data sheets), from the lowest of the family on [V, peak to peak]."""
-    return LimitedSetting("VOLT", float, "Vpp", low, 20.0, digits=4, quantity="amplitude_vpp", partner="offset_v")
+    """Return the amplitude, of four digits (data sheets), from the lowest of the family on [V, peak to peak].
+
+    With a load other than an open circuit the lowest amplitude is smaller.
+    """
+    return LimitedSetting(
+        *("VOLT", float, "Vpp", low, 20.0),
+        span=(0.0, 20.0),
+        digits=4,
+        quantity="amplitude_vpp",
+        partner="offset_v",
+    )
 
 
 def offset_setting(digits: int) -> LimitedSetting:

@@ -7,7 +7,8 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from instruments.drivers.scpi import ScpiInstrument, Setting
+from instruments.drivers.scpi import ScpiInstrument
+from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange
 from instruments.ieee488 import Form
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired, Preamble, Trace
 from instruments.drivers.oscilloscope.setup import Channel, Setup
-from instruments.drivers.scpi import ScpiInstrument, Setting
+from instruments.drivers.scpi import ScpiInstrument
 from instruments.errors import InstrumentError, NoAnswer, OutOfRange, SettingsLost
 from instruments.ieee488 import PLAIN_BLOCK
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from instruments.clock import Clock
     from instruments.drivers import Value
+    from instruments.drivers.setting import Setting
     from instruments.ieee488 import BlockForm, Form
     from instruments.links.transport import Transport
 

@@ -10,7 +10,7 @@ import numpy as np
 from instruments.drivers.oscilloscope import Preamble
 from instruments.drivers.oscilloscope.scope import Scope
 from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup
-from instruments.drivers.scpi import ScpiInstrument, Setting
+from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, OutOfRange
 from instruments.ieee488 import NR1, BlockForm, Form
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from instruments.drivers import Value
+    from instruments.drivers.scpi import ScpiInstrument
 
 
 #: "1.00E+00V", "-6.00E-01V": as it was measured; other firmware may print more digits.
@@ -55,7 +56,8 @@ class _SiglentChannel(Channel):
     inverted = Setting("INVS", bool)
     probe_factor = Setting("ATTN", float, low=0.1, high=1e4, form=_FACTOR)
     coupling = Setting("CPL", str, choices=("D1M", "A1M", "GND"))
-    scale = Setting("VDIV", float, unit="V", form=_VOLTAGE, low=5e-4, high=1e5, suffix="V")
+    #: A probe of less than 1:1 makes it smaller.
+    scale = Setting("VDIV", float, unit="V", form=_VOLTAGE, low=5e-4, high=1e5, span=(1e-5, 1e5), suffix="V")
     offset = Setting("OFST", float, unit="V", form=_VOLTAGE, low=-1e5, high=1e5, suffix="V")
 
     def field_of(self, answer: str, header: str, key: str) -> str:

@@ -6,7 +6,8 @@ Some answers take long to compute, so an instrument works on a message in steps;
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+import functools
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 
 from instruments.virtual.core.parameters import (
     boolean,
@@ -66,17 +67,17 @@ COMMON: tuple[Row, ...] = (
 )
 
 
-#: The tables of all models so far, by class and channels.
-_TABLES: dict[tuple[type[VirtualInstrument], tuple[int, ...]], Table] = {}
+@functools.cache
+def _table(family: type[VirtualInstrument], numbered: tuple[int, ...], lacks: tuple[str, ...]) -> Table:
+    """Return the rows of a model of this family, with these channels and without these nodes, made once."""
+    of_channels = (row.of_channel(n) for n in numbered for row in family.CHANNEL_ROWS)
+    rows = (*family.COMMON, *of_channels, *family.ROWS)
+    return Table([row for row in rows if not has_node(row.header, lacks)], family.DEFAULTS)
 
 
-def _table(model: type[VirtualInstrument], numbered: tuple[int, ...]) -> Table:
-    """The rows of a model with these channels, made once."""
-    table = _TABLES.get((model, numbered))
-    if table is None:
-        of_channels = (row.of_channel(n) for n in numbered for row in model.CHANNEL_ROWS)
-        table = _TABLES[model, numbered] = Table((*model.COMMON, *of_channels, *model.ROWS), model.DEFAULTS)
-    return table
+def has_node(header: str, nodes: tuple[str, ...]) -> bool:
+    """Return whether one of these nodes, in its printed form, is in a printed header."""
+    return any(node in header for node in nodes)
 
 
 class VirtualInstrument:
@@ -89,6 +90,8 @@ class VirtualInstrument:
         identity: the answer to ``*IDN?`` of another model of the family.
         pace: time for one message [s].
         numbered: the numbers of the channels, where they are not those of the class.
+        lacks: nodes of headers, as printed, that this model of the family does not have; its rows with one of them are
+            left out.
     """
 
     identity = "levilab,virtual,0,0"
@@ -108,14 +111,20 @@ class VirtualInstrument:
     numbered: Sequence[int] = ()
 
     def __init__(
-        self, clock: Clock, *, identity: str | None = None, pace: float = 2e-3, numbered: Sequence[int] | None = None
+        self,
+        clock: Clock,
+        *,
+        identity: str | None = None,
+        pace: float = 2e-3,
+        numbered: Sequence[int] | None = None,
+        lacks: tuple[str, ...] = (),
     ) -> None:
-        self.clock, self.pace = clock, pace
+        self.clock, self.pace, self.lacks = clock, pace, lacks
         self.identity = identity or self.identity
         if numbered is not None:
             self.numbered = numbered
-        #: Its rows; one table for all devices of a class with as many channels.
-        self.commands = _table(type(self), tuple(self.numbered))
+        #: The rows; devices of the same model share the table.
+        self.commands = _table(cast("Any", type(self)), tuple(self.numbered), lacks)
         self.settings: dict[str, Value] = dict(self.commands.defaults)
         self.status = Status()
         self.epoch = 0

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from instruments.ieee488 import INFINITY
-from instruments.virtual.core.device import VirtualInstrument
+from instruments.virtual.core.device import VirtualInstrument, has_node
 from instruments.virtual.core.parameters import boolean, limit, number, optional_parameter, parameter
 from instruments.virtual.core.parser import ScpiError, header_pattern
 from instruments.virtual.core.rows import Number
@@ -22,7 +22,7 @@ from instruments.virtual.counter.memory import Memory, statistics
 from instruments.virtual.counter.parameters import without_channels
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from instruments.clock import Clock
     from instruments.virtual.core.device import Answer
@@ -78,30 +78,31 @@ class Count(Number):
 
 
 class VirtualCounter(VirtualInstrument):
-    """A counter: two inputs, one run at a time, and a memory for its readings.
+    """A counter: inputs, one run at a time, and a memory for its readings.
 
     Args:
         clock: of the bench.
         signal: the voltage at input 1.
-        second: the voltage at input 2.
-        identity: the answer to ``*IDN?`` of another model of the family.
+        second: the voltage at input 2, where the model has one.
+        model: identity, numbered, lacks; see the base.
     """
 
-    #: The functions for CONFigure, MEASure and FUNCtion, by the short name in the answer.
-    functions: ClassVar[dict[str, Function]]
-    numbered = (1, 2)
+    #: The functions of the family for CONFigure, MEASure and FUNCtion, by the short name in the answer.
+    FUNCTIONS: ClassVar[dict[str, Function]]
+    numbered: Sequence[int] = (1, 2)
 
-    def __init__(
-        self, clock: Clock, *, signal: Signal, second: Signal = no_signal, identity: str | None = None
-    ) -> None:
-        self._signals = {1: signal, 2: second}
+    def __init__(self, clock: Clock, *, signal: Signal, second: Signal = no_signal, **model: Any) -> None:
         self._run: Run | None = None
         self._memory = Memory()
         self._function = "FREQ"
         self._channels: tuple[int, ...] = (1,)
         self._counted_from = 0
         self._completion_awaited = False
-        super().__init__(clock, identity=identity)
+        super().__init__(clock, **model)
+        self._signals = {n: voltage for n, voltage in ((1, signal), (2, second)) if n in self.numbered}
+        self.functions = {
+            name: function for name, function in self.FUNCTIONS.items() if not has_node(function.header, self.lacks)
+        }
 
     # --- what happens between messages ---
 
@@ -237,7 +238,7 @@ class VirtualCounter(VirtualInstrument):
         """
         headers = ((name, "[:][SENSe[1]:]" + function.header) for name, function in self.functions.items())
         found = next((name for name, header in headers if words and header_pattern(header).fullmatch(words[0])), None)
-        if found is None or not all(word in {"1", "2"} for word in words[1:]):
+        if found is None or not all(word in map(str, self.numbered) for word in words[1:]):
             raise ScpiError(-224, words[0][:20] if words else "")
         self.choose(found, tuple(map(int, words[1:])) or self._channels[:1])
         self.on_change("function")

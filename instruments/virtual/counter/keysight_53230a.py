@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from instruments.virtual.counter.parameters import channels_of, without_channels
 from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
+    from instruments.clock import Clock
     from instruments.virtual.core.signal import Array
     from instruments.virtual.core.steps import Steps
 
@@ -132,7 +133,10 @@ _SYSTEM: tuple[Row, ...] = (
 class Virtual53230A(VirtualCounter):
     """A reciprocal counter: whole periods between the first edge and the first one after the gate, over their time.
 
-    It is a 53220A where its identity says so.
+    Args:
+        clock: of the bench.
+        digits: resolution of a gate of 1 s (data sheet).
+        model: see the base.
 
     Sources: Keysight 53220A/53230A Programmer's Reference and User's Guide.  The guide gives readings a three-digit
     exponent; here it has two, as for every other instrument on this bench.  The time-out is 1 s in the guide and off
@@ -140,9 +144,13 @@ class Virtual53230A(VirtualCounter):
     """
 
     identity = "Keysight Technologies,53230A,VIRTUAL,3.09-levilab"
-    functions = _FUNCTIONS
+    FUNCTIONS: ClassVar = _FUNCTIONS
     CHANNEL_ROWS: ClassVar = _INPUT
     ROWS: ClassVar = (*_MEASURING, *_GATE, *_TRIGGERING, *_MEMORY, *_CALCULATION, *_SYSTEM)
+
+    def __init__(self, clock: Clock, *, digits: int = 12, **model: Any) -> None:
+        self._resolution = 10.0**-digits
+        super().__init__(clock, **model)
 
     def reset(self) -> None:
         """*RST; the time-out is in memory that keeps."""
@@ -154,7 +162,7 @@ class Virtual53230A(VirtualCounter):
 
     def configure(self, name: str, parameters: list[str]) -> None:
         """CONFigure: gate, trigger and level as after power-on; what is expected, and how finely, sets the gate."""
-        channels = channels_of(parameters)
+        channels = channels_of(parameters, self.numbered)
         if len(channels) > self.functions[name].inputs:
             raise ScpiError(-108)
         plain = without_channels(parameters)
@@ -179,11 +187,7 @@ class Virtual53230A(VirtualCounter):
             return 0.1 if math.isnan(expected) else min(max(expected, 1e-6), 1e3)
         if math.isnan(expected) or math.isnan(resolution) or not resolution:
             return 0.1
-        return min(max(self._resolution() * expected / resolution, 1e-4), 1e3)
-
-    def _resolution(self) -> float:
-        """Of a gate of 1 s, relative (data sheet of both: 12 digits a second, and 11)."""
-        return 1e-11 if ",53220A," in self.identity else 1e-12
+        return min(max(self._resolution * expected / resolution, 1e-4), 1e3)
 
     def function(self) -> str:
         """FUNCtion?: the function that is set."""

@@ -174,7 +174,7 @@ class VirtualCNT91(VirtualCounter):
 
     identity = "PENDULUM, CNT-91, VIRTUAL, V1.28 levilab"
     no_error = '0,"No error"'
-    functions = _FUNCTIONS
+    FUNCTIONS: ClassVar = _FUNCTIONS
     CHANNEL_ROWS: ClassVar = _INPUT
     ROWS: ClassVar = (*_MEASURING, *_FETCHING, *_ARMING, *_FORMAT, *_CALCULATION, *_SYSTEM)
     native = False
@@ -202,7 +202,7 @@ class VirtualCNT91(VirtualCounter):
 
     def configure(self, name: str, parameters: list[str], *, array: bool) -> None:
         """CONFigure: function, channels, one result or an array; the counter no longer runs freely."""
-        channels, plain = channels_of(parameters), without_channels(parameters)
+        channels, plain = channels_of(parameters, self.numbered), without_channels(parameters)
         if len(channels) > self.functions[name].inputs:
             raise ScpiError(-108)
         size = 1.0

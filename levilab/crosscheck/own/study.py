@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Mapping  # noqa: TC003 - pydantic reads the types of OwnCheck when it runs
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,7 @@ from levilab.present.numbers import enumeration, signed
 from levilab.present.tables import Table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
     from levilab.crosscheck.own.model import Own
     from levilab.pipelines.analyzed import Analyzed

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from analysis.errors import AnalysisError
-from analysis.field.fit import LEARNS_NOTHING, fit_scan
-from analysis.field.floating import FERRITE_PER_K, Floating, follow
+from analysis.field.fit import LEARNS_NOTHING, FieldScan, fit_scan
+from analysis.field.floating import FERRITE_PER_K, Floating, KnownTop, follow
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
-    from analysis.field.fit import FieldScan
-    from analysis.field.floating import KnownTop
     from levilab.pipelines.sources import Source
 
 FIELD = "field"
@@ -35,6 +33,7 @@ NEEDS = Needs(
     experiments=frozenset({"field"}),
     read_file=read_scan_file,
     read_run=read_scan_run,
+    particular=True,
 )
 #: Correlations above this are worth a word.
 _STRONG = 0.9

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from levilab.pipelines.row import Quantity, columns_of, entry, statistic
+from levilab.pipelines.row import Column, Quantity, columns_of, entry, statistic
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,6 +45,7 @@ FIELD_ROW = (
     *columns_of(QUANTITIES.values()),
     statistic("reduced_chi_square", "1", "χ² per degree of freedom"),
     statistic("rms_residual", "T", "root mean square of the residuals"),
-    entry("floats", "truth", "whether any top floats above the ring"),
-    entry("text", "text", "what the scan says"),
-)
+    Column("floats", "truth", "whether any top floats above the ring",
+           lambda part: part["result"]["floating"] is not None),
+    entry("text", "text", "what the scan says", "result.text"),
+)  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from levilab.pipelines.row import Column, Quantity, columns_of, entry
+from levilab.pipelines.row import Quantity, columns_of, entry
 
 #: Of `analysis.limits.Statistics`.
 QUANTITIES = (
@@ -17,14 +17,14 @@ QUANTITIES = (
 )  # fmt: skip
 
 LIMIT_ROW = (
-    entry("which", "text", "lower or upper"),
-    entry("repetitions", "count", "limits that were measured"),
+    entry("which", "text", "lower or upper", "result.which"),
+    entry("repetitions", "count", "limits that were measured", "result.statistics.n"),
     *columns_of(QUANTITIES),
-    entry("trend_p", "number", "probability of such a trend by chance"),
-    entry("outliers", "count", "limits far from the others"),
+    entry("trend_p", "number", "probability of such a trend by chance", "result.statistics.trend_p"),
+    entry("outliers", "count", "limits far from the others", "result.statistics.outliers"),
     *(
-        Column(f"linear_{edge}_hz", "number", f"{edge} edge of the linear window of the top",
-               lambda part, key=f"linear_{edge}_hz": part["device"][key])  # type: ignore[misc]
+        entry(f"linear_{edge}_hz", "number", f"{edge} edge of the linear window of the top",
+              f"result.device.linear_{edge}_hz")
         for edge in ("lower", "upper")
     ),
     entry("verdict", "text", "what the limits say"),

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import DataError, DoesNotSuit, unquoted
 from levilab.files import CannotWrite
 from levilab.formats.waveforms.header import NoRate
-from levilab.pipelines.catalogue import ANALYSES, Analysis, save
+from levilab.pipelines.catalogue import ANALYSES, Analysis
 from levilab.pipelines.result import relative
 from levilab.pipelines.row import Cell, Column, Kind, plain
+from levilab.pipelines.suits import save
 from levilab.runs.run import Run
 
 if TYPE_CHECKING:

@@ -38,6 +38,7 @@ NEEDS = Needs(
     experiments=frozenset({"precession"}),
     read_file=read_sweep_file,
     read_run=read_sweep_run,
+    particular=True,
 )
 
 

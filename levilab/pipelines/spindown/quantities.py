@@ -56,7 +56,7 @@ def _of_law(law: DragLaw) -> Iterator[Column]:
 
 SPINDOWN_ROW = (
     statistic("n", "1", "readings in the fits", "readings_used", kind="count"),
-    entry("outliers", "count", "readings that do not belong to the others"),
+    entry("outliers", "count", "readings that do not belong to the others", "result.outliers"),
     *columns_of(OF_RUN),
     entry("best_model", "text", "the law with the smallest criterion"),
     entry("decided", "truth", "whether the readings single it out"),

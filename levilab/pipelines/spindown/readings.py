@@ -111,7 +111,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
     times = record.times if isinstance(record, PulseTimes) else None
     duration = record.duration if not isinstance(record, PulseTimes) else float(record.times[-1] - record.times[0])
     if duration < FEWEST * WINDOW_S:
-        expected = f"a spin-down needs {FEWEST} windows of {WINDOW_S:g} s at least: `levilab analyze spin` reads it"
+        expected = f"a spin-down needs {FEWEST} windows of {WINDOW_S:g} s at least"
         raise DoesNotSuit(f"{path}: lasts {digits(duration, 3)} s, {expected}")
     try:
         if isinstance(record, PulseTimes):
@@ -125,7 +125,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
     start, end = track.frequency[first], track.frequency[last - 1]
     if last - first < FEWEST or end > (1 - LEAST_FALL) * start:
         seen = f"the spin in it goes from {start:.6g} Hz to {end:.6g} Hz in {last - first} windows of {WINDOW_S:g} s"
-        expected = "a falling spin is expected: is the drive still on? `levilab analyze spin` reads it"
+        expected = "a falling spin is expected: is the drive still on?"
         raise DoesNotSuit(f"{path}: {seen}, {expected}")
     notes = [f"{path.name}: {note.text}" for note in track.notes]
     what = f"{path.name}: a {'list of pulse times' if times is not None else 'record'} of {digits(duration, 3)} s: "
@@ -235,7 +235,10 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
 
 #: What the analysis calls a column, in the words of a file, and what to do.
 _ABOVE_0 = {
-    "spin frequency": ("the frequency", "Hz, but a spinning top is above 0: remove the reading"),
+    "spin frequency": (
+        "the frequency",
+        "Hz; above 0 is expected: a sign is the sense of the spin, give the magnitude",
+    ),
     "standard uncertainty": ("the uncertainty", "Hz, but must be above 0: correct it or remove the column"),
 }
 

@@ -154,7 +154,7 @@ def test_notes_name_options_on_the_terminal_and_quantities_where_stored(
     page = html.unescape((tmp_path / "report.html").read_text(encoding="utf-8"))
     for text in (result.read_text(encoding="utf-8"), page):
         assert "say columns = f=NAME" in text
-        assert text.count("passed over") == 1
+        assert text.count("skipped") == 1
 
 
 @pytest.mark.usefixtures("undrawn_figures")
@@ -175,8 +175,8 @@ def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab:
 @pytest.mark.usefixtures("undrawn_figures")
 def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levilab: Command, sample_data: Path) -> None:
     done = levilab("analyze", "spindown", sample_data, "--no-save")
-    assert "passed over" not in done.stdout
-    assert "passed over: 3 limit runs\n" in done.stderr
+    assert "skipped" not in done.stdout
+    assert "skipped 3 limit runs\n" in done.stderr
     assert "time [s]" in done.stdout
 
 

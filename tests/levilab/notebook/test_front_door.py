@@ -281,7 +281,7 @@ WRONG = {
         DoesNotSuit,
         r"spin-down-1 suits spindown; field-scan suits field\): analyze them one after the other",
     ),
-    "no file": (lambda: levilab.analyze("nowhere.csv"), DataError, "nowhere.csv: no such file"),
+    "no file": (lambda: levilab.analyze("nowhere.csv"), DataError, "nowhere.csv: there is no such file"),
     "foreign option": (lambda: levilab.analyze(spin_down(), method="edges"), UsageError, "method: is no option of"),
     "no such word": (lambda: levilab.analyze(spin_down(), uncertainty="x"), UsageError, "uncertainty = x: covariance,"),
     "no positive u": (lambda: levilab.analyze(spin_down(), reading_u=-1.0), UsageError, "reading_u = -1: a standard"),

@@ -11,7 +11,8 @@ import pytest
 
 from analysis.spindown.drag import LAWS, spin
 from levilab.pipelines.budget import budget_blocks, budget_table, budgets_of_result, in_a_sentence
-from levilab.pipelines.catalogue import ANALYSES, save
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.suits import save
 from levilab.present.document.blocks import Details, Paragraph, Tabular
 from support.paths import ROOT
 from support.spin_downs import spin_down_csv

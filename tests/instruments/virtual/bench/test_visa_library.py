@@ -165,7 +165,7 @@ def test_other_models_stand_before_the_name_of_the_library():
     assert [name.split(",")[1].strip() for name in names] == ["CNT-91", "DSOX2024A"]
     with (
         contextlib.closing(pyvisa.ResourceManager("realtime,CNT91@levilab")) as manager,
-        pytest.raises(ConfigError, match="'CNT91' before @levilab is no model: known are realtime, 53230A"),
+        pytest.raises(ConfigError, match="'CNT91' before @levilab is no model"),
     ):
         manager.open_resource(COUNTER)
 

@@ -111,12 +111,12 @@ def test_other_options_are_computed_anew_with_those_of_the_result(scan: Path) ->
     assert "inner_radius" in recalled.runs[0].scan.fitted
 
 
-def test_a_result_that_does_not_go_with_the_readings_is_refused(scan: Path) -> None:
+def test_a_result_that_lacks_what_was_found_is_refused(scan: Path) -> None:
     file = keep(analyze_scans([scan], FieldOptions()))
     document = json.loads(file.read_text(encoding="utf-8"))
-    del document["runs"][0]["models"][0]["parameters"]["origin"]
+    del document["runs"][0]["result"]["scan"]["covariance"]
     file.write_text(json.dumps(document), encoding="utf-8")
-    with pytest.raises(DataError, match="each with a value"):
+    with pytest.raises(DataError, match=r"runs\.0\.result\.scan\.covariance: is missing"):
         ANALYSES["field"].recall([scan], FieldOptions())
 
 
@@ -222,7 +222,7 @@ def test_a_file_of_something_else_does_not_suit(tmp_path: Path, sample_data: Pat
 
 
 def test_a_moment_needs_the_mass(scan: Path) -> None:
-    with pytest.raises(DataError, match=r"`height` tells the moment of a top only if its mass is known"):
+    with pytest.raises(DataError, match=r"`height_m` tells the moment of a top only if its mass is known"):
         analyze_scans([scan], FieldOptions(height_m=0.073))
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
-from levilab.pipelines.catalogue import ANALYSES, analyze_suiting, save
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.limit.analysis import (
     LOWER_EDGE,
     RESONANCE,
@@ -22,7 +22,8 @@ from levilab.pipelines.limit.analysis import (
 )
 from levilab.pipelines.limit.report import limit_part
 from levilab.pipelines.limit.table import limit_tables
-from levilab.pipelines.sources import mark_of
+from levilab.pipelines.sources import SkippedRuns, mark_of
+from levilab.pipelines.suits import analyze_suiting, save
 from levilab.present.document.blocks import Listing
 from levilab.report.page import write_report
 from levilab.report.tables.values import of_analysis
@@ -56,13 +57,13 @@ def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Pa
     document = ANALYSES["limit"].document(analysis, tmp_path)
     assert {"lower_mean", "upper_1_mean", "upper_2_standard_error"} <= document["values"].keys()
     assert "The top was lost by the drive 8 times." in analysis.groups[1].text
-    assert [run["which"] for run in document["runs"]] == ["upper", "lower", "upper"]
-    assert [group["repetitions"] for group in document["groups"]] == [10, 8, 8]
+    assert [run["result"]["which"] for run in document["runs"]] == ["upper", "lower", "upper"]
+    assert [group["statistics"]["n"] for group in document["groups"]] == [10, 8, 8]
     warning, conditions = sorted(analysis.all_warnings)  # spin-downs in the same folder are a remark
     assert "the upper limits are of 2 conditions" in conditions
     assert "LOOSE WASHERS" in warning
     assert warning.endswith("(the first of 16 such warnings)")
-    assert "passed over: 4 spin runs" in analysis.remarks
+    assert SkippedRuns("spin", 4) in analysis.remarks
     assert limit_tables(analysis)[1].title == "Beside theory, for 3 kinds of top"  # of 26 tops
     # the lower limits are real, so nothing that is made of them alone bears the mark
     assert marks_of_budgets(analysis) == ["", "SYNTHETIC.", "SYNTHETIC."]
@@ -79,7 +80,6 @@ def marks_of_budgets(analysis: LimitAnalysis) -> list[str]:
 
 
 def test_groups_of_the_same_mean_are_told_apart(sample_data: Path, tmp_path: Path) -> None:
-    """Also in results that were written before budgets had the numbers of their groups."""
     limits = ["67.5,0.25", "68.5,0.25", "68,0.25", "69,0.25"]
     for name, changes, rows in (("a", {}, limits), ("b", {"drive_amplitude_vpp": 20.0}, reversed(limits))):
         folder = shutil.copytree(sample_data / "upper-limits", tmp_path / name)
@@ -95,7 +95,7 @@ def test_groups_of_the_same_mean_are_told_apart(sample_data: Path, tmp_path: Pat
     assert marks_of_budgets(analysis) == ["SYNTHETIC.", ""]
     document = ANALYSES["limit"].document(analysis, tmp_path)
     assert [document["values"][f"upper_{k}_mean"]["group"] for k in (1, 2)] == [0, 1]
-    assert [budget.pop("group") for budget in document["budget"]] == [0, 1]
+    assert [budget["group"] for budget in document["budget"]] == [0, 1]
     (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
     assert marks_of_budgets(ANALYSES["limit"].recall([tmp_path], LimitOptions())) == ["SYNTHETIC.", ""]
     document["budget"][0]["group"] = 2
@@ -124,7 +124,7 @@ def test_measured_and_made_up_runs_are_never_one_mean(sample_data: Path, tmp_pat
     assert not any("says nothing about a real top" in text for text in analysis.all_warnings)
     document = ANALYSES["limit"].document(analysis, tmp_path)
     assert [group["conditions"]["synthetic"] for group in document["groups"]] == [False, True]
-    assert [run["conditions"]["synthetic"] for run in document["runs"]] == [False, True, False]
+    assert [run["result"]["conditions"]["synthetic"] for run in document["runs"]] == [False, True, False]
     save(ANALYSES["limit"], analysis)
     assert ANALYSES["limit"].recall([tmp_path], LimitOptions()).groups == analysis.groups
     page = write_report([tmp_path], tmp_path / "page.html").read_text(encoding="utf-8")
@@ -143,7 +143,7 @@ def test_measured_and_made_up_runs_are_never_one_mean(sample_data: Path, tmp_pat
 def test_what_is_made_up_is_said_of_each_run_and_group(
     sample_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, synthetic: bool | None
 ) -> None:
-    """A data file does not say it; of a result of an earlier version, without the key, the inputs do."""
+    """A data file does not say it."""
     monkeypatch.chdir(tmp_path)  # where the result of several inputs goes
     paths = [tmp_path / "my.csv"] if "my.csv" in name else [shutil.copytree(sample_data / name, tmp_path / name)]
     (tmp_path / "my.csv").write_text("f [Hz]\n21.9\n21.8\n22.0\n", encoding="utf-8")
@@ -155,11 +155,8 @@ def test_what_is_made_up_is_said_of_each_run_and_group(
     document = json.loads(file.read_text(encoding="utf-8"))
     (group,) = document["groups"]
     assert group["conditions"]["synthetic"] is synthetic
-    assert document["runs"][0]["conditions"]["synthetic"] is synthetic
-    assert [run["conditions"]["synthetic"] for run in document["runs"][1:]] == [False] * (len(paths) - 1)
-    for part in (group, *document["runs"]):
-        del part["conditions"]["synthetic"]
-    file.write_text(json.dumps(document), encoding="utf-8")
+    assert document["runs"][0]["result"]["conditions"]["synthetic"] is synthetic
+    assert [run["result"]["conditions"]["synthetic"] for run in document["runs"][1:]] == [False] * (len(paths) - 1)
     recalled = ANALYSES["limit"].recall(paths, LimitOptions())
     assert (recalled.runs, recalled.groups) == (analysis.runs, analysis.groups)
 
@@ -184,9 +181,9 @@ def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Pa
 def test_a_result_that_is_damaged_is_an_error(sample_data: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
     document = ANALYSES["limit"].document(analyze_limits([folder], LimitOptions()), folder)
-    document["runs"][0]["which"] = "middle"
+    document["runs"][0]["result"]["which"] = "middle"
     (folder / "result.json").write_text(json.dumps(document), encoding="utf-8")
-    with pytest.raises(DataError, match=r"result\.json: runs\.0\.which = 'middle'"):
+    with pytest.raises(DataError, match=r"result\.json: runs\.0\.result\.which = 'middle'"):
         ANALYSES["limit"].recall([folder], LimitOptions())
 
 

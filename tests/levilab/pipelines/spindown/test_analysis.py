@@ -12,11 +12,12 @@ import pytest
 
 from levilab.errors import DataError, LevilabError
 from levilab.files import CannotWrite
-from levilab.pipelines.catalogue import ANALYSES, save
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.analysis import analyze_spindowns
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
+from levilab.pipelines.suits import save
 from levilab.present.document.blocks import Tabular
 from levilab.runs.run import Run
 from support.spin_downs import spin_down_csv
