@@ -21,7 +21,15 @@ if TYPE_CHECKING:
 
 
 class CannotWrite(LevilabError):
-    """A file cannot be written (any more)."""
+    """A file cannot be written (any more).
+
+    Attributes:
+        problem: what was seen, without what to do.
+    """
+
+    def __init__(self, problem: str, advice: str = "") -> None:
+        self.problem = problem
+        super().__init__(f"{problem}: {advice}" if advice else problem)
 
 
 #: No program writes tables within tables deeper than this; Python's recursion bears some hundreds.
@@ -156,7 +164,7 @@ def writing(what: str, advice: str = "choose another place with `out`") -> Itera
     try:
         yield
     except OSError as error:
-        raise CannotWrite(f"{what} ({error.strerror or error}): {advice}") from error
+        raise CannotWrite(f"{what} ({error.strerror or error})", advice) from error
 
 
 def check_writable(path: Path) -> None:

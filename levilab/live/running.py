@@ -179,7 +179,8 @@ def mean_limit(columns: Mapping[str, Array], size: int, settings: Mapping[str, A
         stepped = settings.get("which") == "upper"
         sample = (Sample.within_steps if stepped else Sample)(spin, u[used] / np.sqrt(size))
     found = summarize(sample)
-    band = np.empty(0) if found.mean.u is None else np.full(2, stdtrit(found.freedom, 0.975) * found.mean.u)
+    students = float(stdtrit(np.inf if found.freedom is None else found.freedom, 0.975))
+    band = np.empty(0) if found.mean.u is None else np.full(2, students * found.mean.u)
     curve = Curve(np.array([time[0], time[-1]]), np.full(2, found.mean.value), band)
     return Running("mean so far", (with_uncertainty(found.mean),), curve)
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 TableName = Literal["values", "models", "readings"]
 #: Values that the short form of a result shows.
 MOST_VALUES = 4
-_ELSEWHERE = ": choose another `folder`"
+_ELSEWHERE = "choose another `folder`"
 
 
 @dataclass(frozen=True, repr=False)
@@ -211,7 +211,7 @@ class AnalysisResult:
         try:
             return [*written, *save_result(self.analysis, found, place)]
         except CannotWrite as error:
-            raise CannotWrite(f"{str(error).partition(': choose')[0]}{_ELSEWHERE}") from error
+            raise CannotWrite(error.problem, _ELSEWHERE) from error
 
 
 def _print(result: AnalysisResult, console: Any) -> None:
@@ -228,5 +228,5 @@ def _copy(path: Path, folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         replace_atomically(to, content)
     except OSError as error:
-        raise CannotWrite(f"{to}: could not be written ({error.strerror or error}){_ELSEWHERE}") from error
+        raise CannotWrite(f"{to}: could not be written ({error.strerror or error})", _ELSEWHERE) from error
     return to
