@@ -233,7 +233,7 @@ def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, s
     if printed < len(each) and not found.budget:
         each.append(Note("Only the first of them is printed; all are in the report as HTML, and in result.json."))
     if not found.budget and not each:
-        return (Paragraph("The result was written before budgets were kept with it: levilab analyze makes them."),)
+        return (Paragraph("No uncertainty was determined, so that there is none to divide."),)
     together = budget_blocks(found.budget, shown, mark=lambda budget: mark_of(found.inputs_of(budget.group)))
     return (*together, *each)
 
