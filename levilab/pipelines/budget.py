@@ -34,7 +34,7 @@ _LEAST_SHARE = 0.001
 
 
 def time_base(source: Source[Any], kind: str, sensitivity: float, given: float | None, *, what: str = "") -> Component:
-    """The row of an instrument's clock, which no repetition shows, so that it is in no u.
+    """Return the row of an instrument's clock, which no repetition shows, so that it is in no u.
 
     Args:
         source: the input.
@@ -64,7 +64,7 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
 
 
 def bench_clock(sensitivity: float) -> Component:
-    """The row of the clock by which readings have their times; see `time_base`."""
+    """Return the row of the clock by which readings have their times; see `time_base`."""
     return Component(
         "bench_clock",
         "clock of the readings' times",
@@ -89,19 +89,19 @@ def direct_row(  # noqa: PLR0917 - the fields of a row
     *,
     included: bool = True,
 ) -> Component:
-    """A row whose size is known in the result's own unit alone [`unit`]; see `Component`."""
+    """Return a row whose size is known in the result's own unit alone [`unit`]; see `Component`."""
     return Component(name, what, kind, part, unit, 1.0, included, note, remedy)
 
 
 def gate_of(source: Source[Any], experiment: str) -> float | None:
-    """The counter's gate [s], where a run says it."""
+    """Return the counter's gate [s], where a run says it."""
     settings = source.run.record.configuration.get(experiment) if source.run else None
     gate = settings.get("gate_s") if isinstance(settings, dict) else None
     return float(gate) if isinstance(gate, int | float) and 0 < gate < _LONGEST_GATE_S else None
 
 
 def setting_of(source: Source[Any], experiment: str, name: str) -> float | None:
-    """A setting of the run's experiment, where that is a number."""
+    """Return a setting of the run's experiment, where that is a number."""
     settings = source.run.record.configuration.get(experiment) if source.run else None
     value = settings.get(name) if isinstance(settings, dict) else None
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
@@ -116,7 +116,7 @@ _NO_UNIT = ""
 
 
 def budget_table(budget: Budget, shown: Mapping[str, str] | None = None) -> Table:
-    """A row for each component: what u is made of, u, and what it does not contain.
+    """Return a row for each component: what u is made of, u, and what it does not contain.
 
     Args:
         budget: of one result.
@@ -135,7 +135,7 @@ def budget_table(budget: Budget, shown: Mapping[str, str] | None = None) -> Tabl
 
 
 def _in_shown_units(budget: Budget) -> Budget:
-    """The same in the units that people read."""
+    """Return the same in the units that people read."""
     shown, factor = unit(budget.unit).fine
     rows = []
     for one in budget.components:
@@ -146,7 +146,7 @@ def _in_shown_units(budget: Budget) -> Budget:
 
 
 def title_of(budget: Budget, shown: Mapping[str, str] | None = None) -> str:
-    """The result, with its uncertainty."""
+    """Return the result, with its uncertainty."""
     name = (shown or {}).get(budget.quantity, budget.quantity.replace("_", " "))
     of = f" ({budget.model})" if budget.model else ""
     return f"{name} = {with_uncertainty(Estimate(budget.value, budget.u, budget.unit))}{of}"
@@ -170,7 +170,7 @@ def _number(value: float, unit: str) -> str:
 
 
 def _ratio(above: str, below: str) -> str:
-    """The unit of a sensitivity."""
+    """Return the unit of a sensitivity."""
     if above == below:
         return ""
     if below == _NO_UNIT:
@@ -179,7 +179,7 @@ def _ratio(above: str, below: str) -> str:
 
 
 def _percent(share: float | None) -> str:
-    """A share of u².
+    """Return a share of u².
 
     >>> _percent(0.9312), _percent(0.00002), _percent(None)
     ('93 %', '< 0.1 %', '—')
@@ -190,7 +190,7 @@ def _percent(share: float | None) -> str:
 
 
 def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str:
-    """What dominates u of a result, what would make it smaller, and what it does not contain."""
+    """Return what dominates u of a result, what would make it smaller, and what it does not contain."""
     name = (shown or {}).get(budget.quantity, budget.quantity.replace("_", " "))
     budget = _in_shown_units(budget)
     largest, texts = budget.largest, []
@@ -214,7 +214,7 @@ def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str
 
 
 def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, str] | None = None) -> tuple[Block, ...]:
-    """The budgets of what was found: of all inputs together, and of each.
+    """Return the budgets of what was found: of all inputs together, and of each.
 
     Args:
         found: by an analysis.
@@ -241,7 +241,7 @@ def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, s
 def _by_itself(
     source: Source[Any], budgets: Sequence[Budget], shown: Mapping[str, str] | None, *, is_printed: bool
 ) -> Details:
-    """The budgets of one input among several."""
+    """Return the budgets of one input among several."""
     blocks = budget_blocks(budgets, shown, source.name, lambda _: mark_of([source]))
     return Details(f"{source.name} by itself", blocks, on_paper="whole" if is_printed else "out")
 

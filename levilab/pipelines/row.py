@@ -200,7 +200,7 @@ def plain(found: Any, kind: Kind) -> Cell:
 
 
 def text_of(cell: Cell) -> str:
-    """A value as text, empty for None; a float with all its digits.
+    """Return a value as text, empty for None; a float with all its digits.
 
     >>> text_of(0.1 + 0.2), text_of(True), text_of(None)
     ('0.30000000000000004', 'true', '')
@@ -211,7 +211,7 @@ def text_of(cell: Cell) -> str:
 
 
 def value_of_text(text: str, kind: Kind) -> Cell:
-    """The value of a text.  Raises ValueError."""
+    """Return the value of a text.  Raises ValueError."""
     if not text:
         return None
     if kind == "text":

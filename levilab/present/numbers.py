@@ -77,7 +77,7 @@ def column(estimates: Iterable[Estimate | None]) -> list[str]:
 
 
 def ends(estimate: Estimate) -> tuple[str, str] | None:
-    """The ends of the 68 % interval, where there is one, with the digits that u gives the value.
+    """Return the ends of the 68 % interval, where there is one, with the digits that u gives the value.
 
     >>> from analysis.uncertainty import Estimate
     >>> ends(Estimate(2.3687e-4, 3.0e-7, "1/s", (2.365e-4, 2.371e-4)))
@@ -108,7 +108,7 @@ def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> s
 
 
 def enumeration(names: Sequence[str]) -> str:
-    """The names one after the other, in a sentence.
+    """Return the names one after the other, in a sentence.
 
     >>> enumeration(["disc"]), enumeration(["disc", "stokes", "newton"])
     ('disc', 'disc, stokes and newton')
@@ -117,7 +117,7 @@ def enumeration(names: Sequence[str]) -> str:
 
 
 def list_in_words(names: Sequence[str]) -> str:
-    """The names, or the first of them.
+    """Return the names, or the first of them.
 
     >>> list_in_words(["a", "b", "c", "d", "e", "f"])
     'a, b, c, d and 2 more'
@@ -127,7 +127,7 @@ def list_in_words(names: Sequence[str]) -> str:
 
 
 def with_decimals(value: float, decimals: int) -> str:
-    """A number with so many digits after the point; a zero has no sign.
+    """Return a number with so many digits after the point; a zero has no sign.
 
     >>> with_decimals(-0.254, 2), with_decimals(-0.001, 2)
     ('−0.25', '0.00')
@@ -136,7 +136,7 @@ def with_decimals(value: float, decimals: int) -> str:
 
 
 def signed(value: float, decimals: int) -> str:
-    """A number with its sign, and none where it rounds to zero.
+    """Return a number with its sign, and none where it rounds to zero.
 
     >>> signed(0.471, 2), signed(-0.002, 2), signed(-1.614, 2)
     ('+0.47', '0.00', '−1.61')
@@ -172,7 +172,7 @@ def off(value: float, u: float | None) -> str:
 
 
 def reading(value: float, u: float | None, residual: float | None) -> tuple[str, str, str]:
-    """A reading, its uncertainty and what a fit leaves over, for three columns; a dash for what is not known.
+    """Return a reading, its uncertainty and what a fit leaves over, for three columns; a dash for what is not known.
 
     >>> reading(39.93661, 0.03, -0.012), reading(39.9, None, None)
     (('39.937', '0.030', '−0.012'), ('39.90000', '—', '—'))
@@ -185,7 +185,7 @@ def reading(value: float, u: float | None, residual: float | None) -> tuple[str,
 
 
 def short_name(name: str) -> str:
-    """A run's name without the time that it begins with.
+    """Return a run's name without the time that it begins with.
 
     >>> short_name("20261120T101500Z-spin-7f3a")
     'spin-7f3a'
@@ -194,7 +194,7 @@ def short_name(name: str) -> str:
 
 
 def plain(value: float | None, count: int = 3) -> str:
-    """A statistic in so many digits, zeros at the end included; a larger number in whole ones; a dash for none.
+    """Return a statistic in so many digits, zeros at the end included; a larger number in whole ones; a dash for none.
 
     >>> plain(0.0312345), plain(0.21), plain(4478.2), plain(2.34e-14, 2), plain(None)
     ('0.0312', '0.210', '4478', '2.3×10⁻¹⁴', '—')

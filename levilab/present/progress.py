@@ -88,14 +88,14 @@ class LineDisplay:
         self._fifths, self._prepared = 0, ""
 
     def preparing(self, text: str, fraction: float) -> None:
-        """A line each fifth of the way, of each part of it; none that is as the last."""
+        """Print a line each fifth of the way, of each part of it; none that is as the last."""
         before, self._fifths = self._fifths, int(5 * fraction)
         if self._fifths > before and text != self._prepared:
             self._prepared = text
             self.message(text)
 
     def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
-        """A line."""
+        """Print a line."""
         left = time_left_in_words(*remaining, bench_time=self._bench_time)
         self.message(f"{text}   {left}" if remaining[1] >= 0.5 else text)
 
@@ -175,15 +175,15 @@ class BarDisplay:
         return text
 
     def preparing(self, text: str, fraction: float) -> None:
-        """The state of the bench has it."""
+        """Print nothing: the state of the bench has it."""
 
     def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
-        """A line above; time left stands below."""
+        """Print a line above; time left stands below."""
         self.message(text)
         self._next = 0.0
 
     def message(self, text: str) -> None:
-        """A line above."""
+        """Print a line above."""
         self._draw(lambda: self._console.print(printable(text), markup=False, highlight=False))
 
     def is_due(self) -> bool:
@@ -203,7 +203,7 @@ class BarDisplay:
 
 
 def to_stderr(*, bench_time: bool = False) -> Display:
-    """A bar on a terminal, lines elsewhere.  bench_time: see LineDisplay."""
+    """Return a bar on a terminal, lines elsewhere.  bench_time: see LineDisplay."""
     return BarDisplay() if sys.stderr.isatty() else LineDisplay(bench_time=bench_time)
 
 

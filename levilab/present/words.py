@@ -37,7 +37,7 @@ def settings_in_words(settings: Mapping[str, Any]) -> str:
 
 
 def setting_in_words(key: str, value: Any) -> str:
-    """A setting and its value.
+    """Return a setting and its value.
 
     >>> setting_in_words("load_ohm", 9.9e37)
     'load high impedance'
@@ -48,7 +48,7 @@ def setting_in_words(key: str, value: Any) -> str:
 
 
 def value_in_words(key: str, value: Any) -> str:
-    """A setting's value with the unit that its key ends in; other units stand as they are typed.
+    """Return a setting's value with the unit that its key ends in; other units stand as they are typed.
 
     >>> value_in_words("trigger_level_v", 0.6), value_in_words("slope", "POS"), value_in_words("interval_s", 0.005)
     ('0.6 V', 'POS', '5 ms')

@@ -49,7 +49,7 @@ def document_of(
     supplements: Sequence[Supplement] = SUPPLEMENTS,
     asked: Asked | None = None,
 ) -> Document:
-    """The report.
+    """Return the report.
 
     Args:
         results: of measurements: analyses with what they found.
@@ -88,7 +88,7 @@ def blocks_of_part(
     deeper: bool = False,
     supplements: Sequence[Supplement] = SUPPLEMENTS,
 ) -> list[Block]:
-    """What one analysis found: warnings, result, figure, what else is known, run by run.
+    """Return what one analysis found: warnings, result, figure, what else is known, run by run.
 
     Args:
         analysis: the row of the catalogue.
@@ -116,7 +116,7 @@ def blocks_of_part(
 
 
 def _verdict(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
-    """The verdict, which says itself if its numbers are of real and synthetic inputs together: it is read alone."""
+    """Return the verdict; it is read alone, and says itself that real and synthetic inputs are mixed."""
     if not _mixes(found):
         return part.verdict
     made_up = sum(source.synthetic for source in found.sources)
@@ -124,7 +124,7 @@ def _verdict(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
 
 
 def picture_of(analysis: Analysis[A], found: A, part: ReportPart) -> Picture:
-    """The analysis's figure."""
+    """Return the analysis's figure."""
     many = len(found.sources) > MOST_IN_FULL
     return Picture(
         name=analysis.name,
@@ -191,7 +191,7 @@ def _overview(inputs: Sequence[Input]) -> Iterable[Block]:
 
 
 def _document_banner(results: Results, sources: Sequence[Source[Any]], others: Sequence[Section]) -> Banner | None:
-    """The mark of the whole document."""
+    """Return the mark of the whole document."""
     if not results:
         return Banner("SYNTHETIC.", "All of it was simulated on a computer; nothing was measured.") if others else None
     mixed = _mixes(results[0][1]) if len(results) == 1 else False
@@ -232,7 +232,7 @@ def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner | 
 
 
 def notebook_blocks(analysis: Analysis[A], found: A) -> tuple[Block, ...]:
-    """What one analysis found, for a page that is not ours: below a heading, with how synthetic inputs were made."""
+    """Return what one analysis found, for a page of somebody else: below a heading, with the origin of synthetic inputs."""
     part = analysis.part(found)
     mark = _banner(found.sources, mixed=_mixes(found))
     made_up = [

@@ -137,7 +137,7 @@ def _sorted_by_kind(paths: Sequence[Path]) -> tuple[Found, list[Path]]:
 def _results(
     paths: Sequence[Path], given: Mapping[str, Any], tell: Callable[[str], None] | None, *, needed: bool
 ) -> Results:
-    """What was found of the measurements at the paths; none where there are none and none are needed."""
+    """Return what was found of the measurements at the paths; none where there are none and none are needed."""
     try:
         return recall_suiting(paths, given, tell) if paths or needed else []
     except (DoesNotSuit, NoneUsable):
@@ -167,7 +167,7 @@ def _moment(utc: str | None) -> datetime | None:
 
 
 def _values(results: Results, others: Found, folder: Path) -> Iterator[Values]:
-    """The tables for programs."""
+    """Yield the tables for programs."""
     for analysis, found in results:
         yield from of_analysis(analysis, found, folder)
     for kind, places in others:
@@ -175,7 +175,7 @@ def _values(results: Results, others: Found, folder: Path) -> Iterator[Values]:
 
 
 def _remarks(results: Results, others: Found) -> Iterator[str]:
-    """What lies there and is not in the report, and what has no result."""
+    """Yield what lies there and is not in the report, and what has no result."""
     reported = {kind.experiment for kind, _ in others}
     for remark in remarks([found.remarks for _, found in results]):
         if not (isinstance(remark, SkippedRuns) and remark.experiment in reported):
@@ -184,7 +184,7 @@ def _remarks(results: Results, others: Found) -> Iterator[str]:
 
 
 def _without_result(results: Results) -> Iterator[str]:
-    """What was analyzed for the page since it has no result where it lies."""
+    """Yield what was analyzed for the page since it has no result where it lies."""
     lacking = {
         source.name: None
         for _, found in results
@@ -199,12 +199,12 @@ def _without_result(results: Results) -> Iterator[str]:
 
 
 def render(results: Results) -> str:
-    """The HTML page of results."""
+    """Return the HTML page of results."""
     return page_of(document_of(results))
 
 
 def render_part(analysis: Analysis[A], found: A) -> str:
-    """What one analysis found, as a part of a page that is not ours, such as a notebook."""
+    """Return what one analysis found, as a part of a page that is not ours, such as a notebook."""
     return fragment_of(notebook_blocks(analysis, found), prefix=f"levilab-{_digest(found)}-")
 
 

@@ -42,7 +42,7 @@ class Asked:
     crosscheck: bool = True
 
     def command(self, sources: Sequence[Source[Any]]) -> str:
-        """The command that makes the report again."""
+        """Return the command that makes the report again."""
         paths = [shlex.quote(str(path)) for path in self.paths] or named_in_commands(sources)
         options = [word for name in OF_REPORT for word in _option(name, self.given.get(name))]
         no_crosscheck = [] if self.crosscheck else ["--no-crosscheck"]
@@ -50,7 +50,7 @@ class Asked:
 
 
 def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked | None = None) -> Section:
-    """The section at the end of a report of measurements."""
+    """Return the section at the end of a report of measurements."""
     asked = asked or Asked()
     sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
     many = len(sources) > _MOST_NAMED
@@ -95,7 +95,7 @@ def named_in_commands(sources: Sequence[Source[Any]], typed: Sequence[Path] = ()
 
 
 def _options(options: Any) -> tuple[str, ...]:
-    """The options that are not at their defaults, as one types them; those that are no plain words are left out."""
+    """Return the options that are not at their defaults, as one types them, if they are plain words."""
     usual, typed = type(options)(), []
     for name in filter(_is_plain, OPTIONS):
         value = getattr(options, name, None)
@@ -105,7 +105,7 @@ def _options(options: Any) -> tuple[str, ...]:
 
 
 def _option(name: str, value: Any) -> list[str]:
-    """An option as one types it.
+    """Return an option as one types it.
 
     >>> _option("keep_outliers", True), _option("columns", {"t": "1", "f": "a b"}), _option("rate", None)
     (['--keep-outliers'], ['--columns', "'t=1,f=a b'"], [])
@@ -136,7 +136,7 @@ def _columns(names: Mapping[str, str]) -> str:
 
 
 def _others(results: Sequence[tuple[Analysis[Any], Any]]) -> tuple[Note, ...]:
-    """The names of options that are no plain words, such as a file of the top's sizes."""
+    """Return the names of options that are no plain words, such as a file of the top's sizes."""
     options = [origin.options for _, found in results for origin in found.origins]
     names = sorted({_flag(name) for one in options for name in _given(one)})
     return (Note(f"Besides, these options were given: {', '.join(names)}."),) if names else ()
@@ -167,7 +167,7 @@ def _data(sources: Sequence[Source[Any]]) -> Tabular:
 
 
 def _recorded(sources: Sequence[Source[Any]]) -> tuple[Block, ...]:
-    """The commands by which the runs were recorded, and the versions that did, said once if they are the same."""
+    """Return the commands and versions by which the runs were recorded, once if they are the same."""
     facts: list[Fact] = []
     for source in sources:
         record = source.run.record if source.run else None
@@ -183,7 +183,7 @@ def _recorded(sources: Sequence[Source[Any]]) -> tuple[Block, ...]:
 
 
 def _typed(words: Sequence[str]) -> str:
-    """A recorded command as one types it.
+    """Return a recorded command as one types it.
 
     >>> _typed(["/usr/lib/levilab/__main__.py", "acquire", "spin", "--note", "a b"])
     "levilab acquire spin --note 'a b'"

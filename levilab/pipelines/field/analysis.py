@@ -94,7 +94,7 @@ class FieldAnalysis(Analyzed[FieldReadings, FieldRun, None, FieldOptions]):
         return f"{len(self.runs)} scans: {_shown('strength', strength)} in the mean; {agree}. {_advice(self.values)}"
 
     def about_run(self, run: FieldRun) -> Iterable[str]:
-        """What to know of one scan."""
+        """Return what to know of one scan."""
         return run.warnings
 
 
@@ -185,7 +185,7 @@ def _pole(scan: FieldScan) -> str:
 
 
 def _learned_in_words(scan: FieldScan) -> str:
-    """What the scan can tell, and what it cannot."""
+    """Return what the scan can tell, and what it cannot."""
     words = {
         "origin": "origin",
         "thickness": "thickness",

@@ -117,7 +117,7 @@ def _mark_window(axes: Axes, analysis: FieldAnalysis) -> None:
 
 
 def _draw_residuals(axes: Axes, analysis: FieldAnalysis, limits: tuple[float, float]) -> None:
-    """What the fit leaves over should be noise: two thirds within the dark band."""
+    """Draw what the fit leaves over should be noise: two thirds within the dark band."""
     sigma_bands(axes)
     most = 2.5
     for k, run in enumerate(analysis.runs):

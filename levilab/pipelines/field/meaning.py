@@ -21,7 +21,7 @@ _HEIGHT_M = 0.073
 
 
 def meaning(analysis: FieldAnalysis) -> tuple[str, ...]:
-    """The sentences; of several scans those of the first, and how far they agree."""
+    """Return the sentences; of several scans those of the first, and how far they agree."""
     return tuple(_sentences(analysis))
 
 

@@ -24,7 +24,7 @@ MOST_READINGS = 200
 
 
 def field_part(analysis: FieldAnalysis) -> ReportPart:
-    """What the scans say, the base, what follows, and the readings."""
+    """Return what the scans say, the base, what follows, and the readings."""
     several = len(analysis.runs) > 1
     means = " Of several scans these are means; what is common to them makes no mean more certain." if several else ""
     return ReportPart(
@@ -68,7 +68,7 @@ _BASE = (
 
 
 def _bases(analysis: FieldAnalysis) -> tuple[Block, ...]:
-    """The base as each scan finds it."""
+    """Return the base as each scan finds it."""
     if len(analysis.runs) == 1:
         return (Tabular("field-base", replace(base_table(analysis.runs[0].scan), title=""), _BASE),)
     bases = (
@@ -88,7 +88,7 @@ def _in_words(_: Source[FieldReadings], run: FieldRun, *__: object) -> tuple[str
 
 
 def _readings(_: Source[FieldReadings], run: FieldRun, *__: object) -> tuple[Listing]:
-    """The first readings; rows of height [cm], flux density [mT] and residual [u]."""
+    """Return the first readings; rows of height [cm], flux density [mT] and residual [u]."""
     scan = run.scan
     shown = min(len(scan.height), MOST_READINGS)
     scaled = scan.residuals / scan.u
@@ -102,7 +102,7 @@ def _readings(_: Source[FieldReadings], run: FieldRun, *__: object) -> tuple[Lis
 
 
 def _points(analysis: FieldAnalysis) -> tuple[Points, ...]:
-    """What each reading of the figure answers."""
+    """Return what each reading of the figure answers."""
     found = []
     for k, (name, run) in enumerate(zip(labels_of(analysis.sources), analysis.runs, strict=True)):
         texts = tuple(_point(name, run, i) for i in range(len(run.scan.height)))

@@ -28,14 +28,14 @@ _BY_RUN = ("strength", "origin", "lightest_mass", "heaviest_mass", "mass_to_set"
 
 
 def field_tables(analysis: FieldAnalysis) -> tuple[Table, ...]:
-    """The scans, the base, and what follows.  Each fits a terminal of 80 columns."""
+    """Return the scans, the base, and what follows.  Each fits a terminal of 80 columns."""
     if len(analysis.runs) > 1:
         return scans_table(analysis), by_run_table(analysis), follows_table(analysis.values)
     return scans_table(analysis), base_table(analysis.runs[0].scan), follows_table(analysis.values)
 
 
 def scans_table(analysis: FieldAnalysis) -> Table:
-    """What was measured, and how well the model fits."""
+    """Return what was measured, and how well the model fits."""
     rows = []
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
         scan, statistics = run.scan, run.scan.statistics
@@ -56,12 +56,12 @@ def scans_table(analysis: FieldAnalysis) -> Table:
 
 
 def _range(values: NDArray[np.float64], decimals: int) -> str:
-    """The least and the greatest value, which need not be the first and the last."""
+    """Return the least and the greatest value, which need not be the first and the last."""
     return " … ".join(with_decimals(float(end), decimals) for end in (values.min(), values.max()))
 
 
 def base_table(scan: FieldScan) -> Table:
-    """What the scan says of the base, beside what was known before."""
+    """Return what the scan says of the base, beside what was known before."""
     rows = []
     for name, estimate in scan.parameters.items():
         prior = scan.known.prior(name)
@@ -82,7 +82,7 @@ def _prior(name: str, value: float, u: float, like: Estimate) -> str:
 
 
 def _learned(scan: FieldScan, name: str) -> str:
-    """What the scan adds to what was known."""
+    """Return what the scan adds to what was known."""
     left = scan.learned(name)
     if name not in scan.fitted:
         return "held"
@@ -92,14 +92,14 @@ def _learned(scan: FieldScan, name: str) -> str:
 
 
 def follows_table(values: Mapping[str, Estimate]) -> Table:
-    """What follows for the tops that float there."""
+    """Return what follows for the tops that float there."""
     names = [name for name in OF_TOPS if name in values]
     rows = [(QUANTITIES[name].shown_symbol, with_uncertainty(QUANTITIES[name].show(values[name]))) for name in names]
     return table("What follows for a top", ("", ""), rows or [("no top floats above this base", "")])
 
 
 def by_run_table(analysis: FieldAnalysis) -> Table:
-    """The main results, scan by scan, and their means."""
+    """Return the main results, scan by scan, and their means."""
     heads = ["scan", *(QUANTITIES[name].head.replace(" [", "\n[") for name in _BY_RUN)]
     rows = [
         Row((short_name(source.name), *_cells(run.values)))

@@ -166,19 +166,19 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
         return self.sources if group is None else self.averaged[group]
 
     def prefix(self, group: Limits) -> str:
-        """What the names of a group's values begin with; empty where it is the only group."""
+        """Return what the names of a group's values begin with; empty where it is the only group."""
         if len(self.groups) == 1:
             return ""
         of_kind = self.number(group)
         return f"{group.which}_" if of_kind is None else f"{group.which}_{of_kind}_"
 
     def number(self, group: Limits) -> int | None:
-        """The number of a group among those of its kind, from 1; None where it is the only one."""
+        """Return the number of a group among those of its kind, from 1; None where it is the only one."""
         alike = [one for one in self.groups if one.which == group.which]
         return alike.index(group) + 1 if len(alike) > 1 else None
 
     def about_all(self) -> Iterable[str]:
-        """What to know of the limits of the same conditions, and of conditions that differ."""
+        """Return what to know of the limits of the same conditions, and of conditions that differ."""
         for which in ("lower", "upper"):
             texts = [group.conditions_text for group in self.groups if group.which == which]
             if len(texts) > 1:
@@ -189,7 +189,7 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
                 yield from warnings_of(group.statistics)
 
     def about_run(self, run: Limits) -> Iterable[str]:
-        """What to know of one run."""
+        """Return what to know of one run."""
         return warnings_of(run.statistics)
 
 
@@ -216,7 +216,7 @@ def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
 def together(
     sources: Sequence[Source[LimitReadings]], runs: Sequence[Limits], options: LimitOptions
 ) -> tuple[Limits, ...]:
-    """The limits of each of the conditions, lower ones first, else in the order in which they are given.
+    """Return the limits of each of the conditions, lower ones first, else in the order in which they are given.
 
     What was made up says nothing about a real top: it makes a group of its own.
     """
@@ -233,7 +233,7 @@ def together(
 
 
 def tell_apart(groups: Iterable[Limits]) -> tuple[Limits, ...]:
-    """The groups; those that differ only in what is SYNTHETIC say it in their text."""
+    """Return the groups; those that differ only in what is SYNTHETIC say it in their text."""
     keyed = [((replace(group.conditions, synthetic=None), group.device), group) for group in groups]
     alike = Counter(key for key, _ in keyed)
     return tuple(replace(group, told_apart=alike[key] > 1) for key, group in keyed)
@@ -266,7 +266,7 @@ def _combined(
 
 
 def _sample(source: Source[LimitReadings], which: Which, options: LimitOptions) -> Sample:
-    """The limits of a source; of an upper limit that levilab measured, u is a step of the drive over √12."""
+    """Return the limits of a source; of an upper limit that levilab measured, u is a step of the drive over √12."""
     readings = source.readings
     if options.reading_u is not None:
         return Sample(readings.limit, np.full(len(readings), options.reading_u))
@@ -294,7 +294,7 @@ def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> 
 
 
 def _settings_of(source: Source[LimitReadings]) -> Mapping[str, Any]:
-    """The settings of the experiment, empty of a file."""
+    """Return the settings of the experiment, empty of a file."""
     table = source.run.record.configuration.get(LIMIT) if source.run else None
     return table if isinstance(table, dict) else {}
 
@@ -317,7 +317,7 @@ def _which(source: Source[LimitReadings], device: Device) -> Which:
 
 
 def device_of(source: Source[LimitReadings]) -> Device:
-    """The top that was measured: that of the run's scene, or else the thesis's.  Raises DataError for an odd scene."""
+    """Return the top of the run's scene, or else the thesis's.  Raises DataError for an odd scene."""
     table: Any = source.run.record.configuration.get("scene") if source.run else None
     if not isinstance(table, dict):
         return described_device(Scene(), "the thesis's top, 25.26 g")
@@ -329,7 +329,7 @@ def device_of(source: Source[LimitReadings]) -> Device:
 
 
 def described_device(scene: Scene, name: str) -> Device:
-    """What theory says of a scene's top, where it floats.  Raises NoWindow, SceneError."""
+    """Return what theory says of a scene's top, where it floats.  Raises NoWindow, SceneError."""
     from levilab.simulator.equilibrium import stability_of  # with numba, which no other analysis needs
 
     found = stability_of(scene)
@@ -341,7 +341,7 @@ def described_device(scene: Scene, name: str) -> Device:
 
 
 def warnings_of(statistics: Statistics) -> list[str]:
-    """What to know before using the mean."""
+    """Return what to know before using the mean."""
     texts = []
     if statistics.outliers:
         numbers = ", ".join(str(i + 1) for i in statistics.outliers)

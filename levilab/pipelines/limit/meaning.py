@@ -25,7 +25,7 @@ _WHY = MappingProxyType({
 
 
 def meaning(analysis: LimitAnalysis) -> tuple[str, ...]:
-    """The sentences, of each of the conditions."""
+    """Return the sentences, of each of the conditions."""
     return tuple(text for group in analysis.groups for text in _sentences(group))
 
 

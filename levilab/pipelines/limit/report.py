@@ -72,7 +72,7 @@ def _in_words(source: Source[LimitReadings], run: Limits, *_: object) -> tuple[s
 
 
 def _readings(source: Source[LimitReadings], run: Limits, *_: object) -> tuple[Listing]:
-    """The limits; rows of number, limit, u and its distance from the mean of the run [Hz]."""
+    """Return the limits; rows of number, limit, u and its distance from the mean of the run [Hz]."""
     limit, u = source.readings.limit, source.readings.u
     shown = min(limit.size, _MOST_SHOWN)
     heads = ("top", "limit [Hz]", "u [Hz]", "− mean [Hz]")
@@ -88,7 +88,7 @@ def _readings(source: Source[LimitReadings], run: Limits, *_: object) -> tuple[L
 
 
 def _points(analysis: LimitAnalysis) -> tuple[Points, ...]:
-    """What each top of the figure answers."""
+    """Return what each top of the figure answers."""
     each = zip(labels_of(analysis.sources), analysis.sources, analysis.runs, strict=True)
     return tuple(
         Points(

@@ -19,12 +19,12 @@ HEADS = ("limits", "tops", "mean [Hz]", "scatter [Hz]", "trend [Hz/top]", "outli
 
 
 def limit_tables(analysis: LimitAnalysis) -> tuple[Table, ...]:
-    """The runs, and theory beside them.  Each fits a terminal of 80 columns."""
+    """Return the runs, and theory beside them.  Each fits a terminal of 80 columns."""
     return runs_table(analysis), theory_table(analysis)
 
 
 def runs_table(analysis: LimitAnalysis) -> Table:
-    """The statistics, run by run and of each kind together."""
+    """Return the statistics, run by run and of each kind together."""
     rows = [
         Row((f"{short_name(source.name)} ({_group(analysis, k)})", *_cells(run)))
         for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
@@ -50,7 +50,7 @@ def _cells(limits: Limits) -> tuple[str, ...]:
 
 
 def theory_table(analysis: LimitAnalysis) -> Table:
-    """What theory says, and how far the mean is from it."""
+    """Return what theory says, and how far the mean is from it."""
     rows = [
         Row(
             (
@@ -71,7 +71,7 @@ def theory_table(analysis: LimitAnalysis) -> Table:
 
 
 def _group(analysis: LimitAnalysis, run: int) -> str:
-    """The group that a run is of: its kind, and its number where there are several, as in result.json."""
+    """Return the group that a run is of: its kind, and its number where there are several, as in result.json."""
     group = next(group for group in analysis.groups if run in group.runs)
     number = analysis.number(group)
     return group.which if number is None else f"{group.which} {number}"

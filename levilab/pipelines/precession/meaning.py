@@ -20,7 +20,7 @@ _DIFFERS = 2.0
 
 
 def meaning(analysis: PrecessionAnalysis) -> tuple[str, ...]:
-    """The sentences, of the line through all points."""
+    """Return the sentences, of the line through all points."""
     return tuple(_sentences(analysis.combined))
 
 

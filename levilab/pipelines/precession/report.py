@@ -82,7 +82,7 @@ _POINTS = (
 
 
 def _power(analysis: PrecessionAnalysis) -> tuple[Block, ...]:
-    """What it takes to tell the published slope from 1."""
+    """Return what it takes to tell the published slope from 1."""
     found = power_table(analysis.combined)
     note = "The slope of 1.05 was published without an uncertainty."
     return (Tabular("precession-power", found, note, first_column_wraps=True),) if found.rows else ()
@@ -113,7 +113,7 @@ def _readings(source: Source[Readings], run: PrecessionRun, _: PrecessionOptions
 
 
 def _figure_points(analysis: PrecessionAnalysis) -> tuple[Points, ...]:
-    """What each point of the figure that the line goes through answers."""
+    """Return what each point of the figure that the line goes through answers."""
     found = []
     for k, (name, run) in enumerate(zip(labels_of(analysis.sources), analysis.runs, strict=True)):
         texts = tuple(_point(name, point) for point in run.fit.points if point.used)

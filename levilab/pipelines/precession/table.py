@@ -26,7 +26,7 @@ POINT_HEADS = ("ν_d [Hz]", "ν_p [Hz]", "spin [Hz]", "ν_p − ν_d [Hz]", "lev
 
 
 def precession_tables(analysis: PrecessionAnalysis) -> tuple[Table, ...]:
-    """The lines, what it takes to tell a slope of 1.05 from 1, the points.  Each fits a terminal of 80 columns."""
+    """Return tables of the lines, of the power of the test, and of the points.  Each fits a terminal of 80 columns."""
     tables = [lines_table(analysis), power_table(analysis.combined)]
     tables += [points_table(run, name) for run, name in _names(analysis)]
     tables += [coherence_table(run, name) for run, name in _names(analysis)]
@@ -42,7 +42,7 @@ def _names(analysis: PrecessionAnalysis) -> list[tuple[PrecessionRun, str]]:
 
 
 def lines_table(analysis: PrecessionAnalysis) -> Table:
-    """The line of each run and of all together, and the median line beside it."""
+    """Return the line of each run and of all together, and the median line beside it."""
     total = len(analysis.runs)
     rows = []
     if total > 1:
@@ -76,7 +76,7 @@ def _line_cells(fit: SweepFit) -> tuple[str, ...]:
 
 
 def power_table(fit: SweepFit) -> Table:
-    """What tells a slope of 1.05 from 1; without an uncertainty of the slope no rows."""
+    """Return what tells a slope of 1.05 from 1; without an uncertainty of the slope no rows."""
     power = fit.power
     if power is None:
         return table("", (), ())
@@ -102,7 +102,7 @@ def points_table(
     most: int = MOST_POINTS,
     clock: tuple[Sequence[str], Sequence[tuple[str, ...]]] = ((), ()),
 ) -> Table:
-    """The points, the first of many.
+    """Return the points, the first of many.
 
     Args:
         run: the sweep.

@@ -53,7 +53,7 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
 
 
 def _used(analysis: SpinAnalysis) -> str:
-    """What the results come from: pulses of single records, else records or windows, of which each has its pulses."""
+    """Return the number of pulses of single records, and of records or windows, of which each has its pulses."""
     pulses = sum(run.spin.pulses for run in analysis.runs if not run.which)
     counts = {"pulse": pulses} if pulses else {}
     for run in analysis.runs:
@@ -90,7 +90,7 @@ def _series(source: Source[Records], run: SpinRun, *_: object) -> tuple[Block, .
 
 
 def _points(analysis: SpinAnalysis) -> tuple[Points, ...]:
-    """What each value of the frequency against time answers, of the inputs that are drawn."""
+    """Return what each value of the frequency against time answers, of the inputs that are drawn."""
     return tuple(
         Points(f"readings-{k}", tuple(map(_point, run.series.time, run.series.frequency, run.series.u)))
         for k, run in enumerate(analysis.runs[:MOST_DRAWN])

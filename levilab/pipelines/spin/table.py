@@ -31,7 +31,7 @@ def spin_tables(analysis: SpinAnalysis) -> tuple[Table, ...]:
 
 
 def frequency_table(analysis: SpinAnalysis) -> Table:
-    """The result."""
+    """Return the result."""
     spins, slopes = (column(getattr(run.spin, name) for run in analysis.runs) for name in ("frequency", "chirp"))
     several = any(run.which for run in analysis.runs)
     rows = [

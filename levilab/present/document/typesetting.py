@@ -35,7 +35,7 @@ class Run:
 
 
 def typeset(text: str) -> tuple[Run, ...]:
-    """A plain text as runs.
+    """Return a plain text as runs.
 
     >>> [(run.text, run.level) for run in typeset("2.34(3)×10⁻⁴ (rad/s)^−½/s")]
     [('2.34(3)×10', ''), ('−4', 'high'), (' (rad/s)', ''), ('−½', 'high'), ('/s', '')]

@@ -55,7 +55,7 @@ class Writer:
     is_alive: bool = False
 
     def new_id(self, name: str) -> str:
-        """An id that no other element has: the name, and from the second use on a number."""
+        """Return an id that no other element has: the name, and from the second use on a number."""
         plain = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "part"
         self.names[plain] += 1
         count = self.names[plain]
@@ -138,7 +138,7 @@ def _listing(_: Writer, block: Listing, __: int) -> Html:
 
 
 def _moved_sideways(drawn: Html, name: str, kind: str = "scroll") -> Html:
-    """What is too wide is moved sideways, also from the keyboard."""
+    """Return what is too wide is moved sideways, also from the keyboard."""
     return element("div", drawn, class_=kind, tabindex="0", role="region", aria_label=name)
 
 

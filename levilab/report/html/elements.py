@@ -28,7 +28,7 @@ Child: TypeAlias = "str | Html | Iterable[Child]"
 
 
 def element(name: str, /, *children: Child, **attributes: str | bool | None) -> Html:
-    """An element.
+    """Return an element.
 
     Args:
         name: such as "p".
@@ -64,7 +64,7 @@ def _markup(child: Child) -> str:
 
 
 def words(text: str) -> Html:
-    """A text with powers and indices set high and low.
+    """Return a text with powers and indices set high and low.
 
     >>> words("3×10⁻⁴ <b>").markup
     '3×10<sup>−4</sup> &lt;b&gt;'
@@ -73,7 +73,7 @@ def words(text: str) -> Html:
 
 
 def lines(text: str) -> Html:
-    r"""The same of several lines.
+    r"""Return the same of several lines.
 
     >>> lines("ν₀\n[Hz]").markup
     'ν<sub>0</sub><br>[Hz]'

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def page_of(document: Document) -> str:
-    """The whole page; the same document always has the same text."""
+    """Return the whole page; the same document always has the same text."""
     writer = Writer()
     body = joined(
         [
@@ -72,7 +72,7 @@ def _contents(document: Document) -> Html:
 
 
 def _island(writer: Writer) -> Html:
-    """The texts of the points, as data that no browser takes for markup or runs."""
+    """Return the texts of the points, as data that no browser takes for markup or runs."""
     text = json.dumps(writer.points, ensure_ascii=False, sort_keys=True).replace("<", "\\u003c").replace("&", "\\u0026")
     return element("script", Html(text), type="application/json", id="points")
 
@@ -90,11 +90,11 @@ def _policy() -> str:
 
 @cache
 def style() -> str:
-    """The page's style sheet."""
+    """Return the page's style sheet."""
     return files("levilab.report.html").joinpath("style.css").read_text(encoding="utf-8")
 
 
 @cache
 def script() -> str:
-    """The page's script."""
+    """Return the page's script."""
     return files("levilab.report.html").joinpath("script.js").read_text(encoding="utf-8")

@@ -118,7 +118,7 @@ def _is_long(table: Table, k: int) -> bool:
 
 
 def title_of(name: str) -> str:
-    """What a table without a title is called, by its name.
+    """Return what a table without a title is called, by its name.
 
     >>> title_of("spindown-laws")
     'Spindown laws'
@@ -148,7 +148,7 @@ def _row(cells: Sequence[str], aligned: Sequence[str], *, bold: bool = False) ->
 
 
 def _cell(cell: str, aligned: str, *, bold: bool) -> str:
-    r"""A cell, of several lines perhaps: the first stands in the line of the row, of a head the last.
+    r"""Return a cell, of several lines perhaps: the first stands in the line of the row, of a head the last.
 
     >>> _cell("c₁\n[s⁻¹]", "l", bold=False)
     '\\begin{tabular}[t]{@{}l@{}}c\\raisebox{-.4ex}{\\scriptsize 1}\\\\{[}s\\textsuperscript{$-$1}{]}\\end{tabular}'
@@ -164,7 +164,7 @@ def _cell(cell: str, aligned: str, *, bold: bool) -> str:
 
 
 def escaped(text: str) -> str:
-    r"""A plain text as LaTeX, in ASCII.
+    r"""Return a plain text as LaTeX, in ASCII.
 
     >>> escaped("50 % of {x}_1 & \\input{a}")
     '50 \\% of \\{x\\}\\_1 \\& \\textbackslash{}input\\{a\\}'

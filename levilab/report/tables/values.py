@@ -45,7 +45,7 @@ class Values:
 
 
 def as_csv(values: Values) -> str:
-    """The table as CSV; no text in it is a formula to a spreadsheet.
+    """Return the table as CSV; no text in it is a formula to a spreadsheet.
 
     >>> print(as_csv(Values("x", "", ("input", "c1_per_s"), (("=1+1", -0.5), ("a, b", None)))), end="")
     input,c1_per_s
@@ -60,7 +60,7 @@ def as_csv(values: Values) -> str:
 
 
 def _harmless(cell: Cell) -> str:
-    """A cell as text; an apostrophe, which spreadsheets do not show, keeps a text from being a formula."""
+    """Return a cell as text; an apostrophe, which spreadsheets do not show, keeps a text from being a formula."""
     if isinstance(cell, str):
         text = " ".join(cell.split("\n")).replace("\r", " ")
         return f"'{text}" if _FORMULA.match(text) else text
@@ -114,7 +114,7 @@ def _of_part(
     part: Mapping[str, Any],
     inputs_of: Callable[[int | None], Sequence[Source[Any]]] | None = None,
 ) -> Iterator[tuple[Cell, ...]]:
-    """A row for each value.
+    """Yield a row for each value.
 
     inputs_of: returns the inputs of a group, whose values are synthetic where one of them is; None: as the part is.
     """
