@@ -232,7 +232,7 @@ def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner | 
 
 
 def notebook_blocks(analysis: Analysis[A], found: A) -> tuple[Block, ...]:
-    """Return what one analysis found, for a page of somebody else: below a heading, with the origin of synthetic inputs."""
+    """Return the blocks of one analysis for another page: below a heading, with the origin of synthetic inputs."""
     part = analysis.part(found)
     mark = _banner(found.sources, mixed=_mixes(found))
     made_up = [
