@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from levilab.present.characters import for_encoding, printable
 from levilab.present.panel import Trend, bench_lines, time_left_in_words
@@ -25,8 +25,8 @@ _DRAWN_EVERY_S = 0.25
 _STYLES = {"plain": "", "strong": "bold", "on": "green", "off": "dim", "alarm": "bold red"}
 
 
-class Display(Protocol):
-    """What an acquisition reports to."""
+class Display:
+    """The progress of an acquisition; this one shows nothing, others override what they show."""
 
     def preparing(self, text: str, fraction: float) -> None:
         """Show how far the bench is prepared."""
@@ -44,7 +44,8 @@ class Display(Protocol):
         """Show a line of its own."""
 
     def is_due(self) -> bool:
-        """Whether it wants to show the state of the bench now."""
+        """Return whether the state of the bench is to be shown now."""
+        return False
 
     def state(self, state: State) -> None:
         """Show the state of the bench."""
@@ -53,30 +54,7 @@ class Display(Protocol):
         """End the display."""
 
 
-class Mute:
-    """Shows nothing."""
-
-    def preparing(self, text: str, fraction: float) -> None:
-        """Nothing."""
-
-    def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
-        """Nothing."""
-
-    def message(self, text: str) -> None:
-        """Nothing."""
-
-    def is_due(self) -> bool:
-        """Never."""
-        return False
-
-    def state(self, state: State) -> None:
-        """Nothing."""
-
-    def close(self) -> None:
-        """Nothing is open."""
-
-
-class LineDisplay:
+class LineDisplay(Display):
     """One line a reading, for logs, pipes and tests.
 
     Args:
@@ -108,18 +86,8 @@ class LineDisplay:
         except OSError:
             self._gone = True
 
-    def is_due(self) -> bool:
-        """Never."""
-        return False
 
-    def state(self, state: State) -> None:
-        """Nothing: a log has the readings and the events."""
-
-    def close(self) -> None:
-        """Nothing is open."""
-
-
-class BarDisplay:
+class BarDisplay(Display):
     """The readings as lines, and below them the bench as it is: last value, trend, instruments, time left.
 
     It has no thread: it is drawn anew when the bench has something to show, at most four times a second.  A
@@ -174,9 +142,6 @@ class BarDisplay:
                 text.append(for_encoding(piece.text, console.encoding), style=_STYLES[piece.style])
         return text
 
-    def preparing(self, text: str, fraction: float) -> None:
-        """Print nothing: the state of the bench has it."""
-
     def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
         """Print a line above; time left stands below."""
         self.message(text)
@@ -187,7 +152,7 @@ class BarDisplay:
         self._draw(lambda: self._console.print(printable(text), markup=False, highlight=False))
 
     def is_due(self) -> bool:
-        """Whether the last drawing is long enough ago, or a reading came since."""
+        """Return whether the last drawing is long enough ago, or a reading came since."""
         return time.monotonic() >= self._next
 
     def state(self, state: State) -> None:

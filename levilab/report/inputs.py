@@ -11,6 +11,7 @@ from levilab.present.clock import moment
 from levilab.present.document.blocks import Details, Fact, Facts, Note, Section, Tabular
 from levilab.present.document.marks import with_marks
 from levilab.present.tables import table
+from levilab.present.units import split
 from levilab.present.words import setting_in_words, settings_in_words, value_in_words
 
 if TYPE_CHECKING:
@@ -255,4 +256,4 @@ def setting_name(key: str) -> str:
     >>> setting_name("trigger_level_v"), setting_name("sweep")
     ('trigger level', 'sweep')
     """
-    return setting_in_words(key, "").strip()
+    return split(key)[0].replace("_", " ")
