@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from datetime import UTC
 from typing import TYPE_CHECKING, Any
 
 from levilab.pipelines.sources import mark_of
-from levilab.present.clock import moment
+from levilab.present.clock import local, moment
 from levilab.present.document.blocks import Details, Fact, Facts, Note, Section, Tabular
 from levilab.present.document.marks import with_marks
 from levilab.present.tables import table
@@ -155,10 +155,8 @@ def _local_start(source: Source[Any]) -> tuple[str, ...]:
 
 def _time(utc: str) -> str:
     """Return a time of run.json to the second; what is no time stands as it is."""
-    try:
-        return datetime.fromisoformat(utc).astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
-    except (ValueError, OverflowError):
-        return utc
+    found = local(utc)
+    return f"{found.astimezone(UTC):%Y-%m-%d %H:%M:%S UTC}" if found else utc
 
 
 def _events(source: Source[Any]) -> tuple[Block, ...]:

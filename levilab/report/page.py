@@ -16,6 +16,7 @@ from levilab.files import check_writable, replace_atomically, writing
 from levilab.pipelines.document import NO_RESULT
 from levilab.pipelines.sources import SkippedRuns, data_files
 from levilab.pipelines.suits import recall_suiting, remarks
+from levilab.present.clock import local
 from levilab.present.numbers import list_in_words
 from levilab.report.document import document_of, notebook_blocks
 from levilab.report.html.page import fragment_of, page_of
@@ -156,14 +157,8 @@ def _newest(results: Results, others: Found) -> datetime | None:
     records = [source.run.record for _, found in results for source in found.sources if source.run]
     texts = [record.ended_utc or record.started_utc for record in records]
     texts += [kind.when(path) for kind, found in others for path in found]
-    return max(filter(None, map(_moment, texts)), default=None)
-
-
-def _moment(utc: str | None) -> datetime | None:
-    try:
-        return datetime.fromisoformat(utc).astimezone(UTC) if utc else None
-    except (ValueError, OverflowError):
-        return None
+    newest = max(filter(None, map(local, texts)), default=None)
+    return newest.astimezone(UTC) if newest else None
 
 
 def _values(results: Results, others: Found, folder: Path) -> Iterator[Values]:

@@ -16,6 +16,7 @@ from analysis.precession.sweep import EXCLUDED_P, Sweep, SweepFit, fit_sweep
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.budget import gate_of
 from levilab.pipelines.options import PrecessionOptions
 from levilab.pipelines.precession.readings import Readings, read_sweep_file, read_sweep_run
 from levilab.pipelines.sources import Needs
@@ -102,7 +103,7 @@ def fit_source(source: Source[Readings], options: PrecessionOptions) -> Precessi
         u_drive=readings.u_drive,
         spin=readings.spin,
         u_spin=readings.u_spin,
-        gate_s=_gate(source),
+        gate_s=gate_of(source, PRECESSION),
         gates=readings.laser,
     )
     try:
@@ -111,13 +112,6 @@ def fit_source(source: Source[Readings], options: PrecessionOptions) -> Precessi
         raise DataError(f"{source.data}: {error}") from error
     coherences, warnings = _coherences(source)
     return PrecessionRun(fit, coherences, warnings)
-
-
-def _gate(source: Source[Readings]) -> float | None:
-    """Return the counter's gate [s], where a run says it."""
-    settings = source.run.record.configuration.get(PRECESSION) if source.run else None
-    gate = settings.get("gate_s") if isinstance(settings, dict) else None
-    return float(gate) if isinstance(gate, int | float) and gate > 0 else None
 
 
 def combine(runs: Sequence[PrecessionRun], options: PrecessionOptions) -> SweepFit:

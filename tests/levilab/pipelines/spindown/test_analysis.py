@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from analysis.spindown.drag import LAWS
 from levilab.errors import DataError, LevilabError
 from levilab.files import CannotWrite
 from levilab.pipelines.catalogue import ANALYSES
@@ -95,7 +96,7 @@ def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path
     assert result["synthetic"] is True
     assert len(result["inputs"]) == len(result["runs"]) == 4
     assert (tmp_path / result["inputs"][0]["path"]).is_file()
-    assert [model["name"] for model in result["models"]] == ["stokes", "newton", "disc", "mixed", "power"]
+    assert [model["name"] for model in result["models"]] == [*LAWS]
     run = result["runs"][0]
     assert set(run) >= {"path", "values", "models", "best_model", "warnings"}
     for model in run["models"]:
