@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import glob
 import json
 import math
 import os
@@ -199,6 +200,7 @@ def replace_atomically(path: Path, content: str | bytes) -> None:
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """Yield a file that replaces another one as a whole when the context ends without an error.  Raises OSError."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    _remove_parts_of_the_dead(path)
     try:
         part.unlink(missing_ok=True)  # of an earlier process of this number
         with part.open("xb") as file:  # never through a link that stands there
@@ -211,6 +213,28 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
         raise
+
+
+def _remove_parts_of_the_dead(path: Path) -> None:
+    """Remove the parts of a file that processes left which were killed while they wrote it."""
+    for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
+        number = part.name.removesuffix(".part").rpartition(".")[2]
+        if number.isdecimal() and not _is_alive(int(number)):
+            with contextlib.suppress(OSError):  # Windows: its process has it open
+                part.unlink()
+
+
+def _is_alive(process: int) -> bool:
+    """Whether a process may be alive; False on Windows, where asking by a signal would end it."""
+    if os.name != "posix":
+        return False
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        pass
+    return True
 
 
 @contextlib.contextmanager

@@ -16,7 +16,7 @@ class Finding:
     """A remark for the user: a short name, the same in all versions, and a sentence.
 
     Names: fell-back, missing, doubled, wrong, jump, half, double, mains, hum, clipped, gap, not-finite, wander,
-    correlated, scattered, few-pulses, unsteady, coarse; no-pulses of a run with several records.
+    correlated, scattered, coarse; unlike of a track, no-pulses of a run with several records.
     """
 
     name: str

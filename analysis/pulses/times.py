@@ -24,20 +24,20 @@ ROUNDS = 12
 SELDOM = 1e-3
 
 
-#: A jump of the time counts from so many standard uncertainties on.  Of 8600 sound lists of 0.6 to 12 s, with jitter of
-#: all kinds, swings and roundings, three had one, and of 2000 in which a drive was switched four.
+#: A jump of the time counts from this number of standard uncertainties on.  Of 9000 sound lists of 0.6 to 12 s, with
+#: coloured jitter, swings and roundings, three had one, and of 2000 in which a drive was switched four.
 CERTAIN = 8.0
-#: It is looked for at least so many pulses from the ends.
+#: Pulses between a jump and the ends of the list, at least.
 FROM_ENDS = 8
-#: The smallest buffer of a sound card, 64 samples at 48 kHz, lasts longer [s]; and it is no rounding, of so many steps.
+#: The smallest buffer of a sound card, 64 samples at 48 kHz, lasts longer [s]; and a rounding has fewer steps of a clock.
 LEAST_LOST, STEPS = 1e-3, 2.5
-#: The place of a jump is looked for again with the fit that has one, until it stays, at most so often.
+#: The place of a jump is looked for again with the fit that has one, until it stays: that many times at most.
 TRIES = 4
-#: So many pulses on each side show a jump by themselves: to a quarter of its size and twice their uncertainty.
+#: Pulses on each side that show a jump alone: to a quarter of its size and twice their uncertainty.
 BESIDE = 12
 #: Turns that may be lost or repeated at a jump besides, and the natural logarithm of the odds from which they are.
 MORE_TURNS, LOG_ODDS = (-3, -2, -1, 1, 2, 3), 10.0
-#: Pulses so near to their turns are used once a jump was found [turns]; the fit leaves out the others.
+#: Pulses nearer to their turns than this are used once a jump was found [turns]; the fit leaves out the others.
 NEAR = 0.05
 
 
@@ -240,7 +240,10 @@ def findings_of(train: Train) -> tuple[Finding, ...]:
     """The findings about a train."""
     notes = []
     if train.missing:
-        notes.append(Finding("missing", f"{train.missing} turn{'s have' if train.missing > 1 else ' has'} no pulse"))
+        rare = ", more than have one: is the spin a part of this?" if train.missing > train.used.size else ""
+        notes.append(
+            Finding("missing", f"{train.missing} turn{'s have' if train.missing > 1 else ' has'} no pulse{rare}")
+        )
     if train.doubled:
         notes.append(Finding("doubled", f"{train.doubled} pulses lie beside the turns' own and were left out"))
     return (*notes, *findings_of_fit(train.fit, "pulses"))

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.errors import NotPositive, OnlyHum, ShapesDiffer, TooFewPulses
 from analysis.numbers import digits
 from analysis.pulses import traps
-from analysis.pulses.clean import STRAYS, Clean, clean, own_lines
+from analysis.pulses.clean import Clean, clean
 from analysis.pulses.edges import Edges, place_edges
 from analysis.pulses.likelihood import search
 from analysis.pulses.matched import Match, match, window_of
@@ -39,6 +39,8 @@ FEW, CLEAR = 16, 3.0
 WIDE = 0.2
 #: The matched filter is not trusted where more than these parts of the turns have no pulse, or one at a wrong place.
 MOST_MISSING, MOST_WRONG = 0.5, 0.15
+#: Nor where the frequency would change by more than this part of it.
+MOST_SWEPT = 1.0
 #: Nor where so many times as many pulses lie beside the turns as at them: a reflection is one of them for each turn.
 MOST_DOUBLED = 1.5
 #: Pulses that scatter by more than this part of their width are placed one by one, and so are those that scatter by so
@@ -97,10 +99,6 @@ def spin_of_trace(
         if cleaned.lines:
             raise OnlyHum(seen=error.seen, needed=error.needed, duration=error.duration) from None
         raise
-    if cleaned.lines:
-        own = own_lines(cleaned.lines, cleaned.before, rate / (x.size // bins.size), found.match.fit)
-        if own:
-            found = _found(Trace(clean(x, rate, bins, bad, own=own), rate), method, degree, near=found.match.fit)
     return _result(found, start, rate, degree)
 
 
@@ -109,7 +107,7 @@ class Trace:
 
     def __init__(self, cleaned: Clean, rate: float) -> None:
         self.samples, self.bins, self.bad = cleaned.samples, cleaned.bins, cleaned.bad
-        self.notes, self.lines = cleaned.notes, cleaned.lines
+        self.notes = cleaned.notes
         self.trains: dict[int | None, Train] = {}
         self.rate, self.bin_rate = rate, rate / (self.samples.size // self.bins.size)
 
@@ -156,14 +154,14 @@ class Found:
     one_by_one: Fit | None = None
 
 
-def _found(trace: Trace, method: Choice, degree: int | None, *, near: Fit | None = None) -> Found:
-    """The pulses by a method; near: a phase that fitted the trace before it was cleaned anew.  Raises TooFewPulses."""
+def _found(trace: Trace, method: Choice, degree: int | None) -> Found:
+    """Return the pulses by a method.  Raises TooFewPulses."""
     if method == "edges":
         if train := _scattered(trace, math.inf, degree):
             return _one_by_one(trace, train)
         edges, doubled = _by_edges(trace, degree)
         return Found(edges, doubled, "edges", 0.0, trace.notes)
-    found, doubled, used, why = _by_pulse(trace, method, degree, near)
+    found, doubled, used, why = _by_pulse(trace, method, degree)
     train = _scattered(trace, 1.4826 * median(np.abs(found.shifts[found.used])), degree)
     if train and method == "auto":
         return _one_by_one(trace, train)
@@ -171,21 +169,15 @@ def _found(trace: Trace, method: Choice, degree: int | None, *, near: Fit | None
     notes = (*why, *trap, *trace.notes)
     if train is None or not _same(found.fit, train.fit):
         return Found(found, doubled, used, found.origin, notes)
-    _, train = _events(trace, degree)
     notes = (_scatters(train, "a mean pulse does not show it, so their own places are in the uncertainty"), *notes)
     return Found(found, doubled, used, found.origin, notes, train.fit)
 
 
 def _one_by_one(trace: Trace, train: Train) -> Found:
-    """The result by pulses that were placed one by one."""
+    """Return the result by pulses that were placed one by one."""
     edges = Edges(train.fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0)
-    return Found(
-        edges,
-        train.doubled,
-        "edges",
-        0.0,
-        (_scatters(train, "each was timed by itself, without a mean pulse"), *trace.notes),
-    )
+    notes = (_scatters(train, "each was timed by itself, without a mean pulse"), *trace.notes)
+    return Found(edges, train.doubled, "edges", 0.0, notes)
 
 
 def _scatters(train: Train, text: str) -> Finding:
@@ -252,10 +244,8 @@ def _by_edges(trace: Trace, degree: int | None) -> tuple[Edges, int]:
     return edges, train.doubled
 
 
-def _by_pulse(
-    trace: Trace, method: Choice, degree: int | None, near: Fit | None
-) -> tuple[Match, int, Method, tuple[Finding, ...]]:
-    """The match, the number of pulses beside the turns' own, which method found it, and why not the other.
+def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, int, Method, tuple[Finding, ...]]:
+    """Return the match, the number of pulses beside the turns' own, the method, and why it is not the other one.
 
     Raises TooFewPulses.
     """
@@ -267,8 +257,6 @@ def _by_pulse(
         found = trace.match(train.fit, degree)
     except TooFewPulses as error:
         seen = error.seen
-    if found is not None and near is not None and _same(found.fit, near):
-        found = _likelier(found, trace.match(near, degree))
     if method == "matched":
         if found is None:
             raise trace.too_few(seen)
@@ -278,7 +266,7 @@ def _by_pulse(
         if not why:
             return found, doubled, "matched", ()
     other = _of_greatest_likelihood(trace, found, degree)
-    if other is None or _doubt(other).startswith("the frequency"):
+    if other is None or _sweep(other) > MOST_SWEPT:
         raise trace.too_few(seen)
     notes = (
         () if method == "likelihood" else (Finding("fell-back", f"{why}: the greatest likelihood was searched for"),)
@@ -287,31 +275,23 @@ def _by_pulse(
 
 
 def _of_greatest_likelihood(trace: Trace, found: Match | None, degree: int | None) -> Match | None:
-    """The match at the frequency of greatest likelihood, or the one that was found, if that is likelier."""
+    """Return the match at the frequency of greatest likelihood, or the one that was found, if that is likelier."""
     fit = search(trace.bins, trace.bin_rate)
     other = None if fit is None else trace.match(fit, degree)
-    if other and found and _of_hum(trace, found) and not _of_hum(trace, other):
-        return other
-    return _likelier(other, found)
+    return max((each for each in (other, found) if each), key=lambda each: each.evidence, default=None)
 
 
-def _of_hum(trace: Trace, found: Match) -> bool:
-    """Whether the frequency passes one at which hum was taken off: what is left of it recurs as often as it."""
-    ends = np.sort(found.fit.frequency(np.array([0.0, trace.duration])))
-    return any(ends[0] - STRAYS < frequency < ends[1] + STRAYS for frequency, _ in trace.lines)
-
-
-def _likelier(one: Match | None, other: Match | None) -> Match | None:
-    """The one of greater evidence; the first of two alike."""
-    return max((each for each in (one, other) if each), key=lambda each: each.evidence, default=None)
+def _sweep(found: Match) -> float:
+    """Return the change of the frequency along the record, as a part of it."""
+    slope = found.fit.motion_at(found.fit.centre)[1].value or 0.0
+    return abs(slope) * 2 * found.fit.half / found.fit.middle_frequency
 
 
 def _doubt(found: Match) -> str:
-    """The reason to distrust a match; empty where there is none."""
-    turns = found.heights.size
-    sweep = abs(found.fit.motion_at(found.fit.centre)[1].value or 0.0) * found.fit.half
-    if sweep > 0.5 * found.fit.middle_frequency:
-        return f"the frequency would change by {digits(2 * sweep, 3)} Hz"
+    """Return the reason to distrust a match; empty where there is none."""
+    turns, sweep = found.heights.size, _sweep(found)
+    if sweep > MOST_SWEPT:
+        return f"the frequency would change by {digits(sweep * found.fit.middle_frequency, 3)} Hz"
     if found.missing > MOST_MISSING * turns:
         return f"{found.missing} of {turns} turns have no pulse"
     if found.wrong > MOST_WRONG * turns:

@@ -2,9 +2,9 @@
 // The weights are those of Sphinx (searchtools.js); `score` adds the page's own factor.
 var Scorer = {
   score: ([page, title, anchor, description, score, file]) => {
-    if (/^(decisions\/|speed$|mutants$|fuzzing$|contributing$|changes$)/.test(page)) return 0.2 * score;
-    if (/^(reference\/|reproduce$|sweeps-at-scale$)/.test(page)) return 0.4 * score;
-    if (/^(data|tutorial|install|bench|experiments\/|report|notebook)/.test(page)) return 1.5 * score;
+    if (/^(decisions\/|reference\/|speed$|mutants$|fuzzing$|contributing$|changes$)/.test(page)) return 0.2 * score;
+    if (/^(reproduce$|sweeps-at-scale$)/.test(page)) return 0.4 * score;
+    if (/^(data|install|bench|experiments\/|report|notebook)/.test(page)) return 1.5 * score;
     return score;
   },
   objNameMatch: 11,

@@ -148,7 +148,7 @@ class ScpiInstrument:
 
     @classmethod
     def kind_of_instrument(cls) -> str:
-        """The instruments that it drives, in words: the first line of its documentation."""
+        """Return the names of the instruments that it drives: the first line of its documentation."""
         return (cls.__doc__ or cls.__name__).splitlines()[0].rstrip(".")
 
     def forget_errors(self) -> None:
@@ -294,14 +294,14 @@ class ScpiInstrument:
         return [row for row in rows if isinstance(row, Setting)]
 
     def field_of(self, answer: str, header: str, key: str) -> str:
-        """The part of an answer that is one setting; all of it, where it has neither header nor fields.
+        """Return the part of an answer that is one setting; all of it, where it has neither header nor fields.
 
         Raises ValueError where the answer does not have the setting.
         """
         return answer
 
     def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
-        """Called after a setting was sent, so that an instrument without an error queue can be asked for it.
+        """Check a setting that was sent, where an instrument has no error queue; by default do nothing.
 
         Raises:
             OutOfRange: it has set another number.
@@ -320,7 +320,7 @@ class ScpiInstrument:
         raise CommandRefused(self.transport.address, sent, (f"{setting.name} is {now!r} afterwards",))
 
     def header_in_use(self, header: str) -> str:
-        """The header of a declared setting as it is sent; with several inputs, that of the input in use."""
+        """Return the header of a declared setting as it is sent; with several inputs, that of the input in use."""
         return header
 
     def close(self) -> None:
@@ -330,7 +330,7 @@ class ScpiInstrument:
 
 @functools.cache
 def _attributes(driver: Any) -> frozenset[str]:
-    """The names that can be set on a driver: its settings, properties, and annotated attributes."""
+    """Return the names that can be set on a driver: its settings, properties, and annotated attributes."""
     annotated = (name for owner in driver.__mro__ for name in getattr(owner, "__annotations__", {}))
     return frozenset({*dir(driver), *annotated})
 

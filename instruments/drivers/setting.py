@@ -102,7 +102,7 @@ class Setting(Generic[T]):
         self.__doc__ = self.description()
 
     def description(self) -> str:
-        """The text of `help`: what it is, the header on the wire, range and unit."""
+        """Return the text of `help`: the meaning, the header on the wire, range and unit."""
         about = f"{self.about}: " if self.about else ""
         return f"{about}{self.header}{f' {self.key}' if self.key else ''}, {self._allowed()}."
 
@@ -135,11 +135,11 @@ class Setting(Generic[T]):
         return self.read(instrument, question, instrument.transport.query(question))
 
     def question(self, instrument: Owner) -> str:
-        """The question for it, as it is sent."""
+        """Return the question for it, as it is sent."""
         return f"{instrument.header_in_use(self.header)}?"
 
     def read(self, instrument: Owner, question: str, answer: str) -> T:
-        """The value in the answer to its question.  Raises BadAnswer."""
+        """Return the value in the answer to its question.  Raises BadAnswer."""
         form = self.form or instrument.NUMBER
         try:
             return cast("T", self._parse(instrument.field_of(answer, self.header, self.key), form))
@@ -174,7 +174,7 @@ class Setting(Generic[T]):
         return (_PRINTED if self.resolution else _ROUNDING) * value
 
     def _parse(self, answer: str, form: Form) -> bool | float | str:
-        """The value of an answer.  Raises ValueError."""
+        """Return the value of an answer.  Raises ValueError."""
         if self.kind is bool:
             if answer not in _SWITCH:
                 raise ValueError(answer)
@@ -209,7 +209,7 @@ class Setting(Generic[T]):
         return f"a text, as {form.example}"
 
     def _canonical(self, value: T) -> T:
-        """A word in its short form, everything else as it is."""
+        """Return a word in its short form, everything else as it is."""
         if self.kind is not str or not self.choices:
             return value
         with contextlib.suppress(ValueError):
@@ -236,7 +236,7 @@ class Setting(Generic[T]):
 
 
 def _short_form(word: str, choices: tuple[str, ...]) -> str:
-    """The short form of the choice that this word is, in any case.  Raises ValueError where it is none.
+    """Return the short form of the choice that this word is, in any case.  Raises ValueError where it is none.
 
     >>> _short_form("sinusoid", ("SINusoid", "SQUare")), _short_form("SQU", ("SINusoid", "SQUare"))
     ('SIN', 'SQU')
@@ -249,6 +249,6 @@ def _short_form(word: str, choices: tuple[str, ...]) -> str:
 
 
 def _strip_quotes(answer: str) -> str:
-    """A word without the quotes that some instruments put around it."""
+    """Return a word without the quotes that some instruments put around it."""
     quoted = re.fullmatch(r'"([^"]*)"', answer)
     return quoted[1] if quoted else answer

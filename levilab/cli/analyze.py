@@ -47,7 +47,7 @@ class AnalyzeGroup(typer.core.TyperGroup):
         return None
 
     def _is_misspelt(self, word: str) -> bool:
-        """Whether a word is similar to the name of an analysis, and no path."""
+        """Return whether a word is similar to the name of an analysis, and no path."""
         from difflib import get_close_matches  # not for every help
 
         return bool(get_close_matches(word, self.commands)) and not Path(word).exists()

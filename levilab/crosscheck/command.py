@@ -32,7 +32,7 @@ JSON, FIGURE = "crosscheck.json", "crosscheck.png"
 
 
 def check(names: Sequence[str], trials: int | None, seed: int) -> list[Checked]:
-    """The trials of some subjects, or of all where none is named.  Raises UsageError for a name that is unknown."""
+    """Make the trials of some subjects, or of all where none is named.  Raises UsageError for an unknown name."""
     for name in names:
         if name not in SUBJECTS:
             raise UsageError("subject", f"known are {', '.join(SUBJECTS)}", value=name)
@@ -48,7 +48,7 @@ def check(names: Sequence[str], trials: int | None, seed: int) -> list[Checked]:
 
 
 def check_like(names: Sequence[str], paths: Sequence[Path], trials: int | None) -> list[tuple[OwnCheck, Place]]:
-    """The trials with the parameters of results, and where each result lies; of analyses that are named, or of all.
+    """Make trials with the parameters of results, of the named analyses or of all, with its place.
 
     Raises UsageError for a name that is unknown, DataError for what cannot be analyzed.
     """
@@ -71,12 +71,12 @@ def check_like(names: Sequence[str], paths: Sequence[Path], trials: int | None) 
 
 
 def like_as_json(checked: Sequence[tuple[OwnCheck, Place]]) -> str:
-    """What was found, as a document."""
+    """Return the trials as a document."""
     return as_text([one for one, _ in checked])
 
 
 def print_like(checked: Sequence[tuple[OwnCheck, Place]]) -> None:
-    """The table of each result, and what it says."""
+    """Print the table of each result, and a sentence."""
     console = terminal()
     for one, _ in checked:
         shown = ANALYSES[one.analysis].symbols
@@ -96,12 +96,12 @@ def store_like(checked: Sequence[tuple[OwnCheck, Place]], out: Path | None) -> l
 
 
 def as_json(checked: Sequence[Checked]) -> str:
-    """What was found, as a document."""
+    """Return the trials as a document."""
     return json.dumps(as_document(checked), indent=2, allow_nan=False)
 
 
 def print_checked(checked: Sequence[Checked]) -> None:
-    """The table, and what came to no estimate."""
+    """Print the table, and the trials without an estimate."""
     console = terminal()
     console.print(draw(crosscheck_table(checked)))
     for text in failures_in_words(checked):

@@ -35,7 +35,7 @@ _FRAME = "DataFrame"
 
 
 def analyze_data(data: One | Sequence[One], kind: str | None, given: Mapping[str, Any]) -> AnalysisResult:
-    """The result of one analysis.
+    """Analyze data by one analysis.
 
     Args:
         data: a run, a path, a DataFrame, or several of them.
@@ -94,7 +94,7 @@ def _is_one(data: object) -> bool:
 
 
 def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
-    """Where the data lie; a DataFrame is written into the folder."""
+    """Return where the data lie; a DataFrame is written into the folder."""
     if isinstance(item, Run):
         return item.folder
     if isinstance(item, str | PathLike):
@@ -128,7 +128,7 @@ def _refuse_foreign(analysis: Analysis[Any], options: Mapping[str, Any]) -> None
 
 
 def _only_suiting(paths: Sequence[Path], options: Mapping[str, Any]) -> Suiting:
-    """The one analysis that suits what lies at all of the paths.
+    """Return the one analysis that suits the inputs at all of the paths.
 
     Raises:
         UsageError: there are several.
@@ -151,19 +151,19 @@ def _only_suiting(paths: Sequence[Path], options: Mapping[str, Any]) -> Suiting:
 
 
 def _in_rows(text: str, folder: Path, titles: int) -> str:
-    """A message about a DataFrame with rows in the place of a file's lines."""
+    """Return a message about a DataFrame with rows in the place of a file's lines."""
     return in_rows(text, folder, titles=titles) if _FRAME in text else text
 
 
 def _with_words(found: Any, in_words: Callable[[str], str]) -> Any:
-    """What was found, with the warnings about its inputs in other words."""
+    """Replace the warnings about inputs by the caller's words."""
     sources = [replace(source, warnings=tuple(map(in_words, source.warnings))) for source in found.sources]
     return replace(found, sources=tuple(sources), warnings=tuple(map(in_words, found.warnings)))
 
 
 @contextmanager
 def _errors(in_words: Callable[[str], str]) -> Iterator[None]:
-    """Errors as the caller reads them: the same error with another text."""
+    """Give errors the text that the caller reads."""
     try:
         yield
     except LevilabError as error:

@@ -39,11 +39,13 @@ class Origin(Generic[Opt]):
         text: for people.
         budget: what the uncertainties of the input's numbers are made of; None: to be worked out from what was found,
             empty: the result that was read holds none.
+        lacks_result: whether it was analyzed since no result of it was found.
     """
 
     options: Opt
     text: str = NOW
     budget: tuple[Budget, ...] | None = None
+    lacks_result: bool = False
 
 
 @dataclass(frozen=True)
@@ -88,15 +90,15 @@ class Analyzed(Generic[S, R, T, Opt]):
         return (self.sources,)
 
     def inputs_of(self, group: int | None) -> Sequence[Source[S]]:
-        """Inputs of a group, by the number that values and budgets of all together have; None: all inputs."""
+        """Return the inputs of a group, by its number in values and budgets of all together; None: all inputs."""
         return self.sources
 
     def about_all(self) -> Iterable[str]:
-        """What to know of all inputs together before using the numbers."""
+        """Return what to know of all inputs together before using the numbers."""
         return ()
 
     def about_run(self, run: R) -> Iterable[str]:
-        """What to know of one input."""
+        """Return what to know of one input."""
         raise NotImplementedError
 
     @property
@@ -130,7 +132,7 @@ A = TypeVar("A", bound=Analyzed[Any, Any, Any, Any])
 
 
 def _with_name(source: Source[Any], text: str) -> str:
-    """The text with the input's name before it, unless it begins with that or with its path."""
+    """Put the name of the input before a text, unless it begins with the name or the path."""
     return text if source.path.name in text.partition(": ")[0] else f"{source.name}: {text}"
 
 
@@ -167,12 +169,12 @@ class Method(Generic[S, R, Opt, A]):
     budget_of_all: Callable[[A], tuple[Budget, ...]] = lambda _: ()
 
     def analyze(self, paths: Sequence[Path], options: Opt) -> A:
-        """What is found of the inputs at the paths.  Raises DataError for what cannot be used; it names the file."""
+        """Analyze the inputs at the paths.  Raises DataError for what cannot be used; it names the file."""
         paths = [find_run(path) for path in paths]
         return self.analyze_found(paths, collect(paths, self.needs, lambda _: options), options)
 
     def analyze_found(self, paths: Sequence[Path], found: Found[S], options: Opt) -> A:
-        """The same of what was found at the paths already."""
+        """Do the same for inputs that were found already."""
         return self.gather(
             paths, found, options, lambda source: (source, self.fit(source, options), Origin(options, NOW))
         )
@@ -187,7 +189,7 @@ class Method(Generic[S, R, Opt, A]):
         *,
         budget: tuple[Budget, ...] = (),
     ) -> A:
-        """All inputs, each by itself and together.  Raises DataError.
+        """Return what is found of all inputs, each by itself and together.  Raises DataError.
 
         Args:
             paths: run folders, data files, folders that were searched.
@@ -227,7 +229,7 @@ class Method(Generic[S, R, Opt, A]):
     def _each(
         self, sources: Sequence[Source[S]], one: Callable[[Source[S]], tuple[Source[S], R, Origin[Opt]]]
     ) -> tuple[list[tuple[Source[S], R, Origin[Opt]]], list[str]]:
-        """What is found of each input, and warnings about those that are skipped."""
+        """Return what is found of each input, and warnings about those that are skipped."""
         if not self.skips or len(sources) == 1:
             return [one(source) for source in sources], []
         done: list[tuple[Source[S], R, Origin[Opt]]] = []
@@ -242,7 +244,7 @@ class Method(Generic[S, R, Opt, A]):
         return done, [str(Skipped(str(error))) for error in errors]
 
     def about_inputs(self, sources: Sequence[Source[S]], options: Opt) -> Iterable[str]:
-        """What to know of the inputs before using the numbers."""
+        """Return what to know of the inputs before using the numbers."""
         synthetic = sum(source.synthetic for source in sources)
         if self.mixed and 0 < synthetic < len(sources):
             yield f"{synthetic} of {len(sources)} inputs are SYNTHETIC, the others are not known to be: {self.mixed}"

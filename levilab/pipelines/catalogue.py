@@ -92,35 +92,35 @@ class Analysis(Generic[A]):
         return self.needs.analysis
 
     def options_from(self, given: Mapping[str, Any]) -> InputOptions:
-        """Its options, out of those that were given, some of which belong to other analyses."""
+        """Choose its options out of those that were given, some of which belong to other analyses."""
         kind = self.result.method.options
         own = {field.name for field in fields(kind)}
         return kind(**{name: value for name, value in given.items() if name in own})  # type: ignore[no-any-return]
 
     def analyze(self, paths: Sequence[Path], options: InputOptions) -> A:
-        """What lies at the paths.  Raises DataError."""
+        """Analyze the inputs at the paths.  Raises DataError."""
         return self.result.method.analyze(paths, options)
 
     def recall(self, paths: Sequence[Path], options: InputOptions) -> A:
-        """The same, from result.json where it holds.  Raises DataError."""
+        """Read the same from result.json where that holds.  Raises DataError."""
         return self.result.recall(paths, options)
 
     def document(self, found: A, folder: Path) -> dict[str, Any]:
-        """The content of result.json for a folder."""
+        """Return the content of result.json for a folder."""
         content: dict[str, Any] = self.result.of(found, Place(folder)).as_dict()
         return content
 
     def settings_of(self, found: A) -> dict[str, Any]:
-        """How it was analyzed, as result.json has it."""
+        """Return the options of an analysis as result.json has them."""
         settings: dict[str, Any] = self.result.settings(found.options).model_dump(mode="json", by_alias=True)
         return settings
 
     def budgets(self, found: A) -> tuple[Block, ...]:
-        """What the uncertainties of its numbers are made of, as blocks of a document."""
+        """Return the budgets of its uncertainties, as blocks of a document."""
         return budgets_of_result(found, self.symbols)
 
     def figure(self, found: A) -> Figure:
-        """The figure."""
+        """Draw the figure."""
         # with matplotlib
         from levilab.pipelines.field.figure import field_figure
         from levilab.pipelines.limit.figure import limit_figure
@@ -138,7 +138,7 @@ class Analysis(Generic[A]):
         return figures[self.name](found)
 
     def png(self, found: A) -> bytes:
-        """The figure."""
+        """Draw the figure, as PNG."""
         from levilab.present.style import as_png  # with matplotlib
 
         return as_png(self.figure(found))
@@ -164,7 +164,7 @@ ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 def print_analysis(
     analysis: Analysis[A], found: A, in_words: Callable[[str], str] = unquoted, console: Console | None = None
 ) -> None:
-    """The tables, what the data say, and the warnings.
+    """Print the tables, what the data say, and the warnings.
 
     Args:
         analysis: the row of the catalogue.

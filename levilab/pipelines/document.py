@@ -38,19 +38,17 @@ class Settings(Part):
 
     @classmethod
     def of(cls, options: InputOptions, **more: Any) -> Self:
-        """From options, but for those in `more`."""
+        """Make the settings from options; those in `more` go before."""
         return cls.model_validate(
             {name: getattr(options, name) for name in cls.model_fields if name not in more} | more
         )
 
     def arguments(self) -> dict[str, Any]:
-        """The options by their names."""
+        """Return the options by their names."""
         return {name: getattr(self, name) for name in type(self).model_fields}
 
 
 D = TypeVar("D", bound=Result)
-#: Why an input was analyzed for a page.
-NO_RESULT = "there was no result yet"
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,7 @@ class Document(Generic[S, R, Opt, A, D]):
     # --- writing ---
 
     def of(self, found: A, place: Place) -> D:
-        """The result for a place: paths in it are relative to that."""
+        """Return the result for a place: paths in it are relative to the place."""
         document = {
             "schema": SCHEMA,
             "analysis": self.method.needs.analysis,
@@ -105,18 +103,18 @@ class Document(Generic[S, R, Opt, A, D]):
         return self.result.model_validate(finite(document | _budget(found.budget) | self.entries(found)))
 
     def settings(self, options: Opt) -> Settings:
-        """The options as they stand in the file."""
+        """Return the options as they stand in the file."""
         kind: type[Settings] = self.result.model_fields["settings"].annotation  # type: ignore[assignment]
         return kind.of(options)
 
     # --- reading ---
 
     def archive(self, paths: Sequence[Path], results: Sequence[Path] = ()) -> Archive[D]:
-        """The results that were written before of inputs at the paths; results: files that lie elsewhere."""
+        """Return the results that were written before of inputs at the paths; results: files that lie elsewhere."""
         return Archive(paths, self.result, results)
 
     def reading(self, archive: Archive[D], options: Opt) -> Callable[[Path], Opt]:
-        """How an input is read: with the given options, else those of its earlier result."""
+        """Return how an input is read: with the given options, else those of its earlier result."""
         given = _given(options)
 
         def reading(path: Path) -> Opt:
@@ -126,7 +124,7 @@ class Document(Generic[S, R, Opt, A, D]):
         return reading
 
     def recall(self, paths: Sequence[Path], options: Opt) -> A:
-        """What `analyze` found, from its result.json; analyzed again is only what has none that holds.
+        """Read what `analyze` found from result.json; inputs without a result that holds are analyzed.
 
         A result holds as long as the readings are the same bytes, and it was made with the given options.  Those at
         their defaults are not given.
@@ -139,7 +137,7 @@ class Document(Generic[S, R, Opt, A, D]):
         return self.recall_found(paths, found, archive, options)
 
     def recall_found(self, paths: Sequence[Path], found: Found[S], archive: Archive[D], options: Opt) -> A:
-        """The same of what was found at the paths already."""
+        """Do the same for inputs that were found already."""
         given = _given(options)
         whole = archive.whole(found.sources)
         if whole and not any(self._problem(whole.of(source), given, source) for source in found.sources):
@@ -148,11 +146,11 @@ class Document(Generic[S, R, Opt, A, D]):
                 paths,
                 found,
                 options,
-                lambda source: self._of_result(source, whole.of(source)),
+                lambda source: self._read_one(source, whole.of(source)),
                 lambda _: self.renumber(whole.result.combined, numbers),
                 budget=whole.result.budget,
             )
-        return self.method.gather(paths, found, options, lambda source: self._recalled(source, archive, given))
+        return self.method.gather(paths, found, options, lambda source: self._recall_one(source, archive, given))
 
     def _options(self, earlier: Earlier[D]) -> Opt:
         settings: Settings = earlier.result.settings
@@ -168,25 +166,26 @@ class Document(Generic[S, R, Opt, A, D]):
         return self.outdated(earlier.part.result)
 
     def _own(self, given: Mapping[str, Any], source: Source[S]) -> dict[str, Any]:
-        """Those of the given options that matter to an input."""
+        """Return those of the given options that matter to an input."""
         left_out = self.method.of_files if source.run else frozenset[str]()
         return {name: value for name, value in given.items() if name not in left_out}
 
-    def _recalled(
+    def _recall_one(
         self, source: Source[S], archive: Archive[D], given: Mapping[str, Any]
     ) -> tuple[Source[S], R, Origin[Opt]]:
-        """One input: what was found of it, or its analysis."""
+        """Read the result of one input, or analyze it."""
         earlier, own = archive.earlier(source.path, source.data, source.sha256), self._own(given, source)
         if earlier is None:
-            options, why = self.method.options(**own), NO_RESULT
+            options, why = self.method.options(**own), "there was no result yet"
         elif why := self._problem(earlier, given, source):
             options = replace(self._options(earlier), **own)
         else:
-            return self._of_result(source, earlier)
-        return source, self.method.fit(source, options), Origin(options, f"{FOR_THIS_PAGE}: {why}")
+            return self._read_one(source, earlier)
+        origin = Origin(options, f"{FOR_THIS_PAGE}: {why}", lacks_result=earlier is None)
+        return source, self.method.fit(source, options), origin
 
-    def _of_result(self, source: Source[S], earlier: Earlier[D]) -> tuple[Source[S], R, Origin[Opt]]:
-        """One input as it was found.  Raises DataError."""
+    def _read_one(self, source: Source[S], earlier: Earlier[D]) -> tuple[Source[S], R, Origin[Opt]]:
+        """Read the result of one input.  Raises DataError."""
         part = earlier.part
         try:
             self.check(part.result)
@@ -201,7 +200,7 @@ def _given(options: Any) -> dict[str, Any]:
 
 
 def _budget(budgets: Sequence[Budget]) -> dict[str, Any]:
-    """The entry of budgets, where there are any."""
+    """Return the entry of budgets; empty where there are none."""
     return {"budget": tuple(budgets)} if budgets else {}
 
 
@@ -218,16 +217,16 @@ def statistics_of(statistics: Any) -> dict[str, Any]:
 
 
 def values_of(estimates: Mapping[str, Estimate]) -> dict[str, dict[str, Any]]:
-    """Quantities as a result has them, by their names."""
+    """Return quantities as a result has them, by their names."""
     return {name: value_of(estimate) for name, estimate in estimates.items()}
 
 
 def value_of(estimate: Estimate) -> dict[str, Any]:
-    """A quantity as a result has it."""
+    """Return a quantity as a result has it."""
     value = number(estimate.value, estimate.unit, estimate.u)
     return value | ({"interval_68": list(estimate.interval)} if estimate.interval else {})
 
 
 def number(value: float | None, unit: str, u: float | None = None) -> dict[str, Any]:
-    """A quantity as a result has it, most often one without an uncertainty."""
+    """Return a quantity as a result has it, most often one without an uncertainty."""
     return {"value": value, "u": u, "unit": unit}

@@ -137,12 +137,12 @@ class Result(Part):
         return self
 
     def as_dict(self) -> dict[str, Any]:
-        """As it stands in the file."""
+        """Return the result as it stands in the file."""
         return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
 
 
 def relative(path: Path, folder: Path) -> str:
-    """With forward slashes on every system; whole where there is no way (another drive)."""
+    """Return a path from a folder, with forward slashes; the whole path where there is no way (another drive)."""
     try:
         return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
     except ValueError:
@@ -163,15 +163,15 @@ class Place:
     name: str = ""
 
     def result(self, analysis: str = "") -> Path:
-        """The file of the result: of the analysis that is first here, or of another one by its name."""
+        """Return the file of the result: of the analysis that is first here, or of another one by its name."""
         return self._file(f"result.{analysis}.json" if analysis else RESULT)
 
     def results(self, analysis: str) -> tuple[Path, Path]:
-        """The files that may hold the result of an analysis."""
+        """Return the files that may hold the result of an analysis."""
         return self.result(), self.result(analysis)
 
     def figure(self, analysis: str) -> Path:
-        """The file of the figure."""
+        """Return the file of the figure."""
         return self._file(f"{analysis}.png")
 
     def _file(self, name: str) -> Path:
@@ -179,17 +179,17 @@ class Place:
 
 
 def beside(path: Path) -> Place:
-    """The place of a run folder's result, or of a data file's: its whole name, which no other file beside it has."""
+    """Return the place of the result of a run folder, or of a data file: by its whole name, which is its alone."""
     return Place(path) if path.is_dir() else Place(path.parent, path.name)
 
 
 def place_of(paths: Sequence[Path], sources: Sequence[Source[Any]]) -> Place:
-    """Beside the run or the file; of several see `_together`."""
+    """Return the place of the result of inputs: beside a single one; of several see `_together`."""
     return beside(sources[0].path) if len(sources) == 1 else _together(paths)
 
 
 def _together(paths: Sequence[Path]) -> Place:
-    """Of several inputs: the folder that was searched for them, else the present one, or above it if that is a run."""
+    """Return the folder that was searched for several inputs, else the present one, or the one above a present run."""
     if len(paths) == 1:
         return Place(paths[0])
     return Place(Path("..") if Path(RECORD).exists() else Path())
@@ -231,7 +231,7 @@ class NoResult(ResultError):
 
 
 def read_result(path: Path, model: type[R]) -> R | None:
-    """A result that was written before; None where there is none, or one of another analysis.
+    """Read a result that was written before; None where there is none, or one of another analysis.
 
     Raises ResultError when it is damaged or of another schema.
     """
@@ -247,7 +247,7 @@ def read_result(path: Path, model: type[R]) -> R | None:
 
 
 def is_of_another(path: Path, analysis: str) -> bool:
-    """Whether a file holds the result of another analysis than this."""
+    """Return whether a file holds the result of another analysis than this."""
     try:
         return path.is_file() and _read(path).get("analysis") != analysis
     except ResultError:
@@ -255,7 +255,7 @@ def is_of_another(path: Path, analysis: str) -> bool:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """A result as it stands in the file.  Raises NoResult for another program's file, else ResultError."""
+    """Read a result as it stands in the file.  Raises NoResult for another program's file, else ResultError."""
     try:
         data = parse_json(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -284,7 +284,7 @@ class Written:
 
 
 def read_inputs(path: Path) -> Written:
-    """Of what a result is.
+    """Read of which inputs a result is.
 
     Raises NoResult for another program's file, ResultError for damage or an input that is gone.
     """
@@ -312,7 +312,7 @@ class _Head(Part):
 
 
 def results_in(folder: Path) -> list[Written]:
-    """The results that lie in a folder, by name; files of other programs are passed over.  Raises ResultError."""
+    """Read the results that lie in a folder, by name; files of other programs are skipped.  Raises ResultError."""
     found = []
     for file in sorted(folder.glob("*.json")):
         if "result" in file.name.split("."):
@@ -352,7 +352,7 @@ class Earlier(Generic[R]):
         return f"as levilab analyze found it{by}: {self.file}"
 
     def of(self, source: Source[Any]) -> Earlier[R]:
-        """The same of another input of the result."""
+        """Return the same of another input of the result."""
         number = next(k for k, given in enumerate(self.result.inputs) if given.sha256 == source.sha256)
         return replace(self, number=number)
 
@@ -381,7 +381,7 @@ class Archive(Generic[R]):
                 self._read.setdefault(file, None)
 
     def whole(self, sources: Sequence[Source[Any]]) -> Earlier[R] | None:
-        """The result of just these inputs, unchanged."""
+        """Return the result of just these inputs, unchanged."""
         files = beside(sources[0].path).results(self._analysis) if len(sources) == 1 else self._together
         wanted = sorted(source.sha256 for source in sources)
         for file in (*self._named, *files):
@@ -391,7 +391,7 @@ class Archive(Generic[R]):
         return None
 
     def earlier(self, path: Path, data: Path, sha256: str | None = None) -> Earlier[R] | None:
-        """What was found of an input: of the same bytes if there is such a result, else of the same path.
+        """Return the result of an input: of the same bytes if there is such a result, else of the same path.
 
         Args:
             path: the run folder or the data file.
@@ -410,7 +410,7 @@ class Archive(Generic[R]):
         return None
 
     def _files(self, path: Path) -> list[Path]:
-        """Where an input's result may lie."""
+        """Return where the result of an input may lie."""
         own = [*self._named, *self._together, *beside(path).results(self._analysis)]
         above = Place(path.parent).results(self._analysis)
         for file in above:
@@ -419,7 +419,7 @@ class Archive(Generic[R]):
         return [*own, *above]
 
     def _numbers(self, file: Path) -> dict[str | Path, int]:
-        """The inputs of a result by their hash and by their path."""
+        """Return the inputs of a result by their hash and by their path."""
         if file not in self._known:
             result = self._result(file)
             inputs = result.inputs if result else ()
@@ -433,7 +433,7 @@ class Archive(Generic[R]):
         return self._read[file]
 
     def _result_above(self, file: Path) -> R | None:
-        """A file of that name above a run, or beside a data file, may as well be another program's."""
+        """Read a result above a run, or beside a data file; None where it is another program's file."""
         try:
             return self._result(file)
         except ResultError:

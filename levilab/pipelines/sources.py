@@ -40,7 +40,7 @@ class Readings(Protocol):
     def __len__(self) -> int: ...
 
     def same_as(self, other: Self) -> bool:
-        """Whether these are the same readings, written in another way perhaps."""
+        """Return whether these are the same readings, written in another way perhaps."""
 
 
 R = TypeVar("R", bound=Readings)
@@ -76,7 +76,7 @@ class Needs(Generic[R]):
         return self.wanted or f"{' or '.join(sorted(self.experiments))} run"
 
     def take(self, run: Run) -> bool:
-        """Whether a run suits."""
+        """Return whether a run suits."""
         return run.record.experiment in self.experiments or bool(self.also and self.also(run))
 
 
@@ -118,7 +118,7 @@ class Source(Generic[R]):
 
 
 def mark_of(sources: Sequence[Source[Any]]) -> str:
-    """What a table says before its caption of inputs that its numbers are made of; empty where none is synthetic."""
+    """Return the mark of a table with numbers of these inputs; empty where none is synthetic."""
     made_up = [source.name for source in sources if source.synthetic]
     if not made_up:
         return ""
@@ -171,7 +171,7 @@ class Found(Generic[R]):
 
 
 def collect(paths: Sequence[Path], needs: Needs[R], options: Callable[[Path], InputOptions]) -> Found[R]:
-    """What lies at the paths that suits an analysis, the same data once, and what was skipped.
+    """Find the inputs at the paths that suit an analysis, the same data once.
 
     A run folder or a file is taken, or refused with a reason; a folder is searched for runs and data files, and what
     does not suit there is skipped.  Raises DataError.
@@ -185,14 +185,14 @@ def collect(paths: Sequence[Path], needs: Needs[R], options: Callable[[Path], In
 
 
 def find(path: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) -> Found[R]:
-    """What lies at one path; see `collect`."""
+    """Find the inputs at one path; see `collect`."""
     if path.is_dir() and not (path / RECORD).exists():
         return _search(path, needs, options)
     return Found((_one(path, needs, options(path)),))
 
 
 def join(found: Sequence[Found[R]]) -> Found[R]:
-    """What lies at several paths together, the same data once, with short names."""
+    """Join what was found at several paths, the same data once, with short names."""
     warnings = [text for one in found for text in one.warnings]
     sources = _without_copies([source for one in found for source in one.sources], warnings)
     remarks = tuple(remark for one in found for remark in one.remarks)
@@ -204,7 +204,7 @@ _CELL = 1e-8
 
 
 def _without_copies(found: Sequence[Source[R]], warnings: list[str]) -> list[Source[R]]:
-    """Copies of the same readings are no runs of their own: they would pass for agreement."""
+    """Leave out copies of the same readings: they would pass for agreement."""
     kept: list[Source[R]] = []
     cells: dict[tuple[int, int], list[Source[R]]] = {}  # of thousands not each is compared with each
     for source in found:
@@ -221,7 +221,7 @@ def _without_copies(found: Sequence[Source[R]], warnings: list[str]) -> list[Sou
 
 
 def _with_short_names(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
-    """Names that differ: the last part of the path, or as many more as it takes."""
+    """Give the sources names that differ: the last part of the path, or more of it."""
     for parts in range(1, 10):
         names = ["/".join(source.path.resolve().parts[-parts:]) for source in sources]
         if max(Counter(names).values(), default=1) == 1:
@@ -230,7 +230,7 @@ def _with_short_names(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
 
 
 def no_such_path(path: Path) -> DataError:
-    """What to say of a path that does not exist: a name beside it that is nearly the same, or where it was sought."""
+    """Return the error for a path that does not exist, with a name beside it that is nearly the same."""
     folder = next(place for place in (path.parent, *path.parent.parents) if place.is_dir())
     wanted = path.relative_to(folder).parts[0] if folder != path.parent else path.name
     near = difflib.get_close_matches(wanted, sorted(one.name for one in folder.iterdir()), n=1, cutoff=0.8)
@@ -271,7 +271,7 @@ def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
 
 
 def sha256_of(path: Path) -> str:
-    """The hash of a file.  Raises DataError."""
+    """Return the hash of a file.  Raises DataError."""
     if path.exists() and not path.is_file():  # reading from a pipe would wait for ever
         raise DataError(f"{path}: is a folder, a pipe or a device; a file is expected")
     try:
@@ -282,7 +282,7 @@ def sha256_of(path: Path) -> str:
 
 
 def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) -> Found[R]:
-    """The runs and data files below a folder that suit; what is broken or too short is skipped with a warning."""
+    """Find the runs and data files below a folder that suit; a broken or too short one is skipped with a warning."""
     found: list[Source[R]] = []
     broken: list[Skipped] = []
     remarks: list[Remark] = []
@@ -325,7 +325,7 @@ def _skipping(broken: list[Skipped], remarks: list[Remark]) -> Iterator[None]:
 
 
 def data_files(root: Path) -> list[Path]:
-    """The files at or below a folder that may hold data, by name; those of runs belong to their runs."""
+    """Find the files at or below a folder that may hold data, by name; those of runs belong to their runs."""
     found, seen = [], set()
     for folder, below, files in os.walk(root, followlinks=True):
         real = os.path.realpath(folder)

@@ -48,7 +48,7 @@ class Suiting:
 
 
 def suiting(paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None = None) -> list[Suiting]:
-    """The analyses that suit what lies at the paths, in the order of the catalogue.
+    """Return the analyses that suit the inputs at the paths, in the order of the catalogue.
 
     Args:
         paths: run folders, data files, folders to search.
@@ -70,7 +70,7 @@ def suiting(paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None =
 def analyze_suiting(
     paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None = None
 ) -> list[tuple[Analysis[Any], Any]]:
-    """Each analysis that suits what lies at the paths, with what it found; see `suiting`."""
+    """Analyze the inputs at the paths by each analysis that suits; see `suiting`."""
     return [
         (one.analysis, one.analysis.result.method.analyze_found(one.paths, one.found, one.analysis.options_from(given)))
         for one in suiting(paths, given, tell)
@@ -80,7 +80,7 @@ def analyze_suiting(
 def recall_suiting(
     paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None = None
 ) -> list[tuple[Analysis[Any], Any]]:
-    """Each analysis that has a result of what lies at the paths, as it was found; in the order of the catalogue.
+    """Read the results of the inputs at the paths, of each analysis that has one; in the order of the catalogue.
 
     An input that has no result is analyzed by those that suit it.  Raises DataError: no analysis suits a path, or
     damage.
@@ -118,7 +118,7 @@ def recall_suiting(
 
 
 def _split(paths: Sequence[Path]) -> tuple[list[Path], list[Written]]:
-    """What is to be read or searched, and the results that were named by their own paths.  Raises DataError."""
+    """Return the paths to read or search, and the results that were named by their own paths.  Raises DataError."""
     places: list[Path] = []
     written: list[Written] = []
     for path in map(find_run, paths):
@@ -155,7 +155,7 @@ def _suiting(
     tell: Tell | None,
     more: Mapping[str, Sequence[Path]] | None = None,
 ) -> list[Suiting]:
-    """The analyses with what they take.
+    """Return the analyses with the inputs that they take.
 
     Args:
         paths: run folders, data files, folders to search.
@@ -255,7 +255,7 @@ def _usable_runs(root: Path) -> list[Run]:
 
 
 def remarks(of_each: Sequence[Sequence[Remark]]) -> list[Remark]:
-    """What several analyses remark, each once; runs that one of them skipped count only if all did."""
+    """Join the remarks of several analyses; runs that were skipped count only if all of them did."""
     said = list(dict.fromkeys(remark for those in of_each for remark in those))
     return [one for one in said if not isinstance(one, SkippedRuns) or all(one in those for those in of_each)]
 

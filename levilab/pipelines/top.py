@@ -46,7 +46,7 @@ class Calculated:
 
 
 def calculate_top(path: Path) -> Calculated:
-    """Return the top that a device file describes by its parts.  Raises DataError."""
+    """Calculate the top that a device file describes by its parts.  Raises DataError."""
     parts = tuple(parts_of(read_device(path).top))
     if not parts:
         raise DataError(
@@ -59,7 +59,7 @@ def calculate_top(path: Path) -> Calculated:
 
 
 def top_table(found: Calculated) -> Table:
-    """Return the parts, each about the centre of mass of itself, and the whole."""
+    """Return a table of the parts, each about its own centre of mass, and of the whole."""
     rows = [Row((part.name, *_cells(alone))) for part, alone in zip(found.parts, found.alone, strict=True)]
     rows.append(Row(("the top", *_cells(found.top)), "together"))
     heads = ("part", "mass", "I₁, across", "I₃, about the axis", "centre")

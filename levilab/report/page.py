@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DoesNotSuit, NoneUsable, UsageError
 from levilab.files import check_writable, replace_atomically, writing
-from levilab.pipelines.document import NO_RESULT
 from levilab.pipelines.sources import SkippedRuns, data_files
 from levilab.pipelines.suits import recall_suiting, remarks
 from levilab.present.clock import local
@@ -184,7 +183,7 @@ def _without_result(results: Results) -> Iterator[str]:
         source.name: None
         for _, found in results
         for source, origin in zip(found.sources, found.origins, strict=True)
-        if origin.text.endswith(NO_RESULT)
+        if origin.lacks_result
     }
     if lacking:
         yield (

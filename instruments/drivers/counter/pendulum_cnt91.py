@@ -102,7 +102,7 @@ class PendulumCNT91(ReciprocalCounter):
         return self._block(count, columns=2)
 
     def _block(self, count: int, *, columns: int) -> NDArray[np.float64]:
-        """A measurement of so many readings, fetched when it is complete."""
+        """Measure this many readings, and fetch them when the measurement is complete."""
         self._check_count(count)
         found: list[float] = []
         begin, end = (("FORM:TINF ON",), ("FORM:TINF OFF",)) if columns == 2 else ((), ())

@@ -69,7 +69,7 @@ class ReciprocalCounter(ScpiInstrument):
             return None if answer is None else self._reading("READ?", answer)
 
     def _reading(self, question: str, answer: str) -> float | None:
-        """A frequency or a time, or None.  Raises BadAnswer: neither is negative."""
+        """Return a frequency or a time, or None.  Raises BadAnswer: neither is negative."""
         if not answer and self.EMPTY_IS_NONE:
             return None
         value = parse_reading(self.transport.address, question, answer, self.NUMBER)
@@ -136,7 +136,7 @@ class ReciprocalCounter(ScpiInstrument):
             raise OutOfRange(self.transport.address, "count", count, f"1 to {self.MOST}")
 
     def _split(self, question: str, answer: str, expected: int) -> list[float]:
-        """The numbers of a list, NaN where there was no reading.  Raises BadAnswer if they are not so many."""
+        """Return the numbers of a list, NaN where there was no reading.  Raises BadAnswer if they are not so many."""
         words = answer.split(",")
         if len(words) != expected:
             raise BadAnswer(self.transport.address, question, answer, f"{expected} numbers, not {len(words)}")

@@ -60,7 +60,7 @@ class OutputSwitch(Setting[bool]):
 
 
 def frequency_setting(high: float, digits: int) -> LimitedSetting:
-    """The frequency of the output, in steps of 1 µHz, up to the highest of the family [Hz], which prints the digits."""
+    """Return the frequency, in steps of 1 µHz, up to the highest of the family [Hz], which prints the digits."""
     return LimitedSetting(
         "FREQ", float, "Hz", low=1e-6, high=high, resolution=1e-6, digits=digits, quantity="frequency_hz"
     )
@@ -81,7 +81,7 @@ def amplitude_setting(low: float) -> LimitedSetting:
 
 
 def offset_setting(digits: int) -> LimitedSetting:
-    """The offset of the output, with four digits of 10 V, of the digits that the family prints [V]."""
+    """Return the offset, with four digits of 10 V, of the digits that the family prints [V]."""
     low, high = -OPEN_V, OPEN_V
     return LimitedSetting(
         *("VOLT:OFFS", float, "V", low, high),
@@ -125,7 +125,7 @@ class DriveGenerator(ScpiInstrument):
         self.prepared_here = False
 
     def __exit__(self, *_error: object) -> None:
-        """Outputs off, then closed.  Raises CommandRefused if one is still on."""
+        """Switch the outputs off and close the link.  Raises CommandRefused if one is still on."""
         try:
             self.off()
         finally:
@@ -158,7 +158,7 @@ class DriveGenerator(ScpiInstrument):
         self.command("VOLT:UNIT VPP")
 
     def _level(self, amplitude_vpp: float, offset_v: float) -> None:
-        """The offset that was there leaves no room for the amplitude, nor the amplitude after a reset for much."""
+        """Set amplitude and offset: first an offset of 0, for any other leaves the amplitude less room."""
         self.offset = 0.0
         self.amplitude = amplitude_vpp
         if offset_v:

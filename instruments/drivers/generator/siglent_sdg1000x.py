@@ -101,7 +101,7 @@ class SiglentSDG1000X(DriveGenerator):
     output = OutputSwitch("C1:OUTP", bool)
 
     def field_of(self, answer: str, header: str, key: str) -> str:
-        """The value behind its name; that of an output, which has none, is the first field."""
+        """Return the value behind its name; that of an output, which has none, is the first field."""
         head, _, rest = answer.partition(" ")
         fields = rest.split(",")
         if head != header:

@@ -78,7 +78,7 @@ class KeysightDSOX(Scope):
     _points = 1000
 
     def _times(self, setup: Setup) -> dict[str, Value]:
-        """The record is as long as was asked for."""
+        """Return the settings of a record that is as long as was asked for."""
         address = self.transport.address
         if not 50e-9 <= setup.duration_s <= 500:
             raise OutOfRange(address, "duration_s", setup.duration_s, "50e-9 to 500 s")

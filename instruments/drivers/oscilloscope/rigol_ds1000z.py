@@ -113,7 +113,7 @@ class RigolDS1000Z(Scope):
         return {"time_scale": scale, "time_offset": 0.0, "acquisition_type": "NORM", "memory_depth": str(depth)}
 
     def _time_scale(self, duration: float) -> float:
-        """The least time per division with which twelve of them are as long."""
+        """Return the least time per division with which twelve of them are as long."""
         scales = (float(f"{m}e{k}") for k in range(-9, 2) for m in (1, 2, 5))
         found = next((s for s in scales if s >= 5e-9 and 12 * s >= duration * (1 - 1e-9)), None)
         if found is None or duration <= 0:

@@ -35,12 +35,14 @@ class Answer(NamedTuple):
         data: its bytes.
         ready: when they are ready [s].
         epoch: of the measurement that they come from; the device counts it up when it drops a measurement.
+        begun: when the device began with the message [s].
         complete: whether the end of the answer is among the bytes.
     """
 
     data: bytes
     ready: float
     epoch: int
+    begun: float
     complete: bool = True
 
 
@@ -128,7 +130,8 @@ class VirtualInstrument:
         self.settings: dict[str, Value] = dict(self.commands.defaults)
         self.status = Status()
         self.epoch = 0
-        self._ready = 0.0
+        #: When it begins with the message that came last, and when it is done with that [s].
+        self.begun = self._ready = 0.0
         #: On the message that came last, if it is worked on in slices: it may not be done yet.
         self.work: Work[None] | None = None
         self.parser = Parser(
@@ -147,7 +150,8 @@ class VirtualInstrument:
 
     def steps(self, message: str) -> Steps[Answer | None]:
         """As execute(), in steps."""
-        self._ready = max(self._ready, self.clock.now()) + self.pace
+        self.begun = max(self._ready, self.clock.now())
+        self._ready = self.begun + self.pace
         return self._answer((yield from self.parser.steps(message)))
 
     def is_abort(self, message: str) -> bool:
@@ -159,12 +163,12 @@ class VirtualInstrument:
         yield from ()
 
     def begin_next(self) -> None:
-        """Called before each further command or query of a message; by default it takes no time of its own."""
+        """Begin a further command or query of a message; by default it takes no time of its own."""
 
     def _answer(self, text: str | None) -> Answer | None:
         if text is None:
             return None
-        return Answer((text + self.line_end).encode("latin-1"), self._ready, self.epoch)
+        return Answer((text + self.line_end).encode("latin-1"), self._ready, self.epoch, self.begun)
 
     def abandon(self) -> None:
         """Cancel the work under way, and drop the answers that were not read."""
@@ -172,6 +176,14 @@ class VirtualInstrument:
             self.work.cancel()
         self.epoch += 1
         self._ready = self.clock.now()
+
+    def end_since(self, begun: float) -> None:
+        """End what messages since this time have asked for, as their program has left; other programs' answers stay.
+
+        Args:
+            begun: when the device began with the first of them [s].
+        """
+        self._ready = max(begun, self.clock.now())
 
     def busy_until(self, instant: float) -> None:
         """Let the answer to the message under way be ready at this time [s], not before."""
@@ -183,27 +195,27 @@ class VirtualInstrument:
     # --- what the rows need ---
 
     def value(self, name: str) -> float:
-        """A setting that is a number."""
+        """Return a setting that is a number."""
         return float(self.settings[name])
 
     def read_boolean(self, text: str) -> bool:
-        """The value of a switch, from its text on the wire.  Raises ScpiError."""
+        """Return the value of a switch, from its text on the wire.  Raises ScpiError."""
         return boolean(text)
 
     def spell(self, value: float) -> str:
-        """A number as this instrument prints it."""
+        """Return a number as this instrument prints it."""
         return nr3(value)
 
     def reply(self, header: str, text: str, unit: str = "") -> str:
-        """An answer to the query of a row: the text alone."""
+        """Return an answer to the query of a row: the text alone."""
         return text
 
     def on_number_change(self, name: str, before: float) -> None:
-        """Called after a setting has changed.  before: its former value, 0 where that was no number."""
+        """React to a setting that has changed.  before: its former value, 0 where that was no number."""
         self.on_change(name)
 
     def on_change(self, name: str) -> None:
-        """Called after a setting has changed."""
+        """React to a setting that has changed."""
 
     @contextlib.contextmanager
     def all_or_none(self) -> Iterator[None]:
@@ -224,7 +236,7 @@ class VirtualInstrument:
     # --- status ---
 
     def status_byte(self, *, message_available: bool = False) -> int:
-        """The status byte (IEEE 488.2, 11.2)."""
+        """Return the status byte (IEEE 488.2, 11.2)."""
         return self.status.byte(errors_waiting=bool(self.parser.errors), message_available=message_available)
 
     def clear_status(self) -> None:

@@ -120,7 +120,7 @@ class VirtualCounter(VirtualInstrument):
         self._ready += self.pace
 
     def status_byte(self, *, message_available: bool = False) -> int:
-        """The status byte; see the base."""
+        """Return the status byte; see the base."""
         run_to_end(self.catch_up())
         return super().status_byte(message_available=message_available)
 
@@ -128,6 +128,12 @@ class VirtualCounter(VirtualInstrument):
         """ABORt, and device clear: end the measurement, and keep its readings so far."""
         super().abandon()
         self._stop()
+
+    def end_since(self, begun: float) -> None:
+        """See the base: end a measurement that began since then."""
+        super().end_since(begun)
+        if self._run and self._run.begin >= begun:
+            self._stop()
 
     def reset(self) -> None:
         """*RST: go idle, with an empty memory."""
@@ -194,7 +200,7 @@ class VirtualCounter(VirtualInstrument):
         self._run, self._memory, self._counted_from = run, run.memory, 0
 
     def inputs(self) -> Inputs:
-        """The inputs as they are set now."""
+        """Return the inputs as they are set now."""
         return Inputs(
             {
                 channel: (
@@ -208,7 +214,7 @@ class VirtualCounter(VirtualInstrument):
         )
 
     def trigger_input(self, channel: int, *, falling: bool) -> TriggerInput:
-        """The trigger of an input, with the settings that it has now."""
+        """Return the trigger of an input, with the settings that it has now."""
         raise NotImplementedError
 
     def measure(self, inputs: Inputs, gate: GateTime) -> Measurement:
@@ -228,7 +234,7 @@ class VirtualCounter(VirtualInstrument):
         self._function, self._channels = name, channels
 
     def select_function(self, words: list[str]) -> None:
-        """FUNCtion "FREQ 1": select a function and its channels, keep the settings.
+        """Select a function and its channels, as FUNCtion "FREQ 1" does; keep the settings.
 
         Args:
             words: of the string.
@@ -244,7 +250,7 @@ class VirtualCounter(VirtualInstrument):
         self.on_change("function")
 
     def greatest_level(self, channel: int) -> float:
-        """The greatest absolute trigger level [V]."""
+        """Return the greatest absolute trigger level [V]."""
         raise NotImplementedError
 
     def find_level(self, channel: int) -> float:
@@ -261,7 +267,7 @@ class VirtualCounter(VirtualInstrument):
         return boolean(text, rounded=True)
 
     def spell_whole(self, value: float) -> str:
-        """A whole number as this instrument prints it."""
+        """Return a whole number as this instrument prints it."""
         return f"{round(value):+d}"
 
     def note_completion(self) -> None:
@@ -314,6 +320,6 @@ class VirtualCounter(VirtualInstrument):
         return f'"{self._function} {where}"'
 
     def statistics(self) -> dict[str, float]:
-        """The statistics of the readings since INITiate or since the last clear; "not a number" while they are off."""
+        """Return the statistics of the readings since INITiate or the last clear; "not a number" while they are off."""
         values, _ = self._memory.slice(self._counted_from, self.available())
         return statistics(values if self.settings["averaging"] else np.empty(0))

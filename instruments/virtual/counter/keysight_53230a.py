@@ -176,7 +176,7 @@ class Virtual53230A(VirtualCounter):
         self.settings |= {f"relative{channel}": 50.0 for channel in self._channels}
 
     def _gate_for(self, name: str, plain: list[str]) -> float:
-        """The gate that resolves this [s].  Raises ScpiError."""
+        """Return the gate that resolves this [s].  Raises ScpiError."""
         expected, resolution = (
             math.nan
             if text.upper() in {"MIN", "MINIMUM", "MAX", "MAXIMUM", "DEF", "DEFAULT"}
@@ -190,11 +190,11 @@ class Virtual53230A(VirtualCounter):
         return min(max(self._resolution * expected / resolution, 1e-4), 1e3)
 
     def function(self) -> str:
-        """FUNCtion?: the function that is set."""
+        """Answer FUNCtion? with the function that is set."""
         return f'"{self._function}"'
 
     def set_function(self, parameters: list[str]) -> None:
-        """FUNCtion "FREQ (@1)"; see `select_function`."""
+        """Execute FUNCtion "FREQ (@1)"; see `select_function`."""
         self.select_function(re.sub(r"[(@),]", " ", parameter(parameters).strip("\"'")).split())
 
     # --- measuring ---
@@ -294,7 +294,7 @@ class Virtual53230A(VirtualCounter):
         )
 
     def extremes(self, channel: int) -> tuple[float, float]:
-        """The least and the greatest voltage at an input now [V]."""
+        """Return the least and the greatest voltage at an input now [V]."""
         entry = self.trigger_input(channel, falling=False)
         low, high = entry.extremes(self._signals[channel], min(self._ready, self.clock.now() + 1.0))
         self.busy_until(self._ready + entry.window)
@@ -358,7 +358,7 @@ class Virtual53230A(VirtualCounter):
     # --- formats and statistics ---
 
     def _spell(self, values: Array, head: str = "") -> str:
-        """Readings in the format that is set.  head: of a block, if it does not give its length."""
+        """Return readings in the format that is set.  head: of a block, if it does not give its length."""
         if self.settings["format"] == "ASC":
             return ",".join(map(self.spell, values))
         data = values.astype("<f8" if self.settings["byte_order"] == "SWAP" else ">f8").tobytes()

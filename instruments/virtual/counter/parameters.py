@@ -36,7 +36,7 @@ def channels_of(parameters: list[str], numbered: Sequence[int]) -> tuple[int, ..
 
 
 def without_channels(parameters: list[str]) -> list[str]:
-    """The parameters without channel lists; a number may stand in brackets, as in the CNT-91's handbook.
+    """Return the parameters without channel lists; a number may stand in brackets, as in the CNT-91's handbook.
 
     >>> without_channels(["(100)", "(@1)"])
     ['100']

@@ -37,7 +37,7 @@ class FilePart(Part):
 
 
 def file_of(place: Place) -> Path:
-    """Where the trials of a result lie."""
+    """Return the file with the trials of a result."""
     return place.folder / (f"{place.name}.{NAME}" if place.name else NAME)
 
 
@@ -58,7 +58,7 @@ def store(found: Sequence[OwnCheck], place: Place) -> Path:
 
 
 def read_own(place: Place, analysis: str, inputs: Sequence[str], settings: dict[str, Any]) -> OwnCheck | None:
-    """The trials of just this result, if they were made.  Raises DataError where the file is damaged."""
+    """Read the trials of just this result, if they were made.  Raises DataError where the file is damaged."""
     for one in _checks(file_of(place)):
         if one.analysis == analysis and one.inputs == tuple(inputs) and one.settings == settings:
             return one
@@ -66,7 +66,7 @@ def read_own(place: Place, analysis: str, inputs: Sequence[str], settings: dict[
 
 
 def _checks(file: Path, *, tolerant: bool = False) -> tuple[OwnCheck, ...]:
-    """What a file holds; nothing where there is none, or one of another kind."""
+    """Read the trials in a file; none where there is no file, or one of another kind."""
     if not file.is_file():
         return ()
     try:

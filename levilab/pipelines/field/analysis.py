@@ -22,7 +22,6 @@ from levilab.present.numbers import enumeration, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
-    from pathlib import Path
 
     from levilab.pipelines.sources import Source
 
@@ -132,11 +131,6 @@ METHOD = Method(
     fit=analyze_source,
     mixed="a mean over both says nothing about a real base",
 )
-
-
-def analyze_scans(paths: Sequence[Path], options: FieldOptions) -> FieldAnalysis:
-    """Fit the field of a ring to every scan found at the paths.  Raises DataError for what cannot be used."""
-    return METHOD.analyze(paths, options)
 
 
 def means(runs: Sequence[Mapping[str, Estimate]]) -> dict[str, Mean]:

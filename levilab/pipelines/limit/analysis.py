@@ -25,7 +25,6 @@ from levilab.simulator.scene import Scene, scene_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
-    from pathlib import Path
 
     from levilab.pipelines.sources import Source
 
@@ -372,14 +371,6 @@ METHOD = Method(
     fit=limits_of,
     combine=together,
 )
-
-
-def analyze_limits(paths: Sequence[Path], options: LimitOptions) -> LimitAnalysis:
-    """Statistics of the limits found at the paths, and what theory says of them.
-
-    Raises DataError for what cannot be used; the text names the file.
-    """
-    return METHOD.analyze(paths, options)
 
 
 # --- in words ---

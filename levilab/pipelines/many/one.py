@@ -89,12 +89,12 @@ TAIL = (
 
 
 def columns_of(analysis: Analysis[Any]) -> tuple[Column, ...]:
-    """The columns of the table."""
+    """Return the columns of the table."""
     return (*HEAD, *analysis.row, *TAIL)
 
 
 def name_of(path: Path, folder: Path) -> str:
-    r"""The path of an input from a folder, as it is but for line breaks and the like, which are escaped.
+    r"""Return the path of an input from a folder, as it is but for line breaks and the like, which are escaped.
 
     >>> from pathlib import Path
     >>> name_of(Path("runs/two\n  lines"), Path())

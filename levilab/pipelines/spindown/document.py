@@ -55,13 +55,13 @@ class SettingsPart(Settings):
 
     @classmethod
     def of(cls, options: InputOptions, **more: Any) -> Self:
-        """From options."""
+        """Make the settings from options."""
         assert isinstance(options, SpinDownOptions)
         drawn = BootstrapPart(samples=options.bootstrap_samples, seed=options.seed)
         return super().of(options, bootstrap=drawn if options.uncertainty == "bootstrap" else None, **more)
 
     def arguments(self) -> dict[str, Any]:
-        """The same as options."""
+        """Return the settings as options."""
         given = super().arguments()
         drawn: BootstrapPart | None = given.pop("bootstrap")
         return given | ({"bootstrap_samples": drawn.samples, "seed": drawn.seed} if drawn else {})
@@ -97,7 +97,7 @@ def _verdict(best: str, verdict: Verdict) -> dict[str, Any]:
 
 
 def _combined_values(combined: Combined) -> dict[str, Any]:
-    """The favoured law's constants, and by how much they differ from run to run."""
+    """Return the constants of the favoured law, and their scatter from run to run."""
     best = combined.fit(combined.best)
     scatter = {
         f"{name}_scatter": number(mean.scatter, mean.unit) | {"runs": mean.degrees_of_freedom + 1}

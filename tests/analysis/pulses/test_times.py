@@ -5,7 +5,7 @@ import pytest
 
 from analysis.errors import NotFinite, TimesNotIncreasing, TooFewPulses
 from analysis.pulses import spin_of_times
-from levilab.benchmark.estimators.traces import HARD, make
+from analysis.pulses.synthetic import HARD, make
 
 
 def pulse_times(frequency=30.3, chirp=-0.1, duration=10.0, phase=0.37):

@@ -8,9 +8,8 @@ from analysis.pulses import spin_of_trace
 from analysis.pulses.clean import clean
 from analysis.pulses.regression import fit_turns
 from analysis.pulses.search import shorten
+from analysis.pulses.synthetic import DURATION, DUTY, HARD, RATE, Case, bound, make
 from analysis.pulses.trace import Trace, _without_trap
-from levilab.benchmark.estimators.study import bound
-from levilab.benchmark.estimators.traces import DURATION, DUTY, HARD, RATE, Case, make
 
 SIGMA = DUTY / np.sqrt(8 * np.log(2))
 TIME = np.arange(round(4 * RATE)) / RATE

@@ -16,7 +16,7 @@ from support.models import FAMILIES, KIND_OF, SERIAL
 from support.wire import ask, errors, send
 
 #: Rows that are no settings: what they answer is no parameter, or changes by itself, or ends what goes on.
-NO_SETTING = ("*OPC", "CONFigure", "MEASure", "DISPlay:DATA", "C1:(BSWV", "C2:(BSWV")
+NO_SETTING = ("*OPC", "CONFigure", "MEASure", "DISPlay:DATA", "C1:(BSWV", "C2:(BSWV", "(SCDP")
 #: What ``*RST`` leaves as it is, by twin; the time-out of a 53230A and the form of a Siglent's answers are in memory
 #: that keeps, masks of the status are none of its business (IEEE 488.2, 10.32).
 KEPT = {Virtual53230A: {"timeout"}, VirtualSDS1000XE: {"header"}}

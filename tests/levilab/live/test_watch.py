@@ -15,12 +15,12 @@ from starlette.websockets import WebSocketDisconnect
 
 from levilab.live.desk import Desk
 from levilab.live.doors import Doors
-from levilab.live.frame import unpack
 from levilab.live.running import Curve, Running
 from levilab.live.server import FRAMES_PER_S, OWN_BENCH, Hall, Pages
 from levilab.live.watch import Watch
 from levilab.simulator.scene import preset
 from levilab.telemetry.address import Address, write_address
+from levilab.telemetry.codec import unpack
 from levilab.telemetry.messages import State
 from support.live_pages import GrowingRun, publish, spin_down
 from support.waiting import HANG_GUARD_S
@@ -200,7 +200,7 @@ def test_a_watch_that_fails_fails_alone_and_names_the_error(tmp_path: Path, monk
             while not two.followed.readings.count and not reading.done():
                 await asyncio.sleep(0.001)
             reading.cancel()
-            return unpack(one.frame({}))[0]["about"], two.followed.readings.count
+            return unpack(one.frame({}))["about"], two.followed.readings.count
 
     about, readings = asyncio.run(read())
     assert "MemoryError: 1 TiB" in about["problem"]

@@ -55,6 +55,8 @@ def test_the_instruments_of_the_bench_are_listed(manager):
     assert manager.list_resources() == (COUNTER, GENERATOR, OSCILLOSCOPE, MAGNETOMETER)
     assert manager.list_resources("?*generator?*") == (GENERATOR,)
     assert manager.list_resources("GPIB?*::INSTR") == ()
+    assert manager.list_resources("(GPIB|TCPIP)?*") == (COUNTER, GENERATOR, OSCILLOSCOPE)
+    assert manager.list_resources("ASRL[a-m]?*") == (MAGNETOMETER,)
 
 
 @pytest.mark.parametrize("address", [GENERATOR, GENERATOR.lower(), GENERATOR.upper()])
