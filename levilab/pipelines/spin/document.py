@@ -9,6 +9,7 @@ from pydantic import Field
 
 from levilab.pipelines.document import Document, Settings, values_of
 from levilab.pipelines.dump import Dump
+from levilab.pipelines.options import Method  # noqa: TC001 - pydantic reads the type when it runs
 from levilab.pipelines.result import Result, RunPart
 from levilab.pipelines.row import find_all
 from levilab.pipelines.spin.analysis import METHOD, SpinAnalysis, SpinRun
@@ -27,7 +28,7 @@ class SettingsPart(Settings):
 
     channel: str | None
     rate: float | None = Field(gt=0, alias="rate_hz")
-    method: Literal["auto", "edges", "matched", "likelihood"]
+    method: Method
     clock_u: float | None = Field(default=None, gt=0)
 
 

@@ -13,7 +13,7 @@ from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown  # noqa: TC001 - as above
 from levilab.pipelines.document import Document, Settings, number, statistics_of, value_of, values_of
 from levilab.pipelines.dump import Dump
-from levilab.pipelines.options import SpinDownOptions
+from levilab.pipelines.options import SpinDownOptions, Tilt, Uncertainty
 from levilab.pipelines.result import Part, Result, RunPart
 from levilab.pipelines.row import find_all
 from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
@@ -47,9 +47,9 @@ class SettingsPart(Settings):
     channel: str | None = None
     rate: float | None = Field(default=None, gt=0, alias="rate_hz")
     reading_u: float | None = Field(gt=0, alias="reading_u_hz")
-    uncertainty: Literal["covariance", "profile", "bootstrap"]
+    uncertainty: Uncertainty
     keep_outliers: bool
-    tilt: Literal["auto", "none", "fitted"] = "auto"
+    tilt: Tilt = "auto"
     bootstrap: BootstrapPart | None
     clock_u: float | None = Field(default=None, gt=0)
 
