@@ -216,7 +216,7 @@ class ShareBar:
         self._last = share
         left = self._time_left(share, now)
         if self._bar is None and sys.stderr.isatty() and (now - self._begin > 1 or self._attempt > 1):
-            self._bar = self._opened()
+            self._bar = self._open()
         if self._bar is not None:
             again = f", attempt {self._attempt} with shorter steps" if self._attempt > 1 else ""
             self._bar.update(self._task, description=self._description + again, completed=share, left=left)
@@ -233,7 +233,7 @@ class ShareBar:
             return ""
         return f"about {time_in_words(passed * (1 - share) / since)} left"
 
-    def _opened(self) -> Progress:
+    def _open(self) -> Progress:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn
 

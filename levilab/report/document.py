@@ -68,7 +68,7 @@ def document_of(
     blocks += others
     if results:
         blocks += [_measured(results, parts), reproduction(results, asked)]
-    counts = counted(sources)
+    counts = count_inputs(sources)
     subjects = ", ".join([*(part.subject for part in parts), *(one.title.lower() for one in others)])
     return Document(
         title=parts[0].heading if alone else _title(counts, others),
@@ -162,7 +162,7 @@ def _title(counts: str, others: Sequence[Section]) -> str:
 def _lead(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
     """How much was used."""
     warnings = "" if found.grouped_warnings else ", no warnings"
-    return f"{counted(found.sources)}, {part.lead}{warnings}"
+    return f"{count_inputs(found.sources)}, {part.lead}{warnings}"
 
 
 def _measured(results: Results, parts: Sequence[ReportPart]) -> Section:
@@ -184,7 +184,7 @@ def _overview(inputs: Sequence[Input]) -> Iterable[Block]:
     common = in_common(inputs)
     if common:
         yield Section("All of them alike", (Facts(common),))
-    yield Section("Each by itself", tuple(one.without(common).folded() for one in inputs))
+    yield Section("Each by itself", tuple(one.without(common).fold() for one in inputs))
 
 
 # --- what is synthetic ---------------------------------------------------------------------------------
@@ -220,7 +220,7 @@ def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner | 
         return Banner("SYNTHETIC.", f"None of these {total} runs came from a real bench.", *where)
     said = f"{len(made_up)} of {total} runs did not come from a real bench ({list_in_words(made_up)})."
     if not mixed and files:
-        said = f"Of {counted(sources)} {len(made_up)} did not come from a real bench ({list_in_words(made_up)})."
+        said = f"Of {count_inputs(sources)} {len(made_up)} did not come from a real bench ({list_in_words(made_up)})."
         return Banner("SYNTHETIC IN PART.", f"{said} A data file does not say where it is from.", *where)
     if not mixed:
         return Banner("REAL AND SYNTHETIC RUNS.", said, *where)
@@ -248,7 +248,7 @@ def notebook_blocks(analysis: Analysis[A], found: A) -> tuple[Block, ...]:
 # --- words ---------------------------------------------------------------------------------------------
 
 
-def counted(sources: Sequence[Source[Any]]) -> str:
+def count_inputs(sources: Sequence[Source[Any]]) -> str:
     """How many inputs of which kind: "4 runs and 1 data file"."""
     files = sum(source.run is None for source in sources)
     kinds = ((len(sources) - files, "run"), (files, "data file"))

@@ -76,7 +76,7 @@ class Input:
         """Return the input below a heading of its own."""
         return Section(self.name, (Facts(self.facts), *self.blocks))
 
-    def folded(self) -> Details:
+    def fold(self) -> Details:
         """Return the input as one of many: it can be opened on a screen, and is one line on paper."""
         return Details(self.name, (Facts(self.facts), *self.blocks), more=self.more, on_paper="summary")
 

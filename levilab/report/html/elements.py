@@ -42,7 +42,7 @@ def element(name: str, /, *children: Child, **attributes: str | bool | None) -> 
     given = "".join(_attribute(key, value) for key, value in attributes.items())
     if name in _EMPTY:
         return Html(f"<{name}{given}>")
-    return Html(f"<{name}{given}>{joined(children).markup}</{name}>")
+    return Html(f"<{name}{given}>{join(children).markup}</{name}>")
 
 
 def _attribute(key: str, value: str | bool | None) -> str:  # noqa: FBT001 - an attribute's value
@@ -52,7 +52,7 @@ def _attribute(key: str, value: str | bool | None) -> str:  # noqa: FBT001 - an 
     return f" {name}" if value is True else f' {name}="{escape(value)}"'
 
 
-def joined(children: Iterable[Child]) -> Html:
+def join(children: Iterable[Child]) -> Html:
     """Elements and texts one after the other."""
     return Html("".join(_markup(child) for child in children))
 
@@ -60,7 +60,7 @@ def joined(children: Iterable[Child]) -> Html:
 def _markup(child: Child) -> str:
     if isinstance(child, Html):
         return child.markup
-    return escape(child) if isinstance(child, str) else joined(child).markup
+    return escape(child) if isinstance(child, str) else join(child).markup
 
 
 def words(text: str) -> Html:
@@ -69,7 +69,7 @@ def words(text: str) -> Html:
     >>> words("3×10⁻⁴ <b>").markup
     '3×10<sup>−4</sup> &lt;b&gt;'
     """
-    return joined(element(_LEVELS[run.level], run.text) if run.level else run.text for run in typeset(text))
+    return join(element(_LEVELS[run.level], run.text) if run.level else run.text for run in typeset(text))
 
 
 def lines(text: str) -> Html:
@@ -79,4 +79,4 @@ def lines(text: str) -> Html:
     'ν<sub>0</sub><br>[Hz]'
     """
     first, *others = text.split("\n")
-    return joined([words(first), *((element("br"), words(line)) for line in others)])
+    return join([words(first), *((element("br"), words(line)) for line in others)])

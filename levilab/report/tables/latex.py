@@ -61,7 +61,7 @@ def as_latex(name: str, table: Table, *, note: str = "", mark: str = "") -> str:
     """
     title = table.title or title_of(name)
     marks = [mark] if mark and mark.rstrip(".") not in title else []  # which may say it itself
-    caption = escaped(" ".join([*marks, title]))
+    caption = to_latex(" ".join([*marks, title]))
     table = units_in_heads(table)
     aligned = ["r" if k in table.numbers else "p" if _is_long(table, k) else "l" for k in range(len(table.heads))]
     lines = [
@@ -71,7 +71,7 @@ def as_latex(name: str, table: Table, *, note: str = "", mark: str = "") -> str:
         rf"  \caption{{{caption}}}",
         rf"  \label{{tab:{name}}}",
         *_tabular(table, aligned),
-        *([rf"  \par\smallskip{{\footnotesize {escaped(note)}\par}}"] if note else []),
+        *([rf"  \par\smallskip{{\footnotesize {to_latex(note)}\par}}"] if note else []),
         r"\end{table}",
     ]
     return "\n".join(lines) + "\n"
@@ -153,7 +153,7 @@ def _cell(cell: str, aligned: str, *, bold: bool) -> str:
     >>> _cell("c₁\n[s⁻¹]", "l", bold=False)
     '\\begin{tabular}[t]{@{}l@{}}c\\raisebox{-.4ex}{\\scriptsize 1}\\\\{[}s\\textsuperscript{$-$1}{]}\\end{tabular}'
     """
-    lines = [escaped(line) for line in cell.split("\n")]
+    lines = [to_latex(line) for line in cell.split("\n")]
     lines = [rf"\textbf{{{line}}}" if bold and line else line for line in lines]
     if len(lines) == 1:
         return lines[0]
@@ -163,12 +163,12 @@ def _cell(cell: str, aligned: str, *, bold: bool) -> str:
     return rf"\begin{{tabular}}[{'b' if bold else 't'}]{{@{{}}{aligned}@{{}}}}{stacked}\end{{tabular}}"
 
 
-def escaped(text: str) -> str:
+def to_latex(text: str) -> str:
     r"""Return a plain text as LaTeX, in ASCII.
 
-    >>> escaped("50 % of {x}_1 & \\input{a}")
+    >>> to_latex("50 % of {x}_1 & \\input{a}")
     '50 \\% of \\{x\\}\\_1 \\& \\textbackslash{}input\\{a\\}'
-    >>> escaped("3.2(1)×10⁻³, ν_r, é and 中")
+    >>> to_latex("3.2(1)×10⁻³, ν_r, é and 中")
     '3.2(1)$\\times$10\\textsuperscript{$-$3}, $\\nu$\\raisebox{-.4ex}{\\scriptsize r}, e and ?'
     """
     clean = " ".join(printable(text.replace("\t", " ")).split("\n"))

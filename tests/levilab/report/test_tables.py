@@ -16,7 +16,7 @@ from levilab.present.document.blocks import Banner, Details, Document, Section, 
 from levilab.present.tables import Row, table
 from levilab.present.units import UNITS
 from levilab.report.tables.folder import CONTENTS, folder_of, write_tables
-from levilab.report.tables.latex import as_latex, escaped, units_in_heads
+from levilab.report.tables.latex import as_latex, to_latex, units_in_heads
 from levilab.report.tables.values import Values, as_csv, of_analysis
 from support.paths import SAMPLE_DATA
 
@@ -97,8 +97,8 @@ def test_what_a_person_typed_is_no_command_of_latex() -> None:
 
 
 def test_numbers_are_typeset_as_in_the_report() -> None:
-    assert escaped("2.34(3)×10⁻⁴") == r"2.34(3)$\times$10\textsuperscript{$-$4}"
-    assert escaped("φ̇ and χ²") == r"$\dot\varphi$ and $\chi$\textsuperscript{2}"
+    assert to_latex("2.34(3)×10⁻⁴") == r"2.34(3)$\times$10\textsuperscript{$-$4}"
+    assert to_latex("φ̇ and χ²") == r"$\dot\varphi$ and $\chi$\textsuperscript{2}"
 
 
 def test_a_unit_stands_in_the_head_and_long_texts_are_paragraphs() -> None:
