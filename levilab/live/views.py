@@ -53,8 +53,8 @@ def u_of(column: str) -> str:
 def unit_of(column: str) -> tuple[str, float]:
     """The unit in which a column is shown, and how many of it are one of the column's.
 
-    >>> unit_of("height_m"), unit_of("spin_frequency_hz"), unit_of("record")
-    (('cm', 100.0), ('Hz', 1.0), ('', 1.0))
+    >>> [tuple(unit_of(column)) for column in ("height_m", "spin_frequency_hz", "record")]
+    [('cm', 100.0), ('Hz', 1.0), ('', 1.0)]
     """
     _, unit = split(column)
     return unit.shown if unit else ("", 1.0)
