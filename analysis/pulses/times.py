@@ -29,7 +29,7 @@ SELDOM = 1e-3
 CERTAIN = 8.0
 #: Pulses between a jump and the ends of the list, at least.
 FROM_ENDS = 8
-#: The smallest buffer of a sound card, 64 samples at 48 kHz, lasts longer [s]; and a rounding has fewer steps of a clock.
+#: The smallest buffer of a sound card, 64 samples at 48 kHz, lasts longer [s]; a rounding has fewer steps of a clock.
 LEAST_LOST, STEPS = 1e-3, 2.5
 #: The place of a jump is looked for again with the fit that has one, until it stays: that many times at most.
 TRIES = 4
