@@ -138,7 +138,7 @@ def _with_warnings(fit: SweepFit, texts: Iterable[str]) -> SweepFit:
 
 
 def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[str]:
-    """Return a word where the slopes of the runs differ by more than their u."""
+    """Yield a word where the slopes of the runs differ by more than their u."""
     slopes = [(fit.line.slope, fit.line.u_slope) for fit in fits if fit.line.u_slope]
     if len(slopes) < 2:
         return
@@ -168,7 +168,7 @@ METHOD = Method(
 
 
 def _coherences(source: Source[Readings]) -> tuple[tuple[PointCoherence, ...], tuple[str, ...]]:
-    """How firmly the pulses follow the drive in each pair of records of a run, laser and drive."""
+    """Return how firmly the pulses follow the drive in each pair of records of a run, laser and drive."""
     if source.run is None or source.readings.time is None:
         return (), ()
     try:

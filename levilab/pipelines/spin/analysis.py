@@ -160,7 +160,7 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
         return ()
 
     def about_all(self) -> Iterable[str]:
-        """Return what to know of the method."""
+        """Yield what to know of the method."""
         method = self.options.method
         if method != "auto" and all(source.readings.pulses for source in self.sources):
             yield f"the method {method} was chosen, but a list of pulse times leaves no choice"
@@ -290,7 +290,7 @@ def _with_start(series: Series, u_s: float) -> Series:
 
 
 def _by_record(spins: Mapping[int, SpinFrequency], all_of_them: int) -> tuple[Finding, ...]:
-    """Each finding once, with the records that it is of: the table shows the record in the middle, which may lack it.
+    """Return each finding once, with its records: the table shows the record in the middle, which may lack it.
 
     spins: the number of a record, from 1 → its spin.
     """
