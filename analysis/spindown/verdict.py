@@ -10,6 +10,7 @@ from math import floor, log10
 
 from analysis.numbers import digits
 from analysis.residuals import Correlation
+from analysis.spindown.drag import LAWS
 from analysis.spindown.selection import Statistics, deviance, variance_factor
 from analysis.uncertainty import Estimate
 
@@ -17,10 +18,10 @@ EXCLUDED, TIED = 10.0, 4.0  # differences of AICc, Burnham & Anderson (2002) §2
 # Residuals that noise with a correlation of `analysis.residuals.NOISE` makes less often than this have a shape; where
 # the scatter exceeds the stated uncertainties, this much is enough against independent readings.
 SHAPE, SHAPE_BEYOND_U = 0.005, 0.01
-SPECIAL_CASES = {"mixed": ("stokes", "newton"), "power": ("stokes", "newton", "disc")}
+SPECIAL_CASES = {law.name: tuple(one.name for one in LAWS.values() if law.contains(one)) for law in LAWS.values()}
 #: u of an exponent, or of an angle [rad].
 TOO_SMALL = 5e-10
-_SIMPLE = ("stokes", "newton", "disc")
+_SIMPLE = tuple(law.name for law in LAWS.values() if law.exponent is not None)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.errors import LevilabError
-from levilab.present.progress import Mute
+from levilab.present.progress import Display
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -62,7 +62,7 @@ def acquired(
     Raises TrialFailed; KeyboardInterrupt where Ctrl-C ended the run: it is meant for the whole cross-check.
     """
     request = request_for(experiment, AcquisitionOptions(mock=True, out=folder, seed=seed))
-    run = acquire(change(request), Mute())
+    run = acquire(change(request), Display())
     if run.status == "interrupted":
         raise KeyboardInterrupt
     if run.status != "finished":

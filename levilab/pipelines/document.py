@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
     from analysis.budget import Budget
     from analysis.uncertainty import Estimate
+    from levilab.pipelines.options import InputOptions
     from levilab.pipelines.result import Place
-    from levilab.pipelines.sources import Found, InputOptions, Source
+    from levilab.pipelines.sources import Found, Source
 
 #: The data file's own names of columns: an empty table where none were given.
 Columns = Annotated[

@@ -19,20 +19,20 @@ if TYPE_CHECKING:
 
 
 def budget(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
-    """What the uncertainties are made of."""
+    """Return what the uncertainties are made of."""
     lead = "What u of each result is made of, what would make it smaller, and what it does not contain."
     return (Section("Uncertainty budget", analysis.budgets(found), anchor="budget", lead=lead),)
 
 
 def stored_trials(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
-    """The cross-check that `levilab crosscheck --like` made of this result."""
+    """Return the cross-check that `levilab crosscheck --like` made of this result."""
     settings = analysis.settings_of(found)
     known = read_own(found.place, analysis.name, [source.sha256 for source in found.sources], settings)
     return () if known is None else (_section(*own_blocks(known, analysis.symbols)),)
 
 
 def trials(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
-    """The same; where there is none a shorter one, of as many trials as a report has time for."""
+    """Return the same; where there is none a shorter one, of as many trials as a report has time for."""
     stored = stored_trials(analysis, found)
     if stored or analysis.name not in OWN:
         return stored

@@ -12,7 +12,8 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any, Protocol
 
 from analysis.numbers import digits
-from levilab.present.numbers import in_words, with_uncertainty
+from levilab.present.numbers import with_uncertainty
+from levilab.present.units import unit as unit_row
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -219,7 +220,7 @@ def _with_unit(number: str, unit: str) -> str:
     >>> _with_unit("1.5", "°"), _with_unit("0.0032", "1/s"), _with_unit("82", "")
     ('1.5°', '0.0032 s⁻¹', '82')
     """
-    return f"{number}{unit}" if unit == "°" else f"{number} {in_words(unit)}".strip()
+    return f"{number}{unit}" if unit == "°" else f"{number} {unit_row(unit).text}".strip()
 
 
 def _like(value: float, published: Printed) -> str:

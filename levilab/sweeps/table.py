@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from analysis.numbers import with_minus
-from levilab.present.numbers import in_words as unit_in_words
 from levilab.present.tables import Table, table
+from levilab.present.units import unit
 from levilab.sweeps.axes import in_words
 from levilab.sweeps.plan import unit_of
 
@@ -71,5 +71,5 @@ def _cell(value: Any) -> str:
 
 
 def _head(key: str) -> str:
-    unit = unit_of(key)
-    return key if unit == "1" else f"{key} [{unit_in_words(unit)}]"
+    text = unit(unit_of(key)).text
+    return f"{key} [{text}]" if text else key

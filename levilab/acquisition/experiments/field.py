@@ -16,6 +16,7 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.bench.person import PlaceProbe, ShieldProbe
 from levilab.runs.channel import Channel
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from typing import Self
@@ -133,7 +134,7 @@ def run(session: Session[FieldSettings]) -> None:
         row = _measure(session, height)
         each = (session.now() - since) / (k + 1 - done) or _USUAL_S
         session.keep(row, time_left_s=each * (len(heights) - k - 1))
-    session.event("scanned", f"{len(session.rows)} heights are measured")
+    session.event(RunEvent.SCANNED, f"{len(session.rows)} heights are measured")
 
 
 def _set_up(session: Session[FieldSettings]) -> None:
@@ -167,9 +168,9 @@ def _place(session: Session[FieldSettings], height: float, which: str) -> float:
             return height
         typed = typed_height(answer)
         if typed is not None:
-            session.event("another height", f"the probe stands at {1e3 * typed:.2f} mm", height_m=typed)
+            session.event(RunEvent.ANOTHER_HEIGHT, f"the probe stands at {1e3 * typed:.2f} mm", height_m=typed)
             return typed
-        session.event("not understood", f"{answer[:40]!r} is no height: a number in mm is expected, as 61.5")
+        session.event(RunEvent.NOT_UNDERSTOOD, f"{answer[:40]!r} is no height: a number in mm is expected, as 61.5")
 
 
 def typed_height(answer: str) -> float | None:

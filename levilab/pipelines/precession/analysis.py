@@ -16,8 +16,10 @@ from analysis.precession.sweep import EXCLUDED_P, Sweep, SweepFit, fit_sweep
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.budget import gate_of
+from levilab.pipelines.options import PrecessionOptions
 from levilab.pipelines.precession.readings import Readings, read_sweep_file, read_sweep_run
-from levilab.pipelines.sources import InputOptions, Needs
+from levilab.pipelines.sources import Needs
 from levilab.present.numbers import plain, with_uncertainty
 
 if TYPE_CHECKING:
@@ -38,23 +40,6 @@ NEEDS = Needs(
     read_run=read_sweep_run,
     particular=True,
 )
-
-
-@dataclass(frozen=True)
-class PrecessionOptions(InputOptions):
-    """How sweeps are analyzed.
-
-    Attributes:
-        reading_u: of every count of the precession [Hz], in the place of what the data say.
-        keep_outliers: points that miscounted are kept.
-        orthogonal: the uncertainty of the drive's frequency counts, too.
-        clock_u: of the counter's clock, relative; budgets say what it does, it is in no u.
-    """
-
-    reading_u: float | None = None
-    keep_outliers: bool = False
-    orthogonal: bool = False
-    clock_u: float | None = None
 
 
 #: A record that is kept at the moment of a reading is that reading's [s].
@@ -117,7 +102,7 @@ def fit_source(source: Source[Readings], options: PrecessionOptions) -> Precessi
         u_drive=readings.u_drive,
         spin=readings.spin,
         u_spin=readings.u_spin,
-        gate_s=_gate(source),
+        gate_s=gate_of(source, PRECESSION),
         gates=readings.laser,
     )
     try:
@@ -126,13 +111,6 @@ def fit_source(source: Source[Readings], options: PrecessionOptions) -> Precessi
         raise DataError(f"{source.data}: {error}") from error
     coherences, warnings = _coherences(source)
     return PrecessionRun(fit, coherences, warnings)
-
-
-def _gate(source: Source[Readings]) -> float | None:
-    """Return the counter's gate [s], where a run says it."""
-    settings = source.run.record.configuration.get(PRECESSION) if source.run else None
-    gate = settings.get("gate_s") if isinstance(settings, dict) else None
-    return float(gate) if isinstance(gate, int | float) and gate > 0 else None
 
 
 def combine(runs: Sequence[PrecessionRun], options: PrecessionOptions) -> SweepFit:

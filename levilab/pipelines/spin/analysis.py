@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping  # noqa: TC003 - pydantic reads the types of a result when it runs
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,8 @@ from analysis.pulses import (
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
-from levilab.pipelines.sources import InputOptions, Needs
+from levilab.pipelines.options import SpinOptions
+from levilab.pipelines.sources import Needs
 from levilab.pipelines.spin.readings import Records, read_spin_file, read_spin_run
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.traces import INDEX
@@ -56,17 +57,6 @@ NEEDS = Needs(
 LONGEST_WHOLE_S = 12.0
 #: Length of a window of a longer record [s].
 WINDOW_S = 2.0
-
-
-@dataclass(frozen=True)
-class SpinOptions(InputOptions):
-    """How pulses are found, see `analysis.pulses.spin_of_trace`.
-
-    clock_u: of the clock of the oscilloscope or sound card, relative; budgets say what it does, it is in no u.
-    """
-
-    method: Literal["auto", "edges", "matched", "likelihood"] = "auto"
-    clock_u: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from analysis.errors import AnalysisError
 from analysis.spindown.combine import Combined, combine, tilt_demanded
@@ -12,7 +11,8 @@ from analysis.spindown.fit import SpinDown, fit_spin_down
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.budget import gate_of
-from levilab.pipelines.sources import InputOptions, Needs
+from levilab.pipelines.options import SpinDownOptions
+from levilab.pipelines.sources import Needs
 from levilab.pipelines.spindown.laws import SYMBOLS
 from levilab.pipelines.spindown.readings import Readings, read_run_readings, read_spin_file
 
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from analysis.spindown.combine import CombinedLaw
-    from analysis.spindown.lawfit import LawFit, Uncertainty
+    from analysis.spindown.lawfit import LawFit
+    from levilab.pipelines.options import Tilt
     from levilab.pipelines.sources import Source
 
 SPINDOWN = "spindown"
@@ -36,30 +37,8 @@ NEEDS = Needs(
 )
 
 
-#: Whether the count holds the tilt of the top's moment.
-Tilt = Literal["auto", "none", "fitted"]
+#: Whether the count holds the tilt of the top's moment; None: where readings demand it.
 TILTED: dict[Tilt, bool | None] = {"auto": None, "none": False, "fitted": True}
-
-
-@dataclass(frozen=True)
-class SpinDownOptions(InputOptions):
-    """How spin-downs are analyzed.
-
-    Attributes:
-        reading_u: of every reading [Hz], in the place of what the data say.
-        bootstrap_samples, seed: of the bootstrap, where it is asked for.
-        tilt: whether the count holds the tilt of the top's moment, auto: where readings demand it, and what they may
-            hide of it is in u.
-        clock_u: of the counter's clock, relative; budgets say what it does, it is in no u.
-    """
-
-    reading_u: float | None = None
-    uncertainty: Uncertainty = "covariance"
-    keep_outliers: bool = False
-    tilt: Tilt = "auto"
-    bootstrap_samples: int = 1000
-    seed: int = 0
-    clock_u: float | None = None
 
 
 class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):

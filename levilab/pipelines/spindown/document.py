@@ -13,17 +13,19 @@ from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown  # noqa: TC001 - as above
 from levilab.pipelines.document import Document, Settings, number, statistics_of, value_of, values_of
 from levilab.pipelines.dump import Dump
+from levilab.pipelines.options import SpinDownOptions, Tilt, Uncertainty
 from levilab.pipelines.result import Part, Result, RunPart
-from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis, SpinDownOptions
+from levilab.pipelines.row import find_all
+from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
 from levilab.pipelines.spindown.budget import budget_of_all, budget_of_run
+from levilab.pipelines.spindown.quantities import CORRELATION, QUANTITIES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from analysis.residuals import Correlation
     from analysis.spindown.combine import CombinedLaw, Mean
     from analysis.spindown.verdict import Verdict
-    from levilab.pipelines.sources import InputOptions
+    from levilab.pipelines.options import InputOptions
 
 
 class SpinDownPart(RunPart):
@@ -45,9 +47,9 @@ class SettingsPart(Settings):
     channel: str | None = None
     rate: float | None = Field(default=None, gt=0, alias="rate_hz")
     reading_u: float | None = Field(gt=0, alias="reading_u_hz")
-    uncertainty: Literal["covariance", "profile", "bootstrap"]
+    uncertainty: Uncertainty
     keep_outliers: bool
-    tilt: Literal["auto", "none", "fitted"] = "auto"
+    tilt: Tilt = "auto"
     bootstrap: BootstrapPart | None
     clock_u: float | None = Field(default=None, gt=0)
 
@@ -84,8 +86,7 @@ def _entries(analysis: SpinDownAnalysis) -> dict[str, Any]:
 
 
 def _run_entries(run: SpinDown) -> dict[str, Any]:
-    values = {"start_time": number(run.start_time, "s"), "duration": number(float(run.time[-1] - run.time[0]), "s")}
-    values |= values_of(run.fit(run.best).parameters) | _residual_correlation(run.correlation)
+    values = values_of(run.fit(run.best).parameters | find_all(QUANTITIES, run))
     return {"values": values, "models": _models(run)} | _verdict(run.best, run.verdict)
 
 
@@ -104,11 +105,7 @@ def _combined_values(combined: Combined) -> dict[str, Any]:
         if mean.scatter is not None
     }
     tilt = {"moment_tilt": _mean_value(combined.tilt)} if combined.tilt else {}
-    return _means(best.constants) | scatter | tilt | _residual_correlation(combined.correlation)
-
-
-def _residual_correlation(found: Correlation | None) -> dict[str, Any]:
-    return {"residual_correlation": number(found.value, "1", found.u)} if found else {}
+    return _means(best.constants) | scatter | tilt | values_of(find_all([CORRELATION], combined))
 
 
 def _combined_model(fit: CombinedLaw) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
-from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
+from levilab.pipelines.spindown.laws import SYMBOLS
 from levilab.present.numbers import enumeration, plain, with_uncertainty
 
 if TYPE_CHECKING:
@@ -19,10 +19,14 @@ if TYPE_CHECKING:
     from analysis.uncertainty import Estimate
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 
-#: Laws of one power, and the power.
-_POWERS: Mapping[str, float] = MappingProxyType({"stokes": 1.0, "disc": 1.5, "newton": 2.0})
+#: Laws of one power, and the power, in its order.
+_POWERS: Mapping[str, float] = MappingProxyType(
+    {law.name: n for law in sorted(LAWS.values(), key=lambda one: one.orders) if (n := law.exponent) is not None}
+)
 #: C₃/₂ of a bare disc as large as the thesis's top in laminar air, without a free parameter (PHYSICS.md §5) [SI].
 KARMAN = 2.235e-4
+#: Power of the laminar layer of air on a disc.
+_LAMINAR = 1.5
 #: A difference of so many u is one.
 _DIFFERS = 2.0
 #: Runs that scatter by so many times what their readings explain differ.
@@ -46,7 +50,7 @@ def _law(analysis: SpinDownAnalysis) -> Iterator[str]:
         return
     left = f"it leaves {digits(1e3 * stats.rms_residual)} mHz a reading"
     if verdict.decided:
-        yield f"The {best} law describes the readings; {left}. {SHOWN_LAWS[best].meaning}"
+        yield f"The {best} law describes the readings; {left}. {_torque(best)}"
         return
     others = [name for name in verdict.indistinguishable if name != best]
     beside = f" as well as {enumeration(others)}" if others else ""
@@ -54,6 +58,11 @@ def _law(analysis: SpinDownAnalysis) -> Iterator[str]:
         f"The {best} law describes the readings{beside}; {left}. Which law of drag is right these readings do not "
         "decide; it takes a longer fall of the spin, or less scatter."
     )
+
+
+def _torque(law: str) -> str:
+    """Return what the drag's torque depends on, as a sentence."""
+    return f"The torque of the drag is proportional to {LAWS[law].torque}."
 
 
 def _loss(analysis: SpinDownAnalysis) -> Iterator[str]:
@@ -83,9 +92,10 @@ def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
     ((name, value),) = _constants(analysis).items()
     if value.value is None or not value.u or value.value <= 0:
         return
-    if name == "c1":
+    n = _POWERS[combined.best]
+    if n == 1:
         yield f"The spin halves in {plain(math.log(2) / value.value)} s, whatever it is."
-    elif name == "c32":
+    elif n == _LAMINAR:
         off = value.value / KARMAN - 1
         u = value.u / KARMAN
         way = "above" if off > 0 else "below"

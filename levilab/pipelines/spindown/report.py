@@ -8,29 +8,41 @@ from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
-from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
-from levilab.pipelines.spindown.laws import SYMBOLS
+from levilab.pipelines.part import (
+    VALUE_U,
+    FigureText,
+    ReportPart,
+    first_of,
+    input_parts,
+    labels_of,
+    origin_of_u,
+    size_of_u,
+)
+from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
 from levilab.pipelines.spindown.meaning import meaning
+from levilab.pipelines.spindown.quantities import OF_RUN
 from levilab.pipelines.spindown.table import (
     QUALITY_IN_WORDS,
     count_table,
     is_best,
     law_constants,
     quality_table,
-    straight_quantity,
 )
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Details, Listing, Note, Paragraph, Points, Tabular
-from levilab.present.numbers import column, ends, in_words, off, reading, short_name, with_decimals, with_uncertainty
+from levilab.present.numbers import column, ends, off, reading, short_name, with_decimals, with_uncertainty
 from levilab.present.tables import Row, Table, table
+from levilab.present.units import unit as unit_row
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from analysis.spindown.combine import CombinedLaw, Mean
     from analysis.spindown.fit import SpinDown
+    from levilab.pipelines.options import SpinDownOptions
     from levilab.pipelines.sources import Source
-    from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions
+    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
     from levilab.pipelines.spindown.readings import Readings
     from levilab.present.document.blocks import Block
 
@@ -42,8 +54,6 @@ MOST_POINTS = 300
 MOST_COUNTS = 12
 #: Most falls that are listed; of more the range is given.
 MOST_FALLS = 8
-#: The event that says when the top fell.
-FELL = "fell"
 
 
 def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
@@ -67,14 +77,11 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
         ),
         runs_title="Run by run",
         runs=_run_by_run(analysis),
-        inputs=tuple(
-            InputPart(
-                _in_words(source, run, origin.options),
-                origin.text,
-                run.verdict.text,
-                (_readings(source, run, origin.options, combined.best),),
-            )
-            for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
+        inputs=input_parts(
+            analysis,
+            _in_words,
+            lambda source, run, options: (_readings(source, run, options, combined.best),),
+            lambda run: run.verdict.text,
         ),
     )
 
@@ -109,10 +116,7 @@ def _laws(analysis: SpinDownAnalysis) -> tuple[Tabular, Tabular]:
     n = analysis.combined.fit(analysis.combined.best).statistics.n
     low, high = max(2 - 4 / math.sqrt(n), 0), min(2 + 4 / math.sqrt(n), 4)
     u = "Of a mean it comes from the scatter s of the runs, u = s/√N." if several else "ν₀: the spin at first."
-    constants = (
-        "value(u): the digits in parentheses are the standard uncertainty of the last digits. "
-        f"{u}{'' if several else _intervals(analysis)}"
-    )
+    constants = f"{VALUE_U} {u}{'' if several else _intervals(analysis)}"
     quality = (
         "constants: how many were fitted, beside the start of each run; the exponent is common to all runs, and the "
         "tilt δ counts where the readings show it. χ²/dof is near 1 where a law leaves nothing but the readings' own "
@@ -198,7 +202,7 @@ class _Column:
     """A constant, run by run.  head: where it comes from, its symbol and unit; estimates: one a run."""
 
     head: str
-    estimates: tuple[Estimate, ...]
+    estimates: tuple[Estimate | None, ...]
     mean: Mean | None = None
 
     @property
@@ -206,7 +210,7 @@ class _Column:
         """The runs, with their intervals; of several runs mean and scatter, empty where there is none."""
         together = [self.mean, scatter(self.mean) if self.mean else None] if len(self.estimates) > 1 else []
         shown = column([*self.estimates, *together])
-        intervals = [interval(one) for one in self.estimates] + [""] * len(together)
+        intervals = [interval(one) if one else "" for one in self.estimates] + [""] * len(together)
         return [
             f"{cell}\n{more}".rstrip() if cell != "—" or more else ""
             for cell, more in zip(shown, intervals, strict=True)
@@ -231,11 +235,12 @@ def _by_run_table(analysis: SpinDownAnalysis) -> Table:
 
 def _columns(analysis: SpinDownAnalysis) -> list[_Column]:
     """The straight lines' constants and those of the best law's fit."""
-    combined, columns = analysis.combined, []
+    combined = analysis.combined
+    columns = [_Column(one.head, one.show_all(analysis.runs)) for one in OF_RUN]
     for law in combined.fits:
         if law.linearised:
             lines = [run.fit(law.name).linearised or {} for run in analysis.runs]
-            columns += _of_law(f"{straight_quantity(law.name)} against t", law.linearised, lines)
+            columns += _of_law(f"{STRAIGHT_LINES[law.name].quantity} against t", law.linearised, lines)
     best = combined.fit(combined.best)
     fits = [run.fit(best.name).parameters for run in analysis.runs]
     starts = tuple(fit["start_frequency"] for fit in fits)
@@ -248,7 +253,7 @@ def _of_law(of: str, means: Mapping[str, Mean], runs: Sequence[Mapping[str, Esti
 
 
 def _head(of: str, name: str, unit: str) -> str:
-    shown = in_words(unit)
+    shown = unit_row(unit).text
     return f"{of}\n{SYMBOLS[name]}" + (f" [{shown}]" if shown else "")
 
 
@@ -276,13 +281,7 @@ def _uncertainty(source: Source[Readings], fit: SpinDown, options: SpinDownOptio
     """How large u of a reading is, and where it comes from."""
     if fit.u is None:
         return "u of a reading: not known, taken from the scatter about each law"
-    low, high = float(fit.u.min()), float(fit.u.max())
-    size = f"{digits(low)} Hz" if low == high else f"{digits(low)} Hz to {digits(high)} Hz"
-    if options.reading_u is not None:
-        return f"u of a reading: {size}, as given to the analysis"
-    channels = source.run.record.channels if source.run else []
-    origin = next((c.get("source") for c in channels if c.get("name") == "spin_frequency_u_hz"), None)
-    return f"u of a reading: {size}, {origin or 'from a column of the data'}"
+    return f"u of a reading: {size_of_u(fit.u)}, {origin_of_u(source, 'spin_frequency_u_hz', options)}"
 
 
 def _residuals(source: Source[Readings], fit: SpinDown, law: str) -> dict[int, float]:
@@ -315,9 +314,9 @@ def _points(analysis: SpinDownAnalysis) -> tuple[Points, ...]:
     """What each reading of the figure answers: of run k, its readings, and what every law leaves over."""
     return tuple(
         points
-        for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
+        for k, (name, run) in enumerate(zip(labels_of(analysis.sources), analysis.runs, strict=True))
         if len(run.time) <= MOST_POINTS
-        for points in _points_of_run(k, short_name(source.name) if len(analysis.runs) > 1 else "", run, analysis)
+        for points in _points_of_run(k, name, run, analysis)
     )
 
 
@@ -339,7 +338,7 @@ def _points_of_run(k: int, name: str, run: SpinDown, analysis: SpinDownAnalysis)
 def _fall(source: Source[Readings], fit: SpinDown) -> str:
     """What was seen of the fall."""
     events = source.run.events() if source.run else []
-    text = next((str(event["text"]) for event in reversed(events) if event["kind"] == FELL), None)
+    text = next((str(event["text"]) for event in reversed(events) if event["kind"] == RunEvent.FELL), None)
     if text is None:
         return ""
     return f"{text}; last reading that was fitted {fit.frequency[-1]:.2f} Hz at {fit.time[-1]:.1f} s"

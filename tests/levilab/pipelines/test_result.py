@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from levilab.errors import DataError
 from levilab.files import replace_atomically
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Place, beside, read_result, save
-from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+from levilab.pipelines.spindown.analysis import analyze_spindowns
 from levilab.pipelines.spindown.document import DOCUMENT, SpinDownResult
 from levilab.pipelines.suits import save as save_found
 from support.spin_downs import spin_down_csv
