@@ -173,13 +173,15 @@ class Flight:
             times: shape (n,) [s].
 
         Returns:
-            Turns, see `turns`; their rate [Hz], 0 without a top; height of the rim above the base at that spot [m].
+            Turns, counted upwards whatever the sense; their rate [Hz], 0 without a top; height of the rim above the
+            base at that spot [m].
         """
         self.simulate_until(float(times.max(initial=0.0)))
         turns, rate, lift = np.zeros_like(times), np.zeros_like(times), np.zeros_like(times)
         for piece, part in self._pieces.pieces(times):
             if isinstance(piece, _Flying):
-                turns[part], rate[part] = np.interp(times[part], piece.times, piece.turns), _rate(piece)
+                counted, rate[part] = _counted(piece)
+                turns[part] = np.interp(times[part], piece.times, counted)
                 lift[part] = np.interp(times[part], piece.times, piece.lift)
         return turns, rate, lift
 
@@ -201,7 +203,8 @@ class Flight:
         found = [np.empty(0)]
         for piece, end in self._pieces.between(start, stop):
             if isinstance(piece, _Flying) and piece.times.size > 1:
-                turns, at = piece.turns, place(_rate(piece))
+                turns, rate = _counted(piece)
+                at = place(rate)
                 whole = np.arange(math.floor(turns[0]) - 1, math.ceil(turns[-1]) + 1) + at
                 whole = whole[(whole >= turns[0]) & (whole < turns[-1])]
                 times = np.interp(whole, turns, piece.times)
@@ -345,11 +348,16 @@ def _turns(motion: Trajectory) -> Array:
     return np.asarray(np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]) - spot) / (2 * np.pi))
 
 
-def _rate(piece: _Flying) -> float:
-    """Return the mean rate of turns in a piece [Hz]; wobble and drag change it by some per cent within the piece."""
+def _counted(piece: _Flying) -> tuple[Array, float]:
+    """Return turns that increase, and their mean rate [Hz].
+
+    Wobble and drag change the rate by some per cent within the piece.  The light has no sense: a top that spins
+    backwards shows the pulses of its mirror image.
+    """
     if piece.times.size < 2:
-        return 1.0
-    return float((piece.turns[-1] - piece.turns[0]) / (piece.times[-1] - piece.times[0]))
+        return piece.turns, 1.0
+    rate = float((piece.turns[-1] - piece.turns[0]) / (piece.times[-1] - piece.times[0]))
+    return piece.turns * math.copysign(1.0, rate), abs(rate)
 
 
 def _lift(motion: Trajectory) -> NDArray[np.float32]:
