@@ -13,7 +13,8 @@ from analysis.spindown.combine import combine
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import fit_spin_down, is_correlated
 from analysis.spindown.tilt import counted
-from levilab.crosscheck.own.model import OF_ONE_RUN, Own, Trial, pull
+from levilab.crosscheck.own.model import OF_ONE_RUN, Own, pull
+from levilab.crosscheck.subject import Trial
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.spindown.analysis import EXPERIMENT, TILTED
 
