@@ -12,6 +12,7 @@ from levilab.simulator.field import flux_density
 from levilab.simulator.kernels import braking
 from levilab.simulator.kernels.motion import CLOCK, L, R
 from levilab.simulator.numbers import largest, length, smallest, sqrt
+from levilab.simulator.spin import law_of
 
 if TYPE_CHECKING:
     from levilab.simulator.kernels.motion import Model
@@ -72,14 +73,8 @@ def _strongest_damping(drag: Any, start: Array) -> Any:
 def has_kink(drag: Any) -> bool:
     """Whether the drag's law has |ω| in it: then it is not smooth at ω = 0, and a step across that loses its order."""
     if isinstance(drag, braking.WasherDragFlow):
-        return any(_law_has_kink(law) for law in (drag.washers, drag.core))
-    return isinstance(drag, braking.DragFlow) and _law_has_kink(drag.law)
-
-
-def _law_has_kink(law: Any) -> bool:
-    if isinstance(law, braking.Mixed):
-        return law.c2 != 0
-    return not isinstance(law, braking.Stokes) and law.c != 0
+        return not (law_of(drag.washers).is_linear(drag.washers) and law_of(drag.core).is_linear(drag.core))
+    return isinstance(drag, braking.DragFlow) and not law_of(drag.law).is_linear(drag.law)
 
 
 def comes_near_zero(spins: Array) -> NDArray[np.bool_]:
@@ -94,13 +89,7 @@ def comes_near_zero(spins: Array) -> NDArray[np.bool_]:
 
 def _damping_rate(law: Any, spin: Any) -> Any:
     """Return |ω̇/ω| of a drag law at a spin [1/s]."""
-    if isinstance(law, braking.Stokes):
-        return law.c
-    if isinstance(law, braking.Newton):
-        return law.c * spin
-    if isinstance(law, braking.LaminarDisc):
-        return law.c * sqrt(spin)
-    return law.c1 + law.c2 * spin
+    return law_of(law).damping(spin, *law)
 
 
 #: An estimate is to bound the true error; with this factor it is about six times as large.

@@ -22,13 +22,6 @@ if TYPE_CHECKING:
 
     from levilab.acquisition.loop import AcquisitionRequest
 
-#: Law of drag → its constants (SI) for about 0.3 %/s at 30 Hz, their names in result.json, the exponent of its power.
-LAWS: dict[str, tuple[tuple[float, ...], tuple[str, ...], float | None]] = {
-    "stokes": ((3.2e-3,), ("c1",), 1.0),
-    "newton": ((1.72e-5,), ("c2",), 2.0),
-    "disc": ((2.34e-4,), ("c32",), 1.5),
-    "mixed": ((1.6e-3, 0.86e-5), ("c1", "c2"), None),
-}
 #: The spin at which the drive goes off [Hz].
 START_HZ = 40.0
 #: States of the simulated spin per second, for the moment of the fall.
@@ -38,8 +31,8 @@ RATE = 10.0
 def trial(seed: int, folder: Path) -> list[Pull]:
     """One spin-down: drag, fall and scatter of the pulses are drawn by the seed."""
     random = np.random.default_rng((seed, 2))
-    law = sorted(LAWS)[int(random.integers(len(LAWS)))]
-    usual, names, exponent = LAWS[law]
+    law = sorted(DECAYS)[int(random.integers(len(DECAYS)))]
+    usual, names, exponent = DECAYS[law].usual, DECAYS[law].names, DECAYS[law].exponent
     scene = SpinScene(
         start_hz=float(random.uniform(28.0, 33.0)),
         drag=law,
