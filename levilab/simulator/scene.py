@@ -325,8 +325,8 @@ def _read_file(file: Traversable | Path, name: str) -> Scene:
         table = parse_toml(file.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
         raise SceneError(
-            f"{file}: there is no such file; scenes that come with levilab are {', '.join(presets())}, "
-            "each a TOML file to copy and change"
+            f"{file}: there is no such file; scenes that come with levilab are {', '.join(presets())}, each a TOML "
+            "file to copy and change"
         ) from None
     except OSError as error:
         if file.is_dir():

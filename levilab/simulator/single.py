@@ -145,8 +145,8 @@ def simulate(
         given = {"events": events, "scheme": scheme, "step": step, "start": start}
         if useless := [name for name, value in given.items() if value is not None]:
             raise SimulationError(
-                f"{useless[0]}: a scene with observed = spin has a closed form, nothing is integrated: "
-                "take observed = motion"
+                f"{useless[0]}: a scene with observed = spin has a closed form, nothing is integrated: take observed = "
+                "motion"
             )
         return spin_alone(scene, duration, tolerance, rate)
     state = start_of(scene) if start is None else np.array(start, dtype=np.float64)
@@ -154,8 +154,8 @@ def simulate(
         raise SimulationError("the start has a value that is no number: 18 finite numbers are expected")
     if start is None and min(margins(state, (scene.escape.radius_m, scene.escape.height_m)).values()) < 0:
         raise SimulationError(
-            f"escape.height_m = {scene.escape.height_m}: the top starts at {state[R][2]:.4g} m, outside of the "
-            "limits of the escape, where it would be lost before it began"
+            f"escape.height_m = {scene.escape.height_m}: the top starts at {state[R][2]:.4g} m, outside of the limits "
+            "of the escape, where it would be lost before it began"
         )
     model = model_of(scene, state[R])
     problem = Problem(scene, model, state, scheme_for(scheme, model))
@@ -376,8 +376,8 @@ def spin_alone(scene: Scene, duration: float, tolerance: float, rate: float | No
         longest_ago = since_infinity(scene.drag.law, spin, scene.drag.constants)
         if -duration >= longest_ago:
             raise SimulationError(
-                f"duration = {duration} s: under this drag the spin was infinite {longest_ago:.6g} s ago; "
-                "a shorter way back is expected"
+                f"duration = {duration} s: under this drag the spin was infinite {longest_ago:.6g} s ago; a shorter "
+                "way back is expected"
             )
         now = DECAYS[scene.drag.law].after(spin, times, *scene.drag.constants)
         states[:, L] = start[L] * (now / spin)[:, None]

@@ -159,8 +159,8 @@ def check_observables(plan: Plan) -> None:
     if not can_lock(plan.scene, plan.duration_s) and not varied & {"drive", "top.moment_tilt"}:
         raise UsageError(
             "observe",
-            "locked needs a drive that lasts and a moment across the axis "
-            "(drive.waveform, drive.amplitude_t and top.moment_tilt, as in the scene driven)",
+            "locked needs a drive that lasts and a moment across the axis (drive.waveform, drive.amplitude_t and "
+            "top.moment_tilt, as in the scene driven)",
             value="locked",
         )
 

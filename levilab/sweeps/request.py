@@ -114,8 +114,8 @@ def _existing_store(request: SweepRequest, plan: Plan, path: Path, *, resume: bo
         more = f" (and {len(other) - 3} more)" if len(other) > 3 else ""
         raise UsageError(
             "resume",
-            f"{path} is of another sweep: {'; '.join(other[:3])}{more}.  Take `out` for another store, or "
-            f"levilab sweep {path} --resume to go on with that one",
+            f"{path} is of another sweep: {'; '.join(other[:3])}{more}.  Take `out` for another store, or levilab "
+            f"sweep {path} --resume to go on with that one",
         )
     return store
 

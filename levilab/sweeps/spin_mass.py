@@ -103,8 +103,8 @@ def _check(spins: Span, masses: Span) -> None:
     if (tops := spins[2] * masses[2]) > MOST_TOPS:
         raise UsageError(
             "masses",
-            f"{spins[2]} spins and {masses[2]} masses are {tops} tops, at most {MOST_TOPS} are possible: "
-            "take longer steps in `spins` or `masses`",
+            f"{spins[2]} spins and {masses[2]} masses are {tops} tops, at most {MOST_TOPS} are possible: take longer "
+            "steps in `spins` or `masses`",
         )
 
 
