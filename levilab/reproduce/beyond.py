@@ -12,7 +12,6 @@ import numpy as np
 from analysis.precession.sweep import Sweep, fit_sweep
 from analysis.spindown.fit import fit_spin_down
 from analysis.stability import wobble_resonance
-from analysis.uncertainty import Estimate
 from levilab.motion.lines import lines_of, rate_for
 from levilab.motion.lock import body_angle
 from levilab.present.document.blocks import Note, Picture
@@ -180,7 +179,7 @@ def about_lock() -> list[Finding]:
         check(
             f"slope of precession over drive, nine drives from {DRIVES_HZ[0]:g} to {DRIVES_HZ[-1]:g} Hz, simulated",
             printed,
-            Estimate(line.slope, line.u_slope, ""),
+            line.slope,
             Because(
                 "a locked top wobbles at the drive's frequency: slope 1 and intercept 0 jointly (here "
                 f"{line.slope:.6f} and {1e3 * line.intercept:.2f} mHz, p = {p:.2f}); 1.05 is printed without "
@@ -188,6 +187,7 @@ def about_lock() -> list[Finding]:
                 f"{DRIVES_HZ[0]:g} to {DRIVES_HZ[-1]:g} Hz it would be {0.05 * float(np.ptp(DRIVES_HZ)):.1f} Hz",
                 abs(line.slope - 1) < 1e-3 and (p or 0.0) > 0.01,
             ),
+            u=line.u_slope,
         )
     ]
 

@@ -11,12 +11,12 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 from analysis.numbers import digits
+from analysis.uncertainty import Estimate
 from levilab.present.numbers import in_words, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from analysis.uncertainty import Estimate
     from levilab.stability.published.printed import Printed
 
 #: What a float loses in a difference of two numbers with few digits.
@@ -133,19 +133,23 @@ class Finding:
 def check(
     name: str,
     published: Printed,
-    ours: Estimate,
-    way: Way = Rounding(),  # frozen
+    value: float | None,
+    way: Way = Rounding(),
     how: Comparison = Comparison.INDEPENDENT,
+    *,
+    u: float | None = None,
 ) -> Finding:
     """Compare a number.
 
     Args:
         name: what is compared.
         published: as printed.
-        ours: in the unit of the published one.
+        value: ours, in the unit of the published one.
         way: how they are compared.
         how: what the comparison is worth, of a number that the source prints; one that it does not print is ours.
+        u: standard uncertainty of ours.
     """
+    ours = Estimate(value, u, published.unit)
     off = math.nan if ours.value is None else abs(ours.value - published.value)
     verdict = _judge(published, ours, way, off)
     beyond = off > published.rounding * (1 + _FLOAT)

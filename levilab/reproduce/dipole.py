@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Picture
 from levilab.present.numbers import signed
 from levilab.reproduce.chapter import Found
@@ -97,10 +96,10 @@ def make() -> Found:
             f"%, of which ½B″(h²/12 − R²/4) is {signed(leading, 2)} %",
             holds=bool(np.abs(over[0]).max() < 1.0),
         ),
-        check("force at 7.3 cm, disc over point", THESIS["dipole.force"], Estimate(force, None, "%")),
-        check("B″ at 7.3 cm, disc over point", THESIS["dipole.bend"], Estimate(bend, None, "%")),
-        check("lower edge of the heights, a point", THESIS["dipole.edge"], Estimate(edges[0], None, "cm")),
-        check("lower edge of the heights, a disc", THESIS["dipole.disc_edge"], Estimate(edges[1], None, "cm")),
+        check("force at 7.3 cm, disc over point", THESIS["dipole.force"], force),
+        check("B″ at 7.3 cm, disc over point", THESIS["dipole.bend"], bend),
+        check("lower edge of the heights, a point", THESIS["dipole.edge"], edges[0]),
+        check("lower edge of the heights, a disc", THESIS["dipole.disc_edge"], edges[1]),
         statement(
             "is the approximation good?",
             "dipole approximation",

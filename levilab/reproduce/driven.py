@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.uncertainty import Estimate
 from levilab.motion.lines import lines_of, rate_for
 from levilab.motion.lock import is_locked
 from levilab.present.document.blocks import Note, Picture
@@ -82,7 +81,7 @@ def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
         check(
             "mean of the spin ω₃/2π",
             drive,
-            Estimate(turns, None, "Hz"),
+            turns,
             Within(
                 0.1,
                 "the body turns about the vertical as the drive does; ω₃ is that rate times cos θ, here lower by "
@@ -92,17 +91,19 @@ def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
         check(
             "line of n_x + i n_y at the drive, which a laser beside the stem counts",
             drive,
-            Estimate(wave(lines, "drive"), lines.resolution / 2, "Hz"),
+            wave(lines, "drive"),
+            u=lines.resolution / 2,
         ),
         check(
             f"free precession, in the first {WINDOW_S:g} s",
             THESIS["driven.precession"],
-            Estimate(precession, early.resolution / 2, "Hz"),
+            precession,
+            u=early.resolution / 2,
         ),
         check(
             "distance of the sidebands, the spin's swing about the drive",
             THESIS["driven.sideband"],
-            Estimate(sideband(lines), None, "Hz"),
+            sideband(lines),
             Within(
                 1 / WINDOW_S,
                 f"a bin of a record of {WINDOW_S:g} s is {1e3 / WINDOW_S:.0f} mHz wide; the place of a line between "

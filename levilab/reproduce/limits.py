@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Among, Because, Comparison, Within, check, statement
@@ -101,7 +100,7 @@ def lower_checks(lower: dict[str, Array], mass: float) -> list[Finding]:
             check(
                 f"{name}: lower limit",
                 THESIS[f"limits.lower.{name}"],
-                Estimate(float(lower[name][at]), None, "Hz"),
+                float(lower[name][at]),
                 Within(room, f"a step of {STEP_HZ:g} Hz in each of two scans, and half a step of mass, 0.0025 g"),
                 Comparison.FITTED,
             )
@@ -128,12 +127,7 @@ def upper_checks(uppers: dict[str, Upper]) -> list[Finding]:
         )
         inside = one.until - 0.5 <= printed.value <= one.last + 0.5
         found.append(
-            check(
-                f"{name}: upper limit, all tops up to",
-                printed,
-                Estimate(one.until, None, "Hz"),
-                Because(why, inside and islands > 0),
-            )
+            check(f"{name}: upper limit, all tops up to", printed, one.until, Because(why, inside and islands > 0))
         )
     return found
 
@@ -150,7 +144,7 @@ def drag_checks() -> tuple[list[Finding], dict[str, Array]]:
             check(
                 f"{name}: spin at the fall, with drag",
                 printed,
-                Estimate(middle, None, "Hz"),
+                middle,
                 Among(
                     float(ends.min()),
                     float(ends.max()),
@@ -184,23 +178,24 @@ def misprint(with_030: Array) -> tuple[list[Finding], Array]:
         check(
             "IC3: the start's place beside the axis that gives the printed lower limit",
             THESIS["limits.start.IC3_x"],
-            Estimate(100 * aside, 100 * u_aside, "cm"),
+            100 * aside,
             Because(
                 f"the lower limit is {by_x[0.5]:.2f} Hz from x = 0.50 cm as printed and {by_x[0.3]:.2f} Hz from 0.30 "
                 f"cm, with steps of {COARSE_HZ:g} Hz; printed is {printed.text} Hz: a 3 read or printed as 5",
                 abs(by_x[0.3] - printed.value) < COARSE_HZ and by_x[0.5] - printed.value > 1.0,
             ),
+            u=100 * u_aside,
         ),
         check(
             "IC3 with x = 0.50 cm as printed: lower limit",
             printed,
-            Estimate(by_x[0.5], None, "Hz"),
+            by_x[0.5],
             Because(f"with x = 0.30 cm it is {by_x[0.3]:.2f} Hz", by_x[0.3], COARSE_HZ),
         ),
         check(
             "IC3 with x = 0.50 cm as printed: spin at the fall, with drag",
             THESIS["limits.drag.IC3"],
-            Estimate(float(np.median(drag)), None, "Hz"),
+            float(np.median(drag)),
             Because(
                 f"with x = 0.30 cm tops fall at {with_030.min():.2f} to {with_030.max():.2f} Hz",
                 float(np.median(with_030)),

@@ -10,7 +10,6 @@ import numpy as np
 
 from analysis.numbers import digits
 from analysis.stability import sleeping_limit
-from analysis.uncertainty import Estimate
 from levilab.motion.lines import lines_of, rate_for
 from levilab.present.document.blocks import Picture
 from levilab.reproduce.chapter import Found
@@ -131,7 +130,7 @@ def sudden_fall() -> Finding:
     return check(
         f"IC1 without drag, {limit - spins[0]:.2f} Hz below its lower limit: the tilt exceeds {LARGE_RAD:g} rad after",
         THESIS["fall.time"],
-        Estimate(times[0], None, "s"),
+        times[0],
         Within(
             max(times) - min(times), "a hundredth and two below it: " + ", ".join(f"{time:.2f} s" for time in times)
         ),
@@ -179,7 +178,7 @@ def tilted() -> tuple[list[Finding], tuple[Trajectory, Trajectory]]:
         check(
             "angle between moment and axis",
             printed,
-            Estimate(angle, None, "°"),
+            angle,
             Because(
                 f"μ·(0.03, 0, 0.97) leans by arctan(0.03/0.97) = {angle:.4f}°, and it has {norm:.6f} of the length of "
                 f"μ, {100 * (1 - norm):.0f} % less, so that a lighter top floats; 1.5° would be "

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.stability import SymmetricTop, sleeping_limit, spin_windows
-from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
 from levilab.present.numbers import signed
 from levilab.reproduce.chapter import Found
@@ -176,15 +175,10 @@ def make() -> Found:
         near = _among(highest)
         upper = near if near.low - STEP_RAD_S <= last <= near.high + STEP_RAD_S else beyond
         findings += [
-            check(f"{name}: lower edge of the quartic", printed["lower_quartic"], Estimate(low, None, "rad/s")),
-            check(f"{name}: upper edge of the quartic", printed["upper_quartic"], Estimate(high, None, "rad/s")),
-            check(
-                f"{name}: lower limit, simulated",
-                printed["lower"],
-                Estimate(calm[0], None, "rad/s"),
-                _among(lowest),
-            ),
-            check(f"{name}: upper limit, simulated", printed["upper"], Estimate(calm[1], None, "rad/s"), upper),
+            check(f"{name}: lower edge of the quartic", printed["lower_quartic"], low),
+            check(f"{name}: upper edge of the quartic", printed["upper_quartic"], high),
+            check(f"{name}: lower limit, simulated", printed["lower"], calm[0], _among(lowest)),
+            check(f"{name}: upper limit, simulated", printed["upper"], calm[1], upper),
         ]
     three = row("3")
     rpm = {key: SIMON[f"abstract.{key}"].value * TURN / 60 for key in ("upper_simulated", "upper_measured")}

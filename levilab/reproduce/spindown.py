@@ -53,13 +53,13 @@ def straight(runs: tuple[MadeUp, ...]) -> list[Finding]:
     found: list[Finding] = []
     for number, run in enumerate(runs):
         c1, c2 = straight_lines(run.time, run.spin)
-        for name, key, value, unit in (("C₁", "c1", c1, "1/s"), ("|C₂|", "c2", c2, "1/rad")):
+        for name, key, value in (("C₁", "c1", c1), ("|C₂|", "c2", c2)):
             printed = several("thesis", f"spindown.{key}")[number]
             line = f"run {number + 1}: {name}, straight line"
-            found.append(check(line, printed, Estimate(value, None, unit), how=Comparison.CONSTRUCTED))
+            found.append(check(line, printed, value, how=Comparison.CONSTRUCTED))
     average = mean([Estimate(straight_lines(run.time, run.spin)[0], None, "1/s") for run in runs])
-    ours = Estimate(average.value, average.u, "1/s")
-    found.append(check("mean of C₁", THESIS["spindown.mean_c1"], ours, how=Comparison.CONSTRUCTED))
+    printed = THESIS["spindown.mean_c1"]
+    found.append(check("mean of C₁", printed, average.value, how=Comparison.CONSTRUCTED, u=average.u))
     return found
 
 
@@ -75,8 +75,9 @@ def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
             check(
                 f"run {number + 1}: C of the disc's law",
                 printed,
-                Estimate(c32.value, c32.u, printed.unit),
+                c32.value,
                 Within(room, f"the noise of these readings is another one: twice √2 times our u of {digits(c32.u, 2)}"),
+                u=c32.u,
             )
         )
     exponents = [fit.fit("power").parameters["exponent"] for fit in fits]
@@ -98,7 +99,7 @@ def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
         check(
             "von Kármán's disc of the top's radius in air",
             THESIS["spindown.karman"],
-            Estimate(karman_disc(), None, "(rad/s)^-1/2/s"),
+            karman_disc(),
             Within(
                 karman_disc() * (0.005 / AIR_KG_M3 + 0.005e-5 / (2 * AIR_M2_S)),
                 f"{AIR_KG_M3:.2f} kg/m³ and {AIR_M2_S:.2e} m²/s of the air are rounded to three digits",

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.limits import Sample, compare, summarize
-from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Picture
 from levilab.present.numbers import signed
 from levilab.reproduce.chapter import Found
@@ -65,7 +64,7 @@ def make() -> Found:
     assert found.trend.value is not None
     assert found.trend_p is not None
     findings: list[Finding] = [
-        check("mean of ten", THESIS["measured.mean"], Estimate(found.mean.value, None, "Hz")),
+        check("mean of ten", THESIS["measured.mean"], found.mean.value),
         statement(
             "rounding to 0.1 Hz",
             THESIS["measured.limits.0"].place,

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.stability import floating_mass, reduced_mass
-from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Because, Comparison, check
@@ -37,7 +36,7 @@ def heights_and_masses(scene: Scene, prefix: str) -> list[Finding]:
     title = {"twice": "b = 2a", "own": "b/a = 5.5/3"}[prefix]
     names = ("lower region from", "lower region to", "upper region from", "upper region to")
     return [
-        check(f"{title}: {name}", THESIS[f"stability.{prefix}_{key}"], Estimate(z / a, None, "a"))
+        check(f"{title}: {name}", THESIS[f"stability.{prefix}_{key}"], z / a)
         for name, (key, z) in zip(names, edges.items(), strict=True)
     ]
 
@@ -49,16 +48,12 @@ def effective_masses() -> list[Finding]:
     window, base = found.windows[-1], scene.base
     per_kg = reduced_mass(1.0, found.top, base.inner_radius_m, base.strength_t_m)
     masses = [
-        check(
-            f"b = 2a: effective mass of the {word} top",
-            THESIS[f"stability.twice_{key}"],
-            Estimate(mass * per_kg, None, ""),
-        )
+        check(f"b = 2a: effective mass of the {word} top", THESIS[f"stability.twice_{key}"], mass * per_kg)
         for word, key, mass in (("lightest", "light", window.light), ("heaviest", "heavy", window.heavy))
     ]
     resting = stability_of(scene.changed({"top.mass_kg": RESTING / per_kg})).floating
     assert resting is not None
-    height = Estimate(resting.height / base.inner_radius_m, None, "a")
+    height = resting.height / base.inner_radius_m
     return [*masses, check(f"b = 2a: height of the top with M = {RESTING:.4f}", THESIS["stability.twice_rest"], height)]
 
 
@@ -74,7 +69,7 @@ def device() -> list[Finding]:
     true = check(
         "least spin of the thesis's own estimate against the exact one",
         THESIS["stability.estimate"],
-        Estimate(exact, None, "Hz"),
+        exact,
         Because(
             f"the estimate lacks the factor 2√(I₁/I₃) = {factor:.3f}: with it, for "
             f"{found.scene.top.mass_kg * 1e3:.2f} g at {100 * found.floating.height:.2f} cm, where they float, it is "
@@ -84,12 +79,12 @@ def device() -> list[Finding]:
         ),
     )
     return [
-        check("lightest top that floats", THESIS["stability.lightest"], Estimate(1e3 * window.light, None, "g")),
-        check("heaviest top that floats", THESIS["stability.heaviest"], Estimate(1e3 * window.heavy, None, "g")),
+        check("lightest top that floats", THESIS["stability.lightest"], 1e3 * window.light),
+        check("heaviest top that floats", THESIS["stability.heaviest"], 1e3 * window.heavy),
         check(
             "mass of the top that floats at the measured 7.3 cm",
             THESIS["device.mass"],
-            Estimate(1e3 * found.scene.top.mass_kg, None, "g"),
+            1e3 * found.scene.top.mass_kg,
             Because(
                 f"the field of Table 3.1 lifts {1e3 * window.heavy:.3f} g at most: 25.5 g fall. At 7.3 cm it lifts "
                 f"{1e3 * lifted:.2f} g",
@@ -99,13 +94,13 @@ def device() -> list[Finding]:
         check(
             f"height of a top of {1e3 * found.scene.top.mass_kg:.2f} g",
             THESIS["device.height"],
-            Estimate(100 * found.floating.height, None, "cm"),
+            100 * found.floating.height,
             how=Comparison.FITTED,
         ),
         check(
             f"the thesis's estimate, for {1e3 * ESTIMATE_KG:.2f} g at 7.3 cm",
             THESIS["stability.estimate"],
-            Estimate(estimate, None, "Hz"),
+            estimate,
             how=Comparison.FITTED,
         ),
         true,

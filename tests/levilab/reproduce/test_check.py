@@ -7,7 +7,6 @@ import math
 
 import pytest
 
-from analysis.uncertainty import Estimate
 from levilab.reproduce.check import (
     Among,
     Because,
@@ -29,7 +28,7 @@ MEAN = Printed("21.86", "Hz", "ten", "a thesis")
 
 def check(value: float | None, way=None, u: float | None = None) -> Finding:
     given = () if way is None else (way,)
-    return checked("mean", MEAN, Estimate(value, u, "Hz"), *given)
+    return checked("mean", MEAN, value, *given, u=u)
 
 
 @pytest.mark.parametrize(
