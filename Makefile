@@ -48,11 +48,12 @@ fuzz: setup  ## what a fuzzer guided by coverage finds, SECONDS for each target 
 mutants: setup  ## which mistakes in the code the tests would miss, an hour or more the first time; see docs/mutants.md
 	$(BIN)/python benchmarks/mutants
 
-lint: setup  ## style, types and import rules
+lint: setup  ## style, types, import rules, and the number of lines
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+	@$(BIN)/python tests/support/size.py
 
 all-pythons: setup  ## the tests on every Python from 3.11 on that is installed
 	@# pyenv shows only the versions that PYENV_VERSION names

@@ -131,7 +131,7 @@ class Budget:
 
 
 def rest(whole: float, *parts: float) -> float:
-    """What is left of a standard uncertainty when uncorrelated parts of it are taken off; 0 where they exceed it.
+    """Return a standard uncertainty without uncorrelated parts of it; 0 where they exceed it.
 
     >>> rest(5.0, 3.0)
     4.0
@@ -144,7 +144,7 @@ MOST_DECIMALS = 9
 
 
 def printed_step(values: Iterable[float]) -> float | None:
-    """The last decimal to which numbers were rounded when they were printed; None where they were not.
+    """Return the last decimal to which numbers were rounded when they were printed; None where they were not.
 
     The step is found from the numbers themselves, so it may be too large where few of them happen to end in zeros: of
     ten numbers one time in 10¹⁰.
@@ -160,12 +160,12 @@ def printed_step(values: Iterable[float]) -> float | None:
 
 
 def u_of_step(step: float) -> float:
-    """Standard uncertainty of a number rounded to a step: that of an even distribution (GUM F.2.2.1)."""
+    """Return the standard uncertainty of a number rounded to a step: that of an even distribution (GUM F.2.2.1)."""
     return step / sqrt(12)
 
 
 def u_of_limit(limit: float) -> float:
-    """Standard uncertainty of what lies within ±limit, as a data sheet says: an even distribution (GUM 4.3.7)."""
+    """Return the standard uncertainty of an even distribution within ±limit, as a data sheet gives it (GUM 4.3.7)."""
     return limit / sqrt(3)
 
 

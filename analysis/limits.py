@@ -39,7 +39,7 @@ _LINE_S = 20.0
 
 
 def spin_at_fall(times: Array, spins: Array, u: float | None, between: tuple[float, float]) -> Estimate:
-    """The spin at which a free top fell, from a line through its last readings, continued to the fall [Hz].
+    """Return the spin at which a free top fell, from a line through its last readings, continued to the fall [Hz].
 
     The lowest spin that is seen is too high by half the time between two readings, 0.06 Hz/s at 22 Hz.
 
@@ -94,6 +94,11 @@ class Sample:
     u: Array | None = None
     steps: Array | None = None
 
+    @classmethod
+    def within_steps(cls, limits: Array, u: Array) -> Sample:
+        """Return limits that are known to a step of the drive each; u is the standard uncertainty, step/√12."""
+        return cls(limits, u, u * math.sqrt(12))
+
     @property
     def step(self) -> float:
         """The width of a step [Hz], 0 where there was none."""
@@ -119,7 +124,7 @@ class Statistics:
         trend_p: how probable so large a trend is by chance.
         outliers: numbers of those that chance would hardly put there, from 0; they stay in the statistics.
         step: the part of the standard error that the drive's steps leave, however many repetitions there are [Hz].
-        freedom: degrees of freedom of the standard error; infinite where it does not rest on a scatter.
+        freedom: degrees of freedom of the standard error; None where it does not rest on a scatter.
         runs: of how many runs.
         between: standard deviation of a run's mean from another's, beyond what their tops explain, with its u [Hz];
             None of one run, and of runs with a single repetition each, where it is part of the scatter.
@@ -132,7 +137,7 @@ class Statistics:
     trend_p: float | None
     outliers: tuple[int, ...]
     step: float = 0.0
-    freedom: float = math.inf
+    freedom: float | None = None
     runs: int = 1
     between: Estimate | None = None
 
@@ -184,7 +189,7 @@ def summarize(sample: Sample) -> Statistics:
 
 
 def combine(runs: Sequence[Sample]) -> Statistics:
-    """The same of several runs under the same conditions, which may still differ by more than their tops.
+    """Return the same of several runs under the same conditions, which may still differ by more than their tops.
 
     A random-effects mean: all runs share one scatter s from top to top; a run of n tops has the variance τ² + s²/n and
     the weight of its inverse, where τ is the scatter between runs that makes χ² of the runs' means what is expected
@@ -245,27 +250,27 @@ def _checked(limits: Array) -> Array:
 
 
 def _scatter(values: Array) -> float:
-    """Standard deviation; 0 of values that differ by no more than rounding."""
+    """Return the standard deviation; 0 of values that differ by no more than rounding."""
     return _beyond_rounding(float(values.std(ddof=1)), values)
 
 
 def _beyond_rounding(scatter: float, values: Array) -> float:
-    """A scatter of values about what they are compared with; 0 where rounding of the values makes it."""
+    """Return the scatter of values about a reference; 0 where rounding of the values makes it."""
     return scatter if scatter > ROUNDING * float(np.abs(values).max()) else 0.0
 
 
 def _with_own_u(scatter: float, freedom: int) -> Estimate:
-    """A standard deviation and its uncertainty (GUM E.4.3)."""
+    """Return a standard deviation and its uncertainty (GUM E.4.3)."""
     return Estimate(scatter, scatter / math.sqrt(2 * freedom), "Hz")
 
 
-def _freedom(variance: float, by_scatter: float, freedom: int) -> float:
+def _freedom(variance: float, by_scatter: float, freedom: int) -> float | None:
     """Of a variance of which only a part is from a scatter (Welch and Satterthwaite, GUM G.4)."""
-    return math.inf if by_scatter == 0 else freedom * (variance / by_scatter) ** 2
+    return None if by_scatter == 0 else freedom * (variance / by_scatter) ** 2
 
 
 def _between(means: Array, own: Array) -> float:
-    """The variance between runs [Hz²], from the runs' means and the variances that their tops leave to them."""
+    """Return the variance between runs [Hz²], from the runs' means and the variances that their tops leave to them."""
     wanted = means.size - 1
     if not _scatter(means):
         return 0.0
@@ -294,7 +299,7 @@ def _weights(variances: Array) -> Array:
 
 
 def _common_error(scatter: float, step: float) -> float:
-    """The standard uncertainty that steps of the drive leave to a mean of ever so many limits [Hz].
+    """Return the standard uncertainty that steps of the drive leave to a mean of ever so many limits [Hz].
 
     A limit within a step is given as the middle of the step, wrong by step/√12.  Two tops share that error if they fall
     into the same step, and do not if they scatter over several: of tops with a true scatter σ its correlation is
@@ -330,11 +335,11 @@ def _trend(limits: Array) -> tuple[Estimate, float]:
     return Estimate(slope, u, "Hz"), 0.0 if u == 0 else _by_chance(slope / u, limits.size - 2)
 
 
-def _by_chance(t: float, freedom: float) -> float:
-    """How probable |t| or more is under Student's law, the normal one where freedom is infinite."""
+def _by_chance(t: float, freedom: float | None) -> float:
+    """Return how probable |t| or more is under Student's law, the normal one where freedom is None."""
     from scipy.special import ndtr, stdtr  # scipy.stats takes a second to load
 
-    return float(2 * (ndtr(-abs(t)) if math.isinf(freedom) else stdtr(freedom, -abs(t))))
+    return float(2 * (ndtr(-abs(t)) if freedom is None else stdtr(freedom, -abs(t))))
 
 
 def outliers_of(limits: Array) -> tuple[int, ...]:
@@ -386,7 +391,7 @@ class Comparison:
 
 
 def compare(found: Statistics, name: str, expected: float) -> Comparison:
-    """The mean of repeated limits beside a spin that theory names [Hz]."""
+    """Return the mean of repeated limits beside a spin that theory names [Hz]."""
     assert found.mean.value is not None  # as summarized
     difference = found.mean.value - expected
     u = found.mean.u
@@ -410,7 +415,7 @@ def nearest_edge(mean: float, window: tuple[float, float]) -> str:
 
 
 def spins_of_window(windows: Sequence[tuple[float, float]], spin: float) -> tuple[float, float]:
-    """The window [Hz] that holds a spin, or whose edge is nearest to it.  Raises NoWindow."""
+    """Return the window [Hz] that holds a spin, or whose edge is nearest to it.  Raises NoWindow."""
     if not windows:
         raise NoWindow
     return min(windows, key=lambda w: 0.0 if w[0] <= spin <= w[1] else min(abs(spin - w[0]), abs(spin - w[1])))

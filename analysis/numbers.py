@@ -4,7 +4,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def with_minus(text: str) -> str:
-    """A number as Python writes it, with a minus where a hyphen stands before it.
+    """Return a number as Python writes it, with a minus where a hyphen stands before it.
 
     >>> with_minus("-0.56"), with_minus("+0.56")
     ('−0.56', '+0.56')
@@ -13,7 +13,7 @@ def with_minus(text: str) -> str:
 
 
 def digits(value: float, count: int = 2) -> str:
-    """A number rounded to so many digits; with a power of ten only where zeros would hide them.
+    """Return a number rounded to so many digits; with a power of ten only where zeros would hide them.
 
     >>> digits(538.2), digits(0.0312), digits(2.34e-14), digits(1.0), digits(12345, 3), digits(-0.5)
     ('540', '0.031', '2.3×10⁻¹⁴', '1', '12300', '−0.5')

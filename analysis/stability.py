@@ -111,7 +111,7 @@ def _conditions(field: AxialField, top: SymmetricTop, z: Array) -> Array:
 
 
 def windows(field: AxialField, top: SymmetricTop, low: float, high: float) -> tuple[Window, ...]:
-    """The stable heights between low and high [m], for a moment against the field, each with its masses.
+    """Return the stable heights between low and high [m], for a moment against the field, each with its masses.
 
     Scanned in HEIGHTS steps, each edge then found to the last digits.  Without a moment there are none.
     """
@@ -129,7 +129,7 @@ def windows(field: AxialField, top: SymmetricTop, low: float, high: float) -> tu
 
 
 def _edge(field: AxialField, top: SymmetricTop, inside: float, outside: float) -> float:
-    """The height at which one of the conditions passes zero."""
+    """Return the height at which one of the conditions passes zero."""
     size = _sizes(field, inside)
     worst = lambda z: float(np.min(_conditions(field, top, np.array([z]))[:, 0] / size))  # noqa: E731
     return _zero(worst, inside, outside, xtol=1e-15, rtol=1e-14)
@@ -141,7 +141,7 @@ def _sizes(field: AxialField, z: float) -> Array:
 
 
 def floating_mass(field: AxialField, top: SymmetricTop, height: float) -> float:
-    """The mass [kg] that floats at a height: |μ||B′|/g; infinite where nothing weighs."""
+    """Return the mass [kg] that floats at a height: |μ||B′|/g; infinite where nothing weighs."""
     return float(_masses(field, top, np.array([height]))[0])
 
 
@@ -197,19 +197,19 @@ def quartic(field: AxialField, top: SymmetricTop, height: float, spin: float) ->
 
 
 def modes(field: AxialField, top: SymmetricTop, height: float, spin_hz: float) -> NDArray[np.complex128]:
-    """The four frequencies α/2π [Hz] of the sideways motion; real if it is stable, negative if it turns backwards."""
+    """Return the four frequencies α/2π [Hz] of the sideways motion; real if stable, negative if it turns backwards."""
     roots = np.roots(quartic(field, top, height, 2 * math.pi * spin_hz)) / (2 * math.pi)
     return np.asarray(roots[np.argsort(roots.real)], dtype=np.complex128)
 
 
 def vertical_mode(field: AxialField, top: SymmetricTop, height: float) -> float:
-    """The frequency [Hz] of the up-and-down motion; NaN where it is unstable."""
+    """Return the frequency [Hz] of the up-and-down motion; NaN where it is unstable."""
     square = -top.moment * float(field(np.array([height]))[2, 0]) / top.mass
     return math.sqrt(square) / (2 * math.pi) if square > 0 else math.nan
 
 
 def spin_windows(field: AxialField, top: SymmetricTop, height: float) -> tuple[tuple[float, float], ...]:
-    """The windows of spin [Hz] with four real roots, between 0 and 20 times the sleeping top's limit.
+    """Return the windows of spin [Hz] with four real roots, between 0 and 20 times the sleeping top's limit.
 
     Four real roots: two conditions that the discriminant alone does not tell apart, so the scan (SPINS steps) looks
     at the roots, and each edge is then the zero of the discriminant.
@@ -257,7 +257,7 @@ def sleeping_limit(field: AxialField, top: SymmetricTop, height: float) -> float
 
 
 def thesis_limit(field: AxialField, top: SymmetricTop, height: float) -> float:
-    """The thesis's own estimate √(mg/I₃·|φ₁/φ₂|)/2π [Hz]; it lacks the factor 2√(I₁/I₃)."""
+    """Return the thesis's own estimate √(mg/I₃·|φ₁/φ₂|)/2π [Hz]; it lacks the factor 2√(I₁/I₃)."""
     b, slope = (float(value) for value in field(np.array([height]))[:2, 0])
     return math.sqrt(top.mass * top.gravity / top.axial * abs(b / slope)) / (2 * math.pi)
 

@@ -17,7 +17,7 @@ import heyoka as hy
 import numpy as np
 
 import levilab.benchmark.simulator as room
-from levilab.benchmark.simulator.as_called import many
+from as_called import many
 from levilab.benchmark.simulator.motion import MOTIONS, MU, UNDRIVEN, Motion
 from levilab.benchmark.simulator.taylor import heyoka_start, heyoka_system, propagate
 

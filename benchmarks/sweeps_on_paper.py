@@ -24,7 +24,7 @@ BEGIN, END = "<!-- made by benchmarks/sweeps_on_paper.py -->", "<!-- end -->"
 POINTS = 10**9
 MACHINES, CORES_A_MACHINE = 100, 32
 #: Times that a chunk takes [s]: as sweeps cut maps now, and longer.
-CHUNKS_S = (CHUNK_S, 30.0, 300.0)
+CHUNKS_S = (CHUNK_S, 30.0)
 #: What a scheduler keeps of a task [bytes], and a client of one under way: Dask's own objects, a few kB each.
 TASK_BYTES_IN_SCHEDULER = 5_000
 #: One file of a parallel file system's quota of so many; a group's usual one.

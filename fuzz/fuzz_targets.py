@@ -48,7 +48,7 @@ _MOST_MESSAGES = 40
 
 
 def instrument(name: str) -> Target:
-    """The framer, the parser and the model: messages, each a line; the first byte says how they come."""
+    """Feed framer, parser and model with messages, each a line; the first byte says how they come."""
 
     def run(data: bytes) -> None:
         how, rest = (data[0], data[1:]) if data else (0, b"")
@@ -78,7 +78,7 @@ def _batches(items: list[str], size: int) -> list[list[str]]:
 
 
 def framer(data: bytes) -> None:
-    """The same messages however the bytes are cut; the first byte says how."""
+    """Check that the messages are the same however the bytes are cut; the first byte says how."""
     size = (data[0] if data else 0) % 7 + 1
     for blocks in (True, False):
         whole, pieces = Framer(blocks=blocks), Framer(blocks=blocks)
@@ -91,7 +91,7 @@ def framer(data: bytes) -> None:
 
 
 def blocks(data: bytes) -> None:
-    """A block, or BrokenBlock, and never more than came; both readers agree on what is whole."""
+    """Read a block, or get BrokenBlock, and never more than came; both readers agree on what is whole."""
     whole = _block_or_none(lambda: block_of(data))
     stream = io.BytesIO(data)
     streamed = _block_or_none(lambda: read_block(stream.read))
@@ -146,7 +146,7 @@ class Client:
             await asyncio.sleep(0)
 
     def hang_up(self) -> None:
-        """The client is gone."""
+        """Raise an error: the client is gone."""
         if not self.task.done():
             self.reader.feed_eof()
 

@@ -71,7 +71,19 @@ COUNTERS: tuple[Model[Counter], ...] = (
     Model(
         "53220A",
         Keysight53230A,
-        partial(Virtual53230A, identity="Keysight Technologies,53220A,VIRTUAL,3.09-levilab"),
+        partial(Virtual53230A, digits=11, identity="Keysight Technologies,53220A,VIRTUAL,3.09-levilab"),
+        "TCPIP0::192.168.1.20::5025::SOCKET",
+    ),
+    Model(
+        "53210A",
+        Keysight53230A,
+        partial(
+            Virtual53230A,
+            digits=10,
+            numbered=(1,),
+            lacks=("SPERiod", "TINTerval", "PWIDth", "NWIDth", "PDUTycycle", "NDUTycycle", "TOTalize"),
+            identity="Keysight Technologies,53210A,VIRTUAL,3.09-levilab",
+        ),
         "TCPIP0::192.168.1.20::5025::SOCKET",
     ),
     Model("CNT-91", PendulumCNT91, VirtualCNT91, "GPIB0::10::INSTR"),

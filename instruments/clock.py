@@ -30,7 +30,7 @@ class Clock(Protocol):
     meanwhile: Callable[[], None] | None
 
     def now(self) -> float:
-        """The time [s]."""
+        """Return the time [s]."""
 
     def sleep(self, duration: float) -> None:
         """Let time pass [s]."""
@@ -64,7 +64,7 @@ class WallClock:
             self._start = time.monotonic()
 
     def now(self) -> float:
-        """The time [s]."""
+        """Return the time [s]."""
         return 0.0 if self._start is None else self.speed * (time.monotonic() - self._start)
 
     def sleep(self, duration: float) -> None:
@@ -100,7 +100,7 @@ class VirtualClock:
         self.speed = 1.0 if realtime else math.inf
 
     def now(self) -> float:
-        """The time [s]."""
+        """Return the time [s]."""
         return self._now
 
     def sleep(self, duration: float) -> None:

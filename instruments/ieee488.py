@@ -47,7 +47,7 @@ PLAIN_BLOCK = BlockForm()
 
 
 def read_block(read: Callable[[int], bytes], form: BlockForm = PLAIN_BLOCK) -> bytes:
-    r"""The block at the head of a stream, and the line end behind it.
+    r"""Return the block at the head of a stream, and the line end behind it.
 
     read: exactly so many bytes, or fewer if no more come; form: what stands around it.  Raises BrokenBlock.
 
@@ -76,7 +76,7 @@ def _read_end(read: Callable[[int], bytes], size: int) -> None:
 
 
 def _after_header(read: Callable[[int], bytes], longest: int) -> bytes:
-    """The first two bytes of a block behind a header of so many signs at most."""
+    """Return the first two bytes of a block behind a header of so many signs at most."""
     header = b""
     while len(header) <= longest:
         sign = read(1)
@@ -89,7 +89,7 @@ def _after_header(read: Callable[[int], bytes], longest: int) -> bytes:
 
 
 def block(data: bytes, digits: int = 0) -> bytes:
-    """A definite-length block, without a line end.  digits: of its length, by default as few as it needs.
+    """Return a definite-length block, without a line end.  digits: of its length, by default as few as it needs.
 
     >>> block(b"abc"), block(b""), block(b"abc", digits=9)
     (b'#13abc', b'#10', b'#9000000003abc')
@@ -99,7 +99,7 @@ def block(data: bytes, digits: int = 0) -> bytes:
 
 
 def block_of(message: bytes, form: BlockForm = PLAIN_BLOCK) -> bytes:
-    r"""The bytes of a block that came as a whole message.  Raises BrokenBlock.
+    r"""Return the bytes of a block that came as a whole message.  Raises BrokenBlock.
 
     The line feed behind the block is part of an answer (IEEE 488.2, 8.7.9): without it a block that lost a byte on its
     way would be taken for whole, with the line feed as its last byte.
@@ -146,7 +146,7 @@ class Form:
         return _compiled(self.pattern).fullmatch(answer) is not None
 
     def number(self, answer: str) -> float:
-        """The number in an answer of this form.  Raises ValueError."""
+        """Return the number in an answer of this form.  Raises ValueError."""
         if self.suffix:
             found = _compiled(f"({self.pattern}){self.suffix}").fullmatch(answer)
             answer = found[1] if found else ""

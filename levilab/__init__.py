@@ -96,7 +96,7 @@ def acquire(
 
 
 def load(path: str | PathLike[str]) -> Run:
-    """The run in a run folder.
+    """Return the run in a run folder.
 
     Args:
         path: of the folder, or the name of a run in runs/.

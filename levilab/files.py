@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import glob
 import json
 import math
 import os
@@ -21,7 +22,15 @@ if TYPE_CHECKING:
 
 
 class CannotWrite(LevilabError):
-    """A file cannot be written (any more)."""
+    """A file cannot be written (any more).
+
+    Attributes:
+        problem: what was seen, without what to do.
+    """
+
+    def __init__(self, problem: str, advice: str = "") -> None:
+        self.problem = problem
+        super().__init__(f"{problem}: {advice}" if advice else problem)
 
 
 #: No program writes tables within tables deeper than this; Python's recursion bears some hundreds.
@@ -31,7 +40,7 @@ LARGEST = 10**300
 
 
 def parse_json(text: str) -> Any:
-    """What a JSON text says.
+    """Return the content of a JSON text.
 
     Raises:
         ValueError: it is not JSON, or it holds what no program of ours writes and much of Python stumbles over:
@@ -63,7 +72,7 @@ def _finite_number(text: str) -> float:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """What a TOML text says.
+    """Return the content of a TOML text.
 
     Raises:
         ValueError: it is not TOML, or it holds nesting beyond DEEPEST or a whole number beyond LARGEST.
@@ -82,7 +91,7 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 def _hint(text: str, said: str) -> str:
-    """What is wrong with a number at which TOML was left, as the rest of a sentence; empty for anything else."""
+    """Return the fault of a number at which TOML stopped, as the rest of a sentence; empty for anything else."""
     place = re.search(r"line (\d+)", said)
     line = text.splitlines()[int(place[1]) - 1] if place and int(place[1]) <= len(text.splitlines()) else ""
     if re.search(r"=\s*[+-]?\d+,\d", line):
@@ -98,7 +107,7 @@ _TOO_LARGE = "a whole number in it has more than 300 digits"
 
 
 def finite(value: Any) -> Any:
-    """A value for JSON: what no number can say becomes null, in tables and lists too.
+    """Return a value for JSON: what no number can say becomes null, in tables and lists too.
 
     >>> finite({"mean": 1.0, "spread": [math.inf, math.nan]})
     {'mean': 1.0, 'spread': [None, None]}
@@ -156,7 +165,7 @@ def writing(what: str, advice: str = "choose another place with `out`") -> Itera
     try:
         yield
     except OSError as error:
-        raise CannotWrite(f"{what} ({error.strerror or error}): {advice}") from error
+        raise CannotWrite(f"{what} ({error.strerror or error})", advice) from error
 
 
 def check_writable(path: Path) -> None:
@@ -169,7 +178,7 @@ def check_writable(path: Path) -> None:
 
 
 def stamp(path: Path) -> tuple[int, int, int] | None:
-    """What changes when a file is written or replaced: its time [ns], size and inode; None where there is none."""
+    """Return a stamp that changes when a file is written or replaced: time [ns], size, inode; None without one."""
     try:
         found = os.stat(path)  # noqa: PTH116 - some 20 times a second
     except OSError:
@@ -191,6 +200,7 @@ def replace_atomically(path: Path, content: str | bytes) -> None:
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """Yield a file that replaces another one as a whole when the context ends without an error.  Raises OSError."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    _remove_parts_of_the_dead(path)
     try:
         part.unlink(missing_ok=True)  # of an earlier process of this number
         with part.open("xb") as file:  # never through a link that stands there
@@ -203,6 +213,28 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
         raise
+
+
+def _remove_parts_of_the_dead(path: Path) -> None:
+    """Remove the parts of a file that processes left which were killed while they wrote it."""
+    for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
+        number = part.name.removesuffix(".part").rpartition(".")[2]
+        if number.isdecimal() and not _is_alive(int(number)):
+            with contextlib.suppress(OSError):  # Windows: its process has it open
+                part.unlink()
+
+
+def _is_alive(process: int) -> bool:
+    """Whether a process may be alive; False on Windows, where asking by a signal would end it."""
+    if os.name != "posix":
+        return False
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        pass
+    return True
 
 
 @contextlib.contextmanager
@@ -233,7 +265,7 @@ def locked(path: Path, busy: str) -> Iterator[None]:
 
 
 def sync_folder(folder: Path) -> None:
-    """A new name is on the disk only with its folder; Windows keeps names without being asked."""
+    """Put a new name onto the disk, which happens only with its folder; Windows keeps names without being asked."""
     if os.name != "posix":
         return
     descriptor = os.open(folder, os.O_RDONLY)

@@ -87,7 +87,7 @@ class Stop:
             self._raises_at_once = False
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """The signal handler."""
+        """Return the signal handler."""
         second, self.by = self.by is not None, signal.Signals(number).name
         if (second or self._raises_at_once) and not self._is_shielded:
             self._is_shielded = True
@@ -112,7 +112,7 @@ class End:
         self.wake: Callable[[], object] | None = None
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """The signal handler."""
+        """Return the signal handler."""
         self.by = self.by or signal.Signals(number).name
         if self.wake:
             self.wake()

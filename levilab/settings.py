@@ -20,7 +20,7 @@ class Settings(BaseModel):
 
 
 def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> str:
-    """The first thing that is wrong, with its path and what is allowed, and how many more there are.
+    """Return the first thing that is wrong, with its path and what is allowed, and how many more there are.
 
     Args:
         error: of the table.
@@ -40,13 +40,17 @@ def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> st
 
 #: How pydantic begins and ends what it says of a wrong value, and its words for what it expects.
 _SHOULD_BE = re.compile(r"Input should be (a valid )?(.*?)(, unable to .*|, got .*)?")
+_WHOLE = {
+    "Field required": "is missing",
+    "Input should be an instance of ndarray": "numbers in lists of one length are expected",
+}
 _IN_PLAIN_WORDS = {
     "integer": "whole number", "string": "text", "dictionary": "table", "tuple": "list", "array": "list",
 }  # fmt: skip
 
 
 def expected(text: str) -> str:
-    """What pydantic says of a wrong value, in plain words.
+    """Return pydantic's message about a wrong value in plain words.
 
     >>> expected("Input should be a valid number, unable to parse string as a number")
     'a number is expected'
@@ -55,9 +59,9 @@ def expected(text: str) -> str:
     >>> expected("Input should be a valid boolean, unable to interpret input"), expected("Field required")
     ('true or false is expected', 'is missing')
     """
-    found = _SHOULD_BE.fullmatch(text)
+    found = None if text in _WHOLE else _SHOULD_BE.fullmatch(text)
     if not found:
-        return {"Field required": "is missing"}.get(text, text.removeprefix("Value error, "))
+        return _WHOLE.get(text, text.removeprefix("Value error, "))
     is_kind, what = bool(found[1]), found[2]
     if what == "boolean":
         return "true or false is expected"
@@ -67,7 +71,7 @@ def expected(text: str) -> str:
 
 
 def _meant(where: tuple[int | str, ...], of: type[BaseModel] | None) -> str:
-    """The key that an unknown one is most like, or those that there are."""
+    """Return the key that an unknown one is most like, or those that there are."""
     *tables, key = where
     for name in tables:
         field = of.model_fields.get(str(name)) if of else None
@@ -79,7 +83,7 @@ def _meant(where: tuple[int | str, ...], of: type[BaseModel] | None) -> str:
 
 
 def _kinds(annotation: Any) -> list[type]:
-    """The classes of an annotation such as ``Counter | None``."""
+    """Return the classes of an annotation such as ``Counter | None``."""
     return [kind for kind in (annotation, *get_args(annotation)) if isinstance(kind, type)]
 
 
@@ -94,7 +98,7 @@ _NUMBERS = (
 
 
 def hint_about(seen: object, unit: str = "which is in the key's name") -> str:
-    """What is wrong with a text that was nearly a number, as the rest of a sentence; empty for any other.
+    """Return the fault of a text that is nearly a number, as the rest of a sentence; empty for any other.
 
     Args:
         seen: what was given.

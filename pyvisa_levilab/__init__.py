@@ -27,7 +27,7 @@ class PracticeBench(LevilabVisaLibrary):
     """The library that PyVISA makes of a name such as ``"@levilab"``: a fresh bench with a top of its own."""
 
     def default_bench(self) -> VirtualBench:
-        """A top to practise with behind all four instruments.  Raises ConfigError for a word that is no model."""
+        """Return a bench whose top is to practise with.  Raises ConfigError for a word that is no model."""
         words = [word.strip() for word in str(self.library_path).split(",")]
         clock = WallClock() if REALTIME in words else None
         models = [word for word in words if word not in {REALTIME, *map(str, self.get_library_paths())}]
@@ -35,7 +35,7 @@ class PracticeBench(LevilabVisaLibrary):
 
 
 def kind_and_name(model: str) -> tuple[str, str]:
-    """The kind of a model, and its name, given in any case.  Raises ConfigError where it is none.
+    """Return the kind of a model, and its name, given in any case.  Raises ConfigError where it is none.
 
     >>> kind_and_name("cnt-91")
     ('counter', 'CNT-91')

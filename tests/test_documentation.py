@@ -106,9 +106,9 @@ def follow(steps: dict[str, list[str]], place: Path) -> None:
             assert re.match(as_pattern(shown), written), (line, shown, written)
 
 
-def test_the_readme_and_the_first_steps_show_commands() -> None:
+def test_the_readme_and_the_tutorial_show_commands() -> None:
     assert len(steps()["README.md"]) >= 5
-    assert len(steps()["docs/first-steps.md"]) >= 3
+    assert len(steps()["docs/tutorial.md"]) >= 8
 
 
 @pytest.mark.parametrize(("shown", "matches"), [

@@ -587,23 +587,3 @@ def _outliers(scan: FieldScan, leverage: Array) -> list[str]:
         "measure that height again"
         for i in found
     ]
-
-
-def restore_scan(
-    height: ArrayLike,
-    flux_density: ArrayLike,
-    known: Known,
-    u: ArrayLike | None,
-    height_u: ArrayLike | float,
-    *,
-    fitted: tuple[str, ...],
-    parameters: Mapping[str, Estimate],
-    covariance: Array,
-    statistics: Statistics,
-    warnings: tuple[str, ...],
-) -> FieldScan:
-    """Restore an earlier fit from its result and its readings; see `fit_scan`."""
-    z, b, u_b, u_z = _checked(height, flux_density, u, height_u)
-    values = np.array([parameters[name].value for name in PARAMETERS], dtype=float)
-    sigma = _Problem(z, b, u_b, u_z, known, fitted).sigma(values)
-    return FieldScan(parameters, covariance, fitted, known, statistics, z, b, sigma, warnings)

@@ -21,8 +21,10 @@ Array = NDArray[np.float64]
 
 #: Fewer points leave no degree of freedom beside two parameters.
 FEWEST = 3
-#: A χ² less probable than this: the line, or the stated uncertainty, is wrong.
+#: A χ² less probable than this is named.
 NO_FIT = 1e-3
+#: u of points is believed within a quarter of it: as of 8 degrees of freedom (GUM G.4.2).
+BELIEVED = 8.0
 #: Confidence of the bands.
 CONFIDENCE = 0.95
 #: York's iteration ends at this relative change of the slope.  It takes 5 to 10 rounds; after a hundred it has failed.
@@ -44,8 +46,9 @@ class Line:
         n: points.
         chi_square: Σ(residual/u)²; None where no u was given.
         p_fit: probability of such a χ², or a larger one, if the line and the u are right.
-        scale: factor on the points' u: 1, or √(χ²/dof) if p_fit < 0.001; without u, the scatter about the line [Hz].
-        u_known: whether the points' own u are used: then tests use the normal distribution, else Student's t.
+        scale: factor on the points' u: the root of χ² per degree of freedom, combined with a prior of 1; without u, the
+            scatter about the line [Hz].
+        freedom: degrees of freedom of the scale.
         orthogonal: whether u along x counts, too.
     """
 
@@ -61,7 +64,7 @@ class Line:
     chi_square: float | None
     p_fit: float | None
     scale: float
-    u_known: bool
+    freedom: float
     orthogonal: bool
 
     @property
@@ -72,10 +75,9 @@ class Line:
     @property
     def quantile(self) -> float:
         """Half the width of a 95 % interval, in standard uncertainties."""
-        from scipy.special import ndtri, stdtrit
+        from scipy.special import stdtrit
 
-        level = (1 + CONFIDENCE) / 2
-        return float(ndtri(level) if self.u_known else stdtrit(self.degrees_of_freedom, level))
+        return float(stdtrit(self.freedom, (1 + CONFIDENCE) / 2))
 
     def at(self, x: Array) -> Array:
         """Return the line at x [Hz]."""
@@ -98,17 +100,16 @@ class Line:
     def p_against(self, slope: float = 1.0, intercept: float = 0.0) -> float | None:
         """Return the probability of such a departure from a line, or a larger one, if that line is true.
 
-        Slope and intercept are tested jointly, by χ² with two degrees of freedom, or F with two and n − 2.  None if the
+        Slope and intercept are tested jointly, by F with two degrees of freedom and those of the scale.  None if the
         points leave it undefined.
         """
         if not self.u_slope or not self.u_height:
             return None
-        from scipy.special import chdtrc, fdtrc
+        from scipy.special import fdtrc
 
         off = (self.slope - slope) / self.u_slope
         aside = (self.height - intercept - slope * self.centre) / self.u_height
-        statistic = off**2 + aside**2
-        return float(chdtrc(2, statistic) if self.u_known else fdtrc(2, self.degrees_of_freedom, statistic / 2))
+        return float(fdtrc(2, self.freedom, (off**2 + aside**2) / 2))
 
 
 @dataclass(frozen=True)
@@ -118,8 +119,8 @@ class Influence:
     Attributes:
         leverage: how far the line follows the point, 0 to 1.
         residual: y − line [Hz].
-        studentised: the residual in units of its own standard deviation; if u is not known, with the scatter of the
-            other points; NaN if it is undefined.
+        studentised: the residual in units of its own standard deviation, by the scale of the other points; NaN if it is
+            undefined.
         slope_change, intercept_change: of the line without the point, less that of the line with it.
     """
 
@@ -206,13 +207,10 @@ def influence(x: Array, y: Array, line: Line, weight: Array) -> Influence:
     middle_change = -weight * residual / (np.sum(weight) * alone)
     intercept_change = middle_change - slope_change * (x - off)
     own = residual * np.sqrt(weight / alone)
-    if line.u_known:
-        return Influence(leverage, residual, own, slope_change, intercept_change)
-    left = float(np.sum(weight * residual**2)) - own**2  # without the point
-    dof = line.degrees_of_freedom - 1
+    prior = line.freedom - line.degrees_of_freedom
+    left = prior + float(np.sum(weight * residual**2)) - own**2  # without the point
     with np.errstate(invalid="ignore", divide="ignore"):
-        scatter = np.sqrt(left / dof) if dof > 0 else np.full_like(x, np.nan)
-        studentised = np.where(left > 0, own / scatter, np.nan)
+        studentised = np.where(left > 0, own / np.sqrt(left / (line.freedom - 1)), np.nan)
     return Influence(leverage, residual, studentised, slope_change, intercept_change)
 
 
@@ -241,14 +239,13 @@ def _line(
     dof = x.size - 2
     residual = y - height - slope * (x - centre)
     left = float(np.sum(weight * residual**2))
-    p_fit, scale = None, math.sqrt(left / dof)
-    believed = False
+    p_fit, prior = None, 0.0
     if u_given:
         from scipy.special import chdtrc
 
         p_fit = float(chdtrc(dof, left))
-        believed = p_fit >= NO_FIT
-        scale = 1.0 if believed else scale
+        prior = BELIEVED / max(left / dof, 1.0)  # points that scatter far beyond their u leave it no weight
+    scale = math.sqrt((left + prior) / (dof + prior))
     rounding = _ROUNDING * float(np.abs(y).max()) * math.sqrt(float(weight.max()))
     u_slope = u_height = u_intercept = correlation = None
     if scale > rounding:
@@ -268,6 +265,6 @@ def _line(
         chi_square=left if u_given else None,
         p_fit=p_fit,
         scale=scale,
-        u_known=believed,
+        freedom=dof + prior,
         orthogonal=orthogonal,
     )

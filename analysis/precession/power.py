@@ -1,34 +1,26 @@
 """The power of the test of a slope against 1, and the number of points, range or u that a wanted power needs.
 
-Source: Cohen, Statistical Power Analysis (1988), §9: the noncentral t distribution as a normal one over that of the
-scatter.
+Source: Cohen, Statistical Power Analysis (1988), §9.  The difference that a two-sided test at 95 % detects with the
+probability p is the sum of the quantiles 0.975 and p of Student's distribution, in units of u(slope).
 """
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from analysis.precession.line import CONFIDENCE
+from analysis.precession.line import CONFIDENCE, FEWEST
 
 if TYPE_CHECKING:
     from analysis.precession.line import Line
-
-Array = NDArray[np.float64]
 
 #: The slope that was published without an uncertainty, and the wanted probability that the test detects it.
 OTHER_SLOPE, POWER = 1.05, 0.9
 #: A sweep of more points is no useful answer.
 MOST_POINTS = 1_000_000
-#: A slope so many u from 1 is detected almost certainly, even with three points.
-_CERTAIN = 100.0
-#: Nodes of the integral over the distribution of the scatter: right to 1e-7.
-_NODES = 200
+#: Each round changes the number of points by a tenth of the change before, or less.
+ROUNDS = 8
 
 
 @dataclass(frozen=True)
@@ -61,41 +53,6 @@ class Power:
         return self.now >= POWER
 
 
-def detection_probability(difference: float, u_slope: float, degrees_of_freedom: int | None) -> float:
-    """Return the probability that a two-sided test at 95 % detects a slope's difference from 1.
-
-    Args:
-        difference: of the slope from 1.
-        u_slope: its standard uncertainty.
-        degrees_of_freedom: of the scatter from which u_slope was estimated; None: u_slope is known.
-
-    >>> round(detection_probability(3.2415, 1.0, None), 3), round(detection_probability(0.0, 1.0, 7), 3)
-    (0.9, 0.05)
-    """
-    from scipy.special import ndtr, ndtri, stdtrit
-
-    level, shift = (1 + CONFIDENCE) / 2, abs(difference) / u_slope
-    if degrees_of_freedom is None:
-        limit = float(ndtri(level))
-        return float(ndtr(shift - limit) + ndtr(-shift - limit))
-    limit = float(stdtrit(degrees_of_freedom, level))
-    share, weight = _shares(degrees_of_freedom)
-    return float(np.sum(weight * (ndtr(shift - limit * share) + ndtr(-shift - limit * share))))
-
-
-@functools.lru_cache(maxsize=8)
-def _shares(degrees_of_freedom: int) -> tuple[Array, Array]:
-    """Return values of estimated over true scatter, with the probability of each, shape (n,) each.
-
-    They are quantiles at the nodes of Gauss and Legendre.  SciPy's noncentral t distribution does not do: it is NaN for
-    large shifts.
-    """
-    from scipy.special import chdtri
-
-    node, weight = np.polynomial.legendre.leggauss(_NODES)
-    return np.sqrt(chdtri(degrees_of_freedom, (1 - node) / 2) / degrees_of_freedom), weight / 2
-
-
 def power_of(line: Line, range_hz: float, u_hz: float) -> Power | None:
     """Return the power of the points at hand against a slope of 1.05; None if the slope has no u.
 
@@ -106,47 +63,28 @@ def power_of(line: Line, range_hz: float, u_hz: float) -> Power | None:
     """
     if not line.u_slope:
         return None
-    u_slope, difference = line.u_slope, OTHER_SLOPE - 1
-    dof = None if line.u_known else line.degrees_of_freedom
-    reach = _ratio_for(POWER, dof)  # difference in units of u(slope)
-    shrink = u_slope * reach / difference  # by which u(slope) is too large
+    from scipy.special import stdtr, stdtrit
+
+    def quantiles(points: float) -> tuple[float, float]:
+        freedom = max(line.freedom + points - line.n, 1.0)
+        return float(stdtrit(freedom, (1 + CONFIDENCE) / 2)), float(stdtrit(freedom, POWER))
+
+    difference = OTHER_SLOPE - 1
+    limit, reach = quantiles(line.n)
+    smallest = (limit + reach) * line.u_slope
+    shrink = smallest / difference  # by which u(slope) is too large
+    needed = float(line.n)
+    for _ in range(ROUNDS):  # more points have more degrees of freedom
+        needed = line.n * (sum(quantiles(max(needed, FEWEST))) * line.u_slope / difference) ** 2
+    points = max(math.ceil(min(needed, 2.0 * MOST_POINTS)), FEWEST)
     return Power(
         slope=OTHER_SLOPE,
-        now=detection_probability(difference, u_slope, dof),
-        smallest_difference=reach * u_slope,
+        now=float(stdtr(line.freedom, difference / line.u_slope - limit)),
+        smallest_difference=smallest,
         points=line.n,
-        points_needed=_points_needed(line, difference),
+        points_needed=points if points <= MOST_POINTS else None,
         range_hz=range_hz,
         range_needed_hz=range_hz * shrink,
         u_hz=u_hz,
         u_needed_hz=u_hz / shrink,
     )
-
-
-def _ratio_for(power: float, dof: int | None) -> float:
-    """Return the difference that a test with this power detects, over u(slope)."""
-    from scipy.optimize import brentq
-
-    return float(brentq(lambda ratio: detection_probability(ratio, 1.0, dof) - power, 0.0, _CERTAIN))
-
-
-def _points_needed(line: Line, difference: float) -> int | None:
-    """Return the number of points of the same kind; None above a million.
-
-    u(slope) falls with the root of their number, and the test gains degrees of freedom.
-    """
-
-    def enough(n: int) -> bool:
-        dof = None if line.u_known else n - 2
-        u_slope = (line.u_slope or 0.0) * math.sqrt(line.n / n)
-        return detection_probability(difference, u_slope, dof) >= POWER
-
-    low, high = 2, 3
-    while not enough(high):
-        low, high = high, 2 * high
-        if high > MOST_POINTS:
-            return None
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if enough(middle) else (middle, high)
-    return high

@@ -297,7 +297,7 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
             f"point {one.index + 1}, {point.precession:.5g} Hz at a drive of {point.drive:.5g} Hz: {what}{out}"
         )
     line = fit.line
-    if line.p_fit is not None and not line.u_known:
+    if line.p_fit is not None and line.p_fit < NO_FIT:
         texts.append(
             f"the points scatter {digits(line.scale)} times as much as their u says (p = {digits(line.p_fit, 1)}): "
             "all uncertainties are enlarged by that"

@@ -12,7 +12,7 @@ from analysis.numbers import digits
 from analysis.pulses.regression import Fit, median
 from analysis.pulses.result import Finding
 from analysis.pulses.search import WIDE, find_events, noise_of, shorten
-from analysis.pulses.times import FEWEST, fit_train
+from analysis.pulses.times import checked_times, fit_train
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -45,7 +45,7 @@ DEAD = 0.3
 class Clean:
     """samples and the shortened bins without what is no pulse; bad: samples that do not count, None: all do.
 
-    lines: of hum, frequency [Hz] and amplitude; before: the bins with the hum in them.
+    lines: of hum, frequency [Hz] and amplitude.
     """
 
     samples: Array
@@ -53,14 +53,12 @@ class Clean:
     bad: Mask | None
     notes: tuple[Finding, ...]
     lines: Lines
-    before: Array
 
 
-def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, *, own: Lines = ()) -> Clean:
+def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
     """Remove hum and a wandering baseline; a trace without them comes back unchanged.
 
-    samples: shape (n,); rate: of them [1/s]; bins: means of n // len(bins) samples; bad: which samples are no numbers;
-    own: lines that are no hum but the pulses' own.
+    samples: shape (n,); rate: of them [1/s]; bins: means of n // len(bins) samples; bad: which samples are no numbers.
     """
     factor = samples.size // bins.size
     bin_rate = rate / factor
@@ -82,13 +80,10 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, *, own: Li
         long[: bins.size * factor] = np.repeat(dead, factor)
         bad = long if bad is None else bad | long
     if np.count_nonzero(counted) < 64:
-        return Clean(samples, bins, bad, tuple(notes), (), bins)
+        return Clean(samples, bins, bad, tuple(notes), ())
     if not counted.all():
         bins = np.interp(np.arange(bins.size), np.flatnonzero(counted), bins[counted])
-    before = bins
-    lines = tuple(line for line in mains_lines(bins, bin_rate) if line not in own)
-    own = _own_at_sight(lines, bins, bin_rate)
-    lines = tuple(line for line in lines if line not in own)
+    lines = _without_own(mains_lines(bins, bin_rate), bins, bin_rate)
     if lines:
         names = " and ".join(f"{digits(amplitude)} at {frequency:.5g} Hz" for frequency, amplitude in lines)
         notes.append(Finding("hum", f"hum of amplitude {names} was taken off"))
@@ -101,30 +96,26 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, *, own: Li
         bins = bins - np.interp((np.arange(bins.size) + 0.5) / bin_rate, times, values)
     if not counted.all():
         bins = np.where(counted, bins, np.median(bins[counted]))
-    return Clean(samples, bins, bad, tuple(notes), lines, before)
+    return Clean(samples, bins, bad, tuple(notes), lines)
 
 
-def _own_at_sight(lines: Lines, bins: Array, rate: float) -> Lines:
-    """Those lines that are harmonics of pulses which are seen before anything is taken off.
+def _without_own(lines: Lines, bins: Array, rate: float) -> Lines:
+    """Return the lines that are no harmonics of the pulses which stand out of the bins; rate: of the bins.
 
-    Where more turns lack a pulse than have one, hum itself may be what was numbered, and is no measure of hum.
+    Where more turns lack a pulse than have one, hum itself may be numbered, and is no measure of hum.
     """
     if not lines:
         return ()
-    events = find_events(bins, rate)
-    if events.times.size < FEWEST:
-        return ()
     try:
-        train = fit_train(events.times)
+        train = fit_train(checked_times(find_events(bins, rate).times))
     except TooFewPulses:
-        return ()
-    if train.missing > train.used.size:
-        return ()
-    return own_lines(lines, bins, rate, train.fit)
+        return lines
+    own = _own_lines(lines, bins, rate, train.fit) if train.missing <= train.used.size else ()
+    return tuple(line for line in lines if line not in own)
 
 
-def own_lines(lines: Lines, bins: Array, rate: float, fit: Fit) -> Lines:
-    """Those lines that are harmonics of the pulses; bins: with the lines in them; rate: of the bins; fit: the phase.
+def _own_lines(lines: Lines, bins: Array, rate: float, fit: Fit) -> Lines:
+    """Return the lines that are harmonics of the pulses; rate: of the bins; fit: the phase of the pulses.
 
     A harmonic may lie at a multiple of the mains, too. It then is about as high as the harmonics beside it, and hum
     is higher.
@@ -186,15 +177,15 @@ def _dead(bins: Array, rate: float, whole: Mask | None) -> Mask:
     return dead
 
 
-def mains_lines(bins: Array, rate: float) -> list[tuple[float, float]]:
-    """Frequencies [Hz] and amplitudes of hum; a top that turns in step with the mains is none."""
+def mains_lines(bins: Array, rate: float) -> Lines:
+    """Return frequencies [Hz] and amplitudes of hum; a top that turns in step with the mains is none."""
     duration = bins.size / rate
     if duration < SHORTEST:
-        return []
+        return ()
     thin = shorten(bins, max(int(rate / (4 * HIGHEST)), 1))
     thin_rate = rate * thin.size / bins.size
     if not np.isfinite(thin).all():
-        return []
+        return ()
     n = thin.size
     transform = np.fft.rfft(thin - thin.mean())
     amplitude = np.zeros(transform.size)  # behind a Hann window, which is a sum of three neighbours
@@ -206,9 +197,11 @@ def mains_lines(bins: Array, rate: float) -> list[tuple[float, float]]:
         return slice(max(round((frequency - reach) / width), 1), round((frequency + reach) / width) + 1)
 
     found: list[tuple[float, float]] = []
+    top = thin_rate / 2 - 4 * width  # of the spectrum; a line has neighbours on both sides
     for mains in MAINS:
         hum: set[int] = set()
-        for multiple in range(int(HIGHEST / mains), 0, -1):  # from above: hum is no measure of what is below it
+        highest = int(min(HIGHEST, top) / (mains + STRAYS))
+        for multiple in range(highest, 0, -1):  # from above: hum is no measure of what is below it
             nominal = mains * multiple
             reach = max(STRAYS * multiple, 2 * width)
             band = near(nominal, reach)
@@ -218,14 +211,14 @@ def mains_lines(bins: Array, rate: float) -> list[tuple[float, float]]:
             further = sorted(
                 float(amplitude[near(k * nominal, k * reach)].max())
                 for k in (2, 3, 4)
-                if k * nominal < 2 * HIGHEST and k * multiple not in hum
+                if k * (nominal + reach) < min(2 * HIGHEST, top) and k * multiple not in hum
             )
             height, place = float(amplitude[peak]), _peak(amplitude, peak) * width
             alone = not further or height > SINGLE * further[len(further) // 2]
             if alone and _stays(thin, place / thin_rate, height):
                 hum.add(multiple)
                 found.append((place, height))
-    return sorted(found)
+    return tuple(sorted(found))
 
 
 def _narrow(amplitude: Array, peak: int, beside: slice) -> bool:

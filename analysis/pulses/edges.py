@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.pulses.matched import turn_times
-from analysis.pulses.regression import Fit, fit_turns, median, student
+from analysis.pulses.regression import Fit, Grid, fit_turns, median, student
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,9 @@ class Edges:
     wrong: int
 
 
-def place_edges(samples: Array, rate: float, fit: Fit, *, width: float, sign: int) -> Edges | None:
+def place_edges(
+    samples: Array, rate: float, fit: Fit, *, width: float, sign: int, degree: int | None = None
+) -> Edges | None:
     """Improve a phase that is right to a fraction of the pulse's width [s]; None: fewer than four turns."""
     times, numbers, frequency = turn_times(fit, 0.0, samples.size / rate)
     side = max(round(SIDE * width * rate), 1)
@@ -56,18 +58,15 @@ def place_edges(samples: Array, rate: float, fit: Fit, *, width: float, sign: in
     missing = int(np.count_nonzero(~use))
     if np.count_nonzero(use) < 4 or missing > 0.6 * times.size:
         return None
+    grid = Grid(1 / rate, _steepness(x, side, abs(centre - floor)))
     for _ in range(4):
-        new_fit, fitted = fit_turns(times[use], phase[use]), use
+        new_fit = fit_turns(times[use], phase[use], degree=degree, jump=fit.jump, grid=grid)
         away = np.abs(phase - new_fit.phase(times))
         spread = 1.4826 * median(away[use])
-        # few turns say little of their spread
-        far = student(int(np.count_nonzero(use)) - new_fit.coefficients.size, GROSS)
-        new = (heights > 0.3 * typical) & (away < far * max(spread, 1e-12))
+        new = (heights > 0.3 * typical) & (away < student(new_fit.scatter.freedom, GROSS) * max(spread, 1e-12))
         if np.array_equal(new, use) or np.count_nonzero(new) < 4:
             break
         use = new
-    steep = _steepness(x, side, abs(centre - floor))
-    new_fit = new_fit.with_grid(times[fitted], None, step=1 / rate, steep=steep)
     rest = (x if use.all() else x[use]) - mean
     noise = float(np.sqrt(np.einsum("ij,ij->", rest, rest) / rest.size))
     slope = 0.5 * (mean[2:] - mean[:-2])

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.pulses.regression import Fit
+from analysis.pulses.regression import Fit, Scatter
 
 Array = NDArray[np.float64]
 Spectra = NDArray[np.complex128]
@@ -44,14 +44,13 @@ def search(bins: Array, rate: float) -> Fit | None:
     frequency, slope = _together(y, rate, time, frequency, slope)
     half = 0.5 * duration
     return Fit(
-        coefficients=np.array([0.0, frequency * half, 0.5 * slope * half**2]),
-        unit_covariance=np.eye(3),
+        coefficients=np.array([0.0, frequency * half, 0.5 * slope * half**2, 0.0]),
+        covariance=np.eye(4),
         centre=half,
         half=half,
-        variance=1.0,
-        inflation=1.0,
-        freedom=1.0,
         residuals=np.zeros(1),
+        scatter=Scatter(1.0, 1.0, 1.0, 1.0),
+        unit_covariance=np.eye(3),
     )
 
 
@@ -75,7 +74,8 @@ def _apart(y: Array, rate: float, lowest: float, highest: float) -> tuple[float,
     middle = (np.arange(count) + 0.5) * size / rate - 0.5 * count * size / rate
     slopes = np.zeros(1)
     if count > 1:
-        slopes = np.arange(-STEEPEST, STEEPEST, 2 * step / (count * size / rate))
+        steepest = min(STEEPEST, 0.5 * (highest - lowest) / (count * size / rate))  # stays within the trials
+        slopes = np.arange(-steepest, steepest, 2 * step / (count * size / rate))
     best = (-np.inf, 0.0, 0.0)
     for slope in slopes:
         total = np.zeros(trial.size)

@@ -7,12 +7,17 @@ learned anew; and so on until nothing moves. To first order that is the maximum 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.pulses.regression import Fit, fit_turns, median, student
+from analysis.pulses.regression import Fit, Grid, fit_turns, median, student
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 Array = NDArray[np.float64]
 
@@ -31,6 +36,10 @@ EVIDENCE = 160.0
 NOISY = 3.0
 #: Flanks that climb more than this part of the height from one sample to the next lie where the samples are.
 SHARP = 0.25
+#: A piece has three parameters, height, shift and a constant: so few samples leave two for the noise.
+FEWEST_SAMPLES = 5
+#: A piece with less of the pulse's power, or of its slope's, than this part of the median is none.
+LEAST = 0.3
 #: A turn with less of a pulse than this part of the mean one counts as missing.
 FAINT = 0.3
 
@@ -144,7 +153,7 @@ def match(
         fit: a phase that is nearly right, of times from the first sample.
         window: where in the turn the pulse is.
         bad: samples that are no numbers, shape (n,).
-        degree: of the phase; None: 2, or 3 where that differs significantly.
+        degree: of the phase, as of `fit_turns`.
 
     Returns:
         None where there are fewer than four turns, or no pulses.
@@ -155,6 +164,7 @@ def match(
         if found is None:
             return result
         edge = np.array([-1.0, -0.5, 0.0, 0.5, 1.0]) * found.fit.half + found.fit.centre
+        edge = edge if found.fit.jump is None else found.fit.jump.spoil(edge)
         change = found.fit.phase(edge) - fit.phase(edge)
         moved = float(np.abs(change - np.rint(change)).max())
         fit, result = found.fit, found
@@ -173,6 +183,8 @@ def _improve(
         return None
     middle = np.rint(times * rate).astype(np.intp)
     reach = int(np.ceil(window.half * rate / frequency.min()))
+    if reach < FEWEST_SAMPLES // 2:
+        return None
     inside = (middle - reach >= 0) & (middle + reach < samples.size)
     times, numbers, frequency, middle = times[inside], numbers[inside], frequency[inside], middle[inside]
     if times.size < 4:
@@ -196,18 +208,24 @@ def _improve(
         else (place * TABLE).astype(np.intp) % TABLE
     )
     pulse = learn(x, cell, valid, 2 * window.half)
-    return _regress(Pieces(x, cell, valid, times, numbers), pulse, window, degree, rate)
+    return _regress(Pieces(x, cell, valid, times, numbers), pulse, window, fit, degree=degree, rate=rate)
 
 
 def turn_times(fit: Fit, middle: float, duration: float) -> tuple[Array, Array, Array]:
-    """Times at which a phase passes (a part of a turn), those phases, and the frequencies there."""
-    first, last = fit.phase(np.array([0.0, duration]))
+    """Return times at which a phase passes (a part of a turn), those phases, and the frequencies there."""
+    jump, fit = fit.jump, replace(fit, jump=None)
+    end = duration + (0.0 if jump is None else jump.lost)
+    first, last = fit.phase(np.array([0.0, end]))
     numbers = np.arange(np.ceil(first - middle), np.floor(last - middle) + 1) + middle
-    grid = np.linspace(0.0, duration, 65)
+    grid = np.linspace(0.0, end, 65)
     times = np.interp(numbers, fit.phase(grid), grid)
     for _ in range(2):  # Newton's from 1e-3 turns: 1e-9, 1e-20
         times = times - (fit.phase(times) - numbers) / fit.frequency(times)
-    return times, numbers, fit.frequency(times)
+    frequency = fit.frequency(times)
+    if jump is None:
+        return times, numbers, frequency
+    there = (times <= jump.at) | (times > jump.at + jump.lost)
+    return jump.spoil(times[there]), numbers[there], frequency[there]
 
 
 def learn(x: Array, cell: NDArray[np.intp], valid: NDArray[np.bool_] | None, width: float) -> Pulse:
@@ -243,76 +261,127 @@ def _flat(x: Array) -> bool:
     return bool(np.count_nonzero(np.count_nonzero(x == x.max(), axis=1) > 2) > 0.5 * len(x))
 
 
-def _regress(pieces: Pieces, pulse: Pulse, window: Window, degree: int | None, rate: float) -> Match | None:
-    x, cell, valid, times, numbers = pieces.x, pieces.cell, pieces.valid, pieces.times, pieces.numbers
-    g, d = pulse.shape[cell], pulse.slope[cell]
-    if valid is not None:
-        x, g, d = np.where(valid, x, 0.0), g * valid, d * valid
-        n = np.maximum(valid.sum(axis=1), 1).astype(np.float64)
-    else:
-        n = np.full(x.shape[0], float(x.shape[1]))
+@dataclass(frozen=True)
+class Projection:
+    """The fit of pulse, slope of the pulse and a constant to each piece; all of shape (turns,).
 
+    Attributes:
+        usable: whether the piece holds enough of the pulse.
+        height: in units of the mean pulse.
+        shift: of the height times the shift [turns].
+        power: sum of squares of the pulse in the piece; height has a variance of that of the noise over this.
+        information: the same of shift.
+        rest: sum of squares that is left.
+        freedom: samples less parameters.
+    """
+
+    usable: NDArray[np.bool_]
+    height: Array
+    shift: Array
+    power: Array
+    information: Array
+    rest: Array
+    freedom: Array
+
+
+def _project(pieces: Pieces, pulse: Pulse) -> Projection:
+    """Fit the pulse to each piece."""
+    x, shape, slope = pieces.x, pulse.shape[pieces.cell], pulse.slope[pieces.cell]
+    counts = np.full(x.shape[0], float(x.shape[1]))
+    if pieces.valid is not None:
+        x, shape, slope = np.where(pieces.valid, x, 0.0), shape * pieces.valid, slope * pieces.valid
+        counts = np.maximum(pieces.valid.sum(axis=1), 1).astype(np.float64)
     ones = np.ones(x.shape[1])
-    sums = {id(a): a @ ones for a in (x, g, d)}
+    rows = {"x": x, "shape": shape, "slope": slope}
+    sums = {name: row @ ones for name, row in rows.items()}
 
-    def product(a: Array, b: Array) -> Array:
-        return np.asarray(np.einsum("ij,ij->i", a, b) - sums[id(a)] * sums[id(b)] / n)
+    def covariance(a: str, b: str) -> Array:
+        return np.asarray(np.einsum("ij,ij->i", rows[a], rows[b]) - sums[a] * sums[b] / counts)
 
-    gg, gd, dd, xg, xd, xx = (product(*pair) for pair in ((g, g), (g, d), (d, d), (x, g), (x, d), (x, x)))
-    usable = (gg > 0.3 * np.median(gg)) & (dd > 0.3 * np.median(dd)) & (gg * dd > gd**2)
-    determinant = np.where(usable, gg * dd - gd**2, 1.0)
-    height = np.where(usable, (dd * xg - gd * xd) / determinant, 0.0)
-    shift = np.where(usable, (gg * xd - gd * xg) / determinant, 0.0)
-    information = np.where(usable, determinant / np.where(usable, gg, 1.0), 0.0)
-    rest = xx - height * xg - shift * xd
-    freedom = np.maximum(n - 3, 1)
-    noise2 = max(median(rest / freedom), 1e-300)
-    height_variance = noise2 / np.where(usable, gg, 1.0)
-    evidence = float(height[usable] ** 2 @ gg[usable]) / noise2
-    if not usable.any() or evidence <= 0:
+    power, mixed, steepness = covariance("shape", "shape"), covariance("shape", "slope"), covariance("slope", "slope")
+    with_shape, with_slope = covariance("x", "shape"), covariance("x", "slope")
+    determinant = power * steepness - mixed**2
+    usable = (power > LEAST * np.median(power)) & (steepness > LEAST * np.median(steepness)) & (determinant > 0)
+    determinant, power = np.where(usable, determinant, 1.0), np.where(usable, power, 1.0)
+    height = np.where(usable, steepness * with_shape - mixed * with_slope, 0.0) / determinant
+    shift = np.where(usable, power * with_slope - mixed * with_shape, 0.0) / determinant
+    return Projection(
+        usable=usable,
+        height=height,
+        shift=shift,
+        power=power,
+        information=np.where(usable, determinant / power, 0.0),
+        rest=covariance("x", "x") - height * with_shape - shift * with_slope,
+        freedom=np.maximum(counts - 3, 1),
+    )
+
+
+def _amplitudes(found: Projection, noise2: float) -> tuple[Array, float] | None:
+    """Return the height of each pulse, shrunk to the mean as far as noise scatters them, and the mean.
+
+    None where there are no pulses.
+    """
+    usable = found.usable
+    if not usable.any():
         return None
-    mean = float(np.average(height[usable], weights=gg[usable]))
-    if mean**2 * float(gg[usable].sum()) / noise2 < EVIDENCE:
+    height, power = found.height[usable], found.power[usable]
+    mean = float(np.average(height, weights=power))
+    if mean**2 * float(power.sum()) / noise2 < EVIDENCE:
         return None
-    total = float(np.mean((height[usable] - mean) ** 2))
-    share = max(0.0, 1 - float(np.mean(height_variance[usable])) / total) if total > 0 else 0.0
-    amplitude = mean + share * (height - mean)
-    use = usable & (amplitude > 0.03 * mean)
-    if np.count_nonzero(use) < 4:
-        return None
-    weight = amplitude**2 * information
-    phase = numbers + np.divide(shift, amplitude, out=np.zeros_like(shift), where=use)
+    total = float(np.mean((height - mean) ** 2))
+    share = max(0.0, 1 - float(np.mean(noise2 / power)) / total) if total > 0 else 0.0
+    return mean + share * (found.height - mean), mean
+
+
+def _fit_without_far(
+    times: Array, phase: Array, weight: Array, there: NDArray[np.bool_], fit: Callable[[Array, Array, Array], Fit]
+) -> tuple[Fit, NDArray[np.bool_]]:
+    """Return the fit to turns that are there and not far off, and which these are; weight: 1/variance, shape (n,)."""
+    use = there
     for _ in range(4):
-        fit = fit_turns(times[use], phase[use], weight[use] / noise2, degree=degree)
-        standard = (phase - fit.phase(times)) * np.sqrt(weight / noise2)
-        spread = max(1.4826 * median(np.abs(standard[use])), 0.5)
-        fitted = use
-        far = student(int(np.count_nonzero(use)) - fit.coefficients.size, GROSS) * spread
-        new = usable & (amplitude > 0.03 * mean) & (np.abs(standard) < far)
-        if np.array_equal(new, use) or np.count_nonzero(new) < 4:
-            break
-        use = new
-    fit = fit.with_expected_variance()
+        found, before = fit(times[use], phase[use], weight[use]), use
+        standard = np.abs(phase - found.phase(times)) * np.sqrt(weight)
+        spread = max(1.4826 * median(standard[use]), 0.5)
+        use = there & (standard < student(found.scatter.freedom, GROSS) * spread)
+        if np.array_equal(use, before) or np.count_nonzero(use) < 4:
+            return found, before
+    return found, use
+
+
+def _regress(
+    pieces: Pieces, pulse: Pulse, window: Window, near: Fit, *, degree: int | None, rate: float
+) -> Match | None:
+    """Return the phase by the places of the pulses; near: a phase that is nearly right."""
+    found = _project(pieces, pulse)
+    noise2 = max(median(found.rest / found.freedom), 1e-300)
+    sizes = _amplitudes(found, noise2)
+    if sizes is None:
+        return None
+    amplitude, mean = sizes
+    there = found.usable & (amplitude > 0.03 * mean)
+    if np.count_nonzero(there) < 4:
+        return None
+    weight = amplitude**2 * found.information / noise2
+    phase = pieces.numbers + np.divide(found.shift, amplitude, out=np.zeros_like(amplitude), where=there)
     height_of_pulse = float(np.ptp(pulse.shape))
-    steep = float(np.abs(pulse.slope).max()) * fit.coefficients[1] / (fit.half * rate * max(height_of_pulse, 1e-300))
-    fit = fit.with_grid(times[fitted], weight[fitted] / noise2, step=1 / rate, steep=steep)
-    bound = float(np.sqrt(fit.unit_covariance[1, 1])) / fit.half
-    good = usable & (amplitude > 0.03 * mean)
+    steep = float(np.abs(pulse.slope).max()) * near.middle_frequency / (rate * max(height_of_pulse, 1e-300))
+    fit_some = partial(fit_turns, degree=degree, jump=near.jump, grid=Grid(1 / rate, steep), absolute=True)
+    fit, use = _fit_without_far(pieces.times, phase, weight, there, fit_some)
     return Match(
         fit=fit,
         turns=int(np.count_nonzero(use)),
-        numbers=np.floor(numbers - window.middle + 0.5).astype(np.int64),
-        heights=height / mean,
-        shifts=phase - fit.phase(times),
+        numbers=np.floor(pieces.numbers - window.middle + 0.5).astype(np.int64),
+        heights=found.height / mean,
+        shifts=phase - fit.phase(pieces.times),
         used=use,
-        evidence=evidence,
-        flat=_flat(x),
+        evidence=float(found.height[found.usable] ** 2 @ found.power[found.usable]) / noise2,
+        flat=_flat(pieces.x),
         noise=float(np.sqrt(noise2)),
         height=mean * height_of_pulse,
-        bound=bound,
-        missing=int(np.count_nonzero(~usable | (height < FAINT * mean))),
-        wrong=int(np.count_nonzero(good & ~use)),
+        bound=float(np.sqrt(fit.unit_covariance[1, 1])) / fit.half,
+        missing=int(np.count_nonzero(~found.usable | (found.height < FAINT * mean))),
+        wrong=int(np.count_nonzero(there & ~use)),
         pulse=pulse,
         window=window,
-        grid=float(fit.coefficients[1]) / (fit.half * rate) if steep > SHARP else 0.0,
+        grid=fit.middle_frequency / rate if steep > SHARP else 0.0,
     )

@@ -1,4 +1,8 @@
-"""Turn number against time: a polynomial of degree two or three, with its uncertainty from the residuals."""
+"""Turn number against time: a polynomial of the third degree, with its uncertainty from the residuals.
+
+The third degree, the bend of the frequency, has a prior: pulses that show it better than drags are known decide it,
+others leave it to the prior.  A jump of the time, where a recorder lost or repeated samples, is one more parameter.
+"""
 
 from __future__ import annotations
 
@@ -11,118 +15,73 @@ from analysis.uncertainty import Estimate
 
 Array = NDArray[np.float64]
 
-#: The slope's own change is fitted where it differs from 0 by so many standard uncertainties, or, by few residuals, by
-#: as many as chance seldom makes of it as these.
-CURVED = 4.0
-#: Turns from which on a third degree is fitted, and from which on the bend it would show is looked at.
-FEWEST_FOR_THIRD, FEWEST_FOR_BEND = 12, 8
-#: The noise of the samples counts as so many degrees of freedom, where there are fewer of the residuals.
-FEW = 30.0
+#: The frequency's bend as a multiple of slope²/frequency, with its standard uncertainty.  Slower and slower: n under a
+#: drag in proportion to the n-th power of the spin, which is 1 to 2; an even ramp, 0, is three u away.
+UNDER_DRAG, UNDER_DRAG_U = 1.5, 0.5
+#: Faster and faster: only a drive does that.
+UNDER_DRIVE, UNDER_DRIVE_U = 0.0, 0.6
+#: A top that swings about its drive, by 0.3 of a turn or less at about 0.33 Hz, has any bend below 2.7 Hz/s²: each
+#: decade is as probable.  Of none at all and a swing, either is as probable.
+SWINGS_U = np.array([2.0, 0.2, 0.02, 0.002])
+SWING = 0.5
+#: With fewer turns the bend is that of the prior: five parameters and the scatter leave too few.
+FEWEST_FOR_BEND = 8
+#: Turns on each side of a jump.
+FEWEST_BESIDE = 2
+#: Scatter over long times is about that from one turn to the next, within a factor of 2, before it is seen; and so is
+#: the scatter of pulses about the noise of the samples: a variance known to a factor of 2 has four degrees of freedom.
+PRIOR_FREEDOM = 4.0
+#: Turns of a block, and most blocks: over one they are added, so that what goes to and fro from turn to turn vanishes.
+BLOCK, BLOCKS = 6, 50
 #: Roundings that would leave residuals of more than so many times those that are seen, and this part of a rounding, did
 #: not happen.
 UNLIKE, UNSEEN = 1.2, 0.05
 #: Rounded times of turns shift the phase gained in half the record by no more than this part of their rounding.
 GRID_AT_MOST = 0.6
-#: Residuals are grouped into so many blocks to see whether neighbours resemble each other ...
-BLOCKS = 50
-#: ... and into so many, of three turns or more, to see whether neighbours differ.
-SHORT_BLOCKS, SHORTEST_BLOCK = 100, 3
-#: Blocks scatter more, or less, than single residuals where chance would do it with less than this probability.
-WHITE, ALTERNATING = 0.01, 0.001
-#: The same of short blocks that scatter less: hum that is left moves pulses to and fro, from each turn to the next.
-TO_AND_FRO = 0.05
 
 
 @dataclass(frozen=True)
-class Fit:
-    """phase(t) = Σ coefficients[k] uᵏ, u = (t − centre)/half.
+class Jump:
+    """A place where the record's time jumps.
 
     Attributes:
-        coefficients: [turns], shape (p,).
-        unit_covariance: of them for residuals of unit variance and unit weight, shape (p, p).
-        centre: [s].
-        half: half the length [s].
-        variance: of a residual of unit weight [turns²].
-        inflation: factor on variance because neighbours resemble each other (below 1: they alternate).
-        freedom: degrees of freedom of variance x inflation.
-        residuals: [turns], shape (n,).
-        unfitted: the bend that one degree more would show, and its u without Student's factor [Hz/s²]; None where the
-            degree was given, a third one was fitted, or there are too few turns.
+        at: the record's time there [s].
+        lost: time that is missing there, below 0 where samples were repeated [s]; whole turns cannot be seen.
+        u: its standard uncertainty [s].
     """
 
-    coefficients: Array
-    unit_covariance: Array
-    centre: float
-    half: float
-    variance: float
-    inflation: float
-    freedom: float
-    residuals: Array
-    unfitted: tuple[float, float] | None = None
+    at: float
+    lost: float
+    u: float = 0.0
 
-    @property
-    def covariance(self) -> Array:
-        """Of the coefficients, such that one standard uncertainty covers 68.27 %."""
-        return np.asarray(self.unit_covariance * self.variance * self.inflation * student(self.freedom) ** 2)
+    def mend(self, times: Array) -> Array:
+        """Return what a clock would have shown at times of the record."""
+        return times + self.lost * (times > self.at)
 
-    def phase(self, times: Array) -> Array:
-        """Phase at times [turns]."""
-        return _polynomial(self.coefficients, (times - self.centre) / self.half)
+    def spoil(self, times: Array) -> Array:
+        """Return the record's times of what passed at times of the clock."""
+        return times - self.lost * (times > self.at + max(self.lost, 0.0))
 
-    def frequency(self, times: Array) -> Array:
-        """Frequency at times [Hz]."""
-        slopes = self.coefficients[1:] * np.arange(1, self.coefficients.size) / self.half
-        return _polynomial(slopes, (times - self.centre) / self.half)
 
-    def frequency_and_chirp(self) -> tuple[Estimate, Estimate, float]:
-        """Frequency and slope where they are independent, and that time; with a bend, where slope and bend are."""
-        frequency, chirp, away = _independent(self.coefficients, self.covariance, self.half)
-        return frequency, chirp, self.centre + away
+@dataclass(frozen=True)
+class Grid:
+    """Places of the samples.
 
-    def frequency_and_chirp_at(self, time: float) -> tuple[Estimate, Estimate]:
-        """Frequency and slope at any time [s], where they may depend on each other."""
-        return _at(self.coefficients, self.covariance, self.half, (time - self.centre) / self.half)
+    Attributes:
+        step: from one sample to the next [s].
+        steep: part of a pulse's height that lies between two samples at most; what flanks of several samples leave of
+            the error falls with its square.
+    """
 
-    @property
-    def bend(self) -> Estimate | None:
-        """How the slope of the frequency itself changes, its third derivative of phase; None below degree three."""
-        if self.coefficients.size < 4:
-            return None
-        unit = 6 / self.half**3
-        return Estimate(unit * float(self.coefficients[3]), unit * float(np.sqrt(self.covariance[3, 3])), "Hz/s^2")
+    step: float
+    steep: float
 
-    def correlations(self, time: float) -> tuple[float, float, float]:
-        """Of frequency and slope, frequency and bend, slope and bend at a time; none of them below degree three."""
-        if self.coefficients.size < 4:
-            return 0.0, 0.0, 0.0
-        rows = np.stack([*_derivatives((time - self.centre) / self.half, 4), (0.0, 0.0, 0.0, 6.0)])
-        covariance = rows @ self.covariance @ rows.T
-        u = np.sqrt(np.diag(covariance))
-        if not u.all():
-            return 0.0, 0.0, 0.0
-        correlation = covariance / np.outer(u, u)
-        return float(correlation[0, 1]), float(correlation[0, 2]), float(correlation[1, 2])
+    def rounding(self, frequency: float) -> float:
+        """Return the part of a turn [turns] within which samples leave a flank open."""
+        return min(self.steep, 1.0) ** 2 * self.step * frequency
 
-    def times(self, factor: float) -> Fit:
-        """The phase multiplied: half or twice the frequency."""
-        return replace(self, coefficients=self.coefficients * factor)
-
-    def with_expected_variance(self) -> Fit:
-        """For weights that are 1/variance: what few residuals leave unknown comes from the noise of the samples.
-
-        Unless the residuals contradict it: then they alone count.
-        """
-        if self.freedom >= FEW:
-            return self
-        from scipy.special import chdtrc
-
-        if chdtrc(self.freedom, self.freedom * self.variance) < WHITE:
-            return self
-        freedom = self.freedom + FEW
-        return replace(self, variance=(self.freedom * self.variance + FEW) / freedom, freedom=freedom)
-
-    def with_grid(self, times: Array, weight: Array | None, *, step: float, steep: float) -> Fit:
-        """The same with at least the uncertainty that comes from samples which are too far apart for the flanks.
+    def variance(self, times: Array, powers: Array, carried: Array, rounding: float, seen: float) -> float:
+        """Return the least variance of the second coefficient that comes from samples too far apart for the flanks.
 
         A flank between two samples may lie anywhere between them, and residuals do not show it where turns are nearly
         whole numbers of samples.  So the error of a rounded time is carried to the frequency, for all places of the
@@ -130,33 +89,135 @@ class Fit:
         residuals than these, the mean square is the least variance.
 
         Args:
-            times: of the turns that were fitted, shape (n,) [s].
-            weight: of them, shape (n,); None: all alike.
-            step: from one sample to the next [s].
-            steep: part of the pulse's height that lies between two samples at most; what flanks of several samples
-                leave of the error falls with its square.
+            times: of the turns, shape (n,) [s].
+            powers: of their places in the record, from -1 to 1, shape (n, 3).
+            carried: change of the coefficients with each phase, shape (n, 3).
+            rounding: [turns].
+            seen: root mean square of the residuals [turns].
         """
-        rounding = min(steep, 1.0) ** 2 * step * float(self.coefficients[1]) / self.half  # [turns]
-        seen = float(self.covariance[1, 1])
-        if seen >= (GRID_AT_MOST * rounding) ** 2:
-            return self
-        u = (times - self.centre) / self.half
-        powers = u[:, None] ** np.arange(self.coefficients.size)
-        carried = (powers if weight is None else powers * weight[:, None]) @ self.unit_covariance
-        place = np.arange(8)[:, None, None] / 8 + np.linspace(-1, 1, 9)[:, None] * u + times / step
-        rounded = ((place - np.rint(place)) * rounding).reshape(-1, times.size)  # [turns]
+        place = np.arange(8)[:, None, None] / 8 + np.linspace(-1, 1, 9)[:, None] * powers[:, 1] + times / self.step
+        rounded = ((place - np.rint(place)) * rounding).reshape(-1, times.size)
         shifts = rounded @ carried
         left = np.sqrt(np.mean((rounded - shifts @ powers.T) ** 2, axis=1))
-        most = UNLIKE * float(np.sqrt(np.mean(self.residuals**2))) + UNSEEN * rounding
-        possible = left <= max(most, float(left.min()))
-        least = float(np.mean(shifts[possible, 1] ** 2))
-        if least <= seen:
-            return self
-        wider = self.inflation * student(self.freedom) ** 2
-        return replace(self, variance=least / (float(self.unit_covariance[1, 1]) * wider))
+        possible = left <= max(UNLIKE * seen + UNSEEN * rounding, float(left.min()))
+        return float(np.mean(shifts[possible, 1] ** 2))
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Scatter of the residuals.
+
+    Attributes:
+        variance: of one of unit weight [turns²].
+        inflation: factor on it because neighbours resemble each other (below 1: they alternate).
+        freedom: degrees of freedom of variance x inflation.
+        correlated_p: probability of such a factor if residuals are independent.
+        least: variance that samples too far apart for the flanks leave open [turns²].
+    """
+
+    variance: float
+    inflation: float
+    freedom: float
+    correlated_p: float
+    least: float = 0.0
+
+    @property
+    def scale(self) -> float:
+        """Variance of one residual, such that one standard uncertainty covers 68.27 % [turns²]."""
+        return max(self.variance * self.inflation * student(self.freedom) ** 2, self.least)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """phase(t) = Σ coefficients[k] uᵏ, u = (t − centre)/half, t without the jump.
+
+    Attributes:
+        coefficients: [turns], shape (4,).
+        covariance: of them, such that one standard uncertainty covers 68.27 %, shape (4, 4).
+        centre: [s].
+        half: half the length [s].
+        residuals: [turns], shape (n,).
+        scatter: of the residuals.
+        unit_covariance: of the first three, had the bend been known, for residuals of unit variance, shape (3, 3).
+        slope_bias: of the slope by the fourth degree of a drag, with its standard uncertainty [Hz/s].
+        jump: in the times; None: there is none.
+    """
+
+    coefficients: Array
+    covariance: Array
+    centre: float
+    half: float
+    residuals: Array
+    scatter: Scatter
+    unit_covariance: Array
+    slope_bias: tuple[float, float] = (0.0, 0.0)
+    jump: Jump | None = None
+
+    def phase(self, times: Array) -> Array:
+        """Return the phase at times of the record [turns]."""
+        return _polynomial(self.coefficients, self._place(times))
+
+    def frequency(self, times: Array) -> Array:
+        """Return the frequency at times of the record [Hz]."""
+        slopes = self.coefficients[1:] * np.arange(1, self.coefficients.size) / self.half
+        return _polynomial(slopes, self._place(times))
+
+    def _place(self, times: Array) -> Array:
+        return ((times if self.jump is None else self.jump.mend(times)) - self.centre) / self.half
+
+    @property
+    def middle_frequency(self) -> float:
+        """Frequency in the middle of the record [Hz]."""
+        return float(self.coefficients[1]) / self.half
+
+    @property
+    def reference(self) -> float:
+        """Time at which frequency and slope are independent, had the bend been known [s]."""
+        slope = float(self.unit_covariance[2, 2])
+        u = -float(self.unit_covariance[1, 2]) / (2 * slope) if slope > 0 else 0.0
+        return self.centre + min(max(u, -1.0), 1.0) * self.half
+
+    def motion_at(self, time: float) -> tuple[Estimate, Estimate, Estimate]:
+        """Return frequency, slope and bend at a time [s]."""
+        rows = self._rows(time)
+        u = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", rows, self.covariance, rows), 0.0))
+        values = rows @ self.coefficients
+        values[1], u[1] = values[1] - self.slope_bias[0], np.hypot(u[1], self.slope_bias[1])
+        frequency, slope, bend = (
+            Estimate(float(v), float(s), unit) for v, s, unit in zip(values, u, ("Hz", "Hz/s", "Hz/s^2"), strict=True)
+        )
+        return frequency, slope, bend
+
+    def u_of_pulses(self, time: float) -> tuple[float, float]:
+        """Return the standard uncertainties of frequency and slope at a time [s], had the bend been known."""
+        rows = self._rows(time)[:2, :3]
+        frequency, slope = np.sqrt(np.einsum("ij,jk,ik->i", rows, self.unit_covariance, rows) * self.scatter.scale)
+        return float(frequency), float(slope)
+
+    def correlations(self, time: float) -> tuple[float, float, float]:
+        """Return those of frequency and slope, frequency and bend, slope and bend at a time; 0 where one is certain."""
+        rows = self._rows(time)
+        covariance = rows @ self.covariance @ rows.T
+        u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            correlation = np.nan_to_num(covariance / np.outer(u, u), posinf=0.0, neginf=0.0)
+        return float(correlation[0, 1]), float(correlation[0, 2]), float(correlation[1, 2])
+
+    def _rows(self, time: float) -> Array:
+        """Derivatives of the phase by time: frequency, slope, bend, shape (3, 4)."""
+        u, h = (time - self.centre) / self.half, self.half
+        return np.array([
+            [0.0, 1 / h, 2 * u / h, 3 * u**2 / h],
+            [0.0, 0.0, 2 / h**2, 6 * u / h**2],
+            [0.0, 0.0, 0.0, 6 / h**3],
+        ])  # fmt: skip
+
+    def times(self, factor: float) -> Fit:
+        """Return the phase multiplied: half or twice the frequency."""
+        return replace(self, coefficients=self.coefficients * factor)
 
     def phase_at(self, time: float, origin: float = 0.0) -> Estimate:
-        """Phase at a time, from 0 to 1 [turns], of what passes at a phase of origin."""
+        """Return the phase at a time, from 0 to 1 [turns], of what passes at a phase of origin."""
         powers = ((time - self.centre) / self.half) ** np.arange(self.coefficients.size)
         value = float(powers @ self.coefficients) - origin
         return Estimate(value - np.floor(value), float(np.sqrt(powers @ self.covariance @ powers)), "turns")
@@ -171,37 +232,12 @@ def _polynomial(coefficients: Array, u: Array) -> Array:
 
 
 def median(values: Array) -> float:
-    """The upper middle value; several times faster than numpy's for short arrays."""
+    """Return the upper middle value; several times faster than numpy's for short arrays."""
     return float(np.partition(values, values.size // 2)[values.size // 2])
 
 
-def _independent(coefficients: Array, covariance: Array, half: float) -> tuple[Estimate, Estimate, float]:
-    if coefficients.size < 4:
-        d1, d2 = _derivatives(0.0, coefficients.size)
-        against = covariance @ d2
-        slope = float(d2 @ against)
-        u = -float(d1 @ against) / slope if slope > 0 else 0.0
-    else:  # where the slope and its bend are independent: frequency and slope are so at three times, far apart
-        u = -float(covariance[2, 3] / covariance[3, 3]) / 3 if covariance[3, 3] > 0 else 0.0
-    u = min(max(u, -1.0), 1.0)
-    return *_at(coefficients, covariance, half, u), u * half
-
-
-def _at(coefficients: Array, covariance: Array, half: float, u: float) -> tuple[Estimate, Estimate]:
-    d1, d2 = _derivatives(u, coefficients.size)
-    frequency = Estimate(float(d1 @ coefficients) / half, float(np.sqrt(d1 @ covariance @ d1)) / half, "Hz")
-    chirp = Estimate(float(d2 @ coefficients) / half**2, float(np.sqrt(d2 @ covariance @ d2)) / half**2, "Hz/s")
-    return frequency, chirp
-
-
-def _derivatives(u: float, size: int) -> tuple[Array, Array]:
-    d1 = np.array([k * u ** (k - 1) if k > 0 else 0.0 for k in range(size)])
-    d2 = np.array([k * (k - 1) * u ** (k - 2) if k > 1 else 0.0 for k in range(size)])
-    return d1, d2
-
-
 def student(freedom: float, deviations: float = 1.0) -> float:
-    """What a standard deviation from few degrees of freedom is multiplied by, to cover as so many that are known."""
+    """Return the factor of a standard deviation from few degrees of freedom that covers as much as a known one's."""
     if freedom > 200:
         return deviations
     from scipy.special import ndtr, stdtrit
@@ -209,80 +245,208 @@ def student(freedom: float, deviations: float = 1.0) -> float:
     return float(stdtrit(max(freedom, 1.0), float(ndtr(deviations))))
 
 
-def fit_turns(times: Array, turns: Array, weight: Array | None = None, *, degree: int | None = None) -> Fit:
+def fit_turns(
+    times: Array,
+    turns: Array,
+    weight: Array | None = None,
+    *,
+    degree: int | None = None,
+    jump: Jump | None = None,
+    grid: Grid | None = None,
+    absolute: bool = False,
+) -> Fit:
     """Fit the phase.
 
-    times, turns: shape (n,); weight: of each (1/variance, relative), shape (n,); degree: None: two, or three where it
-    differs from two significantly.
+    Args:
+        times: of the record, shape (n,) [s].
+        turns: phases, shape (n,).
+        weight: 1/variance of each, shape (n,); None: all alike.
+        degree: 2: the slope stays the same; 3: nothing is known of its change; None: the prior is.
+        jump: in the times, nearly; it is fitted, too.
+        grid: of the samples that the phases come from.
+        absolute: whether weights are 1/variance by the noise of the samples, or relative.
     """
-    fit, third, u_third = _fit(times, turns, weight, degree or 2)
-    if degree is not None or times.size < FEWEST_FOR_BEND:
-        return fit
-    if times.size >= FEWEST_FOR_THIRD and abs(third) > CURVED * u_third:
-        cubic, *_ = _fit(times, turns, weight, 3)
-        u = float(np.sqrt(cubic.unit_covariance[3, 3] * cubic.variance * max(1.0, cubic.inflation)))
-        if abs(cubic.coefficients[3]) > student(cubic.freedom, CURVED) * u:
-            return cubic
-    unit = 6 / fit.half**3
-    return replace(fit, unfitted=(unit * third, unit * u_third * max(1.0, fit.inflation) ** 0.5))
+    if jump is not None and not FEWEST_BESIDE <= np.count_nonzero(times > jump.at) <= times.size - FEWEST_BESIDE:
+        jump = None
+    model = _Model(degree, jump, grid, absolute)
+    for _ in range(1 if jump is None else 3):  # the second is right to the change of the frequency in what was lost
+        fit, step = _fit(times, turns, weight, model)
+        if model.jump is None or step is None:
+            break
+        turn = 1 / fit.middle_frequency
+        lost = model.jump.lost + (step.value or 0.0) * turn
+        model = replace(model, jump=Jump(model.jump.at, lost, (step.u or 0.0) * turn))
+    return replace(fit, jump=model.jump)
 
 
-def _fit(times: Array, turns: Array, weight: Array | None, degree: int) -> tuple[Fit, float, float]:
-    """The fit, and the coefficient of one degree more with its standard uncertainty if all residuals are white."""
-    centre, half = 0.5 * float(times[0] + times[-1]), 0.5 * float(times[-1] - times[0])
-    degree = min(degree, times.size - 1)
-    u = (times - centre) / half
-    columns = np.empty((times.size, degree + 2))
-    columns[:, 0] = 1.0
-    for k in range(1, degree + 2):
-        columns[:, k] = columns[:, k - 1] * u
-    if weight is not None:
-        root = np.sqrt(weight)
-        columns *= root[:, None]
-        goal = turns * root
-    else:
-        goal = turns
-    orthonormal, triangle = np.linalg.qr(columns)
-    along = orthonormal.T @ goal
-    inverse = np.linalg.inv(triangle[: degree + 1, : degree + 1])
-    coefficients = inverse @ along[: degree + 1]
-    standard = goal - columns[:, : degree + 1] @ coefficients
-    residuals = standard if weight is None else standard / root
-    left = float(standard @ standard) - float(along[-1]) ** 2
-    last = float(triangle[-1, -1]) or 1e-300
-    third = float(along[-1]) / last
-    u_third = float(np.sqrt(max(left, 1e-300) / max(times.size - degree - 2, 1))) / abs(last)
-    variance, inflation, freedom = scatter(standard, turns, degree + 1)
-    return Fit(coefficients, inverse @ inverse.T, centre, half, variance, inflation, freedom, residuals), third, u_third
+@dataclass(frozen=True)
+class _Model:
+    """See `fit_turns`."""
+
+    degree: int | None
+    jump: Jump | None
+    grid: Grid | None
+    absolute: bool
 
 
-def scatter(residuals: Array, turns: Array, parameters: int) -> tuple[float, float, float]:
-    """Variance of residuals, the factor by which blocks of neighbours scatter more or less, degrees of freedom.
+@dataclass(frozen=True)
+class _Solution:
+    """Coefficients of all columns but the last, and of the last one, that of u³.
 
-    residuals: standardised, and turns: their phase, shape (n,); parameters: of the fit.  What matters for a frequency
-    is how residuals scatter over times as long as the record, not from one to the next.
+    Attributes:
+        plain: where the last is 0, shape (m,).
+        unit: covariance of these for residuals of unit variance, shape (m, m).
+        toward: change of all with the last, shape (m + 1,).
+        seen, unit_seen: the last, and its variance for residuals of unit variance; 0 and infinite where it is not
+            looked for.
+    """
+
+    plain: Array
+    unit: Array
+    toward: Array
+    seen: float
+    unit_seen: float
+
+    @classmethod
+    def of(cls, columns: Array, goal: Array, *, free: bool) -> _Solution:
+        """Return the least squares of columns, shape (n, m + 1); free: whether the last one is looked for."""
+        m = columns.shape[1] - 1
+        orthonormal, triangle = np.linalg.qr(columns if free else columns[:, :m])
+        along, inverse = orthonormal.T @ goal, np.linalg.inv(triangle[:m, :m])
+        of_last = triangle[:m, m] if free else orthonormal.T @ columns[:, m]
+        seen, unit_seen = 0.0, np.inf
+        if free:
+            seen, unit_seen = float(along[m] / triangle[m, m]), float(triangle[m, m]) ** -2
+        return cls(inverse @ along[:m], inverse @ inverse.T, np.append(-inverse @ of_last, 1.0), seen, unit_seen)
+
+    def coefficients(self, last: float) -> Array:
+        """Return all of them, shape (m + 1,)."""
+        return np.append(self.plain, 0.0) + last * self.toward
+
+
+def _fit(times: Array, turns: Array, weight: Array | None, model: _Model) -> tuple[Fit, Estimate | None]:
+    """Return the fit, and the step of the phase that is left at a jump [turns]."""
+    clock = times if model.jump is None else model.jump.mend(times)
+    centre, half = 0.5 * float(clock[0] + clock[-1]), 0.5 * float(clock[-1] - clock[0])
+    columns = ((clock - centre) / half)[:, None] ** np.arange(4)
+    first = 0
+    if model.jump is not None:
+        columns, first = np.column_stack([times > model.jump.at, columns]), 1
+    root = np.ones(times.size) if weight is None else np.sqrt(weight)
+    free = times.size >= FEWEST_FOR_BEND and model.degree != 2
+    goal, columns = turns * root, columns * root[:, None]
+    found = _Solution.of(columns, goal, free=free)
+    standard = goal - columns @ found.coefficients(found.seen)
+    scatter = scatter_of(standard, np.rint(turns), first + 3 + free, absolute=model.absolute)
+    if model.grid is not None:
+        powers, unit = (columns / root[:, None])[:, first : first + 3], found.unit[first:, first:]
+        seen = float(np.sqrt(np.mean((standard / root) ** 2)))
+        rounding = model.grid.rounding(float(found.plain[first + 1]) / half)
+        if scatter.scale * unit[1, 1] < (GRID_AT_MOST * rounding) ** 2:
+            carried = (powers * root[:, None] ** 2) @ unit
+            least = model.grid.variance(times, powers, carried, rounding, seen) / float(unit[1, 1])
+            scatter = replace(scatter, least=least)
+    last, v_last, slope_bias = found.seen, found.unit_seen * scatter.scale if free else 0.0, (0.0, 0.0)
+    if model.degree is None:
+        expected = _Expected.of(found.plain[first:], half)
+        last, v_last, slope_bias = expected.combine(last, v_last if free else np.inf, scatter.freedom)
+    coefficients = found.coefficients(last)
+    covariance = v_last * np.outer(found.toward, found.toward)
+    covariance[:-1, :-1] += found.unit * scatter.scale
+    fit = Fit(
+        coefficients=coefficients[first:],
+        covariance=covariance[first:, first:],
+        centre=centre,
+        half=half,
+        residuals=(goal - columns @ coefficients) / root,
+        scatter=scatter,
+        unit_covariance=found.unit[first:, first:],
+        slope_bias=slope_bias,
+        jump=model.jump,
+    )
+    return fit, Estimate(float(coefficients[0]), float(covariance[0, 0]) ** 0.5, "turns") if first else None
+
+
+@dataclass(frozen=True)
+class _Expected:
+    """What is known of the coefficient of u³ before the pulses are seen.
+
+    Attributes:
+        n, u_n: bend under a drag or an even drive, in units of slope²/frequency.
+        one: the coefficient where n is 1 [turns].
+        u_swing: more, of tops that swing about their drives, shape (m,) [turns].
+        fourth: slope³/frequency² times T²/56 [Hz/s].
+    """
+
+    n: float
+    u_n: float
+    one: float
+    u_swing: Array
+    fourth: float
+
+    @classmethod
+    def of(cls, parabola: Array, half: float) -> _Expected:
+        """Return it for a phase, frequency and slope as multiples of uᵏ, shape (3,)."""
+        frequency, slope = float(parabola[1]) / half, 2 * float(parabola[2]) / half**2
+        n, u_n = (UNDER_DRAG, UNDER_DRAG_U) if slope < 0 else (UNDER_DRIVE, UNDER_DRIVE_U)
+        unit, share = half**3 / 6, slope / (frequency or np.inf)
+        return cls(n, u_n, unit * slope * share, unit * SWINGS_U, slope * share**2 * (2 * half) ** 2 / 56)
+
+    def combine(self, seen: float, variance: float, freedom: float) -> tuple[float, float, tuple[float, float]]:
+        """Return mean and variance with a measured value, and bias and u of the slope.
+
+        The prior is a sum of normal distributions; each is combined with the measured value and weighed by its
+        evidence, the density of Student's distribution there.  Under a drag ν′ = −cνⁿ the bend is nν′²/ν, and its own
+        change ν‴ = n(2n − 1)ν′³/ν² makes the slope ν‴T²/56 too high.
+        """
+        mean, swings = self.n * self.one, np.zeros(self.u_swing.size)
+        prior = np.append(0.0, self.u_swing) ** 2 + (self.u_n * self.one) ** 2
+        both = prior + min(variance, 1e300) + 1e-300
+        share, weight, of_drag = prior / both, np.append(1 - SWING, swings + SWING / swings.size), 1.0
+        if variance < np.inf:
+            log = -0.5 * (np.log(both) + (freedom + 1) * np.log1p((seen - mean) ** 2 / both / freedom))
+            evidence = np.exp(log - log.max())
+            weight = weight * evidence / (weight @ evidence)
+            of_drag = float(evidence[0])
+        means, variances = mean + share * (seen - mean), (1 - share) * prior
+        value = float(weight @ means)
+        n = float(means[0]) / self.one if self.one else 0.0
+        u_n = float(1 - share[0]) ** 0.5 * self.u_n
+        fourth = of_drag * self.fourth
+        bias = fourth * n * (2 * n - 1), abs(fourth * (4 * n - 1) * u_n)
+        return value, float(weight @ (variances + (means - value) ** 2)), bias
+
+
+def scatter_of(residuals: Array, turns: Array, parameters: int, *, absolute: bool) -> Scatter:
+    """Return how residuals scatter.
+
+    What matters for a frequency is how they scatter over times as long as the record, not from one to the next: the
+    variance of sums over blocks, combined with a prior in which it is that of single residuals.
+
+    Args:
+        residuals: standardised, shape (n,).
+        turns: their phase, whole numbers, shape (n,).
+        parameters: of the fit.
+        absolute: whether a variance of 1 is expected.
     """
     n = residuals.size
-    freedom = max(n - parameters, 1)
+    freedom = float(max(n - parameters, 1))
     variance = float(residuals @ residuals) / freedom
-    each = -(-n // BLOCKS)
-    if each < 2 or variance <= 0:
-        return variance, 1.0, freedom
-    short = max(SHORTEST_BLOCK, -(-n // SHORT_BLOCKS))
-    for size, less, more in ((each, ALTERNATING, WHITE), (short, TO_AND_FRO, 0.0)):
-        place = turns // size
-        starts = np.concatenate([[0], np.flatnonzero(place[1:] != place[:-1]) + 1])
-        blocks = starts.size
-        if blocks < parameters + 6:
-            continue
-        sums = np.add.reduceat(residuals, starts)
-        sizes = np.diff(np.append(starts, n))
-        ratio = float((sums**2 / sizes).sum()) / (blocks - parameters) / variance
-        if 0.85 < ratio < 1.3:
-            continue
-        from scipy.special import fdtr
+    if absolute:
+        weight = PRIOR_FREEDOM / max(variance, 1.0)  # pulses that scatter beyond the noise say nothing of the noise
+        variance = (freedom * variance + weight) / (freedom + weight)
+        freedom += weight
+    place = np.floor((turns - turns[0]) / max(BLOCK, -(-n // BLOCKS)))
+    starts = np.concatenate([[0], np.flatnonzero(place[1:] != place[:-1]) + 1])
+    blocks = starts.size - parameters
+    if blocks < 1 or variance <= 0:
+        return Scatter(variance, 1.0, freedom, 1.0)
+    sizes = np.diff(np.append(starts, n))
+    ratio = float((np.add.reduceat(residuals, starts) ** 2 / sizes).sum()) / blocks / variance
+    inflation = (PRIOR_FREEDOM + blocks * ratio) / (PRIOR_FREEDOM + blocks)
+    from scipy.special import fdtr
 
-        p = float(fdtr(blocks - parameters, freedom, ratio))
-        if p < less or p > 1 - more:
-            return variance, ratio, blocks - parameters
-    return variance, 1.0, freedom
+    p = float(fdtr(blocks, freedom, ratio))
+    # Welch and Satterthwaite; the blocks' variance is a part of that of all residuals
+    whole = (PRIOR_FREEDOM + blocks) ** 2 / ((PRIOR_FREEDOM**2 + 2 * PRIOR_FREEDOM * blocks) / freedom + blocks)
+    return Scatter(variance, inflation, whole, 2 * min(p, 1 - p))

@@ -13,14 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.errors import NotPositive, OnlyHum, ShapesDiffer, TooFewPulses
 from analysis.numbers import digits
 from analysis.pulses import traps
-from analysis.pulses.clean import STRAYS, Clean, clean, own_lines
+from analysis.pulses.clean import Clean, clean
 from analysis.pulses.edges import Edges, place_edges
 from analysis.pulses.likelihood import search
 from analysis.pulses.matched import Match, match, window_of
-from analysis.pulses.regression import median, student
+from analysis.pulses.regression import Grid, fit_turns, median, student
 from analysis.pulses.result import Finding, Method, SpinFrequency
 from analysis.pulses.search import Events, find_events, shorten
-from analysis.pulses.times import FEWEST, Train, correlated, fit_train, unfitted_of
+from analysis.pulses.times import FEWEST, Train, findings_of_fit, fit_train
 
 if TYPE_CHECKING:
     from analysis.pulses.regression import Fit
@@ -39,6 +39,8 @@ FEW, CLEAR = 16, 3.0
 WIDE = 0.2
 #: The matched filter is not trusted where more than these parts of the turns have no pulse, or one at a wrong place.
 MOST_MISSING, MOST_WRONG = 0.5, 0.15
+#: Nor where the frequency would change by more than this part of it.
+MOST_SWEPT = 1.0
 #: Nor where so many times as many pulses lie beside the turns as at them: a reflection is one of them for each turn.
 MOST_DOUBLED = 1.5
 #: Pulses that scatter by more than this part of their width are placed one by one, and so are those that scatter by so
@@ -52,6 +54,8 @@ BY_NOISE, BY_BINS, MOST_ODD = 3.2, 0.25, 0.1
 MOST_DOUBLINGS = 2
 #: Two frequencies that differ by no more than this part count the same turns.
 SAME = 0.1
+#: With fewer samples a turn, a line at 1/k of the frequency or beyond half the rate leaves samples that look the same.
+COARSE = 12.0
 #: And not where every second pulse lies so many standard deviations from the others.
 APART = 4.0
 
@@ -72,7 +76,7 @@ def spin_of_trace(
         start: time of the first sample [s].
         method: "edges" is the fastest; "matched" the most precise where pulses stand out; "likelihood" for weak or hard
             traces; "auto" is matched, and likelihood where that does not do: a note says so.
-        degree: of the phase in time; None: 2, or 3 where the slope itself changes significantly.
+        degree: of the phase in time, as of `spin_of_times`.
 
     Raises:
         TooFewPulses: fewer than four pulses were found, or none that return regularly.
@@ -95,11 +99,7 @@ def spin_of_trace(
         if cleaned.lines:
             raise OnlyHum(seen=error.seen, needed=error.needed, duration=error.duration) from None
         raise
-    if cleaned.lines:
-        own = own_lines(cleaned.lines, cleaned.before, rate / (x.size // bins.size), found.match.fit)
-        if own:
-            found = _found(Trace(clean(x, rate, bins, bad, own=own), rate), method, degree, near=found.match.fit)
-    return _result(found, start)
+    return _result(found, start, rate, degree)
 
 
 class Trace:
@@ -107,7 +107,7 @@ class Trace:
 
     def __init__(self, cleaned: Clean, rate: float) -> None:
         self.samples, self.bins, self.bad = cleaned.samples, cleaned.bins, cleaned.bad
-        self.notes, self.lines = cleaned.notes, cleaned.lines
+        self.notes = cleaned.notes
         self.trains: dict[int | None, Train] = {}
         self.rate, self.bin_rate = rate, rate / (self.samples.size // self.bins.size)
 
@@ -154,14 +154,14 @@ class Found:
     one_by_one: Fit | None = None
 
 
-def _found(trace: Trace, method: Choice, degree: int | None, *, near: Fit | None = None) -> Found:
-    """The pulses by a method; near: a phase that fitted the trace before it was cleaned anew.  Raises TooFewPulses."""
+def _found(trace: Trace, method: Choice, degree: int | None) -> Found:
+    """Return the pulses by a method.  Raises TooFewPulses."""
     if method == "edges":
         if train := _scattered(trace, math.inf, degree):
             return _one_by_one(trace, train)
-        edges, doubled = _by_edges(trace)
+        edges, doubled = _by_edges(trace, degree)
         return Found(edges, doubled, "edges", 0.0, trace.notes)
-    found, doubled, used, why = _by_pulse(trace, method, degree, near)
+    found, doubled, used, why = _by_pulse(trace, method, degree)
     train = _scattered(trace, 1.4826 * median(np.abs(found.shifts[found.used])), degree)
     if train and method == "auto":
         return _one_by_one(trace, train)
@@ -169,34 +169,28 @@ def _found(trace: Trace, method: Choice, degree: int | None, *, near: Fit | None
     notes = (*why, *trap, *trace.notes)
     if train is None or not _same(found.fit, train.fit):
         return Found(found, doubled, used, found.origin, notes)
-    _, train = _events(trace, found.fit.coefficients.size - 1)
     notes = (_scatters(train, "a mean pulse does not show it, so their own places are in the uncertainty"), *notes)
     return Found(found, doubled, used, found.origin, notes, train.fit)
 
 
 def _one_by_one(trace: Trace, train: Train) -> Found:
-    """The result by pulses that were placed one by one."""
+    """Return the result by pulses that were placed one by one."""
     edges = Edges(train.fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0)
-    return Found(
-        edges,
-        train.doubled,
-        "edges",
-        0.0,
-        (_scatters(train, "each was timed by itself, without a mean pulse"), *trace.notes),
-    )
+    notes = (_scatters(train, "each was timed by itself, without a mean pulse"), *trace.notes)
+    return Found(edges, train.doubled, "edges", 0.0, notes)
 
 
 def _scatters(train: Train, text: str) -> Finding:
     return Finding("scattered", f"the pulses come early or late by {digits(_scatter(train), 2)} turns (rms): {text}")
 
 
-def _events(trace: Trace, degree: int | None = None) -> tuple[Events, Train]:
+def _events(trace: Trace, degree: int | None) -> tuple[Events, Train]:
     """The pulses that stand out of the noise, numbered.  Raises TooFewPulses."""
     events = trace.events
     if events.times.size < FEWEST:
         raise trace.too_few(events.times.size)
     if degree not in trace.trains:  # a bin's centre is that of its samples
-        trace.trains[degree] = fit_train(events.times - 0.5 / trace.rate, degree=degree)
+        trace.trains[degree] = fit_train(events.times - 0.5 / trace.rate, degree=degree, step=1 / trace.rate)
     return events, trace.trains[degree]
 
 
@@ -211,7 +205,7 @@ def _scattered(trace: Trace, left: float, degree: int | None) -> Train | None:
         events, train = _events(trace, degree)
     except TooFewPulses:
         return None
-    width, bin_width = events.width * _frequency(train.fit), _frequency(train.fit) / trace.bin_rate  # [turns]
+    width, bin_width = events.width * train.fit.middle_frequency, train.fit.middle_frequency / trace.bin_rate  # [turns]
     odd = train.missing + train.doubled
     scatter = _scatter(train)
     if odd > MOST_ODD * train.used.size or scatter < max(BY_NOISE / events.contrast * width, BY_BINS * bin_width):
@@ -228,48 +222,41 @@ def _scattered(trace: Trace, left: float, degree: int | None) -> Train | None:
 
 def _scatter(train: Train) -> float:
     """Standard deviation of the pulses about their fit [turns]."""
-    return float(np.sqrt(train.fit.variance))
-
-
-def _frequency(fit: Fit) -> float:
-    """The frequency in the middle of the record [Hz]."""
-    return float(fit.coefficients[1]) / fit.half
+    return float(np.sqrt(train.fit.scatter.variance))
 
 
 def _same(one: Fit, other: Fit) -> bool:
     """Whether two fits count the same turns."""
-    return abs(_frequency(one) - _frequency(other)) < SAME * _frequency(other)
+    return abs(one.middle_frequency - other.middle_frequency) < SAME * other.middle_frequency
 
 
-def _by_edges(trace: Trace) -> tuple[Edges, int]:
+def _by_edges(trace: Trace, degree: int | None) -> tuple[Edges, int]:
     """The edges, and the number of pulses beside the turns' own.  Raises TooFewPulses."""
-    events, train = _events(trace)
-    if events.width * _frequency(train.fit) > WIDE:
-        fit = train.fit.with_grid(events.times[train.used], None, step=1 / trace.rate, steep=1.0)
+    events, train = _events(trace, degree)
+    if events.width * train.fit.middle_frequency > WIDE:
+        times = events.times[train.used] - 0.5 / trace.rate
+        grid = Grid(1 / trace.rate, 1.0)
+        fit = fit_turns(times, train.turns.astype(np.float64), degree=degree, jump=train.fit.jump, grid=grid)
         return Edges(fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0), train.doubled
-    edges = place_edges(trace.samples, trace.rate, train.fit, width=events.width, sign=events.sign)
+    edges = place_edges(trace.samples, trace.rate, train.fit, width=events.width, sign=events.sign, degree=degree)
     if edges is None or (edges.turns < FEW and edges.height < CLEAR * edges.noise):
         raise trace.too_few(train.used.size)
     return edges, train.doubled
 
 
-def _by_pulse(
-    trace: Trace, method: Choice, degree: int | None, near: Fit | None
-) -> tuple[Match, int, Method, tuple[Finding, ...]]:
-    """The match, the number of pulses beside the turns' own, which method found it, and why not the other.
+def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, int, Method, tuple[Finding, ...]]:
+    """Return the match, the number of pulses beside the turns' own, the method, and why it is not the other one.
 
     Raises TooFewPulses.
     """
     found, doubled, seen, astray, why = None, 0, 0, False, "no pulses stand out that return regularly"
     try:
-        _, train = _events(trace)
+        _, train = _events(trace, degree)
         doubled, seen = train.doubled, train.used.size
         astray = doubled > MOST_DOUBLED * seen
         found = trace.match(train.fit, degree)
     except TooFewPulses as error:
         seen = error.seen
-    if found is not None and near is not None and _same(found.fit, near):
-        found = _likelier(found, trace.match(near, degree))
     if method == "matched":
         if found is None:
             raise trace.too_few(seen)
@@ -279,7 +266,7 @@ def _by_pulse(
         if not why:
             return found, doubled, "matched", ()
     other = _of_greatest_likelihood(trace, found, degree)
-    if other is None or _doubt(other).startswith("the frequency"):
+    if other is None or _sweep(other) > MOST_SWEPT:
         raise trace.too_few(seen)
     notes = (
         () if method == "likelihood" else (Finding("fell-back", f"{why}: the greatest likelihood was searched for"),)
@@ -288,31 +275,23 @@ def _by_pulse(
 
 
 def _of_greatest_likelihood(trace: Trace, found: Match | None, degree: int | None) -> Match | None:
-    """The match at the frequency of greatest likelihood, or the one that was found, if that is likelier."""
+    """Return the match at the frequency of greatest likelihood, or the one that was found, if that is likelier."""
     fit = search(trace.bins, trace.bin_rate)
     other = None if fit is None else trace.match(fit, degree)
-    if other and found and _of_hum(trace, found) and not _of_hum(trace, other):
-        return other
-    return _likelier(other, found)
+    return max((each for each in (other, found) if each), key=lambda each: each.evidence, default=None)
 
 
-def _of_hum(trace: Trace, found: Match) -> bool:
-    """Whether the frequency passes one at which hum was taken off: what is left of it recurs as often as it."""
-    ends = np.sort(found.fit.frequency(np.array([0.0, trace.duration])))
-    return any(ends[0] - STRAYS < frequency < ends[1] + STRAYS for frequency, _ in trace.lines)
-
-
-def _likelier(one: Match | None, other: Match | None) -> Match | None:
-    """The one of greater evidence; the first of two alike."""
-    return max((each for each in (one, other) if each), key=lambda each: each.evidence, default=None)
+def _sweep(found: Match) -> float:
+    """Return the change of the frequency along the record, as a part of it."""
+    slope = found.fit.motion_at(found.fit.centre)[1].value or 0.0
+    return abs(slope) * 2 * found.fit.half / found.fit.middle_frequency
 
 
 def _doubt(found: Match) -> str:
-    """The reason to distrust a match; empty where there is none."""
-    turns = found.heights.size
-    sweep = abs(found.fit.frequency_and_chirp()[1].value or 0.0) * found.fit.half
-    if sweep > 0.5 * found.fit.coefficients[1] / found.fit.half:
-        return f"the frequency would change by {digits(2 * sweep, 3)} Hz"
+    """Return the reason to distrust a match; empty where there is none."""
+    turns, sweep = found.heights.size, _sweep(found)
+    if sweep > MOST_SWEPT:
+        return f"the frequency would change by {digits(sweep * found.fit.middle_frequency, 3)} Hz"
     if found.missing > MOST_MISSING * turns:
         return f"{found.missing} of {turns} turns have no pulse"
     if found.wrong > MOST_WRONG * turns:
@@ -368,28 +347,29 @@ def _checked(samples: ArrayLike, rate: float) -> tuple[Array, Array, NDArray[np.
     return x, shorten(x, factor), bad if bad.any() else None
 
 
-def _result(pulses: Found, start: float) -> SpinFrequency:
+def _result(pulses: Found, start: float, rate: float, degree: int | None) -> SpinFrequency:
     found = pulses.match
-    fit = found.fit
-    frequency, chirp, reference = fit.frequency_and_chirp()
-    phase, bend, scatter = fit.phase_at(reference, pulses.origin), fit.bend, 1.4826 * median(np.abs(fit.residuals))
-    if (own := pulses.one_by_one) is not None:
-        at, slope = own.frequency_and_chirp_at(reference)
-        frequency, chirp, phase = _wider(frequency, at), _wider(chirp, slope), _wider(phase, own.phase_at(reference))
-        bend = bend and own.bend and _wider(bend, own.bend)
-        scatter = float(np.sqrt(own.variance))
+    fit, own = found.fit, pulses.one_by_one
+    reference = fit.reference
+    frequency, chirp, bend = fit.motion_at(reference)
+    phase, scatter = fit.phase_at(reference, pulses.origin), 1.4826 * median(np.abs(fit.residuals))
+    u_of_pulses = fit.u_of_pulses(reference)
+    if own is not None:
+        frequency, chirp, bend = map(_wider, (frequency, chirp, bend), own.motion_at(reference))
+        phase, scatter = _wider(phase, own.phase_at(reference)), float(np.sqrt(own.scatter.variance))
+        u_of_pulses = own.u_of_pulses(reference)
     assert frequency.value is not None
     more = [*pulses.notes, *traps.mains(frequency, chirp)]
     if isinstance(found, Match) and found.flat:
         more.append(Finding("clipped", "the tops of the pulses are flat: the detector or the converter is saturated"))
+    if (each := rate / frequency.value) < COARSE:
+        more.append(Finding("coarse", f"a turn has {digits(each, 2)} samples only: a faster top may look the same"))
     if found.missing:
         have = "s have" if found.missing > 1 else " has"
         more.append(Finding("missing", f"{found.missing} turn{have} no pulse"))
     if found.wrong:
         more.append(Finding("wrong", f"{found.wrong} pulses are not at their place and were left out"))
-    if fit.coefficients.size > 3:
-        more.append(Finding("curved", "the slope itself changes: a third degree was fitted"))
-    more += correlated(fit, "turns")
+    more += findings_of_fit(fit, "turns")
     return SpinFrequency(
         frequency=frequency,
         chirp=chirp,
@@ -403,10 +383,10 @@ def _result(pulses: Found, start: float) -> SpinFrequency:
         scatter=scatter / frequency.value,
         snr_db=20 * math.log10(found.height / found.noise) if found.noise > 0 and found.height > 0 else None,
         notes=tuple(more),
-        bend=bend,
+        bend=None if degree == 2 else bend,
         correlations=(own or fit).correlations(reference),
-        unfitted=unfitted_of(own or fit),
-        freedom=(own or fit).freedom,
+        u_of_pulses=u_of_pulses,
+        freedom=(own or fit).scatter.freedom,
     )
 
 

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 WINDOW = 2.0
 #: Turns between two windows are certain where their number is known to this, as a standard uncertainty [turns].
 CERTAIN = 0.1
+#: Natural logarithm of the ratio of neighbouring frequencies that no drag and no drive of 2 s makes: 20 %.
+UNLIKE = 0.18
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,10 +64,16 @@ class Track:
         for spin in self.spins:
             for note in spin.notes:
                 windows.setdefault(note.name, []).append(note.text)
-        return tuple(
+        findings = [
             Finding(name, f"{texts[0]}" + (f" (and in {len(texts) - 1} more windows)" if len(texts) > 1 else ""))
             for name, texts in windows.items()
-        )
+        ]
+        ratio = self.frequency[1:] / self.frequency[:-1]
+        if (unlike := np.flatnonzero(np.abs(np.log(ratio)) > UNLIKE)).size:
+            one, other = (f"{self.frequency[i]:.4g} Hz at {self.time[i]:.4g} s" for i in (unlike[0], unlike[0] + 1))
+            text = f"neighbouring windows have {one} and {other}: pulses are missing or doubled in a pattern"
+            findings.append(Finding("unlike", f"{text} ({unlike.size} times)" if unlike.size > 1 else text))
+        return tuple(findings)
 
 
 def track_of_times(pulse_times: ArrayLike, *, window: float = WINDOW) -> Track:
@@ -189,7 +197,8 @@ def _connect(found: Iterable[SpinFrequency | tuple[float, float]], seen: int, du
     )
     fraction = np.diff(phase)
     off = ahead - fraction - np.rint(ahead - fraction)
-    certain = (ahead_u < CERTAIN) & (np.abs(off) < 0.25)
+    sound = np.array([all(note.name != "jump" for note in spin.notes) for spin in spins[:-1]], dtype=bool)
+    certain = sound & (ahead_u < CERTAIN) & (np.abs(off) < 0.25)
     turns = phase[0] + np.concatenate([[0.0], np.cumsum(np.rint(ahead - fraction) + fraction)])
     return Track(
         time, frequency, u, chirp, chirp_u, turns, phase_u, np.concatenate([[False], certain]),

@@ -106,10 +106,4 @@ def _tables(rows: Sequence[Row]) -> str:
         count = Counter(row.state for row in group)
         numbers = " | ".join(str(count[state]) for state in states)
         lines.append(f"| {name} | {len(group)} | {numbers} | {100 * share(group):.1f} % |")
-    lines += ["", "| survived or equivalent | change | why |", "|---|---|---|"]
-    for row in sorted(rows, key=lambda row: (row.state, row.file, row.function)):
-        if row.state in {"survived", "unreached", "equivalent"}:
-            change = row.text.replace("|", "\\|")
-            place = f"{row.file}, {row.function}" if row.function else row.file
-            lines.append(f"| {row.state}: {place} | {change} | {row.reason or 'no reason is known yet'} |")
     return "\n".join([*lines, "", ""])

@@ -1,4 +1,4 @@
-"""Make docs/pictures/live.png: the bench for practice while it records a spin-down, at 1280 × 800.
+"""Make two pictures of the bench for practice, 1280 × 800: the locked top (locked.png), and a spin-down (live.png).
 
 python docs/pictures/live.py
 """
@@ -9,12 +9,19 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-ROOT = Path(__file__).parents[2]
+from PIL import Image
+
+PICTURES = Path(__file__).parent
+ROOT = PICTURES.parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT)]
 
 from support.browser import DESK, FLAGS, executable  # noqa: E402
 from support.live_pages import until  # noqa: E402
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
 
 #: The browser of this script draws without a graphics card, where the page leaves smooth edges out to be fast.  So it
 #: is made to name a card: the picture shows the page as on a machine that has one.  Nothing but the edges differs.
@@ -26,8 +33,17 @@ GRAPHICS = """for (const kind of [WebGLRenderingContext, WebGL2RenderingContext]
 }"""
 
 
+def take_picture(page: Page, name: str) -> None:
+    """Write NAME.png, with 128 colours to keep it small."""
+    path = PICTURES / f"{name}.png"
+    page.screenshot(path=path)
+    with Image.open(path) as picture:
+        small = picture.convert("RGB").quantize(128)
+    small.save(path, optimize=True)
+
+
 def main() -> None:
-    """Start the bench, record, and take the picture once there is a fit."""
+    """Start the bench, lock the top, record, and take a picture of each."""
     from playwright.sync_api import sync_playwright
 
     with tempfile.TemporaryDirectory() as out, sync_playwright() as playwright:
@@ -44,12 +60,14 @@ def main() -> None:
             page.click("#match")
             page.click("#drive")
             until(page, "document.getElementById('event-list').textContent.includes('the top follows the drive')")
+            page.wait_for_timeout(2500)
+            take_picture(page, "locked")
             page.click("#record")
             until(page, "levilab.data.count >= 24")
             page.select_option("#speed", "1")
             until(page, "levilab.data.fit?.solid_to > 48 && !levilab.data.bench.silent")
             page.wait_for_timeout(2500)
-            page.screenshot(path=sys.argv[1] if len(sys.argv) > 1 else str(Path(__file__).with_suffix(".png")))
+            take_picture(page, "live")
             browser.close()
         finally:
             process.terminate()

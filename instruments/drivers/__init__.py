@@ -38,7 +38,7 @@ class Instrument(Protocol):
     def changed_settings(
         self, now: Mapping[str, Value] | None = None, *, since: Mapping[str, Value] | None = None
     ) -> dict[str, tuple[object, object]]:
-        """Settings that are no longer as they were answered, or by default as they were set: name → (then, now)."""
+        """Return the settings that differ from earlier answers, or from the values set: name → (then, now)."""
 
     def forget_errors(self) -> None:
         """Empty the error queue."""

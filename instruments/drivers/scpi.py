@@ -10,10 +10,10 @@ import difflib
 import functools
 import math
 import re
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, NoReturn, Self, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self, cast
 
 from instruments.clock import WallClock
+from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
 from instruments.ieee488 import IDENTITY_FIELDS, INFINITY, NOT_A_NUMBER, NUMERIC, Form, identity_fields
 from instruments.links.opening import open_link
@@ -24,16 +24,10 @@ if TYPE_CHECKING:
     from instruments.clock import Clock
     from instruments.links.transport import TrafficLog, Transport
 
-T = TypeVar("T", bound=bool | float | str)
 #: Error queues hold 20 to 32 entries: an instrument that still has one after so many never answers "No error".
 _LONGEST_ERROR_QUEUE = 64
 #: An entry of the error queue (SCPI-1999, vol. 2, 21.8): a number and a text in quotes.
 _QUEUE_ENTRY = re.compile(r"([+-]?\d{1,5}), ?(\"[ -~]*\")", re.ASCII)
-#: How instruments print a switch (SCPI-1999, vol. 1, 7.3).
-_SWITCH = {"0": False, "1": True}
-#: Instruments round a setting by this fraction of it at most.  Where their resolution is known, and the number of
-#: digits in their answers is not, these digits are four at least.
-_ROUNDING, _PRINTED = 0.01, 1e-4
 
 
 class ScpiInstrument:
@@ -154,7 +148,7 @@ class ScpiInstrument:
 
     @classmethod
     def kind_of_instrument(cls) -> str:
-        """The instruments that it drives, in words: the first line of its documentation."""
+        """Return the names of the instruments that it drives: the first line of its documentation."""
         return (cls.__doc__ or cls.__name__).splitlines()[0].rstrip(".")
 
     def forget_errors(self) -> None:
@@ -300,14 +294,14 @@ class ScpiInstrument:
         return [row for row in rows if isinstance(row, Setting)]
 
     def field_of(self, answer: str, header: str, key: str) -> str:
-        """The part of an answer that is one setting; all of it, where it has neither header nor fields.
+        """Return the part of an answer that is one setting; all of it, where it has neither header nor fields.
 
         Raises ValueError where the answer does not have the setting.
         """
         return answer
 
     def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
-        """Called after a setting was sent, so that an instrument without an error queue can be asked for it.
+        """Check a setting that was sent, where an instrument has no error queue; by default do nothing.
 
         Raises:
             OutOfRange: it has set another number.
@@ -326,7 +320,7 @@ class ScpiInstrument:
         raise CommandRefused(self.transport.address, sent, (f"{setting.name} is {now!r} afterwards",))
 
     def header_in_use(self, header: str) -> str:
-        """The header of a declared setting as it is sent; with several inputs, that of the input in use."""
+        """Return the header of a declared setting as it is sent; with several inputs, that of the input in use."""
         return header
 
     def close(self) -> None:
@@ -336,202 +330,9 @@ class ScpiInstrument:
 
 @functools.cache
 def _attributes(driver: Any) -> frozenset[str]:
-    """The names that can be set on a driver: its settings, properties, and annotated attributes."""
+    """Return the names that can be set on a driver: its settings, properties, and annotated attributes."""
     annotated = (name for owner in driver.__mro__ for name in getattr(owner, "__annotations__", {}))
     return frozenset({*dir(driver), *annotated})
-
-
-@dataclass(eq=False)
-class Setting(Generic[T]):
-    """A quantity of an instrument to set and to query, declared in one line.
-
-    It checks each answer: a number must have the instrument's form, a switch is 0 or 1, a word is one of the choices,
-    in its short or long form.  For any other answer it raises BadAnswer and clears the link.
-
-    Attributes:
-        header: the SCPI header.
-        kind: float, bool or str.
-        unit: of the number on the wire.
-        low: the lowest number that the instrument takes.
-        high: the highest one.
-        choices: the words that it takes, in their long form with the short form in capitals (SINusoid).
-        answers: words that it may answer beside the choices.
-        form: of its answer, where that is not the instrument's NUMBER, or of a text without choices.
-        resolution: the step in which the instrument sets it [unit].
-        digits: how many significant digits of a number it keeps and prints, where that is known.
-        key: the name of the field where the header has several, ``C1:BSWV WVTP,SINE,FRQ,1000HZ,…``.
-        suffix: the unit to send with a number.
-        values: the only numbers that the instrument has.
-        about: what it is, for `help`.
-        name: of the attribute; Python sets it.
-    """
-
-    header: str
-    kind: type[T]
-    unit: str = ""
-    low: float = -math.inf
-    high: float = math.inf
-    choices: tuple[str, ...] = ()
-    answers: tuple[str, ...] = ()
-    form: Form | None = None
-    resolution: float = 0.0
-    digits: int = 0
-    key: str = ""
-    suffix: str = ""
-    values: tuple[float, ...] = ()
-    about: str = ""
-    name: str = ""
-
-    def __post_init__(self) -> None:
-        if self.kind is str and not (self.choices or self.form):
-            raise TypeError(f"{self.header}: a word needs choices, and a text a form, or no answer could be checked")
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
-        self.__doc__ = self.description()
-
-    def description(self) -> str:
-        """The text of `help`: what it is, the header on the wire, range and unit."""
-        about = f"{self.about}: " if self.about else ""
-        return f"{about}{self.header}{f' {self.key}' if self.key else ''}, {self._allowed()}."
-
-    def _allowed(self) -> str:
-        """The allowed values, in words."""
-        unit = f" {self.unit}" if self.unit else ""
-        if self.kind is bool:
-            return "True or False"
-        if self.values:
-            return " or ".join(f"{value:g}" for value in self.values) + unit
-        if self.kind is float:
-            return f"{self.low:g} to {self.high:g}{unit}"
-        return "one of " + ", ".join(self.choices) if self.choices else f"a text, as {self.form and self.form.example}"
-
-    @property
-    def name_with_unit(self) -> str:
-        """The name with its unit, as in files: gate_s."""
-        return f"{self.name}_{self.unit.lower()}" if self.unit else self.name
-
-    @overload
-    def __get__(self, instrument: None, owner: type) -> Setting[T]: ...
-    @overload
-    def __get__(self, instrument: ScpiInstrument, owner: type) -> T: ...
-    def __get__(self, instrument: ScpiInstrument | None, owner: type) -> Setting[T] | T:
-        """Ask the instrument.  Raises BadAnswer."""
-        if instrument is None:
-            return self
-        question = self.question(instrument)
-        return self.read(instrument, question, instrument.transport.query(question))
-
-    def question(self, instrument: ScpiInstrument) -> str:
-        """The question for it, as it is sent."""
-        return f"{instrument.header_in_use(self.header)}?"
-
-    def read(self, instrument: ScpiInstrument, question: str, answer: str) -> T:
-        """The value in the answer to its question.  Raises BadAnswer."""
-        form = self.form or instrument.NUMBER
-        try:
-            return cast("T", self._parse(instrument.field_of(answer, self.header, self.key), form))
-        except ValueError:
-            instrument.reject(question, answer, self._expected(form))
-
-    def __set__(self, instrument: ScpiInstrument, value: T) -> None:
-        """Check, send, and read the error queue."""
-        self._check(instrument.transport.address, value)
-        key = f"{self.key}," if self.key else ""
-        instrument.command(f"{instrument.header_in_use(self.header)} {key}{self._spell(value)}{self.suffix}")
-        instrument.confirm(self, value)
-        instrument.last_set[self.name_with_unit] = self._canonical(value)
-
-    def differs(self, asked: T, answered: T, *, rounding: float = 0.0) -> bool:
-        """Whether an answer is another value than the one set, apart from rounding.
-
-        Args:
-            asked: the value set.
-            answered: the value in the answer.
-            rounding: of this instrument, in addition to that of the setting [unit].
-        """
-        if self.kind is float:
-            aside = self._last_digit(abs(float(asked))) + self.resolution + rounding
-            return not abs(float(answered) - float(asked)) <= aside
-        return self._canonical(asked) != self._canonical(answered)
-
-    def _last_digit(self, value: float) -> float:
-        """One unit in the last digit of a number that the instrument keeps [unit]."""
-        if self.digits and value:
-            return 10.0 ** (math.floor(math.log10(value)) + 1 - self.digits)
-        return (_PRINTED if self.resolution else _ROUNDING) * value
-
-    def _parse(self, answer: str, form: Form) -> bool | float | str:
-        """The value of an answer.  Raises ValueError."""
-        if self.kind is bool:
-            if answer not in _SWITCH:
-                raise ValueError(answer)
-            return _SWITCH[answer]
-        if self.kind is float:
-            number = form.number(answer)
-            if not abs(number) < NOT_A_NUMBER:  # infinity is a setting: a load of 9.9E37 ohm
-                raise ValueError(answer)
-            return number
-        if self.choices:
-            return _short_form(_strip_quotes(answer), (*self.choices, *self.answers))
-        if not form.matches(answer):
-            raise ValueError(answer)
-        return answer
-
-    def _expected(self, form: Form) -> str:
-        """The expected answer, in words."""
-        if self.kind is bool:
-            return "0 or 1"
-        if self.kind is float:
-            return f"a number, as {form.example}"
-        if self.choices:
-            return "one of " + ", ".join((*self.choices, *self.answers))
-        return f"a text, as {form.example}"
-
-    def _canonical(self, value: T) -> T:
-        """A word in its short form, everything else as it is."""
-        if self.kind is not str or not self.choices:
-            return value
-        with contextlib.suppress(ValueError):
-            return cast("T", _short_form(str(value), (*self.choices, *self.answers)))
-        return value
-
-    def _check(self, address: str, value: T) -> None:
-        if self.choices:
-            try:
-                _short_form(str(value), self.choices)
-            except ValueError:
-                raise OutOfRange(address, self.name, value, self._allowed()) from None
-        if self.values and value not in self.values:
-            raise OutOfRange(address, self.name, value, self._allowed())
-        if self.kind is float and not self.low <= float(value) <= self.high:
-            raise OutOfRange(address, self.name, value, self._allowed())
-        if self.kind is str and not self.choices and self.form and not self.form.matches(str(value)):
-            raise OutOfRange(address, self.name, value, self._allowed())
-
-    def _spell(self, value: T) -> str:
-        if self.kind is bool:
-            return "ON" if value else "OFF"
-        return repr(float(value)) if self.kind is float else str(self._canonical(value)).upper()
-
-
-def _short_form(word: str, choices: tuple[str, ...]) -> str:
-    """The short form of the choice that this word is, in any case.  Raises ValueError where it is none.
-
-    >>> _short_form("sinusoid", ("SINusoid", "SQUare")), _short_form("SQU", ("SINusoid", "SQUare"))
-    ('SIN', 'SQU')
-    """
-    for choice in choices:
-        short = re.sub("[a-z]", "", choice)
-        if word.upper() in {short, choice.upper()}:
-            return short
-    raise ValueError(word)
-
-
-def _strip_quotes(answer: str) -> str:
-    """A word without the quotes that some instruments put around it."""
-    quoted = re.fullmatch(r'"([^"]*)"', answer)
-    return quoted[1] if quoted else answer
 
 
 def parse_reading(address: str, question: str, answer: str, form: Form = NUMERIC) -> float | None:

@@ -23,7 +23,7 @@ _ALWAYS = "check the address, the cable and that it is on"
 
 
 def advice(error: BaseException, address: str = "", library: object = "@py") -> str:
-    """What to try, as the end of a sentence.
+    """Return what to try, as the end of a sentence.
 
     Args:
         error: that was raised.
@@ -42,5 +42,5 @@ def advice(error: BaseException, address: str = "", library: object = "@py") -> 
 
 
 def one_line(error: BaseException) -> str:
-    """An error's text without line breaks."""
+    """Return an error's text without line breaks."""
     return " ".join(str(error).split())

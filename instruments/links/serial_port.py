@@ -120,7 +120,7 @@ class SerialPort:
         return NotConnected(self._address, f"cannot be opened ({one_line(error)}): {_ports_hint(port)}")
 
     def connection(self) -> socket.socket | None:
-        """The connection behind a port that is a URL ``socket://``."""
+        """Return the connection behind a port that is a URL ``socket://``."""
         link = getattr(self.device, "_socket", None)
         return link if isinstance(link, socket.socket) else None
 
@@ -168,7 +168,7 @@ class SerialPort:
         return bytes(seen)
 
     def message(self, within: float) -> bytes:
-        """A serial line does not mark the ends of messages.  Raises NotImplementedError."""
+        """Raise NotImplementedError: a serial line does not mark the ends of messages."""
         raise NotImplementedError
 
     def discard(self) -> None:
@@ -200,7 +200,7 @@ class SerialPort:
 
 
 def port_name(address: str) -> str:
-    """The name by which pyserial knows this port.
+    """Return the name by which pyserial knows this port.
 
     A number alone is VISA's: the third port is COM3, or /dev/ttyS2 elsewhere than on Windows.
 

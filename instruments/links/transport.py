@@ -150,7 +150,7 @@ class Port(Protocol):
         """Lock the instrument against other programs, where that is possible.  Raises Occupied, NotConnected."""
 
     def failure(self, error: Exception) -> Failure:
-        """The meaning of an error of the library."""
+        """Return the meaning of an error of the library."""
 
 
 class MessageLink:

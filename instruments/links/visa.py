@@ -188,7 +188,7 @@ class VisaPort:
             raise NotConnected(self._address, f"it could not be locked ({error!r})") from error
 
     def failure(self, error: Exception) -> Failure:
-        """A time-out is one by VISA's number; pyvisa-py's protocols raise OSError, EOFError, RPCError besides."""
+        """Return what an error means; a time-out has VISA's number, pyvisa-py's protocols raise OSError, too."""
         import pyvisa
 
         time_out = pyvisa.constants.StatusCode.error_timeout
@@ -212,13 +212,13 @@ class VisaPort:
         return getattr(self.resource.visalib, "sessions", {}).get(self.resource.session)
 
     def _bare_socket(self) -> socket.socket | None:
-        """The socket behind a bare TCP connection of pyvisa-py's; None from any other library."""
+        """Return the socket behind a bare TCP connection of pyvisa-py's; None from any other library."""
         interface = getattr(self._session(), "interface", None)
         return interface if isinstance(interface, socket.socket) else None
 
 
 def addresses(library: str | VisaLibraryBase) -> tuple[str, ...]:
-    """The resource names that a PyVISA library finds by itself, serial ports included.  Raises NotConnected."""
+    """Return the resource names that a PyVISA library finds by itself, serial ports included.  Raises NotConnected."""
     import pyvisa
 
     try:

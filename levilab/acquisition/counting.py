@@ -74,7 +74,7 @@ def prepare_counter_again(session: Session[S], gate_s: float | None = None) -> N
 
 
 def spin_now(session: Session[S], gate_s: float | None = None) -> float | None:
-    """What the counter counts, outside of readings [Hz]; one that fails is reached again, a few times.
+    """Return a count outside of readings [Hz]; reach the counter again, a few times, where it fails.
 
     gate_s: as it was prepared.
     """
@@ -111,7 +111,7 @@ class FreeTop(Generic[S]):
         return self.before[-1] if self.before else None
 
     def read(self) -> Row | None:
-        """A reading, or None; a count that is missing or does not follow from the last reading is asked for once more.
+        """Return a reading, or None; ask once more for a count that is missing or does not follow the last one.
 
         Two counts that agree are a reading, even if they do not follow, as long as a coasting top can have them: less
         than before, or as much as before a miscount.  More than it can have is no reading.  A counter that fails, or
@@ -136,7 +136,7 @@ class FreeTop(Generic[S]):
         return reading
 
     def fall(self, asked: float) -> str:
-        """What was seen of the fall, empty while the top is up.
+        """Return a description of the fall, empty while the top is up.
 
         A dark counter, asked twice, means that the top fell; single odd counts do not.
 
@@ -168,7 +168,7 @@ class FreeTop(Generic[S]):
         return Missed.UNSTEADY if first or second else Missed.DARK
 
     def _agreed(self, reading: Row) -> Row | Missed:
-        """What two counts mean that agree, but do not follow from the last reading."""
+        """Return the meaning of two counts that agree, but do not follow from the last reading."""
         last = self.before[-1]  # else they would follow
         if reading["spin_frequency_hz"] < last["spin_frequency_hz"]:
             return reading
@@ -192,7 +192,7 @@ class FreeTop(Generic[S]):
         return Missed.MULTIPLE
 
     def _count(self) -> Row | None:
-        """What the counter counts; its time is the middle of the gate."""
+        """Return one count; its time is the middle of the gate."""
         session = self.session
         spin = session.bench.counter.frequency()
         session.saw("spin_frequency_hz", spin)

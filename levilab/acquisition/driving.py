@@ -220,7 +220,7 @@ def _did_not_follow(session: Session[D], target: float, seen: str) -> DidNotFoll
 
 
 def _free_spin(session: Session[D], target: float, before: str) -> float:
-    """The spin before the drive is on.  before: what the last try ended with.  Raises ExperimentFailed in the dark."""
+    """Return the spin before the drive is on; before: end of the last try.  Raises ExperimentFailed."""
     spin = spin_now(session)
     if spin is None and before:
         raise _did_not_follow(session, target, f"{before}; then it fell")
@@ -282,7 +282,7 @@ def _until(session: Session[D], target: float, left_s: float) -> str:
 
 
 def held_spin(session: Session[D], drive: float) -> float:
-    """The spin of a top that is held by a drive [Hz].  Raises NotHeld."""
+    """Return the spin of a top that is held by a drive [Hz].  Raises NotHeld."""
     spin = spin_now(session)
     if spin is None or abs(spin - drive) > HELD_WITHIN_HZ:
         raise NotHeld(spin, drive)

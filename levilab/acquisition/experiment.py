@@ -35,7 +35,7 @@ class ExperimentSettings(Settings):
         """
 
     def for_scene(self, scene: Scene) -> Self:
-        """These settings for a virtual bench whose top is a scene's: what was not set may suit it better."""
+        """Return these settings for a virtual bench whose top is a scene's: what was not set may suit it better."""
         return self
 
 
@@ -102,5 +102,5 @@ class Experiment(Generic[S]):
     called: str = "reading"
 
     def kinds(self, settings: S) -> tuple[str, ...]:
-        """The kinds of instrument that it needs with these settings."""
+        """Return the kinds of instrument that it needs with these settings."""
         return (*self.instruments, *self.also_needs(settings))

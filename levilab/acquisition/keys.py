@@ -55,7 +55,7 @@ class Key:
 
 
 def keys_of(config: BenchConfig, experiment: str) -> tuple[Key, ...]:
-    """The settings of an experiment, its own before those that it shares with others."""
+    """Return the settings of an experiment, its own before those that it shares with others."""
     (listed,) = (one for one in tables_to_write() if one.name == experiment)
     values = settings_of(config, experiment).model_dump(mode="json")
     schema = _schema(config, experiment)
@@ -65,7 +65,7 @@ def keys_of(config: BenchConfig, experiment: str) -> tuple[Key, ...]:
 
 
 def keys_table(keys: tuple[Key, ...], experiment: str) -> Table:
-    """A table for the terminal."""
+    """Return a table for the terminal."""
     rows = [(one.name, _as_typed(one.value), one.expected, one.meaning) for one in keys]
     return table(f"levilab acquire {experiment} --set {experiment}.KEY=VALUE", ("KEY", "is", "may be", ""), rows)
 
@@ -75,7 +75,7 @@ def _as_typed(value: Any) -> str:
 
 
 def expected(name: str, schema: Mapping[str, Any]) -> str:
-    """What may stand at a key, with its unit.
+    """Return the values that a key takes, with their unit.
 
     Args:
         name: of the key, which ends with its unit.
@@ -120,7 +120,7 @@ def refuse_unknown(config: BenchConfig, experiment: str, name: str) -> None:
 
 
 def refusal(error: ValidationError, given: Mapping[str, str], config: BenchConfig, experiment: str) -> UsageError:
-    """What is wrong with settings that were given as texts by their names, in words."""
+    """Return the faults of settings that were given as texts by their names."""
     first = error.errors()[0]
     name = str(first["loc"][1]) if len(first["loc"]) > 1 else ""
     own = first["type"] == "value_error" or not name  # the experiment's own words
@@ -132,7 +132,7 @@ def refusal(error: ValidationError, given: Mapping[str, str], config: BenchConfi
 
 
 def allowed_values(config: BenchConfig, experiment: str, name: str) -> str:
-    """What may stand at a key of an experiment on this bench, with its unit."""
+    """Return the values that a key of an experiment takes on this bench, with their unit."""
     return expected(name, _schema(config, experiment)[name])
 
 
@@ -141,7 +141,7 @@ def _where(experiment: str) -> str:
 
 
 def _schema(config: BenchConfig, experiment: str) -> dict[str, Any]:
-    """What may stand in an experiment's settings, by their names: as they are declared, and as the bench allows."""
+    """Return the values that an experiment's settings take, by name: as declared, and as the bench allows."""
     schema: dict[str, Any] = type(settings_of(config, experiment)).model_json_schema()["properties"]
     allowed = {name: {"maximum": limit} for name, limit in config.limits.model_dump().items()}
     return {name: one | allowed.get(name, {}) for name, one in schema.items()}

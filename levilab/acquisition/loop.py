@@ -99,7 +99,7 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
 
 
 def _in_words(error: Exception) -> str:
-    """What ended a run: the words of a known failure; the class, too, of one that nothing in this program expects."""
+    """Return the reason that ended a run: the text of a known failure, with the class of an unexpected one."""
     known = isinstance(error, LevilabError | InstrumentError)
     return unquoted(str(error) if known else f"{type(error).__name__}: {error}")
 
@@ -119,7 +119,7 @@ def _at_the_bench(
     *,
     watch: Watch,
 ) -> None:
-    """The steps of the experiment, between opening the bench and leaving it."""
+    """Return the steps of the experiment, between opening the bench and leaving it."""
     settings = settings_of(request.config, experiment.name)
     earlier = _earlier(request)
     log = writer.wire if request.wire_log else None
@@ -162,7 +162,7 @@ def _called_meanwhile(look: Callable[[], None], session: Session[Any]) -> Iterat
 
 
 def _earlier(request: AcquisitionRequest) -> Earlier | None:
-    """What is resumed."""
+    """Return the earlier part of a run that is resumed."""
     if request.resume is None:
         return None
     columns = request.resume.readings().columns

@@ -84,7 +84,7 @@ class AcquisitionOptions:
 
 
 def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequest:
-    """What is to be acquired.  Raises ConfigError, CannotResume, UsageError, DataError, SceneError."""
+    """Return the request for an acquisition.  Raises ConfigError, CannotResume, UsageError, DataError, SceneError."""
     run = _resumable(_run_folder(options.resume, options.out), experiment) if options.resume else None
     virtual = options.mock or bool(run and run.record.seed is not None)
     _check_options(options, run, virtual=virtual)
@@ -114,7 +114,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
 
 
 def chosen_settings(experiment: str, options: AcquisitionOptions) -> BenchConfig:
-    """The configuration with which a new run on a virtual bench would begin.  Raises ConfigError, UsageError."""
+    """Return the configuration with the typed values at some of the experiment's keys.  Raises UsageError."""
     return _with_given_settings(_configuration(options, None, virtual=True), experiment, options.settings)
 
 
@@ -129,7 +129,7 @@ def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: boo
 
 
 def _configuration(options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> BenchConfig:
-    """What the bench file says; a run is resumed as it was begun, only where the instruments are may have changed.
+    """Return the bench file's configuration; a resumed run keeps its own, but for the places of instruments.
 
     The settings of `options` are not in it.
     """
@@ -143,7 +143,7 @@ def _configuration(options: AcquisitionOptions, run: Run | None, *, virtual: boo
 
 
 def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequence[str]) -> BenchConfig:
-    """The configuration with some of the experiment's settings changed.  Raises UsageError."""
+    """Return the configuration with some of the experiment's settings changed.  Raises UsageError."""
     return _with_texts(config, experiment, dict(_key_and_text(config, experiment, setting) for setting in settings))
 
 
@@ -172,7 +172,7 @@ def _wrong_form(experiment: str, setting: str, why: str = "") -> UsageError:
 
 
 def _with_texts(config: BenchConfig, experiment: str, texts: Mapping[str, str]) -> BenchConfig:
-    """The configuration with the values at some of the experiment's keys as they were typed.  Raises UsageError."""
+    """Return the configuration with texts as values at some of the experiment's keys.  Raises UsageError."""
     if not texts:
         return config
     table = config.model_dump(mode="json", exclude_unset=True)  # what was not set may still be suited to a scene
@@ -213,7 +213,7 @@ def _refused(config: BenchConfig, experiment: str) -> ConfigError | None:
 
 
 def _as_it_was(run: Run) -> BenchConfig:
-    """The configuration that a run was begun with."""
+    """Return the configuration that a run was begun with."""
     bench = {key: value for key, value in run.record.configuration.items() if key != "scene"}
     try:
         return Configuration.model_validate(bench)
@@ -222,7 +222,7 @@ def _as_it_was(run: Run) -> BenchConfig:
 
 
 def _run_folder(name: Path, root: Path) -> Path:
-    """The folder of the run that is to be gone on with, by its path or its name.  Raises DataError."""
+    """Return the folder of the run that is to be gone on with, by its path or its name.  Raises DataError."""
     folder = find_run(name, root)
     if folder.exists():
         return folder
@@ -281,7 +281,7 @@ def _check_readings(run: Run, request: AcquisitionRequest) -> None:
 def _on_the_virtual_bench(
     request: AcquisitionRequest, options: AcquisitionOptions, without: BenchConfig
 ) -> AcquisitionRequest:
-    """The request with the wiring of a virtual bench, whose top spins only or moves as a scene's.
+    """Return the request with the wiring of a virtual bench, whose top spins only or moves as a scene's.
 
     Args:
         request: of a bench that may be real.
@@ -313,12 +313,12 @@ def _on_the_virtual_bench(
 
 
 def _for_scene(config: BenchConfig, experiment: str, scene: Scene) -> BenchConfig:
-    """The configuration with an experiment's settings suited to a scene."""
+    """Return the configuration with an experiment's settings suited to a scene."""
     return with_settings(config, experiment, settings_of(config, experiment).for_scene(scene))
 
 
 def request_at(wiring: Wiring, scene: Scene, experiment: str, options: AcquisitionOptions) -> AcquisitionRequest:
-    """What is to be acquired at a virtual bench that is there already, and goes on afterwards.
+    """Return the request for an acquisition at a virtual bench that exists already and goes on afterwards.
 
     Args:
         wiring: of the bench.
@@ -351,7 +351,7 @@ def request_at(wiring: Wiring, scene: Scene, experiment: str, options: Acquisiti
 def _with_a_spinning_top(
     request: AcquisitionRequest, scene: SpinScene, clock: Callable[[], VirtualClock]
 ) -> AcquisitionRequest:
-    """A world in which the top only spins; what one pulse scatters by is known there."""
+    """Return a world in which the top only spins; what one pulse scatters by is known there."""
     config = request.config
     settings: Any = settings_of(config, request.experiment)
     if isinstance(settings, CounterSettings):
@@ -365,7 +365,7 @@ def _with_a_spinning_top(
 
 
 def _world_in_words(scene: SpinScene, experiment: str) -> str:
-    """What of the world an experiment measures."""
+    """Return a description of the part of the world that an experiment measures."""
     if "magnetometer" in EXPERIMENTS[experiment].instruments:
         base = scene.base
         return _BASE.format(**vars(base))
@@ -378,7 +378,7 @@ def _law_in_words(scene: SpinScene) -> str:
 
 
 def _scene(name: str | None, run: Run | None) -> Scene | None:
-    """The scene that was asked for, or that a run was begun with."""
+    """Return the scene that was asked for, or that a run was begun with."""
     begun = run.record.configuration.get("scene") if run else None
     if name is None and begun is None:
         return None

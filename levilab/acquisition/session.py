@@ -310,7 +310,7 @@ class Session(Generic[S]):
         return trace
 
     def _in_words(self, row: Row) -> str:
-        """The values of a reading as they stand in a line, below their heads."""
+        """Return the values of a reading as they stand in a line, below their heads."""
         texts = (_with_unit(row[one.name], one) if one.name in row else "" for one in self._shown)
         return "  ".join(f"{text:>{_width(one)}}" for text, one in zip(texts, self._shown, strict=True))
 
@@ -327,7 +327,7 @@ class Session(Generic[S]):
             raise SettingsLost(self.bench.address(kind), changed)
 
     def reconnect(self, kind: str, error: InstrumentError, set_up: Callable[[], None]) -> None:
-        """An instrument failed in the middle of a run: reach it again and set it up anew, or give up.
+        """Reach an instrument that failed in the middle of a run again and set it up, or give up.
 
         Raises the error that began it after the last of the tries in REOPENING_S, or where it is lost again and again.
         """
@@ -357,7 +357,7 @@ _DIGITS = {"s": ".2f", "Hz": ".4f", "m": ".5f", "T": ".7f", "V": ".4f"}
 
 
 def _head(channel: Channel) -> str:
-    """What stands above a channel's values: its name, without the unit, which stands beside each value."""
+    """Return the heading of a channel's values: its name without the unit, which stands beside each value."""
     name = channel.name.removesuffix(f"_{channel.unit.lower()}")
     return name.removesuffix("_frequency").replace("_", " ")
 

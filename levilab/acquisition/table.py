@@ -32,7 +32,7 @@ Configuration: type[BenchConfig] = create_model("Configuration", __base__=BenchC
 
 
 def tables_to_write() -> tuple[SettingsTable, ...]:
-    """The experiments' tables as they stand in a new bench file: the defaults, with what they mean."""
+    """Return the experiments' tables as they stand in a new bench file: the defaults, with what they mean."""
     return tuple(
         SettingsTable(experiment.name, experiment.about, tuple(_settings_to_write(experiment.settings)))
         for experiment in EXPERIMENTS.values()
@@ -50,12 +50,12 @@ def _settings_to_write(settings: type[ExperimentSettings]) -> Iterator[Setting]:
 
 
 def settings_of(config: BenchConfig, experiment: str) -> Any:
-    """What a `Configuration` says of an experiment."""
+    """Return the settings of an experiment in a `Configuration`."""
     return getattr(config, experiment)
 
 
 def with_settings(config: BenchConfig, experiment: str, settings: ExperimentSettings) -> BenchConfig:
-    """A `Configuration` with other settings of an experiment."""
+    """Return a `Configuration` with other settings of an experiment."""
     return config.model_copy(update={experiment: settings})
 
 

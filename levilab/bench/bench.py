@@ -63,7 +63,7 @@ class Bench:
         self._prepared[kind] = now
 
     def changed_settings(self, kind: str) -> dict[str, tuple[object, object]]:
-        """Settings that are no longer as they were set up, by name: (as set up, now)."""
+        """Return the settings that differ from those set up: name → (as set up, now)."""
         return self.instruments[kind].changed_settings(since=self._prepared.get(kind, {}))
 
     def address(self, kind: str) -> str:
@@ -102,7 +102,7 @@ def open_bench(
     log: TrafficLog | None = None,
     check: Callable[[], None] = lambda: None,
 ) -> Iterator[Bench]:
-    """The bench with the instruments of these kinds, outputs off; on the way out they are off again and all is closed.
+    """Open the bench with the instruments of these kinds; outputs are off at the beginning and at the end.
 
     check: called before each instrument, may raise to give up.  Raises ConfigError for an instrument that is not
     described or of an unknown model, InstrumentError when one does not answer as it should.
@@ -141,7 +141,7 @@ def open_bench(
 
 
 def connected(kind: Kind[I], wiring: Wiring, *, log: TrafficLog | None = None) -> I:
-    """A driver on an open link.  Raises ConfigError for an unknown model, InstrumentError."""
+    """Return a driver on an open link.  Raises ConfigError for an unknown model, InstrumentError."""
     settings = wiring.described(kind.name)
     driver = kind.model(settings.model).driver
     transport = transport_to(driver, settings, library=wiring.library, clock=wiring.clock, log=log)

@@ -122,7 +122,7 @@ def _checked(kind: str, wiring: Wiring, light: Light) -> Checked:
 
 
 def _identity(answer: str) -> dict[str, str]:
-    """The four fields of an answer to ``*IDN?`` (IEEE 488.2, 10.14); those that are missing are empty."""
+    """Return the four fields of an answer to ``*IDN?`` (IEEE 488.2, 10.14); those that are missing are empty."""
     fields = [*(field.strip() for field in answer.split(",", 3)), "", "", ""]
     return dict(zip(("maker", "model", "serial_number", "firmware"), fields, strict=False))
 

@@ -59,7 +59,7 @@ class Limits(Settings):
     drive_lowest_hz: NonNegativeFloat = 0.0
 
     def of_the_drive(self) -> DriveLimits:
-        """The same for the generator's driver, which compares with them."""
+        """Return the same limits for the generator's driver, which compares with them."""
         return DriveLimits(**self.model_dump())
 
 
@@ -74,7 +74,7 @@ class BenchConfig(Settings):
     limits: Limits = Field(default_factory=Limits)
 
     def instruments(self) -> dict[str, InstrumentSettings]:
-        """The instruments that are described, by kind."""
+        """Return the described instruments, by kind."""
         described = {
             "counter": self.counter,
             "generator": self.generator,
@@ -88,7 +88,7 @@ C = TypeVar("C", bound=BenchConfig)
 
 
 def read_bench(path: Path, tables: type[C], *, instead: str = ", or try `mock`") -> C:
-    """The bench described in a TOML file.
+    """Return the bench described in a TOML file.
 
     tables: what the file may hold; `BenchConfig`, or one with more tables; instead: what else can be done where there
     is no file.  Raises ConfigError.

@@ -75,7 +75,7 @@ def identify(address: str, library: str) -> Found:
 
 
 def _lines_to_try(address: str) -> Iterator[tuple[type[Instrument], dict[str, Any]]]:
-    """The drivers whose links are tried, and their lines: for a serial port one of each line, else any driver."""
+    """Yield the drivers whose links are tried, and their lines: for a serial port one of each line, else any driver."""
     if "::" in address and not address.upper().startswith("ASRL"):
         yield COUNTER.models[0].driver, {}
         return
@@ -89,7 +89,7 @@ def _lines_to_try(address: str) -> Iterator[tuple[type[Instrument], dict[str, An
 
 
 def _printable(identity: str) -> str:
-    """What can stand in a file: control characters, which no instrument has in its name, as question marks."""
+    """Return text for a file, with question marks for control characters, which no instrument has in its name."""
     return "".join(sign if sign.isprintable() else "?" for sign in identity)
 
 

@@ -31,7 +31,7 @@ class Kind(Generic[I_co]):
     models: tuple[Model[I_co], ...]
 
     def model(self, name: str) -> Model[I_co]:
-        """The row of a model, in any case of its letters.  Raises ConfigError for a model that has no driver."""
+        """Return the row of a model, in any case of its letters.  Raises ConfigError for a model that has no driver."""
         for model in self.models:
             if model.name.upper() == name.upper():
                 return model
@@ -56,6 +56,6 @@ def transport_to(
     clock: Clock | None = None,
     log: TrafficLog | None = None,
 ) -> Transport:
-    """An open link to an instrument of the bench; see `open_link`.  Raises NotConnected."""
+    """Return an open link to an instrument of the bench; see `open_link`.  Raises NotConnected."""
     line = dict(driver.SERIAL) | settings.line
     return open_link(settings.address, line=line, library=library, timeout=settings.timeout_s, clock=clock, log=log)

@@ -47,5 +47,5 @@ Person = Callable[[Task], str]
 
 
 def ask_no_person(task: Task) -> str:  # noqa: ARG001 - as a person is asked
-    """The answer where no person is at the bench: none."""
+    """Return no answer, as no person is at the bench."""
     return ""

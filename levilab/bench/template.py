@@ -47,7 +47,7 @@ class WouldOverwrite(LevilabError):
 
 
 def bench_text(found: Sequence[Found], library: str, tables: Sequence[SettingsTable]) -> str:
-    """The text of a bench.toml: the first instrument of each kind, the others as comments, and more tables."""
+    """Return the text of a bench.toml: the first instrument of each kind, the others as comments, and more tables."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(  # noqa: S701 - no HTML

@@ -34,7 +34,7 @@ class Wiring:
     poses: Callable[[float, float, int], Poses] | None = None
 
     def described(self, kind: str) -> InstrumentSettings:
-        """What is known of an instrument.  Raises ConfigError where nothing is, or its model has no driver."""
+        """Return the settings of an instrument.  Raises ConfigError: it is not described, or has no driver."""
         if kind not in self.instruments:
             raise ConfigError(f"the bench file describes no {kind}: add a table [{kind}] with model and address")
         settings = self.instruments[kind]
@@ -43,7 +43,7 @@ class Wiring:
 
 
 def described_wiring(config: BenchConfig, person: Person = ask_no_person) -> Wiring:
-    """The wiring of the bench that a bench file describes."""
+    """Return the wiring of the bench that a bench file describes."""
     # a measurement waits by the wall clock, so a virtual bench that jumps from answer to answer would stand still
     library = "realtime@levilab" if config.visa_library == "@levilab" else config.visa_library
     return Wiring(config.instruments(), config.limits, library, WallClock(), person)

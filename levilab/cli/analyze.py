@@ -47,7 +47,7 @@ class AnalyzeGroup(typer.core.TyperGroup):
         return None
 
     def _is_misspelt(self, word: str) -> bool:
-        """Whether a word is similar to the name of an analysis, and no path."""
+        """Return whether a word is similar to the name of an analysis, and no path."""
         from difflib import get_close_matches  # not for every help
 
         return bool(get_close_matches(word, self.commands)) and not Path(word).exists()
@@ -352,7 +352,8 @@ def _analyze(
     as_json: bool,
 ) -> None:
     """Carry out the analysis that the command is named after, or each."""
-    from levilab.pipelines.catalogue import ANALYSES, analyze_suiting
+    from levilab.pipelines.catalogue import ANALYSES
+    from levilab.pipelines.suits import analyze_suiting
 
     left_out: list[str] = []
     with interruptible("what was fitted so far is lost, nothing is written"):
@@ -437,7 +438,7 @@ def _print_tally(context: typer.Context, tally: "Tally", table: Path, *, as_json
     if (more := tally.failed - len(tally.failures)) > 0:
         message(f"and {more} more, whose problem stands in the table")
     for why, count in tally.passed_over.items():
-        message(f"passed over: {count} times {why}")
+        message(f"skipped {count} times: {why}")
     if tally.same:
         message(f"note: {tally.same} rows have the same readings as another one (readings_sha256): count them once")
     if as_json:
@@ -461,37 +462,20 @@ def _analyze_as(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping
     try:
         return analysis.analyze(paths, analysis.options_from(given))
     except DoesNotSuit as error:
-        advice = "" if "levilab analyze" in str(error) else _suiting(analysis, paths, given)
-        raise DoesNotSuit(f"{error}{advice}") from error
+        raise DoesNotSuit(f"{error}{_advice(paths, given)}") from error
 
 
-def _suiting(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, Any]) -> str:
-    """Return which other analyses read the paths, as the end of a sentence; empty if none does."""
-    from levilab.pipelines.catalogue import ANALYSES
-    from levilab.runs.run import find_run
+def _advice(paths: Sequence[Path], given: Mapping[str, Any]) -> str:
+    """Return which analyses read the paths, as the end of a sentence; empty if none does."""
+    from levilab.pipelines.suits import suiting
 
     for path in paths:
-        others = [
-            other.name
-            for other in ANALYSES.values()
-            if other is not analysis and _reads(other, find_run(path), other.options_from(given))
-        ]
-        if others:
-            return f"; levilab analyze {' or '.join(others)} {path} reads it"
+        try:
+            names = [one.analysis.name for one in suiting([path], given)]
+        except LevilabError:
+            continue
+        return f"; levilab analyze {' or '.join(names)} {path} reads it"
     return ""
-
-
-def _reads(analysis: "Analysis[Any]", path: Path, options: Any) -> bool:
-    """Whether an analysis takes a run or a file, or one of the runs in a folder."""
-    from analysis.errors import AnalysisError
-    from levilab.runs.run import Run, find_runs
-
-    try:
-        if path.is_dir():
-            return any(analysis.needs.take(Run.load(folder)) for folder in find_runs(path))
-        return bool(analysis.needs.read_file(path, options))
-    except (LevilabError, AnalysisError):
-        return False
 
 
 def _write_and_print(
@@ -507,11 +491,12 @@ def _write_and_print(
 
     left_out: why other analyses have no result.
     """
-    from levilab.pipelines.catalogue import print_analysis, remarks
+    from levilab.pipelines.catalogue import print_analysis
+    from levilab.pipelines.suits import remarks
 
     in_words = partial(with_options, app=context.find_root().command)
     failures: list[LevilabError] = []
-    messages = [*left_out, *remarks([found.remarks for _, found in results])]
+    messages = [*left_out, *map(str, remarks([found.remarks for _, found in results]))]
     for analysis, found in results:
         if save:
             failure, written = _save(analysis, found, out)
@@ -531,7 +516,7 @@ def _write_and_print(
 
 def _save(analysis: "Analysis[Any]", found: Any, out: Path | None) -> tuple[LevilabError | None, list[Path]]:
     """Write a result.  Returns the error, if any, and the files; the caller prints the result either way."""
-    from levilab.pipelines.catalogue import save
+    from levilab.pipelines.suits import save
 
     try:
         return None, save(analysis, found, out)

@@ -9,7 +9,7 @@ INTERRUPTED = 130
 
 
 def exit_status(error: Exception) -> int | None:
-    """The exit status of a known failure, which is printed in one line; None for what is a defect of this program."""
+    """Return the exit status of a known failure, printed in one line; None for a defect of this program."""
     from analysis.errors import AnalysisError
     from instruments.errors import InstrumentError
     from levilab.errors import LevilabError, NoInstrument, RequestError

@@ -14,5 +14,5 @@ LINE = "levilab: interrupted\n"
 
 
 def importing() -> AbstractContextManager[None]:
-    """The context of these imports: Ctrl-C ends the process in one line."""
+    """Return the context of these imports: Ctrl-C ends the process in one line."""
     return interruption_ends_process(INTERRUPTED, LINE)

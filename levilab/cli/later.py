@@ -38,12 +38,12 @@ class Later(typer.core.TyperCommand):
         return command
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
-        """What is called, asked for help or completed is the command itself."""
+        """Return the command itself, which is called, asked for help or completed."""
         return self.command.make_context(info_name, args, parent, **extra)
 
 
 def _rewrapped(text: str | None) -> str | None:
-    """A help text whose paragraphs are one line each: typer keeps the line breaks of a docstring and adds its own."""
+    """Return a help text with one line a paragraph: typer keeps a docstring's line breaks and adds its own."""
     if text is None:
         return None
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))

@@ -37,13 +37,13 @@ class Commands(typer.core.TyperGroup):
 
 
 def _refused(error: typer.BadParameter) -> object:
-    """The value that pydantic refused, None where something else did."""
+    """Return the value that pydantic refused, None where something else did."""
     errors = getattr(error.__context__, "errors", None)
     return errors()[0]["input"] if errors else None
 
 
 def in_plain_words(text: str, seen: object = None) -> str:
-    """What typer says of a wrong value, with the value and what is wrong with it.
+    """Return typer's message about a wrong value, with the value and its fault.
 
     >>> in_plain_words("Input should be a valid number, unable to parse string as a number", "0,03")
     "'0,03': a number is expected; write a decimal point, not a comma"
@@ -84,7 +84,7 @@ def levilab(
         typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True),
     ] = False,
 ) -> None:
-    """The lab application for experiments on the Levitron: acquire, analyze, report."""
+    """Return the lab application for experiments on the Levitron: acquire, analyze, report."""
 
 
 @app.command(
@@ -202,7 +202,7 @@ def analyze() -> typer.Typer:
 
 @app.command(cls=Later)
 def bench() -> typer.Typer:
-    """The instruments: what answers, and a virtual bench to practise."""
+    """Return the instruments: what answers, and a virtual bench to practise."""
     from levilab.cli.bench import bench_app
 
     return bench_app
@@ -210,7 +210,7 @@ def bench() -> typer.Typer:
 
 @app.command(cls=Later, epilog="Example: levilab live --mock")
 def live() -> Callable[..., None]:
-    r"""The bench in a web browser: a run as it grows, a finished one, or with --mock a bench to play with.
+    r"""Return the bench in a web browser: a run as it grows, a finished one, or with --mock a bench to play with.
 
     A view only, in a process of its own: a run goes on when it is closed, and it can be opened again at any time.  No
     program of another machine reaches it.  Needs the extra live: pip install ".\[live]" in the clone.
@@ -229,7 +229,7 @@ def benchmark() -> typer.Typer:
 
 
 def main() -> None:
-    """The console script: known failures become one line and an exit status, everything else stays loud."""
+    """Return the console script: known failures become one line and an exit status, everything else stays loud."""
     _prepare_output()
     # before numpy is loaded: matrices of a few hundred rows gain nothing by threads, which wait for each other busily
     # where another program has a core (docs/speed.md)

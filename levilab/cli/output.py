@@ -25,12 +25,12 @@ def print_json(document: Any, *, indent: int | None = 2, sort_keys: bool = False
 
 
 def result(text: str) -> None:
-    """A line on standard output; names in it, which others chose, do not steer the terminal."""
+    """Print a line on standard output; names in it, which others chose, do not steer the terminal."""
     typer.echo(printable(text))
 
 
 def message(text: str) -> None:
-    """A line on standard error, as `result` writes it.  One that is closed, as with its terminal, ends nothing."""
+    """Print a line on standard error; a closed one, as with its terminal, ends nothing."""
     try:
         typer.echo(printable(text), err=True)
     except OSError:

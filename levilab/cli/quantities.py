@@ -43,7 +43,7 @@ def _parameters(command: Any) -> Iterator[Any]:
 
 
 def in_options(error: Exception, app: Any) -> str:
-    """The text of an error with options in the place of quantities: "duration = -1: …" is "--duration -1: …"."""
+    """Return the text of an error with options in the place of quantities: "duration = -1: …" is "--duration -1: …"."""
     if not isinstance(error, UsageError):
         return with_options(str(error), app)
     head = option_names(app).get(error.name, (error.name, ""))[0]
@@ -52,7 +52,7 @@ def in_options(error: Exception, app: Any) -> str:
 
 
 def with_options(text: str, app: Any) -> str:
-    """A text with options in the place of quantities.
+    """Return a text with options in the place of quantities.
 
     Args:
         text: a message.
@@ -64,9 +64,10 @@ def with_options(text: str, app: Any) -> str:
 
     def option(match: re.Match[str]) -> str:
         name, setting = match[1], match[2] or ""
-        if name not in names:
+        found = names.get(name) or names.get(name.rpartition("_")[0])  # `height_m` is --height, which takes a number
+        if found is None:
             return match[0]
-        on, off = names[name]
+        on, off = found
         if setting == " = False" and off:
             return off
         return on if setting in {"", " = True"} else on + " "

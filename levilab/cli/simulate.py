@@ -26,7 +26,7 @@ benchmark_app = typer.Typer(no_args_is_help=True, add_completion=False)
 
 
 def chosen_scene(name: str, settings: list[str] | None) -> "Scene":
-    """The scene with the changes; a wrong name or key raises before anything heavy is loaded."""
+    """Return the scene with the changes; a wrong name or key raises before anything heavy is loaded."""
     from levilab.simulator.scene import SceneError, read_scene, with_settings
 
     scene = read_scene(name)
@@ -78,11 +78,9 @@ def simulate(
     chosen = chosen_scene(scene, settings)
     film = _animation_request(animate, animate_from, animate_to, animate_speed)
     if film:
-        from levilab.motion.animation.request import check_request, check_span
+        from levilab.motion.animation.request import check_request
 
         check_request(film, chosen, duration)
-        with interruptible("nothing was written"):
-            check_span(film, chosen, duration, message)
 
     from levilab.files import finite
     from levilab.motion.simulation import SimulationRequest, run_simulation
@@ -221,13 +219,9 @@ def _mapped(scene: "Scene", spans: "tuple[Span | None, Span | None]", duration: 
 
 @benchmark_app.command("simulator", epilog="Example: levilab benchmark simulator --out speed")
 def benchmark_simulator(
-    only: Annotated[
-        str | None,
-        typer.Option(metavar="PART", help="kernel (fixed steps), called (one top) or ensemble (1000)."),
-    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer points and repetitions: a first look.")] = False,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write simulator.json and both figures there.")
+        Path | None, typer.Option(metavar="DIR", help="Write simulator.json and simulator.png there.")
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -238,7 +232,7 @@ def benchmark_simulator(
     """
     from levilab.benchmark.simulator.command import run_and_tell
 
-    run_and_tell(only=only, quick=quick, out=out, as_json=as_json)
+    run_and_tell(quick=quick, out=out, as_json=as_json)
 
 
 @benchmark_app.command("estimators", epilog="Example: levilab benchmark estimators --trials 50 --out speed")

@@ -86,7 +86,7 @@ def choose_columns(
     wanted: Mapping[str, str],
     quantities: Collection[str] = CANONICAL,
 ) -> tuple[tuple[Column, ...], tuple[str, ...]]:
-    """The columns of a file that hold something we know, and warnings about those that nearly do.
+    """Return the columns of a file that hold something we know, and warnings about those that nearly do.
 
     Args:
         path: the file, for messages.
@@ -104,6 +104,47 @@ def choose_columns(
     """
     titles = _with_periods(header)
     chosen, stated = _wanted_columns(path, header, wanted)
+    offered, warnings = _offered_columns(path, header, titles, chosen, quantities)
+    chosen |= {name: _only_one(path, header, name, indices) for name, indices in offered.items()}
+    written = {name: _written_unit(path, name, index, header, units) for name, index in chosen.items()} | stated
+    columns = []
+    for name, index in chosen.items():
+        quantity = COMPANIONS.get(name, name)
+        period = titles[chosen.get(quantity, index)]
+        if period.inverse and name not in stated and not written[name]:
+            # an uncertainty without a unit has that of its period
+            unit = (titles[index] if _is_of_a_period(titles[index], titles) else period).unit
+            columns.append(Column(name, index, header[index], unit_factor(unit or "s", "time") or 1, inverse=True))
+            continue
+        # An uncertainty without a unit has that of its quantity: "rpm,u" gives both in 1/min.
+        unit = written[name] or written.get(quantity)
+        if titles[index].counts_radians(unit) or period.counts_radians(unit):
+            warnings += [_angular(path, header[index])] * (name == quantity)
+            unit = "rad/s"
+        columns.append(Column(name, index, header[index], _factor(path, name, header[index], unit)))
+    return tuple(sorted(columns, key=lambda c: CANONICAL.index(c.name))), tuple(warnings)
+
+
+def _factor(path: Path, name: str, label: str, unit: str | None) -> float:
+    """Return the factor to SI of a column.
+
+    Raises:
+        TableError: no unit of its dimension is known, and its title has one of another dimension.
+    """
+    other = None if unit else foreign_unit(label, dimension(name))
+    if other:
+        raise TableError(
+            path,
+            f"column '{shorten(label)}' is to be {name} and has the unit {other}, which is none of "
+            f"{dimension(name)}: {how_else(label, name)}",
+        )
+    return (unit_factor(unit, dimension(name)) if unit else None) or 1
+
+
+def _offered_columns(
+    path: Path, header: Sequence[str], titles: Sequence[Title], chosen: Mapping[str, int], quantities: Collection[str]
+) -> tuple[dict[str, list[int]], list[str]]:
+    """Return the indices of the columns that could be each quantity not chosen yet, and warnings."""
     offered: dict[str, list[int]] = {}
     warnings = []
     for index, title in enumerate(titles):
@@ -116,32 +157,11 @@ def choose_columns(
             warnings.append(_unknown_unit(path, header[index], title))
         else:
             offered.setdefault(title.column, []).append(index)
-    chosen |= {name: _only_one(path, header, name, indices) for name, indices in offered.items()}
-    written = {name: _written_unit(path, name, index, header, units) for name, index in chosen.items()} | stated
-    columns = []
-    for name, index in chosen.items():
-        period = titles[chosen.get(COMPANIONS.get(name, name), index)]
-        if period.inverse and name not in stated and not written[name]:
-            # an uncertainty without a unit has that of its period
-            unit = (titles[index] if _is_of_a_period(titles[index], titles) else period).unit
-            columns.append(Column(name, index, header[index], unit_factor(unit or "s", "time") or 1, inverse=True))
-            continue
-        # An uncertainty without a unit has that of its quantity: "rpm,u" gives both in 1/min.
-        unit = written[name] or written.get(COMPANIONS.get(name, ""))
-        other = None if unit else foreign_unit(header[index], dimension(name))
-        if other:
-            raise TableError(
-                path,
-                f"column '{shorten(header[index])}' is to be {name} and has the unit {other}, which is none of "
-                f"{dimension(name)}: {how_else(header[index], name)}",
-            )
-        factor = unit_factor(unit, dimension(name)) if unit else 1
-        columns.append(Column(name, index, header[index], factor or 1))
-    return tuple(sorted(columns, key=lambda c: CANONICAL.index(c.name))), tuple(warnings)
+    return offered, warnings
 
 
 def _with_periods(header: Sequence[str]) -> list[Title]:
-    """What the titles say, with T for a period beside a time; periods do not count beside a frequency."""
+    """Return the titles' meanings, with T for a period beside a time; periods do not count beside a frequency."""
     titles = [read_title(text) for text in header]
     if sum(title.column == "time_s" for title in titles) > 1:
         titles = [as_a_period(text) or title for text, title in zip(header, titles, strict=True)]
@@ -153,7 +173,7 @@ def _with_periods(header: Sequence[str]) -> list[Title]:
 
 
 def _of_the_period(text: str, title: Title) -> Title:
-    """An uncertainty of a T, as u_T, is that of the period, where T is one."""
+    """Return the title of u_T as that of the period's uncertainty, where T is a period."""
     if title.column == companion("time_s") and re.search(r"T(?![A-Za-z])", text):
         return Title(companion("spin_frequency_hz"), title.unit)
     return title
@@ -166,7 +186,7 @@ def _is_of_a_period(title: Title, titles: Sequence[Title]) -> bool:
 
 
 def how_else(title: str, name: str) -> str:
-    """What to do with a column that is not the quantity of this canonical name."""
+    """Return advice for a column that is not the quantity of this canonical name."""
     kind = dimension(name)
     own = f"say which unit it is, as NAME [{next(iter(UNITS[kind]))}]"
     if kind != "frequency":
@@ -224,7 +244,7 @@ def _find(header: Sequence[str], title: str) -> int | None:
 
 
 def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) -> int:
-    """The column for a quantity: the canonical title, else the only one that could be."""
+    """Return the column for a quantity: the canonical title, else the only one that could be."""
     exact = [index for index in indices if header[index] == name]
     if len(exact or indices) == 1:
         return (exact or indices)[0]
@@ -238,7 +258,7 @@ def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) 
 
 
 def _written_unit(path: Path, name: str, index: int, header: Sequence[str], units: Sequence[str]) -> str | None:
-    """The unit that the title or the row of units gives a column, if it is one of the quantity's."""
+    """Return the unit that the title or the row of units gives a column, if it is one of the quantity's."""
     title = read_title(header[index])
     kind = dimension(name)
     in_title = title.unit if title.unit and unit_factor(title.unit, kind) is not None else None
@@ -251,6 +271,11 @@ def _written_unit(path: Path, name: str, index: int, header: Sequence[str], unit
             "correct one of them",
         )
     return beneath or in_title
+
+
+def _angular(path: Path, label: str) -> str:
+    what = f"{shorten(str(path), 200)}: column '{shorten(label)}' is an angular frequency, read in rad/s"
+    return f"{what}; if it counts turns, say so with its column, as f=NAME [Hz]"
 
 
 def _unknown_unit(path: Path, label: str, title: Title) -> str:

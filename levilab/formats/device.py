@@ -103,7 +103,7 @@ class Device(Settings):
 
 
 def read_device(path: Path) -> Device:
-    """The device described in a TOML file.  Raises DeviceError."""
+    """Return the device described in a TOML file.  Raises DeviceError."""
     advice = "a TOML file with [base] and [top] is expected, as sample_data/device.toml"
     try:
         if path.is_dir():

@@ -51,7 +51,7 @@ class Dialect:
         return not plain or plain.lstrip().startswith(self.comments)
 
     def split(self, line: str) -> list[str]:
-        """The fields of a line, stripped, without their quotation marks."""
+        """Return the fields of a line, stripped, without their quotation marks."""
         if self.separator is None:
             return _split_at_blanks(line)
         if '"' not in line:
@@ -63,7 +63,7 @@ class Dialect:
         return [field.strip() for field in fields]
 
     def number(self, text: str) -> float:
-        """The number in a field; infinite where it says so or overflows.
+        """Return the number in a field; infinite where it says so or overflows.
 
         Raises:
             ValueError: it is none, or it has the other decimal mark.
@@ -134,18 +134,18 @@ class Line:
 
 
 def filled_count(fields: Sequence[str]) -> int:
-    """Number of fields without the empty ones at the end."""
+    """Return the number of fields without the empty ones at the end."""
     return next((i for i in range(len(fields), 0, -1) if fields[i - 1]), 0)
 
 
 def most_common(counts: Iterable[int]) -> int:
-    """The most frequent of some counts, 0 of none."""
+    """Return the most frequent of some counts, 0 of none."""
     found = Counter(counts).most_common(1)
     return found[0][0] if found else 0
 
 
 def content_lines(lines: Sequence[str], dialect: Dialect, first: int = 1) -> Iterator[Line]:
-    """The lines that are neither blank nor comments; `first` is the number of the first line."""
+    """Yield the lines that are neither blank nor comments; `first` is the number of the first line."""
     for number, line in enumerate(lines, first):
         if not dialect.skips(line):
             fields = tuple(dialect.split(line))
@@ -153,7 +153,7 @@ def content_lines(lines: Sequence[str], dialect: Dialect, first: int = 1) -> Ite
 
 
 def find_dialect(lines: Sequence[str], first: Sequence[str] = ()) -> Dialect | None:
-    """The dialect in which the most lines are rows of equal width; None if nothing looks like a table.
+    """Return the dialect in which the most lines are rows of equal width; None if nothing looks like a table.
 
     Rows without text count first: "1,5 2,5" is three fields with commas, one of them text, but two numbers
     with blanks. Where there are no rows, known titles decide, so that a mere header is seen as one.
@@ -180,7 +180,7 @@ _MOST_DIALECTS = 1 << 14  # in 1.4 MB
 
 
 def _dialect_of_rows(lines: Sequence[str]) -> Dialect | None:
-    """The dialect in which the most lines are rows; None where none is a row in any."""
+    """Return the dialect in which the most lines are rows; None where none is a row in any."""
     text = "\0".join(lines).encode("utf-8", errors="surrogatepass")
     digest = hashlib.blake2b(text, digest_size=16).digest()
     with contextlib.suppress(KeyError):

@@ -90,7 +90,7 @@ def sniff(path: Path) -> Layout:
 
 
 def _of_words(lines: list[str], encoding: str, head: bytes) -> Layout | None:
-    """A table without two numbers in a row, below titles that are not known: it has columns, though none of ours."""
+    """Return the layout of a table without two numbers in a row, below unknown titles."""
     for separator in filter(None, SEPARATORS):
         dialect = Dialect(separator, ".")
         content = list(content_lines(lines[:SAMPLE], dialect))
@@ -145,7 +145,7 @@ def lay_out(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> L
 
 
 def _above_rows(lines: Iterator[Line], width: int, numeric: Sequence[int]) -> tuple[list[Line], int]:
-    """The lines above the first that has numbers where later rows mostly have them, and that line's number."""
+    """Return the lines above the first that has numbers where later rows mostly have them, and that line's number."""
     above: list[Line] = []
     for line in lines:
         if line.is_row and len(line.fields) >= width and not any(line.kinds[i] == "text" for i in numeric):
@@ -167,14 +167,14 @@ def _header(above: list[Line], width: int) -> int | None:
 
 
 def _units(below: Sequence[Line]) -> tuple[str, ...]:
-    """The fields of the line below the header, if it is a row of units."""
+    """Return the fields of the line below the header, if it is a row of units."""
     if below and below[0].is_text and any(is_unit(field) for field in below[0].fields):
         return below[0].fields
     return ()
 
 
 def _header_in_comment(above: list[str], dialect: Dialect, width: int) -> tuple[tuple[str, ...], int]:
-    """The last comment above the rows and its line, as numpy.savetxt writes its header, if it names the columns."""
+    """Return the last comment above the rows and its line if it names the columns, as numpy.savetxt writes it."""
     for number in range(len(above), 0, -1):
         if above[number - 1].lstrip().startswith(dialect.comments):
             fields = tuple(dialect.split(above[number - 1].lstrip(" \t#%/;'")))

@@ -98,7 +98,7 @@ def _may_be_plain(layout: Layout, used: Sequence[int]) -> bool:
 
 
 def _plain_lines(path: Path, layout: Layout) -> tuple[int, bytes]:
-    """Number of lines with rows, and what follows the last line end; none if the separators do not add up."""
+    """Return the number of lines with rows, and the text after the last line end; none if separators do not add up."""
     separator = ord(layout.dialect.separator or " ")
     lines = separators = 0
     rest = b""
@@ -182,7 +182,7 @@ def _read_lines(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_un
 
 
 def _time_in(layout: Layout, chosen: Sequence[Column], line: str) -> str:
-    """What stands in a row for the time, empty where it is missed."""
+    """Return the text for the time in a row, empty where it is missed."""
     fields = layout.dialect.split(line)
     found = next((fields[column.index] for column in chosen if column.name == "time_s"), "")
     return "" if found.casefold() in MISSING else found
@@ -195,7 +195,7 @@ def _from_first_date(times: "NDArray[np.float64]") -> "NDArray[np.float64]":
 
 
 def _doubt_about(time: str) -> str | None:
-    """What to say of the first time: a stopwatch begins at 0:00 or so, hours and minutes of a clock do not."""
+    """Return the doubt about a first time: a stopwatch begins at 0:00 or so, hours and minutes of a clock do not."""
     minutes = re.fullmatch(r"(\d{1,2}):\d\d", time)
     if minutes is None or int(minutes[1]) == 0:
         return None
@@ -203,7 +203,7 @@ def _doubt_about(time: str) -> str | None:
 
 
 def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: str) -> list[float]:
-    """The numbers of one row, NaN where a reading is missed."""
+    """Return the numbers of one row, NaN where a reading is missed."""
     fields = layout.dialect.split(text)
     if len(fields) < layout.width or any(fields[layout.width :]):
         hint = "; if the comma is a decimal mark, separate by ; or tab" if layout.dialect.separator == "," else ""

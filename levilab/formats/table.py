@@ -6,7 +6,7 @@ A file is sniffed (`layout`), its titles are understood (`columns`), its rows re
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -53,7 +53,8 @@ class Table:
     """A table of readings.
 
     `columns` are canonical (`time_s`, `spin_frequency_hz`, …): SI, float64, shape (rows,), all finite; `lines`, shape
-    (rows,), is the 1-based line of `path` that each row stands in; `header` are the titles in the file.
+    (rows,), is the 1-based line of `path` that each row stands in; `header` are the titles in the file; `factors` are
+    those to SI that the file's numbers were multiplied by.
     """
 
     path: Path
@@ -61,6 +62,7 @@ class Table:
     warnings: tuple[str, ...]
     header: tuple[str, ...]
     lines: "NDArray[np.int64]"
+    factors: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """How many readings there are."""
@@ -74,7 +76,7 @@ class Table:
         return pd.DataFrame(dict(self.columns), dtype=np.float64)
 
     def column(self, name: str) -> "NDArray[np.float64]":
-        """A canonical column in SI, shape (rows,).
+        """Return a canonical column in SI, shape (rows,).
 
         Raises:
             TableError: the file has no such column.
@@ -178,7 +180,7 @@ class ColumnsError(UsageError):
 
 
 def parse_columns(text: str) -> dict[str, str]:
-    """What `columns` says, as `read_table` takes it; titles may hold commas and equals signs.
+    """Return the parsed option `columns`, as `read_table` takes it; titles may hold commas and equals signs.
 
     >>> parse_columns("t=Zeit, s,f=3")
     {'t': 'Zeit, s', 'f': '3'}
@@ -205,7 +207,7 @@ def _in_one_word(columns: Iterable[str]) -> str:
 
 
 def _key(name: str) -> str:
-    """What `columns` calls a canonical column."""
+    """Return the key of a canonical column in the option `columns`."""
     return next((short for short, long in SHORTHANDS.items() if long == name), name)
 
 
@@ -250,7 +252,7 @@ def file_errors(path: Path) -> Iterator[None]:
 def _titles(
     path: Path, layout: Layout, wanted: Mapping[str, str], *, guess: bool
 ) -> tuple[tuple[str, ...], Mapping[str, str], list[str]]:
-    """The file's titles, or numbers in their place; what to take for what; a warning where that is a guess."""
+    """Return the file's titles, or numbers in their place; what to take for what; a warning where that is a guess."""
     if layout.header:
         return layout.header, wanted, []
     numbers = tuple(str(n + 1) for n in range(layout.width))
@@ -303,11 +305,11 @@ def _table(
         columns[name] = 1 / columns[name]
         if any(c.inverse and c.name == companion(name) for c in kept):
             columns[companion(name)] = columns[companion(name)] * columns[name] ** 2  # u(1/T) = u(T)/T²
-    return Table(path, columns, tuple(notes), header, lines)
+    return Table(path, columns, tuple(notes), header, lines, {c.name: c.factor for c in kept if not c.inverse})
 
 
 def _missed(name: str, lines: "NDArray[np.int64]", rows: int, *, periods: bool) -> str:
-    """The warning of rows that are left out, with all that counts as missed; periods: whether there is one of them."""
+    """Return the warning about rows left out, with all that counts as missed, a period of 0 with `periods`."""
     kinds = ("empty", *MISSING_WORDS, "inf", *(["a period of 0"] if periods else []))
     places = ", ".join(str(line) for line in lines[:5]) + (", …" if lines.size > 5 else "")
     return (

@@ -27,6 +27,15 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "flux density": {"T": 1, "mT": 1e-3, "μT": 1e-6, "uT": 1e-6, "nT": 1e-9, "G": 1e-4, "gauss": 1e-4, "mG": 1e-7},
 }  # fmt: skip
 
+#: Names of an angular frequency: their 1/s is rad/s, as textbooks write it, and no Hz.
+ANGULAR = (
+    "omega", "ω", "omega3", "ω3", "omega_3", "ω_3", "angular_velocity", "angular_frequency", "angular_speed",
+    "angular_rate", "winkelgeschwindigkeit", "winkelfrequenz", "kreisfrequenz", "vitesse_angulaire",
+    "velocidad_angular", "vinkelhastighet",
+)  # fmt: skip
+#: Units in which the title says whether turns or radians are counted.
+_PER_SECOND = ("1/s", "s-1")
+
 # Canonical column: its dimension, and the names it goes by, in lower case, blanks and hyphens as "_".
 QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "time_s": ("time", (
@@ -35,9 +44,7 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "spin_frequency_hz": ("frequency", (
         "spin_frequency", "f", "freq", "frequency", "frequenz", "nu", "ν", "nu3", "ν3", "f3", "ν_3", "nu_3", "f_3",
         "spin", "spin_freq", "f_spin", "rotation_frequency", "rotation", "drehfrequenz", "hz", "rpm", "rad/s",
-        "omega", "ω", "omega3", "ω3", "omega_3", "ω_3", "angular_velocity", "angular_frequency",
-        "winkelgeschwindigkeit", "drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse", "fréquence",
-        "n")),
+        *ANGULAR, "drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse", "fréquence", "n")),
     "precession_frequency_hz": ("frequency", (
         "precession_frequency", "precession", "f_precession", "f_p", "fp", "νp", "ν_p", "nu_p", "präzession",
         "präzessionsfrequenz")),
@@ -48,26 +55,9 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
 }  # fmt: skip
 
 # Names that say their unit themselves; every other bare name is taken as SI.
-IMPLIED_UNITS = {
-    "rpm": "rpm",
-    "ms": "ms",
-    "milliseconds": "ms",
-    "minutes": "min",
-    "rad/s": "rad/s",
-} | dict.fromkeys(
-    (
-        "omega",
-        "ω",
-        "omega3",
-        "ω3",
-        "omega_3",
-        "ω_3",
-        "angular_velocity",
-        "angular_frequency",
-        "winkelgeschwindigkeit",
-    ),
-    "rad/s",
-)
+IMPLIED_UNITS = dict.fromkeys((*ANGULAR, "rad/s"), "rad/s") | {
+    "rpm": "rpm", "ms": "ms", "milliseconds": "ms", "minutes": "min",
+}  # fmt: skip
 # Names that could as well be in 1/s as in 1/min: known only with a unit.
 NEED_UNITS = ("drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse", "n")
 # The time of a turn, and turns in a time, are read where the title says their unit: T [ms], turns in 10 s.
@@ -108,15 +98,21 @@ class Title:
 
     Attributes:
         inverse: the field holds the time of a turn, of which the column is the inverse.
+        angular: the name is that of an angular frequency, or of its uncertainty.
     """
 
     column: str | None
     unit: str | None
     inverse: bool = False
+    angular: bool = False
+
+    def counts_radians(self, unit: str | None) -> bool:
+        """Return whether a unit that says only "per second" means radians per second here."""
+        return self.angular and unit is not None and plain_unit(unit) in _PER_SECOND
 
 
 def companion(column: str) -> str:
-    """The column of a column's standard uncertainty.
+    """Return the column of a column's standard uncertainty.
 
     >>> companion("spin_frequency_hz")
     'spin_frequency_u_hz'
@@ -147,6 +143,7 @@ def _all_names() -> dict[str, str]:
 
 
 NAMES: Mapping[str, str] = _all_names()
+_ANGULAR_NAMES = frozenset(form.format(name) for name in ANGULAR for form in ("{}", *COMPANION_FORMS))
 
 
 def dimension(column: str) -> str:
@@ -155,7 +152,7 @@ def dimension(column: str) -> str:
 
 
 def plain_unit(text: str) -> str:
-    """A unit as the table spells it: µ as μ, ⁻¹ as -1, without blanks, dots, carets and brackets."""
+    """Return a unit as the table spells it: µ as μ, ⁻¹ as -1, without blanks, dots, carets and brackets."""
     return re.sub(r"[\s^·*()\[\]]", "", unicodedata.normalize("NFKC", text).replace("−", "-"))
 
 
@@ -204,26 +201,26 @@ LONGEST_TITLE = 200
 
 
 def without_runs_of_blanks(text: str) -> str:
-    """A title with a blank where there are many: a program that lays out columns writes thousands."""
+    """Return a title with a blank where there are many: a program that lays out columns writes thousands."""
     return " ".join(text.split())
 
 
 def read_title(text: str) -> Title:
     """Read one header field.
 
-    >>> read_title("f / kHz")
-    Title(column='spin_frequency_hz', unit='kHz', inverse=False)
     >>> read_title("zeit_ms")
-    Title(column='time_s', unit='ms', inverse=False)
-    >>> read_title("turns in 10 s").unit, read_title("period [ms]").inverse
-    ('/10 s', True)
+    Title(column='time_s', unit='ms', inverse=False, angular=False)
+    >>> read_title("f / kHz").unit, read_title("turns in 10 s").unit
+    ('kHz', '/10 s')
+    >>> read_title("period [ms]").inverse, read_title("ω in 1/s").angular
+    (True, True)
     """
     text = without_runs_of_blanks(text)
     if len(text) > LONGEST_TITLE:
         return Title(None, None)
     name = _plain_name(text)
     if name in NAMES and name not in NEED_UNITS:
-        return Title(NAMES[name], IMPLIED_UNITS.get(name))
+        return Title(NAMES[name], IMPLIED_UNITS.get(name), angular=name in _ANGULAR_NAMES)
     forms = (form.fullmatch(text) for form in _UNIT_FORMS)
     found = [(m["name"], m["unit"]) for m in forms if m]
     for label, unit in found:
@@ -237,13 +234,13 @@ def read_title(text: str) -> Title:
 
 
 def _named(label: str, unit: str) -> Title | None:
-    """What a name says together with what may be its unit; None where we do not know the name."""
+    """Return the title that a name gives together with a possible unit; None for an unknown name."""
     name = _plain_name(label)
     if (name in TURNS or label == "U") and unit_factor(f"/{unit}", "frequency"):
         return Title("spin_frequency_hz", f"/{unit}")
     if name in PERIODS and unit_factor(unit, "time"):
         return Title("spin_frequency_hz", unit, inverse=True)
-    return Title(NAMES[name], unit) if name in NAMES else None
+    return Title(NAMES[name], unit, angular=name in _ANGULAR_NAMES) if name in NAMES else None
 
 
 def known_titles(header: Sequence[str]) -> int:
@@ -265,10 +262,10 @@ def nearly_a_frequency(text: str) -> str | None:
 
 
 def as_a_period(text: str) -> Title | None:
-    """The title of a T as that of a period, where it says its unit; beside a time it is one, with a capital letter.
+    """Return the title of a T with a unit of time as that of a period, which it is beside a time.
 
-    >>> as_a_period("T [ms]")
-    Title(column='spin_frequency_hz', unit='ms', inverse=True)
+    >>> as_a_period("T [ms]").inverse, as_a_period("T")
+    (True, None)
     """
     form = re.fullmatch(r"T\s*(?:[/_,]|in\b)?\s*[\[(]?([^\[\]()]+)[\])]?", text.strip())
     unit = form and form[1].strip()
@@ -276,7 +273,7 @@ def as_a_period(text: str) -> Title | None:
 
 
 def foreign_unit(text: str, kind: str) -> str | None:
-    """The unit in a title, if it is one of another dimension.
+    """Return the unit in a title, if it is one of another dimension.
 
     >>> foreign_unit("period_ms", "frequency")
     'ms'
@@ -292,5 +289,5 @@ def foreign_unit(text: str, kind: str) -> str | None:
 
 
 def implied_unit(text: str) -> str | None:
-    """The unit that a name says itself: rpm, omega."""
+    """Return the unit that a name says itself: rpm, omega."""
     return IMPLIED_UNITS.get(_plain_name(text))

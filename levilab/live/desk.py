@@ -15,10 +15,13 @@ from levilab.simulator.scene import read_scene, scene_of
 
 if TYPE_CHECKING:
     from levilab.live.practice.bench import PracticeBench
+    from levilab.live.practice.commands import PracticeEvent
     from levilab.telemetry.address import Address
 
 #: What is kept of what the bench says.
 _MOST_SAID = 100
+#: Answers of the bench that are kept for the requests that wait for them.
+_MOST_ANSWERS = 64
 _LONGEST_TEXT = 600
 #: What a student can record, the experiment of the guide first, and settings that take some minutes of the bench at
 #: most: the usual ones are those of a laboratory, which has the time.  A square wave holds the top better by 4/π.
@@ -53,6 +56,7 @@ class Desk:
         said: the latest of that.
         scene: of its top, None until it is ready.
         folders: of the runs that it has recorded, or records, in order.
+        answers: number of a command → whether it was carried out or refused, of the latest commands.
     """
 
     bench: PracticeBench
@@ -60,6 +64,7 @@ class Desk:
     said: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=_MOST_SAID))
     scene: dict[str, Any] | None = None
     folders: list[Path] = field(default_factory=list)
+    answers: dict[int, PracticeEvent] = field(default_factory=dict)
     _records: bool = field(default=False, init=False)  # between "recording" and "recorded"
 
     @property
@@ -89,6 +94,9 @@ class Desk:
                 self.scene = event.scene
             if event.kind == "recording" and event.folder:
                 self.folders.append(Path(event.folder))
+            if event.kind in {"done", "refused"} and event.number is not None:
+                self.answers[event.number] = event
+                self.answers.pop(event.number - _MOST_ANSWERS, None)
             text = event.text[:_LONGEST_TEXT]
             self._records = event.kind == "recording" or (self._records and event.kind != "recorded")
             about = {"n": self.count, "kind": event.kind, "text": text, "status": event.status, "utc": utc_now()}

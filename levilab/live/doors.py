@@ -57,11 +57,11 @@ class Doors:
 
     def lets_in(self, headers: Iterable[tuple[bytes, bytes]], *, is_socket: bool) -> bool:
         """Whether a request comes from where it should.  A program that is no browser sends no origin."""
-        found = {name.lower(): value.decode("latin-1").lower() for name, value in headers}
-        if found.get(b"host") not in self.hosts:
+        found = [(name.lower(), value.decode("latin-1").lower()) for name, value in headers]
+        hosts, origins = ([value for name, value in found if name == wanted] for wanted in (b"host", b"origin"))
+        if len(hosts) != 1 or hosts[0] not in self.hosts:  # of two hosts, another program may have believed the other
             return False
-        origin = found.get(b"origin")
-        return not is_socket or origin is None or origin in {f"http://{host}" for host in self.hosts}
+        return not is_socket or {*origins} <= {f"http://{host}" for host in self.hosts}
 
     def knows(self, token: object) -> bool:
         """Whether a command carries the token."""

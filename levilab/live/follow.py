@@ -172,7 +172,7 @@ def _event(line: bytes, number: int) -> dict[str, Any]:
         time_s, kind, text = event["time_s"], str(event["kind"]), str(event["text"])
         time_s = float(time_s) if time_s is not None else None
         utc = str(event.get("utc", ""))
-    except (ValueError, KeyError, TypeError, RecursionError):
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
         time_s, kind, text, utc = None, "damaged", "a line of events.jsonl is damaged", ""
     if time_s is not None and not np.isfinite(time_s):
         time_s = None

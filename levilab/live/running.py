@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.special import stdtrit
 
 from analysis.errors import AnalysisError, TooFewReadings
+from analysis.limits import Sample, summarize
 from analysis.precession.sweep import Sweep, fit_sweep
 from analysis.spindown.fall import times_of_fall
 from analysis.spindown.fit import fit_spin_down
@@ -81,13 +84,21 @@ class Running:
 Columns = dict[str, "Array"]
 
 
-def fit_so_far(experiment: str, columns: tuple[str, ...], groups: Groups, *, ended: bool = False) -> Running | None:
+def fit_so_far(
+    experiment: str,
+    columns: tuple[str, ...],
+    groups: Groups,
+    settings: Mapping[str, Any] = MappingProxyType({}),
+    *,
+    ended: bool = False,
+) -> Running | None:
     """Fit the readings of a run so far; None for an experiment without a running fit.
 
     Args:
         experiment: its name.
         columns: names of the readings' channels.
         groups: the readings.
+        settings: of the experiment.
         ended: whether no reading will come any more: nothing is forecast then.
     """
     method = METHODS.get(experiment)
@@ -95,7 +106,7 @@ def fit_so_far(experiment: str, columns: tuple[str, ...], groups: Groups, *, end
         return None
     by_name = {name: groups.mean[k] for k, name in enumerate(columns)}
     try:
-        found = method(by_name, groups.size)
+        found = method(by_name, groups.size, settings)
     except TooFewReadings as error:
         return Running("no fit", (str(error),)) if ended else Running("no fit yet", ("it begins after some readings",))
     except (AnalysisError, KeyError) as error:
@@ -113,8 +124,8 @@ def _without_forecast(found: Running) -> Running:
     return replace(found, head=_SO_FAR.sub("", found.head), curve=curve, end_s=None, dashed="")
 
 
-def spin_down(columns: Mapping[str, Array], size: int) -> Running:
-    """The drag laws through a spin-down, the best of them drawn on to the fall."""
+def spin_down(columns: Mapping[str, Array], size: int, _: Mapping[str, Any] = MappingProxyType({})) -> Running:
+    """Fit the drag laws through a spin-down, the best of them drawn on to the fall."""
     time, spin, u = columns["time_s"], columns["spin_frequency_hz"], columns.get("spin_frequency_u_hz")
     used = np.isfinite(spin) & (np.isfinite(u) if u is not None else True)
     time, spin = time[used], spin[used]
@@ -147,8 +158,8 @@ def _times_of_fall(best: LawFit, last: float, duration: float) -> tuple[float, f
     return between if math.isfinite(between[1]) else None
 
 
-def locked_line(columns: Mapping[str, Array], size: int) -> Running:
-    """The line through precession against drive, and the joint test of slope 1 and intercept 0."""
+def locked_line(columns: Mapping[str, Array], size: int, _: Mapping[str, Any]) -> Running:
+    """Fit the line through precession against drive, and the joint test of slope 1 and intercept 0."""
     drive, precession = columns["drive_frequency_hz"], columns["precession_frequency_hz"]
     u = columns.get("precession_frequency_u_hz")
     used = np.isfinite(drive) & np.isfinite(precession) & (np.isfinite(u) if u is not None else True)
@@ -163,23 +174,29 @@ def locked_line(columns: Mapping[str, Array], size: int) -> Running:
     )
 
 
-def mean_limit(columns: Mapping[str, Array], size: int) -> Running:  # noqa: ARG001 - as the others
-    """The mean of the limits so far."""
-    spin, time = columns["spin_frequency_hz"], columns["time_s"]
-    spin, time = spin[np.isfinite(spin)], time[np.isfinite(spin)]
+def mean_limit(columns: Mapping[str, Array], size: int, settings: Mapping[str, Any]) -> Running:
+    """Return the mean of the limits so far, with the u of `levilab analyze limit`."""
+    spin, time, u = columns["spin_frequency_hz"], columns["time_s"], columns.get("spin_frequency_u_hz")
+    used = np.isfinite(spin) & (np.isfinite(u) if u is not None else True)
+    spin, time = spin[used], time[used]
     if not len(spin):
         return Running("no limit yet")
-    u = float(np.std(spin, ddof=1) / np.sqrt(len(spin))) if len(spin) > 1 else None
-    x = np.array([time[0], time[-1]])
-    band = np.full(2, 2 * u) if u is not None else np.empty(0)
-    return Running("mean so far", (_value(float(spin.mean()), u, "Hz"),), Curve(x, np.full(2, spin.mean()), band))
+    sample = Sample(spin)
+    if u is not None:
+        stepped = settings.get("which") == "upper"
+        sample = (Sample.within_steps if stepped else Sample)(spin, u[used] / np.sqrt(size))
+    found = summarize(sample)
+    students = float(stdtrit(np.inf if found.freedom is None else found.freedom, 0.975))
+    band = np.empty(0) if found.mean.u is None else np.full(2, students * found.mean.u)
+    curve = Curve(np.array([time[0], time[-1]]), np.full(2, found.mean.value), band)
+    return Running("mean so far", (with_uncertainty(found.mean),), curve)
 
 
 def _value(value: float, u: float | None, unit: str = "") -> str:
     return with_uncertainty(Estimate(value, u, unit))
 
 
-METHODS: dict[str, Callable[[Mapping[str, Array], int], Running]] = {
+METHODS: dict[str, Callable[[Mapping[str, Array], int, Mapping[str, Any]], Running]] = {
     "spin": spin_down,
     "precession": locked_line,
     "limit": mean_limit,

@@ -104,16 +104,7 @@ def serve_live(options: LiveOptions, end: End, announce: Callable[[str], None], 
         doors = Doors(listening.getsockname()[1])
         bench = at_end.enter_context(PracticeBench(root, seed=options.seed)) if options.mock else None
         hall = Hall(root, shown, doors, Desk(bench) if bench else None)
-        config = uvicorn.Config(
-            application(hall),
-            log_config=None,
-            access_log=False,
-            lifespan="on",
-            ws="websockets-sansio",
-            ws_max_size=1 << 16,
-            server_header=False,
-            timeout_graceful_shutdown=_GOODBYE_S,
-        )
+        config = configuration(hall)
         at_end.callback(hall.analyses.end)
         server = ViewServer(config, lambda: farewell(bench, hall.analyses.running), say)
         end.wake = server.leave
@@ -121,6 +112,21 @@ def serve_live(options: LiveOptions, end: End, announce: Callable[[str], None], 
             return
         with _announcing(server, doors, announce, commands=options.mock):
             server.run(sockets=[listening])
+
+
+def configuration(hall: Hall) -> uvicorn.Config:
+    """Return how the view is served.  Raises MissingThree."""
+    return uvicorn.Config(
+        application(hall),
+        log_config=None,
+        log_level="critical",  # else a line for each request that is no HTTP, on the terminal of a measurement
+        access_log=False,
+        lifespan="on",
+        ws="websockets-sansio",
+        ws_max_size=1 << 16,
+        server_header=False,
+        timeout_graceful_shutdown=_GOODBYE_S,
+    )
 
 
 def farewell(bench: PracticeBench | None, analyzed: Collection[str] = ()) -> str:

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from starlette.websockets import WebSocket
 
     from levilab.live.desk import Desk
+    from levilab.live.practice.commands import PracticeEvent
     from levilab.live.running import Running
     from levilab.live.watch import FitTask
 
@@ -74,7 +75,10 @@ class Hall:
     def is_run(self, name: str) -> bool:
         """Whether a run of this name lies in the folder; a name with a way to elsewhere does not."""
         plain = bool(name) and name == Path(name).name and name not in {".", ".."}
-        return plain and (self.root / name / RECORD).exists()
+        try:
+            return plain and (self.root / name / RECORD).exists()
+        except OSError:  # the name is too long for a file
+            return False
 
     @contextlib.contextmanager
     def watching(self, name: str) -> Iterator[Watch]:
@@ -121,7 +125,8 @@ class Hall:
             if self.desk:
                 self.desk.step()
             for watch in [*self.watches.values()]:
-                watch.step()
+                with watch.failing_alone():
+                    watch.step()
                 if not fitting and (task := watch.fit_task()):
                     job = asyncio.create_task(self._fit(watch, task))
                     fitting.add(job)
@@ -155,7 +160,8 @@ class Hall:
         return [*(watch.tick for watch in self.watches.values()), self.desk.count if self.desk else 0]
 
     async def _fit(self, watch: Watch, task: FitTask) -> None:
-        watch.fitted(task.folder, *await asyncio.to_thread(_timed, task.compute))
+        with watch.failing_alone():
+            watch.fitted(task.folder, *await asyncio.to_thread(_timed, task.compute))
 
     def _announce(self) -> None:
         self.new.set()
@@ -170,6 +176,14 @@ class Hall:
         ):
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self.new.wait(), left)
+
+    async def wait_for_answer(self, desk: Desk, number: int) -> PracticeEvent | None:
+        """Return what the bench for practice answers to a command; None where it takes longer than PATIENCE_S."""
+        end = time.monotonic() + PATIENCE_S
+        while number not in desk.answers and (left := end - time.monotonic()) > 0:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self.new.wait(), left)
+        return desk.answers.get(number)
 
 
 def _timed(task: Callable[[], Running | None]) -> tuple[Running | None, float]:
@@ -228,7 +242,8 @@ class Pages:
         name, wanted = request.path_params["run"], request.path_params["name"]
         path = self.hall.root / name / wanted
         known = self.hall.is_run(name) and (wanted == REPORT or FIGURES.fullmatch(wanted))
-        return self._file(path, REPORT_POLICY) if known and path.is_file() else _nothing()
+        is_here = known and path.is_file() and not path.is_symlink()  # a link may lead to any file
+        return self._file(path, REPORT_POLICY) if is_here else _nothing()
 
     async def analysis(self, request: Request) -> Response:
         """How far a run's analysis is, and what it says."""
@@ -242,23 +257,30 @@ class Pages:
             body += piece
             if len(body) > _LONGEST_ASK:
                 return self._json({"error": "the command is too long"}, 413)
-        return self._json(*_carry_out(self.hall, request.headers.get("x-levilab-token"), body))
+        return self._json(*await _carry_out(self.hall, request.headers.get("x-levilab-token"), body))
 
     async def frames(self, socket: WebSocket) -> None:
-        """Send a frame for each question, until the page goes."""
+        """Send a frame for each question, FRAMES_PER_S at most, until the page goes.
+
+        Questions that come faster wait: uvicorn reads no further while one is unread.
+        """
         hall, name = self.hall, socket.query_params.get("run", "")
         await socket.accept()
         if not (name in {"", OWN_BENCH if hall.desk else ""} or hall.is_run(name)):
             await socket.close(4404)
             return
         with hall.watching(name) as watch, contextlib.suppress(WebSocketDisconnect, RuntimeError):
-            watch.step()
-            while len(text := await socket.receive_text()) <= _LONGEST_ASK:
+            with watch.failing_alone():
+                watch.step()
+            again = 0.0
+            while (text := (await socket.receive()).get("text")) is not None and len(text) <= _LONGEST_ASK:
                 ask = _table(text)
+                await asyncio.sleep(max(0.0, again - time.monotonic()))
+                again = time.monotonic() + 1 / FRAMES_PER_S
                 await hall.wait_for_news(watch, ask.get("tick"))
                 said = hall.desk.said_after(ask.get("said")) if hall.desk else []
                 await socket.send_bytes(watch.frame(ask, said))
-            await socket.close(1009)
+            await socket.close(1003 if text is None else 1009)
 
 
 def application(hall: Hall) -> Guard:
@@ -300,20 +322,27 @@ def _table(text: str) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-def _carry_out(hall: Hall, token: str | None, body: bytes) -> tuple[dict[str, Any], int]:
-    """Carry out what a page with the token asks for; the answer, and the status of the request."""
+async def _carry_out(hall: Hall, token: str | None, body: bytes) -> tuple[dict[str, Any], int]:
+    """Carry out the command of a page with the token.  Return the answer and the status of the request."""
     if not hall.doors.knows(token):
         return {"error": "this page may only look: open the address that the terminal shows"}, 403
     if hall.desk is None:
         return {"error": "there is no bench for practice: levilab live --mock brings one"}, 404
-    wanted = _table(body.decode("utf-8", "replace")) if len(body) <= _LONGEST_ASK else {}
+    wanted = _table(body.decode("utf-8", "replace"))
     try:
         if wanted.get("do") == "analyze":
-            name = str(wanted.get("run"))
-            if not hall.is_run(name):
-                return {"error": "there is no such run"}, 404
-            hall.analyses.begin(hall.root / name)
-            return {}, 200
-        return {"number": hall.desk.carry_out(wanted)}, 200
+            return _analyze(hall, str(wanted.get("run")))
+        number = hall.desk.carry_out(wanted)
     except LevilabError as error:
         return {"error": str(error)}, 400
+    answer = await hall.wait_for_answer(hall.desk, number)
+    if answer is not None and answer.kind == "refused":
+        return {"error": answer.text}, 409
+    return {"number": number}, 202 if answer is None else 200
+
+
+def _analyze(hall: Hall, name: str) -> tuple[dict[str, Any], int]:
+    if not hall.is_run(name):
+        return {"error": "there is no such run"}, 404
+    hall.analyses.begin(hall.root / name)
+    return {}, 200

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections import deque
 from dataclasses import asdict, dataclass
@@ -12,15 +13,15 @@ import numpy as np
 
 from levilab.live.envelope import by_columns
 from levilab.live.follow import Followed
-from levilab.live.frame import pack
 from levilab.live.running import Running, fit_so_far
 from levilab.live.views import u_of, unit_of, view_of
 from levilab.telemetry.address import read_address
+from levilab.telemetry.codec import pack
 from levilab.telemetry.messages import Poses, Record, State
 from levilab.telemetry.subscriber import Subscriber
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from levilab.telemetry.address import Address
     from levilab.telemetry.messages import Message
@@ -35,6 +36,8 @@ _FIT_EVERY_S, _FIT_PAUSE_S, _FIT_SHARE = 1.5, 10.0, 0.05
 _FEWEST_COLUMNS, _MOST_COLUMNS = 50, 2000
 #: The latest readings alone, where the page asks for them.
 LATEST = 200
+#: Longest description of a failure that is sent to the page.
+_LONGEST_FAILURE = 300
 _INSTRUMENT = {"identity", "driver", "address"}
 _SETTINGS = {"frequency_hz", "amplitude_vpp", "waveform", "offset_v", "gate_s", "trigger_level_v"}
 
@@ -91,8 +94,20 @@ class Watch:
         self._pose_number = 0
         self._subscriber: Subscriber | None = None
         self._silent = True
+        self._failure = ""  # what went wrong while this run was read
 
     # --- what is new ---
+
+    @contextlib.contextmanager
+    def failing_alone(self) -> Iterator[None]:
+        """Let an error here, as of a damaged file, end neither the other watches nor this one: the page names it."""
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001 - whatever it is, the other runs are read on
+            failure = f"this run cannot be read in full: {type(error).__name__}: {error}"[:_LONGEST_FAILURE]
+            if failure != self._failure:
+                self._failure = failure
+                self.tick += 1
 
     def step(self) -> None:
         """Read what is new; `tick` says whether there was anything."""
@@ -155,6 +170,7 @@ class Watch:
         if self.followed is None or folder != self.followed.folder:
             self.followed = Followed(folder, self.clock)
             self.fit, self._fitted, self._fit_again = None, (-1, False), 0.0
+            self._failure = ""
             self.fit_version += 1
             self.tick += 1
 
@@ -173,11 +189,12 @@ class Watch:
         ):
             return None
         self._fitted = (followed.version, ended)
-        experiment, columns, readings = followed.record.experiment, followed.columns, followed.readings
-        groups = readings.groups()
+        experiment, columns, groups = followed.record.experiment, followed.columns, followed.readings.groups()
+        settings = followed.record.configuration.get(experiment)
+        settings = settings if isinstance(settings, dict) else {}
 
         def compute() -> Running | None:
-            return fit_so_far(experiment, columns, groups, ended=ended)
+            return fit_so_far(experiment, columns, groups, settings, ended=ended)
 
         return FitTask(followed.folder, compute)
 
@@ -211,57 +228,40 @@ class Watch:
         ask = ask if ask.get("run") == name else {key: ask.get(key) for key in ("columns", "latest", "poses")}
         head: dict[str, Any] = {"tick": self.tick, "run": name, "bench": self._about_bench(), "said": said}
         head["source"] = self._subscriber.address.port if self._subscriber else None
-        arrays: dict[str, Any] = {}
         if followed:
-            head["about"] = _about(followed)
+            head["about"] = _about(followed, self._failure)
             if ask.get("readings") != followed.version or ask.get("changed"):
-                head["readings"] = _readings(followed, ask, arrays)
+                head["readings"] = _readings(followed, ask)
             seen = _whole(ask.get("events"))
             head["events"] = followed.texts_after(seen if seen <= followed.event_count else 0)
         if ask.get("fit") != self.fit_version:
-            head["fit"] = self._about_fit(arrays)
-        head["records"] = self._new_records(ask.get("records"), arrays)
-        head["poses"] = self._new_poses(_whole(ask.get("poses")), arrays)
-        return pack(head, arrays)
+            head["fit"] = self._about_fit()
+        head["records"] = self._new_records(ask.get("records"))
+        head["poses"] = self._new_poses(_whole(ask.get("poses")))
+        return pack(head)
 
     def _about_bench(self) -> dict[str, Any] | None:
         if self.state is None:
             return None
         return asdict(self.state) | {"silent": self._silent}
 
-    def _about_fit(self, arrays: dict[str, Any]) -> dict[str, Any]:
+    def _about_fit(self) -> dict[str, Any]:
         fit = self.fit
         if fit is None:
             return {"version": self.fit_version}
         lines = (*fit.lines, fit.dashed) if fit.dashed else fit.lines
-        about: dict[str, Any] = {"head": fit.head, "lines": lines, "end_s": fit.end_s, "look": fit.look}
-        if fit.curve:
-            arrays |= {"fit_x": fit.curve.x, "fit_y": fit.curve.y, "fit_band": fit.curve.band}
-            about["solid_to"] = fit.curve.solid_to
+        curve = vars(fit.curve) if fit.curve else None
+        about = {"head": fit.head, "lines": lines, "end_s": fit.end_s, "look": fit.look, "curve": curve}
         return about | {"version": self.fit_version}
 
-    def _new_records(self, seen: Any, arrays: dict[str, Any]) -> list[dict[str, Any]]:
+    def _new_records(self, seen: Any) -> list[dict[str, Any]]:
         seen = seen if isinstance(seen, dict) else {}
-        found: list[dict[str, Any]] = []
-        for channel, record in self._records.items():
-            if seen.get(channel) != record.number:
-                k = len(found)
-                arrays |= {f"low_{k}": record.low, f"high_{k}": record.high}
-                about = {"number": record.number, "start_s": record.start_s, "step_s": record.step_s}
-                found.append({"channel": channel, "time_s": record.time_s} | about)
-        return found
+        return [vars(record) for channel, record in self._records.items() if seen.get(channel) != record.number]
 
-    def _new_poses(self, seen: int, arrays: dict[str, Any]) -> list[dict[str, Any]]:
+    def _new_poses(self, seen: int) -> list[dict[str, Any]]:
         if seen > self._pose_number:  # of another server
             seen = 0
-        found: list[dict[str, Any]] = []
-        for number, poses in self._poses:
-            if number > seen:
-                k = len(found)
-                arrays |= {f"position_{k}": poses.position.ravel(), f"quaternion_{k}": poses.quaternion.ravel()}
-                arrays[f"up_{k}"] = poses.up
-                found.append({"number": number, "start_s": poses.start_s, "step_s": poses.step_s})
-        return found
+        return [vars(poses) | {"number": number} for number, poses in self._poses if number > seen]
 
     def close(self) -> None:
         """Listen no longer."""
@@ -274,11 +274,10 @@ def _whole(value: Any) -> int:
     return value if type(value) is int and value >= 0 else 0
 
 
-def _about(followed: Followed) -> dict[str, Any]:
-    """The run's record, in the few words that the page shows."""
-    about: dict[str, Any] = {
-        "status": followed.status, "problem": followed.problem, "event_count": followed.event_count
-    }  # fmt: skip
+def _about(followed: Followed, failure: str) -> dict[str, Any]:
+    """Return the part of the run's record that the page shows.  failure: of the watch, empty without one."""
+    problem = followed.problem or failure
+    about: dict[str, Any] = {"status": followed.status, "problem": problem, "event_count": followed.event_count}
     record = followed.record
     if record is None:
         return about
@@ -303,8 +302,8 @@ def _settings(instrument: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in found.items() if key in _SETTINGS and isinstance(value, str | float | int)}
 
 
-def _readings(followed: Followed, ask: dict[str, Any], arrays: dict[str, Any]) -> dict[str, Any]:
-    """The readings as the page draws them, and the last one in full."""
+def _readings(followed: Followed, ask: dict[str, Any]) -> dict[str, Any]:
+    """Return the readings as the page draws them, and the last one in full."""
     columns, readings = followed.columns, followed.readings
     last = readings.latest(1)
     about: dict[str, Any] = {
@@ -325,13 +324,14 @@ def _readings(followed: Followed, ask: dict[str, Any], arrays: dict[str, Any]) -
     if not single:
         order = np.argsort(x, kind="stable")
         x, low, high = by_columns(x[order], low[order], high[order], width)
-    elif u_of(view.y) in place:
-        arrays["reading_u"] = groups.mean[place[u_of(view.y)]][kept]
-    arrays |= {"reading_x": x, "reading_low": low, "reading_high": high}
     return about | {
+        "x": x,
+        "low": low,
+        "high": high,
+        "u": groups.mean[place[u_of(view.y)]][kept] if single and u_of(view.y) in place else None,
         "single": single,
-        "x": [view.x_label, *unit_of(view.x)],
-        "y": [view.y_label, *unit_of(view.y)],
+        "x_axis": [view.x_label, *unit_of(view.x)],
+        "y_axis": [view.y_label, *unit_of(view.y)],
         "trend": _trend(groups, place),
     }
 

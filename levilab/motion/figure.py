@@ -58,7 +58,7 @@ _PATH, _CURVE, _PITCH, _SPECTRUM, _BOTTOM = 2.1, 0.86, 1.16, 2.3, 0.55
 
 
 def motion_figure(summary: Summary) -> Figure:
-    """The path from the side and from above, height, spin, tilt and energy in time, and the spectrum of n_x + i n_y."""
+    """Draw the path from the side and from above, height, spin, tilt, energy in time, the spectrum of n_x + i n_y."""
     with mpl.rc_context(STYLE):
         if summary.motion.scene.observed == "spin":
             return _spin_figure(summary)
@@ -116,7 +116,7 @@ def _finding(summary: Summary) -> str:
 
 
 def _zoom(summary: Summary) -> tuple[float, float] | None:
-    """The second that is shown by itself [s]: the last one of a top that fell, else the middle one."""
+    """Return the second that is shown by itself [s]: the last one of a top that fell, else the middle one."""
     if summary.end < _LEAST_FOR_ZOOM:
         return None
     start = summary.end - ZOOM_S if summary.motion.fell else math.floor(summary.end / 2)
@@ -232,7 +232,7 @@ def _exactly(change: float) -> str:
 
 
 def _draw_quantity(axes: Axes, quantity: _Quantity, time: Array) -> None:
-    """The curves over the whole time, with what they are above them."""
+    """Return the curves over the whole time, with what they are above them."""
     envelope = False
     for name, label, values in quantity.curves:
         envelope |= curve(axes, time, values, LOOKS[name], pieces=PIECES, label=label)
@@ -246,7 +246,7 @@ def _draw_quantity(axes: Axes, quantity: _Quantity, time: Array) -> None:
 
 
 def _draw_zoom(axes: Axes, quantity: _Quantity, time: Array, zoom: tuple[float, float]) -> None:
-    """The same curves for a second."""
+    """Return the same curves for a second."""
     inside = slice(*np.searchsorted(time, zoom))
     for name, _, values in quantity.curves:
         axes.plot(time[inside], values[inside], linewidth=0.9, **LOOKS[name].as_line)
@@ -293,7 +293,7 @@ def _draw_spectrum(axes: Axes, summary: Summary) -> None:
 
 
 def _outline(frequency: Array, amplitude: Array) -> tuple[Array, Array]:
-    """The highest bin of each piece: no line is lost."""
+    """Return the highest bin of each piece: no line is lost."""
     if len(frequency) <= 4 * PIECES:
         return frequency, amplitude
     edges = np.linspace(0, len(frequency), 4 * PIECES + 1).astype(int)[:-1]

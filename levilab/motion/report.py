@@ -51,7 +51,7 @@ _PROGRAMS = {"levilab", "levilab.exe", "__main__.py", "levilab-script.py"}
 
 
 def motion_section(run: Run) -> Section:
-    """The section of a simulated motion.  Raises DataError for a folder in which one is not, or not whole."""
+    """Return the section of a simulated motion.  Raises DataError for a folder in which one is not, or not whole."""
     found, scene = _document(run), _scene(run)
     name = str(found.get("scene") or scene.name or "without a name")
     blocks: list[Block] = [
@@ -233,7 +233,7 @@ def _digits(found: Mapping[str, Any], key: str, count: int = 3) -> str:
 
 
 def scene_blocks(scene: Scene, more: Sequence[Fact] = ()) -> tuple[Block, ...]:
-    """What a scene is, what differs from its preset, which effects it has and which it lacks, and its keys."""
+    """Return a scene's description: differences from its preset, effects that it has and lacks, its keys."""
     changed = changes(scene)
     kinds = (*field_kinds(scene), *KINDS)
     included = [kind.name for kind in kinds if kind.included(scene)]
@@ -281,7 +281,7 @@ def _pictures(run: Run, scene: Scene, name: str, found: Mapping[str, Any]) -> It
 
 
 def _again(run: Run, scene: Scene, found: Mapping[str, Any]) -> Summary | None:
-    """The motion computed once more; None where that takes long, or does not end in the same state."""
+    """Return the motion computed once more; None where that takes long, or does not end in the same state."""
     settings, took = run.record.configuration, found.get("computing_time_s")
     if not isinstance(took, int | float) or took > LONGEST_S:
         return None
@@ -296,7 +296,7 @@ def _again(run: Run, scene: Scene, found: Mapping[str, Any]) -> Summary | None:
 
 
 def _last_state(path: Path) -> str:
-    """The last line of a file; empty if there is none."""
+    """Return the last line of a file; empty if there is none."""
     try:
         with path.open("rb") as file:
             file.seek(0, 2)
@@ -334,7 +334,7 @@ def _reproduction(run: Run) -> Iterator[Block]:
 
 
 def command_in_words(words: Sequence[str]) -> str:
-    """A recorded command line as one types it: ours without the place of its program.
+    """Return a recorded command line as one types it: ours without the place of its program.
 
     >>> command_in_words(["/opt/bin/levilab", "simulate", "my scene.toml"])
     "levilab simulate 'my scene.toml'"

@@ -122,7 +122,7 @@ def run_simulation(
 
 
 def _samples_per_state(request: SimulationRequest) -> int:
-    """Samples for each state that is kept: the spectrum needs more of them than a file does.  Checks the numbers."""
+    """Return the number of samples for each kept state, as the spectrum needs more than a file.  Checks the numbers."""
     for name, value in (("duration", request.duration), ("tolerance", request.tolerance), ("rate", request.rate)):
         if not 0 < value <= LONGEST_S:
             raise UsageError(name, f"a number above 0 and up to {LONGEST_S:.0e} is expected", value=value)

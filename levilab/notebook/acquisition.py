@@ -31,19 +31,19 @@ def acquire_run(experiment: str, options: AcquisitionOptions) -> Run:
 
 
 def as_path(place: str | PathLike[str] | Run | None) -> Path | None:
-    """A file or a run folder as a path."""
+    """Return a file or a run folder as a path."""
     if place is None:
         return None
     return place.folder if isinstance(place, Run) else Path(place)
 
 
 def assignments(settings: Mapping[str, Any]) -> tuple[str, ...]:
-    """Settings as one would type them, KEY=VALUE."""
+    """Return settings as one would type them, KEY=VALUE."""
     return tuple(f"{key}={_typed(value)}" for key, value in settings.items())
 
 
 def _typed(value: Any) -> str:
-    """A value as one would type it behind KEY=."""
+    """Return a value as one would type it behind KEY=."""
     value = plain(value)
     return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)
 
@@ -59,7 +59,7 @@ def ask_with_input(task: Task) -> str:
 
 
 def load_run(path: str | PathLike[str]) -> Run:
-    """The run in a run folder, or of a name in runs/.  Raises DataError."""
+    """Load the run in a run folder, or of a name in runs/.  Raises DataError."""
     folder = find_run(Path(path))
     if folder.is_file():
         raise DataError(f"{folder}: is a file; a run folder is expected, a data file goes to levilab.analyze as it is")

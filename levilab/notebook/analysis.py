@@ -5,22 +5,21 @@ from __future__ import annotations
 import shutil
 import tempfile
 import weakref
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import fields, replace
 from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from analysis.errors import AnalysisError
-from levilab.errors import DataError, DoesNotSuit, LevilabError, UsageError
+from levilab.errors import DoesNotSuit, LevilabError, UsageError
 from levilab.formats.device import read_device
 from levilab.formats.table import parse_columns
 from levilab.notebook.frame import has_numbers_for_titles, in_rows, is_frame, write_frame
 from levilab.notebook.result import AnalysisResult
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.sources import data_files
-from levilab.runs.run import READINGS, RECORD, Run, find_run, find_runs
+from levilab.pipelines.suits import suiting
+from levilab.runs.run import Run, find_run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.suits import Suiting
 
     One: TypeAlias = "Run | str | PathLike[str] | pd.DataFrame"
 
@@ -41,16 +41,12 @@ _POSITIVE = {
     "rate": "samples per second are expected, a number above 0 [Hz]",
     "reading_u": "a standard uncertainty above 0 [Hz] is expected",
 }
-#: Analyses that need columns which nothing else has: a file that one of them reads is made for it.
-_PARTICULAR = ("field", "precession")
-#: Quantities that messages name as the command line has them → names of the keywords, which have the unit.
-_KEYWORDS = {"height": "height_m", "height_u": "height_u_m"}
 #: What DataFrames are called, in messages and beside saved results.
 _FRAME = "DataFrame"
 
 
 def analyze_data(data: One | Sequence[One], kind: str | None, given: Mapping[str, Any]) -> AnalysisResult:
-    """The result of one analysis.
+    """Analyze data by one analysis.
 
     Args:
         data: a run, a path, a DataFrame, or several of them.
@@ -69,7 +65,7 @@ def analyze_data(data: One | Sequence[One], kind: str | None, given: Mapping[str
         raise UsageError("kind", f"{', '.join(ANALYSES)} or None is expected", value=kind)
     frames = [item for item in items if is_frame(item)]
     if not frames:
-        return _analyzed([_path(item) for item in items], kind, options, _in_keywords)
+        return _analyzed([_path(item) for item in items], kind, options, str)
     folder = Path(tempfile.mkdtemp(prefix="levilab-"))
     in_words = partial(_in_rows, folder=folder, titles=0 if any(map(has_numbers_for_titles, frames)) else 1)
     try:
@@ -91,9 +87,15 @@ def _analyzed(
 ) -> AnalysisResult:
     """in_words: a message as the caller reads it; folder: in which DataFrames were written."""
     with _errors(in_words):
-        analysis = ANALYSES[kind] if kind else _made_for(paths, options)
-        _refuse_foreign(analysis, options)
-        found = analysis.analyze(paths, analysis.options_from(options))
+        if kind:
+            analysis = ANALYSES[kind]
+            _refuse_foreign(analysis, options)
+            found = analysis.analyze(paths, analysis.options_from(options))
+        else:
+            one = _only_suiting(paths, options)
+            analysis = one.analysis
+            _refuse_foreign(analysis, options)
+            found = analysis.result.method.analyze_found(one.paths, one.found, analysis.options_from(options))
     copies = tuple(path for path in paths if path.parent == folder)
     return AnalysisResult(analysis, _with_words(found, in_words), copies)
 
@@ -103,7 +105,7 @@ def _is_one(data: object) -> bool:
 
 
 def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
-    """Where the data lie; a DataFrame is written into the folder."""
+    """Return where the data lie; a DataFrame is written into the folder."""
     if isinstance(item, Run):
         return item.folder
     if isinstance(item, str | PathLike):
@@ -119,7 +121,7 @@ def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
 
 
 def _options(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Options as analyses take them, those that are None left out.  Raises UsageError, DataError."""
+    """Return options as analyses take them, without those that are None.  Raises UsageError, DataError."""
     options = {name: value for name, value in given.items() if value is not None}
     for name, choices in _CHOICES.items():
         if options.get(name, choices[0]) not in choices:
@@ -136,7 +138,7 @@ def _options(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _columns(given: Mapping[str, str | int] | str) -> dict[str, str]:
-    """As text or as a mapping.  Raises UsageError."""
+    """Return names of columns, given as text or as a mapping.  Raises UsageError."""
     return parse_columns(given) if isinstance(given, str) else {name: str(title) for name, title in given.items()}
 
 
@@ -155,106 +157,46 @@ def _refuse_foreign(analysis: Analysis[Any], options: Mapping[str, Any]) -> None
             raise UsageError(name, f"is no option of {analysis.name}, but of {' and '.join(others)}: leave it out")
 
 
-# --- the analysis that is made for data ----------------------------------------------------------------
+# --- the analysis that suits data ---------------------------------------------------------------------
 
 
-def _made_for(paths: Sequence[Path], options: Mapping[str, Any]) -> Analysis[Any]:
-    """The one analysis that is made for what lies at all of the paths.
+def _only_suiting(paths: Sequence[Path], options: Mapping[str, Any]) -> Suiting:
+    """Return the one analysis that suits the inputs at all of the paths.
 
     Raises:
         UsageError: there are several.
         DataError: there is none, or the data cannot be used.
     """
-    of_each = [_suiting(path, options) for path in paths]
-    names = [name for name in ANALYSES if all(name in suiting for suiting in of_each)]
-    if len(names) == 1:
-        return ANALYSES[names[0]]
+    taken = suiting(paths, options)
+    of_all = [one for one in taken if len(one.paths) == len(paths)]
+    if len(of_all) == 1:
+        return of_all[0]
+    names = [one.analysis.name for one in of_all]
     if names:
         instead = ", or name a single run" if paths[0].is_dir() else ""
         raise UsageError("kind", f"{paths[0]} suits {', '.join(names)}: say which, as kind={names[0]!r}{instead}")
-    kinds = "; ".join(f"{path.name} suits {' and '.join(one)}" for path, one in zip(paths, of_each, strict=True))
+    of_each = {path: [one.analysis.name for one in taken if path in one.paths] for path in paths}
+    kinds = "; ".join(f"{path.name} suits {' and '.join(names)}" for path, names in of_each.items())
     raise DoesNotSuit(f"no analysis takes all of these together ({kinds}): analyze them one after the other")
-
-
-def _suiting(path: Path, options: Mapping[str, Any]) -> list[str]:
-    """Names of the analyses that are made for what lies at a path.  Raises DataError where there is none."""
-    if path.name == READINGS and (path.parent / RECORD).exists():
-        with suppress(DataError):  # where its record is damaged, the readings can still be analyzed
-            return _for_run(Run.load(path.parent))
-    if path.is_dir():
-        runs = [Run.load(path)] if (path / RECORD).exists() else list(_usable_runs(path))
-        suiting = {name for run in runs for name in _for_run(run)}
-        if len(runs) == 1 and not suiting:
-            raise DoesNotSuit(f"{path}: there is no analysis of a {runs[0].record.experiment} run")
-        if not runs:
-            files = data_files(path)
-            suiting = {name for file in files for name in _readers(file, options)[0]}
-        if not suiting:
-            raise DoesNotSuit(f"{path}: holds no run and no data file that can be analyzed: name one of them")
-        return [name for name in ANALYSES if name in suiting]
-    suiting_file, error = _readers(path, options)
-    if error and not suiting_file:
-        raise error
-    return suiting_file
-
-
-def _usable_runs(root: Path) -> Iterator[Run]:
-    """The runs below a folder; a damaged one decides nothing."""
-    for folder in find_runs(root):
-        try:
-            yield Run.load(folder)
-        except DataError:
-            continue
-
-
-def _for_run(run: Run) -> list[str]:
-    """The analyses for the run's experiment, else those that take it."""
-    rows = ANALYSES.values()
-    own = [row.name for row in rows if run.record.experiment in row.needs.experiments]
-    return own or [row.name for row in rows if row.needs.take(run)]
-
-
-def _readers(file: Path, options: Mapping[str, Any]) -> tuple[list[str], LevilabError | None]:
-    """The analyses that read a file, and what is wrong with it where none does: damage before another kind."""
-    names, damage, foreign = [], None, None
-    for row in ANALYSES.values():
-        try:
-            row.needs.read_file(file, row.options_from(options))
-            names.append(row.name)
-        except DoesNotSuit as error:
-            foreign = foreign or error
-        except DataError as error:
-            damage = damage or error
-        except AnalysisError as error:
-            damage = damage or DataError(f"{file}: {error}")
-    particular = [name for name in names if name in _PARTICULAR]
-    return particular or names, damage or foreign
 
 
 # --- messages ------------------------------------------------------------------------------------------
 
 
-def _in_keywords(text: str) -> str:
-    """A message with the names of keywords."""
-    for quantity, keyword in _KEYWORDS.items():
-        text = text.replace(f"`{quantity}`", f"`{keyword}`")
-    return text
-
-
 def _in_rows(text: str, folder: Path, titles: int) -> str:
-    """A message with the names of keywords, and about a DataFrame with rows in the place of a file's lines."""
-    return in_rows(_in_keywords(text), folder, titles=titles) if _FRAME in text else _in_keywords(text)
+    """Return a message about a DataFrame with rows in the place of a file's lines."""
+    return in_rows(text, folder, titles=titles) if _FRAME in text else text
 
 
 def _with_words(found: Any, in_words: Callable[[str], str]) -> Any:
-    """What was found, with the warnings about its inputs in other words."""
+    """Replace the warnings about inputs by the caller's words."""
     sources = [replace(source, warnings=tuple(map(in_words, source.warnings))) for source in found.sources]
     return replace(found, sources=tuple(sources), warnings=tuple(map(in_words, found.warnings)))
 
 
 @contextmanager
 def _errors(in_words: Callable[[str], str]) -> Iterator[None]:
-    """Errors as the caller reads them: the same error with another text."""
+    """Give errors the text that the caller reads."""
     try:
         yield
     except LevilabError as error:

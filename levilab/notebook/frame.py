@@ -36,17 +36,17 @@ def write_frame(frame: pd.DataFrame, path: Path) -> None:
 
 
 def is_frame(data: Any) -> bool:
-    """Whether data are a DataFrame: pandas need not be loaded to know."""
+    """Return whether data are a DataFrame: pandas need not be loaded to know."""
     return hasattr(data, "to_csv") and hasattr(data, "columns")
 
 
 def has_numbers_for_titles(frame: pd.DataFrame) -> bool:
-    """Whether the columns are numbered."""
+    """Return whether the columns are numbered."""
     return all(isinstance(title, int) for title in frame.columns)
 
 
 def in_rows(text: str, folder: Path, *, titles: int) -> str:
-    r"""A message about such a file in the words of a DataFrame: rows, counted from 0, and no folder.
+    r"""Return a message about such a file in the words of a DataFrame: rows, counted from 0, and no folder.
 
     Args:
         text: of the message.

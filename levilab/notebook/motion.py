@@ -52,7 +52,7 @@ class SimulatedMotion(Trajectory):
         return as_document(self._found)
 
     def _repr_html_(self) -> str:
-        """As a notebook shows it."""
+        """Return the HTML that a notebook shows."""
         found = self._found
         error = f"{self.accuracy.position:.1g} m, {self.accuracy.axis:.1g} rad of the axis (estimated)"
         facts = [
@@ -65,13 +65,13 @@ class SimulatedMotion(Trajectory):
         return facts_as_html(headline(found), facts)
 
     def summary(self) -> str:
-        """What `levilab simulate` prints: how it ended, heights, spin, the lines of the axis, the errors."""
+        """Return what `levilab simulate` prints: how it ended, heights, spin, the lines of the axis, the errors."""
         from levilab.present.terminal import as_text  # with rich
 
         return as_text(partial(print_motion, self._found))
 
     def to_dataframe(self) -> pd.DataFrame:
-        """The states, a row each, with the columns of states.csv: time_s, x_m, …, energy_j."""
+        """Return the states, a row each, with the columns of states.csv: time_s, x_m, …, energy_j."""
         import pandas as pd
 
         return pd.DataFrame({name: values(self) for name, _, _, values in COLUMNS})

@@ -11,8 +11,8 @@ from analysis.uncertainty import Estimate
 from levilab.errors import UsageError, unquoted
 from levilab.files import CannotWrite, replace_atomically
 from levilab.pipelines.catalogue import print_analysis
-from levilab.pipelines.catalogue import save as save_result
 from levilab.pipelines.result import Place
+from levilab.pipelines.suits import save as save_result
 from levilab.present.numbers import in_one_line
 from levilab.report.page import render_part
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 TableName = Literal["values", "models", "readings"]
 #: Values that the short form of a result shows.
 MOST_VALUES = 4
-_ELSEWHERE = ": choose another `folder`"
+_ELSEWHERE = "choose another `folder`"
 
 
 @dataclass(frozen=True, repr=False)
@@ -136,17 +136,17 @@ class AnalysisResult:
         )
 
     def _repr_html_(self) -> str:
-        """As a notebook shows it: what a report says, with its figure; nothing is fetched from elsewhere."""
+        """Return the HTML that a notebook shows: a report with its figure; nothing is fetched from elsewhere."""
         return render_part(self.analysis, self.found)
 
     def summary(self) -> str:
-        """The tables and sentences that `levilab analyze` prints."""
+        """Return the tables and sentences that `levilab analyze` prints."""
         from levilab.present.terminal import as_text  # with rich
 
         return as_text(partial(_print, self))
 
     def to_dataframe(self, table: TableName = "values") -> pd.DataFrame:
-        """The result as a table.
+        """Return the result as a table.
 
         Args:
             table: "values", a row for each quantity of each input (columns input, name, value, u, unit), and of several
@@ -190,7 +190,7 @@ class AnalysisResult:
         return frame.astype({"value": float, "u": float})
 
     def plot(self) -> Figure:
-        """The figure; it needs no display, a notebook shows it, and `savefig` writes it."""
+        """Draw the figure; it needs no display, a notebook shows it, and `savefig` writes it."""
         from levilab.present.style import for_notebooks  # with matplotlib
 
         return for_notebooks(self.analysis.figure(self.found))
@@ -211,7 +211,7 @@ class AnalysisResult:
         try:
             return [*written, *save_result(self.analysis, found, place)]
         except CannotWrite as error:
-            raise CannotWrite(f"{str(error).partition(': choose')[0]}{_ELSEWHERE}") from error
+            raise CannotWrite(error.problem, _ELSEWHERE) from error
 
 
 def _print(result: AnalysisResult, console: Any) -> None:
@@ -219,7 +219,7 @@ def _print(result: AnalysisResult, console: Any) -> None:
 
 
 def _copy(path: Path, folder: Path) -> Path:
-    """A copy of a file in a folder, by a name that replaces no other content.  Raises CannotWrite."""
+    """Copy a file into a folder, by a name that replaces no other content.  Raises CannotWrite."""
     content, number, to = path.read_bytes(), 1, folder / path.name
     try:
         while to.exists() and to.read_bytes() != content:
@@ -228,5 +228,5 @@ def _copy(path: Path, folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         replace_atomically(to, content)
     except OSError as error:
-        raise CannotWrite(f"{to}: could not be written ({error.strerror or error}){_ELSEWHERE}") from error
+        raise CannotWrite(f"{to}: could not be written ({error.strerror or error})", _ELSEWHERE) from error
     return to

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from levilab.errors import DataError
 from levilab.pipelines.result import Place, place_of
-from levilab.pipelines.sources import InputOptions, Needs, Readings, Source, collect
+from levilab.pipelines.sources import InputOptions, Needs, Readings, Remark, Skipped, Source, collect
 from levilab.runs.run import find_run
 
 if TYPE_CHECKING:
@@ -38,11 +38,13 @@ class Origin(Generic[Opt]):
         text: for people.
         budget: what the uncertainties of the input's numbers are made of; None: to be worked out from what was found,
             empty: the result that was read holds none.
+        lacks_result: whether it was analyzed since no result of it was found.
     """
 
     options: Opt
     text: str = NOW
     budget: tuple[Budget, ...] | None = None
+    lacks_result: bool = False
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ class Analyzed(Generic[S, R, T, Opt]):
     options: Opt
     place: Place
     warnings: tuple[str, ...]
-    remarks: tuple[str, ...]
+    remarks: tuple[Remark, ...]
     origins: tuple[Origin[Opt], ...]
     budget: tuple[Budget, ...] = ()
 
@@ -87,15 +89,15 @@ class Analyzed(Generic[S, R, T, Opt]):
         return (self.sources,)
 
     def inputs_of(self, group: int | None) -> Sequence[Source[S]]:
-        """Inputs of a group, by the number that values and budgets of all together have; None: all inputs."""
+        """Return the inputs of a group, by its number in values and budgets of all together; None: all inputs."""
         return self.sources
 
     def about_all(self) -> Iterable[str]:
-        """What to know of all inputs together before using the numbers."""
+        """Return what to know of all inputs together before using the numbers."""
         return ()
 
     def about_run(self, run: R) -> Iterable[str]:
-        """What to know of one input."""
+        """Return what to know of one input."""
         raise NotImplementedError
 
     @property
@@ -129,7 +131,7 @@ A = TypeVar("A", bound=Analyzed[Any, Any, Any, Any])
 
 
 def _with_name(source: Source[Any], text: str) -> str:
-    """The text with the input's name before it, unless it begins with that or with its path."""
+    """Put the name of the input before a text, unless it begins with the name or the path."""
     return text if source.path.name in text.partition(": ")[0] else f"{source.name}: {text}"
 
 
@@ -145,7 +147,7 @@ class Method(Generic[S, R, Opt, A]):
         combine: all inputs together.
         mixed: what is wrong with numbers over real and synthetic inputs; empty where there are none.
         of_files: names of options that say nothing about runs, whose columns are known.
-        passes_over: whether of several inputs one that cannot be used is passed over with a warning.
+        skips: whether of several inputs one that cannot be used is skipped with a warning.
         refit: number of each input to analyze once more, for what only all together show → what is found then.
         refit_text: why, in words.
         budget_of_run: what the uncertainties of one input's numbers are made of.
@@ -159,16 +161,19 @@ class Method(Generic[S, R, Opt, A]):
     combine: Callable[[Sequence[Source[S]], Sequence[R], Opt], Any] = lambda *_: None
     mixed: str = ""
     of_files: frozenset[str] = frozenset({"columns", "channel", "rate"})
-    passes_over: bool = False
+    skips: bool = False
     refit: Callable[[Sequence[Source[S]], Sequence[R], Sequence[Opt]], Mapping[int, R]] = lambda *_: {}
     refit_text: str = ""
     budget_of_run: Callable[[Source[S], R, Opt], tuple[Budget, ...]] = lambda *_: ()
     budget_of_all: Callable[[A], tuple[Budget, ...]] = lambda _: ()
 
     def analyze(self, paths: Sequence[Path], options: Opt) -> A:
-        """What is found of the inputs at the paths.  Raises DataError for what cannot be used; it names the file."""
+        """Analyze the inputs at the paths.  Raises DataError for what cannot be used; it names the file."""
         paths = [find_run(path) for path in paths]
-        found = collect(paths, self.needs, lambda _: options)
+        return self.analyze_found(paths, collect(paths, self.needs, lambda _: options), options)
+
+    def analyze_found(self, paths: Sequence[Path], found: Found[S], options: Opt) -> A:
+        """Do the same for inputs that were found already."""
         return self.gather(
             paths, found, options, lambda source: (source, self.fit(source, options), Origin(options, NOW))
         )
@@ -183,7 +188,7 @@ class Method(Generic[S, R, Opt, A]):
         *,
         budget: tuple[Budget, ...] = (),
     ) -> A:
-        """All inputs, each by itself and together.  Raises DataError.
+        """Return what is found of all inputs, each by itself and together.  Raises DataError.
 
         Args:
             paths: run folders, data files, folders that were searched.
@@ -223,21 +228,22 @@ class Method(Generic[S, R, Opt, A]):
     def _each(
         self, sources: Sequence[Source[S]], one: Callable[[Source[S]], tuple[Source[S], R, Origin[Opt]]]
     ) -> tuple[list[tuple[Source[S], R, Origin[Opt]]], list[str]]:
-        """What is found of each input, and warnings about those that are passed over."""
-        if not self.passes_over or len(sources) == 1:
+        """Return what is found of each input, and warnings about those that are skipped."""
+        if not self.skips or len(sources) == 1:
             return [one(source) for source in sources], []
-        done, warnings = [], []
+        done: list[tuple[Source[S], R, Origin[Opt]]] = []
+        errors: list[DataError] = []
         for source in sources:
             try:
                 done.append(one(source))
             except DataError as error:
-                warnings.append(f"passed over: {error}")
+                errors.append(error)
         if not done:
-            raise DataError(warnings[-1].removeprefix("passed over: "))
-        return done, warnings
+            raise errors[-1]
+        return done, [str(Skipped(str(error))) for error in errors]
 
     def about_inputs(self, sources: Sequence[Source[S]], options: Opt) -> Iterable[str]:
-        """What to know of the inputs before using the numbers."""
+        """Return what to know of the inputs before using the numbers."""
         synthetic = sum(source.synthetic for source in sources)
         if self.mixed and 0 < synthetic < len(sources):
             yield f"{synthetic} of {len(sources)} inputs are SYNTHETIC, the others are not known to be: {self.mixed}"

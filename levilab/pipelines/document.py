@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Generic, Self, TypeVar
 
 from pydantic import BeforeValidator, PlainSerializer
 
-from levilab.errors import unquoted
+from levilab.errors import DataError, unquoted
 from levilab.files import finite
 from levilab.pipelines.analyzed import FOR_THIS_PAGE, A, Method, Opt, Origin, R, S
-from levilab.pipelines.result import SCHEMA, Archive, BudgetPart, Earlier, Part, Result, budgets_of, relative
+from levilab.pipelines.result import ANEW, SCHEMA, Archive, Earlier, Part, Result, relative
 from levilab.pipelines.sources import collect
 from levilab.runs.run import find_run
 from levilab.software import software_versions
@@ -37,42 +37,17 @@ class Settings(Part):
 
     @classmethod
     def of(cls, options: InputOptions, **more: Any) -> Self:
-        """From options, but for those in `more`."""
+        """Make the settings from options; those in `more` go before."""
         return cls.model_validate(
             {name: getattr(options, name) for name in cls.model_fields if name not in more} | more
         )
 
     def arguments(self) -> dict[str, Any]:
-        """The options by their names."""
+        """Return the options by their names."""
         return {name: getattr(self, name) for name in type(self).model_fields}
 
 
 D = TypeVar("D", bound=Result)
-#: Why an input was analyzed for a page.
-NO_RESULT = "there was no result yet"
-
-
-@dataclass(frozen=True)
-class Looked(Generic[S, Opt, D]):
-    """Inputs as they lie there, and the results that were written of them.
-
-    Attributes:
-        paths: where they were looked for.
-        found: the inputs.
-        archive: the results.
-        options: as given.
-        given: those of them that are not at their defaults.
-    """
-
-    paths: Sequence[Path]
-    found: Found[S]
-    archive: Archive[D]
-    options: Opt
-    given: Mapping[str, Any]
-
-    def has_result(self, source: Source[S]) -> bool:
-        """Whether there is a result of an input, of earlier readings or with other options perhaps."""
-        return self.archive.earlier(source.path, source.data, source.sha256) is not None
 
 
 @dataclass(frozen=True)
@@ -82,25 +57,25 @@ class Document(Generic[S, R, Opt, A, D]):
     Attributes:
         method: of the analysis.
         result: all that is in it, with the parts of which it is made.
-        entries: its own entries at the top.
-        run_entries: those of one input; `warnings` are added to the source's.
-        run: what was found of one input, from its part of the result, with the options of that time; raises ValueError
-            for what does not go with the readings.
-        combined: what was found of all together, from the result, the runs, and the number of each of them in the
-            result; raises ValueError.
+        entries: its own entries at the top, for people: `values`, `models`.
+        run_entries: likewise those of one input.
+        check: raises ValueError for what was read of one input and cannot have been found.
+        outdated: why this version cannot use what was read of one input, so that it is analyzed again; empty: it can.
+        renumber: what was found of all together, for inputs in another order: the number of each in the result.
     """
 
     method: Method[S, R, Opt, A]
     result: type[D]
     entries: Callable[[A], dict[str, Any]]
-    run_entries: Callable[[Source[S], R], dict[str, Any]]
-    run: Callable[[Any, Source[S], Opt], R]
-    combined: Callable[[D, Sequence[R], Sequence[int]], Any] = lambda *_: None
+    run_entries: Callable[[R], dict[str, Any]]
+    check: Callable[[R], None] = lambda _: None
+    outdated: Callable[[R], str] = lambda _: ""
+    renumber: Callable[[Any, Sequence[int]], Any] = lambda combined, _: combined
 
     # --- writing ---
 
     def of(self, found: A, place: Place) -> D:
-        """The result for a place: paths in it are relative to that."""
+        """Return the result for a place: paths in it are relative to the place."""
         document = {
             "schema": SCHEMA,
             "analysis": self.method.needs.analysis,
@@ -108,122 +83,149 @@ class Document(Generic[S, R, Opt, A, D]):
             "synthetic": any(source.synthetic for source in found.sources),
             "software": software_versions(),
             "settings": self.settings(found.options),
-            "values": {},
             "models": [],
             "runs": [
-                self._part(source, run, origin, place.folder)
+                {
+                    "path": relative(source.path, place.folder),
+                    "synthetic": source.synthetic,
+                    "warnings": [unquoted(text) for text in (*source.warnings, *found.about_run(run))],
+                    "models": [],
+                    "result": run,
+                }
+                | _budget(origin.budget or ())
+                | self.run_entries(run)
                 for source, run, origin in zip(found.sources, found.runs, found.origins, strict=True)
             ],
             "warnings": [unquoted(text) for text in found.all_warnings],
+            "combined": found.combined,
         }
         return self.result.model_validate(finite(document | _budget(found.budget) | self.entries(found)))
 
-    def _part(self, source: Source[S], run: R, origin: Origin[Opt], folder: Path) -> dict[str, Any]:
-        head = {"path": relative(source.path, folder), "synthetic": source.synthetic, "values": {}, "models": []}
-        own = self.run_entries(source, run) | _budget(origin.budget or ())
-        return head | own | {"warnings": [unquoted(text) for text in (*source.warnings, *own.get("warnings", ()))]}
-
     def settings(self, options: Opt) -> Settings:
-        """The options as they stand in the file."""
+        """Return the options as they stand in the file."""
         kind: type[Settings] = self.result.model_fields["settings"].annotation  # type: ignore[assignment]
         return kind.of(options)
 
     # --- reading ---
 
-    def look(self, paths: Sequence[Path], options: Opt, results: Sequence[Path] = ()) -> Looked[S, Opt, D]:
-        """What lies at the paths, and the results that were written of it.  Raises DataError.
+    def archive(self, paths: Sequence[Path], results: Sequence[Path] = ()) -> Archive[D]:
+        """Return the results that were written before of inputs at the paths; results: files that lie elsewhere."""
+        return Archive(paths, self.result, results)
 
-        Args:
-            paths: run folders, data files, folders to search.
-            options: as given; those at their defaults are not given, and those of an earlier result count.
-            results: files of results that do not lie beside their inputs.
-        """
-        paths = [find_run(path) for path in paths]
-        archive = Archive(paths, self.result, results)
-        given = {one.name: value for one in fields(options) if (value := getattr(options, one.name)) != one.default}
+    def reading(self, archive: Archive[D], options: Opt) -> Callable[[Path], Opt]:
+        """Return how an input is read: with the given options, else those of its earlier result."""
+        given = _given(options)
 
         def reading(path: Path) -> Opt:
             earlier = archive.earlier(path, path)
             return replace(self._options(earlier), **given) if earlier else options
 
-        return Looked(paths, collect(paths, self.method.needs, reading), archive, options, given)
+        return reading
 
-    def recall(self, looked: Looked[S, Opt, D]) -> A:
-        """What `analyze` found, from its result.json; analyzed anew is only what has none that holds.
+    def recall(self, paths: Sequence[Path], options: Opt) -> A:
+        """Read what `analyze` found from result.json; inputs without a result that holds are analyzed.
 
-        A result holds as long as the readings are the same bytes, and it was made with the given options.
+        A result holds as long as the readings are the same bytes, and it was made with the given options.  Those at
+        their defaults are not given.
 
         Raises DataError for what cannot be used, a damaged result.json included.
         """
-        found, archive, given = looked.found, looked.archive, looked.given
+        paths = [find_run(path) for path in paths]
+        archive = self.archive(paths)
+        found = collect(paths, self.method.needs, self.reading(archive, options))
+        return self.recall_found(paths, found, archive, options)
+
+    def recall_found(self, paths: Sequence[Path], found: Found[S], archive: Archive[D], options: Opt) -> A:
+        """Do the same for inputs that were found already."""
+        given = _given(options)
         whole = archive.whole(found.sources)
-        if whole and all(self._holds(whole.of(source), given, source) for source in found.sources):
-            found = replace(found, warnings=(*whole.result.warnings, *map(unquoted, found.warnings)))
+        if whole and not any(self._problem(whole.of(source), given, source) for source in found.sources):
             numbers = [whole.of(source).number for source in found.sources]
             return self.method.gather(
-                looked.paths,
+                paths,
                 found,
-                looked.options,
-                lambda source: self._restored(source, whole.of(source)),
-                lambda runs: whole.restore(lambda: self.combined(whole.result, runs, numbers)),
-                budget=budgets_of(whole.result.budget),
+                options,
+                lambda source: self._read_one(source, whole.of(source)),
+                lambda _: self.renumber(whole.result.combined, numbers),
+                budget=whole.result.budget,
             )
-        return self.method.gather(
-            looked.paths, found, looked.options, lambda source: self._recalled(source, archive, given)
-        )
+        return self.method.gather(paths, found, options, lambda source: self._recall_one(source, archive, given))
 
     def _options(self, earlier: Earlier[D]) -> Opt:
         settings: Settings = earlier.result.settings
         return self.method.options(**settings.arguments())
 
-    def _holds(self, earlier: Earlier[D], given: Mapping[str, Any], source: Source[S]) -> bool:
-        """Whether a result was made with the given options, as far as they matter to the input."""
+    def _problem(self, earlier: Earlier[D], given: Mapping[str, Any], source: Source[S]) -> str:
+        """Return why an input has to be analyzed again; empty where its result holds."""
+        if earlier.sha256 != source.sha256:
+            return f"the readings are others than in {earlier.file}"
         made_with = self._options(earlier)
-        return self.settings(replace(made_with, **self._own(given, source))) == self.settings(made_with)
+        if self.settings(replace(made_with, **self._own(given, source))) != self.settings(made_with):
+            return f"other options than those of {earlier.file}"
+        return self.outdated(earlier.part.result)
 
     def _own(self, given: Mapping[str, Any], source: Source[S]) -> dict[str, Any]:
-        """Those of the given options that matter to an input."""
+        """Return those of the given options that matter to an input."""
         left_out = self.method.of_files if source.run else frozenset[str]()
         return {name: value for name, value in given.items() if name not in left_out}
 
-    def _recalled(
+    def _recall_one(
         self, source: Source[S], archive: Archive[D], given: Mapping[str, Any]
     ) -> tuple[Source[S], R, Origin[Opt]]:
-        """One input: what was found of it, or its analysis."""
+        """Read the result of one input, or analyze it."""
         earlier, own = archive.earlier(source.path, source.data, source.sha256), self._own(given, source)
         if earlier is None:
-            options, why = self.method.options(**own), NO_RESULT
-        elif earlier.sha256 != source.sha256:
-            options, why = replace(self._options(earlier), **own), f"the readings are others than in {earlier.file}"
-        elif not self._holds(earlier, given, source):
-            options, why = replace(self._options(earlier), **own), f"other options than those of {earlier.file}"
+            options, why = self.method.options(**own), "there was no result yet"
+        elif why := self._problem(earlier, given, source):
+            options = replace(self._options(earlier), **own)
         else:
-            return self._restored(source, earlier)
-        return source, self.method.fit(source, options), Origin(options, f"{FOR_THIS_PAGE}: {why}")
+            return self._read_one(source, earlier)
+        origin = Origin(options, f"{FOR_THIS_PAGE}: {why}", lacks_result=earlier is None)
+        return source, self.method.fit(source, options), origin
 
-    def _restored(self, source: Source[S], earlier: Earlier[D]) -> tuple[Source[S], R, Origin[Opt]]:
-        """One input as it was found; its warnings are those of that time."""
-        options, part = self._options(earlier), earlier.part
-        run = earlier.restore(lambda: self.run(part, source, options))
-        return replace(source, warnings=part.warnings), run, Origin(options, earlier.text, budgets_of(part.budget))
+    def _read_one(self, source: Source[S], earlier: Earlier[D]) -> tuple[Source[S], R, Origin[Opt]]:
+        """Read the result of one input.  Raises DataError."""
+        part = earlier.part
+        try:
+            self.check(part.result)
+        except ValueError as error:
+            raise DataError(f"{earlier.file}: {error}: {ANEW}") from error
+        return source, part.result, Origin(self._options(earlier), earlier.text, part.budget)
+
+
+def _given(options: Any) -> dict[str, Any]:
+    """Return the options that are not at their defaults."""
+    return {one.name: value for one in fields(options) if (value := getattr(options, one.name)) != one.default}
 
 
 def _budget(budgets: Sequence[Budget]) -> dict[str, Any]:
-    """The entry of budgets, where there are any."""
-    return {"budget": [BudgetPart.of(one).model_dump(exclude_unset=True) for one in budgets]} if budgets else {}
+    """Return the entry of budgets; empty where there are none."""
+    return {"budget": tuple(budgets)} if budgets else {}
+
+
+#: Statistics that a result has of each model; None where a model has no such number.
+_STATISTICS = (
+    "n", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson", "runs_test_p", "difference",
+    "n_effective",
+)  # fmt: skip
+
+
+def statistics_of(statistics: Any) -> dict[str, Any]:
+    """Return how well a model fits, as a result has it."""
+    return {name: getattr(statistics, name, None) for name in _STATISTICS}
 
 
 def values_of(estimates: Mapping[str, Estimate]) -> dict[str, dict[str, Any]]:
-    """Quantities as a result has them, by their names."""
+    """Return quantities as a result has them, by their names."""
     return {name: value_of(estimate) for name, estimate in estimates.items()}
 
 
 def value_of(estimate: Estimate) -> dict[str, Any]:
-    """A quantity as a result has it."""
+    """Return a quantity as a result has it."""
     value = number(estimate.value, estimate.unit, estimate.u)
     return value | ({"interval_68": list(estimate.interval)} if estimate.interval else {})
 
 
 def number(value: float | None, unit: str, u: float | None = None) -> dict[str, Any]:
-    """A quantity as a result has it, most often one without an uncertainty."""
+    """Return a quantity as a result has it, most often one without an uncertainty."""
     return {"value": value, "u": u, "unit": unit}

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import os
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -15,12 +15,13 @@ from analysis.budget import Budget, Component
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.files import parse_json, replace_atomically, writing
+from levilab.pipelines.dump import Dump
 from levilab.runs.run import RECORD
 from levilab.settings import in_one_line
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from levilab.pipelines.sources import Source
 
@@ -36,7 +37,7 @@ _ANEW_OR_AWAY = f"{ANEW}, or move the file away"
 class Part(BaseModel):
     """A part of a result.  Keys that are not known here are of a newer version, and passed over."""
 
-    model_config = ConfigDict(frozen=True, validate_by_name=True, validate_by_alias=True, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, validate_by_name=True, validate_by_alias=True, arbitrary_types_allowed=True)
 
 
 class Value(Part):
@@ -72,66 +73,49 @@ class Input(Part):
     sha256: str
 
 
-class ComponentPart(Part):
-    """A row of a budget; see `analysis.budget.Component`."""
+#: Rows of a budget with what they contribute, and what is known beside u.
+Budgets = Annotated[tuple[Budget, ...], Dump({Budget: ("u_with_all",), Component: ("contribution",)})]
+
+
+#: Further entries are written for people and other programs: levilab does not read them.
+_FOR_OTHERS = ConfigDict(extra="allow")
+
+
+class Model(Part):
+    """A model that was fitted."""
+
+    model_config = _FOR_OTHERS
 
     name: str
-    source: str
-    kind: Literal["A", "B"]
-    u: float | None = Field(ge=0)
-    unit: str
-    sensitivity: float
-    contribution: float | None = Field(ge=0)
-    included: bool
-    note: str
-    remedy: str
-
-
-class BudgetPart(Part):
-    """What u of a quantity is made of; see `analysis.budget.Budget`."""
-
-    quantity: str
-    model: str
-    value: float
-    u: float = Field(ge=0)
-    u_with_all: float = Field(ge=0)
-    unit: str
-    components: tuple[ComponentPart, ...]
-    group: int | None = Field(default=None, ge=0)
-
-    @classmethod
-    def of(cls, budget: Budget) -> Self:
-        """From a budget."""
-        rows = [asdict(one) | {"contribution": one.contribution} for one in budget.components]
-        entries = asdict(budget) | {"u_with_all": budget.u_with_all, "components": rows}
-        if budget.group is None:
-            del entries["group"]
-        return cls.model_validate(entries)
-
-    @property
-    def budget(self) -> Budget:
-        """The budget, but for what follows from the rest of it."""
-        rows = (Component(**one.model_dump(exclude={"contribution"})) for one in self.components)
-        return Budget(self.quantity, self.value, self.u, self.unit, tuple(rows), self.model, self.group)
-
-
-def budgets_of(parts: Sequence[BudgetPart]) -> tuple[Budget, ...]:
-    """The budgets that a result holds; none, if an earlier version wrote it."""
-    return tuple(one.budget for one in parts)
+    parameters: dict[str, Value]
+    covariance: tuple[tuple[float | None, ...], ...] | None
+    statistics: dict[str, Any]
 
 
 class RunPart(Part):
-    """One input by itself."""
+    """One input by itself.
+
+    result: the dataclass of the analysis; an analysis says which.
+    """
+
+    model_config = _FOR_OTHERS
 
     path: str
     synthetic: bool
     values: dict[str, Value]
+    models: tuple[Model, ...] = ()
     warnings: tuple[str, ...]
-    budget: tuple[BudgetPart, ...] = ()
+    budget: Budgets = ()
+    result: Any
 
 
 class Result(Part):
-    """What results of all analyses have in common."""
+    """What results of all analyses have in common.
+
+    combined: what was found of all inputs together; None where the analysis combines nothing.
+    """
+
+    model_config = _FOR_OTHERS
 
     schema_: Literal["levilab-result/1"] = Field(alias="schema")
     analysis: str
@@ -140,9 +124,11 @@ class Result(Part):
     software: dict[str, str]
     settings: Any
     values: dict[str, Value]
+    models: tuple[Model, ...] = ()
     runs: tuple[Any, ...]
     warnings: tuple[str, ...]
-    budget: tuple[BudgetPart, ...] = ()
+    budget: Budgets = ()
+    combined: Any = None
 
     @model_validator(mode="after")
     def _one_run_an_input(self) -> Self:
@@ -151,12 +137,12 @@ class Result(Part):
         return self
 
     def as_dict(self) -> dict[str, Any]:
-        """As it stands in the file."""
+        """Return the result as it stands in the file."""
         return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
 
 
 def relative(path: Path, folder: Path) -> str:
-    """With forward slashes on every system; whole where there is no way (another drive)."""
+    """Return a path from a folder, with forward slashes; the whole path where there is no way (another drive)."""
     try:
         return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
     except ValueError:
@@ -177,15 +163,15 @@ class Place:
     name: str = ""
 
     def result(self, analysis: str = "") -> Path:
-        """The file of the result: of the analysis that is first here, or of another one by its name."""
+        """Return the file of the result: of the analysis that is first here, or of another one by its name."""
         return self._file(f"result.{analysis}.json" if analysis else RESULT)
 
     def results(self, analysis: str) -> tuple[Path, Path]:
-        """The files that may hold the result of an analysis."""
+        """Return the files that may hold the result of an analysis."""
         return self.result(), self.result(analysis)
 
     def figure(self, analysis: str) -> Path:
-        """The file of the figure."""
+        """Return the file of the figure."""
         return self._file(f"{analysis}.png")
 
     def _file(self, name: str) -> Path:
@@ -193,17 +179,17 @@ class Place:
 
 
 def beside(path: Path) -> Place:
-    """The place of a run folder's result, or of a data file's: its whole name, which no other file beside it has."""
+    """Return the place of the result of a run folder, or of a data file: by its whole name, which is its alone."""
     return Place(path) if path.is_dir() else Place(path.parent, path.name)
 
 
 def place_of(paths: Sequence[Path], sources: Sequence[Source[Any]]) -> Place:
-    """Beside the run or the file; of several see `_together`."""
+    """Return the place of the result of inputs: beside a single one; of several see `_together`."""
     return beside(sources[0].path) if len(sources) == 1 else _together(paths)
 
 
 def _together(paths: Sequence[Path]) -> Place:
-    """Of several inputs: the folder that was searched for them, else the present one, or above it if that is a run."""
+    """Return the folder that was searched for several inputs, else the present one, or the one above a present run."""
     if len(paths) == 1:
         return Place(paths[0])
     return Place(Path("..") if Path(RECORD).exists() else Path())
@@ -236,14 +222,18 @@ R = TypeVar("R", bound=Result)
 T = TypeVar("T")
 
 
-class NoResult(DataError):
+class ResultError(DataError):
+    """A result that cannot be used."""
+
+
+class NoResult(ResultError):
     """A file of that name that no levilab wrote."""
 
 
 def read_result(path: Path, model: type[R]) -> R | None:
-    """A result that was written before; None where there is none, or one of another analysis.
+    """Read a result that was written before; None where there is none, or one of another analysis.
 
-    Raises DataError when it is damaged or of another schema.
+    Raises ResultError when it is damaged or of another schema.
     """
     if not path.is_file():
         return None
@@ -253,30 +243,30 @@ def read_result(path: Path, model: type[R]) -> R | None:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise DataError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
+        raise ResultError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
 
 
 def is_of_another(path: Path, analysis: str) -> bool:
-    """Whether a file holds the result of another analysis than this."""
+    """Return whether a file holds the result of another analysis than this."""
     try:
         return path.is_file() and _read(path).get("analysis") != analysis
-    except DataError:
+    except ResultError:
         return False
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """A result as it stands in the file.  Raises NoResult for another program's file, else DataError."""
+    """Read a result as it stands in the file.  Raises NoResult for another program's file, else ResultError."""
     try:
         data = parse_json(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); {_ANEW_OR_AWAY}") from error
+        raise ResultError(f"{path}: cannot be read ({error.strerror}); {_ANEW_OR_AWAY}") from error
     except ValueError as error:
         raise NoResult(f"{path}: is cut off or not JSON ({error}); {_ANEW_OR_AWAY}") from error
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         seen = data.get("schema") if isinstance(data, dict) else type(data).__name__
         ours = isinstance(seen, str) and seen.startswith("levilab-result/")
         text = f"{path}: schema is {repr(seen)[:60]}, expected {SCHEMA!r} of this version; {_ANEW_OR_AWAY}"
-        raise DataError(text) if ours else NoResult(text)
+        raise ResultError(text) if ours else NoResult(text)
     return data
 
 
@@ -294,19 +284,19 @@ class Written:
 
 
 def read_inputs(path: Path) -> Written:
-    """Of what a result is.
+    """Read of which inputs a result is.
 
-    Raises NoResult for another program's file, DataError for damage or an input that is gone.
+    Raises NoResult for another program's file, ResultError for damage or an input that is gone.
     """
     data = _read(path)
     try:
         written = _Head.model_validate(data)
     except ValidationError as error:
-        raise DataError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
+        raise ResultError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
     inputs = tuple(path.parent / run.path for run in written.runs)
     for one in inputs:
         if not one.exists():
-            raise DataError(f"{path}: is of {one}, which is not there: name the run or data file where it lies now")
+            raise ResultError(f"{path}: is of {one}, which is not there: name the run or data file where it lies now")
     return Written(path, written.analysis, inputs)
 
 
@@ -322,7 +312,7 @@ class _Head(Part):
 
 
 def results_in(folder: Path) -> list[Written]:
-    """The results that lie in a folder, by name; files of other programs are passed over.  Raises DataError."""
+    """Read the results that lie in a folder, by name; files of other programs are skipped.  Raises ResultError."""
     found = []
     for file in sorted(folder.glob("*.json")):
         if "result" in file.name.split("."):
@@ -362,16 +352,9 @@ class Earlier(Generic[R]):
         return f"as levilab analyze found it{by}: {self.file}"
 
     def of(self, source: Source[Any]) -> Earlier[R]:
-        """The same of another input of the result."""
+        """Return the same of another input of the result."""
         number = next(k for k, given in enumerate(self.result.inputs) if given.sha256 == source.sha256)
         return replace(self, number=number)
-
-    def restore(self, read: Callable[[], T]) -> T:
-        """What is read from the result.  Raises DataError, which names the file, where that raises ValueError."""
-        try:
-            return read()
-        except ValueError as error:
-            raise DataError(f"{self.file}: {error}: {ANEW}") from error
 
 
 class Archive(Generic[R]):
@@ -388,7 +371,7 @@ class Archive(Generic[R]):
         self._analysis: str = model.model_fields["analysis"].default
         self._read: dict[Path, R | None] = {}
         self._known: dict[Path, dict[str | Path, int]] = {}
-        several = len(paths) > 1 or (paths[0].is_dir() and not (paths[0] / RECORD).exists())
+        several = len(paths) > 1 or any(path.is_dir() and not (path / RECORD).exists() for path in paths)
         self._named = tuple(files)
         self._together = _together(paths).results(self._analysis) if several else ()
         if len(paths) > 1:
@@ -398,7 +381,7 @@ class Archive(Generic[R]):
                 self._read.setdefault(file, None)
 
     def whole(self, sources: Sequence[Source[Any]]) -> Earlier[R] | None:
-        """The result of just these inputs, unchanged."""
+        """Return the result of just these inputs, unchanged."""
         files = beside(sources[0].path).results(self._analysis) if len(sources) == 1 else self._together
         wanted = sorted(source.sha256 for source in sources)
         for file in (*self._named, *files):
@@ -408,7 +391,7 @@ class Archive(Generic[R]):
         return None
 
     def earlier(self, path: Path, data: Path, sha256: str | None = None) -> Earlier[R] | None:
-        """What was found of an input: of the same bytes if there is such a result, else of the same path.
+        """Return the result of an input: of the same bytes if there is such a result, else of the same path.
 
         Args:
             path: the run folder or the data file.
@@ -427,7 +410,7 @@ class Archive(Generic[R]):
         return None
 
     def _files(self, path: Path) -> list[Path]:
-        """Where an input's result may lie."""
+        """Return where the result of an input may lie."""
         own = [*self._named, *self._together, *beside(path).results(self._analysis)]
         above = Place(path.parent).results(self._analysis)
         for file in above:
@@ -436,7 +419,7 @@ class Archive(Generic[R]):
         return [*own, *above]
 
     def _numbers(self, file: Path) -> dict[str | Path, int]:
-        """The inputs of a result by their hash and by their path."""
+        """Return the inputs of a result by their hash and by their path."""
         if file not in self._known:
             result = self._result(file)
             inputs = result.inputs if result else ()
@@ -450,8 +433,8 @@ class Archive(Generic[R]):
         return self._read[file]
 
     def _result_above(self, file: Path) -> R | None:
-        """A file of that name above a run, or beside a data file, may as well be another program's."""
+        """Read a result above a run, or beside a data file; None where it is another program's file."""
         try:
             return self._result(file)
-        except DataError:
+        except ResultError:
             return self._read.setdefault(file, None)

@@ -78,10 +78,12 @@ def value(name: str, unit: str, meaning: str, *, kind: Kind = "number") -> Colum
 
 
 def entry(name: str, kind: Kind, meaning: str, key: str = "") -> Column:
-    """The column of what stands beside the values, by its key, which by default is the name; of a list its length."""
+    """The column of what stands beside the values, by its dotted key, by default the name; of a list its length."""
 
     def read(part: Mapping[str, Any]) -> Any:
-        found = part.get(key or name)
+        found: Any = part
+        for one in (key or name).split("."):
+            found = found.get(one)
         return len(found) if isinstance(found, list | tuple) else found
 
     return Column(name, kind, meaning, read)

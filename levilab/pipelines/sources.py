@@ -55,7 +55,7 @@ class Readings(Protocol):
     def __len__(self) -> int: ...
 
     def same_as(self, other: Self) -> bool:
-        """Whether these are the same readings, written in another way perhaps."""
+        """Return whether these are the same readings, written in another way perhaps."""
 
 
 R = TypeVar("R", bound=Readings)
@@ -72,6 +72,7 @@ class Needs(Generic[R]):
             cannot be used.
         data: the file of a run that the readings come from.
         also: whether a run of any experiment suits.
+        particular: whether it reads files by columns that no other analysis reads, so that such a file is made for it.
         wanted: such runs in words, where the experiment says too little.
     """
 
@@ -81,6 +82,7 @@ class Needs(Generic[R]):
     read_run: Callable[[Run, InputOptions], R]
     data: str = READINGS
     also: Callable[[Run], bool] | None = None
+    particular: bool = False
     wanted: str = ""
 
     @property
@@ -89,7 +91,7 @@ class Needs(Generic[R]):
         return self.wanted or f"{' or '.join(sorted(self.experiments))} run"
 
     def take(self, run: Run) -> bool:
-        """Whether a run suits."""
+        """Return whether a run suits."""
         return run.record.experiment in self.experiments or bool(self.also and self.also(run))
 
 
@@ -131,11 +133,39 @@ class Source(Generic[R]):
 
 
 def mark_of(sources: Sequence[Source[Any]]) -> str:
-    """What a table says before its caption of inputs that its numbers are made of; empty where none is synthetic."""
+    """Return the mark of a table with numbers of these inputs; empty where none is synthetic."""
     made_up = [source.name for source in sources if source.synthetic]
     if not made_up:
         return ""
     return "SYNTHETIC." if len(made_up) == len(sources) else f"SYNTHETIC IN PART ({list_in_words(made_up)})."
+
+
+@dataclass(frozen=True)
+class SkippedRuns:
+    """Runs of an experiment that the analysis is not for."""
+
+    experiment: str
+    count: int
+
+    def __str__(self) -> str:
+        return f"skipped {self.count} {self.experiment} run{'s' * (self.count > 1)}"
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A run or a file that is not taken.
+
+    reason: why, with its path.
+    """
+
+    reason: str
+
+    def __str__(self) -> str:
+        return f"skipped {self.reason}"
+
+
+#: What lies in a folder and is no input, without a cause for a warning.
+Remark = SkippedRuns | Skipped
 
 
 @dataclass(frozen=True)
@@ -148,36 +178,40 @@ class Found(Generic[R]):
     """
 
     sources: tuple[Source[R], ...]
-    warnings: tuple[str, ...]
-    remarks: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
 
 
 # --- finding the inputs --------------------------------------------------------------------------------
 
 
 def collect(paths: Sequence[Path], needs: Needs[R], options: Callable[[Path], InputOptions]) -> Found[R]:
-    """What lies at the paths that suits an analysis, the same data once, and what was passed over.
+    """Find the inputs at the paths that suit an analysis, the same data once.
 
     A run folder or a file is taken, or refused with a reason; a folder is searched for runs and data files, and what
-    does not suit there is passed over.  Raises DataError.
+    does not suit there is skipped.  Raises DataError.
 
     Args:
         paths: run folders, data files, folders to search.
         needs: of the analysis.
         options: how an input is read.
     """
-    found: list[Source[R]] = []
-    warnings: list[str] = []
-    remarks: list[str] = []
-    for path in paths:
-        if path.is_dir() and not (path / RECORD).exists():
-            here = _search(path, needs, options)
-            found += here.sources
-            warnings += here.warnings
-            remarks += here.remarks
-        else:
-            found.append(_one(path, needs, options(path)))
-    return Found(_with_short_names(_without_copies(found, warnings)), tuple(warnings), tuple(remarks))
+    return join([find(path, needs, options) for path in paths])
+
+
+def find(path: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) -> Found[R]:
+    """Find the inputs at one path; see `collect`."""
+    if path.is_dir() and not (path / RECORD).exists():
+        return _search(path, needs, options)
+    return Found((_one(path, needs, options(path)),))
+
+
+def join(found: Sequence[Found[R]]) -> Found[R]:
+    """Join what was found at several paths, the same data once, with short names."""
+    warnings = [text for one in found for text in one.warnings]
+    sources = _without_copies([source for one in found for source in one.sources], warnings)
+    remarks = tuple(remark for one in found for remark in one.remarks)
+    return Found(_with_short_names(sources), tuple(warnings), remarks)
 
 
 #: Logarithms of fingerprints that are alike differ by less: those of the same readings are in neighbouring cells.
@@ -185,7 +219,7 @@ _CELL = 1e-8
 
 
 def _without_copies(found: Sequence[Source[R]], warnings: list[str]) -> list[Source[R]]:
-    """Copies of the same readings are no runs of their own: they would pass for agreement."""
+    """Leave out copies of the same readings: they would pass for agreement."""
     kept: list[Source[R]] = []
     cells: dict[tuple[int, int], list[Source[R]]] = {}  # of thousands not each is compared with each
     for source in found:
@@ -202,7 +236,7 @@ def _without_copies(found: Sequence[Source[R]], warnings: list[str]) -> list[Sou
 
 
 def _with_short_names(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
-    """Names that differ: the last part of the path, or as many more as it takes."""
+    """Give the sources names that differ: the last part of the path, or more of it."""
     for parts in range(1, 10):
         names = ["/".join(source.path.resolve().parts[-parts:]) for source in sources]
         if max(Counter(names).values(), default=1) == 1:
@@ -211,7 +245,7 @@ def _with_short_names(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
 
 
 def no_such_path(path: Path) -> DataError:
-    """What to say of a path that does not exist: a name beside it that is nearly the same, or where it was sought."""
+    """Return the error for a path that does not exist, with a name beside it that is nearly the same."""
     folder = next(place for place in (path.parent, *path.parent.parents) if place.is_dir())
     wanted = path.relative_to(folder).parts[0] if folder != path.parent else path.name
     near = difflib.get_close_matches(wanted, sorted(one.name for one in folder.iterdir()), n=1, cutoff=0.8)
@@ -252,7 +286,7 @@ def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
 
 
 def sha256_of(path: Path) -> str:
-    """The hash of a file.  Raises DataError."""
+    """Return the hash of a file.  Raises DataError."""
     if path.exists() and not path.is_file():  # reading from a pipe would wait for ever
         raise DataError(f"{path}: is a folder, a pipe or a device; a file is expected")
     try:
@@ -263,50 +297,50 @@ def sha256_of(path: Path) -> str:
 
 
 def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) -> Found[R]:
-    """The runs and data files below a folder that suit; what is broken or too short is passed over with a warning."""
+    """Find the runs and data files below a folder that suit; a broken or too short one is skipped with a warning."""
     found: list[Source[R]] = []
-    broken: list[str] = []
-    remarks: list[str] = []
+    broken: list[Skipped] = []
+    remarks: list[Remark] = []
     others: Counter[str] = Counter()
     for folder in find_runs(root):
         chosen = options(folder)
         try:
             run = Run.load(folder)
             if goes_on := run.continued_in:
-                remarks.append(f"passed over: {folder} was broken off, its run goes on in {goes_on.name}")
+                remarks.append(Skipped(f"{folder}, which was broken off: its run goes on in {goes_on.name}"))
             elif needs.take(run):
                 found.append(_of_run(run, needs, chosen))
             else:
                 others[run.record.experiment] += 1
         except DataError as error:
-            broken.append(f"passed over: {error}")
+            broken.append(Skipped(str(error)))
     files = data_files(root)
     for file in files:
         chosen = replace(options(file), guess=False)
-        with _passing_over(broken, remarks):
+        with _skipping(broken, remarks):
             found.append(_of_file(file, needs, chosen))
+    kinds = [SkippedRuns(kind, count) for kind, count in sorted(others.items())]
     if not found:
-        text = f"{root}: {_nothing_found(needs, others, broken, [file.name for file in files])}"
-        raise NoneUsable(text, tuple(broken)) if broken else DoesNotSuit(text)
-    kinds = [f"passed over: {count} {kind} run{'s' * (count > 1)}" for kind, count in sorted(others.items())]
-    return Found(tuple(found), tuple(broken), (*kinds, *remarks))
+        text = f"{root}: {_nothing_found(needs, kinds, broken, [file.name for file in files])}"
+        raise NoneUsable(text, tuple(map(str, broken))) if broken else DoesNotSuit(text)
+    return Found(tuple(found), tuple(map(str, broken)), (*kinds, *remarks))
 
 
 @contextmanager
-def _passing_over(broken: list[str], remarks: list[str]) -> Iterator[None]:
+def _skipping(broken: list[Skipped], remarks: list[Remark]) -> Iterator[None]:
     """Note what is wrong with a data file that was found in a folder; one of another kind is of no concern."""
     try:
         yield
     except NoRate as error:
-        remarks.append(f"passed over: {error}")
+        remarks.append(Skipped(str(error)))
     except DoesNotSuit:
         return
     except DataError as error:
-        broken.append(f"passed over: {error}")
+        broken.append(Skipped(str(error)))
 
 
 def data_files(root: Path) -> list[Path]:
-    """The files at or below a folder that may hold data, by name; those of runs belong to their runs."""
+    """Find the files at or below a folder that may hold data, by name; those of runs belong to their runs."""
     found, seen = [], set()
     for folder, below, files in os.walk(root, followlinks=True):
         real = os.path.realpath(folder)
@@ -318,9 +352,9 @@ def data_files(root: Path) -> list[Path]:
     return sorted(found)
 
 
-def _nothing_found(needs: Needs[Any], others: Counter[str], broken: list[str], files: list[str]) -> str:
-    seen = [f"{count} {kind} run{'s' * (count > 1)}" for kind, count in sorted(others.items())]
-    seen += [f"{len(broken)} that cannot be used, as {broken[0].removeprefix('passed over: ')}"] if broken else []
+def _nothing_found(needs: Needs[Any], others: list[SkippedRuns], broken: list[Skipped], files: list[str]) -> str:
+    seen = [f"{one.count} {one.experiment} run{'s' * (one.count > 1)}" for one in others]
+    seen += [f"{len(broken)} that cannot be used, as {broken[0].reason}"] if broken else []
     seen += [f"{len(files)} data file{'s' * (len(files) > 1)}, as {files[0]}"] if files else []
     if not seen:
         return "holds no run and no data file; name a run folder, a data file, or a folder with some of them"

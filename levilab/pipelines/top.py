@@ -46,7 +46,7 @@ class Calculated:
 
 
 def calculate_top(path: Path) -> Calculated:
-    """The top that a device file describes by its parts.  Raises DataError."""
+    """Calculate the top that a device file describes by its parts.  Raises DataError."""
     parts = tuple(parts_of(read_device(path).top))
     if not parts:
         raise DataError(
@@ -59,7 +59,7 @@ def calculate_top(path: Path) -> Calculated:
 
 
 def top_table(found: Calculated) -> Table:
-    """The parts, each about the centre of mass of itself, and the whole."""
+    """Return a table of the parts, each about its own centre of mass, and of the whole."""
     rows = [Row((part.name, *_cells(alone))) for part, alone in zip(found.parts, found.alone, strict=True)]
     rows.append(Row(("the top", *_cells(found.top)), "together"))
     heads = ("part", "mass", "I₁, across", "I₃, about the axis", "centre")
@@ -77,7 +77,7 @@ def _in(estimate: Estimate, factor: float, unit: str) -> Estimate:
 
 
 def top_text(found: Calculated) -> str:
-    """What to mind, and how a scene takes the top."""
+    """Return what to mind, and how a scene takes the top."""
     top = found.top
     ratio = (top.axial.value or 0.0) / (top.transverse.value or 1.0)
     kind = "flat, as a Levitron's" if ratio > 1 else "long: a Levitron's is flat, with I₃ > I₁"
@@ -91,7 +91,7 @@ def top_text(found: Calculated) -> str:
 
 
 def top_document(found: Calculated) -> dict[str, Any]:
-    """The same in SI; covariance: of mass, inertia_transverse and inertia_axial."""
+    """Return the same in SI; covariance: of mass, inertia_transverse and inertia_axial."""
 
     def values(estimates: dict[str, Estimate]) -> dict[str, Any]:
         return {name: {"value": one.value, "u": one.u, "unit": one.unit} for name, one in estimates.items()}

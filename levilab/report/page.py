@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DoesNotSuit, NoneUsable, UsageError
 from levilab.files import check_writable, replace_atomically, writing
-from levilab.pipelines.catalogue import recall_suiting, remarks
-from levilab.pipelines.document import NO_RESULT
-from levilab.pipelines.sources import data_files
+from levilab.pipelines.sources import SkippedRuns, data_files
+from levilab.pipelines.suits import recall_suiting, remarks
 from levilab.present.numbers import list_in_words
 from levilab.report.document import document_of, notebook_blocks
 from levilab.report.html.page import fragment_of, page_of
@@ -176,10 +175,10 @@ def _values(results: Results, others: Found, folder: Path) -> Iterator[Values]:
 
 def _remarks(results: Results, others: Found) -> Iterator[str]:
     """What lies there and is not in the report, and what has no result."""
-    in_it = tuple(f" {kind.experiment} run" for kind, _ in others if kind.experiment)
+    reported = {kind.experiment for kind, _ in others}
     for remark in remarks([found.remarks for _, found in results]):
-        if not remark.removesuffix("s").endswith(in_it or ("\0",)):
-            yield remark
+        if not (isinstance(remark, SkippedRuns) and remark.experiment in reported):
+            yield str(remark)
     yield from _without_result(results)
 
 
@@ -189,7 +188,7 @@ def _without_result(results: Results) -> Iterator[str]:
         source.name: None
         for _, found in results
         for source, origin in zip(found.sources, found.origins, strict=True)
-        if origin.text.endswith(NO_RESULT)
+        if origin.lacks_result
     }
     if lacking:
         yield (

@@ -101,7 +101,7 @@ class RunWriter:
                 replace_atomically(writer.folder / RECORD, record.as_json())
                 sync_folder(out)
             except BaseException:
-                writer._close()
+                writer.discard()
                 raise
         return writer
 

@@ -46,6 +46,18 @@ class SceneError(LevilabError):
     """A scene that cannot be simulated as it is described."""
 
 
+class UnknownKey(SceneError):
+    """A key that a scene lacks.
+
+    Attributes:
+        problem: the text without the setting.
+    """
+
+    def __init__(self, given: str, problem: str) -> None:
+        self.problem = problem
+        super().__init__(f"{given}: {problem}")
+
+
 class UnknownScene(SceneError, RequestError):
     """A name that none of the scenes has that come with levilab."""
 
@@ -90,7 +102,8 @@ def set_key(table: Table, key: str, value: Any) -> None:
         value: a number, string or list; a table changes the keys that it holds and leaves the others.
 
     Raises:
-        SceneError: there is no such key, or it is a table and the value is none.
+        UnknownKey: there is no such key.
+        SceneError: it is a table and the value is none.
     """
     given = f"{key} = {short_text(value)}"
     *way, last = key.split(".")
@@ -123,7 +136,7 @@ def _step(table: Table, at: Any, way: list[str], given: str) -> str | int:
     if isinstance(at, dict) and part in at:
         return part
     if isinstance(at, dict):
-        raise SceneError(f"{given}: {_unknown_key(table, at, way)}")
+        raise UnknownKey(given, _unknown_key(table, at, way))
     if not isinstance(at, list):
         raise SceneError(f"{given}: {'.'.join(before)} = {short_text(at)} has no parts, give it as a whole")
     if not (part.isdecimal() and int(part) < len(at)):

@@ -12,7 +12,7 @@ from levilab.errors import SimulationError, UsageError
 from levilab.formats.dialect import Dialect
 from levilab.settings import hint_about
 from levilab.simulator.equilibrium import HEAVIEST_KG
-from levilab.simulator.keys import SceneError, short_text
+from levilab.simulator.keys import SceneError, UnknownKey, short_text
 from levilab.simulator.scene import SWITCHES
 from levilab.simulator.start import start_of
 from levilab.simulator.varied import broadcast
@@ -217,9 +217,10 @@ def _value_of(scene: Scene, axis: Axis, name: str) -> Any:
     """Return the scene's own value of an axis's key.  Raises UsageError where it has none."""
     try:
         scene.changed({axis.key: _plain(axis.values[0])})
-    except SceneError as error:
-        if "there is no key" in str(error):
-            raise UsageError(name, str(error).partition(": ")[2], value=axis.key) from error
+    except UnknownKey as error:
+        raise UsageError(name, error.problem, value=axis.key) from error
+    except SceneError:
+        pass  # of the value, which is looked at below
     at: Any = scene.as_table()
     for part in axis.key.split("."):
         if isinstance(at, dict) and part in at:

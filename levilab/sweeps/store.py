@@ -89,14 +89,19 @@ class Store:
 
         if path is None:
             return cls._in(zarr.storage.MemoryStore(), None, plan, begin)
+        taken = f"{path} is there already: give another place with `out`, or go on with it by `resume`"
         if path.exists():
-            raise CannotWrite(f"{path} is there already: give another place with `out`, or go on with it by `resume`")
+            raise CannotWrite(taken)
         part = path.with_name(f".{path.name}.{os.getpid()}.part")
         with writing(f"{path} cannot be made"):
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 cls._in(str(part), part, plan, begin)
-                move(part, path)  # refused where another process was quicker
+                move(part, path)
+            except OSError as error:
+                if path.exists():  # another process was quicker
+                    raise CannotWrite(taken) from error
+                raise
             finally:
                 shutil.rmtree(part, ignore_errors=True)
             sync_folder(path.parent)

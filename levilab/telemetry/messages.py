@@ -1,45 +1,43 @@
 """The messages of a bench to its views, and their bytes.
 
-A message is one of three dataclasses.  Its bytes are, in this order:
-
-====================  ==================================================================================
-4 bytes               length of the head, unsigned, little-endian
-the head              JSON in UTF-8: ``kind`` (``state``, ``record``, ``poses``), the fields that are no arrays, by
-                      their names, and ``rows``, the length of the arrays
-the arrays            in the order of the fields, little-endian, row by row; their types stand in `_ARRAYS`
-====================  ==================================================================================
-
-`State` has no arrays.  Numbers in the head are finite; a value that is not known has no key in `State.last`.
+A message is one of three dataclasses.  Its bytes are those of a document (`levilab.telemetry.codec`) with its fields
+and its ``kind``: ``state``, ``record`` or ``poses``.  A value that is not known has no key in `State.last`.
 """
 
 from __future__ import annotations
 
-import json
-import struct
-from dataclasses import asdict, dataclass, field, fields
-from typing import TYPE_CHECKING, Any, ClassVar
+from dataclasses import asdict, dataclass, field, replace
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from numpy.typing import NDArray  # noqa: TC002 - pydantic reads the annotations
+from pydantic import ConfigDict, PlainValidator, TypeAdapter
 
-from levilab.files import finite, parse_json
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from levilab.telemetry.codec import MalformedMessage, pack, unpack
 
 #: Poses in a second of bench time: between two of them a top that spins at 30 Hz turns by 27°.
 POSES_PER_S = 400.0
 #: Most points of a record that are sent: half of them are lows, half highs.
 MOST_POINTS = 2000
-#: Longest array that is read.
-_MOST_ROWS = 100_000
 
 #: How what comes is read: a key that is not known is of a later version.  What is sent is not checked.
 _READ = ConfigDict(extra="ignore", allow_inf_nan=False)
 
 
-class MalformedMessage(ValueError):
-    """Bytes that are no message."""
+def _must_be(kind: type[np.generic], *width: int) -> PlainValidator:
+    """Return a check that a value is an array of a kind with rows of a width."""
+
+    def check(value: Any) -> Any:
+        if not isinstance(value, np.ndarray) or value.dtype != kind or value.ndim < 1 or value.shape[1:] != width:
+            raise ValueError(f"an array of {kind.__name__} is expected, with rows of {width}")
+        return value
+
+    return PlainValidator(check)
+
+
+def _same_length(*arrays: NDArray[Any]) -> None:
+    if len({len(one) for one in arrays}) > 1:
+        raise ValueError("arrays of one length are expected")
 
 
 @dataclass(frozen=True)
@@ -146,13 +144,18 @@ class Record:
         high: shape (n,), float32 [V].
     """
 
+    __pydantic_config__: ClassVar[ConfigDict] = _READ
+
     number: int
     channel: str
     time_s: float
     start_s: float
     step_s: float
-    low: NDArray[np.float32]
-    high: NDArray[np.float32]
+    low: Annotated[NDArray[np.float32], _must_be(np.float32)]
+    high: Annotated[NDArray[np.float32], _must_be(np.float32)]
+
+    def __post_init__(self) -> None:
+        _same_length(self.low, self.high)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,93 +170,39 @@ class Poses:
         up: whether a top floats; where none does, position and quaternion are those of rest; shape (n,), bool.
     """
 
+    __pydantic_config__: ClassVar[ConfigDict] = _READ
+
     start_s: float
     step_s: float
-    position: NDArray[np.float32]
-    quaternion: NDArray[np.float32]
-    up: NDArray[np.bool_]
+    position: Annotated[NDArray[np.float32], _must_be(np.float32, 3)]
+    quaternion: Annotated[NDArray[np.float32], _must_be(np.float32, 4)]
+    up: Annotated[NDArray[np.bool_], _must_be(np.bool_)]
+
+    def __post_init__(self) -> None:
+        _same_length(self.position, self.quaternion, self.up)
 
 
 Message = State | Record | Poses
 
-_KINDS: dict[str, type[State | Record | Poses]] = {"state": State, "record": Record, "poses": Poses}
-_NAMES = {kind: name for name, kind in _KINDS.items()}
-#: Kind → array → its type on the wire, and how many of it stand in a row.
-_ARRAYS: dict[str, dict[str, tuple[str, int]]] = {
-    "state": {},
-    "record": {"low": ("<f4", 1), "high": ("<f4", 1)},
-    "poses": {"position": ("<f4", 3), "quaternion": ("<f4", 4), "up": ("|b1", 1)},
+_READERS: dict[str, TypeAdapter[Message]] = {
+    kind: TypeAdapter(one) for kind, one in {"state": State, "record": Record, "poses": Poses}.items()
 }
-
-
-@dataclass(frozen=True)
-class _RecordHead:
-    __pydantic_config__: ClassVar[ConfigDict] = _READ
-
-    number: int
-    channel: str
-    time_s: float
-    start_s: float
-    step_s: float
-
-
-@dataclass(frozen=True)
-class _PosesHead:
-    __pydantic_config__: ClassVar[ConfigDict] = _READ
-
-    start_s: float
-    step_s: float
-
-
-_HEADS: dict[str, TypeAdapter[Any]] = {
-    "state": TypeAdapter(State),
-    "record": TypeAdapter(_RecordHead),
-    "poses": TypeAdapter(_PosesHead),
-}
-_LENGTH = struct.Struct("<I")
+_KINDS = {State: "state", Record: "record", Poses: "poses"}
 
 
 def encode(message: Message) -> bytes:
     """Return the bytes of a message."""
-    name = _NAMES[type(message)]
-    arrays = _ARRAYS[name]
     if isinstance(message, State):
-        head = finite(asdict(message))
-        head["last"] = {key: value for key, value in head["last"].items() if value is not None}
-        rows = 0
+        fields = asdict(replace(message, last={name: one for name, one in message.last.items() if np.isfinite(one)}))
     else:
-        head = finite({one.name: getattr(message, one.name) for one in fields(message) if one.name not in arrays})
-        rows = len(getattr(message, next(iter(arrays))))
-    text = json.dumps({"kind": name, "rows": rows} | head, allow_nan=False, separators=(",", ":")).encode()
-    parts = [np.ascontiguousarray(getattr(message, key), dtype=kind).tobytes() for key, (kind, _) in arrays.items()]
-    return b"".join([_LENGTH.pack(len(text)), text, *parts])
+        fields = vars(message)
+    return pack({"kind": _KINDS[type(message)]} | fields)
 
 
 def decode(data: bytes) -> Message:
     """Return the message that the bytes are of.  Raises MalformedMessage."""
+    head = unpack(data)
     try:
-        (length,) = _LENGTH.unpack_from(data)
-        head = parse_json(data[_LENGTH.size : _LENGTH.size + length].decode())
-        name, rows = head["kind"], head["rows"]
-        values = _HEADS[name].validate_python(head)
-    except (struct.error, ValueError, KeyError, TypeError, ValidationError) as error:
+        return _READERS[head["kind"]].validate_python(head)
+    except (KeyError, TypeError, ValueError) as error:
         raise MalformedMessage(f"no message: {error}") from error
-    if type(rows) is not int or not 0 <= rows <= _MOST_ROWS:
-        raise MalformedMessage(f"rows = {rows!r}: a whole number up to {_MOST_ROWS} is expected")
-    if isinstance(values, State):
-        return values
-    return _KINDS[name](**vars(values), **_arrays(name, rows, data[_LENGTH.size + length :]))
-
-
-def _arrays(name: str, rows: int, data: bytes) -> dict[str, Any]:
-    sizes = {key: rows * width * np.dtype(kind).itemsize for key, (kind, width) in _ARRAYS[name].items()}
-    if sum(sizes.values()) != len(data):
-        raise MalformedMessage(f"{len(data)} bytes of arrays, {sum(sizes.values())} are expected")
-    found: dict[str, Any] = {}
-    begin = 0
-    for key, (kind, width) in _ARRAYS[name].items():
-        part = data[begin : begin + sizes[key]]
-        array = np.frombuffer(part, np.uint8) != 0 if kind == "|b1" else np.frombuffer(part, kind)
-        found[key] = array.reshape(rows, width) if width > 1 else array
-        begin += sizes[key]
-    return found

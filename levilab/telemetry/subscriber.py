@@ -8,8 +8,9 @@ import time
 from typing import TYPE_CHECKING, Self
 
 from levilab.telemetry.address import LOOPBACK
+from levilab.telemetry.codec import MalformedMessage
 from levilab.telemetry.datagrams import DATAGRAM_BYTES, Joiner, wish
-from levilab.telemetry.messages import MalformedMessage, decode
+from levilab.telemetry.messages import decode
 
 if TYPE_CHECKING:
     from collections.abc import Callable

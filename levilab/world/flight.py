@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +23,15 @@ if TYPE_CHECKING:
     from levilab.simulator.trajectory import Trajectory
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 #: The motion is simulated in pieces of this length [s], to this error of place [m] and axis [rad] at the end of each,
 #: with so many states per second: between two of them a tape turns evenly to 1e-4 of a turn.
 PIECE_S, TOLERANCE, RATE = 1.0, 1e-7, 400.0
 
-#: Pieces whose states are remembered for a view.
+#: Pieces whose samples are kept, 15 kB each: of the 600 s that an oscilloscope looks back, and more.
+SAMPLED = 700
+#: Pieces whose states are kept, for a view.
 _REMEMBERED = 4
 
 #: In so short a time [s] no motion is to be simulated.
@@ -39,14 +42,33 @@ _AT_ONCE = 1e-9
 _NEGLIGIBLE_TILT = 1e-17
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Flying:
-    """A piece of motion.
+    """A piece of motion, from which its samples can be simulated again.
 
     Attributes:
         scene: with the drive.
         state: at the start, shape (18,).
         step: of the integration [s].
+        slip: turns of loose washers relative to the top at the start.
+    """
+
+    scene: Scene
+    state: Array
+    step: float
+    slip: float
+
+    @property
+    def start(self) -> float:
+        """Its time [s]."""
+        return float(self.state[TIME])
+
+
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """The motion in a piece, as instruments see it.
+
+    Attributes:
         times: of the samples, shape (n,) [s].
         turns: of the tape at these times, shape (n,).
         slips: turns of loose washers relative to the top, shape (n,); the tape is on them, so `turns` contain these.
@@ -54,9 +76,6 @@ class _Flying:
         lift: height above the base of the rim's point towards x [m], shape (n,).
     """
 
-    scene: Scene
-    state: Array
-    step: float
     times: Array
     turns: Array
     slips: Array
@@ -64,9 +83,15 @@ class _Flying:
     lift: NDArray[np.float32]
 
     @property
-    def start(self) -> float:
-        """Its time [s]."""
-        return float(self.state[TIME])
+    def counted(self) -> tuple[Array, float]:
+        """Turns that increase, and their mean rate [Hz]; wobble and drag change it by some per cent within the piece.
+
+        The light has no sense: a top that spins backwards shows the pulses of its mirror image.
+        """
+        if self.times.size < 2:
+            return self.turns, 1.0
+        rate = float((self.turns[-1] - self.turns[0]) / (self.times[-1] - self.times[0]))
+        return self.turns * math.copysign(1.0, rate), abs(rate)
 
 
 @dataclass(frozen=True)
@@ -102,7 +127,8 @@ class Flight:
         self._state: Array | None = self._start_state(0.0)
         self._known_until = 0.0
         self._slip = 0.0  # of the washers then [turns]
-        self._looked_at: dict[float, tuple[_Flying, Array, Array]] = {}  # by the start of a piece
+        self._samples: dict[_Flying, _Samples] = {}  # of the latest pieces
+        self._states: dict[_Flying, tuple[Array, Array]] = {}  # of those that a view has looked at
 
     def prepare(self) -> None:
         """Compile the simulator's code, or load it from the disk, for any drive that may come."""
@@ -126,12 +152,14 @@ class Flight:
         now = self._pieces.at(time)
         if isinstance(now, _Flying):
             self._pieces.cut(time)
-            self._slip = float(np.interp(time, now.times, now.slips))
+            samples = self._samples_of(now)
+            self._slip = float(np.interp(time, samples.times, samples.slips))
             self._state, self._known_until = _state_within(now, time), time
         else:
             self._pieces.cut(math.nextafter(time, math.inf))
             self._wait(now.start)
-        self._scene = self._scene.changed({f"drive.{key}": value for key, value in drive.items()})
+        changed = self._scene.changed({f"drive.{key}": value for key, value in drive.items()})
+        self._scene = self._scene.model_copy(update={"drive": changed.drive})  # the pieces share all else
 
     def put_back(self, time: float) -> None:
         """Start the top again at this time, as the scene says, if it has fallen."""
@@ -163,7 +191,8 @@ class Flight:
         turns, up = np.zeros_like(times), np.zeros(times.shape, dtype=np.bool_)
         for piece, part in self._pieces.pieces(times):
             if isinstance(piece, _Flying):
-                turns[part], up[part] = np.interp(times[part], piece.times, piece.turns), True
+                samples = self._samples_of(piece)
+                turns[part], up[part] = np.interp(times[part], samples.times, samples.turns), True
         return turns, up
 
     def tape(self, times: Array) -> tuple[Array, Array, Array]:
@@ -180,16 +209,19 @@ class Flight:
         turns, rate, lift = np.zeros_like(times), np.zeros_like(times), np.zeros_like(times)
         for piece, part in self._pieces.pieces(times):
             if isinstance(piece, _Flying):
-                counted, rate[part] = _counted(piece)
-                turns[part] = np.interp(times[part], piece.times, counted)
-                lift[part] = np.interp(times[part], piece.times, piece.lift)
+                samples = self._samples_of(piece)
+                counted, rate[part] = samples.counted
+                turns[part] = np.interp(times[part], samples.times, counted)
+                lift[part] = np.interp(times[part], samples.times, samples.lift)
         return turns, rate, lift
 
     def first_lift(self) -> float:
         """Return the mean height of the rim over the first second [m], in which a top bobs at least once."""
         self.simulate_until(0.0)
         piece = self._pieces.at(0.0)
-        return float(piece.lift.mean()) if isinstance(piece, _Flying) else self._scene.start.position_m[2]
+        if isinstance(piece, _Flying):
+            return float(self._samples_of(piece).lift.mean())
+        return self._scene.start.position_m[2]
 
     def passages(self, place: Callable[[float], float], start: float, stop: float) -> Array:
         """Return when the tape passes a place in its turn, increasing, shape (n,) [s].
@@ -202,12 +234,12 @@ class Flight:
         self.simulate_until(stop)
         found = [np.empty(0)]
         for piece, end in self._pieces.between(start, stop):
-            if isinstance(piece, _Flying) and piece.times.size > 1:
-                turns, rate = _counted(piece)
+            if isinstance(piece, _Flying) and (samples := self._samples_of(piece)).times.size > 1:
+                turns, rate = samples.counted
                 at = place(rate)
                 whole = np.arange(math.floor(turns[0]) - 1, math.ceil(turns[-1]) + 1) + at
                 whole = whole[(whole >= turns[0]) & (whole < turns[-1])]
-                times = np.interp(whole, turns, piece.times)
+                times = np.interp(whole, turns, samples.times)
                 found.append(times[(times >= start) & (times < min(stop, end))])
         return np.concatenate(found)
 
@@ -224,7 +256,8 @@ class Flight:
         place, up = np.zeros_like(times), np.zeros(times.shape, dtype=np.bool_)
         for piece, part in self._pieces.pieces(times):
             if isinstance(piece, _Flying):
-                place[part], up[part] = _cubic(times[part], piece.times, *piece.stem), True
+                samples = self._samples_of(piece)
+                place[part], up[part] = _cubic(times[part], samples.times, *samples.stem), True
         return place, up
 
     def attitude(self, times: Array) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
@@ -249,17 +282,23 @@ class Flight:
         return place, axis, arm, up
 
     def _states_of(self, piece: _Flying) -> tuple[Array, Array]:
-        """Return times and states of a piece; those of the last pieces are remembered."""
-        if piece.start not in self._looked_at:
-            while len(self._looked_at) >= _REMEMBERED:
-                del self._looked_at[next(iter(self._looked_at))]
-            motion = simulate(piece.scene, PIECE_S, step=piece.step, tolerance=TOLERANCE, rate=RATE, start=piece.state)
-            self._looked_at[piece.start] = piece, motion.time.copy(), motion.states.copy()
-        known, time, states = self._looked_at[piece.start]
-        if known is not piece:  # the drive was changed at the very start of the piece
-            del self._looked_at[piece.start]
-            return self._states_of(piece)
-        return time, states
+        """Return times and states of a piece; those of the last pieces are kept."""
+        if piece not in self._states:
+            motion = _simulate_again(piece)
+            _keep(self._states, piece, (motion.time.copy(), motion.states.copy()), _REMEMBERED)
+        return self._states[piece]
+
+    def _samples_of(self, piece: _Flying) -> _Samples:
+        """Return the samples of a piece; those of the last SAMPLED pieces are kept."""
+        if piece not in self._samples:
+            _keep(self._samples, piece, self._sample(_simulate_again(piece), piece.slip), SAMPLED)
+        return self._samples[piece]
+
+    def _sample(self, motion: Trajectory, slip: float) -> _Samples:
+        slips = slip + _slips(motion)
+        return _Samples(
+            motion.time.copy(), _turns(motion) + slips, slips, _stem(motion, self._stem_height), _lift(motion)
+        )
 
     # --- the simulation ---
 
@@ -285,11 +324,11 @@ class Flight:
         except LeftRange:  # it has hit the base, where the field is infinite
             self._fall(begin)
             return
-        # a bench may run for hours, so only the first of the states is kept
-        slips = self._slip + _slips(motion)
-        self._slip = float(slips[-1])
-        samples = (motion.time.copy(), _turns(motion) + slips, slips, _stem(motion, self._stem_height), _lift(motion))
-        self._pieces.append(begin, _Flying(self._scene, state, motion.accuracy.step, *samples))
+        # a bench may run for hours: of all pieces only the first state is kept
+        piece, samples = _Flying(self._scene, state, motion.accuracy.step, self._slip), self._sample(motion, self._slip)
+        self._slip = float(samples.slips[-1])
+        self._pieces.append(begin, piece)
+        _keep(self._samples, piece, samples, SAMPLED)
         if motion.fell is not None:
             self._fall(motion.fell.time)
         else:
@@ -316,6 +355,17 @@ class Flight:
             None,
             math.inf if self._put_back_after_s is None else fallen + self._put_back_after_s,
         )
+
+
+def _simulate_again(piece: _Flying) -> Trajectory:
+    return simulate(piece.scene, PIECE_S, step=piece.step, tolerance=TOLERANCE, rate=RATE, start=piece.state)
+
+
+def _keep(kept: dict[_Flying, T], piece: _Flying, value: T, most: int) -> None:
+    """Keep a value; of more than `most` the oldest go."""
+    while len(kept) >= most:
+        del kept[next(iter(kept))]
+    kept[piece] = value
 
 
 def _state_within(piece: _Flying, time: float) -> Array:
@@ -346,18 +396,6 @@ def _turns(motion: Trajectory) -> Array:
     arm, place = motion.states[:, ARM], motion.position
     spot = np.arctan2(-place[:, 1], motion.scene.top.magnet_radius_m - place[:, 0])
     return np.asarray(np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]) - spot) / (2 * np.pi))
-
-
-def _counted(piece: _Flying) -> tuple[Array, float]:
-    """Return turns that increase, and their mean rate [Hz].
-
-    Wobble and drag change the rate by some per cent within the piece.  The light has no sense: a top that spins
-    backwards shows the pulses of its mirror image.
-    """
-    if piece.times.size < 2:
-        return piece.turns, 1.0
-    rate = float((piece.turns[-1] - piece.turns[0]) / (piece.times[-1] - piece.times[0]))
-    return piece.turns * math.copysign(1.0, rate), abs(rate)
 
 
 def _lift(motion: Trajectory) -> NDArray[np.float32]:

@@ -12,9 +12,12 @@ from building.docstrings import as_markup
 from building.outside_pages import lead_to_site
 from building.requests import loaded_from_elsewhere
 from levilab.cli.main import app
+from support.paths import DOCS
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from playwright.sync_api import Page
 
 
 def test_the_page_of_commands_has_each_command_with_its_options() -> None:
@@ -26,7 +29,7 @@ def test_the_page_of_commands_has_each_command_with_its_options() -> None:
 
 
 @pytest.mark.parametrize(("page", "written", "led"), [
-    ("first-steps", "[a](../README.md)", "[a](index.md)"),
+    ("tutorial", "[a](../README.md)", "[a](index.md)"),
     ("experiments/field", "[a](../../sample_data/README.md#x)", "[a](../sample-data.md#x)"),
     ("data", "[a](../sample_data/device.toml)", "[a](../sample_data/device.toml)"),
     ("data", "[a](speed.md#b)", "[a](speed.md#b)"),
@@ -64,3 +67,11 @@ def test_a_font_from_elsewhere_in_a_style_sheet_is_found(tmp_path: Path) -> None
         '@import "https://fonts.example/a.css"; b { background: url(a.png) }', encoding="utf-8"
     )
     assert loaded_from_elsewhere(tmp_path) == [("a.css", "https://fonts.example/a.css")]
+
+
+def test_the_search_ranks_pages_of_users_before_those_of_developers(page: Page) -> None:
+    page.add_script_tag(path=DOCS / "building" / "scorer.js")
+    names = ["decisions/0014-records", "reference/python", "pulses", "data"]
+    scores = page.evaluate("names => names.map(name => Scorer.score([name, '', '', '', 10, '']))", names)
+    assert scores == sorted(scores)
+    assert scores[0] < scores[-1]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+import subprocess
+import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,3 +36,16 @@ def test_a_file_that_was_written_or_replaced_has_another_stamp(tmp_path: Path) -
 def test_what_is_not_json_is_said_by_its_place_alone() -> None:
     with pytest.raises(ValueError, match=r"^from line 2, column 1 on$"):
         parse_json("{\nx}")
+
+
+def test_a_write_takes_the_part_away_that_a_killed_process_left(tmp_path: Path) -> None:
+    killed = subprocess.Popen([sys.executable, "-c", ""])
+    killed.wait()
+    left, of_a_live_process, of_another_file = (
+        tmp_path / name for name in (f".t.csv.{killed.pid}.part", f".t.csv.{os.getppid()}.part", ".u.csv.1.part")
+    )
+    for part in (left, of_a_live_process, of_another_file):
+        part.touch()
+    replace_atomically(tmp_path / "t.csv", "a")
+    kept = {tmp_path / "t.csv", of_another_file} | ({of_a_live_process} if os.name == "posix" else set())
+    assert {*tmp_path.iterdir()} == kept

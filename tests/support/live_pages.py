@@ -11,7 +11,8 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from levilab.live.doors import Doors
-from levilab.live.server import Hall, application
+from levilab.live.serve import configuration
+from levilab.live.server import Hall
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -35,9 +36,7 @@ def serving(root: Path, shown: str = "", desk: Desk | None = None) -> Iterator[H
 
     with socket.create_server(("127.0.0.1", 0)) as listening:
         hall = Hall(root, shown, Doors(listening.getsockname()[1]), desk)
-        server = uvicorn.Server(
-            uvicorn.Config(application(hall), log_config=None, ws="websockets-sansio", timeout_graceful_shutdown=1)
-        )
+        server = uvicorn.Server(configuration(hall))
         thread = threading.Thread(target=lambda: asyncio.run(server.serve(sockets=[listening])), daemon=True)
         thread.start()
         try:

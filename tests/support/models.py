@@ -7,12 +7,16 @@ import pytest
 
 from instruments.catalogue import CATALOGUE
 from instruments.drivers.oscilloscope import Trace
+from support import hostile
 
 #: Every model of the catalogue, and its kind.
 ROWS = {model.name: model for models in CATALOGUE.values() for model in models}
 KIND_OF = {model.name: kind for kind, models in CATALOGUE.items() for model in models}
-#: One model of each twin: a twin that is made with other numbers is the same wire.
-FAMILIES = tuple(name for name, model in ROWS.items() if isinstance(model.twin, type))
+#: One model of each table of rows, in the order of the catalogue: the one whose twin is a class, or the first.
+_OF_TABLE: dict = {}
+for _name in sorted(ROWS, key=lambda name: not isinstance(ROWS[name].twin, type)):
+    _OF_TABLE.setdefault(hostile.instrument(_name).commands, _name)
+FAMILIES = tuple(name for name in ROWS if name in _OF_TABLE.values())
 #: Whose link is a serial line.
 SERIAL = tuple(name for name, model in ROWS.items() if model.driver.SERIAL)
 

@@ -329,8 +329,8 @@ def _kind(name):
     return Kind(driver, prepare, _operations(driver, operations(driver)))
 
 
-#: Each model of the catalogue that has a twin of its own.
-KINDS = {name: _kind(name) for name in FAMILIES}
+#: The first model of each driver.
+KINDS = {name: _kind(name) for name in sorted({ROWS[name].driver: name for name in reversed(FAMILIES)}.values())}
 SCOPES = tuple(name for name in KINDS if KIND_OF[name] == "oscilloscope")
 #: Those at a serial line.
 ON_A_LINE = tuple(name for name, kind in KINDS.items() if kind.driver.SERIAL)

@@ -13,7 +13,7 @@ from instruments.drivers.counter.reciprocal import (
     READINGS_AT_ONCE,
     ReciprocalCounter,
 )
-from instruments.drivers.scpi import Setting
+from instruments.drivers.setting import Setting
 from instruments.errors import OutOfRange
 from instruments.ieee488 import Form
 
@@ -48,8 +48,8 @@ class PendulumCNT91(ReciprocalCounter):
     impedance = Setting("INP1:IMP", float, unit="ohm", values=IMPEDANCES_OHM, form=_IMPEDANCE)
     attenuation = Setting("INP1:ATT", float, values=(1.0, 10.0), form=Form(r"\+?(10?|1\.0+E\+0[01])", "10"))
     low_pass_filter = Setting("INP1:FILT", bool)
-    #: Resolution: data sheet, without attenuation.
-    trigger_level = Setting("INP1:LEV", float, unit="V", low=-5.0, high=5.0, resolution=3e-3)
+    #: Resolution: data sheet, without attenuation, which multiplies the level by 10.
+    trigger_level = Setting("INP1:LEV", float, unit="V", low=-5.0, high=5.0, resolution=3e-3, span=(-50.0, 50.0))
     automatic_level = Setting("INP1:LEV:AUTO", bool)
     slope = Setting("INP1:SLOP", str, choices=("POSitive", "NEGative"))
     measurement_timeout = Setting("SYST:TOUT:TIME", float, unit="s", low=0.01, high=1000.0)
@@ -102,7 +102,7 @@ class PendulumCNT91(ReciprocalCounter):
         return self._block(count, columns=2)
 
     def _block(self, count: int, *, columns: int) -> NDArray[np.float64]:
-        """A measurement of so many readings, fetched when it is complete."""
+        """Measure this many readings, and fetch them when the measurement is complete."""
         self._check_count(count)
         found: list[float] = []
         begin, end = (("FORM:TINF ON",), ("FORM:TINF OFF",)) if columns == 2 else ((), ())

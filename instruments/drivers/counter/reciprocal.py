@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 READINGS_AT_ONCE = 1000
 #: Readings that are waited for with one question: so long, at most [s].  VISA waits for 49 days and no longer.
 LONGEST_WAIT_S = 30 * 86400.0
-#: The inputs that count slow pulses: 1 and 2, which the CNT-91 has as A and B on its front.
-CHANNELS = (1, 2)
 #: The impedances of an input [ohm]; the same printed short (regular expression, without a sign).
 IMPEDANCES_OHM = (50.0, 1e6)
 IMPEDANCES = r"50|1000000|5\.0{1,9}E\+01|1\.0{1,9}E\+06"
@@ -49,10 +47,15 @@ class ReciprocalCounter(ScpiInstrument):
         """See the base; the settings are declared with the header of input 1."""
         return header.replace("INP1:", f"INP{self.channel}:")
 
+    @property
+    def channels(self) -> tuple[int, ...]:
+        """The inputs that count slow pulses; 1 and 2 stand as A and B on the front of a CNT-91."""
+        return (1, 2)
+
     def _choose(self, channel: int) -> None:
         """Measure frequency at this input from now on.  Raises OutOfRange."""
-        if channel not in CHANNELS:
-            raise OutOfRange(self.transport.address, "channel", channel, " or ".join(map(str, CHANNELS)))
+        if channel not in self.channels:
+            raise OutOfRange(self.transport.address, "channel", channel, " or ".join(map(str, self.channels)))
         if channel != self.channel:
             self.last_set.clear()  # what was set is the other input's
         self.channel = channel
@@ -66,7 +69,7 @@ class ReciprocalCounter(ScpiInstrument):
             return None if answer is None else self._reading("READ?", answer)
 
     def _reading(self, question: str, answer: str) -> float | None:
-        """A frequency or a time, or None.  Raises BadAnswer: neither is negative."""
+        """Return a frequency or a time, or None.  Raises BadAnswer: neither is negative."""
         if not answer and self.EMPTY_IS_NONE:
             return None
         value = parse_reading(self.transport.address, question, answer, self.NUMBER)
@@ -133,7 +136,7 @@ class ReciprocalCounter(ScpiInstrument):
             raise OutOfRange(self.transport.address, "count", count, f"1 to {self.MOST}")
 
     def _split(self, question: str, answer: str, expected: int) -> list[float]:
-        """The numbers of a list, NaN where there was no reading.  Raises BadAnswer if they are not so many."""
+        """Return the numbers of a list, NaN where there was no reading.  Raises BadAnswer if they are not so many."""
         words = answer.split(",")
         if len(words) != expected:
             raise BadAnswer(self.transport.address, question, answer, f"{expected} numbers, not {len(words)}")

@@ -38,7 +38,7 @@ class Limits:
     def beyond(
         self, *, frequency_hz: float | None = None, amplitude_vpp: float = 0.0, offset_v: float = 0.0
     ) -> Beyond | None:
-        """What of this signal is more, or less, than they allow; None where nothing is.
+        """Return the quantity of this signal that is beyond the limits, None where none is.
 
         frequency_hz: None where there is none.
         """

@@ -12,7 +12,7 @@ from instruments.drivers.generator.drive import (
     frequency_setting,
     offset_setting,
 )
-from instruments.drivers.scpi import Setting
+from instruments.drivers.setting import Setting
 from instruments.ieee488 import INFINITY, Form
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, cast
 
 from instruments.drivers.generator import NO_LIMITS, OPEN_V, Limits, check_peak
-from instruments.drivers.scpi import ScpiInstrument, Setting
+from instruments.drivers.scpi import ScpiInstrument
+from instruments.drivers.setting import Owner, Setting
 from instruments.errors import CommandRefused, OutOfRange
 from instruments.ieee488 import INFINITY
 
@@ -25,7 +26,7 @@ class LimitedSetting(Setting[float]):
     quantity: str = ""
     partner: str = ""
 
-    def __set__(self, instrument: ScpiInstrument, value: float) -> None:
+    def __set__(self, instrument: Owner, value: float) -> None:
         address = instrument.transport.address
         cast("DriveGenerator", instrument).limits.check(address, **{self.quantity: value})
         self._check(address, value)
@@ -39,7 +40,7 @@ class LimitedSetting(Setting[float]):
 class LoadSetting(Setting[float]):
     """The load that the display is for.  Where the coil has limits they are those of the open terminals."""
 
-    def __set__(self, instrument: ScpiInstrument, value: float) -> None:
+    def __set__(self, instrument: Owner, value: float) -> None:
         if cast("DriveGenerator", instrument).limits != NO_LIMITS and not value >= INFINITY:
             allowed = f"{INFINITY:g}: limits.drive_amplitude_vpp in the bench file is that of the open terminals"
             raise OutOfRange(instrument.transport.address, self.name, value, allowed)
@@ -50,7 +51,7 @@ class LoadSetting(Setting[float]):
 class OutputSwitch(Setting[bool]):
     """The output.  Where the coil has limits, nothing goes on that was not set under them."""
 
-    def __set__(self, instrument: ScpiInstrument, value: bool) -> None:  # noqa: FBT001 - it is what is assigned
+    def __set__(self, instrument: Owner, value: bool) -> None:  # noqa: FBT001 - it is what is assigned
         drive = cast("DriveGenerator", instrument)
         if value and drive.limits != NO_LIMITS and not drive.prepared_here:
             allowed = "prepare() first: what stands there may be beyond limits.drive_amplitude_vpp in the bench file"
@@ -59,19 +60,28 @@ class OutputSwitch(Setting[bool]):
 
 
 def frequency_setting(high: float, digits: int) -> LimitedSetting:
-    """The frequency of the output, in steps of 1 µHz, up to the highest of the family [Hz], which prints the digits."""
+    """Return the frequency, in steps of 1 µHz, up to the highest of the family [Hz], which prints the digits."""
     return LimitedSetting(
         "FREQ", float, "Hz", low=1e-6, high=high, resolution=1e-6, digits=digits, quantity="frequency_hz"
     )
 
 
 def amplitude_setting(low: float) -> LimitedSetting:
-    """The amplitude of the output, four digits (data sheets), from the lowest of the family on [V, peak to peak]."""
-    return LimitedSetting("VOLT", float, "Vpp", low, 20.0, digits=4, quantity="amplitude_vpp", partner="offset_v")
+    """Return the amplitude, of four digits (data sheets), from the lowest of the family on [V, peak to peak].
+
+    With a load other than an open circuit the lowest amplitude is smaller.
+    """
+    return LimitedSetting(
+        *("VOLT", float, "Vpp", low, 20.0),
+        span=(0.0, 20.0),
+        digits=4,
+        quantity="amplitude_vpp",
+        partner="offset_v",
+    )
 
 
 def offset_setting(digits: int) -> LimitedSetting:
-    """The offset of the output, with four digits of 10 V, of the digits that the family prints [V]."""
+    """Return the offset, with four digits of 10 V, of the digits that the family prints [V]."""
     low, high = -OPEN_V, OPEN_V
     return LimitedSetting(
         *("VOLT:OFFS", float, "V", low, high),
@@ -115,7 +125,7 @@ class DriveGenerator(ScpiInstrument):
         self.prepared_here = False
 
     def __exit__(self, *_error: object) -> None:
-        """Outputs off, then closed.  Raises CommandRefused if one is still on."""
+        """Switch the outputs off and close the link.  Raises CommandRefused if one is still on."""
         try:
             self.off()
         finally:
@@ -148,7 +158,7 @@ class DriveGenerator(ScpiInstrument):
         self.command("VOLT:UNIT VPP")
 
     def _level(self, amplitude_vpp: float, offset_v: float) -> None:
-        """The offset that was there leaves no room for the amplitude, nor the amplitude after a reset for much."""
+        """Set amplitude and offset: first an offset of 0, for any other leaves the amplitude less room."""
         self.offset = 0.0
         self.amplitude = amplitude_vpp
         if offset_v:

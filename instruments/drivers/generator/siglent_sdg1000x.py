@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from instruments.drivers.generator import OPEN_V
 from instruments.drivers.generator.drive import DriveGenerator, LimitedSetting, LoadSetting, OutputSwitch
-from instruments.drivers.scpi import Setting
+from instruments.drivers.setting import Setting
 from instruments.errors import CommandRefused
 from instruments.ieee488 import INFINITY, Form
 
@@ -83,6 +83,7 @@ class SiglentSDG1000X(DriveGenerator):
         *("C1:BSWV", float, "Vpp", 2e-3, 20.0),
         key="AMP",
         form=_VOLTS,
+        span=(0.0, 20.0),
         digits=6,
         quantity="amplitude_vpp",
         partner="offset_v",
@@ -100,7 +101,7 @@ class SiglentSDG1000X(DriveGenerator):
     output = OutputSwitch("C1:OUTP", bool)
 
     def field_of(self, answer: str, header: str, key: str) -> str:
-        """The value behind its name; that of an output, which has none, is the first field."""
+        """Return the value behind its name; that of an output, which has none, is the first field."""
         head, _, rest = answer.partition(" ")
         fields = rest.split(",")
         if head != header:

@@ -7,7 +7,8 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from instruments.drivers.scpi import ScpiInstrument, Setting
+from instruments.drivers.scpi import ScpiInstrument
+from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange
 from instruments.ieee488 import Form
 
@@ -40,7 +41,7 @@ class Coded(Setting[str]):
     first: int = 1
 
     def word(self, answer: str) -> str:
-        """The word that a number on the wire stands for.  Raises ValueError."""
+        """Return the word that a number on the wire stands for.  Raises ValueError."""
         index = int(_DIGITS.number(answer)) - self.first
         if not 0 <= index < len(self.choices):
             raise ValueError(answer)
@@ -102,7 +103,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
             raise CommandRefused(self.transport.address, message, (f"{header}? answers {answer!r} afterwards",))
 
     def settings(self) -> dict[str, bool | float | str]:
-        """Unit, mode, range and probe as they stand in the instrument."""
+        """Return the instrument's unit, mode, range and probe."""
         probe = self.probe()
         return super().settings() | {"probe": probe, "range_t": self._range_t(probe)}
 
@@ -114,7 +115,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
         return _PROBES[int(answer[1])]
 
     def _range_t(self, probe: str) -> float:
-        """The greatest flux density of the range in use [T]."""
+        """Return the greatest flux density of the range in use [T]."""
         ranges = self.RANGES_T[probe]
         answer = self.transport.query("RANGE?")
         if not _DIGITS.matches(answer) or not 1 <= int(answer) <= len(ranges):
@@ -151,7 +152,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
         raise BadAnswer(self.transport.address, _READING, answer, "a unit that stays what it is")
 
     def _parts(self, answer: str) -> tuple[str, str, str, int]:
-        """Unit, field, unit and status of an answer.  Raises BadAnswer."""
+        """Return unit, field, unit and status of an answer.  Raises BadAnswer."""
         try:
             before, field, after, status = answer.split(";")
             return _UNIT.word(before), field, _UNIT.word(after), int(_STATUS.number(status))
@@ -160,7 +161,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
             raise BadAnswer(self.transport.address, _READING, answer, expected) from None
 
     def _field_t(self, answer: str, field: str, per_unit: float, status: int) -> float | None:
-        """The field in an answer, given one of its unit [T] and the status.  Raises BadAnswer."""
+        """Return the field in an answer, given one of its unit [T] and the status.  Raises BadAnswer."""
         if status & (_NO_PROBE | _INVALID_PROBE) or field == _WITHOUT_PROBE:
             advice = "is the probe plugged in (with the instrument off)?"
             raise BadAnswer(self.transport.address, _READING, answer, "a flux density", advice)
@@ -176,7 +177,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
         return None if status & _OVERLOAD else field_t
 
     def _status(self) -> int:
-        """The bits of OPST?."""
+        """Return the bits of OPST?."""
         answer = self.transport.query("OPST?")
         if not _STATUS.matches(answer):
             self.reject("OPST?", answer, f"three digits, as {_STATUS.example}")
@@ -188,7 +189,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
 
 
 def _whole_numbers(text: str) -> list[int] | None:
-    """The numbers of a list with commas; None if it is none."""
+    """Return the numbers of a list with commas; None if it is none."""
     return [int(part) for part in text.split(",")] if _LIST.matches(text) else None
 
 

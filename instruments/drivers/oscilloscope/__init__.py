@@ -129,7 +129,7 @@ class Oscilloscope(Instrument, Protocol):
         """
 
     def trace(self, channel: int, arrived: Callable[[Trace, int], None] | None = None) -> Trace:
-        """The record of one channel, whole: one byte per point.
+        """Return the record of one channel, whole: one byte per point.
 
         Args:
             channel: an input that was prepared.
@@ -142,7 +142,7 @@ class Oscilloscope(Instrument, Protocol):
         """
 
     def blocks(self, channel: int) -> Iterator[NDArray[np.uint8]]:
-        """The codes of the same record, piece by piece as they come: never more than one piece in memory.
+        """Return the codes of the same record, piece by piece as they come: never more than one piece in memory.
 
         Raises NothingAcquired; SettingsLost, before the first or behind the last piece.
         """

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 from instruments.drivers.oscilloscope import Preamble
 from instruments.drivers.oscilloscope.scope import TRIGGER_MODES, TRIGGER_SOURCES, Scope
 from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup
-from instruments.drivers.scpi import Setting
+from instruments.drivers.setting import Setting
 from instruments.errors import OutOfRange
 from instruments.ieee488 import NR1, Form
 
@@ -33,7 +33,8 @@ class _KeysightChannel(Channel):
     inverted = Setting("INV", bool)
     probe_factor = Setting("PROB", float, low=0.1, high=1e4)
     coupling = Setting("COUP", str, choices=("AC", "DC"))
-    scale = Setting("SCAL", float, unit="V", low=5e-4, high=1e5)
+    #: A probe of less than 1:1 makes it smaller.
+    scale = Setting("SCAL", float, unit="V", low=5e-4, high=1e5, span=(1e-5, 1e5))
     offset = Setting("OFFS", float, unit="V", low=-1e5, high=1e5)
 
 
@@ -77,7 +78,7 @@ class KeysightDSOX(Scope):
     _points = 1000
 
     def _times(self, setup: Setup) -> dict[str, Value]:
-        """The record is as long as was asked for."""
+        """Return the settings of a record that is as long as was asked for."""
         address = self.transport.address
         if not 50e-9 <= setup.duration_s <= 500:
             raise OutOfRange(address, "duration_s", setup.duration_s, "50e-9 to 500 s")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 from instruments.drivers.oscilloscope import Preamble
 from instruments.drivers.oscilloscope.scope import TRIGGER_MODES, TRIGGER_SOURCES, Scope
 from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup
-from instruments.drivers.scpi import Setting
+from instruments.drivers.setting import Setting
 from instruments.errors import OutOfRange
 from instruments.ieee488 import NR1, Form
 
@@ -52,7 +52,8 @@ class _RigolChannel(Channel):
         form=Form(rf"{_NUMBER.pattern}|\+?([125]0{{0,3}}|0\.0?[125])|\+[125]\.0{{1,5}}[Ee][+-]0[0-3]", "10"),
     )
     coupling = Setting("COUP", str, choices=("AC", "DC", "GND"))
-    scale = Setting("SCAL", float, unit="V", low=1e-3, high=1e4)
+    #: A probe of less than 1:1 makes it smaller.
+    scale = Setting("SCAL", float, unit="V", low=1e-3, high=1e4, span=(1e-5, 1e4))
     offset = Setting("OFFS", float, unit="V", low=-1e5, high=1e5)
 
 
@@ -112,7 +113,7 @@ class RigolDS1000Z(Scope):
         return {"time_scale": scale, "time_offset": 0.0, "acquisition_type": "NORM", "memory_depth": str(depth)}
 
     def _time_scale(self, duration: float) -> float:
-        """The least time per division with which twelve of them are as long."""
+        """Return the least time per division with which twelve of them are as long."""
         scales = (float(f"{m}e{k}") for k in range(-9, 2) for m in (1, 2, 5))
         found = next((s for s in scales if s >= 5e-9 and 12 * s >= duration * (1 - 1e-9)), None)
         if found is None or duration <= 0:

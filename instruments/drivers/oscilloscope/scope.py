@@ -16,7 +16,7 @@ import numpy as np
 
 from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired, Preamble, Trace
 from instruments.drivers.oscilloscope.setup import Channel, Setup
-from instruments.drivers.scpi import ScpiInstrument, Setting
+from instruments.drivers.scpi import ScpiInstrument
 from instruments.errors import InstrumentError, NoAnswer, OutOfRange, SettingsLost
 from instruments.ieee488 import PLAIN_BLOCK
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from instruments.clock import Clock
     from instruments.drivers import Value
+    from instruments.drivers.setting import Setting
     from instruments.ieee488 import BlockForm, Form
     from instruments.links.transport import Transport
 
@@ -82,7 +83,7 @@ class Scope(ScpiInstrument):
         self._prepared: tuple[ScpiInstrument, ...] = ()
 
     def identity(self) -> str:
-        """The answer to ``*IDN?``; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
+        """Return the answer to ``*IDN?``; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         answer = super().identity()
         self._inputs = self._number_of_inputs(answer.split(",")[1])
         return answer
@@ -105,7 +106,7 @@ class Scope(ScpiInstrument):
 
     @staticmethod
     def _number_of_inputs(model: str) -> int:
-        """The last digit of the model's number: DS1054Z, DSO-X 1102G."""
+        """Return the last digit of the model's number: DS1054Z, DSO-X 1102G."""
         digits = re.findall(r"\d", model)
         return int(digits[3]) if len(digits) > 3 and digits[3] in "1248" else 4
 
@@ -167,7 +168,7 @@ class Scope(ScpiInstrument):
         self._check_taken()
 
     def _check_setup(self, setup: Setup) -> int:
-        """What is checked before anything is sent; the number of inputs.  Raises OutOfRange."""
+        """Check the inputs before anything is sent, and return how many there are.  Raises OutOfRange."""
         self._check("sweep", setup.sweep, tuple(self.SWEEPS))
         self._check("trigger_slope", setup.trigger_slope, tuple(self.SLOPES))
         self._check("coupling", setup.coupling, ("DC", "AC"))
@@ -183,7 +184,7 @@ class Scope(ScpiInstrument):
             raise OutOfRange(self.transport.address, name, value, "one of " + ", ".join(map(str, choices)))
 
     def _times(self, setup: Setup) -> dict[str, Value]:
-        """The settings of time base and memory, in the order in which they are set.  Raises OutOfRange."""
+        """Return the settings of time base and memory, in the order in which they are set.  Raises OutOfRange."""
         raise NotImplementedError
 
     def _scaling(self, setup: Setup) -> dict[str, Value]:
@@ -212,7 +213,7 @@ class Scope(ScpiInstrument):
     # --- comparing ---
 
     def lost(self) -> dict[str, tuple[object, object]]:
-        """Settings that are no longer as they were set: name → (as set, now).
+        """Return the settings that differ from the values set: name → (as set, now).
 
         Those of the prepared inputs as ``channel1_…``; what acquire() changes by itself is none of them.
         """
@@ -226,7 +227,7 @@ class Scope(ScpiInstrument):
         return differing
 
     def rounding(self, row: Setting[Any]) -> float:
-        """A part of a division, and of the record."""
+        """Return a part of a division, or of the record."""
         return self._setup.rounding(row.unit) if self._setup else 0.0
 
     def _check_taken(self) -> None:
@@ -303,7 +304,7 @@ class Scope(ScpiInstrument):
     # --- reading ---
 
     def trace(self, channel: int, arrived: Callable[[Trace, int], None] | None = None) -> Trace:
-        """The record of one channel; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
+        """Return the record of one channel; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         self._check_readable(channel)
         with self._reporting_changed_settings():
             preamble = self.preamble(channel)
@@ -319,7 +320,7 @@ class Scope(ScpiInstrument):
         return Trace(codes, *scaling, channel, *self.CODES)
 
     def blocks(self, channel: int) -> Iterator[NDArray[np.uint8]]:
-        """The codes of one channel, piece by piece; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
+        """Yield the codes of one channel in pieces; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         self._check_readable(channel)
         self._check_kept()
         with self._reporting_changed_settings():
@@ -359,7 +360,7 @@ class Scope(ScpiInstrument):
         raise NotImplementedError
 
     def _block(self, points: int, question: str = ":WAV:DATA?", form: BlockForm = PLAIN_BLOCK) -> NDArray[np.uint8]:
-        """The next block, which must hold so many codes.  Raises BadAnswer, CommandRefused."""
+        """Return the next block, which must hold so many codes.  Raises BadAnswer, CommandRefused."""
         self.raise_errors(question)
         try:
             with self.clearing_on_bad_answer():

@@ -10,7 +10,7 @@ import numpy as np
 from instruments.drivers.oscilloscope import Preamble
 from instruments.drivers.oscilloscope.scope import Scope
 from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup
-from instruments.drivers.scpi import ScpiInstrument, Setting
+from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, OutOfRange
 from instruments.ieee488 import NR1, BlockForm, Form
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from instruments.drivers import Value
+    from instruments.drivers.scpi import ScpiInstrument
 
 
 #: "1.00E+00V", "-6.00E-01V": as it was measured; other firmware may print more digits.
@@ -39,7 +40,7 @@ _DESCRIPTOR, _COUNT, _VOLTS, _STEP = 346, 116, 156, 176
 
 
 def _after_header(answer: str, header: str) -> str:
-    """What stands behind the header of an answer.  Raises ValueError where it is another one."""
+    """Return the text behind the header of an answer.  Raises ValueError for another header."""
     head, blank, rest = answer.partition(" ")
     if head.upper() != header.upper() or not blank:
         raise ValueError(answer)
@@ -55,11 +56,12 @@ class _SiglentChannel(Channel):
     inverted = Setting("INVS", bool)
     probe_factor = Setting("ATTN", float, low=0.1, high=1e4, form=_FACTOR)
     coupling = Setting("CPL", str, choices=("D1M", "A1M", "GND"))
-    scale = Setting("VDIV", float, unit="V", form=_VOLTAGE, low=5e-4, high=1e5, suffix="V")
+    #: A probe of less than 1:1 makes it smaller.
+    scale = Setting("VDIV", float, unit="V", form=_VOLTAGE, low=5e-4, high=1e5, span=(1e-5, 1e5), suffix="V")
     offset = Setting("OFST", float, unit="V", form=_VOLTAGE, low=-1e5, high=1e5, suffix="V")
 
     def field_of(self, answer: str, header: str, key: str) -> str:
-        """What stands behind the header; a switch as 0 or 1."""
+        """Return the text behind the header; a switch as 0 or 1."""
         return _as_digit(_after_header(answer, self.header_in_use(header)))
 
     def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
@@ -68,7 +70,7 @@ class _SiglentChannel(Channel):
 
 
 def _single(value: float) -> float:
-    """A number that came in single precision, which has seven digits: 0.2 instead of 0.20000000298."""
+    """Return a number that came in single precision, which has seven digits: 0.2 instead of 0.20000000298."""
     return float(f"{value:.7g}")
 
 
@@ -129,7 +131,7 @@ class SiglentSDS1000XE(Scope):
         return f"C{self._setup.trigger_source if self._setup else 1}:{header}"
 
     def field_of(self, answer: str, header: str, key: str) -> str:
-        """What stands behind the header: ``TRSE EDGE,SR,C1,HT,OFF`` says that the source is C1."""
+        """Return the value behind the header: ``TRSE EDGE,SR,C1,HT,OFF`` says that the source is C1."""
         rest = _after_header(answer, self.header_in_use(header))
         if not key:
             return rest.partition(",")[0]

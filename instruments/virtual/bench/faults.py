@@ -50,7 +50,7 @@ class Fault:
         return self.after < self.seen <= self.after + self.times
 
     def act(self, session: Session, answer: Answer) -> Answer | None:
-        """The answer as the fault leaves it, None where it is lost."""
+        """Return the answer as the fault leaves it, None where it is lost."""
         return FAULTS[self.what](session, answer)
 
 
@@ -59,7 +59,7 @@ LATE, AWAY = 10.0, 5.0
 
 
 def _change_bytes(change: Callable[[bytes], bytes]) -> Act:
-    """A fault that changes only the bytes."""
+    """Return a fault that changes nothing but the bytes."""
     return lambda _, answer: answer._replace(data=change(answer.data))
 
 

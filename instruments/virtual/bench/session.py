@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING, Protocol
 
 from instruments.clock import WallClock
 from instruments.ieee488 import INFINITY
+from instruments.virtual.bench.exchange import MARKED, STREAM, Event, State
 from instruments.virtual.core.message import Framer, Overrun
 from instruments.virtual.core.parser import LONGEST_ANSWER, ScpiError
 from instruments.virtual.core.steps import Work, run_to_end
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from instruments.virtual.core.device import Answer, VirtualInstrument
     from instruments.virtual.core.steps import Steps
 
-_NOTHING, _WALL = memoryview(b""), WallClock()
+_WALL = WallClock()
 #: Answers that may wait for the program to read them, at most.
 MOST_ANSWERS = 1000
 #: How long an instrument works in one slice [s], by the wall clock.
@@ -80,17 +81,15 @@ class AnswerFault(Protocol):
         """Whether the fault changes the answer to this message."""
 
     def act(self, session: Session, answer: Answer) -> Answer | None:
-        """The answer as the fault leaves it, None where it is lost."""
+        """Return the answer as the fault leaves it, None where it is lost."""
 
 
 @dataclass(eq=False)
 class Session:
     """One program's link to one instrument.
 
-    stream: bytes without ends, as over a serial line or a bare socket: a line feed ends a message, and answers follow
-    each other.  Otherwise the interface marks the end of a message (GPIB, USBTMC, VXI-11, HiSLIP), and a question sent
-    before the last answer was read discards that answer (IEEE 488.2, 6.3.2.3).  Every method raises LinkLost when the
-    link is lost.
+    stream: whether bytes have no ends, as over a serial line or a bare socket.  The module `exchange` says what
+    messages and reads do in either case.  Every method raises LinkLost when the link is lost.
 
     lock, client_lock, faults, unreachable_until: all sessions of a bench share them, see `bench.VirtualBench`.
     """
@@ -104,13 +103,21 @@ class Session:
     chunk: int = 1 << 30  # bytes of an answer handed over in one piece, at most
     lost_after: int | None = None  # bytes that still arrive before the link is lost
     _framer: Framer = field(init=False)
+    _state: State = State.IDLE
     _answers: deque[Answer] = field(default_factory=deque)
-    _rest: memoryview = _NOTHING
-    _complete: bool = True
-    _asked: bool = False  # whether the program has sent a message since it read the last answer
+    _taken: int = 0  # bytes of the first answer that the program has read, in the state READING
 
     def __post_init__(self) -> None:
         self._framer = Framer(blocks=self.device.takes_blocks)
+        self._table = STREAM if self.stream else MARKED
+
+    def _change_state(self, event: Event) -> None:
+        """Go to the next state, and queue the error that the table says."""
+        self._state, error = self._table[self._state, event]
+        if self._state in {State.IDLE, State.ASKED}:
+            self._answers.clear()
+        if error:
+            self.device.parser.report(ScpiError(error))
 
     def write(self, data: bytes, *, end: bool = True) -> None:
         """Send bytes to the instrument, which works on every message that they complete.
@@ -125,7 +132,7 @@ class Session:
                     run_to_end(self._run(message, self.device.work))
 
     def messages(self, data: bytes, *, end: bool) -> Iterator[str]:
-        """The messages that these bytes complete, for begin().
+        """Yield the messages that these bytes complete, for begin().
 
         Empty ones among them are pauses for other work: to split a million line feeds takes a second.
         """
@@ -164,9 +171,11 @@ class Session:
         return not work.done
 
     def cancel(self, work: Work[None]) -> None:
-        """End this work before its end."""
+        """End this work on a message, and what the message has asked for."""
         with self.lock:
-            work.cancel()
+            if not work.done:
+                work.cancel()
+                self.device.end_since(self.device.begun)
 
     def _run(self, message: str, before: Work[None] | None) -> Steps[None]:
         if before and not before.done:
@@ -175,11 +184,7 @@ class Session:
             while before.step():
                 yield
         self._drop_abandoned_answers()
-        if not self.stream and (self._answers or self._rest):
-            self.device.parser.report(ScpiError(-410))
-            self._answers.clear()
-            self._rest = _NOTHING
-        self._asked = True
+        self._change_state(Event.MESSAGE)
         answer = yield from self.device.steps(message)
         for fault in self.faults:
             if answer is not None and fault.strikes(message):
@@ -187,7 +192,10 @@ class Session:
         self._drop_abandoned_answers()
         if answer is not None:
             self._answers.append(answer)
-            self._drop_unread_answers()
+            self._change_state(Event.ANSWER)
+            waiting = len(self._answers)
+            if waiting > MOST_ANSWERS or (waiting > 1 and sum(len(a.data) for a in self._answers) > LONGEST_ANSWER):
+                self._change_state(Event.OVERFLOW)  # the program asks and never reads
 
     def is_abort(self, message: str) -> bool:
         """Whether this message aborts what the instrument works on."""
@@ -198,29 +206,27 @@ class Session:
         whole = not self._framer.begun and ((end and not self.stream) or data.endswith(b"\n"))
         return whole and self.is_abort(data.decode("latin-1"))
 
-    def _drop_unread_answers(self) -> None:
-        """Drop all answers, and queue error −430, when the program asks and never reads (IEEE 488.2, 6.3.1.7)."""
-        if len(self._answers) < 2:
-            return
-        if len(self._answers) > MOST_ANSWERS or sum(len(answer.data) for answer in self._answers) > LONGEST_ANSWER:
-            self._answers.clear()
-            self._rest = _NOTHING
-            self.device.parser.report(ScpiError(-430))
-
     def _check_link(self) -> None:
         if self.lost_after is not None and self.lost_after <= 0:
             raise LinkLost
 
     def _drop_abandoned_answers(self) -> None:
-        while self._answers and self._answers[0].epoch != self.device.epoch:
+        """Drop the answers of a measurement that was given up; the program may read to its end what it has begun."""
+        if self._state is State.ANSWERED:
+            self._drop_while(lambda answer: answer.epoch != self.device.epoch)
+
+    def _drop_while(self, condition: Callable[[Answer], bool]) -> None:
+        while self._answers and condition(self._answers[0]):
             self._answers.popleft()
+        if not self._answers:
+            self._change_state(Event.DROP)
 
     def ready(self) -> float | None:
         """When the next bytes of an answer are ready [s], None where no answer is under way."""
         with self.lock:
             self._check_link()
             self._drop_abandoned_answers()
-            if self._rest:
+            if self._state is State.READING:
                 return self.device.clock.now()
             return self._answers[0].ready if self._answers else None
 
@@ -236,9 +242,11 @@ class Session:
             The bytes, and whether the answer ends with them; None after the timeout.
         """
         clock = self.device.clock
-        ready = self.ready()
+        with self.lock:
+            ready = self.ready()
+            if ready is None:
+                self._change_state(Event.READ_NOTHING)
         if ready is None or ready > clock.now() + timeout or ready >= INFINITY:
-            self._report_unterminated(ready)
             if math.isfinite(timeout):  # a clock cannot jump to infinity
                 clock.sleep(timeout)
             return None
@@ -249,26 +257,36 @@ class Session:
         """Take at most `count` bytes of what is ready.  Returns them, and whether the answer ends with them."""
         with self.lock:
             self._check_link()
-            if not self._rest and self._answers:
-                answer = self._answers.popleft()
-                self._rest, self._complete = memoryview(answer.data), answer.complete
-            self._asked = False
+            if not self._answers:
+                return b"", True
+            answer, start = self._answers[0], self._taken if self._state is State.READING else 0
             most = min(count, self.chunk, self.lost_after if self.lost_after is not None else count)
-            chunk = bytes(self._rest[:most])
+            chunk = answer.data[start : start + most]
             if until and until in chunk:
                 chunk = chunk[: chunk.index(until) + 1]
-            self._rest = self._rest[len(chunk) :]
+            self._taken = start + len(chunk)
+            ended = self._taken == len(answer.data)
+            if ended:
+                self._next_answer()
+            else:
+                self._change_state(Event.READ_PART)
             if self.lost_after is not None:
                 self.lost_after -= len(chunk)
-            return chunk, not self._rest and self._complete
+            return chunk, ended and answer.complete
+
+    def _next_answer(self) -> None:
+        """Drop the answer that the program has read."""
+        self._answers.popleft()
+        self._change_state(Event.READ_ONE if self._answers else Event.READ_LAST)
 
     def discard(self) -> None:
         """Drop what is ready and was not read."""
         with self.lock:
-            self._rest = _NOTHING
+            if self._state is State.READING:
+                self._next_answer()
             self._drop_abandoned_answers()
-            while self._answers and self._answers[0].ready <= self.device.clock.now():
-                self._answers.popleft()
+            if self._answers:
+                self._drop_while(lambda answer: answer.ready <= self.device.clock.now())
 
     def trigger(self) -> None:
         """Send the interface's trigger message."""
@@ -279,25 +297,23 @@ class Session:
                 self.device.parser.report(error)
 
     def close(self) -> None:
-        """End the session, and release its lock."""
-        self.client_lock.release(self)
-
-    def _report_unterminated(self, ready: float | None) -> None:
-        """Queue error −420 where a program reads and has asked nothing (IEEE 488.2, 6.3.2.2)."""
+        """End the session: release its lock, and end the instrument's work on a question of its program."""
         with self.lock:
-            if ready is None and not self.stream and not self._asked:
-                self.device.parser.report(ScpiError(-420))
+            self.client_lock.release(self)
+            now, epoch = self.device.clock.now(), self.device.epoch
+            for answer in self._answers:
+                if answer.epoch == epoch and answer.begun <= now < answer.ready:
+                    self.device.end_since(answer.begun)
 
     def clear(self) -> None:
         """Device clear: drop what is under way in either direction, keep the settings."""
         with self.lock:
             self._framer.clear()
-            self._answers.clear()
-            self._rest = _NOTHING
+            self._change_state(Event.CLEAR)
             self.device.abandon()
 
     def status_byte(self) -> int:
-        """The status byte, as a serial poll reads it."""
+        """Return the status byte, as a serial poll reads it."""
         with self.lock:
             ready = self.ready()
             there = ready is not None and ready <= self.device.clock.now()

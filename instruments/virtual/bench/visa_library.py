@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fnmatch
 import itertools
 import math
 from typing import TYPE_CHECKING, Any, TypeVar, cast
@@ -36,6 +35,8 @@ _DEFAULT_ATTRIBUTES: dict[int, Any] = {
     ResourceAttribute.termchar_enabled: False,
     ResourceAttribute.send_end_enabled: True,
     ResourceAttribute.resource_lock_state: constants.AccessModes.no_lock,
+    ResourceAttribute.resource_manufacturer_name: "levilab",
+    ResourceAttribute.interface_number: 0,
 }
 #: The same for a serial line (VPP-4.3, 5.1.2): 9600 baud, 8N1.
 _SERIAL_ATTRIBUTES: dict[int, Any] = {
@@ -65,7 +66,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
         self._sessions = {}
 
     def _bench(self) -> VirtualBench:
-        """The bench of this library; the default one, made at the first use, where none was given."""
+        """Return the bench of this library; the default one, made at the first use, where none was given."""
         if self.bench is None:
             self.bench = self.default_bench()
         return self.bench
@@ -79,9 +80,8 @@ class LevilabVisaLibrary(VisaLibraryBase):
         return cast("VISARMSession", next(_numbers)), self.handle_return_value(None, StatusCode.success)
 
     def list_resources(self, session: VISARMSession, query: str = "?*::INSTR") -> tuple[str, ...]:
-        """ViFindRsrc; the query's ``?*`` is ``*`` here."""
-        pattern = query.upper().replace("?*", "*")
-        return tuple(name for name in self._bench().instruments if fnmatch.fnmatch(name.upper(), pattern))
+        """ViFindRsrc."""
+        return rname.filter(self._bench().instruments, query)
 
     def parse_resource_extended(self, session: VISARMSession, resource_name: str) -> tuple[ResourceInfo, StatusCode]:
         """ViParseRsrcEx; resource names know no case (VPP-4.3, 4.3.1), pyvisa's parser knows INSTR only."""
@@ -118,7 +118,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
         return number, self.handle_return_value(number, StatusCode.success)
 
     def _name_on_bench(self, resource_name: str) -> str:
-        """The bench's own spelling of a name: PyVISA fills in what is left out (USB's interface, boards)."""
+        """Return the bench's own spelling of a name: PyVISA fills in what is left out (USB's interface, boards)."""
         wanted = _canonical(resource_name)
         return next((name for name in self._bench().instruments if _canonical(name) == wanted), resource_name)
 
@@ -258,7 +258,7 @@ def _seconds(timeout: int) -> float:
 
 
 def _line_settings(attributes: Attributes) -> LineSettings:
-    """The program's end of a serial line; VISA counts stop bits in tenths and parities from none to space."""
+    """Return the program's end of a serial line; VISA counts stop bits in tenths and parities from none to space."""
     return LineSettings(
         int(attributes[ResourceAttribute.asrl_baud_rate]),
         int(attributes[ResourceAttribute.asrl_data_bits]),
@@ -268,7 +268,7 @@ def _line_settings(attributes: Attributes) -> LineSettings:
 
 
 def _termchar(attributes: Attributes) -> bytes:
-    """The character that ends a read, or none; a serial line has one by default (VPP-4.3, VI_ATTR_ASRL_END_IN)."""
+    """Return the character that ends a read, or none; a serial line has one by default (VI_ATTR_ASRL_END_IN)."""
     serial = attributes.get(ResourceAttribute.asrl_end_in) == constants.SerialTermination.termination_char
     wanted = attributes[ResourceAttribute.termchar_enabled] or serial
     return bytes([attributes[ResourceAttribute.termchar]]) if wanted else b""

@@ -6,7 +6,8 @@ Some answers take long to compute, so an instrument works on a message in steps;
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+import functools
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 
 from instruments.virtual.core.parameters import (
     boolean,
@@ -34,12 +35,14 @@ class Answer(NamedTuple):
         data: its bytes.
         ready: when they are ready [s].
         epoch: of the measurement that they come from; the device counts it up when it drops a measurement.
+        begun: when the device began with the message [s].
         complete: whether the end of the answer is among the bytes.
     """
 
     data: bytes
     ready: float
     epoch: int
+    begun: float
     complete: bool = True
 
 
@@ -66,17 +69,17 @@ COMMON: tuple[Row, ...] = (
 )
 
 
-#: The tables of all models so far, by class and channels.
-_TABLES: dict[tuple[type[VirtualInstrument], tuple[int, ...]], Table] = {}
+@functools.cache
+def _table(family: type[VirtualInstrument], numbered: tuple[int, ...], lacks: tuple[str, ...]) -> Table:
+    """Return the rows of a model of this family, with these channels and without these nodes, made once."""
+    of_channels = (row.of_channel(n) for n in numbered for row in family.CHANNEL_ROWS)
+    rows = (*family.COMMON, *of_channels, *family.ROWS)
+    return Table([row for row in rows if not has_node(row.header, lacks)], family.DEFAULTS)
 
 
-def _table(model: type[VirtualInstrument], numbered: tuple[int, ...]) -> Table:
-    """The rows of a model with these channels, made once."""
-    table = _TABLES.get((model, numbered))
-    if table is None:
-        of_channels = (row.of_channel(n) for n in numbered for row in model.CHANNEL_ROWS)
-        table = _TABLES[model, numbered] = Table((*model.COMMON, *of_channels, *model.ROWS), model.DEFAULTS)
-    return table
+def has_node(header: str, nodes: tuple[str, ...]) -> bool:
+    """Return whether one of these nodes, in its printed form, is in a printed header."""
+    return any(node in header for node in nodes)
 
 
 class VirtualInstrument:
@@ -89,6 +92,8 @@ class VirtualInstrument:
         identity: the answer to ``*IDN?`` of another model of the family.
         pace: time for one message [s].
         numbered: the numbers of the channels, where they are not those of the class.
+        lacks: nodes of headers, as printed, that this model of the family does not have; its rows with one of them are
+            left out.
     """
 
     identity = "levilab,virtual,0,0"
@@ -108,18 +113,25 @@ class VirtualInstrument:
     numbered: Sequence[int] = ()
 
     def __init__(
-        self, clock: Clock, *, identity: str | None = None, pace: float = 2e-3, numbered: Sequence[int] | None = None
+        self,
+        clock: Clock,
+        *,
+        identity: str | None = None,
+        pace: float = 2e-3,
+        numbered: Sequence[int] | None = None,
+        lacks: tuple[str, ...] = (),
     ) -> None:
-        self.clock, self.pace = clock, pace
+        self.clock, self.pace, self.lacks = clock, pace, lacks
         self.identity = identity or self.identity
         if numbered is not None:
             self.numbered = numbered
-        #: Its rows; one table for all devices of a class with as many channels.
-        self.commands = _table(type(self), tuple(self.numbered))
+        #: The rows; devices of the same model share the table.
+        self.commands = _table(cast("Any", type(self)), tuple(self.numbered), lacks)
         self.settings: dict[str, Value] = dict(self.commands.defaults)
         self.status = Status()
         self.epoch = 0
-        self._ready = 0.0
+        #: When it begins with the message that came last, and when it is done with that [s].
+        self.begun = self._ready = 0.0
         #: On the message that came last, if it is worked on in slices: it may not be done yet.
         self.work: Work[None] | None = None
         self.parser = Parser(
@@ -138,7 +150,8 @@ class VirtualInstrument:
 
     def steps(self, message: str) -> Steps[Answer | None]:
         """As execute(), in steps."""
-        self._ready = max(self._ready, self.clock.now()) + self.pace
+        self.begun = max(self._ready, self.clock.now())
+        self._ready = self.begun + self.pace
         return self._answer((yield from self.parser.steps(message)))
 
     def is_abort(self, message: str) -> bool:
@@ -150,12 +163,12 @@ class VirtualInstrument:
         yield from ()
 
     def begin_next(self) -> None:
-        """Called before each further command or query of a message; by default it takes no time of its own."""
+        """Begin a further command or query of a message; by default it takes no time of its own."""
 
     def _answer(self, text: str | None) -> Answer | None:
         if text is None:
             return None
-        return Answer((text + self.line_end).encode("latin-1"), self._ready, self.epoch)
+        return Answer((text + self.line_end).encode("latin-1"), self._ready, self.epoch, self.begun)
 
     def abandon(self) -> None:
         """Cancel the work under way, and drop the answers that were not read."""
@@ -163,6 +176,14 @@ class VirtualInstrument:
             self.work.cancel()
         self.epoch += 1
         self._ready = self.clock.now()
+
+    def end_since(self, begun: float) -> None:
+        """End what messages since this time have asked for, as their program has left; other programs' answers stay.
+
+        Args:
+            begun: when the device began with the first of them [s].
+        """
+        self._ready = max(begun, self.clock.now())
 
     def busy_until(self, instant: float) -> None:
         """Let the answer to the message under way be ready at this time [s], not before."""
@@ -174,27 +195,27 @@ class VirtualInstrument:
     # --- what the rows need ---
 
     def value(self, name: str) -> float:
-        """A setting that is a number."""
+        """Return a setting that is a number."""
         return float(self.settings[name])
 
     def read_boolean(self, text: str) -> bool:
-        """The value of a switch, from its text on the wire.  Raises ScpiError."""
+        """Return the value of a switch, from its text on the wire.  Raises ScpiError."""
         return boolean(text)
 
     def spell(self, value: float) -> str:
-        """A number as this instrument prints it."""
+        """Return a number as this instrument prints it."""
         return nr3(value)
 
     def reply(self, header: str, text: str, unit: str = "") -> str:
-        """An answer to the query of a row: the text alone."""
+        """Return an answer to the query of a row: the text alone."""
         return text
 
     def on_number_change(self, name: str, before: float) -> None:
-        """Called after a setting has changed.  before: its former value, 0 where that was no number."""
+        """React to a setting that has changed.  before: its former value, 0 where that was no number."""
         self.on_change(name)
 
     def on_change(self, name: str) -> None:
-        """Called after a setting has changed."""
+        """React to a setting that has changed."""
 
     @contextlib.contextmanager
     def all_or_none(self) -> Iterator[None]:
@@ -215,7 +236,7 @@ class VirtualInstrument:
     # --- status ---
 
     def status_byte(self, *, message_available: bool = False) -> int:
-        """The status byte (IEEE 488.2, 11.2)."""
+        """Return the status byte (IEEE 488.2, 11.2)."""
         return self.status.byte(errors_waiting=bool(self.parser.errors), message_available=message_available)
 
     def clear_status(self) -> None:

@@ -28,7 +28,7 @@ class LineSettings:
 
 
 def received_as(data: bytes, sender: LineSettings, receiver: LineSettings, *, checked: bool = True) -> bytes:
-    r"""The bytes that a receiver gets of those sent one after the other, on a line that was idle before.
+    r"""Return the bytes that a receiver gets of those sent one after the other, on a line that was idle before.
 
     A missing stop bit stops no byte.
 
@@ -56,7 +56,7 @@ def received_as(data: bytes, sender: LineSettings, receiver: LineSettings, *, ch
 
 
 def _half_bits(data: bytes, sender: LineSettings) -> list[int]:
-    """The levels on the line, two for each bit."""
+    """Return the levels on the line, two for each bit."""
     levels: list[int] = []
     for byte in data:
         bits = [byte >> place & 1 for place in range(sender.data_bits)]
@@ -69,7 +69,7 @@ def _half_bits(data: bytes, sender: LineSettings) -> list[int]:
 
 
 def _sample_bits(levels: list[int], sent_at: int, receiver: LineSettings, parity_bits: tuple[int, int] | None) -> bytes:
-    """The bytes of a receiver that samples the line in the middle of each of its own bits.
+    """Return the bytes of a receiver that samples the line in the middle of each of its own bits.
 
     Time is counted in units that make half a bit of the sender and half a bit of the receiver whole numbers.
     """

@@ -24,7 +24,7 @@ _AT_A_STRETCH = 1000
 
 
 def read_units(message: str, *, path_memory: bool = True) -> Iterator[tuple[str, list[str]] | None]:
-    """The units of a compound message: the full header of each, and its parameters.
+    """Yield the units of a compound message: the full header of each, and its parameters.
 
     Yields None where the work may be interrupted: between units, and now and then within a long one.
 
@@ -53,7 +53,7 @@ def read_units(message: str, *, path_memory: bool = True) -> Iterator[tuple[str,
 
 
 def split_units(message: str) -> Iterator[str | None]:
-    """The units of a compound message: split at semicolons outside of quotes and blocks.
+    """Return the units of a compound message: split at semicolons outside of quotes and blocks.
 
     Yields None now and then in a long message, where the work may be interrupted; an empty unit is "".
 
@@ -64,7 +64,7 @@ def split_units(message: str) -> Iterator[str | None]:
 
 
 def read_unit(unit: str, path: str) -> tuple[str, str, str]:
-    """The full header of a unit, the text of its parameters, and the path that the next unit starts from.
+    """Return the full header of a unit, the text of its parameters, and the path that the next unit starts from.
 
     >>> read_unit("FREQ 40", "SOUR:")
     ('SOUR:FREQ', '40', 'SOUR:')
@@ -79,7 +79,7 @@ def read_unit(unit: str, path: str) -> tuple[str, str, str]:
 
 
 def split_parameters(text: str) -> Iterator[str | None]:
-    """The parameters of a unit: split at commas outside of quotes, parentheses and blocks.
+    """Return the parameters of a unit: split at commas outside of quotes, parentheses and blocks.
 
     Yields None where the work may be interrupted, as split_units() does.
 
@@ -92,7 +92,7 @@ def split_parameters(text: str) -> Iterator[str | None]:
 
 
 def _split(text: str, separator: str) -> Iterator[str | None]:
-    """The pieces between separators, without blanks around them, but with blanks that are bytes of a block.
+    """Yield the pieces between separators, without blanks around them, but with blanks that are bytes of a block.
 
     Yields None after every _AT_A_STRETCH special characters, where the work may be interrupted.
     """

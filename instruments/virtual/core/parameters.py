@@ -18,7 +18,7 @@ MOST_DIGITS = 255
 
 
 def optional_parameter(parameters: list[str]) -> str:
-    """The only parameter or "", a channel list aside.  Raises ScpiError if there are more."""
+    """Return the only parameter or "", a channel list aside.  Raises ScpiError if there are more."""
     plain = [parameter for parameter in parameters if not _CHANNEL_LIST.fullmatch(parameter)]
     if len(plain) > 1:
         raise ScpiError(-108)
@@ -26,11 +26,30 @@ def optional_parameter(parameters: list[str]) -> str:
 
 
 def parameter(parameters: list[str]) -> str:
-    """The only parameter, a channel list aside.  Raises ScpiError if there is none, or more than one."""
+    """Return the only parameter, a channel list aside.  Raises ScpiError if there is none, or more than one."""
     only = optional_parameter(parameters)
     if not only:
         raise ScpiError(-109)
     return only
+
+
+def quoted(parameters: list[str]) -> str:
+    """Return the text of the only parameter, a string in quotes (IEEE 488.2, 7.7.5).
+
+    Raises:
+        ScpiError: it is no string, or something follows the string.
+
+    >>> quoted(["'it''s'"])
+    "it's"
+    """
+    given = parameter(parameters)
+    quote = given[0]
+    if len(given) < 2 or quote not in "\"'" or given[-1] != quote:
+        raise ScpiError(-104, given[:20])
+    text = given[1:-1].replace(quote * 2, "\0")
+    if quote in text:
+        raise ScpiError(-103, given[:20])
+    return text.replace("\0", quote)
 
 
 def no_parameters(parameters: list[str]) -> None:
@@ -44,7 +63,7 @@ def _limits(low: float, high: float, default: float) -> dict[str, float]:
 
 
 def limit(text: str, *, low: float, high: float, default: float) -> float:
-    """The limit or default that a query asks for by ``MIN``, ``MAX`` or ``DEF``.  Raises ScpiError.
+    """Return the limit or default that a query asks for by ``MIN``, ``MAX`` or ``DEF``.  Raises ScpiError.
 
     >>> limit("max", low=0, high=1e6, default=0)
     1000000.0
@@ -56,7 +75,7 @@ def limit(text: str, *, low: float, high: float, default: float) -> float:
 
 
 def number(text: str, *, low: float, high: float, default: float, unit: str = "") -> float:
-    """A numeric parameter: ``25``, ``1 kHz``, ``MIN``, ``MAX``, ``DEF``, ``INF``.  Raises ScpiError.
+    """Return a numeric parameter: ``25``, ``1 kHz``, ``MIN``, ``MAX``, ``DEF``, ``INF``.  Raises ScpiError.
 
     >>> number("1.5 kHz", low=0, high=1e6, default=0, unit="HZ")
     1500.0
@@ -85,12 +104,12 @@ def one_of(value: float, values: tuple[float, ...]) -> float:
 
 
 def block_text(data: bytes, digits: int = 0) -> str:
-    """A definite-length block as text, a character for each byte; see `instruments.ieee488.block`."""
+    """Return a definite-length block as text, a character for each byte; see `instruments.ieee488.block`."""
     return block(data, digits).decode("latin-1")
 
 
 def block_content(text: str, error: int = -104) -> bytes:
-    """The bytes of a block that is a parameter.  Raises ScpiError with the number `error` where it is no block.
+    """Return the bytes of a block that is a parameter.  Raises ScpiError with the number `error` where it is no block.
 
     >>> block_content("#13abc")
     b'abc'
@@ -102,7 +121,7 @@ def block_content(text: str, error: int = -104) -> bytes:
 
 
 def _value(match: re.Match[str]) -> float:
-    """The number without its unit.  Raises ScpiError if it has too many digits."""
+    """Return the number without its unit.  Raises ScpiError if it has too many digits."""
     mantissa, exponent = match[1], match[2] or ""
     if len(mantissa) > MOST_DIGITS and len(mantissa.lstrip("+-0.").replace(".", "")) > MOST_DIGITS:
         raise ScpiError(-124)
@@ -120,7 +139,7 @@ def _multiplier(suffix: str, unit: str) -> float:
 
 
 def choice(text: str, words: tuple[str, ...]) -> str:
-    """The short form of one of the words, given in its short or long form.  Raises ScpiError.
+    """Return the short form of one of the words, given in its short or long form.  Raises ScpiError.
 
     >>> choice("square", ("SINusoid", "SQUare"))
     'SQU'
@@ -133,7 +152,7 @@ def choice(text: str, words: tuple[str, ...]) -> str:
 
 
 def boolean(text: str, *, rounded: bool = False) -> bool:
-    """The value of ON, OFF, 1 or 0, in any form of the number.  Raises ScpiError.
+    """Return the value of ON, OFF, 1 or 0, in any form of the number.  Raises ScpiError.
 
     Args:
         text: on the wire.
@@ -153,7 +172,7 @@ def boolean(text: str, *, rounded: bool = False) -> bool:
 
 
 def nr3(value: float) -> str:
-    """A number as these instruments print it: fifteen digits, and room for one more.
+    """Return a number as these instruments print it: fifteen digits, and room for one more.
 
     >>> nr3(23.456789), nr3(9.9e37)  # a sixteenth digit would make 9.899999999999999 of it
     ('+2.345678900000000E+01', '+9.900000000000000E+37')

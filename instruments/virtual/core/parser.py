@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 ERRORS = {
     -102: "Syntax error",
+    -103: "Invalid separator",
     -104: "Data type error",
     -108: "Parameter not allowed",
     -109: "Missing parameter",
@@ -88,8 +89,8 @@ class Row:
         """Whether the row has a query."""
         return True
 
-    def set(self, device: Any, parameters: list[str]) -> Steps[None] | None:
-        """Execute the command.  Raises ScpiError."""
+    def set(self, device: Any, parameters: list[str]) -> Steps[Any] | str | None:
+        """Execute the command, and return the answer where it has one.  Raises ScpiError."""
         raise NotImplementedError
 
     def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
@@ -97,11 +98,11 @@ class Row:
         raise NotImplementedError
 
     def defaults(self) -> dict[str, Value]:
-        """The settings behind this row, with their values after ``*RST``."""
+        """Return the settings behind this row, with their values after ``*RST``."""
         return {}
 
     def of_channel(self, n: int) -> Self:
-        """The row of one channel: ``{n}`` in its texts is the channel's number.
+        """Return the row of one channel: ``{n}`` in its texts is the channel's number.
 
         ``[n]`` is the number, too, which may be left out for channel 1, with all that stands in the brackets around it.
 
@@ -136,7 +137,7 @@ class Table:
         self._actions: dict[str, Action] = {}
 
     def find(self, header: str) -> Action:
-        """The function of a header; that of a query ends with a question mark.  Raises ScpiError."""
+        """Return the function of a header; that of a query ends with a question mark.  Raises ScpiError."""
         name = header.upper()
         action = self._actions.get(name)
         if action is None:  # only known headers are kept: there could be any number of unknown ones
@@ -161,7 +162,7 @@ class Table:
 
 @cache
 def _beginnings(pattern: str) -> frozenset[str]:
-    """The first two letters of each word of a printed header, in its long and its short form.
+    """Return the first two letters of each word of a printed header, in its long and its short form.
 
     >>> sorted(_beginnings("[SOURce[1]:]FREQuency[:CW|:FIXed]")), sorted(_beginnings("C1:BaSic_WaVe"))
     (['CW', 'FI', 'FR', 'SO'], ['BA', 'BS', 'C'])
@@ -172,12 +173,12 @@ def _beginnings(pattern: str) -> frozenset[str]:
 
 @cache
 def header_pattern(pattern: str) -> re.Pattern[str]:
-    """A printed header as a regular expression for a header without its question mark."""
+    """Return a printed header as a regular expression for a header without its question mark."""
     return re.compile(_expression(pattern), re.IGNORECASE)
 
 
 def _expression(pattern: str) -> str:
-    """A printed header as a regular expression: FREQuency → (?:FREQUENCY|FREQ), [x] → (?:x)?.
+    """Return a printed header as a regular expression: FREQuency → (?:FREQUENCY|FREQ), [x] → (?:x)?.
 
     >>> _expression("[SOURce[1]:]FREQuency")
     '(?:(?:SOURCE|SOUR)(?:1)?:)?(?:FREQUENCY|FREQ)'

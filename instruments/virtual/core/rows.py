@@ -23,6 +23,7 @@ from instruments.virtual.core.parameters import (
     one_of,
     optional_parameter,
     parameter,
+    quoted,
 )
 from instruments.virtual.core.parser import Row, ScpiError, Value
 
@@ -43,16 +44,16 @@ class Device(Protocol):
     lenient: bool
 
     def on_number_change(self, name: str, before: float) -> None:
-        """Called after a setting has changed.  before: its former value, 0 where that was no number."""
+        """React to a setting that has changed.  before: its former value, 0 where that was no number."""
 
     def read_boolean(self, text: str) -> bool:
-        """The value of a switch, from its text on the wire."""
+        """Return the value of a switch, from its text on the wire."""
 
     def spell(self, value: float) -> str:
-        """A number as the device prints it."""
+        """Return a number as the device prints it."""
 
     def reply(self, header: str, text: str, unit: str = "") -> str:
-        """An answer: the text alone, or with its header and unit."""
+        """Return an answer: the text alone, or with its header and unit."""
 
 
 def _put(device: Device, name: str, value: Value) -> None:
@@ -99,7 +100,7 @@ class Number(Row):
         return replace(row, limits=lambda device: find(device, n)) if callable(find) else row
 
     def range(self, device: Device) -> tuple[float, float]:
-        """The lowest and the highest number allowed now."""
+        """Return the lowest and the highest number allowed now."""
         return self.limits(device) if callable(self.limits) else self.limits
 
     def set(self, device: Device, parameters: list[str]) -> None:
@@ -130,12 +131,12 @@ class Number(Row):
         return device.reply(self.header, self.printed(device, value), self.unit)
 
     def printed(self, device: Device, value: float) -> str:
-        """The number as the answer has it, without header and unit."""
+        """Return the number as the answer has it, without header and unit."""
         return (self.spell or device.spell)(value)
 
 
 def whole(header: str, name: str, default: float, limits: tuple[float, float], *, sign: str = "") -> Number:
-    """A row for a whole number.  sign: "+" where the maker prints it."""
+    """Return a row for a whole number.  sign: "+" where the maker prints it."""
     return Number(header, name, default, limits, rounded=lambda v: float(round(v)), spell=lambda v: f"{v:{sign}.0f}")
 
 
@@ -174,7 +175,7 @@ class Word(Row):
 
 @cache
 def _split(words: str) -> tuple[str, ...]:
-    """The words without the asterisk of the default."""
+    """Return the words without the asterisk of the default."""
     return tuple(word.removeprefix("*") for word in words.split())
 
 
@@ -226,10 +227,7 @@ class Text(Row):
 
     def set(self, device: Device, parameters: list[str]) -> None:
         """See the base."""
-        given = parameter(parameters)
-        if len(given) < 2 or given[0] not in "\"'" or given[-1] != given[0]:
-            raise ScpiError(-104)
-        _put(device, self.name, given[1:-1].translate(_NOT_IN_TEXTS)[: self.longest].upper())
+        _put(device, self.name, quoted(parameters).translate(_NOT_IN_TEXTS)[: self.longest].upper())
 
     def ask(self, device: Device, parameters: list[str]) -> str:
         """See the base."""
@@ -279,6 +277,20 @@ class Ask(Row):
         """See the base."""
         no_parameters(parameters)
         return self.answer(device)
+
+
+@dataclass(frozen=True)
+class Tell(Ask):
+    """A command that is answered, without parameters; its query is the same."""
+
+    @property
+    def settable(self) -> bool:
+        """See the base."""
+        return True
+
+    def set(self, device: Any, parameters: list[str]) -> Steps[str] | str:
+        """See the base."""
+        return self.ask(device, parameters)
 
 
 @dataclass(frozen=True)
@@ -347,7 +359,7 @@ class Own(Both):
 
 
 def short_header(pattern: str) -> str:
-    """A printed header in its shortest form.
+    """Return a printed header in its shortest form.
 
     >>> short_header("TIMebase[:MAIN]:SCALe"), short_header("C1:(VDIV|VOLT_DIV)")
     ('TIM:SCAL', 'C1:VDIV')

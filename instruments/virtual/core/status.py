@@ -32,12 +32,12 @@ class Status:
         self.events |= _BITS.get(abs(number) // 100, DEVICE_ERROR)
 
     def take_events(self) -> int:
-        """The events, as ``*ESR?`` answers them; the register is empty afterwards."""
+        """Return the events, as ``*ESR?`` answers them; the register is empty afterwards."""
         events, self.events = self.events, 0
         return events
 
     def byte(self, *, errors_waiting: bool, message_available: bool) -> int:
-        """The status byte, as ``*STB?`` and a serial poll read it."""
+        """Return the status byte, as ``*STB?`` and a serial poll read it."""
         bits = ERRORS_WAITING * errors_waiting + MESSAGE_AVAILABLE * message_available
         bits += EVENT_SUMMARY * bool(self.events & self.event_enable)
         return bits + SERVICE_REQUEST * bool(bits & self.request_enable)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from instruments.ieee488 import INFINITY
-from instruments.virtual.core.device import VirtualInstrument
+from instruments.virtual.core.device import VirtualInstrument, has_node
 from instruments.virtual.core.parameters import boolean, limit, number, optional_parameter, parameter
 from instruments.virtual.core.parser import ScpiError, header_pattern
 from instruments.virtual.core.rows import Number
@@ -22,7 +22,7 @@ from instruments.virtual.counter.memory import Memory, statistics
 from instruments.virtual.counter.parameters import without_channels
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from instruments.clock import Clock
     from instruments.virtual.core.device import Answer
@@ -78,30 +78,31 @@ class Count(Number):
 
 
 class VirtualCounter(VirtualInstrument):
-    """A counter: two inputs, one run at a time, and a memory for its readings.
+    """A counter: inputs, one run at a time, and a memory for its readings.
 
     Args:
         clock: of the bench.
         signal: the voltage at input 1.
-        second: the voltage at input 2.
-        identity: the answer to ``*IDN?`` of another model of the family.
+        second: the voltage at input 2, where the model has one.
+        model: identity, numbered, lacks; see the base.
     """
 
-    #: The functions for CONFigure, MEASure and FUNCtion, by the short name in the answer.
-    functions: ClassVar[dict[str, Function]]
-    numbered = (1, 2)
+    #: The functions of the family for CONFigure, MEASure and FUNCtion, by the short name in the answer.
+    FUNCTIONS: ClassVar[dict[str, Function]]
+    numbered: Sequence[int] = (1, 2)
 
-    def __init__(
-        self, clock: Clock, *, signal: Signal, second: Signal = no_signal, identity: str | None = None
-    ) -> None:
-        self._signals = {1: signal, 2: second}
+    def __init__(self, clock: Clock, *, signal: Signal, second: Signal = no_signal, **model: Any) -> None:
         self._run: Run | None = None
         self._memory = Memory()
         self._function = "FREQ"
         self._channels: tuple[int, ...] = (1,)
         self._counted_from = 0
         self._completion_awaited = False
-        super().__init__(clock, identity=identity)
+        super().__init__(clock, **model)
+        self._signals = {n: voltage for n, voltage in ((1, signal), (2, second)) if n in self.numbered}
+        self.functions = {
+            name: function for name, function in self.FUNCTIONS.items() if not has_node(function.header, self.lacks)
+        }
 
     # --- what happens between messages ---
 
@@ -119,7 +120,7 @@ class VirtualCounter(VirtualInstrument):
         self._ready += self.pace
 
     def status_byte(self, *, message_available: bool = False) -> int:
-        """The status byte; see the base."""
+        """Return the status byte; see the base."""
         run_to_end(self.catch_up())
         return super().status_byte(message_available=message_available)
 
@@ -127,6 +128,12 @@ class VirtualCounter(VirtualInstrument):
         """ABORt, and device clear: end the measurement, and keep its readings so far."""
         super().abandon()
         self._stop()
+
+    def end_since(self, begun: float) -> None:
+        """See the base: end a measurement that began since then."""
+        super().end_since(begun)
+        if self._run and self._run.begin >= begun:
+            self._stop()
 
     def reset(self) -> None:
         """*RST: go idle, with an empty memory."""
@@ -193,7 +200,7 @@ class VirtualCounter(VirtualInstrument):
         self._run, self._memory, self._counted_from = run, run.memory, 0
 
     def inputs(self) -> Inputs:
-        """The inputs as they are set now."""
+        """Return the inputs as they are set now."""
         return Inputs(
             {
                 channel: (
@@ -207,7 +214,7 @@ class VirtualCounter(VirtualInstrument):
         )
 
     def trigger_input(self, channel: int, *, falling: bool) -> TriggerInput:
-        """The trigger of an input, with the settings that it has now."""
+        """Return the trigger of an input, with the settings that it has now."""
         raise NotImplementedError
 
     def measure(self, inputs: Inputs, gate: GateTime) -> Measurement:
@@ -227,7 +234,7 @@ class VirtualCounter(VirtualInstrument):
         self._function, self._channels = name, channels
 
     def select_function(self, words: list[str]) -> None:
-        """FUNCtion "FREQ 1": select a function and its channels, keep the settings.
+        """Select a function and its channels, as FUNCtion "FREQ 1" does; keep the settings.
 
         Args:
             words: of the string.
@@ -237,13 +244,13 @@ class VirtualCounter(VirtualInstrument):
         """
         headers = ((name, "[:][SENSe[1]:]" + function.header) for name, function in self.functions.items())
         found = next((name for name, header in headers if words and header_pattern(header).fullmatch(words[0])), None)
-        if found is None or not all(word in {"1", "2"} for word in words[1:]):
+        if found is None or not all(word in map(str, self.numbered) for word in words[1:]):
             raise ScpiError(-224, words[0][:20] if words else "")
         self.choose(found, tuple(map(int, words[1:])) or self._channels[:1])
         self.on_change("function")
 
     def greatest_level(self, channel: int) -> float:
-        """The greatest absolute trigger level [V]."""
+        """Return the greatest absolute trigger level [V]."""
         raise NotImplementedError
 
     def find_level(self, channel: int) -> float:
@@ -260,7 +267,7 @@ class VirtualCounter(VirtualInstrument):
         return boolean(text, rounded=True)
 
     def spell_whole(self, value: float) -> str:
-        """A whole number as this instrument prints it."""
+        """Return a whole number as this instrument prints it."""
         return f"{round(value):+d}"
 
     def note_completion(self) -> None:
@@ -313,6 +320,6 @@ class VirtualCounter(VirtualInstrument):
         return f'"{self._function} {where}"'
 
     def statistics(self) -> dict[str, float]:
-        """The statistics of the readings since INITiate or since the last clear; "not a number" while they are off."""
+        """Return the statistics of the readings since INITiate or the last clear; "not a number" while they are off."""
         values, _ = self._memory.slice(self._counted_from, self.available())
         return statistics(values if self.settings["averaging"] else np.empty(0))

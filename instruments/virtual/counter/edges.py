@@ -69,7 +69,7 @@ class TriggerInput:
         return self.level is None or self.alternating
 
     def thresholds(self, signal: Signal, instant: float) -> Thresholds:
-        """The trigger's voltages for the signal at this time [s].
+        """Return the trigger's voltages for the signal at this time [s].
 
         An automatic level is right where the window holds at least a period of the signal.  The pulse of a slower
         signal may fall outside the window; then the level lies in the noise of the dark.
@@ -84,7 +84,7 @@ class TriggerInput:
         return Thresholds(self.level + mean, self.level + mean - sign * self.hysteresis, sign)
 
     def extremes(self, signal: Signal, instant: float) -> tuple[float, float]:
-        """The least and the greatest voltage within the window [V]."""
+        """Return the least and the greatest voltage within the window [V]."""
         voltage = signal(instant, 1 / RATE, max(2, int(self.window * RATE)))
         return float(voltage.min()), float(voltage.max())
 
@@ -117,7 +117,7 @@ class EdgeFinder:
         return self._start + (self._samples - 1) / RATE
 
     def find(self, instant: float) -> Edge | None:
-        """The first known edge at this time or later, None where there is none."""
+        """Return the first known edge at this time or later, None where there is none."""
         count = int(np.searchsorted(self._times, instant))
         self._times, self._passed = self._times[count:], self._passed + count
         return Edge(self._passed, float(self._times[0])) if self._times.size else None
@@ -152,7 +152,7 @@ class EdgeFinder:
         return True
 
     def _crossings(self, count: int) -> Array | None:
-        """The edges in the next `count` samples as the signal itself gives them, None where it cannot."""
+        """Return the edges in the next `count` samples as the signal itself gives them, None where it cannot."""
         if self._ask is None:
             return None
         begin = self._start + max(self._samples - 1, 0) / RATE
@@ -162,7 +162,7 @@ class EdgeFinder:
         return times
 
     def _crossings_seen(self, count: int) -> Array:
-        """The edges in the next `count` samples of the voltage."""
+        """Return the edges in the next `count` samples of the voltage."""
         voltage = self._signal(self._start + self._samples / RATE, 1 / RATE, count)
         joined = self._triggers.sign * np.concatenate((self._last, voltage))
         sign = self._triggers.sign

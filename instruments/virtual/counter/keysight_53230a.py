@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from instruments.virtual.counter.parameters import channels_of, without_channels
 from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
+    from instruments.clock import Clock
     from instruments.virtual.core.signal import Array
     from instruments.virtual.core.steps import Steps
 
@@ -132,7 +133,10 @@ _SYSTEM: tuple[Row, ...] = (
 class Virtual53230A(VirtualCounter):
     """A reciprocal counter: whole periods between the first edge and the first one after the gate, over their time.
 
-    It is a 53220A where its identity says so.
+    Args:
+        clock: of the bench.
+        digits: resolution of a gate of 1 s (data sheet).
+        model: see the base.
 
     Sources: Keysight 53220A/53230A Programmer's Reference and User's Guide.  The guide gives readings a three-digit
     exponent; here it has two, as for every other instrument on this bench.  The time-out is 1 s in the guide and off
@@ -140,9 +144,13 @@ class Virtual53230A(VirtualCounter):
     """
 
     identity = "Keysight Technologies,53230A,VIRTUAL,3.09-levilab"
-    functions = _FUNCTIONS
+    FUNCTIONS: ClassVar = _FUNCTIONS
     CHANNEL_ROWS: ClassVar = _INPUT
     ROWS: ClassVar = (*_MEASURING, *_GATE, *_TRIGGERING, *_MEMORY, *_CALCULATION, *_SYSTEM)
+
+    def __init__(self, clock: Clock, *, digits: int = 12, **model: Any) -> None:
+        self._resolution = 10.0**-digits
+        super().__init__(clock, **model)
 
     def reset(self) -> None:
         """*RST; the time-out is in memory that keeps."""
@@ -154,7 +162,7 @@ class Virtual53230A(VirtualCounter):
 
     def configure(self, name: str, parameters: list[str]) -> None:
         """CONFigure: gate, trigger and level as after power-on; what is expected, and how finely, sets the gate."""
-        channels = channels_of(parameters)
+        channels = channels_of(parameters, self.numbered)
         if len(channels) > self.functions[name].inputs:
             raise ScpiError(-108)
         plain = without_channels(parameters)
@@ -168,7 +176,7 @@ class Virtual53230A(VirtualCounter):
         self.settings |= {f"relative{channel}": 50.0 for channel in self._channels}
 
     def _gate_for(self, name: str, plain: list[str]) -> float:
-        """The gate that resolves this [s].  Raises ScpiError."""
+        """Return the gate that resolves this [s].  Raises ScpiError."""
         expected, resolution = (
             math.nan
             if text.upper() in {"MIN", "MINIMUM", "MAX", "MAXIMUM", "DEF", "DEFAULT"}
@@ -179,18 +187,14 @@ class Virtual53230A(VirtualCounter):
             return 0.1 if math.isnan(expected) else min(max(expected, 1e-6), 1e3)
         if math.isnan(expected) or math.isnan(resolution) or not resolution:
             return 0.1
-        return min(max(self._resolution() * expected / resolution, 1e-4), 1e3)
-
-    def _resolution(self) -> float:
-        """Of a gate of 1 s, relative (data sheet of both: 12 digits a second, and 11)."""
-        return 1e-11 if ",53220A," in self.identity else 1e-12
+        return min(max(self._resolution * expected / resolution, 1e-4), 1e3)
 
     def function(self) -> str:
-        """FUNCtion?: the function that is set."""
+        """Answer FUNCtion? with the function that is set."""
         return f'"{self._function}"'
 
     def set_function(self, parameters: list[str]) -> None:
-        """FUNCtion "FREQ (@1)"; see `select_function`."""
+        """Execute FUNCtion "FREQ (@1)"; see `select_function`."""
         self.select_function(re.sub(r"[(@),]", " ", parameter(parameters).strip("\"'")).split())
 
     # --- measuring ---
@@ -290,7 +294,7 @@ class Virtual53230A(VirtualCounter):
         )
 
     def extremes(self, channel: int) -> tuple[float, float]:
-        """The least and the greatest voltage at an input now [V]."""
+        """Return the least and the greatest voltage at an input now [V]."""
         entry = self.trigger_input(channel, falling=False)
         low, high = entry.extremes(self._signals[channel], min(self._ready, self.clock.now() + 1.0))
         self.busy_until(self._ready + entry.window)
@@ -354,7 +358,7 @@ class Virtual53230A(VirtualCounter):
     # --- formats and statistics ---
 
     def _spell(self, values: Array, head: str = "") -> str:
-        """Readings in the format that is set.  head: of a block, if it does not give its length."""
+        """Return readings in the format that is set.  head: of a block, if it does not give its length."""
         if self.settings["format"] == "ASC":
             return ",".join(map(self.spell, values))
         data = values.astype("<f8" if self.settings["byte_order"] == "SWAP" else ">f8").tobytes()

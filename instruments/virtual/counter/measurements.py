@@ -40,7 +40,7 @@ class Inputs:
     _finders: dict[tuple[int, bool], EdgeFinder] = field(default_factory=dict)
 
     def finder(self, channel: int, instant: float, *, other_slope: bool = False) -> EdgeFinder:
-        """The edge finder of a channel, for its own slope or the other one; a new one begins at this time [s]."""
+        """Return the edge finder of a channel's own slope or the other one; a new one begins at this time [s]."""
         key = channel, other_slope
         if key not in self._finders:
             signal, own, other = self.inputs[channel]
@@ -83,7 +83,7 @@ class GateTime:
     deadline: float
 
     def without_result(self) -> Reading:
-        """The reading of a measurement without a result."""
+        """Return the reading of a measurement without a result."""
         return Reading(NOT_A_NUMBER, self.begin, self.deadline)
 
 
@@ -102,7 +102,7 @@ def frequency(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
 
 
 def period(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
-    """The mean period [s]."""
+    """Measure the mean period [s]."""
     found = yield from frequency(inputs, channel, gate)
     return found if found.value == NOT_A_NUMBER else Reading(1 / found.value, found.stamp, found.done)
 
@@ -113,7 +113,7 @@ def single_period(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
 
 
 def interval(inputs: Inputs, start: int, stop: int, gate: GateTime, *, slopes: tuple[bool, bool]) -> Measurement:
-    """The time from an edge of one input to the next edge of another, or of the same one [s].
+    """Measure the time from an edge of one input to the next edge of another, or of the same one [s].
 
     Args:
         inputs: of the run.
@@ -138,7 +138,7 @@ def interval(inputs: Inputs, start: int, stop: int, gate: GateTime, *, slopes: t
 
 
 def duty(inputs: Inputs, channel: int, gate: GateTime, *, slopes: tuple[bool, bool]) -> Measurement:
-    """The duty cycle: the part of a period between an edge of one slope and the next edge of the other."""
+    """Measure the duty cycle: the part of a period between an edge of one slope and the next edge of the other."""
     width = yield from interval(inputs, channel, channel, gate, slopes=slopes)
     if width.value == NOT_A_NUMBER:
         return width

@@ -40,7 +40,7 @@ _MOST = 10_000.0
 
 
 def number_text(value: float) -> str:
-    """A number as this instrument prints it: fourteen digits.
+    """Return a number as this instrument prints it: fourteen digits.
 
     >>> number_text(2e-8), number_text(9.91e37)
     ('+2.0000000000000E-08', '+9.9100000000000E+37')
@@ -174,7 +174,7 @@ class VirtualCNT91(VirtualCounter):
 
     identity = "PENDULUM, CNT-91, VIRTUAL, V1.28 levilab"
     no_error = '0,"No error"'
-    functions = _FUNCTIONS
+    FUNCTIONS: ClassVar = _FUNCTIONS
     CHANNEL_ROWS: ClassVar = _INPUT
     ROWS: ClassVar = (*_MEASURING, *_FETCHING, *_ARMING, *_FORMAT, *_CALCULATION, *_SYSTEM)
     native = False
@@ -186,7 +186,7 @@ class VirtualCNT91(VirtualCounter):
             self.initiate(endless=True)
 
     def on_change(self, name: str) -> None:
-        """A free-running counter begins anew with the new setting."""
+        """Let a free-running counter begin again with the new setting."""
         if name == "continuous" and not self.settings[name]:
             self._stop()
         elif self.settings.get("continuous") and name not in _HARMLESS:
@@ -202,7 +202,7 @@ class VirtualCNT91(VirtualCounter):
 
     def configure(self, name: str, parameters: list[str], *, array: bool) -> None:
         """CONFigure: function, channels, one result or an array; the counter no longer runs freely."""
-        channels, plain = channels_of(parameters), without_channels(parameters)
+        channels, plain = channels_of(parameters, self.numbered), without_channels(parameters)
         if len(channels) > self.functions[name].inputs:
             raise ScpiError(-108)
         size = 1.0
@@ -223,11 +223,11 @@ class VirtualCNT91(VirtualCounter):
         return f'"ARR:{plain[1:]}' if self.value("triggers") > 1 else plain
 
     def function(self) -> str:
-        """FUNCtion?: the function that is set, and its channels."""
+        """Answer FUNCtion? with the function that is set, and its channels."""
         return f'"{self._function} {",".join(map(str, self._channels))}"'
 
     def set_function(self, parameters: list[str]) -> None:
-        """FUNCtion "FREQ 1"; see `select_function`."""
+        """Execute FUNCtion "FREQ 1"; see `select_function`."""
         self.select_function(parameter(parameters).strip("\"'").replace(",", " ").replace("@", "").split())
 
     # --- measuring ---

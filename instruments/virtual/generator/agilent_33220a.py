@@ -91,7 +91,7 @@ class Virtual33220A(VirtualGenerator):
     # --- arbitrary waveforms: one in the volatile memory, four that are kept, and the built-in ones ---
 
     def keep(self, n: int, parameters: list[str], *, full_scale: float = 1.0) -> None:
-        """DATA: into the volatile memory.  Raises ScpiError."""
+        """Put DATA into the volatile memory.  Raises ScpiError."""
         if len(parameters) < 2:
             raise ScpiError(-109)
         if plain_name(parameters[0]) != "VOLATILE":
@@ -104,7 +104,7 @@ class Virtual33220A(VirtualGenerator):
         return ",".join(f'"{name}"' for name in (*sorted(self.channel(n).memory.held, reverse=True), *_BUILT_IN))
 
     def copies(self, n: int) -> list[str]:
-        """The names in the four places."""
+        """Return the names in the four places."""
         return [name for name in self.channel(n).memory.held if name != "VOLATILE"]
 
     def copy(self, n: int, parameters: list[str]) -> None:

@@ -35,7 +35,7 @@ class DeviceError(ScpiError):
 
 
 def built_in() -> dict[str, Samples]:
-    """The waveforms in the instrument's own memory, each from −1 to 1, shape (250,)."""
+    """Return the waveforms in the instrument's own memory, each from −1 to 1, shape (250,)."""
     x = np.linspace(0.0, 1.0, _BUILT_IN_POINTS)
     centred = 12 * (x - 0.5)
     lorentz = 1 / (1 + centred**2)
@@ -59,7 +59,7 @@ def built_in() -> dict[str, Samples]:
 
 
 def plain_name(text: str) -> str:
-    """A waveform's name as the instrument keeps it: no quotes, capitals.  Raises ScpiError.
+    """Return a waveform's name as the instrument keeps it: no quotes, capitals.  Raises ScpiError.
 
     >>> plain_name('"test"')
     'TEST'
@@ -71,7 +71,7 @@ def plain_name(text: str) -> str:
 
 
 def samples(data: Sequence[str], *, full_scale: float, block: str, least: int, most: int) -> Samples:
-    """The values of a waveform as they were sent, −1 to 1, shape (n,).
+    """Return the values of a waveform as they were sent, −1 to 1, shape (n,).
 
     data: numbers as text, or one definite-length block; full_scale: the number that stands for 1; block: NumPy's
     name of the type of a block's numbers; least, most: how many there may be.  Raises ScpiError.
@@ -118,7 +118,7 @@ class Memory:
         return self.room - sum(values.size for values in self.held.values())
 
     def names(self) -> str:
-        """The catalogue, as the answer has it.
+        """Return the catalogue in the form of the answer.
 
         >>> Memory(1000, {"A": np.zeros(8), "B": np.zeros(8)}).names()
         '"A","B"'
@@ -127,7 +127,7 @@ class Memory:
 
 
 def attribute(values: Samples, which: str) -> float:
-    """The property of a waveform that ``DATA:ATTRibute`` answers: AVERage, CFACtor, POINts or PTPeak.
+    """Return the property of a waveform that ``DATA:ATTRibute`` answers: AVERage, CFACtor, POINts or PTPeak.
 
     >>> attribute(np.array([-1.0, 1.0]), "CFAC")
     1.0

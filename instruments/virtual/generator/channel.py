@@ -91,7 +91,7 @@ class Output:
     samples: NDArray[np.float64] | None = field(default=None, compare=False, repr=False)
 
     def times(self, factor: float) -> Output:
-        """The output in another unit, of a quantity that is `factor` per volt."""
+        """Return the output in another unit, of a quantity that is `factor` per volt."""
         return replace(self, amplitude=factor * self.amplitude, offset=factor * self.offset)
 
 
@@ -131,7 +131,7 @@ class Channel:
         self._settings[self.prefix + name] = value
 
     def number(self, name: str) -> float:
-        """A setting that is a number."""
+        """Return a setting that is a number."""
         return float(self[name])
 
     def on(self, mode: str) -> bool:
@@ -143,7 +143,7 @@ class Channel:
         self._report(ScpiError(-221, text))
 
     def clip(self, value: float, low: float, high: float) -> float:
-        """The number or the limit that it is beyond, which goes into the error queue.
+        """Return the number or the limit that it is beyond, which goes into the error queue.
 
         A limit as it is printed, with its last digit rounded, is no more than itself.
         """
@@ -155,7 +155,7 @@ class Channel:
         return bound
 
     def read(self, text: str, low: float, high: float, default: float, unit: str = "") -> float:
-        """A numeric parameter, at most at its limits.  Raises ScpiError."""
+        """Return a numeric parameter, at most at its limits.  Raises ScpiError."""
         if text[:1].isalpha():
             if text.upper() in {"INF", "INFINITY"} or text.upper() not in _WORDS:
                 raise ScpiError(-104, text[:20])
@@ -163,7 +163,7 @@ class Channel:
         return self.clip(quantity_of(text, (unit,))[0], low, high)
 
     def degrees_per_unit(self) -> float:
-        """What the unit of UNIT:ANGLe is worth [°]."""
+        """Return the size of the unit of UNIT:ANGLe [°]."""
         return math.degrees(1) if self._settings["angle_unit"] == "RAD" else 1.0
 
     # --- frequency ---
@@ -203,7 +203,7 @@ class Channel:
             self["frequency"] = value
 
     def set_rate(self, value: float) -> None:
-        """Samples per second of an arbitrary waveform."""
+        """Return the samples per second of an arbitrary waveform."""
         self["arb_rate"] = value
 
     def frequency_limits(self) -> tuple[float, float]:
@@ -220,17 +220,17 @@ class Channel:
         self["frequency"] = 1 / value
 
     def square_periods(self) -> tuple[float, float]:
-        """The limits of the period of a square wave [s]."""
+        """Return the limits of the period of a square wave [s]."""
         return 1 / self.family.waveform("SQU").top, 1e6
 
     def square_duties(self) -> tuple[float, float]:
-        """The limits of the duty cycle of a square wave [%]."""
+        """Return the limits of the duty cycle of a square wave [%]."""
         return self.family.square(self.number("frequency"))
 
     # --- sweeps: centre and span are start and stop in other words ---
 
     def sweep_centre(self) -> float:
-        """The mean of start and stop [Hz]."""
+        """Return the mean of start and stop [Hz]."""
         return (self.number("sweep_start") + self.number("sweep_stop")) / 2
 
     def set_sweep_centre(self, value: float) -> None:
@@ -256,7 +256,7 @@ class Channel:
         return 1.0 if load >= INFINITE else load / (load + SOURCE_OHM)
 
     def voltage_limits(self) -> tuple[float, float]:
-        """The lowest and the highest voltage that there can be [V]."""
+        """Return the lowest and the highest voltage that there can be [V]."""
         top = OPEN_V * self.load_factor
         if self["limits_on"]:
             return max(-top, self.number("limit_low")), min(top, self.number("limit_high"))
@@ -275,14 +275,14 @@ class Channel:
         return min(0.0, low + half), max(0.0, high - half)
 
     def from_vpp(self, vpp: float, unit: str) -> float:
-        """A peak-to-peak voltage [V] in this unit."""
+        """Return a peak-to-peak voltage [V] in this unit."""
         if unit == "VPP":
             return vpp
         rms = vpp / self._crest()
         return rms if unit == "VRMS" else 10 * math.log10(rms**2 / self.number("load") / 1e-3)
 
     def to_vpp(self, value: float, unit: str) -> float:
-        """A number in this unit as a peak-to-peak voltage [V]."""
+        """Return a number in this unit as a peak-to-peak voltage [V]."""
         if unit == "VPP":
             return value
         rms = value if unit == "VRMS" else math.sqrt(10 ** (min(value, 300.0) / 10) * 1e-3 * self.number("load"))
@@ -294,11 +294,11 @@ class Channel:
         return 2.0 / max(float(np.sqrt(np.mean(self.samples**2))), 1e-3)
 
     def high(self) -> float:
-        """The high level [V]."""
+        """Return the high level [V]."""
         return round(self.number("offset") + self.number("amplitude_vpp") / 2, 12)
 
     def low(self) -> float:
-        """The low level [V]."""
+        """Return the low level [V]."""
         return round(self.number("offset") - self.number("amplitude_vpp") / 2, 12)
 
     def high_limits(self) -> tuple[float, float]:
@@ -351,7 +351,7 @@ class Channel:
         return least, 1 / self.number("frequency") - least
 
     def set_width(self, width: float) -> None:
-        """The width of pulses [s], and with it their duty cycle."""
+        """Return the width of pulses [s], and with it their duty cycle."""
         self["pulse_width"], self["pulse_duty"] = width, 100 * width * self.number("frequency")
 
     def pulse_duties(self) -> tuple[float, float]:
@@ -360,7 +360,7 @@ class Channel:
         return 100 * low * self.number("frequency"), 100 * high * self.number("frequency")
 
     def set_pulse_duty(self, duty: float) -> None:
-        """The duty cycle of pulses [%], and with it their width."""
+        """Return the duty cycle of pulses [%], and with it their width."""
         self["pulse_duty"], self["pulse_width"] = duty, duty / 100 / self.number("frequency")
 
     def set_edges(self, time: float) -> None:
@@ -389,7 +389,7 @@ class Channel:
         return bool(armed) and self["trigger_source"] not in {"IMM", "TIM"}
 
     def trigger(self) -> None:
-        """A trigger comes now."""
+        """Take a trigger that comes now."""
         start = self._now() + self.number("trigger_delay")
         lasts = self.number("burst_cycles") / self.frequency if self["burst"] else self.number("sweep_time")
         endless = self["burst"] and self.number("burst_cycles") >= INFINITE
@@ -402,7 +402,7 @@ class Channel:
     # --- the terminals ---
 
     def signal(self, time: float) -> Output:
-        """What stands at the open terminals at this time [s]."""
+        """Return the voltage at the open terminals at this time [s]."""
         on = bool(self["output"])
         start, end = self.under_way
         silent = bool(self["burst"]) and (self._gated() or (self.waits and not start <= time < end))

@@ -69,5 +69,5 @@ class Family:
     edge_part: float = 0.625
 
     def waveform(self, short: str) -> Waveform:
-        """The waveform with this short name."""
+        """Return the waveform with this short name."""
         return next(waveform for waveform in self.waveforms if waveform.short == short)

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.core.device import VirtualInstrument
-from instruments.virtual.core.parameters import choice, limit, nr3, optional_parameter, parameter
+from instruments.virtual.core.parameters import choice, limit, nr3, optional_parameter, parameter, quoted
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.generator.arbitrary import DeviceError, attribute, plain_name, samples
 from instruments.virtual.generator.channel import INFINITE, Channel, Output, quantity_of
@@ -46,7 +46,7 @@ class VirtualGenerator(VirtualInstrument):
         )
 
     def channel(self, n: int) -> Channel:
-        """The channel of this number."""
+        """Return the channel of this number."""
         return self.channels[n - 1]
 
     # --- what happens ---
@@ -69,11 +69,11 @@ class VirtualGenerator(VirtualInstrument):
                 self._listener(instant, self.channels[0].signal(instant))
 
     def signal(self, channel: int = 1) -> Output:
-        """What stands at the terminals of a channel."""
+        """Return the signal at the terminals of a channel."""
         return self.channel(channel).signal(self.clock.now())
 
     def reset(self) -> None:
-        """The state after ``*RST``: all outputs off."""
+        """Go to the state after ``*RST``: all outputs off."""
         for channel in self.channels:
             channel.stop()
         self.settings |= self.commands.defaults
@@ -114,14 +114,11 @@ class VirtualGenerator(VirtualInstrument):
 
     def set_text(self, parameters: list[str]) -> None:
         """DISPlay:TEXT: a string in quotes.  Raises ScpiError."""
-        given = parameter(parameters)
-        if len(given) < 2 or given[0] not in "\"'" or given[-1] != given[0]:
-            raise ScpiError(-104, given[:20])
-        self._text = given[1:-1][:_LONGEST_TEXT]
+        self._text = quoted(parameters)[:_LONGEST_TEXT]
 
     def text(self) -> str:
         """DISPlay:TEXT?: in quotes."""
-        return f'"{self._text}"'
+        return '"{}"'.format(self._text.replace('"', '""'))
 
     def clear_text(self) -> None:
         """DISPlay:TEXT:CLEar: none."""
@@ -147,7 +144,7 @@ class VirtualGenerator(VirtualInstrument):
 
     @staticmethod
     def _amplitude(channel: Channel, text: str) -> float:
-        """An amplitude as it is sent, with a unit or in the one that is set, as peak to peak [V], within its limits."""
+        """Return the peak-to-peak voltage of an amplitude that was sent, in its unit or the one that is set [V]."""
         least, most = channel.amplitude_limits()
         unit = str(channel["voltage_unit"])
         if text[:1].isalpha():

@@ -59,7 +59,7 @@ _FAMILY = Family(
 
 
 def _rates(channel: Channel) -> tuple[float, float]:
-    """Samples per second: fewer without a filter."""
+    """Return the limits of samples per second: fewer without a filter."""
     return 1e-6, 62.5e6 if channel["arb_filter"] == "OFF" else _FASTEST
 
 

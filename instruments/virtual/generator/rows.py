@@ -57,7 +57,7 @@ class Quantity(Row):
         return {} if self.alias else {self.name: self.default}
 
     def range(self, channel: Channel) -> tuple[float, float]:
-        """The lowest and the highest number allowed now."""
+        """Return the lowest and the highest number allowed now."""
         return self.limits(channel) if callable(self.limits) else self.limits
 
     def _is_infinite(self, text: str) -> bool:
@@ -88,7 +88,7 @@ class Quantity(Row):
         return device.spell(self.value_or_limit(device.channel(self.channel), parameters))
 
     def value_or_limit(self, channel: Channel, parameters: list[str]) -> float:
-        """The number, or the limit that the query asks for.  Raises ScpiError."""
+        """Return the number, or the limit that the query asks for.  Raises ScpiError."""
         if text := optional_parameter(parameters):
             low, high = self.range(channel)
             return limit(text, low=low, high=high, default=self.default)
@@ -204,26 +204,21 @@ CHANNEL: tuple[Row, ...] = (
     Quantity("[SOURce[n]:]SWEep:RTIMe", "{n}:sweep_return", 0.0, (0, 3600), "S"),
     Quantity("[SOURce[n]:]MARKer:FREQuency", "{n}:marker_frequency", 500.0, (1e-6, 30e6), "HZ"),
     # modulation, of which the model keeps the settings
-    Switch("[SOURce[n]:]AM:STATe", "{n}:am"),
-    Word("[SOURce[n]:]AM:SOURce", "{n}:am_source", "INTernal EXTernal"),
+    *(
+        row
+        for name, frequency in (("AM", 100.0), ("FM", 10.0), ("PM", 10.0), ("PWM", 10.0))
+        for header, key in ((f"[SOURce[n]:]{name}", f"{{n}}:{name.lower()}"),)
+        for row in (
+            Switch(f"{header}:STATe", key),
+            Word(f"{header}:SOURce", f"{key}_source", "INTernal EXTernal"),
+            Word(f"{header}:INTernal:FUNCtion", f"{key}_function", INNER),
+            Quantity(f"{header}:INTernal:FREQuency", f"{key}_frequency", frequency, (1e-6, 30e6), "HZ"),
+        )
+    ),
     Quantity("[SOURce[n]:]AM[:DEPTh]", "{n}:am_depth", 100.0, (0, 120), "PCT"),
-    Word("[SOURce[n]:]AM:INTernal:FUNCtion", "{n}:am_function", INNER),
-    Quantity("[SOURce[n]:]AM:INTernal:FREQuency", "{n}:am_frequency", 100.0, (1e-6, 30e6), "HZ"),
-    Switch("[SOURce[n]:]FM:STATe", "{n}:fm"),
-    Word("[SOURce[n]:]FM:SOURce", "{n}:fm_source", "INTernal EXTernal"),
     Quantity("[SOURce[n]:]FM[:DEViation]", "{n}:fm_deviation", 100.0, (1e-6, 15e6), "HZ"),
-    Word("[SOURce[n]:]FM:INTernal:FUNCtion", "{n}:fm_function", INNER),
-    Quantity("[SOURce[n]:]FM:INTernal:FREQuency", "{n}:fm_frequency", 10.0, (1e-6, 30e6), "HZ"),
-    Switch("[SOURce[n]:]PM:STATe", "{n}:pm"),
-    Word("[SOURce[n]:]PM:SOURce", "{n}:pm_source", "INTernal EXTernal"),
     Quantity("[SOURce[n]:]PM[:DEViation]", "{n}:pm_deviation", 180.0, (0, 360), "DEG"),
-    Word("[SOURce[n]:]PM:INTernal:FUNCtion", "{n}:pm_function", INNER),
-    Quantity("[SOURce[n]:]PM:INTernal:FREQuency", "{n}:pm_frequency", 10.0, (1e-6, 30e6), "HZ"),
-    Switch("[SOURce[n]:]PWM:STATe", "{n}:pwm"),
-    Word("[SOURce[n]:]PWM:SOURce", "{n}:pwm_source", "INTernal EXTernal"),
     Quantity("[SOURce[n]:]PWM[:DEViation]", "{n}:pwm_deviation", 1e-5, (0, 1e6), "S"),
-    Word("[SOURce[n]:]PWM:INTernal:FUNCtion", "{n}:pwm_function", INNER),
-    Quantity("[SOURce[n]:]PWM:INTernal:FREQuency", "{n}:pwm_frequency", 10.0, (1e-6, 30e6), "HZ"),
     Switch("[SOURce[n]:]FSKey:STATe", "{n}:fsk"),
     Word("[SOURce[n]:]FSKey:SOURce", "{n}:fsk_source", "INTernal EXTernal"),
     Quantity("[SOURce[n]:]FSKey:FREQuency", "{n}:fsk_frequency", 100.0, (1e-6, 30e6), "HZ"),
@@ -257,7 +252,7 @@ SHARED: tuple[Row, ...] = (
 
 
 def waveforms(family: Family) -> tuple[Row, ...]:
-    """The rows that know the waveforms of a family."""
+    """Return the rows that know the waveforms of a family."""
     return (
         Word("[SOURce[n]:]FUNCtion[:SHAPe]", "{n}:waveform", " ".join(waveform.word for waveform in family.waveforms)),
         *(
@@ -268,7 +263,7 @@ def waveforms(family: Family) -> tuple[Row, ...]:
 
 
 def pulses(periods: tuple[float, float], edges: tuple[float, float], edge: float) -> tuple[Row, ...]:
-    """The rows of the times of pulses.  periods, edges: their limits [s]; edge: after ``*RST`` [s]."""
+    """Return the rows of the times of pulses.  periods, edges: their limits [s]; edge: after ``*RST`` [s]."""
     edge_of = f"{_PULSE}TRANsition"
     return (
         Quantity(
@@ -284,7 +279,7 @@ def pulses(periods: tuple[float, float], edges: tuple[float, float], edge: float
 
 
 def burst_cycles(most: float) -> Row:
-    """The row of the cycles of a burst."""
+    """Return the row of the cycles of a burst."""
     return Quantity(
         *("[SOURce[n]:]BURSt:NCYCles", "{n}:burst_cycles", 1.0, (1, most)), put=Channel.set_burst_cycles, endless=True
     )

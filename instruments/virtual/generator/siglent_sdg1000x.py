@@ -6,18 +6,19 @@ what the authors of a public driver measured on an SDG2042X (the answer to ``C1:
 number, ten of a frequency; volts r.m.s. of a sine are 0.3535 of its peak to peak, of a ramp 1/3.464; the fraction of a
 load is cut off).  Inferred: which field gives way where amplitude and offset together go beyond 10 V (the one that is
 set), that a message has no path memory and changes nothing where one of its fields is unknown, limits of the ramp.
-Modulation, sweep, burst and arbitrary waveforms are missing.
+Modulation, sweep and burst are always off, arbitrary waveforms are missing.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.core.device import VirtualInstrument
-from instruments.virtual.core.parameters import choice, number
+from instruments.virtual.core.parameters import boolean, choice, number, parameter
 from instruments.virtual.core.parser import Row, ScpiError, Value
-from instruments.virtual.core.rows import Both, Do
+from instruments.virtual.core.rows import Ask, Both, Own, Switch, short_header
 from instruments.virtual.generator.channel import INFINITE, OPEN_V, SOURCE_OHM, Output
 
 if TYPE_CHECKING:
@@ -44,7 +45,8 @@ class Field:
     """A field of BSWV that is a number.
 
     key: its name on the wire; name: the setting; default; unit; shown: whether it is printed at the load; only: the
-    waveforms that have it, all by default.
+    waveforms that have it, all by default.  Fields without a setting of their own are sent only: their names begin
+    with an underscore.
     """
 
     key: str
@@ -62,6 +64,11 @@ _FIELDS = {
         Field("PERI", "frequency", 1000.0, "S"),
         Field("AMP", "amplitude", 4.0, "V", shown=True),
         Field("OFST", "offset", 0.0, "V", shown=True),
+        Field("HLEV", "_high", 2.0, "V", shown=True),
+        Field("LLEV", "_low", -2.0, "V", shown=True),
+        Field("AMPVRMS", "_rms", 1.414, "V", shown=True),
+        Field("AMPDBM", "_dbm", 0.0),
+        Field("MAX_OUTPUT_AMP", "greatest_amplitude", 20.0, "V"),
         Field("PHSE", "phase", 0.0),
         Field("DUTY", "duty", 50.0, only=("SQUARE", "PULSE")),
         Field("SYM", "symmetry", 50.0, only=("RAMP",)),
@@ -69,7 +76,7 @@ _FIELDS = {
 }
 #: The settings of a channel, with their values after ``*RST``.
 _DEFAULTS: dict[str, Value] = {
-    **{field.name: field.default for field in _FIELDS.values()},
+    **{field.name: field.default for field in _FIELDS.values() if not field.name.startswith("_")},
     "waveform": "SINE",
     "output": False,
     "load": INFINITE,
@@ -78,11 +85,23 @@ _DEFAULTS: dict[str, Value] = {
 _CHANNEL: tuple[Row, ...] = (
     Both("C{n}:(BSWV|BASIC_WAVE)", lambda s, n, p: s.set_wave(n, p), lambda s, n, p: s.wave(n, p)),
     Both("C{n}:(OUTP|OUTPUT)", lambda s, n, p: s.set_output(n, p), lambda s, n, p: s.output(n, p)),
+    *(
+        Own(f"C{{n}}:({short}|{long})", lambda _s, _n, p: _only_off(p), lambda _s, n, w=short: f"C{n}:{w} STATE,OFF")
+        for short, long in (("MDWV", "MODULATEWAVE"), ("SWWV", "SWEEPWAVE"), ("BTWV", "BURSTWAVE"))
+    ),
+    Switch("C{n}:SYNC", "{n}:sync", words=("OFF", "ON")),
+    Own("C{n}:(INVT|INVERT)", lambda s, n, p: s.invert(n, p), lambda s, n: s.inverted(n)),
 )
 
 
+def _only_off(parameters: list[str]) -> None:
+    """STATE,OFF: modulation, sweep and burst are missing here.  Raises ScpiError for all else."""
+    if [word.upper() for word in parameters] != ["STATE", "OFF"]:
+        raise ScpiError(-224)
+
+
 def _key(n: int, name: str) -> str:
-    """The name of a channel's setting."""
+    """Return the name of a channel's setting."""
     return f"{n}:{name}"
 
 
@@ -103,7 +122,10 @@ class VirtualSDG1000X(VirtualInstrument):
     path_memory = False
     numbered = (1, 2)
     CHANNEL_ROWS: ClassVar = _CHANNEL
-    ROWS: ClassVar[tuple[Row, ...]] = (Do("(BUZZ|BUZZER)"),)
+    ROWS: ClassVar[tuple[Row, ...]] = (
+        Switch("(BUZZ|BUZZER)", "buzzer", default=True, words=("OFF", "ON")),
+        Ask("(CHDR|COMM_HEADER)", lambda _s: "CHDR SHORT"),
+    )
     DEFAULTS: ClassVar = {_key(n, name): value for n in numbered for name, value in _DEFAULTS.items()}
 
     def __init__(
@@ -116,13 +138,17 @@ class VirtualSDG1000X(VirtualInstrument):
         """Six digits, and none that is zero at the end: 1000, 0.001."""
         return f"{value:.6g}"
 
+    def reply(self, header: str, text: str, unit: str = "") -> str:
+        """See the base: with the header."""
+        return f"{short_header(header)} {text}"
+
     def on_change(self, name: str) -> None:
         """Pass the voltage at the terminals of channel 1 to the listener."""
         if self._listener and name.startswith("1:"):
             self._listener(self.clock.now(), self.signal())
 
     def reset(self) -> None:
-        """The state after ``*RST``: all outputs off."""
+        """Go to the state after ``*RST``: all outputs off."""
         self.settings |= self.commands.defaults
         self.on_change("1:output")
 
@@ -152,16 +178,40 @@ class VirtualSDG1000X(VirtualInstrument):
         self.on_change(_key(n, "waveform"))
 
     def _set_number(self, n: int, field: Field, value: float) -> None:
+        amplitude, offset = self._number(n, "amplitude"), self._number(n, "offset")
+        kind = _WAVEFORMS[str(self.settings[_key(n, "waveform")])]
+        other = {"HLEV": offset - amplitude / 2, "LLEV": offset + amplitude / 2}.get(field.key)
+        if other is not None:  # the other level stays
+            self._set_number(n, _FIELDS["OFST"], 0.0)
+            self._set_number(n, _FIELDS["AMP"], abs(value - other))
+            self._set_number(n, _FIELDS["OFST"], (value + other) / 2)
+            return
         if field.key == "PERI":
             value = 1 / max(value, 1e-12)
+        elif field.key == "AMPVRMS":
+            field, value = _FIELDS["AMP"], value * kind[2]
+        elif field.key == "AMPDBM":
+            field, value = _FIELDS["AMP"], self._volts_of_dbm(n, value) * kind[2]
         low, high = self._limits(n, field.name)
         self.settings[_key(n, field.name)] = min(max(value, low), high)
+        if field.key == "MAX_OUTPUT_AMP":
+            self._set_number(n, _FIELDS["AMP"], amplitude)
+
+    def _volts_of_dbm(self, n: int, dbm: float) -> float:
+        """Return the open-circuit voltage, r.m.s., for this power at the load [V].  Raises ScpiError without a load."""
+        load = self._number(n, "load")
+        if load >= INFINITE:
+            raise ScpiError(-221)
+        return math.sqrt(1e-3 * load) * 10 ** (min(max(dbm, -1e3), 1e3) / 20) / self._load_factor(n)
 
     def _limits(self, n: int, name: str) -> tuple[float, float]:
         if name == "frequency":
             return 1e-6, _WAVEFORMS[str(self.settings[_key(n, "waveform")])][1]
         if name == "amplitude":
-            return _LEAST_VPP, max(_LEAST_VPP, 2 * (OPEN_V - abs(self._number(n, "offset"))))
+            room = min(2 * (OPEN_V - abs(self._number(n, "offset"))), self._number(n, "greatest_amplitude"))
+            return _LEAST_VPP, max(_LEAST_VPP, room)
+        if name == "greatest_amplitude":
+            return _LEAST_VPP, 2 * OPEN_V
         if name == "offset":
             reach = OPEN_V - self._number(n, "amplitude") / 2
             return -reach, reach
@@ -222,10 +272,19 @@ class VirtualSDG1000X(VirtualInstrument):
         polarity = self.settings[_key(n, "polarity")]
         return f"C{n}:OUTP {state},LOAD,{shown},PLRT,{polarity}"
 
+    def invert(self, n: int, parameters: list[str]) -> None:
+        """INVT ON or OFF: the polarity, as PLRT of OUTP sets it.  Raises ScpiError."""
+        self.settings[_key(n, "polarity")] = _POLARITIES[boolean(parameter(parameters))]
+        self.on_change(_key(n, "output"))
+
+    def inverted(self, n: int) -> str:
+        """INVT?: whether the output is inverted."""
+        return f"C{n}:INVT {'ON' if self.settings[_key(n, 'polarity')] == 'INVT' else 'OFF'}"
+
     # --- the terminals ---
 
     def signal(self, n: int = 1) -> Output:
-        """What stands at the open terminals of a channel."""
+        """Return the signal at the open terminals of a channel."""
         on, short = bool(self.settings[_key(n, "output")]), _WAVEFORMS[str(self.settings[_key(n, "waveform")])][0]
         return Output(
             waveform=short,

@@ -27,7 +27,7 @@ _NOISE_PEAK = 3.3
 
 
 def voltage(output: Output, turns: Array, times: Array) -> Array:
-    """The voltage at the terminals, shape (n,) [V].
+    """Return the voltage at the terminals, shape (n,) [V].
 
     Args:
         output: at the terminals.
@@ -52,7 +52,7 @@ def fundamental(output: Output) -> float:
 
 
 def _busy(output: Output) -> float:
-    """The part of the time in which bursts are on."""
+    """Return the fraction of time in which bursts are on."""
     burst = output.burst
     if burst is None or burst.period is None or not output.frequency:
         return 1.0

@@ -47,7 +47,7 @@ class HallProbe:
     zero_error: float
 
     def look(self, instant: float, mode: int, time_constant: float, noise: float) -> Reading:
-        """A reading.  mode: as in RDGMODE; time_constant: of the filter for steady fields [s]; noise: see Reading."""
+        """Read.  mode: as in RDGMODE; time_constant: of the filter for steady fields [s]; noise: see Reading."""
         steady = self.steady(instant, time_constant)
         if mode == 1:
             return Reading(instant, mode, steady, 0.0, steady, steady, 0.0, noise)
@@ -57,7 +57,7 @@ class HallProbe:
         return Reading(instant, mode, steady, rms, lowest, highest, _frequency(field, step), noise)
 
     def steady(self, instant: float, time_constant: float) -> float:
-        """The mean over the time constant, the probe's own zero error included [T]."""
+        """Return the mean over the time constant, the probe's own zero error included [T]."""
         step = time_constant / _STEADY_LOOKS
         field = self._sampled(instant - step * np.arange(_STEADY_LOOKS)[::-1])
         return float(field.mean()) + self.zero_error

@@ -63,14 +63,14 @@ class Field:
     whole: bool = True
 
     def read(self, text: str) -> float:
-        """The parameter.  Raises ScpiError."""
+        """Return the parameter.  Raises ScpiError."""
         value = number(text, low=self.low, high=self.high, default=self.default)
         if self.whole and value != int(value):
             raise ScpiError(-224, text[:20])
         return value
 
     def spell(self, value: float) -> str:
-        """The number as the instrument prints it."""
+        """Return the number as the instrument prints it."""
         return f"{int(value)}" if self.whole else field_text(value)
 
 
@@ -99,7 +99,7 @@ class Fields(Row):
 
 
 def field_text(value: float) -> str:
-    """A number as these instruments print it, ±nnn.nnnE±nn.
+    """Return a number as these instruments print it, ±nnn.nnnE±nn.
 
     >>> field_text(12.3456), field_text(-3.5e-5), field_text(0.0)
     ('+123.456E-01', '-350.000E-07', '+000.000E+00')
@@ -202,7 +202,7 @@ class VirtualGaussmeter(VirtualInstrument):
         return _UNITS_T[int(self.value("unit")) - 1]
 
     def in_unit(self, value: float) -> str:
-        """A flux density [T] as it is printed in the present unit."""
+        """Return a flux density [T] as it is printed in the present unit."""
         return field_text(value / self._unit())
 
     def restore_factory_settings(self, parameters: list[str]) -> None:
@@ -226,7 +226,7 @@ class VirtualGaussmeter(VirtualInstrument):
         self.settings |= {"range": Field("range", 1, len(self._ranges()), 1).read(parameters[0]), "auto": 0.0}
 
     def range_index(self) -> int:
-        """The index of the range in use; the automatic choice goes down at nine tenths of the lower range."""
+        """Return the index of the range in use; the automatic choice goes down at nine tenths of the lower range."""
         ranges = self._ranges()
         index = min(int(self.value("range")), len(ranges)) - 1
         if self.value("auto") and self.probe:
@@ -245,7 +245,7 @@ class VirtualGaussmeter(VirtualInstrument):
         raise NotImplementedError
 
     def _counts(self) -> float:
-        """Steps of the last digit in a full range."""
+        """Return the steps of the last digit in a full range."""
         raise NotImplementedError
 
     def _interval(self) -> float:
@@ -253,7 +253,7 @@ class VirtualGaussmeter(VirtualInstrument):
         return 1 / 30
 
     def reading(self) -> Reading:
-        """The latest reading at the time at which the message is worked on."""
+        """Return the latest reading at the time at which the message is worked on."""
         self._finish_zeroing()
         interval = self._interval()
         instant = math.floor(self._ready / interval + 1e-9) * interval
@@ -268,7 +268,7 @@ class VirtualGaussmeter(VirtualInstrument):
         return int(self.value("mode"))
 
     def measured(self) -> float:
-        """The reading in the present mode before it is rounded [T]."""
+        """Return the reading in the present mode before it is rounded [T]."""
         reading = self.reading()
         if self._mode() == 2:
             return reading.rms
@@ -281,7 +281,7 @@ class VirtualGaussmeter(VirtualInstrument):
         return reading.highest + self._hall.zero_error
 
     def shown(self) -> float:
-        """The reading as the instrument rounds it [T]."""
+        """Return the reading as the instrument rounds it [T]."""
         resolution = self._ranges()[self.range_index()] / self._counts()
         reading = self.reading()
         shown = round((self.measured() + _NOISE * reading.noise * resolution) / resolution) * resolution
@@ -293,7 +293,7 @@ class VirtualGaussmeter(VirtualInstrument):
         return self.probe is not None and abs(self.measured()) > self._ranges()[self.range_index()]
 
     def answer(self, value: Callable[[], float]) -> str:
-        """A field [T] in the present unit, or why there is none."""
+        """Return a field [T] in the present unit, or why there is none."""
         if self.probe is None:
             return "NO PROBE"
         return "OL" if self._overloaded() else self.in_unit(value())

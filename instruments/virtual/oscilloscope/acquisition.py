@@ -88,7 +88,7 @@ class Acquisition:
         self.was_armed = True
 
     def arm_again(self, now: float) -> None:
-        """Settings have changed: what is under way begins anew with them."""
+        """Begin again with settings that have changed."""
         if self.armed is not None and not self.blocked:
             self.arm(now, once=self.once)
 
@@ -128,7 +128,7 @@ class Acquisition:
         return (self.armed or 0.0) + self._plan.before
 
     def first(self, until: float) -> Record | None:
-        """The record for which the scope is armed, if its trigger comes before that time [s]."""
+        """Return the record for which the scope is armed, if its trigger comes before that time [s]."""
         if self._edge is None:
             self._edge = self._plan.search(self.filled)
         automatic = self.filled + AUTO_AFTER if self._plan.automatic else math.inf

@@ -219,7 +219,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
     # --- acquiring ---
 
     def on_number_change(self, name: str, before: float) -> None:
-        """An offset beyond what the range allows is set to the nearest that it does."""
+        """Set an offset that is beyond the limits of the range to the nearest one within."""
         if name.startswith("chan") and name.endswith("_offset"):
             n = int(name[4])
             reach = (2.0 if self.value(f"chan{n}_scale") / self.probe(n) < 0.2 else 50.0) * self.probe(n)
@@ -227,7 +227,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         super().on_number_change(name, before)
 
     def digitize_sources(self, parameters: list[str]) -> None:
-        """Raises ScpiError in roll and XY mode, where there is no record."""
+        """Raise ScpiError in roll and XY mode, where there is no record."""
         if self.settings["time_mode"] in {"ROLL", "XY"}:
             raise ScpiError(-221)
         words = (*(f"CHANnel{n}" for n in self.channels), *_EMPTY_SOURCES)
@@ -261,7 +261,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         return f"{int(not self.running() and self.acquisition.latest is not None):+d}"
 
     def condition(self) -> int:
-        """The operation register: bit 3 while it runs, bit 5 while it waits for a trigger."""
+        """Return the operation register: bit 3 while it runs, bit 5 while it waits for a trigger."""
         if not self.running():
             return 0
         waits = self.now >= self.acquisition.filled and self.acquisition.first(self.now) is None
@@ -308,7 +308,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
     # --- scaling ---
 
     def full_scale(self) -> tuple[float, int]:
-        """The record fills the screen and nothing else."""
+        """Return rate and points of a record that fills the screen and nothing else."""
         length = 10 * self.value("time_scale")
         rate = min(_FASTEST / (1 if len(self.shown()) <= 1 else 2), self._memory / length)
         return rate, max(2, round(rate * length))
@@ -329,17 +329,17 @@ class VirtualDSOX1000(VirtualOscilloscope):
         return float(self.middle), float(_CODES_ON_SCREEN)
 
     def fit(self, channel: int, middle: float, division: float) -> None:
-        """The offset is the voltage in the middle."""
+        """Return the voltage in the middle of the screen: the offset."""
         self.settings |= {f"chan{channel}_scale": division, f"chan{channel}_offset": middle}
 
     # --- reading the record ---
 
     def set_points(self, parameters: list[str]) -> None:
-        """A number, rounded to the next the scope can give when it is asked for; MAXimum takes all."""
+        """Return a number, rounded to the next the scope can give when it is asked for; MAXimum takes all."""
         self.settings["wav_points"] = number(parameter(parameters), low=1, high=8e6, default=_FOR_SCREEN)
 
     def sequence(self) -> tuple[Record, float, int]:
-        """The record, the distance of the points that can be read [s], how many.  Raises ScpiError."""
+        """Return the record, the distance of the points that can be read [s], how many.  Raises ScpiError."""
         if self.settings["time_mode"] in {"ROLL", "XY"}:
             raise ScpiError(-221)
         record = self.record()
@@ -410,7 +410,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         self.settings["measure_source"] = f"CHAN{self.channel_of(parameters[0])}"
 
     def _where(self, parameters: list[str]) -> int:
-        """The channel that is named last, after words that say over what is measured.  Raises ScpiError."""
+        """Return the channel that is named last, after words that say over what is measured.  Raises ScpiError."""
         for word in parameters[:-1]:
             choice(word, _INTERVALS)
         if not parameters or parameters[-1].upper() in {"CYCL", "CYCLE", "DISP", "DISPLAY", "AC", "DC"}:

@@ -86,7 +86,7 @@ class Measured:
         return _mean_gap(self.crossings(first, rising=rising), self.crossings(last, rising=rising)) * self.step
 
     def whole_periods(self) -> Volts:
-        """The samples from the first rising edge to the last."""
+        """Return the samples from the first rising edge to the last."""
         if self.rises.size < 2:
             raise NotMeasurable
         return self.volts[round(self.rises[0]) : round(self.rises[-1])]
@@ -123,7 +123,7 @@ def _level(volts: Volts, *, upper: bool) -> float:
 
 
 def _mean_gap(starts: Volts, ends: Volts) -> float:
-    """The mean way from each start to the end behind it, in samples."""
+    """Return the mean way from each start to the end behind it, in samples."""
     following = np.searchsorted(ends, starts)
     there = following < ends.size
     if not there.any():

@@ -47,11 +47,11 @@ class Input:
     highest: int
 
     def volts(self, start: float, step: float, n: int) -> NDArray[np.float64]:
-        """What the scope takes the voltage at the probe's tip for."""
+        """Return the voltage that the scope shows for the one at the probe's tip."""
         return self.factor * (self.signal(start, step, n) - self.mean)
 
     def codes(self, start: float, step: float, n: int) -> Codes:
-        """The same as the converter gives it."""
+        """Return the converter's codes of the same samples."""
         codes = np.rint(self.volts(start, step, n) / self.volts_per_code) + self.zero
         return np.asarray(np.clip(codes, self.lowest, self.highest), dtype=np.uint8)
 
@@ -80,7 +80,7 @@ class Record:
         return self.trigger + self.origin + self.points / self.rate
 
     def taken(self, trigger: float, *, forced: bool) -> Record:
-        """The same, triggered at that time [s]."""
+        """Return the same record, triggered at this time [s]."""
         return replace(self, trigger=trigger, forced=forced, _kept={})
 
     def codes(self, channel: int, first: int, count: int, *, of: int, start: float, step: float) -> Codes:
@@ -144,7 +144,7 @@ class Edge:
         return None
 
     def _first(self, k: int, volts: NDArray[np.float64], slope: float) -> int | None:
-        """The first sample at or above the level after one below it less the hysteresis."""
+        """Return the first sample at or above the level after one below it less the hysteresis."""
         level = slope * self.level
         begin = 0
         if not self._armed[k]:
@@ -160,7 +160,7 @@ class Edge:
         return None
 
     def _placed(self, start: float, step: float, slope: float) -> float:
-        """The crossing between two looks, looked at ever closer."""
+        """Return the time of the crossing between two looks, by halving."""
         while step > self.fine:
             step /= 1000
             volts = self.volts(start, step, 1001)

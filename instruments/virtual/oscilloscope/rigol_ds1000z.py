@@ -205,7 +205,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
         self.single()
 
     def on_number_change(self, name: str, before: float) -> None:
-        """A sweep of SINGle waits for one record, the others go on."""
+        """Begin to acquire: one record with a sweep of SINGle, without end with the others."""
         self._keep_zoom_within()
         super().on_number_change(name, before)
         if name == "trigger_sweep" and self.acquisition.armed is not None:
@@ -240,11 +240,11 @@ class VirtualDS1000Z(VirtualOscilloscope):
     # --- time base and memory ---
 
     def zoom_scales(self) -> tuple[float, float]:
-        """The delayed sweep: no coarser than the main one, no finer than a fortieth of 50 sample intervals."""
+        """Return the delayed sweep: no coarser than the main one, no finer than a fortieth of 50 sample intervals."""
         return one_two_five(50 / self.full_scale()[0] / 40, up=True), self.value("time_scale")
 
     def zoom_offsets(self) -> tuple[float, float]:
-        """The delayed sweep: all of it within the main one."""
+        """Return the delayed sweep: all of it within the main one."""
         reach = 6 * (self.value("time_scale") - self.value("zoom_scale"))
         return self.value("time_offset") - reach, self.value("time_offset") + reach
 
@@ -285,7 +285,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
     # --- scaling ---
 
     def full_scale(self) -> tuple[float, int]:
-        """The record fills the screen, or goes beyond it where even the fastest rate is too slow to fill it."""
+        """Return rate and points of a record that fills the screen, or more where even the fastest rate is too slow."""
         fastest, length = _FASTEST / self._share(), self.columns * self.value("time_scale")
         depth = str(self.settings["depth"])
         if depth == "AUTO":
@@ -303,7 +303,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
     # --- reading the record ---
 
     def sequence(self) -> tuple[Record, float, float, int]:
-        """The record, and of the points that can be read: where they begin [s], their distance [s], how many.
+        """Return the record, and of the points that can be read: where they begin [s], their distance [s], how many.
 
         Raises ScpiError: the memory can only be read when the scope has stopped.
         """

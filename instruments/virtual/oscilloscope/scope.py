@@ -82,11 +82,11 @@ class VirtualOscilloscope(VirtualInstrument):
     # --- what a subclass says of its numbers and its scaling ---
 
     def spell(self, value: float) -> str:
-        """A number as this maker prints it."""
+        """Return a number as this maker prints it."""
         raise NotImplementedError
 
     def full_scale(self) -> tuple[float, int]:
-        """Samples per second and points of the record that would be taken now."""
+        """Return samples per second and points of the record that would be taken now."""
         raise NotImplementedError
 
     def screen(self) -> tuple[float, float]:
@@ -102,7 +102,7 @@ class VirtualOscilloscope(VirtualInstrument):
         return volts_per_code, self.middle + round(self.value(f"chan{channel}_offset") / volts_per_code)
 
     def codes_on_screen(self, channel: int) -> tuple[float, float]:
-        """The code in the middle of the screen, and how many codes it is high: eight divisions."""
+        """Return the code in the middle of the screen, and how many codes it is high: eight divisions."""
         return float(self.middle), 8.0 * self.codes_per_division
 
     def fit(self, channel: int, middle: float, division: float) -> None:
@@ -112,15 +112,15 @@ class VirtualOscilloscope(VirtualInstrument):
     # --- settings ---
 
     def level_name(self, channel: int) -> str:
-        """The setting that holds the trigger level of a channel."""
+        """Return the setting that holds the trigger level of a channel."""
         return "trigger_level"
 
     def source_word(self, channel: int) -> str:
-        """A channel as a source of the trigger."""
+        """Return a channel as a source of the trigger."""
         return f"CHAN{channel}"
 
     def slope_name(self, channel: int) -> str:
-        """The setting that holds the trigger slope of a channel."""
+        """Return the setting that holds the trigger slope of a channel."""
         return "trigger_slope"
 
     def division(self, channel: int) -> float:
@@ -132,27 +132,27 @@ class VirtualOscilloscope(VirtualInstrument):
         return self.value(f"chan{channel}_probe")
 
     def shown(self) -> list[int]:
-        """The channels that are on."""
+        """Return the channels that are on."""
         return [n for n in self.channels if self.settings[f"chan{n}_display"]]
 
     def source_channel(self) -> int | None:
-        """The channel that triggers, None where it is something else."""
+        """Return the channel that triggers, None where it is something else."""
         found = _CHANNEL.fullmatch(str(self.settings["trigger_source"]))
         return int(found[1]) if found else None
 
     def channel_of(self, text: str) -> int:
-        """The channel of ``CHAN1`` or ``CHANnel1``.  Raises ScpiError."""
+        """Return the channel of ``CHAN1`` or ``CHANnel1``.  Raises ScpiError."""
         words = tuple(f"CHANnel{n}" for n in self.channels)
         return int(choice(text, words)[4:])
 
     # --- when a setting changes ---
 
     def on_change(self, name: str) -> None:
-        """A setting has changed: what runs begins anew."""
+        """Begin the acquisition again, as a setting has changed."""
         self.on_number_change(name, 0.0)
 
     def on_number_change(self, name: str, before: float) -> None:
-        """A number has changed from what it was before."""
+        """Adjust other settings to a number that has changed."""
         if name.endswith("_probe") and before:
             self._follow_probe(name.removesuffix("_probe"), float(self.settings[name]) / before)
         if not name.startswith("wav"):
@@ -168,7 +168,7 @@ class VirtualOscilloscope(VirtualInstrument):
             self.settings[level] = ratio * float(self.settings[level])
 
     def reset(self) -> None:
-        """The state after ``*RST``: it runs."""
+        """Go to the state after ``*RST``: it runs."""
         self.acquisition.blocked = False
         super().reset()
         self.run()
@@ -193,7 +193,7 @@ class VirtualOscilloscope(VirtualInstrument):
         return f'"{value}"' if name.endswith("_label") else value
 
     def restore(self, setup: str) -> None:
-        """Settings from messages; a setup that is none leaves what it had already set.  Raises ScpiError."""
+        """Take settings from messages; a wrong one leaves those before it set.  Raises ScpiError."""
         if self._restoring:
             raise ScpiError(-224)
         known = set(self._headers().values())
@@ -225,7 +225,7 @@ class VirtualOscilloscope(VirtualInstrument):
         return max(self._ready, now) if math.isfinite(self._ready) else now
 
     def _plan(self, armed: float) -> Plan:
-        """What is acquired from this time on [s]."""
+        """Return the plan of an acquisition from this time on [s]."""
         rate, points = self.full_scale()
         start, length = self.screen()
         record = Record(
@@ -254,7 +254,7 @@ class VirtualOscilloscope(VirtualInstrument):
         return Input(signal, factor, mean, volts_per_code, zero, self.lowest, self.highest)
 
     def _search(self, record: Record, start: float) -> Edge | None:
-        """A search for the trigger of this record from a time on [s], or None if the source never triggers."""
+        """Return a search for the trigger of this record from a time on [s], or None if the source never triggers."""
         channel = self.source_channel()
         if channel is None:
             return None
@@ -305,12 +305,17 @@ class VirtualOscilloscope(VirtualInstrument):
         self.acquisition.settle(record, self.now)
 
     def abandon(self) -> None:
-        """A device clear: what is under way is given up, an acquisition that blocks included."""
+        """Clear the device: give up what is under way, an acquisition that blocks included."""
         super().abandon()
         self.acquisition.unblock()
 
+    def end_since(self, begun: float) -> None:
+        """See the base: end an acquisition that blocks."""
+        super().end_since(begun)
+        self.acquisition.unblock()
+
     def record(self) -> Record:
-        """The latest record; the answer waits for it if one is under way.  Raises ScpiError if there is none."""
+        """Return the latest record; the answer waits for it if one is under way.  Raises ScpiError if there is none."""
         acquisition = self.acquisition
         acquisition.follow(self.now)
         if acquisition.latest is None and acquisition.runs_freely:
@@ -325,12 +330,12 @@ class VirtualOscilloscope(VirtualInstrument):
     # --- what the record shows ---
 
     def block(self, data: bytes) -> str:
-        """A definite-length block as text, and the time that it takes."""
+        """Return a definite-length block as text, and the time that it takes."""
         self.busy_until(self._ready + len(data) / self.transfer)
         return block_text(data, self.digits)
 
     def on_screen(self, channel: int, points: int = 50_000) -> Measured:
-        """The trace on the screen, from its codes.  Raises ScpiError if there is none."""
+        """Return the trace on the screen, from its codes.  Raises ScpiError if there is none."""
         record = self.record()
         start, length = record.screen
         points = max(2, min(points, round(length * record.rate)))
@@ -340,7 +345,7 @@ class VirtualOscilloscope(VirtualInstrument):
         return Measured((codes.astype(np.float64) - scale.zero) * scale.volts_per_code, step, start)
 
     def measured(self, name: str, channel: int) -> float:
-        """A measurement on the screen, or what stands for none."""
+        """Return a measurement on the screen, or what stands for none."""
         value = measure(name, self.on_screen(channel))
         return self.no_measurement if value is None else value
 
@@ -358,7 +363,7 @@ class VirtualOscilloscope(VirtualInstrument):
     # --- settings from the signal ---
 
     def half_level(self) -> None:
-        """The trigger level half way between the lowest and the highest voltage on the screen."""
+        """Return the trigger level half way between the lowest and the highest voltage on the screen."""
         channel = self.source_channel()
         if channel is not None:
             trace, name = self.on_screen(channel), self.level_name(channel)
@@ -405,7 +410,7 @@ def at_input(lowest: float, highest: float) -> Callable[[VirtualOscilloscope, in
 
 
 def one_two_five(value: float, *, up: bool = False) -> float:
-    """The number of the series 1, 2, 5, 10 … nearest to a positive one, or the next that is not less.
+    """Return the number of the series 1, 2, 5, 10 … nearest to a positive one, or the next that is not less.
 
     >>> one_two_five(3e-3), one_two_five(4e-3), one_two_five(2.1, up=True), one_two_five(0.2, up=True)
     (0.002, 0.005, 5.0, 0.2)

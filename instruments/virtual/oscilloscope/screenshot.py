@@ -21,7 +21,7 @@ _COLOURS = {1: (255, 255, 0), 2: (0, 255, 255), 3: (255, 0, 255), 4: (64, 128, 2
 
 
 def draw(traces: Mapping[int, NDArray[np.float64]], *, columns: int) -> Picture:
-    """The screen, shape (HEIGHT, WIDTH, 3).
+    """Return the screen, shape (HEIGHT, WIDTH, 3).
 
     traces: by channel, one height per column of the screen from 0, the lower edge, to 1; columns: of the grid.
     """
@@ -37,12 +37,12 @@ def draw(traces: Mapping[int, NDArray[np.float64]], *, columns: int) -> Picture:
 
 
 def grey(picture: Picture) -> Picture:
-    """The same without colours."""
+    """Return the same screen without colours."""
     return np.repeat(picture.max(axis=2, keepdims=True), 3, axis=2)
 
 
 def png(picture: Picture) -> bytes:
-    """A PNG file (ISO/IEC 15948): eight bits per colour."""
+    """Return a PNG file (ISO/IEC 15948): eight bits per colour."""
     height, width, _ = picture.shape
     rows = np.zeros((height, 1 + 3 * width), dtype=np.uint8)  # each row begins with its filter, 0: none
     rows[:, 1:] = picture.reshape(height, -1)
@@ -57,14 +57,14 @@ def png(picture: Picture) -> bytes:
 
 
 def bmp24(picture: Picture) -> bytes:
-    """A BMP file with 24 bits per pixel; rows from below, blue first."""
+    """Return a BMP file with 24 bits per pixel; rows from below, blue first."""
     height, width, _ = picture.shape
     pixels = picture[::-1, :, ::-1].tobytes()  # 800 pixels of 3 bytes need no padding
     return _bmp_head(width, height, 24, 54, len(pixels)) + pixels
 
 
 def bmp8(picture: Picture) -> bytes:
-    """A BMP file with 8 bits per pixel and the 216 colours of a cube of six."""
+    """Return a BMP file with 8 bits per pixel and the 216 colours of a cube of six."""
     height, width, _ = picture.shape
     levels = np.arange(216)
     palette = np.zeros((256, 4), np.uint8)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from instruments.virtual.core.parameters import choice, parameter
 from instruments.virtual.core.parser import Row, ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Word, short_header
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Tell, Word, short_header
 from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, one_two_five
 from instruments.virtual.oscilloscope.screenshot import bmp24, draw
 
@@ -99,8 +99,8 @@ _REST: tuple[Row, ...] = (
     Both("(SANU|SAMPLE_NUM)", answer=lambda s, p: s.sample_number(p)),
     Ask("(SAST|SAMPLE_STATUS)", lambda s: s.reply("SAST", s.state())),
     Ask("INR", lambda s: s.reply("INR", str(s.internal_state()))),
-    Ask("(SCDP|SCREEN_DUMP)", lambda s: s.picture()),
-    Do("(BUZZ|BUZZER)"),
+    Tell("(SCDP|SCREEN_DUMP)", lambda s: s.picture()),
+    Switch("(BUZZ|BUZZER)", "buzzer", default=True, words=("OFF", "ON")),
 )
 
 
@@ -121,7 +121,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         super().__init__(clock, signals=signals, channels=channels, identity=identity)
 
     def reset(self) -> None:
-        """The state after ``*RST``; how answers look stays."""
+        """Go to the state after ``*RST``; the form of answers stays."""
         header = self.settings["header"]
         super().reset()
         self.settings["header"] = header
@@ -224,7 +224,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     # --- time base and memory ---
 
     def delays(self) -> tuple[float, float]:
-        """The limits of TRDL [s]."""
+        """Return the limits of TRDL [s]."""
         return -max(5.0, 7 * self.value("time_scale")), 7 * self.value("time_scale")
 
     def _halved(self) -> bool:
@@ -246,7 +246,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         return self.reply("MSIZ", list(_HALVES)[list(_DEPTHS).index(word)] if self._halved() else word)
 
     def full_scale(self) -> tuple[float, int]:
-        """The record fills the screen and nothing else."""
+        """Return rate and points of a record that fills the screen and nothing else."""
         share = 2 if self._halved() else 1
         length = _COLUMNS * self.value("time_scale")
         rate = min(_FASTEST / share, _DEPTHS[str(self.settings["depth"])] / share / length)
@@ -275,7 +275,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         return self.reply("WFSU", ",".join(f"{name},{value}" for name, value in self._setup.items()))
 
     def _places(self, record: Record) -> range:
-        """The points of a record that are sent."""
+        """Return the points of a record that are sent."""
         step, most, first = max(1, self._setup["SP"]), self._setup["NP"], min(self._setup["FP"], record.points)
         places = range(first, record.points, step)
         return places[:most] if most else places

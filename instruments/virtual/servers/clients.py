@@ -101,6 +101,7 @@ class ServedInstrument:
 
     bench: VirtualBench
     device: VirtualInstrument
+    links: list[Link] = field(default_factory=list)
     _jobs: deque[Job] = field(default_factory=deque)  # in the order of their turns
     _current: Job | None = None  # whose message the instrument works on
     _free_at: float = 0.0  # when the instrument takes the next message [s]
@@ -120,7 +121,7 @@ class ServedInstrument:
         self._give_turn()
 
     def jobs(self) -> Iterator[Job]:
-        """The job that the instrument works on, then those that wait."""
+        """Yield the job that the instrument works on, then those that wait."""
         if self._current:
             yield self._current
         yield from self._jobs
@@ -153,7 +154,7 @@ class ServedInstrument:
             self._next_turn = asyncio.get_running_loop().call_later(wait, self._give_turn)
 
     def _choose(self) -> Job | None:
-        """The job to work on: the first that may have its turn, which may abort the one under way; else that one."""
+        """Return the job to work on: the first that may have its turn, or the one under way if none may."""
         job = next((job for job in self._jobs if job.may_have_turn()), None)
         if job:
             self._jobs.remove(job)
@@ -214,12 +215,16 @@ class Link:
 
     Attributes:
         session: see :class:`instruments.virtual.bench.session.Session`; only the event loop may use it.
+        lingers: whether it waits for an answer alone, and ends when another client comes.
         messages_done: how many messages the instrument has worked on.
         error: the exception that ended the work on one of them, None so far.
     """
 
     def __init__(self, instrument: ServedInstrument, *, stream: bool = False) -> None:
-        self.instrument, self.closed, self.messages_done = instrument, False, 0
+        self.instrument, self.closed, self.lingers, self.messages_done = instrument, False, False, 0
+        for link in [link for link in instrument.links if link.lingers]:
+            link.close()
+        instrument.links.append(self)
         self.session = self._new(stream=stream)
         self.error: Exception | None = None
 
@@ -280,21 +285,20 @@ class Link:
         """Wait until the instrument has worked on what a client sent before it fell silent.
 
         The wait ends when a message takes longer than LINGER.  On a stream it includes the answers: the client may have
-        closed its own direction alone.
+        closed its own direction alone.  It waits for longer than LINGER for an answer while no other client is there.
 
         Args:
             ended: returns when everything is done.
         """
         done = -1
-        while done < self.messages_done or self._answers_later():
+        while done < self.messages_done or self.lingers:
             done = self.messages_done
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(LINGER):
                     await ended()
                     return
-
-    def _answers_later(self) -> bool:
-        return self.session.stream and 0 < (self.seconds_until_ready() or 0.0) < INFINITY
+            later = not self.closed and self.session.stream and 0 < (self.seconds_until_ready() or 0.0) < INFINITY
+            self.lingers = later and self.instrument.links == [self]
 
     async def catch_up(self) -> None:
         """Work out what has happened in the instrument since the last message."""
@@ -303,7 +307,7 @@ class Link:
             await asyncio.sleep(0)  # the others' turn
 
     def trigger(self) -> None:
-        """The interface's trigger message."""
+        """Send the interface's trigger message."""
         self.session.trigger()
         self.instrument.notify()
 
@@ -322,8 +326,11 @@ class Link:
             self.instrument.device.parser.report(ScpiError(-410))
 
     def close(self) -> None:
-        """End the link: drop the client's messages and release its lock."""
+        """End the link: drop the client's messages, release its lock, and end what its question has begun."""
+        if self.closed:
+            return
         self.closed = True
+        self.instrument.links.remove(self)
         self.instrument.drop(self)
         self.session.close()
         self.instrument.notify()
@@ -376,7 +383,7 @@ class Link:
         return not self.is_busy() and self.seconds_until_ready() is None
 
     def status_byte(self, *, unread: bool = False) -> int:
-        """The status byte, as a serial poll reads it.  unread: whether the client has not read an answer sent to it."""
+        """Return the status byte of a serial poll.  unread: whether the client has not read an answer sent to it."""
         with self.session.lock:
             return self.instrument.device.status_byte(message_available=True) if unread else self.session.status_byte()
 

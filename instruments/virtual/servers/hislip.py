@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 from dataclasses import dataclass, field
+from enum import Enum, auto
 from typing import TYPE_CHECKING
 
 from instruments.virtual.servers.clients import FIRST_WORDS, MOST_CLIENTS, Disconnected, Link, Listener, first_of
@@ -39,6 +40,42 @@ SECOND_CHANNEL = FIRST_WORDS
 _FIRST_ID, _STEP, _IDS = 0xFFFFFF00, 2, 1 << 32
 
 
+class State(Enum):
+    """What a client and its session wait for (3.1.1, 6.12)."""
+
+    #: Messages; no answer was sent whole that the client has not confirmed.
+    IDLE = auto()
+    #: The client's confirmation (RMT-delivered) that it has read the answer that was sent whole.
+    SENT = auto()
+    #: The end of a device clear.
+    CLEARING = auto()
+
+
+class Event(Enum):
+    """What changes the state."""
+
+    MESSAGE = auto()
+    CONFIRMED = auto()
+    SENT_PART = auto()
+    SENT_END = auto()
+    CLEAR = auto()
+    CLEARED = auto()
+
+
+#: The transitions of all states; an event that is missing changes nothing.
+TRANSITIONS: dict[State, dict[Event, State]] = {
+    State.IDLE: {Event.SENT_END: State.SENT, Event.CLEAR: State.CLEARING},
+    State.SENT: {
+        Event.MESSAGE: State.IDLE,  # rule 2: the client has not read the answer, it was interrupted
+        Event.CONFIRMED: State.IDLE,
+        Event.SENT_PART: State.IDLE,
+        Event.CLEAR: State.CLEARING,
+        Event.CLEARED: State.IDLE,
+    },
+    State.CLEARING: {Event.CLEARED: State.IDLE},
+}
+
+
 @dataclass(eq=False)
 class Client:
     """One client: its link, its two channels, and the state of each."""
@@ -50,12 +87,23 @@ class Client:
     synchronous_ended: asyncio.Event = field(default_factory=asyncio.Event)  # no more messages come there
     gone: asyncio.Event = field(default_factory=asyncio.Event)
     max_payload: int = DEFAULT_PAYLOAD
-    clearing: bool = False
+    state: State = State.IDLE
     received: int = _FIRST_ID - _STEP  # MessageID of the last message received
     answering: int = 0  # MessageID that the answers under way belong to
-    rmt_expected: bool = False  # an answer was sent whole, and the client has not confirmed that it has read it
     lock_request: asyncio.Task[None] | None = None
     shared: bool = False  # whether its lock is a shared one
+
+    def is_clearing(self) -> bool:
+        """Return whether the client has begun a device clear."""
+        return self.state is State.CLEARING
+
+    def _change_state(self, event: Event) -> None:
+        self.state = TRANSITIONS[self.state].get(event, self.state)
+
+    def _confirm(self, message: Message) -> None:
+        """Note that the client has read the last answer, where its message says so (RMT-delivered)."""
+        if message.control & 1:
+            self._change_state(Event.CONFIRMED)
 
     # --- the synchronous channel ---
 
@@ -88,9 +136,10 @@ class Client:
         if not await self._wait_for_turn(message):
             return
         self.received = message.parameter
-        if self.rmt_expected and not message.control & 1:  # 3.1.1, rule 2: no message to the client
+        self._confirm(message)
+        if self.state is State.SENT:  # 3.1.1, rule 2: no message to the client
             self.link.report_interrupted()
-        self.rmt_expected = False
+        self._change_state(Event.MESSAGE)
         if message.type == Type.TRIGGER:
             self.link.trigger()
             return
@@ -98,17 +147,17 @@ class Client:
         if end:
             if self.link.seconds_until_ready() is not None:  # rule 1: the session drops the answer
                 await self._send_interrupted(message.parameter)
-                if self.clearing:  # the client has begun a device clear during the send
+                if self.is_clearing():  # the client has begun it during the send
                     return
             self.answering = message.parameter
         await self.link.write(message.payload, end=end)
 
     async def _wait_for_turn(self, message: Message) -> bool:
         """Wait until the instrument may take a message.  Returns False where a device clear ends the wait."""
-        await self.link.wait_unlocked(give_up=lambda: self.clearing)
+        await self.link.wait_unlocked(give_up=self.is_clearing)
         if not self.link.is_abort(message.payload, end=message.type == Type.DATA_END):
-            await self.link.wait_until_done(give_up=lambda: self.clearing)
-        return not self.clearing
+            await self.link.wait_until_done(give_up=self.is_clearing)
+        return not self.is_clearing()
 
     async def _send_interrupted(self, number: int) -> None:
         """Send Interrupted on both channels, the asynchronous one first (6.11, table 30)."""
@@ -122,7 +171,8 @@ class Client:
 
         The answer says synchronized mode, whichever mode the client prefers.
         """
-        self.clearing, self.rmt_expected, self.received = False, False, _FIRST_ID - _STEP
+        self._change_state(Event.CLEARED)
+        self.received = _FIRST_ID - _STEP
         self.synchronous.send(Message(Type.DEVICE_CLEAR_ACKNOWLEDGE))
 
     async def answer(self) -> None:
@@ -130,7 +180,7 @@ class Client:
         while await self.link.wait_for_answer():
             data, end = self.link.take(self.max_payload)
             self.synchronous.send(Message(Type.DATA_END if end else Type.DATA, parameter=self.answering, payload=data))
-            self.rmt_expected = end
+            self._change_state(Event.SENT_END if end else Event.SENT_PART)
             await self.synchronous.drain()
 
     # --- the asynchronous channel ---
@@ -157,7 +207,7 @@ class Client:
 
     def clear(self, channel: Channel, message: Message) -> None:
         """AsyncDeviceClear: drop what comes on the synchronous channel until the clear ends there (6.12)."""
-        self.clearing = True
+        self._change_state(Event.CLEAR)
         self.link.clear()
         channel.send(Message(Type.ASYNC_DEVICE_CLEAR_ACKNOWLEDGE))
 
@@ -166,10 +216,10 @@ class Client:
 
         A query whose MessageID is not the last message's comes too early; pyvisa-py 0.8 sends the next message's.
         """
-        if message.control & 1:
-            self.rmt_expected = False
+        self._confirm(message)
         known = message.parameter in {self.received, (self.received + _STEP) % _IDS}
-        channel.send(Message(Type.ASYNC_STATUS_RESPONSE, self.link.status_byte(unread=self.rmt_expected and known)))
+        unread = self.state is State.SENT and known
+        channel.send(Message(Type.ASYNC_STATUS_RESPONSE, self.link.status_byte(unread=unread)))
 
     def lock(self, channel: Channel, message: Message) -> None:
         """AsyncLock: request or release the lock (6.5)."""
@@ -217,7 +267,7 @@ class Client:
 
 
 async def _next(channel: Channel) -> Message:
-    """The next message, once the client has read its replies, so that unread replies do not pile up."""
+    """Return the next message, once the client has read its replies, so that unread replies do not pile up."""
     await channel.drain()
     await asyncio.sleep(0)  # many messages may have come at once: let the other clients have their turn
     return await channel.receive()

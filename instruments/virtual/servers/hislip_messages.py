@@ -87,7 +87,7 @@ class Message(NamedTuple):
     payload: bytes = b""
 
     def pack(self) -> bytes:
-        """The bytes on the wire."""
+        """Return the bytes on the wire."""
         return HEADER.pack(b"HS", self.type, self.control, self.parameter, len(self.payload)) + self.payload
 
 

@@ -51,12 +51,12 @@ def read_call(record: bytes) -> Call:
 
 
 def reply(call: Call, results: bytes) -> bytes:
-    """The record that answers a call with its results: accepted, no verifier, success."""
+    """Return the record that answers a call with its results: accepted, no verifier, success."""
     return pack(call.number, 1, 0, 0, b"", 0) + results
 
 
 def refusal(call: Call, why: AcceptStatus, *versions: int) -> bytes:
-    """The record that refuses a call.  versions: the first and the last that the program has, for a mismatch."""
+    """Return the record that refuses a call.  versions: the first and the last that the program has, for a mismatch."""
     return pack(call.number, 1, 0, 0, b"", why, *versions)
 
 
@@ -82,7 +82,7 @@ class Program:
 
 
 async def read_record(reader: asyncio.StreamReader, longest: int) -> bytes:
-    """The next record, from its fragments (RFC 5531, 11).  Raises Disconnected when it is longer than any call."""
+    """Return the next record from its fragments (RFC 5531, 11).  Raises Disconnected: it is longer than any call."""
     record = bytearray()  # a record may come in a million fragments
     while True:
         head = int.from_bytes(await reader.readexactly(4))

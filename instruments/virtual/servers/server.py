@@ -57,7 +57,7 @@ class ListenAt:
     port_mapper: int | None = None
 
     def name_in_resources(self) -> str:
-        """The host as resource names have it: a name of this machine where it listens at all addresses."""
+        """Return the host as resource names have it: a name of this machine where it listens at all addresses."""
         return socket.gethostname() if self.host in {"", "0.0.0.0"} else self.host  # noqa: S104 - only asked for
 
     def of_instrument(self, index: int) -> ListenAt:
@@ -65,7 +65,7 @@ class ListenAt:
         return self if self.port_mapper is None else replace(self, host=f"127.0.0.{2 + index}")
 
     def ports(self, index: int) -> Iterator[int]:
-        """The ports of the instrument of this index, 0 for any free one."""
+        """Yield the ports of the instrument of this index, 0 for any free one."""
         first = self.port_base
         for listen_at in range(PORTS_PER_INSTRUMENT):
             yield 0 if first is None else first + PORTS_PER_INSTRUMENT * index + listen_at

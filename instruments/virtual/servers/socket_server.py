@@ -38,7 +38,7 @@ class TcpWire:
 
 
 def socket_listener(instrument: ServedInstrument) -> Listener:
-    """A listener that serves an instrument over bare TCP."""
+    """Return a listener that serves an instrument over bare TCP."""
 
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await converse(instrument, TcpWire(reader, writer))

@@ -127,7 +127,7 @@ class Vxi11Server:
         self._links.pop(number).link.close()
 
     def link(self, number: int) -> OpenLink:
-        """The link with this number, which must exist."""
+        """Return the link with this number, which must exist."""
         return self._links[number]
 
 
@@ -149,7 +149,7 @@ class _Connection:
             self._server.destroy(number)
 
     def procedures(self) -> Mapping[int, Procedure]:
-        """The procedures of the core channel (B.6)."""
+        """Return the procedures of the core channel (B.6)."""
         return {
             10: self._create_link,
             11: self._device_write,

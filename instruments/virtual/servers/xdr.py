@@ -16,15 +16,15 @@ class Reader:
         self._data, self._place = data, 0
 
     def number(self) -> int:
-        """An unsigned whole number of 32 bits (a signed one is not negative here).  Raises Garbage."""
+        """Return an unsigned whole number of 32 bits (a signed one is not negative here).  Raises Garbage."""
         return int.from_bytes(self._bytes(4))
 
     def numbers(self, count: int) -> tuple[int, ...]:
-        """The next `count` numbers.  Raises Garbage."""
+        """Return the next `count` numbers.  Raises Garbage."""
         return tuple(self.number() for _ in range(count))
 
     def opaque(self) -> bytes:
-        """A string of bytes.  Raises Garbage."""
+        """Return a string of bytes.  Raises Garbage."""
         length = self.number()
         data = self._bytes(length)
         self._place += -length % 4

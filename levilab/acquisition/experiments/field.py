@@ -113,7 +113,7 @@ class FieldSettings(ExperimentSettings):
 
 
 def channels(settings: FieldSettings) -> tuple[Channel, ...]:
-    """The uncertainties of all that is known, and that of the mean alone: only the latter is a reading's own."""
+    """Return the uncertainties of all that is known, and that of the mean alone: only the latter is a reading's own."""
     return (
         Channel("time_s", "s", "bench clock, from the zero of the probe"),
         Channel("height_m", "m", "of the probe on the axis, as the person set or typed it"),
@@ -215,7 +215,7 @@ def _place(session: Session[FieldSettings], height: float, which: str) -> float:
 
 
 def typed_height(answer: str) -> float | None:
-    """A height as a person types it, in mm where no unit is said [m]; None for what is none.
+    """Return a height as a person types it, in mm where no unit is said [m]; None for what is none.
 
     >>> typed_height("61,5"), typed_height("6.15 cm"), typed_height("high")
     (0.0615, 0.0615, None)
@@ -231,7 +231,7 @@ def typed_height(answer: str) -> float | None:
 
 
 def _measure(session: Session[FieldSettings], height: float) -> Row:
-    """The mean of the readings at a height; a magnetometer that fails is set up anew, and the height read anew."""
+    """Return the mean of the readings at a height; set up a magnetometer that fails again, and read again."""
     while True:
         try:
             session.wait(session.settings.settle_s)
@@ -275,7 +275,7 @@ def _mean(settings: FieldSettings, values: list[float]) -> Row:
 
 
 def _digit(values: list[float]) -> float:
-    """The last digit that the instrument shows [T]: the smallest step between readings, else that of six digits."""
+    """Return the last digit of the instrument [T]: the smallest step between readings, else that of six digits."""
     different = sorted(set(values))
     steps = [b - a for a, b in pairwise(different)]
     largest = max(abs(value) for value in values)

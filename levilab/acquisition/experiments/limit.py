@@ -72,7 +72,7 @@ class LimitSettings(DriveSettings):
 
 
 def channels(settings: LimitSettings) -> tuple[Channel, ...]:
-    """The same for both limits."""
+    """Return the same for both limits."""
     limit = "at which the free top fell" if settings.which == "lower" else "up to which the top followed the drive"
     seen = "the lowest one counted" if settings.which == "lower" else "the last one counted of the held top"
     return (
@@ -190,7 +190,7 @@ def _lower(session: Session[LimitSettings], keep: Callable[[Row], None]) -> bool
 
 
 def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_since: float, text: str) -> Row:
-    """The reading of a fall.  missed_since: when the first count was asked for that saw no top any more [s]."""
+    """Return the reading of a fall.  missed_since: when the first count was asked for that saw no top any more [s]."""
     settings = session.settings
     if len(seen) < 3:
         raise ExperimentFailed(
@@ -263,7 +263,7 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
 
 
 def _limit_of_loss(settings: LimitSettings, between: tuple[float, float], seen: list[tuple[float, float]]) -> Row:
-    """The reading of a top that no longer follows, without its time.
+    """Return the reading of a top that no longer follows, without its time.
 
     between: the drive's frequencies at the last look at which it did, and at the first one at which it did not [Hz];
     seen: each count until then, with the drive's frequency [Hz].

@@ -109,7 +109,7 @@ class PrecessionSettings(DriveSettings):
 
 
 def also_needs(settings: PrecessionSettings) -> tuple[str, ...]:
-    """The oscilloscope is needed for records only."""
+    """Return the oscilloscope is needed for records only."""
     return ("oscilloscope",) if settings.record_s else ()
 
 
@@ -149,7 +149,7 @@ def run(session: Session[PrecessionSettings]) -> None:
 
 
 def _points_done(rows: list[Row], sweep: tuple[float, ...]) -> int:
-    """The first point after those that the readings are of, in order."""
+    """Return the first point after those that the readings are of, in order."""
     done = 0
     for row in rows:
         drive = row["drive_frequency_hz"]
@@ -263,7 +263,7 @@ def calming_step(swing: Swing, drive: float, now: float, limits: DriveLimits) ->
 
 
 def _counted(session: Session[PrecessionSettings], drive: float, what: str, level_v: float, channel: int) -> Gates:
-    """The gates of an input of the counter.
+    """Return the gates of an input of the counter.
 
     A gate begins and ends with a pulse.  Pulses come early and late where a nutation goes on beside the wobble in step,
     at the beats of the two, and a late pulse is the likelier one to begin or end a gate.  Both ends are late alike, and
@@ -339,7 +339,7 @@ def _check_pulses(session: Session[PrecessionSettings], laser: Gates) -> None:
 
 
 def _say_what_was_miscounted(session: Session[PrecessionSettings], laser: Gates, found: Rate, drive: float) -> None:
-    """An event where gates of the laser were left out, or had no count."""
+    """Note an event where gates of the laser were left out, or had no count."""
     said = [f"gate {gate + 1} has {pulses_too_many(pulses)}" for gate, pulses in found.wrong]
     if found.missing:
         said.append(f"{found.missing} of {len(laser)} gates have no count")
@@ -349,7 +349,7 @@ def _say_what_was_miscounted(session: Session[PrecessionSettings], laser: Gates,
 
 
 def _u(rate: Rate, settings: PrecessionSettings) -> float:
-    """Standard uncertainty of a rate [Hz]; one that the configuration gives is that of one count."""
+    """Return the standard uncertainty of a rate [Hz]; one from the configuration is that of one count."""
     if settings.reading_u_hz is not None:
         return settings.reading_u_hz / math.sqrt(settings.counts)
     return max(rate.u, _LEAST_U_HZ)

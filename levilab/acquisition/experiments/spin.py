@@ -73,7 +73,7 @@ def keeps_its_spin(first: Row, last: Row) -> bool:
 
 
 def _why_it_keeps_its_spin(session: Session[SpinSettings], first: Row, last: Row) -> str:
-    """What was seen of a top that keeps its spin, and what may be the reason."""
+    """Return a description of a top that keeps its spin, with a likely reason."""
     seen = (
         f"the spin does not fall: {first['spin_frequency_hz']:.2f} Hz, and {last['spin_frequency_hz']:.2f} Hz "
         f"{last['time_s'] - first['time_s']:.0f} s later"

@@ -82,7 +82,7 @@ class TraceSettings(ExperimentSettings):
         return self.trigger_channel or self.channels[0]
 
     def label(self, channel: int) -> str:
-        """What a channel shows, as it stands beside its traces."""
+        """Return the meaning of a channel, as it stands beside its traces."""
         k = self.channels.index(channel)
         return self.shows[k] if k < len(self.shows) else f"channel {channel}"
 
@@ -108,7 +108,7 @@ class TraceSettings(ExperimentSettings):
 
 
 def channels(settings: TraceSettings) -> tuple[Channel, ...]:
-    """A row of readings.csv for each record."""
+    """Write a row of readings.csv for each record."""
     trigger = f"oscilloscope, channel {settings.trigger_source}, which triggers"
     if settings.trigger_source not in settings.channels:
         trigger = f"oscilloscope, channel {settings.channels[0]}"
@@ -121,7 +121,7 @@ def channels(settings: TraceSettings) -> tuple[Channel, ...]:
 
 
 def also_needs(settings: TraceSettings) -> tuple[str, ...]:
-    """The generator, if the top is to be driven."""
+    """Return the generator, if the top is to be driven."""
     return ("generator",) if settings.drive_frequency_hz else ()
 
 
@@ -144,7 +144,7 @@ def run(session: Session[TraceSettings]) -> None:
 
 
 def _note_what_was_cut_short(session: Session[TraceSettings]) -> None:
-    """A process that was killed in the middle of a record has left codes without a line, or channels without a row."""
+    """Note codes without a line, or channels without a row, left by a process killed in the middle of a record."""
     folder = session.writer.folder
     if left := undescribed_codes(folder):
         text = f"{', '.join(left)}: the run was cut short before {INDEX} said how to read it; it stays, and is left out"
@@ -209,7 +209,7 @@ class _Watch:
     lost: bool = False
 
     def look(self, traces: list[Trace]) -> None:
-        """What a record that is kept says of the drive; a generator that was changed or is lost is set up anew."""
+        """Return the drive's settings for a record; set a generator that was changed or lost up again."""
         session, drive = self.session, self.session.settings.drive_frequency_hz
         if drive is None:
             return
@@ -278,7 +278,7 @@ def _take(session: Session[TraceSettings]) -> list[Trace]:
 
 
 def _why_no_trigger(session: Session[TraceSettings]) -> str:
-    """What the signal is instead: a record without a trigger shows it."""
+    """Return a description of the signal, by a record without a trigger."""
     settings, count = session.settings, len(session.rows)
     where = f"at {settings.trigger_level_v:g} V on channel {settings.trigger_source}"
     said = f"no trigger {where} within {settings.trigger_patience_s:g} s, after {count} of {settings.records} records"
@@ -298,12 +298,12 @@ def _why_no_trigger(session: Session[TraceSettings]) -> str:
 
 
 def _shown(settings: TraceSettings) -> int:
-    """The channel whose range the message names: the one that triggers, if it is recorded."""
+    """Return the channel whose range the message names: the one that triggers, if it is recorded."""
     return settings.trigger_source if settings.trigger_source in settings.channels else settings.channels[0]
 
 
 def _range(trace: Trace) -> tuple[float, float]:
-    """The lowest and the highest voltage of a trace [V], NaN where it has no sample."""
+    """Return the lowest and the highest voltage of a trace [V], NaN where it has no sample."""
     volts = trace.volts[~np.isnan(trace.volts)]
     return (float(volts.min()), float(volts.max())) if volts.size else (math.nan, math.nan)
 
@@ -320,7 +320,7 @@ def _keep(session: Session[TraceSettings], traces: list[Trace], time_s: float) -
 
 
 def _problem(trace: Trace, settings: TraceSettings) -> str:
-    """What is wrong with the scale of a trace, empty if nothing is."""
+    """Return the fault of a trace's scale, empty if it has none."""
     codes = trace.codes if trace.none is None else trace.codes[trace.codes != trace.none]
     what = f"channel {trace.channel} ({settings.label(trace.channel)})"
     if not codes.size or int(codes.max()) - int(codes.min()) < _FEWEST_CODES:

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
 from analysis.pulses import spin_of_times, spin_of_trace
+from analysis.pulses.synthetic import DURATION, HARD, RATE, Case, Trace, bound, make
 from levilab.benchmark.estimators.peers import PEERS
-from levilab.benchmark.estimators.traces import DURATION, DUTY, HARD, RATE, Case, Trace, make
 from levilab.benchmark.machine import processor, version_of
 from levilab.errors import UsageError
 
@@ -40,15 +40,6 @@ AIMS = (
     ("fast", 10.0, 1.25, 120e6),
     ("maximum likelihood", 0.0, 1.10, RATE * DURATION / 0.1),
 )
-
-
-def bound(snr: float) -> float:
-    """The Cramér–Rao bound of the frequency at the middle [Hz] of the study's traces: PHYSICS §5, closed form.
-
-    σ_f² = 12 σ²/(N G T²), G = A²√π/(2 s), s = duty/2.3548.
-    """
-    steepness = math.sqrt(math.pi) / (2 * DUTY / math.sqrt(8 * math.log(2)))
-    return math.sqrt(12 / (RATE * DURATION * steepness * DURATION**2)) * 10 ** (-snr / 20)
 
 
 @dataclass
@@ -175,7 +166,11 @@ def hard_case(name: str, case: Case, trials: int, seed: int = SEED) -> Score:
 def _try(found: Trials, trace: Trace, number: int, method: Choice, *, times: bool = False) -> None:
     begin = time.process_time()
     try:
-        spin = spin_of_times(trace.samples) if times else spin_of_trace(trace.samples, RATE, method=method)
+        # the slope of these traces stays, and so it does in the bound
+        if times:
+            spin = spin_of_times(trace.samples, degree=2)
+        else:
+            spin = spin_of_trace(trace.samples, RATE, method=method, degree=2)
     except AnalysisError:
         found.refused += number >= 0
         return

@@ -21,7 +21,7 @@ from levilab.simulator.stops import stops_between
 from levilab.simulator.varied import batches
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
 #: Steps in the 5 s.
 STEPS = {
@@ -41,21 +41,21 @@ def problem(name: str) -> Problem:
     return Problem(scene, model_of(scene), start_of(scene), SCHEMES[name])
 
 
-def scalar(quick: bool) -> Iterator[Point]:  # noqa: FBT001
-    """One top, one core, fixed steps: the kernel alone."""
-    for name, counts in STEPS.items():
+def scalar(quick: bool, names: Iterable[str] = tuple(STEPS)) -> Iterator[Point]:  # noqa: FBT001
+    """Yield points of one top, one core, fixed steps: the kernel alone."""
+    for name in names:
         ready = problem(name)
-        for count in counts[:: 2 if quick else 1]:
+        for count in STEPS[name][:: 2 if quick else 1]:
             stops = stops_between(0.0, motion.DURATION, motion.DURATION / count, ready.scene.drive)
             states, _ = ready.advance_to_stops(ready.start, stops, ready.escape)
             seconds = best_time(partial(ready.advance_to_stops, ready.start, stops, ready.escape))
             yield Point(name, f"{count} steps", error_of(states[-1, :3]), motion.DURATION / seconds)
 
 
-def many(quick: bool) -> Iterator[Point]:  # noqa: FBT001
-    """Four times as many tops as lanes, one core, fixed steps; the error of the first."""
+def many(quick: bool, names: Iterable[str] = ("levitron-6", "kahan-li-8")) -> Iterator[Point]:  # noqa: FBT001
+    """Yield points of four times as many tops as lanes, one core, fixed steps; the error of the first."""
     tops = 4 * LANES
-    for name in ("levitron-6", "kahan-li-8"):
+    for name in names:
         ready = problem(name)
         places = ready.start[0] + np.arange(tops) * 1e-6
         (batch,) = batches(ready.scene, {"start.position_m.0": places})

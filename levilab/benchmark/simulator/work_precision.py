@@ -4,27 +4,20 @@ from __future__ import annotations
 
 import math
 import platform
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from levilab.benchmark.machine import processor, version_of
-from levilab.benchmark.simulator import kernel, ours
-from levilab.benchmark.simulator.as_called.comparison import measure_calls
-from levilab.benchmark.simulator.as_called.overhead import OVERHEADS, overhead
-from levilab.benchmark.simulator.as_called.tasks import TASKS
+from levilab.benchmark.simulator import ours
 from levilab.benchmark.simulator.peers import PEERS, Peer
 from levilab.benchmark.simulator.speeds import Ratio, best_speed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
-    from levilab.benchmark.simulator.as_called.comparison import Case
-    from levilab.benchmark.simulator.as_called.overhead import Overhead
     from levilab.benchmark.simulator.peers import Point
 
-#: The parts of the benchmark: kernels at fixed steps, one top as called, many tops as called.
-PARTS = ("kernel", "called", "ensemble")
 ROUNDS = 3
 #: What is to be compared: ours, the peer, the error [m], and the ratio that was aimed at.
 AIMS = (
@@ -37,44 +30,29 @@ AIMS = (
 
 @dataclass(frozen=True)
 class Comparison:
-    """What was measured; empty what was not.
+    """What was measured.
 
     Attributes:
         points: of the kernels at fixed steps and the peers, on one motion.
         ratios: of their speeds.
-        rates: of the kernels.
-        cases: motions and ensembles as called.
-        overheads: of calls.
         missing: the peers' packages that are not installed.
     """
 
-    points: tuple[Point, ...] = ()
-    ratios: tuple[Ratio, ...] = ()
-    rates: Mapping[str, kernel.Rate] = field(default_factory=dict)
-    cases: tuple[Case, ...] = ()
-    overheads: tuple[Overhead, ...] = ()
+    points: tuple[Point, ...]
+    ratios: tuple[Ratio, ...]
     missing: tuple[str, ...] = ()
 
 
-def compare(
-    parts: Sequence[str] = PARTS, *, quick: bool = False, tell: Callable[[str], None] = lambda _: None
-) -> Comparison:
+def compare(*, quick: bool = False, tell: Callable[[str], None] = lambda _: None) -> Comparison:
     """Measure everything in one process.
 
     Args:
-        parts: of PARTS.
         quick: fewer settings, one round.
         tell: called with what is under way.
     """
-    points = kernel_points(quick=quick, tell=tell) if "kernel" in parts else ()
-    return Comparison(
-        points,
-        ratios(points) if points else (),
-        kernel.rates(points) if points else {},
-        measure_calls([task for task in TASKS if task.part in parts], quick=quick, tell=tell),
-        tuple(overhead(call) for call in OVERHEADS if call.part in parts),
-        tuple(sorted({peer.package for peer in PEERS if not peer.installed})),
-    )
+    points = kernel_points(quick=quick, tell=tell)
+    missing = {peer.package for peer in PEERS if not peer.installed}
+    return Comparison(points, ratios(points), tuple(sorted(missing)))
 
 
 def kernel_points(*, quick: bool, tell: Callable[[str], None]) -> tuple[Point, ...]:
@@ -97,7 +75,7 @@ def kernel_points(*, quick: bool, tell: Callable[[str], None]) -> tuple[Point, .
 
 
 def ratios(points: Sequence[Point]) -> tuple[Ratio, ...]:
-    """The ratios of AIMS, each side at its best setting for the error."""
+    """Return the ratios of AIMS, each side at its best setting for the error."""
     single = [p for p in points if p.method in ours.STEPS]
     lanes = [p for p in points if p.method.endswith(", lanes")]
     found = []
@@ -109,39 +87,26 @@ def ratios(points: Sequence[Point]) -> tuple[Ratio, ...]:
 
 
 def as_document(found: Comparison) -> dict[str, Any]:
-    """Everything, with units in the names."""
+    """Return everything, with units in the names."""
     return {
         "schema": "levilab-benchmark-simulator/1",
         "motion": "undriven, IC1, 30 Hz, 25.26 g, 5 s; error: largest component of the place at the end",
         "measured_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": {"processor": processor(), "system": platform.system(), "python": platform.python_version()},
         "software": {name: version_of(name) for name in ("levilab", "numba", "numpy", "scipy", "heyoka")},
-        "points": [_point(p) for p in found.points],
-        "ratios": [_ratio(r) for r in found.ratios],
-        "kernel": {name: asdict(rate) for name, rate in found.rates.items()},
-        "called": [
-            {
-                "motion": case.task.name,
-                "duration_s": case.task.duration,
-                "tops": case.task.tops,
-                "points": [_point(p) for p in case.points],
-                "ratios": [_ratio(r) for r in case.ratios],
-            }
-            for case in found.cases
-        ],
-        "overheads": [
-            {"call": o.call, "outside_kernels_s": o.outside, "whole_s": o.whole, "aim_s": o.aim}
-            for o in found.overheads
-        ],
+        "points": [as_point(p) for p in found.points],
+        "ratios": [as_ratio(r) for r in found.ratios],
         "missing": list(found.missing),
     }
 
 
-def _point(p: Point) -> dict[str, Any]:
+def as_point(p: Point) -> dict[str, Any]:
+    """Return a point with units in the names."""
     return {"method": p.method, "setting": p.setting, "error_m": _finite(p.error), "simulated_s_per_s": p.speed}
 
 
-def _ratio(r: Ratio) -> dict[str, Any]:
+def as_ratio(r: Ratio) -> dict[str, Any]:
+    """Return a ratio with units in the names."""
     return {
         "ours": r.ours,
         "peer": r.peer,

@@ -36,7 +36,7 @@ def own(found: LimitAnalysis) -> Own:
         about="limits of as many tops and runs from a normal law, with this scatter and these steps of the drive",
         trial=trial,
         cost_s=_COST_S * max(len(groups), 1),
-        freedom={_name(group, groups): round(min(group.statistics.freedom, 1e6)) for group in groups},
+        freedom={_name(group, groups): round(min(group.statistics.freedom or 1e6, 1e6)) for group in groups},
     )
 
 

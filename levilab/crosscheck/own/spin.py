@@ -9,7 +9,6 @@ import numpy as np
 
 from analysis.budget import rest
 from analysis.pulses import spin_of_times, spin_of_trace
-from analysis.pulses.result import UNDER_DRAG, UNDER_DRIVE
 from levilab.crosscheck.own.model import Own, pull
 from levilab.crosscheck.subject import Trial, TrialFailed
 
@@ -56,9 +55,7 @@ def _motion(spin: SpinFrequency) -> tuple[float, float, float]:
     frequency, chirp = spin.frequency.value, spin.chirp.value
     if not frequency or chirp is None:
         raise TrialFailed("the record has no frequency")
-    if spin.bend is not None and spin.bend.value is not None:
-        return frequency, chirp, spin.bend.value
-    return frequency, chirp, (UNDER_DRAG if chirp < 0 else UNDER_DRIVE) * chirp**2 / frequency
+    return frequency, chirp, (spin.bend.value if spin.bend else None) or 0.0
 
 
 def _pulse_times(spin: SpinFrequency) -> Array:
@@ -90,7 +87,7 @@ def _of_times(random: np.random.Generator, spin: SpinFrequency) -> Trial:
     kept = np.ones(times.size, dtype=bool)
     kept[random.choice(times.size, min(spin.missing, times.size // 4), replace=False)] = False
     times = np.sort(times + spin.scatter * random.standard_normal(times.size))[kept]
-    return _compared(spin_of_times(times).under_drag(), spin)
+    return _compared(spin_of_times(times), spin)
 
 
 def _of_trace(
@@ -116,5 +113,5 @@ def _of_trace(
     volts = np.exp(-(away**2) / (2 * width**2)) + noise * random.standard_normal(n)
     if code > 0:
         volts = np.round(volts / (code * noise)) * code * noise
-    found = spin_of_trace(volts, rate, start=float(times[0]), method=method).under_drag()  # type: ignore[arg-type]
+    found = spin_of_trace(volts, rate, start=float(times[0]), method=method)  # type: ignore[arg-type]
     return _compared(found, spin)

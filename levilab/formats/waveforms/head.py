@@ -40,7 +40,7 @@ class Head:
 
 
 def read_head(path: Path) -> Head:
-    """The first 64 KiB of a text file as lines.
+    """Return the first 64 KiB of a text file as lines.
 
     Raises:
         NoTable: it is no text, or empty.
@@ -65,7 +65,7 @@ def read_head(path: Path) -> Head:
 
 
 def _encoding(head: bytes) -> str:
-    """The encoding by the mark at the beginning; else UTF-16 by its NULs, UTF-8, or Latin-1."""
+    """Return the encoding by the mark at the beginning; else UTF-16 by its NULs, UTF-8, or Latin-1."""
     for mark, encoding in BYTE_ORDER_MARKS:
         if head.startswith(mark):
             return encoding

@@ -9,12 +9,14 @@ Headers as the scopes write them (each found in public files):
     Siglent SDS                     Record Length,Analog:14000  …  Source,CH1  /  Second,Volt
     Tektronix MDO, MSO, TBS         Model,MDO3014               …  TIME,CH1
     Tektronix TDS                   Record Length,2.5e+03,,-0.02,0.04   the header beside the first 18 rows
+    OWON HDS                        Time interval  :,100.00uS  …  index,CH1_Voltage(mV)
+    Hantek DSO                      #CLOCK=50.0uS  /  #SIZE=4000, below them the samples alone
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from levilab.formats.columns import NoSuchColumn, TableError, quoted, shorten
@@ -39,8 +41,10 @@ if TYPE_CHECKING:
 WANTED = "samples beside their times, a scope's CSV, WAV, .npy, or a column of pulse times is expected"
 #: A header ends within so many lines.
 MOST_LINES = 200
-#: Words for volts beside the symbols.
-_VOLTS = frozenset({"volt", "volts", "voltage", "value", "spannung"})
+#: What stands for a unit beside its symbol.
+_UNIT_WORDS = dict.fromkeys(("volt", "volts", "voltage", "value", "spannung", "y"), "V") | dict.fromkeys(
+    ("a", "amp", "amps", "ampere", "amperes", "current", "strom"), "A"
+)
 _TIMES = frozenset({"time", "second", "seconds", "s", "x", "x-axis", "t", "zeit"})
 #: Where a table might as well be one of readings, a coarser step than this makes it one [s]: no top of 20 to 60 turns
 #: a second can be sampled so slowly.
@@ -131,7 +135,7 @@ def read_header(head: Head, dialect: Dialect, columns: Mapping[str, str]) -> Hea
     """
     lines = [line.lstrip("#") for line in head.lines[:MOST_LINES]]
     rows = [[field.strip().strip('"').strip() for field in dialect.split(line)] for line in lines]
-    for recognise in (_rigol, _titled, _beside, _keyed):
+    for recognise in (_rigol, _beside, _keyed, _titled, _stepped):
         header = recognise(head, dialect, rows)
         if header:
             return header
@@ -139,7 +143,7 @@ def read_header(head: Head, dialect: Dialect, columns: Mapping[str, str]) -> Hea
 
 
 def printed(text: str, dialect: Dialect) -> Printed | None:
-    """A number and how finely it is printed; None if it is none.
+    """Return a number and how finely it is printed; None if it is none.
 
     >>> printed("-250.0000E-03", Dialect(",", "."))
     Printed(value=-0.25, resolution=1e-07)
@@ -175,16 +179,22 @@ def dialect_of(head: Head) -> Dialect:
 
 
 def _unit(text: str) -> tuple[str, float]:
-    """The unit of a channel and the factor to it: V for all kinds of volts, else what stands there."""
+    """Return the unit of a channel and the factor to it: V for all kinds of volts, else what stands there."""
     plain = plain_unit(text)
-    if not plain or plain.casefold() in _VOLTS:
-        return "V", 1.0
+    if not plain or plain.casefold() in _UNIT_WORDS:
+        return _UNIT_WORDS.get(plain.casefold(), "V"), 1.0
     factor = unit_factor(plain, "voltage")
     return ("V", factor) if factor is not None else (shorten(plain, 12), 1.0)
 
 
+def _is_unit_word(text: str) -> bool:
+    return text.casefold() in _UNIT_WORDS or is_unit(text)
+
+
 def _signal(title: str) -> str:
-    return f"CH{title}" if title.isdecimal() else shorten(title)
+    """Return the name of a channel: 1, CH1, and Y(CH1) or Volt(CH1), which name the column beside its times."""
+    inner = re.fullmatch(r"(\w+)\((CH\w+)\)", title, re.IGNORECASE)
+    return f"CH{title}" if title.isdecimal() else shorten(inner[2] if inner else title)
 
 
 def _is_number(text: str, dialect: Dialect) -> bool:
@@ -200,16 +210,30 @@ def _first_row(rows: Sequence[Sequence[str]], after: int, index: int, dialect: D
 
 def _with_samples(
     columns: Sequence[SampleColumn], rows: Sequence[Sequence[str]], first: int, dialect: Dialect
-) -> tuple[SampleColumn, ...]:
-    """The channels that were on: those whose first sample is there."""
-    return tuple(c for c in columns if c.index < len(rows[first]) and _is_number(rows[first][c.index], dialect))
+) -> tuple[tuple[SampleColumn, ...], int]:
+    """Return the channels that were on, which have a sample in any row read, and the first row with all of them.
+
+    Two channels of one name, as the segments of a memory have, are numbered.
+    """
+    seen = rows[first:]
+    kept = [c for c in columns if any(c.index < len(row) and _is_number(row[c.index], dialect) for row in seen)]
+    begin = first
+    while any(not (c.index < len(rows[begin]) and _is_number(rows[begin][c.index], dialect)) for c in kept):
+        begin += 1
+        if begin == len(rows):  # channels that were never on together: those of the first row, as it stands
+            kept, begin = [c for c in kept if _is_number(dict(enumerate(rows[first])).get(c.index, ""), dialect)], first
+    names = [c.name for c in kept]
+    numbers = [names[:k].count(name) for k, name in enumerate(names)]
+    return tuple(
+        replace(c, name=f"{c.name} ({number + 1})") if number else c for c, number in zip(kept, numbers, strict=True)
+    ), begin
 
 
 # --- one vendor's header each --------------------------------------------------------------------------
 
 
 def _rigol(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
-    """Start and increment in the second row, below their titles; the samples numbered or not."""
+    """Recognise start and increment in the second row, below their titles; the samples numbered or not."""
     title = [text.casefold() for text in rows[0]] if len(rows) > 1 else []
     if "start" not in title or "increment" not in title:
         return None
@@ -225,11 +249,12 @@ def _rigol(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Heade
     if first is None or not channels:
         raise TableError(head.path, "holds a header of Rigol's and no samples: export it anew", line=len(rows))
     columns = [SampleColumn(_signal(rows[0][k]), *_from_unit(rows[1], k)) for k in channels]
+    kept, begin = _with_samples(columns, rows, first, dialect)
     return Header(
         "Rigol CSV" if numbered else "Rigol CSV of the screen",
         dialect,
-        first + 1,
-        _with_samples(columns, rows, first, dialect),
+        (begin if numbered else first) + 1,
+        kept,
         sequence=0 if numbered else None,
         start=start.value,
         step=step,
@@ -242,26 +267,33 @@ def _from_unit(units: Sequence[str], index: int) -> tuple[str, int, float]:
 
 
 def _titled(_: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
-    """A row of titles, below it "second" and units, as Keysight and Rigol's old models write; no increment."""
-    if len(rows) < 3 or len(rows[0]) < 2 or rows[0][0].casefold() not in {"x", "x-axis"}:
+    """Recognise names above a row of units, "second" first, as Keysight, Rigol and UltraScope write; no increment."""
+    k = next((k for k, row in enumerate(rows) if k and _are_units(row) and len(rows[k - 1]) >= filled_count(row)), None)
+    names = rows[k - 1] if k else rows[0]
+    if k is None and not re.fullmatch(r"(time|x)\(.+\)", names[0], re.IGNORECASE):
         return None
-    factor = unit_factor(rows[1][0], "time")
-    first = _first_row(rows, 1, 0, dialect)
-    if factor is None or first is None:
+    units = rows[k] if k else [text.partition("(")[0] for text in names]
+    first, factor = _first_row(rows, k or 0, 0, dialect), unit_factor(units[0], "time")
+    if first is None or filled_count(names) < 2:
         return None
-    columns = [SampleColumn(_signal(rows[0][k]), *_from_unit(rows[1], k)) for k in range(1, filled_count(rows[0]))]
-    return Header(
-        "Keysight CSV" if rows[0][0].casefold() == "x-axis" else "Rigol CSV with times",
-        dialect,
-        first + 1,
-        _with_samples(columns, rows, first, dialect),
-        time=0,
-        time_factor=factor,
-    )
+    channels = [i for i in range(1, filled_count(names)) if not _is_time(units[i] if i < len(units) else "")]
+    columns = [SampleColumn(_signal(names[i]), *_from_unit(units, i)) for i in channels]
+    kept, begin = _with_samples(columns, rows, first, dialect)
+    made = "Keysight CSV" if names[0].casefold() == "x-axis" else "Rigol CSV with times"
+    return Header(made, dialect, begin + 1, kept, time=0, time_factor=factor or 1.0)
+
+
+def _is_time(text: str) -> bool:
+    return text.casefold() in _TIMES or unit_factor(text, "time") is not None
+
+
+def _are_units(row: Sequence[str]) -> bool:
+    """Return whether a row holds units alone, that of the times in words first."""
+    return row[0].casefold() in {"second", "seconds"} and all(_is_unit_word(text) for text in row[1:] if text)
 
 
 def _beside(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
-    """Tektronix TDS: the header stands beside the first rows, time and samples in the last columns."""
+    """Recognise Tektronix TDS: the header stands beside the first rows, time and samples in the last columns."""
     if len(rows) < 2 or rows[0][0].casefold() != "record length" or len(rows[0]) < 5:
         return None
     time = filled_count(rows[0]) - 2
@@ -286,7 +318,7 @@ _KEYS = frozenset({"record length", "sample interval", "sample rate", "source"})
 
 
 def _keyed(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
-    """A key and its value a line, then the titles, time first: Siglent; Tektronix MDO, MSO, TBS."""
+    """Recognise a key and its value a line, then the titles, time first: Siglent; Tektronix MDO, MSO, TBS."""
     titles = next((k for k, row in enumerate(rows) if len(row) > 1 and row[0].casefold() in {"time", "second"}), None)
     if titles is None:
         return None
@@ -301,35 +333,66 @@ def _keyed(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Heade
     columns = []
     for k in range(1, filled_count(rows[titles])):
         title, given = rows[titles][k], units[k - 1] if k <= len(units) else ("", "", "")
-        worded = title.casefold() in _VOLTS or is_unit(title)
+        worded = _is_unit_word(title)
         name = names[k - 1] if k <= len(names) else (given[0] if given[1] else "")
         unit, factor = _unit((given[2] or given[0]).strip() if given[0] else title if worded else "")
         columns.append(SampleColumn(_signal(title if not worded else name or f"CH{k}"), unit, k, factor))
+    kept, begin = _with_samples(columns, rows, first, dialect)
     siglent = any("analog:" in cell.casefold() for cells in keys.values() for cell in cells) or "source" in keys
     return Header(
         "Siglent CSV" if siglent else "Tektronix CSV",
         dialect,
-        first + 1,
-        _with_samples(columns, rows, first, dialect),
+        begin + 1,
+        kept,
         time=0,
         step=_interval(head, keys, dialect),
         count=_count(keys, dialect),
     )
 
 
+def _stepped(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
+    """Recognise samples without times, numbered or not, below keys that give their interval: OWON, Hantek."""
+    first = _first_row(rows, 0, 0, dialect)
+    keys = _keys(rows[:first]) if first is not None else {}
+    step = _interval(head, keys, dialect)
+    if first is None or step is None:
+        return None
+    titles = rows[first - 1]
+    numbered = titles[0].casefold() == "index"
+    columns = []
+    for k in range(int(numbered), filled_count(rows[first])):
+        title = titles[k] if numbered and k < len(titles) else ""
+        unit, factor = _unit(title.partition("(")[2].rstrip(")") or _value(keys, "units"))
+        name = title.partition("(")[0].removesuffix("_Voltage") or (not k and _value(keys, "channel")) or f"CH{k + 1}"
+        columns.append(SampleColumn(shorten(name), unit, k, factor))
+    kept, begin = _with_samples(columns, rows, first, dialect)
+    made = "OWON CSV" if numbered else "Hantek CSV"
+    return Header(
+        made, dialect, (begin if numbered else first) + 1, kept, sequence=0 if numbered else None, step=step,
+        count=_count(keys, dialect),
+    )  # fmt: skip
+
+
 def _keys(rows: Sequence[Sequence[str]]) -> dict[str, Sequence[str]]:
-    return {row[0].rstrip(" =:").casefold(): row[1:] for row in reversed(rows) if row and row[0]}
+    """Return key → cells of each line: Source,CH1; Time interval :,4uS; CLOCK=50uS."""
+    found: dict[str, Sequence[str]] = {}
+    for row in reversed(rows):
+        key, mark, value = re.fullmatch(r"([^:=]*)([:=]?)(.*)", row[0], re.DOTALL).groups() if row else ("", "", "")  # type: ignore[union-attr]
+        if key.strip():
+            found[key.strip().casefold()] = ([value.strip()] if mark and value.strip() else []) + list(row[1:])
+    return found
 
 
 def _value(keys: Mapping[str, Sequence[str]], key: str) -> str:
-    """The value of a key, without the word before a colon: Analog:140000."""
+    """Return the value of a key, without the word before a colon: Analog:140000."""
     cells = keys.get(key, ())
     return cells[0].rpartition(":")[2].strip() if cells else ""
 
 
 def _interval(head: Head, keys: Mapping[str, Sequence[str]], dialect: Dialect) -> Printed | None:
-    """The sampling interval [s]."""
-    interval, rate = (printed(_value(keys, key), dialect) for key in ("sample interval", "sample rate"))
+    """Return the sampling interval [s]."""
+    interval = next((one for key in _INTERVALS if (one := _printed_time(_value(keys, key), dialect))), None)
+    rate = printed(_value(keys, "sample rate"), dialect)
     if interval is None and rate is not None and rate.value > 0:
         interval = Printed(1 / rate.value, rate.resolution / rate.value**2)
     if interval is not None and not interval.value > 0:
@@ -337,8 +400,18 @@ def _interval(head: Head, keys: Mapping[str, Sequence[str]], dialect: Dialect) -
     return interval
 
 
+_INTERVALS = ("sample interval", "time interval", "clock")
+
+
+def _printed_time(text: str, dialect: Dialect) -> Printed | None:
+    """Return a time [s] with or without its unit: 1e-3, 50.0uS."""
+    number, unit = re.fullmatch(r"(.*?)\s*([a-zµμ]*)", text, re.IGNORECASE | re.DOTALL).groups()  # type: ignore[union-attr]
+    factor, found = unit_factor(unit, "time") if unit else 1.0, printed(number, dialect)
+    return Printed(found.value * factor, found.resolution * factor) if found and factor else None
+
+
 def _count(keys: Mapping[str, Sequence[str]], dialect: Dialect) -> int | None:
-    count = printed(_value(keys, "record length"), dialect)
+    count = printed(_value(keys, "record length") or _value(keys, "size"), dialect)
     return int(count.value) if count and 0 < count.value < 1e15 else None
 
 
@@ -346,7 +419,7 @@ def _count(keys: Mapping[str, Sequence[str]], dialect: Dialect) -> int | None:
 
 
 def _plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) -> Header:
-    """A column of times and others beside it, with titles or without."""
+    """Recognise a column of times and others beside it, with titles or without."""
     layout = lay_out(list(head.lines), head.encoding, dialect, b"")
     titles = [read_title(text) for text in layout.header]
     readings = [title.column for title in titles if title.column in QUANTITIES and title.column not in _NO_READINGS]
@@ -366,7 +439,7 @@ def _plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) -> Header:
             certain = certain and bool(given) and unit == "V"
             columns.append(SampleColumn(_bare(names[k]), unit, k, factor))
     rows = [dialect.split(line) for line in head.lines[layout.first_line - 1 :][:MOST_LINES] if not dialect.skips(line)]
-    kept = _with_samples(columns, rows, 0, dialect) if rows else ()
+    kept = _with_samples(columns, rows, 0, dialect)[0] if rows else ()
     if not kept:
         raise NoWaveform(head.path, f"has no samples beside its times, its columns are {quoted(names)}")
     return Header(
@@ -385,7 +458,7 @@ _NO_READINGS = ("time_s", "drive_amplitude_v")
 
 
 def _bare(title: str) -> str:
-    """A title without its unit."""
+    """Return a title without its unit."""
     bare = re.sub(r" ?/? ?[\[(][^\[\]()]*[\])]$| ?/ ?\S+$", "", without_runs_of_blanks(title)[:LONGEST_TITLE])
     return shorten(bare.strip() or title)
 

@@ -25,7 +25,7 @@ MOST_CHANNELS = 64
 
 
 def read_npy(path: Path, rate: float | None) -> Waveform | PulseTimes:
-    """An array of samples [V], shape (n,), (n, channels) or (channels, n); without a rate, pulse times [s], shape (n,).
+    """Read samples [V], shape (n,), (n, channels) or (channels, n); without a rate pulse times [s], shape (n,).
 
     Raises:
         NoRate: it holds no pulse times, and no rate is given.
@@ -63,7 +63,7 @@ _BROKEN = (
 
 
 def _load(path: Path) -> NDArray[Any]:
-    """The array as it lies in the file, which stays there."""
+    """Return the array as it lies in the file, which stays there."""
     try:
         data: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
     except _BROKEN as error:

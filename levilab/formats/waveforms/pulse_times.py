@@ -30,7 +30,7 @@ _MOST_TITLES = 20
 
 
 def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool = True) -> PulseTimes | Waveform:
-    """A file with one number a line: times that increase, or with a rate samples.
+    """Read a file with one number a line: times that increase, or with a rate samples.
 
     Args:
         head: the beginning of the file.
@@ -85,7 +85,7 @@ def _refuse_another_quantity(path: Path, titles: list[str]) -> None:
 
 
 def _factor(titles: list[str]) -> float:
-    """Unit of the times [s], by the title or a row of units; seconds without one."""
+    """Return the unit of the times [s], by the title or a row of units; seconds without one."""
     for text in reversed(titles):
         unit = plain_unit(text) if is_unit(text) else read_title(text).unit or ""
         factor = unit_factor(unit, "time") if unit else None

@@ -28,7 +28,7 @@ SEARCHED = TEXTS | SUFFIXES | {".wav", ".npy"}
 def read_record(
     path: Path, *, columns: Mapping[str, str] | None = None, rate: float | None = None, guess: bool = True
 ) -> Waveform | PulseTimes:
-    """Samples or pulse times from a file: WAV, NumPy, a scope's CSV or binary file, CSV with times, a column of times.
+    """Read samples or pulse times: WAV, NumPy, a scope's CSV or binary file, CSV with times, a column of times.
 
     Args:
         path: the file.

@@ -44,19 +44,19 @@ class Block:
     torn: str | None = None
 
     def line_of(self, row: int, dialect: Dialect) -> int:
-        """The line of a row."""
+        """Return the line of a row."""
         rows = (n for n, line in enumerate(self.text.split("\n"), self.line) if not dialect.skips(line))
         return next(n for k, n in enumerate(rows) if k == row)
 
     def fields(self, column: int, dialect: Dialect) -> list[str]:
-        """The texts of a column in the first and the last rows."""
+        """Return the texts of a column in the first and the last rows."""
         lines = [line for line in self.text.split("\n") if not dialect.skips(line)]
         split = [dialect.split(line) for line in (*lines[:ENDS], *lines[-ENDS:])]
         return [fields[column] for fields in split if column < len(fields)]
 
 
 def read_blocks(path: Path, encoding: str, dialect: Dialect, first_line: int, used: Sequence[int]) -> Iterator[Block]:
-    """The numbers of some columns, in memory that does not grow with the file.
+    """Yield the numbers of some columns, in memory that does not grow with the file.
 
     Raises:
         TableError: a line is damaged, or a sample is missing.
@@ -94,6 +94,8 @@ def _at_once(text: str, dialect: Dialect, used: Sequence[int]) -> Array | None:
 def _line_by_line(path: Path, text: str, first: int, dialect: Dialect, used: Sequence[int], *, last: bool) -> Block:
     rows, torn = [], None
     lines = text.split("\n")
+    while last and lines and not lines[-1].strip(f"{dialect.separator or ''} \t"):  # programs end with empty rows
+        lines.pop()
     for number, line in enumerate(lines, first):
         if dialect.skips(line):
             continue

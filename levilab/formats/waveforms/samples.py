@@ -112,7 +112,7 @@ class _Survey:
 
 
 def read_samples(head: Head, dialect: Dialect, *, columns: Mapping[str, str], rate: float | None) -> Waveform:
-    """A table of samples.  The file is read once for its length and its times, and again for each channel.
+    """Read a table of samples.  The file is read once for its length and its times, and again for each channel.
 
     Args:
         head: the beginning of the file.
@@ -153,7 +153,7 @@ def read_samples(head: Head, dialect: Dialect, *, columns: Mapping[str, str], ra
 
 
 def _about_count(path: Path, header: Header, survey: _Survey) -> Iterator[str]:
-    """What to know of the end of the file."""
+    """Yield warnings about the end of the file."""
     if survey.torn:
         yield f"{path.name}, {survey.torn}"
     if header.count is not None and header.count != survey.count:

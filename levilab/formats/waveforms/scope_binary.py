@@ -28,7 +28,7 @@ _EVEN = 0.01
 
 
 def read_scope_binary(path: Path) -> Waveform:
-    """A scope's own file: Rigol, Tektronix, Keysight, Siglent, LeCroy, Rohde & Schwarz, Yokogawa.
+    """Read a scope's own file: Rigol, Tektronix, Keysight, Siglent, LeCroy, Rohde & Schwarz, Yokogawa.
 
     The file is read into memory as a whole: RigolWFM knows no other way.
 
@@ -85,7 +85,7 @@ def _about_times(path: Path, times: Array, step: float) -> list[str]:
 
 
 def _about_volts(path: Path, model: str) -> list[str]:
-    """What was found wrong with the volts of a family of scopes."""
+    """Return the fault found with the volts of a family of scopes."""
     if not any(name in model.casefold() for name in ("1000z", "1054z", "1074z", "1104z")):
         return []
     wrong = "a level of 0.02 V came as -0.40 V, with a gain 11 % off"

@@ -28,7 +28,7 @@ _ADVICE = "export it anew as PCM or float WAV"
 
 
 def read_wav(path: Path) -> Waveform:
-    """A WAV recording; its samples are in parts of full scale, as the file does not know volts.
+    """Read a WAV recording; its samples are in parts of full scale, as the file does not know volts.
 
     Raises:
         TableError: it is damaged, or of a kind that is not read.

@@ -100,7 +100,7 @@ class Waveform:
         )
 
     def blocks(self, wanted: str | None = None) -> Iterator[Array]:
-        """The samples of a channel in order, in blocks that fit into memory."""
+        """Return the samples of a channel in order, in blocks that fit into memory."""
         return self.read(self.signal(wanted))
 
     def samples(self, wanted: str | None = None) -> Array:
@@ -109,7 +109,7 @@ class Waveform:
         return np.concatenate(found) if found else np.zeros(0)
 
     def at_rate(self, rate: float | None) -> Waveform:
-        """The same at a rate that is given [Hz], with a warning where it is another than the file's."""
+        """Return the same at a rate that is given [Hz], with a warning where it is another than the file's."""
         if rate is None:
             return self
         warnings = (*self.warnings, *about_rate(self.path, self.step, rate))
@@ -132,7 +132,7 @@ class PulseTimes:
 
 
 def about_rate(path: Path, known: float | None, rate: float | None) -> list[str]:
-    """A warning where a given rate is not the file's.
+    """Yield a warning where a given rate is not the file's.
 
     Args:
         path: the file.

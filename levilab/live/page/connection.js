@@ -2,22 +2,21 @@
 
 export const GONE = "the server is gone: start levilab live again";
 
-/** Head and arrays of a frame, as frame.py packs them. */
+/** A frame with its arrays, row by row, as levilab/telemetry/codec.py packs it. */
 export function unpack(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
-  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
-  const arrays = {};
-  for (const [name, [first, count]] of Object.entries(head.arrays)) {
-    arrays[name] = new Float32Array(buffer, 4 + length + first, count);
-  }
-  return {head, arrays};
+  return JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)), (_, value) => {
+    if (!Array.isArray(value?.$array)) return value;
+    const [kind, shape, first] = value.$array;
+    return new {"<f4": Float32Array, "|b1": Uint8Array}[kind](buffer, 4 + length + first, shape.reduce((a, b) => a * b, 1));
+  });
 }
 
 /**
  * Ask for frames until closed; after a break it tries again, at most every 5 s.
  *
  * @param {() => object} ask what the page has, and what it wants.
- * @param {(head, arrays) => void} show draws a frame.
+ * @param {(frame: object) => void} show draws a frame.
  * @param {(open: boolean) => void} changed whether the server is there.
  */
 export function connect({run, ask, show, changed}) {
@@ -41,8 +40,7 @@ export function connect({run, ask, show, changed}) {
     };
     socket.onmessage = ({data}) => {
       waiting = false;
-      const {head, arrays} = unpack(data);
-      show(head, arrays);
+      show(unpack(data));
       // the browser draws first: a page in the background, which is not drawn, asks once a second
       if (document.hidden) setTimeout(next, 1000);
       else requestAnimationFrame(next);

@@ -53,7 +53,7 @@ addEventListener("hashchange", () => {  // the address of the terminal in a page
 
 // --- frames ---
 
-function take(head, arrays) {
+function take(head) {
   window.levilab.frames += 1;
   if (paused) {  // what comes meanwhile is not kept: the next frame after the pause has it all
     seen.tick = head.tick;
@@ -78,15 +78,15 @@ function take(head, arrays) {
     if (data.about && data.about.status !== head.about.status) listRuns(seen.run);
     data.about = head.about;
   }
-  if (head.readings) takeReadings(head.readings, arrays);
+  if (head.readings) takeReadings(head.readings);
   if (head.events) takeEvents(head.events);
-  if (head.fit) takeFit(head.fit, arrays);
-  head.records.forEach((one, k) => {
+  if (head.fit) takeFit(head.fit);
+  for (const one of head.records) {
     seen.records[one.channel] = one.number;
-    data.records.set(one.channel, {...one, low: arrays[`low_${k}`], high: arrays[`high_${k}`]});
+    data.records.set(one.channel, one);
     dirty.trace = true;
-  });
-  if (head.poses.length) takePoses(head.poses, arrays);
+  }
+  if (head.poses.length) takePoses(head.poses);
   show();
   if (follows) open(wanted = "");  // an older run was chosen, and a new one begins
 }
@@ -101,21 +101,17 @@ function turnTo(run) {
   if (by("run").value !== run && run) listRuns(run);
 }
 
-function takeReadings(about, arrays) {
+function takeReadings(about) {
   seen.readings = about.version;
   Object.assign(data, {last: about.last, count: about.count, trend: about.trend});
-  data.readings = about.x ? {
-    x: arrays.reading_x, low: arrays.reading_low, high: arrays.reading_high, u: arrays.reading_u || null,
-    single: about.single, xAxis: about.x, yAxis: about.y,
-  } : null;
+  data.readings = about.x ? {...about, xAxis: about.x_axis, yAxis: about.y_axis} : null;
   if (pointed >= (data.readings?.x.length ?? 0)) pointed = -1;
   dirty.plot = true;
 }
 
-function takeFit(about, arrays) {
+function takeFit(about) {
   seen.fit = about.version;
-  data.fit = arrays.fit_x
-    ? {...about, x: arrays.fit_x, y: arrays.fit_y, band: arrays.fit_band, solid_to: about.solid_to ?? Infinity} : null;
+  data.fit = about.curve ? {...about, ...about.curve, solid_to: about.curve.solid_to ?? Infinity} : null;
   typeset(by("fit-head"), about.head || "");
   typeset(by("fit-lines"), (about.lines || []).join(" · "));
   data.end = about.end_s || null;
@@ -154,7 +150,7 @@ async function drawTopOf(about) {
   }
 }
 
-function takePoses(pieces, arrays) {
+function takePoses(pieces) {
   const about = `${seen.run} ${data.about?.status} ${seen.source}`;  // the top of another bench may be another one
   if (!space) {
     topOf = about;
@@ -163,12 +159,12 @@ function takePoses(pieces, arrays) {
     topOf = about;
     drawTopOf(about);
   }
-  for (const [k, piece] of pieces.entries()) {
+  for (const piece of pieces) {
     seen.poses = piece.number;
-    const up = arrays[`up_${k}`], last = up.findLastIndex((one) => one > 0.5);
+    const up = piece.up, last = up.findLastIndex(Boolean);
     data.up = last === up.length - 1;
     if (last >= 0) data.lastUp = piece.start_s + last * piece.step_s;
-    space.add(piece.start_s, piece.step_s, arrays[`position_${k}`], arrays[`quaternion_${k}`], arrays[`up_${k}`]);
+    space.add(piece.start_s, piece.step_s, piece.position, piece.quaternion, up);
   }
 }
 

@@ -95,7 +95,8 @@ export function drawReadings(paper, data, pointed) {
   const below = fit ? Math.max(54, 0.22 * (height - TOP - BOTTOM)) : 0;
   const bottom = height - BOTTOM, split = bottom - (fit ? below + GAP : 0);
 
-  const xs = extent(fit ? [x, fit.x] : [x], 0.02), ys = extent(fit ? [low, high, fit.y] : [low, high], 0.06);
+  const ends = u ? [low.map((value, k) => value - u[k]), high.map((value, k) => value + u[k])] : [low, high];
+  const xs = extent(fit ? [x, fit.x] : [x], 0.02), ys = extent(fit ? [...ends, fit.y] : ends, 0.06);
   const yMarks = ticks(ys[0] * fy, ys[1] * fy, split / 46), yTexts = yMarks.map((mark) => fixed(mark, decimals(yMarks)));
   const edge = Math.max(LEFT, ASIDE + Math.max(...yTexts.map((text) => c.measureText(text).width)));
   const toX = (value) => edge + (value - xs[0]) / (xs[1] - xs[0]) * (width - edge - RIGHT);
@@ -147,11 +148,16 @@ export function drawReadings(paper, data, pointed) {
   // the fit: its band, the line, and dashed what it expects
   if (fit) {
     if (fit.band.length) {
+      c.save();  // of few readings the band is wider than the picture
+      c.beginPath();
+      c.rect(edge, TOP, width - edge - RIGHT, split - TOP);
+      c.clip();
       c.fillStyle = paint.band;
       c.beginPath();
       fit.x.forEach((value, k) => c.lineTo(toX(value), toY(fit.y[k] + fit.band[k])));
       for (let k = fit.x.length - 1; k >= 0; k -= 1) c.lineTo(toX(fit.x[k]), toY(fit.y[k] - fit.band[k]));
       c.fill();
+      c.restore();
     }
     c.strokeStyle = paint[fit.look] || paint.fit;
     c.lineWidth = 1.6;

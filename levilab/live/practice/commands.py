@@ -10,7 +10,7 @@ import json
 from dataclasses import asdict, dataclass, field
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, StrictBool, TypeAdapter, ValidationError
 
 from levilab.errors import LevilabError
 from levilab.files import finite, parse_json
@@ -32,7 +32,7 @@ class SwitchDrive(Settings):
     """Switch the generator's output on or off.  It goes on at the frequency and amplitude that are set."""
 
     do: Literal["switch the drive"] = "switch the drive"
-    on: bool
+    on: StrictBool
 
 
 class TuneDrive(Settings):
@@ -46,10 +46,10 @@ class TuneDrive(Settings):
     """
 
     do: Literal["tune the drive"] = "tune the drive"
-    frequency_hz: Annotated[float, Field(gt=0)] | None = None
-    amplitude_vpp: Annotated[float, Field(gt=0)] | None = None
+    frequency_hz: Annotated[float, Field(strict=True, gt=0)] | None = None
+    amplitude_vpp: Annotated[float, Field(strict=True, gt=0)] | None = None
     waveform: Literal["SIN", "SQU", "TRI"] | None = None
-    ramp_hz_per_s: Annotated[float, Field(ge=SLOWEST_RAMP, le=FASTEST_RAMP)] | None = None
+    ramp_hz_per_s: Annotated[float, Field(strict=True, ge=SLOWEST_RAMP, le=FASTEST_RAMP)] | None = None
 
 
 class MatchDrive(Settings):
@@ -68,21 +68,21 @@ class SetSpeed(Settings):
     """Change how fast the bench's time passes.  speed: seconds of the bench in one of the wall."""
 
     do: Literal["set the speed"] = "set the speed"
-    speed: Annotated[float, Field(ge=SLOWEST, le=FASTEST)]
+    speed: Annotated[float, Field(strict=True, ge=SLOWEST, le=FASTEST)]
 
 
 class Pause(Settings):
     """Stop the bench's time, or let it go on."""
 
     do: Literal["pause"] = "pause"
-    on: bool
+    on: StrictBool
 
 
 class PlaceProbe(Settings):
     """Put the magnetometer's probe on the axis.  height_m: above the base [m]; None: into its chamber."""
 
     do: Literal["place the probe"] = "place the probe"
-    height_m: Annotated[float, Field(ge=LOWEST_PROBE_M, le=HIGHEST_PROBE_M)] | None
+    height_m: Annotated[float, Field(strict=True, ge=LOWEST_PROBE_M, le=HIGHEST_PROBE_M)] | None
 
 
 class RecordRun(Settings):

@@ -13,6 +13,7 @@ from functools import singledispatchmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from instruments.clock import PacedClock
 from instruments.errors import InstrumentError
 from levilab.acquisition.driving import DidNotFollow, NoLight
@@ -316,8 +317,11 @@ class PracticeProcess:
 
     def _measure(self, bench: Bench) -> None:
         """Read each instrument once."""
+        before = self._seen.values.get("spin_frequency_hz")
         spin = bench.counter.frequency()
         self._saw("spin_frequency_hz", spin)
+        if spin is None and before is not None and before <= max(FALLS_BETWEEN_HZ) and not self._floats():
+            self._note_fall(before)
         self._go_on_with_hold(bench, spin)
         if self._hold is not None and self._hold.grip is not None and self._hold.is_under_way:
             return  # the drive yields to the top: no other instrument keeps it waiting
@@ -330,6 +334,14 @@ class PracticeProcess:
             self._seen.number += 1
             for input_, channel in CHANNELS.items():
                 self._seen.records[channel] = self._seen.number, taken, bench.oscilloscope.trace(input_)
+
+    def _note_fall(self, spin: float) -> None:
+        """Say that the top fell because it was slow, and at which spin it was counted last [Hz]."""
+        if self._hold is not None:
+            self._hold.is_lost, self._text = True, ""
+        low, high = sorted(FALLS_BETWEEN_HZ)
+        slow = f"too slow for the spin to hold it up, as every top between {high:.0f} and {low:.0f} Hz"
+        self._report(PracticeEvent("message", f"the top fell at {spin:.1f} Hz, {slow}: put it back"))
 
     def _saw(self, channel: str, value: float | None) -> None:
         if value is None:

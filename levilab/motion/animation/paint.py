@@ -114,7 +114,6 @@ class _Solid:
     """A part with its marks, between two heights on the axis [m]."""
 
     surface: _Surface
-    caps: tuple[tuple[Array, Array], ...]  # polygons across the axis, shape (n, 3), and their normals
     low: float
     high: float
     marks: tuple[tuple[_Surface, str], ...]
@@ -312,8 +311,6 @@ class Painter:
             solid.surface.corners @ lean.T + pose.position, solid.surface.normals @ lean.T, solid.surface.colour
         )
         self._draw_facets(pen, surface)
-        for polygon, normal in solid.caps:
-            self._draw_polygon(pen, polygon @ lean.T + pose.position, lean @ normal, surface.colour)
         for mark, turns in solid.marks:
             turn = pose.matrix @ _about_z(pose.slip) if turns == "washers" else pose.matrix
             self._draw_facets(pen, _Surface(mark.corners @ turn.T + pose.position, mark.normals @ turn.T, mark.colour))
@@ -350,10 +347,6 @@ class Painter:
         ):
             pen.polygon(polygon, fill=tuple(colour))
 
-    def _draw_polygon(self, pen: ImageDraw, polygon: Array, normal: Array, colour: Colour) -> None:
-        if (self._camera.place - polygon[0]) @ normal > 0:
-            pen.polygon(_flat(self._camera.project(polygon)), fill=tuple(self._lit(normal[None], colour)[0]))
-
     def _lit(self, normals: Array, colour: Colour) -> list[list[int]]:
         """The colour under the lights, for facets with these normals, shape (n, 3)."""
         bright = np.full(len(normals), _EVERYWHERE) + 0.10 * normals[:, 2]
@@ -366,11 +359,7 @@ class Painter:
         solids = []
         for part in self.parts["parts"]:
             outline = part["outline"]
-            sides = [[r, z] for r, z in outline if r > 0]
-            corners, normals = _revolve(sides, _AROUND)
-            caps = []
-            for (r, z), sign in ((sides[0], -1.0), (sides[-1], 1.0)):
-                caps.append((_circle(r, z, _AROUND), np.array([0.0, 0.0, sign])))
+            corners, normals = _revolve(outline, _AROUND)
             marks = [
                 (_Surface(*_patch(mark, _OUT * self._reach), colour=self.colours[mark["colour"]]), mark["turns"])
                 for mark in self.parts["marks"]
@@ -378,7 +367,7 @@ class Painter:
             ]
             heights = [z for _, z in outline]
             surface = _Surface(corners, normals, self.colours[part["colour"]])
-            solids.append(_Solid(surface, tuple(caps), min(heights), max(heights), tuple(marks), part["name"]))
+            solids.append(_Solid(surface, min(heights), max(heights), tuple(marks), part["name"]))
         return solids
 
 

@@ -39,22 +39,8 @@ _MOST_PICTURES = 3000
 _POSES_A_PICTURE = 3
 #: A page has at least so many poses a second: the wobble is faster than the spin of a slow top.
 _LEAST_RATE_HZ = 240.0
-#: Tolerance of the simulation that finds out whether a top falls early.
-_COARSE = 1e-3
 #: With fewer pictures in a turn the eye loses which way the top turns.
 _PICTURES_A_TURN = 4
-
-
-class SpanTooLong(UsageError):
-    """More of the motion is to be shown than a file holds.
-
-    Attributes:
-        longest: span that it holds [s].
-    """
-
-    def __init__(self, text: str, longest: float) -> None:
-        self.longest = longest
-        super().__init__("animate_to", text)
 
 
 @dataclass(frozen=True)
@@ -157,45 +143,14 @@ def check_request(request: AnimationRequest, scene: Scene, duration: float) -> N
     chosen.check()
 
 
-def check_span(request: AnimationRequest, scene: Scene, duration: float, message: Callable[[str], None]) -> None:
-    """Raise SpanTooLong where the span is longer than the file holds, unless the top falls early enough.
-
-    Only then it is simulated, coarsely, to find out whether it falls.
-
-    Args:
-        request: checked by `check_request`.
-        scene: what will be simulated.
-        duration: for how long [s].
-        message: called when code is compiled for it.
-    """
-    start, stop = _span(request, duration)
-    try:
-        if request.format.encode:
-            _check_pictures(request.format, stop - start, request.played)
-        else:  # it turns no slower than at the start, and perhaps faster later
-            _count_for_page(scene, stop - start, abs(scene.start.spin_hz))
-    except SpanTooLong as error:
-        with announce_compilation(message):
-            is_lost = _is_lost_by(scene, start + error.longest)
-        if not is_lost:
-            raise
-
-
-def _is_lost_by(scene: Scene, time: float) -> bool:
-    """Whether the top falls before a time [s], by a coarse simulation; `animate` checks the span that there is."""
-    from levilab.simulator.single import simulate
-
-    return simulate(scene, time, tolerance=_COARSE, rate=None).fell is not None
-
-
 def _check_pictures(chosen: _Format, span: float, speed: float) -> None:
     pictures = span / speed * chosen.pictures_per_s
     if pictures > _MOST_PICTURES:
         longest = _MOST_PICTURES / chosen.pictures_per_s * speed
-        raise SpanTooLong(
+        raise UsageError(
+            "animate_to",
             f"{span:.4g} s at speed {speed:g} are {pictures:.0f} pictures, at most {_MOST_PICTURES} are drawn: "
             f"choose a span of at most {longest:.3g} s, or a higher `animate_speed`",
-            longest,
         )
 
 
@@ -205,7 +160,7 @@ def animate(
     """Animate a span of a simulated motion; what does not come to its end leaves nothing behind.
 
     Args:
-        request: checked by `check_request` and `check_span`.
+        request: checked by `check_request`.
         summary: of the motion.
         message: called with what a viewer should know.
         progress: called with the share that is done.
@@ -262,17 +217,17 @@ def _count_for_page(scene: Scene, span: float, turns: float) -> int:
         turns: of the fastest part in a second.
 
     Raises:
-        SpanTooLong: even the fewest poses do not fit.
+        UsageError: even the fewest poses do not fit.
     """
     most = most_poses(len(columns_of(scene))) - 1
     turning = max(turns, _LEAST_RATE_HZ / POSES_A_TURN)
     wanted, least = math.ceil(span * turning * POSES_A_TURN), math.ceil(span * turning * FEWEST_A_TURN)
     if least > most:
         longest = most / (turning * FEWEST_A_TURN)
-        raise SpanTooLong(
+        raise UsageError(
+            "animate_to",
             f"{span:.4g} s at {turning:.3g} turns a second are {least} poses, a page of at most 1.5 MB holds {most}: "
             f"choose a span of at most {longest:.3g} s with `animate_from` and `animate_to`",
-            longest,
         )
     return max(min(wanted, most), 1)
 

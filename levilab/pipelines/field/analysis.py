@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from analysis.errors import AnalysisError
-from analysis.field.fit import LEARNS_NOTHING, fit_scan
-from analysis.field.floating import FERRITE_PER_K, Floating, follow
+from analysis.field.fit import LEARNS_NOTHING, FieldScan, fit_scan
+from analysis.field.floating import FERRITE_PER_K, Floating, KnownTop, follow
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
@@ -21,10 +21,7 @@ from levilab.present.numbers import enumeration, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
-    from pathlib import Path
 
-    from analysis.field.fit import FieldScan
-    from analysis.field.floating import KnownTop
     from levilab.pipelines.sources import Source
 
 FIELD = "field"
@@ -34,6 +31,7 @@ NEEDS = Needs(
     experiments=frozenset({"field"}),
     read_file=read_scan_file,
     read_run=read_scan_run,
+    particular=True,
 )
 #: Correlations above this are worth a word.
 _STRONG = 0.9
@@ -132,11 +130,6 @@ METHOD = Method(
     fit=analyze_source,
     mixed="a mean over both says nothing about a real base",
 )
-
-
-def analyze_scans(paths: Sequence[Path], options: FieldOptions) -> FieldAnalysis:
-    """Fit the field of a ring to every scan found at the paths.  Raises DataError for what cannot be used."""
-    return METHOD.analyze(paths, options)
 
 
 def means(runs: Sequence[Mapping[str, Estimate]]) -> dict[str, Mean]:

@@ -132,7 +132,7 @@ def known_top(options: FieldOptions, height_u: float | None) -> tuple[KnownTop, 
         height = Estimate(options.height_m, u or 0.0, "m")
         if mass is None:
             raise DataError(
-                "`height` tells the moment of a top only if its mass is known: write [top] with mass_kg or its parts "
+                "`height_m` tells the moment of a top only if its mass is known: write [top] with mass_kg or its parts "
                 "into a file, as sample_data/device.toml, and give it with `device`"
             )
     transverse, axial, missing = _inertias(table, made)

@@ -30,6 +30,7 @@ FIELD_ROW = (
            lambda part: part["models"][0]["statistics"]["reduced_chi_square"]),
     Column("rms_residual_t", "number", "root of the mean square of what the fit leaves over",
            lambda part: part["models"][0]["statistics"]["rms_residual"]),
-    entry("floats", "truth", "whether any top floats above the ring"),
-    entry("text", "text", "what the scan says"),
+    Column("floats", "truth", "whether any top floats above the ring",
+           lambda part: part["result"]["floating"] is not None),
+    entry("text", "text", "what the scan says", "result.text"),
 )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping  # noqa: TC003 - pydantic reads the types of a result when it runs
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -21,8 +22,7 @@ from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import Scene, scene_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-    from pathlib import Path
+    from collections.abc import Iterable, Sequence
 
     from levilab.pipelines.sources import Source
 
@@ -64,20 +64,21 @@ class Device:
 
     Attributes:
         name: where its parameters come from, in words.
-        lower, upper: edges of the linear window of its spin [Hz].
-        resonance: of its wobble [Hz]; None where there is none.
+        linear_lower_hz, linear_upper_hz: edges of the linear window of its spin.
+        resonance_hz: of its wobble; None where there is none.
     """
 
     name: str
-    lower: float
-    upper: float
-    resonance: float | None
+    linear_lower_hz: float
+    linear_upper_hz: float
+    resonance_hz: float | None
 
     def expected(self, which: Which) -> dict[str, float]:
         """Name → spin [Hz] that a limit is compared with."""
         if which == "upper":
-            return {UPPER_EDGE: self.upper}
-        return {LOWER_EDGE: self.lower} | ({RESONANCE: self.resonance} if self.resonance is not None else {})
+            return {UPPER_EDGE: self.linear_upper_hz}
+        resonance = {} if self.resonance_hz is None else {RESONANCE: self.resonance_hz}
+        return {LOWER_EDGE: self.linear_lower_hz} | resonance
 
 
 @dataclass(frozen=True)
@@ -190,18 +191,8 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
                 listed = "; ".join(texts)
                 yield f"the {which} limits are of {len(texts)} conditions and are not put together: {listed}"
         for group in self.groups:
-            yield from self._about_tops(group)
             if len(group.runs) > 1:
                 yield from warnings_of(group.statistics)
-
-    def _about_tops(self, group: Limits) -> Iterable[str]:
-        """Of a result that an earlier version wrote: it put measured and made-up runs into one group."""
-        synthetic = sum(self.sources[k].synthetic for k in group.runs)
-        if 0 < synthetic < len(group.runs):
-            yield (
-                f"{synthetic} of {len(group.runs)} runs of {group.which} limits are SYNTHETIC, the others are not "
-                "known to be: a mean over both says nothing about a real top"
-            )
 
     def about_run(self, run: Limits) -> Iterable[str]:
         """What to know of one run."""
@@ -285,8 +276,9 @@ def _sample(source: Source[LimitReadings], which: Which, options: LimitOptions) 
     readings = source.readings
     if options.reading_u is not None:
         return Sample(readings.limit, np.full(len(readings), options.reading_u))
-    stepped = which == "upper" and source.run is not None and readings.u is not None
-    return Sample(readings.limit, readings.u, readings.u * 12**0.5 if stepped and readings.u is not None else None)
+    if which == "upper" and source.run is not None and readings.u is not None:
+        return Sample.within_steps(readings.limit, readings.u)
+    return Sample(readings.limit, readings.u)
 
 
 def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> Conditions:
@@ -327,7 +319,7 @@ def _which(source: Source[LimitReadings], device: Device) -> Which:
     if said in {"lower", "upper"}:
         return "upper" if said == "upper" else "lower"
     mean = float(source.readings.limit.mean())
-    return "upper" if nearest_edge(mean, (device.lower, device.upper)) == "upper" else "lower"
+    return "upper" if nearest_edge(mean, (device.linear_lower_hz, device.linear_upper_hz)) == "upper" else "lower"
 
 
 def device_of(source: Source[LimitReadings]) -> Device:
@@ -386,14 +378,6 @@ METHOD = Method(
     fit=limits_of,
     combine=together,
 )
-
-
-def analyze_limits(paths: Sequence[Path], options: LimitOptions) -> LimitAnalysis:
-    """Statistics of the limits found at the paths, and what theory says of them.
-
-    Raises DataError for what cannot be used; the text names the file.
-    """
-    return METHOD.analyze(paths, options)
 
 
 # --- in words ---

@@ -157,7 +157,7 @@ def _draw_theory(axes: Axes, name: str, expected: float) -> None:
 
 def _shade_beyond_window(axes: Axes, group: Limits) -> None:
     """Where small motions of the top grow, so that no spin keeps it up."""
-    window = (group.device.lower, group.device.upper)
+    window = (group.device.linear_lower_hz, group.device.linear_upper_hz)
     low, high = axes.get_ylim()
     label: str | None = f"small motions grow: outside the linear window, {window[0]:.2f} to {window[1]:.2f} Hz"
     for begin, end in ((low, min(window[0], high)), (max(window[1], low), high)):

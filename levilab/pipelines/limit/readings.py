@@ -131,7 +131,9 @@ def limit_readings(table: Table) -> LimitReadings:
         raise TableError(table.path, "holds no limit: at least one repetition is needed")
     has_u = "spin_frequency_u_hz" in table.columns
     u = table.column("spin_frequency_u_hz") if has_u else None
-    must_be_positive(table, limit, "the limit", "Hz, but a spinning top is above 0: remove the row")
+    must_be_positive(
+        table, limit, "the limit", "Hz; above 0 is expected: a sign is the sense of the spin, give the magnitude"
+    )
     if u is not None:
         must_be_positive(table, u, "the uncertainty", "Hz, but must be above 0: correct it or remove the column")
     spread = float(np.ptp(limit) / limit.mean())

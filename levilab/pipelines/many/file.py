@@ -126,7 +126,7 @@ class TableFile:
         self._places[str(cells[0])] = place
 
     def sha256(self, path: str) -> str:
-        """The hash of the readings that the row of a path was made of; empty for a path without a row."""
+        """Return the hash of the readings that the row of a path was made of; empty for a path without a row."""
         if (place := self._places.get(path)) is None:
             return ""
         self._file.seek(place)
@@ -236,7 +236,7 @@ class TableFile:
         return filter(self._stands, rows)
 
     def _stands(self, cells: Sequence[Cell]) -> bool:
-        """Whether a row is to be kept: a run that failed, or was not at its end, is analyzed anew."""
+        """Return whether a row is kept: a run that failed, or was not at its end, is analyzed again."""
         return cells[self._index("status")] != "running" and cells[self._index("problem")] is None
 
     def _index(self, column: str) -> int:

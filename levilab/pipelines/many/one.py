@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import DataError, DoesNotSuit, unquoted
 from levilab.files import CannotWrite
 from levilab.formats.waveforms.header import NoRate
-from levilab.pipelines.catalogue import ANALYSES, Analysis, save
+from levilab.pipelines.catalogue import ANALYSES, Analysis
 from levilab.pipelines.result import relative
 from levilab.pipelines.row import Cell, Column, Kind, plain
+from levilab.pipelines.suits import save
 from levilab.runs.run import Run
 
 if TYPE_CHECKING:
@@ -88,12 +89,12 @@ TAIL = (
 
 
 def columns_of(analysis: Analysis[Any]) -> tuple[Column, ...]:
-    """The columns of the table."""
+    """Return the columns of the table."""
     return (*HEAD, *analysis.row, *TAIL)
 
 
 def name_of(path: Path, folder: Path) -> str:
-    r"""The path of an input from a folder, as it is but for line breaks and the like, which are escaped.
+    r"""Return the path of an input from a folder, as it is but for line breaks and the like, which are escaped.
 
     >>> from pathlib import Path
     >>> name_of(Path("runs/two\n  lines"), Path())

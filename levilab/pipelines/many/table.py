@@ -145,7 +145,7 @@ def write_table(
 
 
 def _hash(readings: Path) -> str | None:
-    """The hash of a file; None if it cannot be read any more."""
+    """Return the hash of a file; None if it cannot be read any more."""
     try:
         return sha256_of(readings)
     except DataError:
@@ -162,7 +162,7 @@ def _outcome(done: Done[Task, Row | PassedOver]) -> Row | PassedOver:
 
 
 def inputs(paths: Sequence[Path]) -> Iterator[tuple[str, bool, bool]]:
-    """Each input, with whether it is a run and whether a search found it: in the order of the paths, by name.
+    """Find each input, with whether it is a run and whether a search found it: in the order of the paths, by name.
 
     As text: a Path takes a kilobyte.  Raises DataError for a path that does not exist.
     """

@@ -22,7 +22,6 @@ from levilab.present.numbers import plain, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
-    from pathlib import Path
 
     from analysis.precession.power import Power
     from levilab.pipelines.sources import Source
@@ -37,6 +36,7 @@ NEEDS = Needs(
     experiments=frozenset({"precession"}),
     read_file=read_sweep_file,
     read_run=read_sweep_run,
+    particular=True,
 )
 
 
@@ -184,14 +184,6 @@ METHOD = Method(
     combine=lambda _, runs, options: combine(runs, options),
     mixed="a line through both says nothing about a real top",
 )
-
-
-def analyze_precessions(paths: Sequence[Path], options: PrecessionOptions) -> PrecessionAnalysis:
-    """Fit a line to every sweep found at the paths, and to all points together.
-
-    Raises DataError for what cannot be used; the text names the file.
-    """
-    return METHOD.analyze(paths, options)
 
 
 # --- phase lock ----------------------------------------------------------------------------------------

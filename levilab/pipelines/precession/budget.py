@@ -87,7 +87,7 @@ def _of_points(
     by, along_y, along_x = influence
     line = fit.line
     stated = all(point.u is not None for point in fit.points if point.used)
-    own_scale = 1.0 if stated else line.scale
+    own_scale = min(line.scale, 1.0) if stated else line.scale
     # an orthogonal fit moves its points along x, too: the squares are shared out as the variances of the points are
     share = float(np.sum((by * along_x) ** 2) / np.sum(by**2 * (along_x**2 + along_y**2)))
     scatter = whole * own_scale / line.scale

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from analysis.precession.coherence import Coherence  # noqa: TC001 - pydantic reads the types when it runs
-from analysis.precession.sweep import SweepFit  # noqa: TC001 - as above
-from levilab.errors import unquoted
+from analysis.precession.sweep import SweepFit  # noqa: TC001 - pydantic reads the type when it runs
 from levilab.pipelines.document import Document, Settings, number, values_of
+from levilab.pipelines.dump import Dump
 from levilab.pipelines.precession.analysis import (
     METHOD,
-    PointCoherence,
     PrecessionAnalysis,
     PrecessionRun,
     intercept_of,
@@ -22,14 +20,10 @@ from levilab.pipelines.precession.analysis import (
     verdict,
 )
 from levilab.pipelines.precession.budget import budget_of_all, budget_of_run
-from levilab.pipelines.result import Part, Result, RunPart, Value
+from levilab.pipelines.result import Result, RunPart
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from analysis.precession.line import Line
-    from levilab.pipelines.precession.readings import Readings
-    from levilab.pipelines.sources import Source
 
 #: Attribute of SweepFit.power → name and unit of the value.
 _POWER_VALUES = {
@@ -41,61 +35,10 @@ _POWER_VALUES = {
 }
 
 
-# --- what is in it -------------------------------------------------------------------------------------
-
-
-class StatisticsPart(Part):
-    """How well a line fits."""
-
-    n: int = Field(ge=3)
-    rms_residual: float = Field(ge=0)
-    reduced_chi_square: float | None = Field(ge=0)
-    p_fit: float | None = Field(ge=0, le=1)
-
-
-class CentredPart(Part):
-    """A line about the weighted mean of ν_d, where slope and height are uncorrelated."""
-
-    centre: Value
-    height: Value
-    covariance: tuple[tuple[float | None, ...], ...] | None
-
-
-class ModelPart(Part):
-    """A line.
-
-    Attributes:
-        covariance: of slope and intercept.
-    """
-
-    name: Literal["weighted", "orthogonal", "robust"]
-    parameters: dict[str, Value]
-    covariance: tuple[tuple[float | None, ...], ...] | None
-    centred: CentredPart | None
-    statistics: StatisticsPart
-
-
-class _WithLine(Part):
-    """What stands at the top of a result and with each of its runs.  fit: all of it, as the analysis made it."""
-
-    models: tuple[ModelPart, ...]
-    verdict: str
-    fit: SweepFit | None
-
-
-class CoherencePart(Part):
-    """How firmly the laser's pulses follow the drive at a point."""
-
-    point: int = Field(ge=0)
-    coherence: Coherence
-
-
-class PrecessionPart(RunPart, _WithLine):
+class PrecessionPart(RunPart):
     """One sweep."""
 
-    fit: SweepFit
-    coherences: tuple[CoherencePart, ...]
-    record_warnings: tuple[str, ...]
+    result: Annotated[PrecessionRun, Dump()]
 
 
 class SettingsPart(Settings):
@@ -107,32 +50,25 @@ class SettingsPart(Settings):
     clock_u: float | None = Field(default=None, gt=0)
 
 
-class PrecessionResult(Result, _WithLine):
-    """result.json of sweeps.  fit: None for one input, it is then that run's."""
+class PrecessionResult(Result):
+    """result.json of sweeps."""
 
     analysis: Literal["precession"] = "precession"
     settings: SettingsPart
     runs: tuple[PrecessionPart, ...]
-
-
-# --- writing -------------------------------------------------------------------------------------------
+    combined: Annotated[SweepFit, Dump()]
 
 
 def _entries(analysis: PrecessionAnalysis) -> dict[str, Any]:
-    return _about(analysis.combined) | ({} if len(analysis.runs) > 1 else {"fit": None})
+    return _about(analysis.combined)
 
 
-def _run_entries(_: Source[Readings], run: PrecessionRun) -> dict[str, Any]:
-    return {
-        "coherences": [asdict(one) for one in run.coherences],
-        "record_warnings": [unquoted(text) for text in run.warnings],
-        "warnings": (*run.fit.warnings, *run.warnings),
-    } | _about(run.fit)
+def _run_entries(run: PrecessionRun) -> dict[str, Any]:
+    return _about(run.fit)
 
 
 def _about(fit: SweepFit) -> dict[str, Any]:
-    """What a fit says, for people and programs; then all of it."""
-    return {"values": _values(fit), "models": [_line(fit), _robust(fit)], "verdict": verdict(fit), "fit": asdict(fit)}
+    return {"values": _values(fit), "models": [_line(fit), _robust(fit)], "verdict": verdict(fit)}
 
 
 def _values(fit: SweepFit) -> dict[str, Any]:
@@ -192,33 +128,9 @@ def _covariance(u: float | None, v: float | None, correlation: float | None) -> 
     return [[u * u, correlation * u * v], [correlation * u * v, v * v]]
 
 
-# --- reading -------------------------------------------------------------------------------------------
-
-
-def _combined(result: PrecessionResult, runs: Sequence[PrecessionRun], _: object) -> SweepFit:
-    """The fit of all points together.  Raises ValueError where the result lacks it."""
-    if result.fit is None and len(runs) > 1:
-        raise ValueError("lacks the fit of all points together")
-    return result.fit or runs[0].fit
-
-
-def _run(part: PrecessionPart, source: Source[Readings], _: object) -> PrecessionRun:
-    """One run as it was found.  Raises ValueError where it is not of these points."""
-    seen = (part.fit.column("drive"), part.fit.column("precession"))
-    if not all(
-        len(a) == len(b) and np.allclose(a, b, rtol=1e-9, atol=0)
-        for a, b in zip(seen, (source.readings.drive, source.readings.precession), strict=True)
-    ):
-        raise ValueError(f"its points are not those of {source.data}")
-    coherences = tuple(PointCoherence(one.point, one.coherence) for one in part.coherences)
-    return PrecessionRun(part.fit, coherences, part.record_warnings)
-
-
 DOCUMENT = Document(
     method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
     result=PrecessionResult,
     entries=_entries,
     run_entries=_run_entries,
-    run=_run,
-    combined=_combined,
 )

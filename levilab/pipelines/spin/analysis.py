@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping  # noqa: TC003 - pydantic reads the types of a result when it runs
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.budget import rest
 from analysis.errors import AnalysisError
-from analysis.pulses import Finding, phases, spin_of_times, spin_of_trace, track_of_blocks, track_of_times
+from analysis.pulses import (
+    Finding,
+    SpinFrequency,
+    phases,
+    spin_of_times,
+    spin_of_trace,
+    track_of_blocks,
+    track_of_times,
+)
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
@@ -21,16 +31,14 @@ from levilab.runs.traces import INDEX
 from levilab.runs.waveforms import has_traces
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
-    from analysis.pulses import Phase, SpinFrequency, Track
+    from analysis.pulses import Phase, Track
     from levilab.formats.waveforms.waveform import Waveform
     from levilab.pipelines.sources import Source
 
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 SPIN = "spin"
 #: The runs and files that suit.
@@ -197,7 +205,7 @@ METHOD = Method(
     options=SpinOptions,
     fit=spin_of_source,
     of_files=frozenset({"columns", "rate"}),  # a run may have records of several channels
-    passes_over=True,
+    skips=True,
 )
 
 
@@ -212,8 +220,7 @@ def analyze_spins(paths: Sequence[Path], options: SpinOptions) -> SpinAnalysis:
 def _of_times(times: Array) -> SpinRun:
     if times[-1] - times[0] <= LONGEST_WHOLE_S:
         spin = spin_of_times(times)
-        dragged = spin.under_drag()
-        return replace(_of_one(dragged), parts=parts_of(spin, dragged, dragged))
+        return replace(_of_one(spin), parts=parts_of(spin, spin))
     return _of_track(track_of_times(times, window=WINDOW_S))
 
 
@@ -221,9 +228,8 @@ def _of_waveform(waveform: Waveform, channel: str, options: SpinOptions) -> Spin
     if waveform.duration <= LONGEST_WHOLE_S:
         samples = waveform.samples(channel)
         spin = spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method)
-        dragged = spin.under_drag()
-        found = _with_rate(dragged, waveform)
-        return replace(_of_one(found), parts=parts_of(spin, dragged, found), code=_code(samples, found))
+        found = _with_rate(spin, waveform)
+        return replace(_of_one(found), parts=parts_of(spin, found), code=_code(samples, found))
     blocks = waveform.blocks(channel)
     return _of_track(
         track_of_blocks(blocks, waveform.rate, start=waveform.start, window=WINDOW_S, method=options.method)
@@ -248,8 +254,8 @@ def _of_several(records: Records, options: SpinOptions) -> SpinRun:
         try:
             samples = waveform.samples()
             spin = spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method)
-            spins.append(dragged := spin.under_drag())
-            parts.append((parts_of(spin, dragged, dragged), _code(samples, dragged)))
+            spins.append(spin)
+            parts.append((parts_of(spin, spin), _code(samples, spin)))
             numbers.append(number)
         except AnalysisError as error:
             missed = error
@@ -266,14 +272,13 @@ def _of_several(records: Records, options: SpinOptions) -> SpinRun:
     return SpinRun(spins[len(spins) // 2], series, notes, *parts[len(spins) // 2])
 
 
-def parts_of(plain: SpinFrequency, dragged: SpinFrequency, found: SpinFrequency) -> dict[str, UParts]:
-    """What the uncertainties are made of, from those without drag, with drag, and with the sampling interval, too."""
+def parts_of(spin: SpinFrequency, found: SpinFrequency) -> dict[str, UParts]:
+    """Return the parts of the uncertainties, from those without and with that of the sampling interval."""
     parts = {}
-    for name in ("frequency", "chirp"):
-        sizes = [getattr(one, name).u for one in (plain, dragged, found)]
-        if all(size is not None and math.isfinite(size) for size in sizes):
-            pulses, more, whole = sizes
-            parts[name] = UParts(pulses, rest(more, pulses), rest(whole, more))
+    for name, pulses in zip(("frequency", "chirp"), spin.u_of_pulses or (), strict=False):
+        more, whole = getattr(spin, name).u, getattr(found, name).u
+        if all(size is not None and math.isfinite(size) for size in (pulses, more, whole)):
+            parts[name] = UParts(min(pulses, more), rest(more, pulses), rest(whole, more))
     return parts
 
 
@@ -322,7 +327,7 @@ def _of_track(track: Track) -> SpinRun:
     middle = int(np.abs(track.time - 0.5 * (track.time[0] + track.time[-1])).argmin())
     series = Series(track.time, track.frequency, track.u, tuple(map(_phase, phases(track))), of="window")
     spin = track.spins[middle]
-    return SpinRun(spin, series, track.notes, parts_of(spin, spin, spin))
+    return SpinRun(spin, series, track.notes, parts_of(spin, spin))
 
 
 def _phase(phase: Phase) -> tuple[str, float, float]:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from analysis.budget import Budget, Component, rest
 from analysis.numbers import digits
-from analysis.pulses.result import UNDER_DRAG, UNDER_DRIVE
 from levilab.pipelines.budget import direct_row, time_base
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ def budget_of_run(source: Source[Records], run: SpinRun, options: SpinOptions) -
         estimate: Estimate = getattr(run.spin, name)
         if name not in run.parts or estimate.value is None or not estimate.u:
             continue
-        rows = [*_of_pulses(run, name, run.parts[name], estimate), *_of_the_rest(run, name, run.parts[name], estimate)]
+        rows = [*_of_pulses(run, name, run.parts[name], estimate), *_of_the_rest(run.parts[name], estimate)]
         what = "" if source.run else "clock of the recording"
         rows.append(time_base(source, "oscilloscope", by_clock * estimate.value, options.clock_u, what=what))
         made.append(Budget(name, estimate.value, estimate.u, estimate.unit, tuple(rows)))
@@ -75,27 +74,13 @@ def _bound(spin: SpinFrequency, name: str) -> float | None:
     return spin.bound if name == "frequency" else spin.bound * math.sqrt(60) / span
 
 
-def _of_the_rest(run: SpinRun, name: str, parts: UParts, estimate: Estimate) -> Iterator[Component]:
+def _of_the_rest(parts: UParts, estimate: Estimate) -> Iterator[Component]:
     """How the slope changes, and what the file says of its sampling interval."""
     if parts.drag > 0:
-        note = "the frequency is taken where a drag in proportion to ω^(1.5 ± 0.5), or an even drive, leaves it"
+        note = "as a drag in proportion to ω^(1.5 ± 0.5), an even drive or a swing changes it, and as the pulses show"
         yield direct_row("drag", "law by which the slope changes", parts.drag, estimate.unit, note, "a shorter record")
-    elif run.series.of == "window" and name == "frequency" and run.spin.bend is None:
-        note = "ν″T²/40 of a window; its values are not corrected for it"
-        yield direct_row("drag", "change of the slope within a window", abs(_bend(run.spin)), estimate.unit, note,
-                      "shorter windows", included=False)  # fmt: skip
     if parts.step > 0:
         note = "from a straight line through times that lost digits when they were printed"
         yield direct_row(
             "step", "sampling interval", parts.step, estimate.unit, note, "a file with its interval in the header"
         )
-
-
-def _bend(spin: SpinFrequency) -> float:
-    """By how much a parabola of the phase gives too high a frequency [Hz]."""
-    frequency, chirp = spin.frequency.value, spin.chirp.value
-    if not frequency or not chirp:
-        return 0.0
-    span = (spin.pulses + spin.missing - 1) / frequency
-    n = UNDER_DRAG if chirp < 0 else UNDER_DRIVE
-    return n * chirp**2 / frequency * span**2 / 40

@@ -118,7 +118,7 @@ def turns_of(spin: SpinFrequency, time: Array) -> Array:
 
 
 def _bend(spin: SpinFrequency) -> float:
-    """How the slope itself changes [Hz/s²]; 0 where no third degree was fitted."""
+    """Return the change of the slope [Hz/s²]; 0 where it was said to stay."""
     return (spin.bend.value if spin.bend else None) or 0.0
 
 
@@ -288,8 +288,7 @@ def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
     if limit > 0:
         axes.set_ylim(-1.1 * limit, room * limit)
     axes.set(xlabel="time  [s]", ylabel=f"pulse − fit  [{unit}]")
-    degree = ", fit of third degree" if spin.bend else ""
-    axes.set_title(f"Residuals of the pulses' times{degree}", loc="left")
+    axes.set_title("Residuals of the pulses' times", loc="left")
 
 
 def _draw_series(axes: Axes, run: SpinRun, excerpt: _Excerpt, gid: str) -> None:
@@ -303,8 +302,7 @@ def _draw_series(axes: Axes, run: SpinRun, excerpt: _Excerpt, gid: str) -> None:
         band(axes, t, nu, u, FIT)
         axes.plot(t, nu, **LOOKS["fit"].as_line)
         axes.plot(spin.reference_time, spin.frequency.value or 0.0, markersize=4, **LOOKS["readings"].as_points)
-        degree = " of third degree" if spin.bend else ""
-        axes.set_title(f"Frequency by the fit{degree}, ± u", loc="left")
+        axes.set_title("Frequency by the fit, ± u", loc="left")
     else:
         axes.errorbar(series.time, series.frequency, series.u, color=READINGS, fmt="none", elinewidth=0.7)
         axes.plot(series.time, series.frequency, ".", color=READINGS, markersize=3, gid=gid)

@@ -71,8 +71,8 @@ def _sentences(run: SpinRun) -> Iterator[str]:
     if (change := _change(run)) is None:
         return
     yield from _about_change(change, frequency.value)
-    if spin.bound and frequency.u:
-        ratio = frequency.u / spin.bound
+    if spin.bound and "frequency" in run.parts:
+        ratio = run.parts["frequency"].pulses / spin.bound
         if ratio < _AT_BOUND:
             yield "With such noise no other method would find it much better."
         else:

@@ -13,9 +13,10 @@ SPIN_ROW = (
     value("scatter", "s", "of one pulse's time"),
     value("snr", "dB", "signal to noise"),
     entry("method", "text", "how the pulses were found"),
-    entry("pulses", "count", "pulses that were found"),
-    entry("missing", "count", "pulses that are missing"),
-    entry("doubled", "count", "pulses that were counted twice"),
-    Column("records", "count", "windows or records with a frequency each", lambda part: len(part["series"]["time_s"])),
-    Column("notes", "text", "names of the findings", lambda part: " ".join(note["name"] for note in part["notes"])),
-)
+    entry("pulses", "count", "pulses that were found", "result.spin.pulses"),
+    entry("missing", "count", "pulses that are missing", "result.spin.missing"),
+    entry("doubled", "count", "pulses that were counted twice", "result.spin.doubled"),
+    entry("records", "count", "windows or records with a frequency each", "result.series.time"),
+    Column("notes", "text", "names of the findings",
+           lambda part: " ".join(note["name"] for note in part["result"]["notes"])),
+)  # fmt: skip

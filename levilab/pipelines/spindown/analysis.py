@@ -72,7 +72,13 @@ class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
 
     def about_all(self) -> Iterable[str]:
         """What to know of the means, and of the laws that are not excluded."""
-        return map(_with_symbols, (*self.combined.warnings, *self._of_laws(self.combined.fits)))
+        return map(_with_symbols, (*self.combined.warnings, *self._left_out(), *self._of_laws(self.combined.fits)))
+
+    def _left_out(self) -> Iterable[str]:
+        """Yield which runs the means leave out, since their unit is in doubt."""
+        names = [source.name for source in self.sources if source.readings.doubtful]
+        if 0 < len(names) < len(self.sources):
+            yield f"the means leave out {', '.join(names)}, whose unit is in doubt: say it, or remove the file"
 
     def about_run(self, run: SpinDown) -> Iterable[str]:
         """What to know of one run."""
@@ -134,12 +140,17 @@ def fit_with_tilt(
     }
 
 
+def _undoubted(sources: Sequence[Source[Readings]], runs: Sequence[SpinDown]) -> Sequence[SpinDown]:
+    """Return the runs whose unit is not in doubt; all of them where every unit is."""
+    return [run for source, run in zip(sources, runs, strict=True) if not source.readings.doubtful] or runs
+
+
 METHOD = Method(
     needs=NEEDS,
     kind=SpinDownAnalysis,
     options=SpinDownOptions,
     fit=fit_source,
-    combine=lambda _, runs, __: combine(runs),
+    combine=lambda sources, runs, _: combine(_undoubted(sources, runs)),
     mixed="a mean over both says nothing about a real top",
     refit=fit_with_tilt,
     refit_text="the runs show a tilt of the top together, not each by itself",

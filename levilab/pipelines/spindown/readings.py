@@ -12,6 +12,7 @@ from analysis.spindown.readings import checked
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, Table, read_table
+from levilab.formats.titles import unit_factor
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes
@@ -39,6 +40,7 @@ class Readings:
     """Spin readings, each array of shape (n,): increasing `time` [s], positive `frequency` and its `u` [Hz].
 
     driven: whether a drive is known to have brought the top to its spin.
+    doubtful: whether the unit is in doubt; means over several runs leave such a run out.
     """
 
     time: "NDArray[np.float64]"
@@ -46,6 +48,7 @@ class Readings:
     u: "NDArray[np.float64] | None"
     warnings: tuple[str, ...]
     driven: bool = False
+    doubtful: bool = False
 
     def __len__(self) -> int:
         return len(self.time)
@@ -108,7 +111,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
     times = record.times if isinstance(record, PulseTimes) else None
     duration = record.duration if not isinstance(record, PulseTimes) else float(record.times[-1] - record.times[0])
     if duration < FEWEST * WINDOW_S:
-        expected = f"a spin-down needs {FEWEST} windows of {WINDOW_S:g} s at least: `levilab analyze spin` reads it"
+        expected = f"a spin-down needs {FEWEST} windows of {WINDOW_S:g} s at least"
         raise DoesNotSuit(f"{path}: lasts {digits(duration, 3)} s, {expected}")
     try:
         if isinstance(record, PulseTimes):
@@ -122,7 +125,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
     start, end = track.frequency[first], track.frequency[last - 1]
     if last - first < FEWEST or end > (1 - LEAST_FALL) * start:
         seen = f"the spin in it goes from {start:.6g} Hz to {end:.6g} Hz in {last - first} windows of {WINDOW_S:g} s"
-        expected = "a falling spin is expected: is the drive still on? `levilab analyze spin` reads it"
+        expected = "a falling spin is expected: is the drive still on?"
         raise DoesNotSuit(f"{path}: {seen}, {expected}")
     notes = [f"{path.name}: {note.text}" for note in track.notes]
     what = f"{path.name}: a {'list of pulse times' if times is not None else 'record'} of {digits(duration, 3)} s: "
@@ -164,28 +167,37 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
         checked(time, frequency, u)
     except AnalysisError as error:
         raise _in_the_file(table, error) from error
-    return Readings(time, frequency, u, (*table.warnings, *_doubts(table, time, frequency)))
+    doubts = _doubts(table, time, frequency)
+    return Readings(time, frequency, u, (*table.warnings, *doubts), doubtful=bool(doubts))
 
 
-#: A Levitron spins at 20 to 60 Hz, driven to about 60 Hz; far below or above that the unit is in doubt [Hz].  60 turns
-#: per second read as turns per minute are 1 Hz.
-SLOWEST_SPIN_HZ, FASTEST_HZ = 5.0, 200.0
+#: No such top floats far below or above these [Hz], linear theory says 21.65 to 80.6: the unit is in doubt there.
+#: 20 to 60 turns a second are 126 to 377 rad/s: taken for turns, they lie above.
+SLOWEST_SPIN_HZ, FASTEST_HZ = 10.0, 100.0
+#: Units in which the numbers of a file may be meant.
+_UNITS = ("Hz", "rpm", "rad/s", "°/s")
 
 
 def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[str]:
-    """Doubts about units: a spin that no such top has, readings closer than a turn.
-
-    Turns per minute and per second may be confused, and seconds be named ms.
-    """
+    """Return doubts about units: a spin that no such top has, readings closer than a turn."""
     middle, step = float(np.median(frequency)), float(np.median(np.diff(time)))
     if not SLOWEST_SPIN_HZ <= middle <= FASTEST_HZ:
         doubt = f"{table.path.name}: the spin is about {middle:.4g} Hz, a Levitron spins at 20 to 60 Hz"
-        per, unit = ("minute", "rpm") if middle > FASTEST_HZ else ("second", "Hz")
-        return [f"{doubt}; if these are turns per {per}, say so with their column, as f=NAME [{unit}]"]
+        meant = [
+            f"f=NAME [{unit}] ({digits(spin, 3)} Hz)"
+            for unit, spin in _other_spins(middle / table.factors.get("spin_frequency_hz", 1.0)).items()
+        ]
+        return [f"{doubt}; say the unit with the column: {' or '.join(meant)}" if meant else doubt]
     if step * middle < 1:  # nor does a counter give a reading in less
         doubt = f"{table.path.name}: the readings lie {1e3 * step:.3g} ms apart, the top needs {1e3 / middle:.3g} ms"
         return [f"{doubt} for a turn; if the times are in seconds, say so with their column, as t=NAME [s]"]
     return []
+
+
+def _other_spins(number: float) -> dict[str, float]:
+    """Return the spin [Hz] that a number of a file means in each unit in which a top can have it."""
+    spins = {unit: number * (unit_factor(unit, "frequency") or 1.0) for unit in _UNITS}
+    return {unit: spin for unit, spin in spins.items() if SLOWEST_SPIN_HZ <= spin <= FASTEST_HZ}
 
 
 #: Beyond these a number is no measurement, and its powers would leave the range of floating point.
@@ -223,7 +235,10 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
 
 #: What the analysis calls a column, in the words of a file, and what to do.
 _ABOVE_0 = {
-    "spin frequency": ("the frequency", "Hz, but a spinning top is above 0: remove the reading"),
+    "spin frequency": (
+        "the frequency",
+        "Hz; above 0 is expected: a sign is the sense of the spin, give the magnitude",
+    ),
     "standard uncertainty": ("the uncertainty", "Hz, but must be above 0: correct it or remove the column"),
 }
 

@@ -43,7 +43,7 @@ def _of_law(law: DragLaw) -> Iterator[Column]:
 
 SPINDOWN_ROW = (
     Column("readings_used", "count", "readings in the fits", lambda part: part["models"][0]["statistics"]["n"]),
-    entry("outliers", "count", "readings that do not belong to the others"),
+    entry("outliers", "count", "readings that do not belong to the others", "result.outliers"),
     value("start_time", "s", "time of the first reading"),
     value("duration", "s", "from the first reading to the last"),
     entry("best_model", "text", "the law with the smallest criterion"),

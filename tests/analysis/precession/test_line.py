@@ -13,6 +13,14 @@ U = np.array([0.02, 0.05, 0.02, 0.03, 0.04, 0.02, 0.06, 0.03])
 Y = 0.3 + 0.99 * X + U * RANDOM.standard_normal(X.size)
 
 
+def believed(line, u):
+    """The factor of u by its prior: as of 8 degrees of freedom, and less where χ² contradicts it."""
+    if u is None:
+        return 1.0, line.n - 2
+    prior = 8 / max(line.chi_square / (line.n - 2), 1)
+    return ((line.chi_square + prior) / (line.n - 2 + prior)) ** 0.5, line.n - 2 + prior
+
+
 def numpys(x, y, u, cov):
     """numpy's weighted fit: slope and intercept, and their covariance."""
     return np.polyfit(x, y, 1, w=1 / u, cov=cov)
@@ -21,25 +29,26 @@ def numpys(x, y, u, cov):
 @pytest.mark.parametrize("known", [True, False])
 def test_the_line_and_its_covariance_are_numpys(known):
     line = fit_line(X, Y, U if known else None)
+    scale, freedom = believed(line, U if known else None)
     expected, covariance = numpys(X, Y, U, "unscaled") if known else numpys(X, Y, np.ones_like(X), True)
+    covariance *= scale**2
     np.testing.assert_allclose([line.slope, line.intercept], expected, rtol=1e-10)
     np.testing.assert_allclose([line.u_slope**2, line.u_intercept**2], np.diag(covariance), rtol=1e-9)
     assert line.correlation * line.u_slope * line.u_intercept == pytest.approx(covariance[0, 1], rel=1e-9)
     at = np.array([20.0, 33.0, 50.0])
     design = np.stack((at, np.ones(3)))
-    half = (stats.norm if known else stats.t(X.size - 2)).ppf(0.975) * np.sqrt(
-        np.einsum("ik,ij,jk->k", design, covariance, design)
-    )
+    half = stats.t(freedom).ppf(0.975) * np.sqrt(np.einsum("ik,ij,jk->k", design, covariance, design))
     np.testing.assert_allclose(line.confidence_band(at), half, rtol=1e-9)
     np.testing.assert_allclose(line.prediction_band(at, 0.0), half, rtol=1e-9)
 
 
-def test_more_scatter_than_u_explains_enlarges_all_u():
-    line = fit_line(X, Y, U / 10)
-    _, covariance = numpys(X, Y, U / 10, True)
-    assert line.p_fit < 1e-3
-    assert line.u_slope == pytest.approx(covariance[0, 0] ** 0.5, rel=1e-9)
-    assert not line.u_known
+def test_u_grows_smoothly_with_a_scatter_beyond_that_of_the_points():
+    shares = np.geomspace(0.05, 20, 200)
+    lines = [fit_line(X, Y, U * share) for share in shares]
+    _, covariance = numpys(X, Y, U, True)
+    assert lines[0].p_fit < 1e-3
+    assert lines[0].u_slope == pytest.approx(covariance[0, 0] ** 0.5, rel=0.01)  # the points' own u counts for nothing
+    assert np.abs(np.diff(np.log([line.u_slope for line in lines]))).max() < 0.05  # u grows by 3 % from one to the next
 
 
 @pytest.mark.parametrize("known", [True, False])
@@ -49,7 +58,8 @@ def test_the_joint_test_compares_two_sums_of_squares(known):
     left = np.sum(weight * (Y - line.at(X)) ** 2)
     more = np.sum(weight * (Y - X) ** 2) - left
     dof = X.size - 2
-    expected = stats.chi2(2).sf(more) if known else stats.f(2, dof).sf(more / 2 / (left / dof))
+    scale, freedom = believed(line, U if known else None)
+    expected = stats.f(2, freedom).sf(more / 2 / (scale**2 if known else left / dof))
     assert line.p_against() == pytest.approx(expected, rel=1e-7)
 
 
@@ -60,13 +70,16 @@ def test_each_points_influence_is_what_a_fit_without_it_shows(known):
     effects = influence(X, Y, line, u**-2.0)
     for i in range(X.size):
         others = np.arange(X.size) != i
-        (slope, intercept), covariance = numpys(X[others], Y[others], u[others], "unscaled" if known else True)
+        (slope, intercept), _ = numpys(X[others], Y[others], u[others], True)
         assert effects.slope_change[i] == pytest.approx(slope - line.slope, rel=1e-6)
         assert effects.intercept_change[i] == pytest.approx(intercept - line.intercept, rel=1e-6)
-        # the point against what the others predict, in units of that difference's own standard deviation
-        row = np.array([X[i], 1.0])
-        scatter = 1.0 if known else np.sum((Y - slope * X - intercept)[others] ** 2) / (X.size - 3)
-        deviation = np.sqrt(row @ covariance @ row + scatter * u[i] ** 2)
+        # the point against the prediction of the others, in units of that difference's own standard deviation
+        row, (_, freedom) = np.array([X[i], 1.0]), believed(line, u if known else None)
+        left = np.sum(((Y - slope * X - intercept) / u)[others] ** 2)
+        prior = freedom - X.size + 2 if known else 0.0
+        scatter = (left + prior) / (X.size - 3 + prior)
+        _, unit = numpys(X[others], Y[others], u[others], "unscaled")
+        deviation = np.sqrt(scatter * (row @ unit @ row + u[i] ** 2))
         assert effects.studentised[i] == pytest.approx((Y[i] - slope * X[i] - intercept) / deviation, rel=1e-6)
     assert effects.leverage.sum() == pytest.approx(2)  # the trace of the hat matrix
 
@@ -79,7 +92,8 @@ def test_pearsons_data_with_yorks_weights_give_the_published_line():
     w_y = np.array([1, 1.8, 4, 8, 20, 20, 70, 70, 100, 500.0])
     line = fit_orthogonal(x, y, w_x**-0.5, w_y**-0.5)
     assert (line.slope, line.intercept) == (pytest.approx(-0.480533407, abs=1e-9), pytest.approx(5.47991022, abs=1e-8))
-    assert (line.u_slope, line.u_intercept) == (pytest.approx(0.0579850, abs=1e-7), pytest.approx(0.294971, abs=1e-6))
+    u = line.u_slope / line.scale, line.u_intercept / line.scale
+    assert u == (pytest.approx(0.0579850, abs=1e-7), pytest.approx(0.294971, abs=1e-6))
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e6])

@@ -6,7 +6,7 @@ import pytest
 from analysis.pulses.edges import place_edges
 from analysis.pulses.likelihood import search
 from analysis.pulses.matched import COARSE, window_of
-from analysis.pulses.regression import Fit, fit_turns, median
+from analysis.pulses.regression import Fit, Scatter, fit_turns, median
 
 
 def test_the_median_is_numpys():
@@ -19,13 +19,15 @@ def test_the_median_is_numpys():
 def test_at_the_end_of_a_record_frequency_slope_and_bend_are_correlated():
     """Independent coefficients of variance 1: c₁ + 2 c₂ + 3 c₃, 2 c₂ + 6 c₃ and 6 c₃ at u = 1, by hand."""
 
-    def of(coefficients, variance):
-        n = len(coefficients)
-        return Fit(np.array(coefficients), np.eye(n), 1.0, 2.0, variance, 1.0, np.inf, np.zeros(9)).correlations(3.0)
+    def of(third, variance):
+        covariance = variance * np.diag([1.0, 1.0, 1.0, third])
+        return Fit(
+            np.array([0.3, 60.0, -0.5, 0.1]), covariance, 1.0, 2.0, np.zeros(9), Scatter(1.0, 1.0, 9.0, 1.0), np.eye(3)
+        ).correlations(3.0)
 
-    assert of([0.3, 60.0, -0.5, 0.1], 0.01) == pytest.approx((22 / 560**0.5, 18 / 504**0.5, 36 / 1440**0.5))
-    assert of([0.3, 60.0, -0.5], 0.01) == (0, 0, 0)
-    assert of([0.3, 60.0, -0.5, 0.1], 0.0) == (0, 0, 0)  # without noise
+    assert of(1.0, 0.01) == pytest.approx((22 / 560**0.5, 18 / 504**0.5, 36 / 1440**0.5))
+    assert of(0.0, 0.01) == pytest.approx((4 / 20**0.5, 0, 0))
+    assert of(1.0, 0.0) == (0, 0, 0)  # without noise
 
 
 def test_a_flat_trace_stands_out_nowhere_however_few_samples_a_part_of_the_turn_has():

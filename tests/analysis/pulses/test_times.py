@@ -5,7 +5,7 @@ import pytest
 
 from analysis.errors import NotFinite, TimesNotIncreasing, TooFewPulses
 from analysis.pulses import spin_of_times
-from levilab.benchmark.estimators.traces import HARD, make
+from analysis.pulses.synthetic import HARD, make
 
 
 def pulse_times(frequency=30.3, chirp=-0.1, duration=10.0, phase=0.37):
@@ -52,9 +52,9 @@ def test_what_moves_pulses_to_and_fro_averages_out_in_the_uncertainty():
         swing = 1e-4 * np.sin(2 * np.pi * (50 * times + random.uniform()))
         found = spin_of_times(times + swing + 5e-5 * random.standard_normal(times.size))
         pulls.append((found.frequency.value - 30.3 + 0.1 * found.reference_time) / found.frequency.u)
-        swings += [note.text for note in found.notes if note.name == "correlated"]
+        swings += [note.name for note in found.notes]
     assert np.std(pulls) == pytest.approx(1, abs=0.2)  # 3 standard errors from 150; without the blocks it is 0.6
-    assert "neighbouring pulses differ from each other, which averages out: variance x 0.3" in swings[0]
+    assert swings.count("correlated") > 100
 
 
 def test_few_pulses_widen_the_uncertainty_to_68_per_cent():
@@ -64,30 +64,32 @@ def test_few_pulses_widen_the_uncertainty_to_68_per_cent():
     assert covered == pytest.approx(0.683, abs=0.063)  # 3 standard errors; without Student's t it would be 0.61
 
 
-def test_a_bend_that_is_too_small_to_be_fitted_is_in_the_uncertainty():
-    """Of a top that swings about its drive: 19 pulses show a bend of five standard uncertainties, or nearly."""
-    random, pulls, fitted = np.random.default_rng(3), [], 0
-    turns = np.arange(-9.0, 10.0)
-    times = turns / 30
-    bend = 5 * 6 * 30 * 1e-4 * np.sqrt(np.linalg.inv((a := np.vander(times, 4, increasing=True)).T @ a)[3, 3])
-    for _ in range(5):
-        times = times - (30 * times + bend * times**3 / 6 - turns) / (30 + bend * times**2 / 2)
-    for _ in range(150):
-        found = spin_of_times(times + 1e-4 * random.standard_normal(19)).under_drag()
+@pytest.mark.parametrize("jitter", [2e-6, 2e-5, 2e-4])
+def test_tops_that_swing_have_the_bend_in_value_and_uncertainty(jitter):
+    """Of half of the tops 61 pulses show no bend, of the others one of 1e-3 to 2 Hz/s², each decade as often."""
+    random, pulls = np.random.default_rng(3), []
+    turns = np.arange(-30.0, 31.0)
+    for i in range(300):
+        bend = 10 ** random.uniform(-3, 0.3) * (i % 2)
+        times = turns / 30
+        for _ in range(5):
+            times = times - (30 * times + bend * times**3 / 6 - turns) / (30 + bend * times**2 / 2)
+        found = spin_of_times(times + jitter * random.standard_normal(times.size))
         pulls.append((found.frequency.value - 30 - bend * found.reference_time**2 / 2) / found.frequency.u)
-        fitted += found.bend is not None
-    assert 30 < fitted < 90  # the others have a parabola, off by 11 times what its residuals show
-    assert np.std(pulls) < 2.1  # without the part of the bend 4.2
-    assert np.mean(np.abs(pulls) < 2) > 0.7  # without it 0.36
+    assert np.std(pulls) == pytest.approx(1, abs=0.25)  # 0.12 are 3 standard errors; the sum of normals has long tails
+    assert np.mean(np.abs(pulls) < 1) == pytest.approx(0.68, abs=0.09)
+    assert np.mean(np.abs(pulls) < 3) > 0.96
 
 
-def test_a_bend_that_is_none_widens_the_uncertainty_by_little():
-    random, times, pulls = np.random.default_rng(3), np.arange(19) / 30, []
-    for _ in range(300):
-        plain = spin_of_times(times + 1e-4 * random.standard_normal(19))
-        found = plain.under_drag()
-        pulls.append((found.frequency.value - 30) / found.frequency.u)
-    assert np.std(pulls) == pytest.approx(1.04, abs=0.15)  # Student's t of 16; 3 standard errors
+def test_uncertainties_have_no_step_as_the_noise_grows():
+    """One pattern of noise, scaled: a bend of 0.3 Hz/s² goes from certain to unseen, and u is smooth all the way."""
+    turns = np.arange(-30.0, 31.0)
+    times = turns / 30 - 0.3 * (turns / 30) ** 3 / 180
+    pattern = np.random.default_rng(5).standard_normal(times.size)
+    scales = np.geomspace(1e-6, 2e-4, 115)
+    found = [spin_of_times(times + scale * pattern) for scale in scales]
+    u = np.array([each.frequency.u for each in found])
+    assert np.abs(np.diff(np.log(u))).max() < 0.1  # the noise grows by 4.7 % from one to the next
 
 
 def test_missing_doubled_and_wrong_pulses_are_counted():
@@ -112,15 +114,37 @@ def test_a_switch_that_spoils_half_of_the_turns_is_stood():
     assert np.std(pulls) == pytest.approx(1, abs=0.34)  # 3 standard errors from 40
 
 
-def test_a_slope_that_changes_is_fitted_with_a_third_degree():
+def test_the_bend_of_a_long_record_is_found():
     grid = np.linspace(0, 20, 200001)
     phase = 30 * (1 - np.exp(-0.004 * grid)) / 0.004
     times = np.interp(np.arange(1, int(phase[-1])), phase, grid)
     found = spin_of_times(times + 1e-6 * np.random.default_rng(6).standard_normal(times.size))
-    assert "curved" in names(found)
     truth = 30 * np.exp(-0.004 * found.reference_time)
-    assert abs(found.frequency.value / truth - 1) < 3e-6  # what the fourth degree leaves
+    assert abs(found.frequency.value / truth - 1) < 3e-6  # the part of the fourth degree
+    assert found.bend.value == pytest.approx(0.004**2 * truth, rel=0.01)
     assert abs(spin_of_times(times, degree=2).frequency.value / truth - 1) > 5e-5
+
+
+@pytest.mark.parametrize("power", [0.0, 1.0, 1.5, 2.0])
+def test_pulses_that_know_the_bend_better_than_a_drag_does_decide_it(power):
+    """ν′ = −0.1 Hz/s (ν/30 Hz)^n over 11.5 s; n = 0, an even ramp, is three standard uncertainties from any drag."""
+    pulls, random = [], np.random.default_rng(4)
+    turns = np.arange(345.0)
+    rates = np.linspace(31.0, 28.0, 20001)
+    passed = np.concatenate(
+        [[0], np.cumsum(np.diff(rates) * -0.5 * ((r := rates / (0.1 * (rates / 30) ** power))[1:] + r[:-1]))]
+    )
+    clock = np.concatenate(
+        [[0], np.cumsum(np.diff(rates) * -0.5 * ((r := 1 / (0.1 * (rates / 30) ** power))[1:] + r[:-1]))]
+    )
+    times = np.interp(turns, passed, clock)
+    for _ in range(60):
+        found = spin_of_times(times + 1e-5 * random.standard_normal(times.size))
+        truth = np.interp(found.reference_time, clock, rates)
+        pulls.append((found.frequency.value - truth) / found.frequency.u)
+        assert found.frequency.u < 1e-4
+    assert np.mean(pulls) == pytest.approx(0, abs=0.6)  # 0.39 are 3 standard errors; the prior moves n = 0 by the rest
+    assert np.std(pulls) == pytest.approx(1, abs=0.28)
 
 
 @pytest.mark.parametrize("missing", [0, 100])
@@ -133,11 +157,53 @@ def test_the_frequency_at_another_time_follows_the_whole_polynomial(missing):
     turns, times = (np.delete(column, slice(300, 300 + missing)) for column in (turns, times))
     found = spin_of_times(times)
     coefficients, covariance = np.polyfit(times - 9.0, turns, 3, cov=True)
+    ratios = []
     for time in (0.0, 4.0, found.reference_time, 15.0, 25.0):
         along = np.array([3 * (time - 9.0) ** 2, 2 * (time - 9.0), 1.0, 0.0])
         at = found.at(time)
-        assert at.value == pytest.approx(along @ coefficients, rel=1e-9)
-        assert at.u == pytest.approx(np.sqrt(along @ covariance @ along), rel=0.02)  # Student's factor of 200 and more
+        assert at.value == pytest.approx(along @ coefficients, rel=1e-7)
+        ratios.append(at.u / np.sqrt(along @ covariance @ along))
+    assert ratios == pytest.approx(5 * [ratios[0]], rel=0.02)  # the prior of the bend
+    assert ratios[0] == pytest.approx(1, abs=0.3)  # of the scatter over long times, by 45 blocks: 3 standard errors
+
+
+def sound_lists(random):
+    """Lists without a jump: swings about a drive, coloured jitter, rounded times, a drive that is switched."""
+    time = np.linspace(0, (length := random.choice([0.6, 2.0, 12.0])), round(2000 * length) + 1)
+    spin, start, jitter = random.uniform(22, 45), random.uniform(), 10 ** random.uniform(-6, -3)
+
+    def passes(turns, noise=jitter):
+        number = np.arange(np.ceil(turns[0] + start), np.floor(turns[-1] + start))
+        return np.interp(number, turns + start, time) + noise * random.standard_normal(number.size)
+
+    coasting = spin * time - random.uniform(0.03, 0.2) * time**2 / 2
+    swing = 10 ** random.uniform(-3, -0.5) * np.sin(2 * np.pi * 0.33 * time + random.uniform(0, 6))
+    switched = random.uniform(0.1, 0.9) * length
+    yield passes(coasting)
+    yield passes(spin * time + swing)
+    walk = np.cumsum(1e-5 * random.standard_normal((times := passes(coasting)).size))
+    yield times + walk
+    yield np.round(passes(coasting, 0.0) / 1e-4) * 1e-4
+    yield passes(spin * time - 0.05 * np.maximum(time - switched, 0) ** 2)
+    yield passes(spin * time - 0.1 * np.maximum(switched - time, 0) ** 2)
+
+
+def test_sound_lists_have_no_jump():
+    jumps = 0
+    for seed in range(100):
+        for times in sound_lists(np.random.default_rng([seed, 9])):
+            jumps += "jump" in names(spin_of_times(np.unique(times)))
+    assert jumps <= 3  # of 600; 7 of 10 600 in a longer study, most where a drive is switched
+
+
+def test_a_jump_takes_turns_that_were_lost_with_it():
+    """46 ms, a buffer of 2048 samples, are 1.4 turns: a slope of -0.3 Hz/s shows the whole one."""
+    times = pulse_times(chirp=-0.3) + 1e-5 * np.random.default_rng(1).standard_normal(pulse_times(chirp=-0.3).size)
+    late = times > 4.0 + 0.046
+    found = spin_of_times(np.concatenate([times[times <= 4.0], times[late] - 0.046]))
+    assert "jump" in names(found)
+    assert found.missing in {1, 2}
+    assert abs(found.frequency.value - 30.3 + 0.3 * found.reference_time) < 4 * found.frequency.u
 
 
 def test_wrong_lists_are_refused_with_the_reason():
@@ -150,36 +216,36 @@ def test_wrong_lists_are_refused_with_the_reason():
 
 
 @pytest.mark.parametrize("power", [1.0, 1.5, 2.0])
-def test_a_slope_that_changes_as_under_drag_is_allowed_for(power):
-    """ν′ = −0.1 Hz/s (ν/30 Hz)^n over 4 s, to the third order of time; the parabola alone is off by ν″T²/40."""
-    slope, spin = -0.1, 30.0
+def test_few_noisy_pulses_leave_the_bend_to_the_drag(power):
+    """ν′ = −1 Hz/s (ν/30 Hz)^n over 2 s; the parabola alone is off by ν″T²/40."""
+    slope, spin, random, pulls = -1.0, 30.0, np.random.default_rng(1), []
     change = power * slope**2 / spin
-    t = np.linspace(-2.0, 2.0, 4001)
+    t = np.linspace(-1.0, 1.0, 4001)
     turns = spin * t + slope * t**2 / 2 + change * t**3 / 6
     whole = np.arange(np.ceil(turns[0]), np.floor(turns[-1]) + 1)
-    times = np.interp(whole, turns, t) + np.random.default_rng(1).normal(0, 1e-7, whole.size)
-    plain = spin_of_times(times, degree=2)
-    found = plain.under_drag()
-    truth = spin + slope * found.reference_time
-    assert found.frequency.u == pytest.approx(0.5 * slope**2 / spin * 16 / 40, rel=0.05)  # 0.5 ν′²/ν T²/40
-    assert abs(found.frequency.value - truth) < 2 * found.frequency.u
-    assert abs(plain.frequency.value - truth) == pytest.approx(change * 16 / 40, abs=2e-6)
+    times = np.interp(whole, turns, t)
+    parabola = spin_of_times(times, degree=2)
+    assert parabola.frequency.value - spin - slope * parabola.reference_time == pytest.approx(change * 4 / 40, rel=0.1)
+    for _ in range(100):
+        found = spin_of_times(times + 3e-4 * random.standard_normal(times.size))
+        pulls.append((found.frequency.value - spin - slope * found.reference_time) / found.frequency.u)
+    # drags of 1 and 2 are one standard uncertainty of the prior from 1.5; the parabola's pull is 1.5 to 3
+    assert np.mean(pulls) == pytest.approx(0, abs=0.3 if power == 1.5 else 0.9)
+    assert np.std(pulls) == pytest.approx(0.9, abs=0.25)
 
 
-@pytest.mark.parametrize(("power", "degree"), [(1.25, 2), (1.25, 3), (1.5, 2), (1.5, 3), (1.75, 3)])
-def test_the_chirp_under_drag_allows_for_how_the_bend_changes(power, degree):
+@pytest.mark.parametrize("power", [1.25, 1.5, 1.75])
+def test_the_slope_allows_for_how_the_bend_changes(power):
     """Pulses under ν′ = −cνⁿ in closed form: dφ/dν = −ν^(1 − n)/c.  A fit alone gives the slope ν‴T²/56 too high."""
     first, slope = 30.0, -0.3
     c = -slope / first**power
     turns = np.arange(300)
     spins = (first ** (2 - power) - c * (2 - power) * turns) ** (1 / (2 - power))
     times = (spins ** (1 - power) - first ** (1 - power)) / (c * (power - 1))
-    plain = spin_of_times(times + np.random.default_rng(2).normal(0, 1e-8, times.size), degree=degree)
-    found = plain.under_drag()
+    times += np.random.default_rng(2).normal(0, 1e-8, times.size)
+    plain, found = spin_of_times(times, degree=3), spin_of_times(times)
     spin = (first ** (1 - power) + c * (power - 1) * found.reference_time) ** (1 / (1 - power))
     truth = -c * spin**power
     bias = power * (2 * power - 1) * truth**3 / spin**2 * times[-1] ** 2 / 56
-    if degree == 3:  # with a parabola the bend, too, moves the slope a little, as the pulses are not even in time
-        assert plain.chirp.value - truth == pytest.approx(bias, rel=0.1)
-        assert found.chirp.value == pytest.approx(truth, abs=0.1 * abs(bias))
-    assert abs(found.chirp.value - truth) < 3 * found.chirp.u
+    assert plain.chirp.value - truth == pytest.approx(bias, rel=0.1)
+    assert found.chirp.value == pytest.approx(truth, abs=0.1 * abs(bias))

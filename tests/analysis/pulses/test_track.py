@@ -67,6 +67,24 @@ def test_times_of_a_switch_up_and_down_are_cut_as_well():
     assert {"doubled", "missing"} <= {note.name for note in found.notes}
 
 
+@pytest.mark.parametrize("pattern", [(1, 2), (2, 3), (3, 2, 2), (1, 3), (3, 4), (3, 5)])
+def test_pulses_that_come_in_a_pattern_of_turns_have_the_rate_of_the_turns(pattern):
+    turns = np.cumsum(np.tile(pattern, 300))
+    times = (26.83 - np.sqrt(26.83**2 - 2 * 0.05 * turns)) / 0.05
+    times = times[times < 30] + 1e-4 * np.random.default_rng(1).standard_normal(np.count_nonzero(times < 30))
+    found = track_of_times(times)
+    pulls = (found.frequency - 26.83 + 0.05 * found.time) / found.u
+    assert np.abs(pulls).max() < 4
+    assert [note.name for note in found.notes] == ["missing"]
+
+
+def test_windows_that_contradict_each_other_are_named():
+    times = np.arange(600) / 30.0
+    halves = np.concatenate([times[times < 10], times[times >= 10][::2]])
+    assert "unlike" in {note.name for note in track_of_times(halves).notes}
+    assert "unlike" not in {note.name for note in track_of_times(times).notes}
+
+
 def test_blocks_are_not_all_held():
     held = []
 

@@ -8,7 +8,8 @@ from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.generator.agilent_33220a import Agilent33220A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.drivers.generator.siglent_sdg1000x import SiglentSDG1000X
-from instruments.drivers.scpi import ScpiInstrument, Setting, parse_reading
+from instruments.drivers.scpi import ScpiInstrument, parse_reading
+from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, OutOfRange, WrongInstrument
 from support.conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 

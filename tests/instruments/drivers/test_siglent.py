@@ -3,6 +3,7 @@
 The bytes are those that users of an SDS1204X-E and of SDG generators wrote down; see the drivers.
 """
 
+import re
 import struct
 
 import numpy as np
@@ -103,6 +104,61 @@ def test_a_field_of_each_channel_is_set_asked_and_reset(waveform, name, values, 
         assert f",{name},{value}" not in ask(device, f"C{other}:BSWV WVTP,{waveform};C{other}:BSWV?")
         send(device, b"*RST\n")
         assert f",{name},{default}" in ask(device, f"C{n}:BSWV WVTP,{waveform};C{n}:BSWV?")
+
+
+@pytest.mark.parametrize(
+    ("sent", "amplitude", "offset"),
+    [
+        ("HLEV,4", 6, 1),  # the low level stays
+        ("LLEV,0", 2, 1),
+        ("HLEV,4,LLEV,1", 3, 2.5),
+        ("AMPVRMS,1", 2.82885, 0),  # six digits of 1/0.3535
+        ("MAX_OUTPUT_AMP,3", 3, 0),
+        ("MAX_OUTPUT_AMP,3,AMP,9", 3, 0),
+    ],
+)
+def test_the_voltages_are_set_in_each_way(sent, amplitude, offset):
+    device = VirtualSDG1000X(VirtualClock())
+    send(device, f"C1:BSWV {sent}\n".encode())
+    answer = ask(device, "C1:BSWV?")
+    assert f",AMP,{amplitude}V," in answer
+    assert f",OFST,{offset}V," in answer
+
+
+def test_a_power_is_one_of_a_load():
+    device = VirtualSDG1000X(VirtualClock())
+    send(device, b"C1:BSWV AMPDBM,10\n")
+    assert errors(device) == [-221]  # at open terminals there is none
+    send(device, b"C1:OUTP LOAD,50;C1:BSWV AMPDBM,10\n")
+    volts = float(re.search(r"AMPVRMS,([\d.]+)Vrms", ask(device, "C1:BSWV?"))[1])
+    assert volts**2 / 50 == pytest.approx(10e-3, rel=1e-5)  # six digits
+
+
+@pytest.mark.parametrize("device", [VirtualSDG1000X(VirtualClock()), scope()], ids=["generator", "scope"])
+def test_the_buzzer_is_switched_and_asked_for(device):
+    assert ask(device, "BUZZ OFF;BUZZ?") == "BUZZ OFF"
+    assert "SHORT" in ask(device, "CHDR?")
+
+
+@pytest.mark.parametrize("header", ["MDWV", "SWWV", "BTWV"])
+def test_what_a_generator_lacks_is_off(header):
+    device = VirtualSDG1000X(VirtualClock())
+    assert ask(device, f"C1:{header} STATE,OFF;C1:{header}?") == f"C1:{header} STATE,OFF"
+    send(device, f"C1:{header} STATE,ON\n".encode())
+    assert errors(device) == [-224]
+
+
+def test_an_inverted_output_is_one_of_inverted_polarity():
+    device = VirtualSDG1000X(VirtualClock())
+    assert ask(device, "C1:INVT ON;C1:OUTP?").endswith("PLRT,INVT")
+    assert ask(device, "C1:OUTP PLRT,NOR;C1:INVT?") == "C1:INVT OFF"
+    assert ask(device, "C2:SYNC ON;C2:SYNC?") == "C2:SYNC ON"
+
+
+def test_a_screen_dump_is_a_command_that_is_answered():
+    device = scope("STOP")
+    send(device, b"SCDP\n")
+    assert received(device, 10.0)[:2] == b"BM"
 
 
 @pytest.mark.parametrize("wrong", ["FRQ,30,XYZ,1", "WVTP,RAMP,FRQ,30,AMP,x"])

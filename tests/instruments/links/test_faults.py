@@ -6,7 +6,8 @@ import pytest
 import pyvisa_py.protocols.rpc
 
 from instruments.clock import VirtualClock
-from instruments.drivers.scpi import ScpiInstrument, Setting
+from instruments.drivers.scpi import ScpiInstrument
+from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, NotConnected
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bench import VirtualBench

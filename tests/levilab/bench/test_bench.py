@@ -3,6 +3,7 @@
 import pytest
 import pyvisa
 
+from instruments.catalogue import COUNTERS
 from instruments.clock import VirtualClock, WallClock
 from instruments.errors import InstrumentError, NotConnected, Occupied, OutOfRange, WrongInstrument
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
@@ -345,11 +346,9 @@ def test_an_instrument_that_is_not_described_is_asked_for_by_name():
 
 def test_an_unknown_model_is_reported_with_its_key_and_the_known_ones():
     config = described(counter=InstrumentSettings(model="SR620", address="GPIB0::10::INSTR"))
-    with (
-        pytest.raises(ConfigError, match=r"counter\.model = 'SR620' is unknown, known are 53230A, 53220A, CNT-91"),
-        open_bench(config, ("counter",)),
-    ):
+    with pytest.raises(ConfigError, match=r"counter\.model = 'SR620'") as unknown, open_bench(config, ("counter",)):
         pass
+    assert all(model.name in str(unknown.value) for model in COUNTERS)
 
 
 def test_an_address_that_leads_to_another_instrument_is_reported_and_that_one_left_alone():

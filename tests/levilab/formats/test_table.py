@@ -95,6 +95,31 @@ TABLES = {
 }
 
 
+ANGULAR = (
+    "ω in 1/s", "omega [1/s]", "ω in s^-1", "ω [s⁻¹]", "ω / s⁻¹", "Winkelgeschwindigkeit in 1/s",
+    "angular velocity (1/s)", "Kreisfrequenz / (1/s)", "ω\ns;1/s",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("title", ANGULAR)
+def test_an_angular_frequency_in_1_per_s_is_in_rad_per_s(title, table_file):
+    """As German textbooks write it: 1/s of an ω is no Hz; its uncertainty likewise."""
+    name, _, units = title.partition("\n")
+    head = f"t in s;{name};u_ω in 1/s\n" + (f"{units};1/s\n" if units else "")
+    rows = "".join(f"{t};{2 * math.pi * f!r};{2 * math.pi * 0.25!r}\n" for t, f in zip(*PLAIN.values(), strict=True))
+    table = read_table(table_file(head + rows))
+    np.testing.assert_allclose(table.column(F), PLAIN[F], rtol=4e-16)
+    np.testing.assert_allclose(table.column(U), [0.25] * 3, rtol=4e-16)
+    assert any("rad/s" in warning for warning in table.warnings)
+
+
+@pytest.mark.parametrize("title", ["f in 1/s", "Drehzahl [1/s]", "ω in Hz", "n / s⁻¹"])
+def test_turns_in_1_per_s_stay_turns(title, table_file):
+    table = read_table(table_file(f"t;{title}\n0;61.5\n0.5;61.25\n1;61\n"))
+    np.testing.assert_array_equal(table.column(F), PLAIN[F])
+    assert not table.warnings
+
+
 @BOTH_WAYS
 @pytest.mark.parametrize("name", TABLES)
 def test_a_table_reads_the_same_in_every_dialect(name, table_file):

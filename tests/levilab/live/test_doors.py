@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from levilab.live.doors import Doors
-from support.live_pages import GrowingRun, address, serving
+from levilab.live.practice.commands import EventKind, PracticeEvent
+from support.live_pages import PATIENCE_S, GrowingRun, address, serving
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,8 +37,9 @@ def test_only_pages_of_this_server_come_in(host: bytes, origin: bytes | None, so
     assert Doors(8765).lets_in(headers, is_socket=socket) is inside
 
 
-def test_a_request_without_a_host_stays_outside() -> None:
-    assert not Doors(8765).lets_in([], is_socket=False)
+@pytest.mark.parametrize("hosts", [[], [b"evil.example", HERE], [HERE, HERE]])
+def test_a_request_without_one_host_stays_outside(hosts: list[bytes]) -> None:
+    assert not Doors(8765).lets_in([(b"host", host) for host in hosts], is_socket=False)
 
 
 class Bench:
@@ -45,15 +47,19 @@ class Bench:
 
     def __init__(self) -> None:
         self.commands: list[Any] = []
+        self.answers: list[PracticeEvent] = []
 
     address = None
 
     def command(self, command: Any) -> int:
         self.commands.append(command)
+        kind: EventKind = "refused" if command.do == "stop the run" else "done"
+        self.answers.append(PracticeEvent(kind, "no run", len(self.commands)))
         return len(self.commands)
 
-    def events(self) -> list[Any]:
-        return []
+    def events(self) -> list[PracticeEvent]:
+        answers, self.answers = self.answers, []
+        return answers
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +76,7 @@ def hall(tmp_path_factory: pytest.TempPathFactory, bench: Bench) -> Iterator[Hal
     (root / "one" / "report.html").write_text("<h1>report</h1>", encoding="utf-8")
     (root / "one" / "secret.txt").write_text("secret", encoding="utf-8")
     (root.parent / "run.json").write_text("{}", encoding="utf-8")
+    (root / "one" / "linked.png").symlink_to(root / "one" / "secret.txt")
     with serving(root, desk=Desk(bench)) as hall:  # type: ignore[arg-type]
         yield hall
 
@@ -94,7 +101,8 @@ def test_another_name_for_this_machine_is_turned_away(hall: Hall) -> None:
 @pytest.mark.parametrize(
     "path",
     ["/run/one/secret.txt", "/run/one/run.json", "/run/../run.json", "/run/..%2f/run.json", "/run/one%2f../report.html",
-     "/page/..%2fserver.py", "/page/none.js", "/run/two/report.html"],
+     "/page/..%2fserver.py", "/page/none.js", "/run/two/report.html", "/run/one/linked.png",
+     f"/run/{5000 * 'a'}/report.html"],
 )  # fmt: skip
 def test_nothing_but_figures_and_the_report_is_served(hall: Hall, path: str) -> None:
     status, text = request(hall, path)
@@ -120,9 +128,36 @@ def test_a_command_needs_the_token(hall: Hall, bench: Bench) -> None:
 
 
 @pytest.mark.parametrize(
-    "wanted", [{}, [], "x", {"do": "explode"}, {"do": "pause", "on": "maybe"}, {"do": "analyze", "run": ".."}]
-)
+    "wanted",
+    [{}, [], "x", {"do": "explode"}, {"do": "pause", "on": "yes"}, {"do": "analyze", "run": ".."},
+     {"do": "tune the drive", "frequency_hz": "30"}, {"do": "stop the run"}],
+)  # fmt: skip
 def test_what_is_no_command_is_refused_in_words(hall: Hall, wanted: object) -> None:
     status, text = request(hall, "/do", wanted, **{"X-Levilab-Token": hall.doors.token})
-    assert status in {400, 404}
+    assert status in {400, 404, 409}
     assert json.loads(text)["error"]
+
+
+@pytest.mark.parametrize(("question", "code"), [(b"{}", 1003), (5000 * "x", 1009)])
+def test_a_question_that_is_no_text_or_too_long_closes_the_socket(
+    hall: Hall, question: bytes | str, code: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    from websockets.exceptions import ConnectionClosed
+    from websockets.sync.client import connect
+
+    with connect(f"ws://127.0.0.1:{hall.doors.port}/frames?run=one") as socket:
+        socket.send(question)
+        with pytest.raises(ConnectionClosed) as closed:
+            socket.recv(timeout=PATIENCE_S)
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == code
+    assert not [record for record in caplog.records if record.name.startswith("uvicorn")]
+
+
+def test_a_request_that_is_no_http_prints_nothing(hall: Hall, caplog: pytest.LogCaptureFixture) -> None:
+    import socket
+
+    with socket.create_connection(("127.0.0.1", hall.doors.port), timeout=PATIENCE_S) as raw:
+        raw.sendall(b"\x16\x03\x01 junk\r\n\r\n")
+        assert raw.recv(100).startswith(b"HTTP/1.1 400")
+    assert not caplog.records

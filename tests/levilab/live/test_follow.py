@@ -103,11 +103,12 @@ def test_events_are_kept_up_to_a_number_and_damaged_ones_named(tmp_path: Path) -
         run.event(f"event {k}", time_s=float(k))
     with (run.folder / "events.jsonl").open("a") as file:
         file.write('{"time_s": "never"}\n' + "x" * 3_000_000 + "\n")
+        file.write(f'{{"time_s": 1{400 * "0"}, "kind": "said", "text": "a time beyond all floats"}}\n')
     run.event("y" * 5000)
     followed = look(Followed(run.folder))
     assert len(followed.events) == MOST_EVENTS
-    texts = followed.texts_after(followed.event_count - 2)
-    assert [event["kind"] for event in texts] == ["damaged", "said"]
+    texts = followed.texts_after(followed.event_count - 3)
+    assert [event["kind"] for event in texts] == ["damaged", "damaged", "said"]
     assert len(texts[-1]["text"]) == 600
 
 

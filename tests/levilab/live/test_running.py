@@ -1,13 +1,24 @@
-"""What the running fit forecasts."""
+"""The running fit: its forecast, and the u that the analysis gives."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+import pytest
 
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from analysis.spindown.tilt import count
-from levilab.live.running import _without_forecast, spin_down
+from analysis.uncertainty import Estimate
+from levilab import analyze
+from levilab.live.envelope import Groups
+from levilab.live.running import _without_forecast, fit_so_far, spin_down
+from levilab.present.numbers import with_uncertainty
+from support.live_pages import GrowingRun
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 C32, START_HZ, RESONANCE_HZ, TILT_RAD = 2.3e-4, 34.0, 21.4, 0.025
 
@@ -36,3 +47,17 @@ def test_the_forecast_is_of_the_law_and_does_not_run_into_the_resonance() -> Non
     assert ended.head.startswith(f"{found.look} law   ω̇ = ")
     assert not ended.dashed
     assert steps.max() < 2 * steps.min() * (START_HZ / FALLS_BETWEEN_HZ[1]) ** 1.5  # no kink at the last reading
+
+
+@pytest.mark.parametrize("which", ["lower", "upper"])
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_the_mean_of_limits_has_the_u_of_the_analysis(tmp_path: Path, which: str, count: int) -> None:
+    settings = {"limit": {"which": which}}
+    run = GrowingRun(tmp_path, "20261122T100000Z-limit-0000", experiment="limit", configuration=settings)
+    run.readings([(10.0 * k, 23.23 + 0.009 * k, 0.036 * (1 + k % 2)) for k in range(count)])
+    columns = run.folder.joinpath("readings.csv").read_text().splitlines()[0].split(",")
+    rows = np.loadtxt(run.folder / "readings.csv", delimiter=",", skiprows=1, ndmin=2).T
+    shown = fit_so_far("limit", tuple(columns), Groups(1, rows, rows, rows), settings["limit"])
+    result = analyze(run.folder, kind="limit")
+    assert shown is not None
+    assert shown.lines == (with_uncertainty(Estimate(result.values["mean"].value, result.values["mean"].u, "Hz")),)

@@ -4,25 +4,29 @@ from __future__ import annotations
 
 import asyncio
 import math
+import time
 from contextlib import nullcontext
-from types import SimpleNamespace
-from typing import TYPE_CHECKING
+from types import MappingProxyType, SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from starlette.websockets import WebSocketDisconnect
 
 from levilab.live.desk import Desk
 from levilab.live.doors import Doors
 from levilab.live.running import Curve, Running
-from levilab.live.server import OWN_BENCH, Hall
+from levilab.live.server import FRAMES_PER_S, OWN_BENCH, Hall, Pages
 from levilab.live.watch import Watch
 from levilab.simulator.scene import preset
 from levilab.telemetry.address import Address, write_address
+from levilab.telemetry.codec import unpack
 from levilab.telemetry.messages import State
 from support.live_pages import GrowingRun, publish, spin_down
 from support.waiting import HANG_GUARD_S
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
 
@@ -175,3 +179,70 @@ def test_a_page_that_waits_is_sent_a_fit_when_it_is_there(tmp_path: Path, monkey
         reading.cancel()
 
     asyncio.run(wait_for_fit())
+
+
+def test_a_watch_that_fails_fails_alone_and_names_the_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    GrowingRun(tmp_path, "1-broken")
+    sound = GrowingRun(tmp_path, "2-sound")
+    hall = Hall(tmp_path, "", Doors(1))
+
+    def fail() -> None:
+        raise MemoryError("1 TiB")
+
+    async def read() -> tuple[dict[str, Any], int]:
+        with hall.watching("1-broken") as one, hall.watching("2-sound") as two:
+            one.step()
+            assert one.followed
+            assert two.followed
+            monkeypatch.setattr(one.followed, "look", fail)
+            sound.readings(spin_down(3))
+            reading = asyncio.create_task(hall.read_on())
+            while not two.followed.readings.count and not reading.done():
+                await asyncio.sleep(0.001)
+            reading.cancel()
+            return unpack(one.frame({}))["about"], two.followed.readings.count
+
+    about, readings = asyncio.run(read())
+    assert "MemoryError: 1 TiB" in about["problem"]
+    assert about["experiment"] == "spin"  # as far as it was read
+    assert readings == 3
+
+
+class Flood:
+    """A socket with a question at any time.  It is closed after 1000 answers."""
+
+    query_params: Mapping[str, str] = MappingProxyType({"run": "one"})
+
+    def __init__(self) -> None:
+        self.answers = 0
+
+    async def accept(self) -> None:
+        pass
+
+    async def receive(self) -> dict[str, str]:
+        return {"type": "websocket.receive", "text": "{}"}
+
+    async def receive_text(self) -> str:
+        return "{}"
+
+    async def send_bytes(self, _: bytes) -> None:
+        self.answers += 1
+        if self.answers == 1000:
+            raise WebSocketDisconnect
+
+
+def test_a_flood_of_questions_leaves_time_to_others(tmp_path: Path) -> None:
+    GrowingRun(tmp_path, "one")
+    flood = Flood()
+
+    async def serve() -> float:
+        pages = Pages(Hall(tmp_path, "", Doors(1)))
+        begin = time.monotonic()
+        flooded = asyncio.create_task(pages.frames(flood))  # type: ignore[arg-type]
+        for _ in range(20):  # what another page takes
+            await asyncio.sleep(0.01)
+        flooded.cancel()
+        return time.monotonic() - begin
+
+    took = asyncio.run(serve())
+    assert 1 <= flood.answers <= 1 + took * FRAMES_PER_S

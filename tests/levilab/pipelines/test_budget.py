@@ -11,7 +11,8 @@ import pytest
 
 from analysis.spindown.drag import LAWS, spin
 from levilab.pipelines.budget import budget_blocks, budget_table, budgets_of_result, in_a_sentence
-from levilab.pipelines.catalogue import ANALYSES, save
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.suits import save
 from levilab.present.document.blocks import Details, Paragraph, Tabular
 from support.paths import ROOT
 from support.spin_downs import spin_down_csv
@@ -76,24 +77,6 @@ def test_a_budget_is_of_the_value_that_the_result_has(found: dict[str, Any], cas
         if budget["quantity"] in values:
             assert budget["value"] == values[budget["quantity"]]["value"]
             assert budget["u"] == values[budget["quantity"]]["u"]
-
-
-@pytest.mark.parametrize(
-    ("case", "given"), [("four spin-downs", {"tilt": "none"}), ("records", {}), ("a sweep", {}), ("a scan", {}),
-                        ("upper limits", {})]
-)  # fmt: skip
-def test_a_result_that_is_read_back_has_the_same_budgets(
-    sample_data: Path, tmp_path: Path, case: str, given: dict[str, Any]
-):
-    name, parts = CASES[case]
-    for part in parts[:2]:
-        shutil.copytree(sample_data / part, tmp_path / "runs" / part)
-    row, paths = ANALYSES[name], [tmp_path / "runs"]
-    before = row.analyze(paths, row.options_from(given))
-    save(row, before, with_figure=False)
-    after = row.recall(paths, row.options_from(given))
-    assert after.budget == before.budget
-    assert [origin.budget for origin in after.origins] == [origin.budget for origin in before.origins]
 
 
 def test_a_law_as_good_with_fewer_constants_has_its_budget_too(tmp_path: Path):

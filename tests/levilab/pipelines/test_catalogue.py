@@ -12,11 +12,12 @@ import pytest
 
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines import catalogue
-from levilab.pipelines.catalogue import ANALYSES, Analysis, analyze_suiting, recall_suiting
-from levilab.pipelines.catalogue import save as save_found
+from levilab.pipelines.catalogue import ANALYSES, Analysis
 from levilab.pipelines.result import Archive
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
 from levilab.pipelines.spindown.document import SpinDownResult
+from levilab.pipelines.suits import analyze_suiting, recall_suiting, suiting
+from levilab.pipelines.suits import save as save_found
 from support.spin_downs import spin_down_csv
 
 SPINDOWN = ANALYSES["spindown"]
@@ -181,19 +182,30 @@ def test_the_analysis_made_for_an_experiment_goes_before_one_that_takes_its_reco
         assert [row.name for row, _ in recall_suiting([sample_data / name], {})] == [wanted], name
 
 
-def test_an_analysis_that_does_not_suit_is_passed_over(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, sample_data: Path
-) -> None:
-    use(monkeypatch, SPINDOWN, content_row("limit"))
+def test_what_no_analysis_takes_is_refused_with_what_is_there(tmp_path: Path, sample_data: Path) -> None:
+    run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "runs" / "one")
+    text = (run / "run.json").read_text(encoding="utf-8")
+    (run / "run.json").write_text(text.replace('"experiment": "spin"', '"experiment": "dummy"'), encoding="utf-8")
+    for path in (run, run.parent):
+        for look in (analyze_suiting, recall_suiting):
+            with pytest.raises(DoesNotSuit, match=r"there is no analysis of a dummy run \(found 1 dummy run\)$"):
+                look([path], {})
     (tmp_path / "empty").mkdir()
-    table = tmp_path / "field.csv"
-    table.write_text("time_s,field_t\n0,1\n1,2\n2,3\n", encoding="utf-8")
-    for path in (sample_data / "lower-limits", tmp_path / "empty", table):
-        assert [row.name for row, _ in analyze_suiting([path], {})] == ["second"], path
-    text = table.read_text(encoding="utf-8").replace("field_t", "spin_frequency_hz")
-    table.write_text(text.replace("1,2", "1,two"), encoding="utf-8")
+    with pytest.raises(DoesNotSuit, match="holds no run and no data file"):
+        analyze_suiting([tmp_path / "empty"], {})
+
+
+def test_a_damaged_file_is_refused_for_its_damage(tmp_path: Path) -> None:
+    table = tmp_path / "my.csv"
+    table.write_text("time_s,spin_frequency_hz\n0,1\n1,two\n2,3\n", encoding="utf-8")
     with pytest.raises(DataError, match="line 3"):
         analyze_suiting([table], {})
+
+
+def test_a_file_with_columns_of_one_analysis_alone_is_for_that_one(tmp_path: Path, sample_data: Path) -> None:
+    """The readings of a sweep have times and spins, too, as those of a spin-down."""
+    file = shutil.copy(sample_data / "precession-sweep" / "readings.csv", tmp_path / "sweep.csv")
+    assert [one.analysis.name for one in suiting([Path(file)], {})] == ["precession"]
 
 
 @pytest.mark.usefixtures("undrawn_figures")

@@ -12,7 +12,7 @@ import pytest
 
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.sources import collect, sha256_of
+from levilab.pipelines.sources import Skipped, SkippedRuns, collect, sha256_of
 from levilab.pipelines.spindown.analysis import NEEDS, SpinDownOptions, analyze_spindowns
 from levilab.pipelines.spindown.readings import Readings
 from support.spin_downs import spin_down_csv
@@ -82,13 +82,13 @@ def test_a_run_that_goes_on_in_another_folder_counts_once(tmp_path: Path, sample
     (tmp_path / "run" / "readings.csv").write_text("".join(lines[:-2]), encoding="utf-8")
     analysis = analyze_spindowns([tmp_path], SpinDownOptions())
     assert [source.name for source in analysis.sources] == ["run-rescued"]
-    assert analysis.remarks == (f"passed over: {tmp_path / 'run'} was broken off, its run goes on in run-rescued",)
+    assert analysis.remarks == (Skipped(f"{tmp_path / 'run'}, which was broken off: its run goes on in run-rescued"),)
 
 
 def test_runs_of_another_experiment_are_a_remark_and_no_warning(sample_data: Path) -> None:
     analysis = analyze_spindowns([sample_data], SpinDownOptions())
-    assert "passed over: 3 limit runs" in analysis.remarks
-    assert not any("passed over" in warning for warning in analysis.all_warnings)
+    assert SkippedRuns("limit", 3) in analysis.remarks
+    assert not any("skipped" in warning for warning in analysis.all_warnings)
 
 
 def test_what_is_no_regular_file_has_no_hash(tmp_path: Path) -> None:

@@ -16,8 +16,9 @@ from typing import Any
 import pytest
 
 from levilab.errors import DataError, LevilabError
-from levilab.pipelines.catalogue import ANALYSES, save
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
+from levilab.pipelines.suits import save
 from levilab.report.html.page import script
 from levilab.report.inputs import _drive
 from levilab.report.page import render as render_found

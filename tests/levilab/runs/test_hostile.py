@@ -395,6 +395,8 @@ def test_too_few_open_files_cost_one_line(tmp_path: Path, words: list[str]) -> N
     """
     import resource
 
+    import levilab.present.style  # noqa: F401 - for figures, which none of these draws the first time
+
     assert command(*words, cwd=tmp_path).status == 0
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     for more in range(4):

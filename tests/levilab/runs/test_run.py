@@ -3,6 +3,7 @@
 import errno
 import hashlib
 import json
+import os
 import re
 import tempfile
 from dataclasses import replace
@@ -332,3 +333,13 @@ def test_a_disk_that_fails_is_no_full_one(
         monkeypatch.setattr("os.fsync", fail)
         with pytest.raises(CannotWrite, match=advice):
             writer.reading(row(0))
+
+
+def test_a_run_folder_that_cannot_be_filled_is_taken_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("levilab.runs.writer.replace_atomically", fail)
+    with pytest.raises(CannotWrite):
+        RunWriter.create(tmp_path / "runs", record())
+    assert not [*(tmp_path / "runs").iterdir()]

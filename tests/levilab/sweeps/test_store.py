@@ -124,6 +124,18 @@ def test_a_store_whose_marks_are_torn_is_an_error(tmp_path: Path) -> None:
         Store.open(tmp_path / "map.zarr")
 
 
+def test_the_slower_of_two_sweeps_is_refused_as_if_it_had_come_later(tmp_path: Path) -> None:
+    path, other = tmp_path / "map.zarr", tmp_path / "other.zarr"
+    Store.create(other, plan())
+    refused = []
+    for begin in (lambda _: other.rename(path), lambda _: None):
+        with pytest.raises(CannotWrite) as error:
+            Store.create(path, plan(), begin)
+        refused.append(str(error.value))
+    assert refused[0] == refused[1]
+    assert [one.name for one in tmp_path.iterdir()] == ["map.zarr"]
+
+
 def test_a_folder_that_is_there_is_not_written_over(tmp_path: Path) -> None:
     Store.create(tmp_path / "map.zarr", plan())
     with pytest.raises(CannotWrite, match="is there already"):

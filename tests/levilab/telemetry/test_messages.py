@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from levilab.telemetry.messages import Counting, Drive, MalformedMessage, Message, Poses, Record, State, decode, encode
+from levilab.telemetry.codec import MalformedMessage
+from levilab.telemetry.messages import Counting, Drive, Message, Poses, Record, State, decode, encode
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=30)
@@ -37,6 +38,13 @@ states = st.builds(
     paused=st.booleans(),
     probe_m=maybe,
     busy=st.booleans(),
+)
+
+
+#: A head of poses with shapes of its arrays, for 32 bytes of them.
+POSES = (
+    '{"kind":"poses","start_s":0,"step_s":1,"position":{"$array":["<f4",%s,0]},'
+    '"quaternion":{"$array":["<f4",%s,12]},"up":{"$array":["|b1",%s,28]}}'
 )
 
 
@@ -92,15 +100,15 @@ def test_any_bytes_are_no_message(data: bytes) -> None:
 @pytest.mark.parametrize(
     "head",
     [
-        "[]", "null", '{"kind":"state"}', '{"kind":"other","rows":0}', '{"kind":"state","rows":0,"time_s":NaN}',
-        '{"kind":"state","rows":0,"time_s":"<b>"}', '{"kind":"poses","rows":-1,"start_s":0,"step_s":1}',
-        '{"kind":"poses","rows":1e3,"start_s":0,"step_s":1}', '{"kind":"poses","rows":99999999,"start_s":0,"step_s":1}',
-        '{"kind":["state"],"rows":0}', "[" * 5000,
+        "[]", "null", '{"kind":"state"}', '{"kind":"other"}', '{"kind":"state","time_s":NaN}',
+        '{"kind":"state","time_s":"<b>"}', '{"kind":["state"]}', "[" * 5000, POSES % ("[9,3]", "[9,4]", "[9]"),
+        POSES % ("[1,3]", "[1,4]", "[2]"), POSES % ("[1]", "[1,4]", "[1]"), POSES % ("[-1,3]", "[1,4]", "[1]"),
+        POSES % ("[1e3,3]", "[1,4]", "[1]"), POSES % ("7", "[1,4]", "[1]"), POSES % ("[0,3]", "[0,4]", "[0]") + "x",
     ],
 )  # fmt: skip
 def test_a_head_that_says_something_else_is_refused(head: str) -> None:
     with pytest.raises(MalformedMessage):
-        decode(len(head).to_bytes(4, "little") + head.encode())
+        decode(len(head).to_bytes(4, "little") + head.encode() + bytes(32))
 
 
 def test_what_is_not_a_number_is_left_out_and_a_newer_key_ignored() -> None:

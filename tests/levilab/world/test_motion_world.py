@@ -1,5 +1,6 @@
 """A world in full motion: what it shows is the simulator's motion, however and in whatever order one looks at it."""
 
+import gc
 import math
 from dataclasses import replace
 
@@ -13,8 +14,9 @@ from instruments.virtual.generator.channel import Burst, Output
 from instruments.virtual.generator.voltage import fundamental
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator import SceneError, preset, simulate
+from levilab.simulator.parts import Top
 from levilab.world.base import Base
-from levilab.world.flight import RATE, Flight, _cubic
+from levilab.world.flight import RATE, SAMPLED, Flight, _cubic
 from levilab.world.light import Tape
 from levilab.world.motion_world import MotionWorld
 from levilab.world.spin_world import KEPT_S
@@ -339,6 +341,22 @@ def test_a_bench_that_runs_for_hours_drops_old_history(look):
         look(top)
     kept = len(top._flight._pieces)
     assert kept < 2 * KEPT_S / 60 + 1100  # a life and a fall each minute, and a thousand that are not let go yet
+
+
+def test_a_bench_that_runs_for_hours_keeps_the_samples_of_the_last_minutes_alone():
+    top = world(TILTED)
+    top.clock.sleep(20.0)
+    before = top.light(5.0, 1e-4, 10_000), top.laser(5.0, 1e-4, 10_000)
+    tables = sum(isinstance(one, Top) for one in gc.get_objects())
+    for k in range(12):
+        top.drive(top.clock.now(), Output("SIN", 30.0 + 0.01 * k, amplitude=1e-6, offset=0.0))
+        top.clock.sleep(100.0)
+        top.catch_up()
+    assert len(top._flight._pieces) > 1200
+    assert len(top._flight._samples) == SAMPLED
+    assert sum(isinstance(one, Top) for one in gc.get_objects()) <= tables + 1  # however often the drive was changed
+    again = top.light(5.0, 1e-4, 10_000), top.laser(5.0, 1e-4, 10_000)
+    assert np.array_equal(before, again)  # simulated once more, to the bit
 
 
 def test_a_top_that_cannot_be_simulated_is_an_error_and_no_fall(monkeypatch):

@@ -159,7 +159,7 @@ def test_models_are_chosen_by_kind_in_any_case():
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["counter=DVM"], "no such counter, known are 53230A"),
+        (["counter=DVM"], "no such counter, known are "),
         (["piano=1"], "'piano' is no kind of instrument"),
         (["counter"], "no such counter"),
     ],

@@ -224,7 +224,8 @@ class Liar:
         if "?" not in message or not self.replies or (reply := self.replies.pop(0)) is None:
             return answer
         data, delay, complete = reply
-        return Answer(data, self._device.clock.now() + delay, self._device.epoch, complete) if data else None
+        now = self._device.clock.now()
+        return Answer(data, now + delay, self._device.epoch, now, complete) if data else None
 
 
 def _block(size, data):

@@ -55,6 +55,8 @@ def test_the_instruments_of_the_bench_are_listed(manager):
     assert manager.list_resources() == (COUNTER, GENERATOR, OSCILLOSCOPE, MAGNETOMETER)
     assert manager.list_resources("?*generator?*") == (GENERATOR,)
     assert manager.list_resources("GPIB?*::INSTR") == ()
+    assert manager.list_resources("(GPIB|TCPIP)?*") == (COUNTER, GENERATOR, OSCILLOSCOPE)
+    assert manager.list_resources("ASRL[a-m]?*") == (MAGNETOMETER,)
 
 
 @pytest.mark.parametrize("address", [GENERATOR, GENERATOR.lower(), GENERATOR.upper()])
@@ -165,7 +167,7 @@ def test_other_models_stand_before_the_name_of_the_library():
     assert [name.split(",")[1].strip() for name in names] == ["CNT-91", "DSOX2024A"]
     with (
         contextlib.closing(pyvisa.ResourceManager("realtime,CNT91@levilab")) as manager,
-        pytest.raises(ConfigError, match="'CNT91' before @levilab is no model: known are realtime, 53230A"),
+        pytest.raises(ConfigError, match="'CNT91' before @levilab is no model"),
     ):
         manager.open_resource(COUNTER)
 

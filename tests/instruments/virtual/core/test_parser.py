@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
+from instruments.virtual.bench.session import Session
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.message import LONGEST_LINE
 from instruments.virtual.core.rows import Ask, Both, Do
@@ -283,6 +284,14 @@ def test_clear_drops_a_half_sent_message_and_unread_answers(generator):
     cable(generator).clear()
     assert ask(generator, "FREQ?") == "+1.000000000000000E+03"
     assert errors(generator) == []
+
+
+def test_a_program_that_reads_after_a_clear_must_have_asked(generator):
+    link = Session(generator)
+    link.write(b"*IDN?\n")
+    link.clear()
+    assert link.read(100, 1.0) is None
+    assert errors(generator) == [-420]
 
 
 def test_an_answer_takes_its_time_on_the_clock_of_the_bench(generator):

@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
+from instruments.drivers.counter.keysight_53230a import Keysight53230A
+from instruments.errors import OutOfRange
+from instruments.virtual.bench.bench import VirtualBench
+from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
+from support import hostile
 from support.wire import ask, cable, errors, received, send
 
 DARK, BRIGHT, DUTY = 0.1, 1.2, 0.03
@@ -484,3 +489,35 @@ def test_what_the_counter_does_not_take_is_out_of_range(bad):
     device = counter(pulses(40.0))
     send(device, bad.encode() + b"\n")
     assert errors(device) == [-222]
+
+
+# --- a member of the family with one input and two functions ---
+
+
+@pytest.mark.parametrize(
+    ("message", "error"),
+    [
+        (b"CONF:TINT (@1),(@2)", -113),
+        (b"MEAS:PWID?", -113),
+        (b"SENS:TOT:GATE:TIME 1", -113),
+        (b"INP2:COUP DC", -113),
+        (b'FUNC "TINT 1,2"', -224),
+        (b'FUNC "FREQ 2"', -224),
+        (b"CONF:FREQ (@2)", -224),
+    ],
+)
+def test_a_53210a_does_not_know_what_it_lacks(message, error):
+    device = hostile.instrument("53210A")
+    send(device, message + b"\n")
+    assert errors(device) == [error]
+
+
+def test_a_53210a_counts_at_its_input_and_its_driver_refuses_another():
+    address = "TCPIP0::box::inst0::INSTR"
+    library = library_for(VirtualBench({address: hostile.instrument("53210A")}))
+    with Keysight53230A.connect(address, library=library) as driver:
+        with pytest.raises(OutOfRange) as refused:
+            driver.prepare(gate_s=0.5, trigger_level_v=0.6, channel=2)
+        assert (refused.value.value, refused.value.allowed) == (2, "1")
+        driver.prepare(gate_s=0.5, trigger_level_v=0.6)
+        assert driver.frequency() == pytest.approx(30.0, rel=1e-3)  # of the light in that room

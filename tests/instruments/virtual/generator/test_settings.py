@@ -81,6 +81,9 @@ def test_the_state_after_reset_is_that_of_the_family(generator):
 def test_a_text_is_displayed_until_it_is_cleared(either):
     assert ask(either, "DISP:TEXT 'coil on; do not touch';:DISP:TEXT?") == '"coil on; do not touch"'
     assert ask(either, "DISP:TEXT:CLE;:DISP:TEXT?") == '""'
+    assert ask(either, "DISP:TEXT 'it''s on';:DISP:TEXT?") == '"it\'s on"'
+    send(either, b'DISP:TEXT "a" "b"\n')
+    assert errors(either) == [-103]
 
 
 @pytest.mark.parametrize("text", ["hello", "x", "'half", "\"other'"])

@@ -237,7 +237,7 @@ def test_a_clear_drops_a_message_while_the_interruption_is_sent():
         await client.link.wait_until_done()
         await client._handle(Message(Type.DATA_END, parameter=4, payload=b"LEV 5"))
         await client.link.wait_until_done()
-        assert client.clearing
+        assert client.is_clearing()
 
     asyncio.run(clear_meanwhile())
     assert thing.settings["level"] == 0

@@ -10,8 +10,10 @@ import struct
 import pytest
 
 from instruments.clock import WallClock
-from instruments.ieee488 import INFINITY
+from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.bench.bench import VirtualBench
+from instruments.virtual.core.signal import no_signal
+from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.servers.clients import LINGER, Link, ServedInstrument
 from instruments.virtual.servers.hislip import HislipServer
 from instruments.virtual.servers.hislip_messages import HEADER, Type
@@ -168,3 +170,64 @@ def test_a_stream_client_whose_answer_never_comes_is_let_go(loop, instrument):
     instrument.device.busy_until(INFINITY)
     assert loop.run_until_complete(over_a_stream(instrument, [b"*IDN?"])) == b""
     assert loop.now < 3 * LINGER
+
+
+# --- a question that holds the instrument ends with its client ---
+
+
+GATE = b"SENS:FREQ:GATE:TIME 100;:SYST:TIM 2000;:READ?"
+HOLDS = {
+    "no trigger": b"TRIG:SOUR EXT;:READ?",
+    "a long gate": GATE,
+    "many questions": b";".join([b"*IDN?"] * 20_000),
+}
+
+
+@pytest.fixture
+def counter(loop):
+    """A counter whose input is dark."""
+    device = Virtual53230A(WallClock(), signal=no_signal)
+    return ServedInstrument(VirtualBench({NETWORK: device}), device)
+
+
+async def identity_in_time(link):
+    """Return the answer to ``*IDN?``, which must come within a second."""
+    await link.write(b"*IDN?\n")
+    assert await link.wait_for_answer(1.0)
+    return link.take(1 << 10)[0].decode().strip()
+
+
+@pytest.mark.parametrize("question", HOLDS.values(), ids=HOLDS)
+def test_what_a_stream_client_has_asked_ends_when_it_leaves(loop, counter, question):
+    async def ask_and_leave():
+        other = Link(counter, stream=True)
+        assert await over_a_stream(counter, [question]) == b""
+        return await identity_in_time(other)
+
+    assert loop.run_until_complete(ask_and_leave()) == counter.device.identity
+    assert loop.now < 3 * LINGER
+
+
+def test_a_client_that_still_waits_makes_way_for_the_next_one(loop, counter):
+    async def ask_and_wait():
+        waiting = asyncio.ensure_future(over_a_stream(counter, [GATE]))
+        await asyncio.sleep(20 * LINGER)
+        assert not waiting.done()  # its answer comes after 200 s
+        answer = await identity_in_time(Link(counter, stream=True))
+        assert await waiting == b""
+        return answer
+
+    assert loop.run_until_complete(ask_and_wait()) == counter.device.identity
+
+
+def test_the_answer_to_another_client_outlives_the_one_that_leaves(loop, counter):
+    async def ask_and_let_the_other_leave():
+        measures = Link(counter, stream=True)
+        await measures.write(b"SENS:FREQ:GATE:TIME 2;:SYST:TIM 4;:READ?\n")
+        await measures.wait_until_done()
+        await over_a_stream(counter, [b"*IDN?"])
+        assert await measures.wait_for_answer(10.0)
+        return measures.take(1 << 10)[0]
+
+    assert float(loop.run_until_complete(ask_and_let_the_other_leave())) == NOT_A_NUMBER
+    assert loop.now == pytest.approx(4.0, abs=0.1)

@@ -21,7 +21,7 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration, settings_of, with_settings
 from levilab.bench.config import ConfigError
 from levilab.errors import UsageError
-from levilab.pipelines.limit.analysis import LimitOptions, analyze_limits
+from levilab.pipelines.limit.analysis import METHOD, LimitOptions
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 from support.acquisitions import Impatient, Silent, in_world
@@ -106,7 +106,7 @@ def test_the_mean_of_tops_that_are_all_alike_is_no_better_than_a_step(tmp_path: 
     run = acquire(
         in_world(mock(tmp_path, *SLIPS[:-1], "limit.repetitions=4"), Slipping(SpinScene(), VirtualClock())), Silent()
     )
-    (found,) = (one.statistics for one in analyze_limits([run.folder], LimitOptions()).runs)
+    (found,) = (one.statistics for one in METHOD.analyze([run.folder], LimitOptions()).runs)
     assert found.n == 4
     assert found.mean.value is not None
     assert found.mean.u is not None

@@ -7,7 +7,6 @@ from scipy.integrate import solve_ivp
 
 from levilab.benchmark.simulator import motion
 from levilab.benchmark.simulator.command import print_comparison
-from levilab.benchmark.simulator.kernel import Rate
 from levilab.benchmark.simulator.ours import problem
 from levilab.benchmark.simulator.peers import PEERS, Peer, Point
 from levilab.benchmark.simulator.speeds import best_speed
@@ -49,8 +48,7 @@ def test_the_ratios_compare_each_side_at_its_best():
 
 
 def test_the_table_and_the_document_tell_what_is_missing(capsys):
-    rates = {"peak": Rate(0.0, 100.0, 1.0), "one top": Rate(19.0, 9.6, 0.096)}
-    found = Comparison(POINTS, ratios(POINTS), rates, missing=("heyoka",))
+    found = Comparison(POINTS, ratios(POINTS), missing=("heyoka",))
     print_comparison(found)
     shown = capsys.readouterr().out
     assert 'pip install ".[peers]"' in shown

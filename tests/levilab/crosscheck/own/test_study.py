@@ -123,7 +123,8 @@ def test_pulls_of_few_pulses_are_compared_with_students_law():
 
 def test_a_record_of_few_pulses_says_by_how_much_pulls_scatter(sample_data: Path):
     checked = study_result("spin", result("spin", sample_data / "trace-laser"), {}, 150)
-    assert {one.widened for one in checked.spreads} == {15}  # 19 pulses, four coefficients
+    # 19 pulses, four coefficients; the noise counts for nothing
+    assert [one.widened for one in checked.spreads] == pytest.approx([15, 15], abs=0.3)
     assert checked.holds
     assert "pulls have a standard deviation of 1.04" in as_text(checked)
     # single bends that were not fitted made it 1.3 to 1.5, single records at half the frequency 1000

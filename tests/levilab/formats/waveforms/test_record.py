@@ -102,8 +102,21 @@ def rows(n: int = 20, first: int = 0) -> str:
         ("#Model,MDO3014\n#Sample Interval,4e-09\n#Record Length,20\n#TIME,D1,D0\n"
          + "".join(f"{k * 4e-9:.7e},1,0\n" for k in range(20)), 0.0, 4e-9, "D1 V, D0 V"),
         ("x-axis,1,2\nsecond,Volt,Ampere\n" + "".join(f"{k}.0E-03,1,2\n" for k in range(20)),
-         0.0, 1e-3, "CH1 V, CH2 Ampere"),
+         0.0, 1e-3, "CH1 V, CH2 A"),
         ("t,CH1\n" + "".join(f"{k / 1000},1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
+        ("X(CH1),CH1\nSecond,Volt\n" + "".join(f"{k / 1000},1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
+        ("X(CH1),Y(CH1),X(CH2),Y(CH2)\nSecond,Volt,Second,Ampere\n"
+         + "".join(f"{k / 1000},1,{k / 1000},2\n" for k in range(20)), 0.0, 1e-3, "CH1 V, CH2 A"),
+        ("Time(CH1),Volt(CH1)\n" + "".join(f"{k / 1000},1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
+        ("x-axis,1,1,1\nsecond,Volt,Volt,Volt\n" + "".join(f"{k}.0E-03,1,2,3\n" for k in range(20)),
+         0.0, 1e-3, "CH1 V, CH1 (2) V, CH1 (3) V"),
+        ("x-axis,1,2\nsecond,Volt,Volt\n-1.0E-03,,5\n" + "".join(f"{k}.0E-03,1,2\n" for k in range(20)) + ",,\n",
+         0.0, 1e-3, "CH1 V, CH2 V"),
+        ("Source,CH1,CH2\nSample Interval,1e-3\nSecond,Volt,Ampere\n" + "".join(f"{k / 1000},1,2\n" for k in range(20)),
+         0.0, 1e-3, "CH1 V, CH2 A"),
+        ("Channel\t\t :,CH1\nFrequency :,F=1.498kHz\nTime interval\t :,100.00uS\n\nindex,CH1_Voltage(mV)\n"
+         + "".join(f"{k},{k % 5}.00\n" for k in range(20)), 0.0, 1e-4, "CH1 V"),
+        ("#CHANNEL:CH2\n#CLOCK=50.0uS\n#SIZE=20\n#UNITS:mV\n" + "1.5,\n2.5,\n" * 10, 0.0, 5e-5, "CH2 V"),
         ("".join(f"{k / 1000},1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
         ("t/us\tu/mV\n" + "".join(f"{k}\t1\n" for k in range(20)), 0.0, 1e-6, "u V"),
     ],

@@ -207,8 +207,20 @@ def test_a_top_falls_near_the_edge_and_is_put_back(tmp_path: Path) -> None:
     assert math.isnan(script.spins(30.0, 33.0)[-1][2])
     assert [text.partition(", ")[0] for text in script.said("refused")] == 3 * ["the top is down"]
     assert script.said("done") == ["the top floats again"]
+    assert [text.partition(" Hz,")[0] for text in script.said("message")] == [f"the top fell at {counted[-1]:.1f}"]
     assert not list(tmp_path.iterdir())  # no run was begun
     assert script.spins(36.0, 39.0)[-1][2] == pytest.approx(25.0, abs=0.5)
+
+
+def test_a_held_top_that_falls_for_want_of_spin_is_not_said_to_be_lost_by_the_drive(tmp_path: Path) -> None:
+    down = TuneDrive(frequency_hz=20.0, ramp_hz_per_s=0.3)
+    script = carry_out(
+        tmp_path, (2.0, MatchDrive()), (2.1, SwitchDrive(on=True)), (20.0, down), (45.0, None), start_hz=26.0
+    )
+    assert [text.partition(" at ")[0] for text in script.said("message")][-2:] == [
+        "the top follows the drive",
+        "the top fell",
+    ]
 
 
 def test_what_the_bench_cannot_do_is_refused_with_what_to_do(session: Script) -> None:

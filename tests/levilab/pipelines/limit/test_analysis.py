@@ -11,18 +11,19 @@ import pytest
 
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
-from levilab.pipelines.catalogue import ANALYSES, analyze_suiting, save
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.limit.analysis import (
     LOWER_EDGE,
+    METHOD,
     RESONANCE,
     UPPER_EDGE,
     LimitAnalysis,
     LimitOptions,
-    analyze_limits,
 )
 from levilab.pipelines.limit.report import limit_part
 from levilab.pipelines.limit.table import limit_tables
-from levilab.pipelines.sources import mark_of
+from levilab.pipelines.sources import SkippedRuns, mark_of
+from levilab.pipelines.suits import analyze_suiting, save
 from levilab.present.document.blocks import Listing
 from levilab.report.page import write_report
 from levilab.report.tables.values import of_analysis
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
 
 def test_the_published_limits_give_the_published_statistics(sample_data: Path) -> None:
-    analysis = analyze_limits([sample_data / "lower-limits"], LimitOptions())
+    analysis = METHOD.analyze([sample_data / "lower-limits"], LimitOptions())
     values = ANALYSES["limit"].document(analysis, sample_data)["values"]
     assert round(values["mean"]["value"], 2) == 21.86
     assert round(values["scatter"]["value"], 2) == 0.25
@@ -45,7 +46,7 @@ def test_theory_beside_them_is_that_of_the_thesis_top(sample_data: Path, tmp_pat
     """PHYSICS: window 21.65 to 80.6 Hz at z = 7.30 cm, computed there from the quartic; resonance 22.1 Hz."""
     file = tmp_path / "upper.csv"  # with no scene of its own
     file.write_text("61.2\n60.9\n61.0\n", encoding="utf-8")
-    (lower, upper) = analyze_limits([sample_data / "lower-limits", file], LimitOptions()).groups
+    (lower, upper) = METHOD.analyze([sample_data / "lower-limits", file], LimitOptions()).groups
     expected = {one.name: one.expected for group in (lower, upper) for one in group.comparisons}
     assert expected == pytest.approx({LOWER_EDGE: 21.65, RESONANCE: 22.1, UPPER_EDGE: 80.6}, abs=0.06)
     assert "0.21 Hz above the lower edge of the linear window" in lower.text
@@ -56,13 +57,13 @@ def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Pa
     document = ANALYSES["limit"].document(analysis, tmp_path)
     assert {"lower_mean", "upper_1_mean", "upper_2_standard_error"} <= document["values"].keys()
     assert "The top was lost by the drive 8 times." in analysis.groups[1].text
-    assert [run["which"] for run in document["runs"]] == ["upper", "lower", "upper"]
-    assert [group["repetitions"] for group in document["groups"]] == [10, 8, 8]
+    assert [run["result"]["which"] for run in document["runs"]] == ["upper", "lower", "upper"]
+    assert [group["statistics"]["n"] for group in document["groups"]] == [10, 8, 8]
     warning, conditions = sorted(analysis.all_warnings)  # spin-downs in the same folder are a remark
     assert "the upper limits are of 2 conditions" in conditions
     assert "LOOSE WASHERS" in warning
     assert warning.endswith("(the first of 16 such warnings)")
-    assert "passed over: 4 spin runs" in analysis.remarks
+    assert SkippedRuns("spin", 4) in analysis.remarks
     assert limit_tables(analysis)[1].title == "Beside theory, for 3 kinds of top"  # of 26 tops
     # the lower limits are real, so nothing that is made of them alone bears the mark
     assert marks_of_budgets(analysis) == ["", "SYNTHETIC.", "SYNTHETIC."]
@@ -79,7 +80,6 @@ def marks_of_budgets(analysis: LimitAnalysis) -> list[str]:
 
 
 def test_groups_of_the_same_mean_are_told_apart(sample_data: Path, tmp_path: Path) -> None:
-    """Also in results that were written before budgets had the numbers of their groups."""
     limits = ["67.5,0.25", "68.5,0.25", "68,0.25", "69,0.25"]
     for name, changes, rows in (("a", {}, limits), ("b", {"drive_amplitude_vpp": 20.0}, reversed(limits))):
         folder = shutil.copytree(sample_data / "upper-limits", tmp_path / name)
@@ -95,7 +95,7 @@ def test_groups_of_the_same_mean_are_told_apart(sample_data: Path, tmp_path: Pat
     assert marks_of_budgets(analysis) == ["SYNTHETIC.", ""]
     document = ANALYSES["limit"].document(analysis, tmp_path)
     assert [document["values"][f"upper_{k}_mean"]["group"] for k in (1, 2)] == [0, 1]
-    assert [budget.pop("group") for budget in document["budget"]] == [0, 1]
+    assert [budget["group"] for budget in document["budget"]] == [0, 1]
     (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
     assert marks_of_budgets(ANALYSES["limit"].recall([tmp_path], LimitOptions())) == ["SYNTHETIC.", ""]
     document["budget"][0]["group"] = 2
@@ -124,7 +124,7 @@ def test_measured_and_made_up_runs_are_never_one_mean(sample_data: Path, tmp_pat
     assert not any("says nothing about a real top" in text for text in analysis.all_warnings)
     document = ANALYSES["limit"].document(analysis, tmp_path)
     assert [group["conditions"]["synthetic"] for group in document["groups"]] == [False, True]
-    assert [run["conditions"]["synthetic"] for run in document["runs"]] == [False, True, False]
+    assert [run["result"]["conditions"]["synthetic"] for run in document["runs"]] == [False, True, False]
     save(ANALYSES["limit"], analysis)
     assert ANALYSES["limit"].recall([tmp_path], LimitOptions()).groups == analysis.groups
     page = write_report([tmp_path], tmp_path / "page.html").read_text(encoding="utf-8")
@@ -143,7 +143,7 @@ def test_measured_and_made_up_runs_are_never_one_mean(sample_data: Path, tmp_pat
 def test_what_is_made_up_is_said_of_each_run_and_group(
     sample_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, synthetic: bool | None
 ) -> None:
-    """A data file does not say it; of a result of an earlier version, without the key, the inputs do."""
+    """A data file does not say it."""
     monkeypatch.chdir(tmp_path)  # where the result of several inputs goes
     paths = [tmp_path / "my.csv"] if "my.csv" in name else [shutil.copytree(sample_data / name, tmp_path / name)]
     (tmp_path / "my.csv").write_text("f [Hz]\n21.9\n21.8\n22.0\n", encoding="utf-8")
@@ -155,11 +155,8 @@ def test_what_is_made_up_is_said_of_each_run_and_group(
     document = json.loads(file.read_text(encoding="utf-8"))
     (group,) = document["groups"]
     assert group["conditions"]["synthetic"] is synthetic
-    assert document["runs"][0]["conditions"]["synthetic"] is synthetic
-    assert [run["conditions"]["synthetic"] for run in document["runs"][1:]] == [False] * (len(paths) - 1)
-    for part in (group, *document["runs"]):
-        del part["conditions"]["synthetic"]
-    file.write_text(json.dumps(document), encoding="utf-8")
+    assert document["runs"][0]["result"]["conditions"]["synthetic"] is synthetic
+    assert [run["result"]["conditions"]["synthetic"] for run in document["runs"][1:]] == [False] * (len(paths) - 1)
     recalled = ANALYSES["limit"].recall(paths, LimitOptions())
     assert (recalled.runs, recalled.groups) == (analysis.runs, analysis.groups)
 
@@ -167,13 +164,8 @@ def test_what_is_made_up_is_said_of_each_run_and_group(
 @pytest.mark.usefixtures("undrawn_figures")
 def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(sample_data / "loose-washers", tmp_path / "run")
-    analysis = analyze_limits([folder], LimitOptions())
+    analysis = METHOD.analyze([folder], LimitOptions())
     assert [file.name for file in save(ANALYSES["limit"], analysis)] == ["result.json", "limit.png"]
-    again = ANALYSES["limit"].recall([folder], LimitOptions())
-    assert again.origins[0].text.startswith("as levilab analyze found it")
-    assert again.groups == analysis.groups
-    assert again.all_warnings == analysis.all_warnings
-    assert limit_tables(again) == limit_tables(analysis)
     page = write_report([folder], tmp_path / "page.html").read_text(encoding="utf-8")
     assert "LOOSE WASHERS" in page
     assert analysis.groups[0].text.split(".")[0] in page
@@ -181,19 +173,10 @@ def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Pa
     assert other.origins[0].text.startswith("analyzed for this page")
 
 
-def test_a_result_that_is_damaged_is_an_error(sample_data: Path, tmp_path: Path) -> None:
-    folder = shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
-    document = ANALYSES["limit"].document(analyze_limits([folder], LimitOptions()), folder)
-    document["runs"][0]["which"] = "middle"
-    (folder / "result.json").write_text(json.dumps(document), encoding="utf-8")
-    with pytest.raises(DataError, match=r"result\.json: runs\.0\.which = 'middle'"):
-        ANALYSES["limit"].recall([folder], LimitOptions())
-
-
 def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path: Path) -> None:
     file = tmp_path / "my.csv"
     file.write_text("top,f [Hz]\n1,80.1\n2,80.3\n3,79.9\n", encoding="utf-8")
-    (group,) = analyze_limits([file], LimitOptions()).groups
+    (group,) = METHOD.analyze([file], LimitOptions()).groups
     assert (group.which, group.statistics.n) == ("upper", 3)  # by the nearer edge of the window
 
 
@@ -210,7 +193,7 @@ def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path: Path) -> None:
 def test_a_column_of_limits_alone_is_enough(tmp_path: Path, text: str, request: pytest.FixtureRequest) -> None:
     file = tmp_path / "my.csv"
     file.write_text(("rpm\n" if request.node.callspec.id == "rpm" else "") + text, encoding="utf-8")
-    (group,) = analyze_limits([file], LimitOptions()).groups
+    (group,) = METHOD.analyze([file], LimitOptions()).groups
     assert group.statistics.mean.value == pytest.approx(65.0 / 3)
     assert (group.which, group.statistics.n) == ("lower", 3)
 
@@ -220,7 +203,7 @@ def test_another_column_is_no_limit(tmp_path: Path, text: str) -> None:
     file = tmp_path / "my.csv"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(TableError):
-        analyze_limits([file], LimitOptions())
+        METHOD.analyze([file], LimitOptions())
 
 
 def test_runs_of_other_conditions_stand_apart(sample_data: Path, tmp_path: Path) -> None:
@@ -235,7 +218,7 @@ def test_runs_of_other_conditions_stand_apart(sample_data: Path, tmp_path: Path)
         off = 4.0 * k + np.tile([-0.1, 0.1], 4)
         rows = ["spin_frequency_hz,spin_frequency_u_hz", *(f"{67 + one},0.05" for one in off)]
         (folder / "readings.csv").write_text("\n".join([*rows, ""]), encoding="utf-8")
-    analysis = analyze_limits([tmp_path / name for name in names], LimitOptions())
+    analysis = METHOD.analyze([tmp_path / name for name in names], LimitOptions())
     assert sorted(group.runs for group in analysis.groups) == [(0, 1), (2,), (3,)]
     both = next(group for group in analysis.groups if group.runs == (0, 1))
     assert both.statistics.between
@@ -253,7 +236,7 @@ def test_a_repetition_far_off_is_numbered_among_all_and_the_page_shows_200(tmp_p
         limits = 21.9 + 0.1 * np.sin(1.0 + np.arange(n))
         limits[3] += 2.0 * (name == "two")
         (tmp_path / f"{name}.csv").write_text("\n".join(f"{one:.3f}" for one in limits), encoding="utf-8")
-    analysis = analyze_limits([tmp_path / "one.csv", tmp_path / "two.csv"], LimitOptions())
+    analysis = METHOD.analyze([tmp_path / "one.csv", tmp_path / "two.csv"], LimitOptions())
     of_all, of_second = (text for text in analysis.all_warnings if "not belong to the others" in text)
     assert of_all.startswith("repetition 14 does not")
     assert of_second.startswith("two.csv: repetition 4 does not")
@@ -269,7 +252,7 @@ def test_upper_limits_that_do_not_scatter_are_no_better_than_a_step(sample_data:
     header, *rows = (folder / "readings.csv").read_text(encoding="utf-8").splitlines()
     alike = [",".join([row.split(",")[0], *rows[0].split(",")[1:]]) for row in rows]
     (folder / "readings.csv").write_text("\n".join([header, *alike, ""]), encoding="utf-8")
-    analysis = analyze_limits([folder], LimitOptions())
+    analysis = METHOD.analyze([folder], LimitOptions())
     (run,) = analysis.runs
     assert run.statistics.mean.u == pytest.approx(float(rows[0].split(",")[2]))
     assert any("however often it is repeated: creep slower" in text for text in analysis.all_warnings)
@@ -279,17 +262,17 @@ def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path: Path
     file = spin_down_csv(tmp_path / "my.csv")
     assert [row.name for row, _ in analyze_suiting([file], {})] == ["spindown"]
     with pytest.raises(DoesNotSuit, match="no limits of one top"):
-        analyze_limits([file], LimitOptions())
+        METHOD.analyze([file], LimitOptions())
     file.write_text("t,f\n0,40\n10,39\n20,38\n30,37\n40,36\n", encoding="utf-8")  # not far down
     with pytest.raises(DoesNotSuit, match="the spin falls from row to row"):
-        analyze_limits([file], LimitOptions())
+        METHOD.analyze([file], LimitOptions())
     empty = shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
     (empty / "readings.csv").write_text("spin_frequency_hz\n", encoding="utf-8")
     with pytest.raises(TableError, match="at least one repetition is needed"):
-        analyze_limits([empty], LimitOptions())
+        METHOD.analyze([empty], LimitOptions())
     (empty / "readings.csv").write_text("spin_frequency_hz\n21.9\n-1\n", encoding="utf-8")
     with pytest.raises(TableError, match="line 3: the limit is -1 Hz"):
-        analyze_limits([empty], LimitOptions())
+        METHOD.analyze([empty], LimitOptions())
 
 
 def test_a_scene_that_was_measured_is_the_one_compared_with(sample_data: Path, tmp_path: Path) -> None:
@@ -297,10 +280,10 @@ def test_a_scene_that_was_measured_is_the_one_compared_with(sample_data: Path, t
     record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     record["configuration"]["scene"] = {"name": "mine", "top": {"mass_kg": 0.025}}
     (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
-    (run,) = analyze_limits([folder], LimitOptions()).runs
+    (run,) = METHOD.analyze([folder], LimitOptions()).runs
     assert run.device
     assert run.device.name == "the scene mine, 25 g"
     record["configuration"]["scene"]["top"]["mass_kg"] = 0.03  # floats nowhere
     (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
     with pytest.raises(DataError, match=r"configuration\.scene: no spin keeps this top up"):
-        analyze_limits([folder], LimitOptions())
+        METHOD.analyze([folder], LimitOptions())

@@ -12,10 +12,11 @@ import pytest
 
 from levilab.errors import DataError, LevilabError
 from levilab.files import CannotWrite
-from levilab.pipelines.catalogue import ANALYSES, save
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
+from levilab.pipelines.suits import save
 from levilab.present.document.blocks import Tabular
 from levilab.runs.run import Run
 from support.spin_downs import spin_down_csv
@@ -165,25 +166,39 @@ def test_the_hash_in_the_result_is_that_of_the_file(sample_data: Path, tmp_path:
         assert hashlib.sha256((tmp_path / given["path"]).read_bytes()).hexdigest() == given["sha256"]
 
 
-def test_turns_per_minute_taken_for_hertz_are_doubted(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("unit", "factor"), [("rpm", 60), ("rad/s", 2 * np.pi), ("°/s", 360)])
+def test_another_unit_taken_for_hertz_is_doubted(tmp_path: Path, unit: str, factor: float) -> None:
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
-    np.savetxt(path, np.c_[t, 60 * nu], delimiter=",", header="t,f", comments="")
+    np.savetxt(path, np.c_[t, factor * nu], delimiter=",", header="t,f", comments="")
     (source,) = analyze_spindowns([path], SpinDownOptions()).sources
-    assert "[rpm]" in source.warnings[0]
-    stated = analyze_spindowns([path], SpinDownOptions(columns={"t": "t", "f": "f [rpm]"}))
+    assert source.readings.doubtful
+    assert f"f=NAME [{unit}]" in source.warnings[0]
+    stated = analyze_spindowns([path], SpinDownOptions(columns={"t": "t", "f": f"f [{unit}]"}))
     assert stated.runs[0].frequency[0] == pytest.approx(40, abs=0.1)
+    assert not stated.sources[0].readings.doubtful
 
 
-def test_turns_per_second_taken_for_turns_per_minute_are_doubted(tmp_path: Path) -> None:
+def test_hertz_taken_for_another_unit_are_doubted(tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     path.write_text(path.read_text("utf-8").replace(path.read_text("utf-8").split("\n", 1)[0], "time,speed"), "utf-8")
-    (source,) = analyze_spindowns([path], SpinDownOptions(columns={"f": "speed [rpm]"})).sources
-    assert source.warnings[0].startswith("my.csv: the spin is about 0.")
-    assert "a Levitron spins at 20 to 60 Hz; if these are turns per second" in source.warnings[0]
-    assert "f=NAME [Hz]" in source.warnings[0]
+    for unit in ("rpm", "rad/s", "°/s"):
+        (source,) = analyze_spindowns([path], SpinDownOptions(columns={"f": f"speed [{unit}]"})).sources
+        assert source.readings.doubtful
+        assert "f=NAME [Hz]" in source.warnings[0]
     (right,) = analyze_spindowns([path], SpinDownOptions(columns={"f": "speed [Hz]"})).sources
     assert not right.warnings
+
+
+def test_a_run_whose_unit_is_in_doubt_stays_out_of_the_means(sample_data: Path, tmp_path: Path) -> None:
+    path = spin_down_csv(tmp_path / "my.csv", u=False)
+    t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
+    np.savetxt(path, np.c_[t, 360 * nu], delimiter=",", header="t,f", comments="")
+    alone = analyze_spindowns([sample_data], SpinDownOptions())
+    both = analyze_spindowns([sample_data, path], SpinDownOptions())
+    assert both.combined.fit("disc").constants == alone.combined.fit("disc").constants
+    assert len(both.runs) == len(alone.runs) + 1
+    assert any("my" in warning for warning in both.about_all())
 
 
 def test_a_speed_without_unit_may_be_in_hertz_or_turns_per_minute(tmp_path: Path) -> None:

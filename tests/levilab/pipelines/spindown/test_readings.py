@@ -34,7 +34,7 @@ def test_uncertainties_may_be_absent(tmp_path):
         ("0,61,.1\n1,60,.1\n\n1,59,.1\n", 5, ["the time 1 s is repeated", "in line 3"]),
         ("0,61,.1\n2,60,.1\n# x\n1,59,.1\n", 5, ["the time 1 s comes after 2 s in line 3"]),
         ("0,61,.1\n1,0,.1\n2,59,.1\n", 3, ["the frequency is 0 Hz"]),
-        ("0,61,.1\n1,60,.1\n2,-59,.1\n", 4, ["the frequency is -59 Hz"]),
+        ("0,61,.1\n1,60,.1\n2,-59,.1\n", 4, ["the frequency is -59 Hz", "magnitude"]),
         ("0,61,.1\n1,60,0\n2,59,.1\n", 3, ["the uncertainty is 0 Hz"]),
         ("0,61,.1\n1,60,.1\n2,59,-.1\n", 4, ["the uncertainty is -0.1 Hz"]),
     ],

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.benchmark.simulator.as_called.contenders import Contender
+from as_called.contenders import Contender
 from levilab.benchmark.simulator.peers import Point, best_time_and_result
 from levilab.benchmark.simulator.speeds import Ratio, best_speed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from levilab.benchmark.simulator.as_called.contenders import Call
-    from levilab.benchmark.simulator.as_called.tasks import Task
+    from as_called.contenders import Call
+    from as_called.tasks import Task
 
 ROUNDS = 3
 #: How long a point is repeated in a round [s].

@@ -1,4 +1,4 @@
-"""How far the kernels are from the processor's peak, and where the rest goes."""
+"""How far the kernels are from the processor's peak (one core, 20 s): python benchmarks/kernel_rates.py."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numba
 import numpy as np
 
-from levilab.benchmark.simulator import motion
+from levilab.benchmark.simulator import motion, ours
 from levilab.benchmark.simulator.peers import best_time
 from levilab.simulator.kernels.compiled import wide_registers
 from levilab.simulator.schemes import SCHEMES
@@ -77,3 +77,16 @@ def rates(points: Iterable[Point]) -> dict[str, Rate]:
                 ns = motion.DURATION / point.speed / (1000 * stages) * 1e9
                 found[name] = Rate(ns, OPERATIONS / ns, OPERATIONS / ns / best)
     return found
+
+
+def main() -> None:
+    """Measure and print."""
+    found = rates([*ours.scalar(quick=False, names=("levitron-6",)), *ours.many(quick=False, names=("levitron-6",))])
+    best = found.pop("peak").gflops
+    for name, rate in found.items():
+        share = f"{100 * rate.share:.0f} % of the {best:.0f} Gflop/s that multiply-adds alone reach"
+        print(f"{name}: {rate.ns:.2f} ns a stage, {rate.gflops:.1f} Gflop/s, {share}")
+
+
+if __name__ == "__main__":
+    main()

@@ -106,6 +106,15 @@ class Trace:
         return self.frequency + CHIRP * (time - self.middle)
 
 
+def bound(snr: float) -> float:
+    """Return the Cramér–Rao bound of the frequency at the middle [Hz] of a trace with a snr [dB].
+
+    σ_f² = 12 σ²/(N G T²), G = A²√π/(2 s), s = duty/2.3548.
+    """
+    steepness = np.sqrt(np.pi) / (2 * DUTY / np.sqrt(8 * np.log(2)))
+    return float(np.sqrt(12 / (RATE * DURATION * steepness * DURATION**2)) * 10 ** (-snr / 20))
+
+
 def make(case: Case, random: Random) -> Trace:
     """One trace of a kind, its frequency, phase and all that disturbs it drawn at random."""
     frequency = case.frequency + random.uniform(-0.5, 0.5)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from levilab.benchmark.simulator.as_called import many
-from levilab.benchmark.simulator.as_called.contenders import CONTENDERS, Contender
+from as_called import many
+from as_called.contenders import CONTENDERS, Contender
 from levilab.benchmark.simulator.motion import MOTIONS, Motion, reference
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from numba.core.dispatcher import Dispatcher
 
-from levilab.benchmark.simulator.as_called import many
-from levilab.benchmark.simulator.as_called.contenders import scene_of
+from as_called import many
+from as_called.contenders import scene_of
 from levilab.benchmark.simulator.motion import UNDRIVEN
 from levilab.benchmark.simulator.peers import CLOCK
 from levilab.simulator.single import simulate

@@ -8,21 +8,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from as_called import comparison, many
+from as_called.comparison import Case, measure_calls
+from as_called.contenders import CONTENDERS, Contender, scene_of
+from as_called.figure import as_called_figure
+from as_called.overhead import Overhead, Watched, before_lanes, outside_all, overhead
+from as_called.tasks import TASKS
 from levilab.benchmark.simulator import motion
-from levilab.benchmark.simulator.as_called import comparison, many
-from levilab.benchmark.simulator.as_called.comparison import Case, measure_calls
-from levilab.benchmark.simulator.as_called.contenders import CONTENDERS, Contender, scene_of
-from levilab.benchmark.simulator.as_called.figure import as_called_figure
-from levilab.benchmark.simulator.as_called.overhead import Overhead, Watched, before_lanes, outside_all, overhead
-from levilab.benchmark.simulator.as_called.tasks import TASKS
-from levilab.benchmark.simulator.command import print_called, print_overheads
 from levilab.benchmark.simulator.peers import Point
 from levilab.benchmark.simulator.taylor import VARIABLES, heyoka_start, heyoka_system
-from levilab.benchmark.simulator.work_precision import Comparison, as_document
 from levilab.present.terminal import Terminal
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.single import simulate
 from levilab.simulator.stops import kinks
+from simulator_as_called import as_document, print_called, print_overheads
 from support.figures import faults
 from support.paths import GOLDEN
 
@@ -170,7 +169,7 @@ def test_the_tables_fit_the_terminal(capsys, width):
 
 
 def test_the_document_has_the_calls_with_units():
-    document = json.loads(json.dumps(as_document(Comparison(cases=(CASE,), overheads=(OVERHEAD,))), allow_nan=False))
+    document = json.loads(json.dumps(as_document([CASE], [OVERHEAD]), allow_nan=False))
     (called,) = document["called"]
     assert (called["motion"], called["duration_s"], called["tops"]) == ("sine", 60.0, 1)
     assert called["points"][0]["simulated_s_per_s"] == 40000.0
@@ -187,8 +186,3 @@ def test_the_figure_has_a_panel_for_each_motion_and_says_its_ratios():
     assert axes.get_title("left") == "sine, 60 s"
     assert faults(figure) == []
     assert [text.get_text() for text in axes.texts] == ["8×\naim 5", "–\naim 3"]
-
-
-def test_the_benchmark_refuses_a_part_that_is_none(levilab):
-    assert "kernel, called or ensemble" in levilab("benchmark", "simulator", "--only", "all", check=2).stderr
-    assert "leave --only away" in levilab("benchmark", "simulator", "--only", "called", "--out", "x", check=2).stderr

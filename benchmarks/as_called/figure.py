@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from levilab.benchmark.simulator.as_called.comparison import Case
+    from as_called.comparison import Case
     from levilab.benchmark.simulator.speeds import Ratio
 
 #: Methods that are drawn: colour, marker, line, name in the legend.

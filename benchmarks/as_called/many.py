@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from as_called.contenders import Contender, scene_of
 from levilab.benchmark.simulator import motion as given
 from levilab.benchmark.simulator import taylor
-from levilab.benchmark.simulator.as_called.contenders import Contender, scene_of
 from levilab.benchmark.simulator.motion import UNDRIVEN, Array, Motion, references, vector_start
 from levilab.simulator.ensemble import simulate_many
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from levilab.benchmark.simulator.as_called.contenders import Call
+    from as_called.contenders import Call
     from levilab.simulator.ensemble import Ensemble
 
 DURATION = 5.0

@@ -1,0 +1,278 @@
+"""Which analysis suits an input: one rule for the command line, notebooks and reports.
+
+A run is for the analyses of its experiment; where there are none, for those that take its records.  A data file is for
+the analyses that read it; where one of them reads it by columns that no other analysis reads, for that one alone.  A
+folder is for the analyses of the runs and files in it.  A result that was written before says itself what suits.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from analysis.errors import AnalysisError
+from levilab.errors import DataError, DoesNotSuit, NoneUsable
+from levilab.pipelines import catalogue
+from levilab.pipelines.result import ResultError, is_of_another, read_inputs, results_in
+from levilab.pipelines.result import save as save_files
+from levilab.pipelines.sources import Found, SkippedRuns, data_files, find, join
+from levilab.runs.run import RECORD, Run, find_run, find_runs
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping, Sequence
+    from pathlib import Path
+
+    from levilab.pipelines.analyzed import A
+    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.result import Archive, Written
+    from levilab.pipelines.sources import InputOptions, Remark, Source
+
+    Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Suiting:
+    """An analysis, and what it takes.
+
+    Attributes:
+        analysis: the row of the catalogue.
+        paths: those of the paths with something for it.
+        found: what it takes there.
+    """
+
+    analysis: Analysis[Any]
+    paths: tuple[Path, ...]
+    found: Found[Any]
+
+
+def suiting(paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None = None) -> list[Suiting]:
+    """Return the analyses that suit the inputs at the paths, in the order of the catalogue.
+
+    Args:
+        paths: run folders, data files, folders to search.
+        given: options by their names, of any analysis.
+        tell: called with the reason why an analysis found nothing usable in a folder.
+
+    Raises:
+        DoesNotSuit: no analysis suits one of the paths.
+        DataError: one of them is damaged, so that no analysis can use it.
+    """
+
+    def options(analysis: Analysis[Any]) -> Callable[[Path], InputOptions]:
+        chosen = analysis.options_from(given)
+        return lambda _: chosen
+
+    return _suiting([find_run(path) for path in paths], options, _made_for, tell)
+
+
+def analyze_suiting(
+    paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None = None
+) -> list[tuple[Analysis[Any], Any]]:
+    """Analyze the inputs at the paths by each analysis that suits; see `suiting`."""
+    return [
+        (one.analysis, one.analysis.result.method.analyze_found(one.paths, one.found, one.analysis.options_from(given)))
+        for one in suiting(paths, given, tell)
+    ]
+
+
+def recall_suiting(
+    paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None = None
+) -> list[tuple[Analysis[Any], Any]]:
+    """Read the results of the inputs at the paths, of each analysis that has one; in the order of the catalogue.
+
+    An input that has no result is analyzed by those that suit it.  Raises DataError: no analysis suits a path, or
+    damage.
+
+    Args:
+        paths: run folders, data files, folders to search, and results that lie elsewhere: their files, or a folder with
+            nothing to analyze in it.
+        given: options by their names, of any analysis.
+        tell: called with the reason why an analysis found nothing usable in a folder.
+    """
+    places, written = _split(paths)
+    own = {name: [one for one in written if one.analysis == name] for name in catalogue.ANALYSES}
+    archives: dict[str, Archive[Any]] = {}
+
+    def options(analysis: Analysis[Any]) -> Callable[[Path], InputOptions]:
+        of_results = own[analysis.name]
+        inputs = [*places, *(path for one in of_results for path in one.inputs)]
+        archive = analysis.result.archive(inputs, [one.file for one in of_results])
+        archives[analysis.name] = archive
+        return analysis.result.reading(archive, analysis.options_from(given))
+
+    def has_result(name: str, source: Source[Any]) -> bool:
+        return archives[name].earlier(source.path, source.data, source.sha256) is not None
+
+    def choose(source: Source[Any], takers: Collection[str]) -> Collection[str]:
+        return [name for name in takers if has_result(name, source)] or _made_for(source, takers)
+
+    results = {name: [path for one in of for path in one.inputs] for name, of in own.items()}
+    done = []
+    for one in _suiting(places, options, choose, tell, results):
+        result, chosen = one.analysis.result, one.analysis.options_from(given)
+        recalled = result.recall_found(one.paths, one.found, archives[one.analysis.name], chosen)
+        done.append((one.analysis, recalled))
+    return done
+
+
+def _split(paths: Sequence[Path]) -> tuple[list[Path], list[Written]]:
+    """Return the paths to read or search, and the results that were named by their own paths.  Raises DataError."""
+    places: list[Path] = []
+    written: list[Written] = []
+    for path in map(find_run, paths):
+        results = []
+        if path.suffix == ".json" and path.is_file():
+            results = [read_inputs(path)]
+        elif path.is_dir() and not (path / RECORD).exists() and not find_runs(path) and not data_files(path):
+            results = results_in(path)
+        written += results
+        places += [] if results else [path]
+    return places, written
+
+
+# --- the rule ------------------------------------------------------------------------------------------
+
+
+def _made_for(source: Source[Any], takers: Collection[str]) -> Collection[str]:
+    """Return those of the analyses which take an input that are made for it."""
+    rows = catalogue.ANALYSES
+    if source.run:
+        own = _of_experiment(source.run)
+        return [name for name in takers if name in own] if own else takers
+    return [name for name in takers if rows[name].needs.particular] or takers
+
+
+def _of_experiment(run: Run) -> list[str]:
+    return [row.name for row in catalogue.ANALYSES.values() if run.record.experiment in row.needs.experiments]
+
+
+def _suiting(
+    paths: Sequence[Path],
+    options: Callable[[Analysis[Any]], Callable[[Path], InputOptions]],
+    choose: Callable[[Source[Any], Collection[str]], Collection[str]],
+    tell: Tell | None,
+    more: Mapping[str, Sequence[Path]] | None = None,
+) -> list[Suiting]:
+    """Return the analyses with the inputs that they take.
+
+    Args:
+        paths: run folders, data files, folders to search.
+        options: an analysis → how it reads an input.
+        choose: an input, and the analyses that take it → those that get it.
+        tell: see `suiting`.
+        more: analysis → paths that are for it alone.
+    """
+    rows = catalogue.ANALYSES
+    readers = {name: options(row) for name, row in rows.items()}
+    taken: dict[str, list[tuple[Path, Found[Any]]]] = {name: [] for name in rows}
+    unusable: list[NoneUsable] = []
+    for path in paths:
+        found, errors = _look(path, readers)
+        chosen = _chosen(found, choose)
+        if not chosen:
+            raise _refusal(path, errors)
+        unusable += [error for error in errors.values() if isinstance(error, NoneUsable)]
+        for name, one in chosen.items():
+            taken[name].append((path, one))
+    for name, inputs in (more or {}).items():
+        taken[name] += [(path, find(path, rows[name].needs, readers[name])) for path in inputs]
+    done = [
+        Suiting(rows[name], tuple(path for path, _ in those), join([one for _, one in those]))
+        for name, those in taken.items()
+        if those
+    ]
+    said = {text for one in done for text in one.found.warnings}
+    for error in unusable:
+        if tell and not said.issuperset(error.reasons):
+            tell(str(error))
+    return done
+
+
+def _look(
+    path: Path, readers: Mapping[str, Callable[[Path], InputOptions]]
+) -> tuple[dict[str, Found[Any]], dict[str, DataError]]:
+    """Return what each analysis finds at a path, and why the others find nothing."""
+    found: dict[str, Found[Any]] = {}
+    errors: dict[str, DataError] = {}
+    for name, row in catalogue.ANALYSES.items():
+        try:
+            found[name] = find(path, row.needs, readers[name])
+        except ResultError:
+            raise
+        except DataError as error:
+            errors[name] = error
+        except AnalysisError as error:
+            errors[name] = DataError(f"{path}: {error}")
+    return found, errors
+
+
+def _chosen(
+    found: Mapping[str, Found[Any]], choose: Callable[[Source[Any], Collection[str]], Collection[str]]
+) -> dict[str, Found[Any]]:
+    """Return what was found, each input with the analyses that get it."""
+    takers: dict[Path, list[str]] = {}
+    for name, one in found.items():
+        for source in one.sources:
+            takers.setdefault(source.path, []).append(name)
+    parts = {
+        name: replace(one, sources=tuple(s for s in one.sources if name in choose(s, takers[s.path])))
+        for name, one in found.items()
+    }
+    return {name: one for name, one in parts.items() if one.sources}
+
+
+def _refusal(path: Path, errors: Mapping[str, DataError]) -> DataError:
+    """Return why no analysis takes a path: damage goes before another kind of data."""
+    damage = [error for error in errors.values() if not isinstance(error, DoesNotSuit)]
+    if damage or not path.is_dir():
+        return [*damage, *errors.values()][0]
+    runs, files = _usable_runs(path), data_files(path)
+    own = [name for run in runs for name in _of_experiment(run)]
+    if own:
+        return errors[own[0]]
+    counts = Counter(run.record.experiment for run in runs)
+    seen = [f"{count} {name} run{'s' * (count > 1)}" for name, count in counts.items()]
+    seen += [f"{len(files)} data file{'s' * (len(files) > 1)}, as {files[0].name}"] if files else []
+    if runs:
+        kinds = " or ".join(counts)
+        return DoesNotSuit(f"{path}: there is no analysis of a {kinds} run (found {'; '.join(seen)})")
+    if files:
+        return DoesNotSuit(f"{path}: no analysis reads what is in it ({seen[0]}): name a file to see why")
+    return next(iter(errors.values()))
+
+
+def _usable_runs(root: Path) -> list[Run]:
+    """Return the runs at or below a folder; a damaged one decides nothing."""
+    runs = []
+    for folder in find_runs(root):
+        try:
+            runs.append(Run.load(folder))
+        except DataError:
+            continue
+    return runs
+
+
+def remarks(of_each: Sequence[Sequence[Remark]]) -> list[Remark]:
+    """Join the remarks of several analyses; runs that were skipped count only if all of them did."""
+    said = list(dict.fromkeys(remark for those in of_each for remark in those))
+    return [one for one in said if not isinstance(one, SkippedRuns) or all(one in those for those in of_each)]
+
+
+# --- writing -------------------------------------------------------------------------------------------
+
+
+def save(analysis: Analysis[A], found: A, folder: Path | None = None, *, with_figure: bool = True) -> list[Path]:
+    """Write the result and the figure beside the inputs, or into a folder; returns the files.  Raises CannotWrite.
+
+    The name result.json belongs to the first analysis of the run's experiment, or where there is none to the first one
+    that takes the run; with data files and with several inputs, which may be of any kind, to the first of all.
+    Every other analysis has its name in its result's, and into a given folder also one that would replace another's.
+    """
+    run = found.sources[0].run if len(found.sources) == 1 else None
+    names = [row.name for row in catalogue.ANALYSES.values() if run is None or row.needs.take(run)]
+    first = (run and _of_experiment(run)) or names
+    place = replace(found.place, folder=folder or found.output_folder)
+    is_first = first[0] == analysis.name and not (folder and is_of_another(place.result(), analysis.name))
+    picture = analysis.png(found) if with_figure else None
+    return save_files(analysis.result.of(found, place), place, picture, first=is_first)
