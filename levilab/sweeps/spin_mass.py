@@ -11,7 +11,7 @@ from levilab.errors import UsageError
 from levilab.files import CannotWrite, replace_atomically, writing
 from levilab.settings import hint_about
 from levilab.simulator.equilibrium import HEAVIEST_KG, stability_of
-from levilab.sweeps.cost import cut
+from levilab.sweeps.observables import cut
 from levilab.sweeps.plan import Axis, Plan
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from levilab.crosscheck.subject import Pull, TrialFailed
 
@@ -51,9 +51,3 @@ def pull(quantity: str, found: Estimate | None, truth: float) -> Pull:
     if found is None or found.value is None or not found.u:
         raise TrialFailed(f"{quantity}: the analysis gives no value with an uncertainty")
     return Pull(quantity, found.value, found.u, truth)
-
-
-def one_of(found: Any) -> Any:
-    """The only run of an analysis."""
-    (run,) = found.runs
-    return run
