@@ -14,7 +14,6 @@ from levilab.simulator.kernels import braking
 from levilab.simulator.kernels.loads import Aligned, Disc, Leaning, PiecewiseLinear, Sine, Tilted, Upright
 from levilab.simulator.kernels.motion import Body, Loose, Model, Rigid
 from levilab.simulator.numbers import cos, hypot, largest, sin
-from levilab.simulator.spin import DECAYS
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
@@ -95,7 +94,7 @@ def _drag(scene: Scene) -> Any:
         return _loose_drag(scene)
     if scene.drag.law == "none" or not any(constants):
         return None
-    law = DECAYS[scene.drag.law].kernel(*constants)
+    law = braking.LAWS[scene.drag.law][0](*constants)
     return braking.DragFlow(law) if has_attitude(scene) else braking.PrescribedDrag(law)
 
 
@@ -103,7 +102,7 @@ def _loose_drag(scene: Scene) -> braking.WasherDragFlow:
     """The torque of the air is shared: each part slows as by a law of its own, scaled by I₃ over its inertia."""
     axial, washers = scene.top.inertia_axial_kg_m2, scene.washers.inertia_kg_m2
     core, share = axial - washers, scene.washers.drag_share
-    law = braking.Stokes if scene.drag.law == "none" else DECAYS[scene.drag.law].kernel
+    law = braking.Stokes if scene.drag.law == "none" else braking.LAWS[scene.drag.law][0]
     constants = scene.drag.constants or (0.0,)
     return braking.WasherDragFlow(
         washers=law(*(c * share * axial / washers for c in constants)),

@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, NonNegativeFloat, model
 from pydantic_core import PydanticCustomError
 
 from levilab.settings import Settings
-from levilab.simulator.spin import DECAYS
+from levilab.simulator.laws import LAWS
 
 FieldKind = Literal[
     "exact", "paraxial-2", "paraxial-4", "paraxial-6", "paraxial-8", "paraxial-10", "paraxial-12", "paraxial-14",
@@ -23,7 +23,7 @@ FieldKind = Literal[
 if TYPE_CHECKING:
     Law = str
 else:
-    Law = Literal["none", *DECAYS]
+    Law = Literal["none", *LAWS]
 
 
 def _numbers(count: int) -> BeforeValidator:
@@ -145,7 +145,7 @@ class Drag(Part):
     @classmethod
     def _usual(cls, table: Any) -> Any:
         if isinstance(table, dict) and table.get("coefficient") is None:
-            usual = DECAYS[law].usual if (law := str(table.get("law"))) in DECAYS else (None,)
+            usual = LAWS[law].usual if (law := str(table.get("law"))) in LAWS else (None,)
             return table | {"coefficient": usual if len(usual) > 1 else usual[0]}
         return table
 

@@ -17,8 +17,8 @@ from pydantic import NonNegativeFloat, ValidationError, model_validator
 from levilab.files import parse_toml
 from levilab.settings import in_one_line
 from levilab.simulator.keys import SceneError, Table, UnknownScene, as_toml, nearest, parse_setting, set_key, short_text
+from levilab.simulator.laws import LAWS
 from levilab.simulator.parts import Base, Drag, Drive, Escape, Part, Start, Top, Washers
-from levilab.simulator.spin import DECAYS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -100,7 +100,7 @@ def _place_is_given(s: Scene) -> bool:
 
 
 def _as_many_coefficients_as_the_law_has(s: Scene) -> bool:
-    return s.drag.law == "none" or len(s.drag.constants) == len(DECAYS[s.drag.law].names)
+    return s.drag.law == "none" or len(s.drag.constants) == len(LAWS[s.drag.law].names)
 
 
 RULES: tuple[Rule, ...] = (
@@ -225,7 +225,7 @@ SWITCHES: tuple[Switch, ...] = (
         "drag",
         lambda s: s.drag.law == "none",
         ("coefficient",),
-        f"drag.law = none; one of {', '.join(DECAYS)} switches the drag on",
+        f"drag.law = none; one of {', '.join(LAWS)} switches the drag on",
     ),
     Switch(
         "washers",

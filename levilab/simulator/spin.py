@@ -1,4 +1,4 @@
-"""The laws of drag, a row each, and the spin alone in closed form.
+"""The spin alone, in closed form, for every law of drag.
 
 Where only the spin is observed nothing has to be integrated: with an aligned dipole the axial spin obeys
 ω̇ = −g(ω) and nothing else.  Everything follows from two integrals over the spin itself,
@@ -6,8 +6,8 @@ Where only the spin is observed nothing has to be integrated: with an aligned di
     time to fall from ω₀ to ω     ∫ dω/g(ω)
     angle turned meanwhile        ∫ ω dω/g(ω)
 
-so a law is a row: these functions, its kernel and its usual constants.  The laws share no algebra with the ones that
-are fitted in `analysis.spindown.drag`.  Spins in rad/s, angles in rad, times in s.
+so a law is a row of functions.  The laws share no algebra with the ones that are fitted in
+ `analysis.spindown.drag`.  Spins in rad/s, angles in rad, times in s.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from levilab.simulator.kernels import braking
+from levilab.simulator.laws import LAWS
 from levilab.simulator.numbers import sqrt
 
 if TYPE_CHECKING:
@@ -28,32 +28,20 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class DragLaw:
-    """A law of drag.
+class SpinDecay:
+    """A law of drag in closed form.
 
     Attributes:
-        kernel: its constants, in the order of `usual`; `kernels.braking` has what the kernels compute.
-        usual: constants where a scene gives none, from the thesis's four spin-downs (40 Hz to the fall near 22 Hz).
-        names: of the constants, as in result.json.
-        exponent: n of ω̇ ∝ −ωⁿ; None of a sum of powers.
         after: (ω₀, t, *constants) → ω.
         elapsed: (ω₀, ω, *constants) → t.
         turned: (ω₀, ω, *constants) → angle.
         damping: (|ω|, *constants) → |ω̇/ω| [1/s].
     """
 
-    kernel: Callable[..., Any]
-    usual: tuple[float, ...]
-    names: tuple[str, ...]
-    exponent: float | None
     after: Callable[..., Array]
     elapsed: Callable[..., float]
     turned: Callable[..., Array]
     damping: Callable[..., Any]
-
-    def is_linear(self, constants: tuple[float, ...]) -> bool:
-        """Whether the drag is in proportion to the spin: any other has |ω| in it, and a kink at ω = 0."""
-        return self.exponent == 1 or constants[-1] == 0
 
 
 def _mixed_after(spin: float, t: ArrayLike, c1: float, c2: float) -> Array:
@@ -80,46 +68,27 @@ def _over_its_argument(function: Callable[[Array], Array], x: ArrayLike) -> Arra
     return np.where(x == 0, 1.0, function(other) / other)
 
 
-#: Stokes −C₁ω, Newton −C₂ω², laminar disc −Cω^(3/2), mixed −C₁ω − C₂ω² (one of them may be 0).  The usual constants are
-#: the means of the thesis's C₁ [1/s] and C₂ [1/rad], and of the disc law's constant refitted to each run
-#: [(rad/s)^-1/2/s].  The thesis has no fit of C₁ and C₂ together: mixed is half of either mean, and thereby, each to
-#: 1.4 %, the tangent to the disc law at 30 Hz, √ω ≈ √ω₀/2 + ω/(2√ω₀).
-DECAYS: dict[str, DragLaw] = {
-    "stokes": DragLaw(
-        kernel=braking.Stokes,
-        usual=(0.00318175,),
-        names=("c1",),
-        exponent=1.0,
+#: Law → its closed form.
+DECAYS: dict[str, SpinDecay] = {
+    "stokes": SpinDecay(
         after=lambda spin, t, c: spin * np.exp(-c * np.asarray(t)),
         elapsed=lambda spin, end, c: np.log(spin / end) / c,
         turned=lambda spin, end, c: (spin - end) / c,
         damping=lambda _, c: c,
     ),
-    "newton": DragLaw(
-        kernel=braking.Newton,
-        usual=(1.7270e-5,),
-        names=("c2",),
-        exponent=2.0,
+    "newton": SpinDecay(
         after=lambda spin, t, c: 1 / (1 / spin + c * np.asarray(t)),
         elapsed=lambda spin, end, c: (1 / end - 1 / spin) / c,
         turned=lambda spin, end, c: np.log(spin / end) / c,
         damping=lambda spin, c: c * spin,
     ),
-    "disc": DragLaw(
-        kernel=braking.LaminarDisc,
-        usual=(2.340e-4,),
-        names=("c32",),
-        exponent=1.5,
+    "disc": SpinDecay(
         after=lambda spin, t, c: (spin**-0.5 + 0.5 * c * np.asarray(t)) ** -2,
         elapsed=lambda spin, end, c: 2 * (end**-0.5 - spin**-0.5) / c,
         turned=lambda spin, end, c: 2 * (spin**0.5 - end**0.5) / c,
         damping=lambda spin, c: c * sqrt(spin),
     ),
-    "mixed": DragLaw(
-        kernel=braking.Mixed,
-        usual=(0.5 * 0.00318175, 0.5 * 1.7270e-5),
-        names=("c1", "c2"),
-        exponent=None,
+    "mixed": SpinDecay(
         after=_mixed_after,
         elapsed=_mixed_elapsed,
         turned=_mixed_turned,
@@ -136,9 +105,4 @@ def since_infinity(law: str, spin: float, constants: tuple[float, ...]) -> float
         spin: now [rad/s].
         constants: of the law.
     """
-    return np.inf if DECAYS[law].is_linear(constants) else float(DECAYS[law].elapsed(np.inf, spin, *constants))
-
-
-def law_of(kernel: Any) -> DragLaw:
-    """Return the law of a kernel's constants."""
-    return next(law for law in DECAYS.values() if law.kernel is type(kernel))
+    return np.inf if LAWS[law].is_linear(constants) else float(DECAYS[law].elapsed(np.inf, spin, *constants))

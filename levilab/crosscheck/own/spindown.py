@@ -17,7 +17,7 @@ from levilab.crosscheck.own.model import OF_ONE_RUN, Own, pull
 from levilab.crosscheck.subject import Trial
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.spindown.analysis import EXPERIMENT, TILTED
-from levilab.simulator.spin import DECAYS
+from levilab.simulator import laws
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -189,7 +189,7 @@ def _trial(
     if not several:
         truth = runs[0].fit.parameters["start_frequency"].value or 0.0
         pulls.append(pull("start_frequency", found["start_frequency"], truth))
-    exponent = DECAYS[law].exponent if law in DECAYS else None
+    exponent = laws.LAWS[law].exponent if law in laws.LAWS else None
     if law == "power":
         exponent = float(np.mean([run.fit.parameters["exponent"].value or 0.0 for run in runs]))
     if exponent is not None:

@@ -11,6 +11,7 @@ import numpy as np
 from instruments.clock import VirtualClock
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.simulator.laws import LAWS
 from levilab.simulator.scene import Scene
 from levilab.simulator.single import simulate
 from levilab.simulator.spin import DECAYS
@@ -31,8 +32,8 @@ RATE = 10.0
 def trial(seed: int, folder: Path) -> list[Pull]:
     """One spin-down: drag, fall and scatter of the pulses are drawn by the seed."""
     random = np.random.default_rng((seed, 2))
-    law = sorted(DECAYS)[int(random.integers(len(DECAYS)))]
-    usual, names, exponent = DECAYS[law].usual, DECAYS[law].names, DECAYS[law].exponent
+    law = sorted(LAWS)[int(random.integers(len(LAWS)))]
+    usual, names, exponent = LAWS[law].usual, LAWS[law].names, LAWS[law].exponent
     scene = SpinScene(
         start_hz=float(random.uniform(28.0, 33.0)),
         drag=law,
