@@ -75,6 +75,7 @@ bench: setup  ## speed, as ratios within one run (a few minutes); the kept resul
 	$(BIN)/python benchmarks/startup.py
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[dev,peers]"
 	$(BIN)/levilab benchmark simulator
+	$(BIN)/python benchmarks/simulator_as_called.py
 	$(BIN)/levilab benchmark estimators
 	$(BIN)/python benchmarks/wire.py
 

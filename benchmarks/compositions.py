@@ -39,20 +39,20 @@ def halves(stages: int) -> tuple[int, int]:
 
 
 def composition(free: np.ndarray, stages: int) -> Scheme:
-    """The whole of it from its first halves."""
+    """Return the whole of it from its first halves."""
     drifts, kicks = np.split(free, [halves(stages)[0]])
     whole = [np.concatenate([half, half[::-1][full % 2 :]]) for half, full in ((drifts, stages + 1), (kicks, stages))]
     return Scheme(f"{stages} stages", 6, tuple(whole[0].tolist()), tuple(whole[1].tolist()), any_split=False)
 
 
 def missed(free: np.ndarray, stages: int) -> np.ndarray:
-    """The conditions of order 5; by symmetry order 6 comes with them."""
+    """Return the conditions of order 5; by symmetry order 6 comes with them."""
     scheme = composition(free, stages)
     return residuals(np.array(scheme.drifts), np.array(scheme.kicks), 5)
 
 
 def solved(free: np.ndarray, stages: int) -> np.ndarray | None:
-    """The nearest solution of the conditions, by Gauss and Newton; None where they do not lead to one."""
+    """Return the nearest solution of the conditions, by Gauss and Newton; None where they do not lead to one."""
     for _ in range(30):
         now = missed(free, stages)
         if np.abs(now).max() < 1e-15:
@@ -83,7 +83,7 @@ class Case:
 
 
 def after(problem: Problem, steps: int) -> np.ndarray:
-    """The state after the time."""
+    """Return the state after the time."""
     return integrate_to_end(problem, stops_between(0.0, DURATION, DURATION / steps, problem.scene.drive))
 
 
@@ -115,7 +115,7 @@ def mean_error(scheme: Scheme, tops: list[Case], rate: float) -> float:
 
 
 def score(free: np.ndarray, stages: int, tops: list[Case]) -> float:
-    """What is to be small."""
+    """Return what is to be small."""
     return float(np.mean([mean_error(composition(free, stages), tops, rate) for rate in RATES]))
 
 

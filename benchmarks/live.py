@@ -87,7 +87,7 @@ def main() -> None:
 
 
 def practice(browser, out: Path, seconds: float) -> dict[str, float]:
-    """The top in motion, records twice a second."""
+    """Return the top in motion, records twice a second."""
     import subprocess
 
     import psutil

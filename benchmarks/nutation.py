@@ -61,7 +61,7 @@ def main() -> None:
 
 
 def nutation_of(seed: int) -> dict[str, float]:
-    """The angle of a top's nutation [rad], its spin [Hz] and K/ν."""
+    """Return the angle of a top's nutation [rad], its spin [Hz] and K/ν."""
     scene = drawn_scene(seed)
     world = scene_world(scene, VirtualClock, lambda _: None, seed=seed)
 
@@ -84,7 +84,7 @@ def nutation_of(seed: int) -> dict[str, float]:
 
 
 def angle_at(frequency_hz: float, world: World) -> float:
-    """The angle of the axis's line near a frequency, from now on [rad]."""
+    """Return the angle of the axis's line near a frequency, from now on [rad]."""
     x, y, z, w = world.poses(world.clock.now() + 0.2, 1 / RATE, POSES).quaternion.astype(float).T
     axis = 2 * (x * z + w * y) + 2j * (y * z - w * x)
     window = np.hanning(POSES)

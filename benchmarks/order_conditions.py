@@ -77,7 +77,7 @@ def _children(left: int, largest: int, first: int) -> Iterator[tuple[Tree, ...]]
 
 
 def residuals(drifts: Array, kicks: Array, order: int) -> Array:
-    """What each condition up to the order is missed by; all zero for a composition of that order."""
+    """Return what each condition up to the order is missed by; all zero for a composition of that order."""
     nodes = np.cumsum(drifts)[:-1]
     matrix = np.tril(kicks[None, :] * (nodes[:, None] - nodes[None, :]), -1)
     return np.array(

@@ -20,7 +20,7 @@ STEP_S, HELD_WITHIN_HZ, ANGLES = 1.0, 1.5, 8
 
 
 def lost_at(rate: float, turns: float) -> float | None:
-    """The drive's frequency [Hz] at which the top is lost; None for one that is held to the end.
+    """Return the drive's frequency [Hz] at which the top is lost; None for one that is held to the end.
 
     rate [Hz/s]; turns: the drive's phase when it comes on.
     """

@@ -26,14 +26,14 @@ WHERE = Path(room.__file__).parent / "references.json"
 
 
 def integrator_of(motion: Motion, tolerance: float) -> Any:
-    """An integrator of one top, on 80-bit numbers."""
+    """Return an integrator of one top, on 80-bit numbers."""
     start = heyoka_start(motion).astype(Q)
     system = heyoka_system(motion, each_pull=motion.drive == "off")
     return hy.taylor_adaptive(system, start, tol=Q(tolerance), fp_type=Q, compact_mode=True)
 
 
 def end(integrator: Any, motion: Motion, duration: float) -> Any:
-    """The place at the end [m], 80-bit."""
+    """Return the place at the end [m], 80-bit."""
     if motion.drive == "off":
         integrator.pars[0] = Q(MU / motion.mass)
     return propagate(integrator, motion, heyoka_start(motion).astype(Q), duration)

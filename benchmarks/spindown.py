@@ -107,7 +107,7 @@ def _reference(law: str, data: bytes) -> float:
 
 
 def reference(law: str, nu: NDArray[np.float64]) -> float:
-    """The constant of the best least-squares solution, found another way."""
+    """Return the constant of the best least-squares solution, found another way."""
     return _reference(law, nu.tobytes())
 
 

@@ -143,7 +143,7 @@ def speed_of(name: str, ways: dict[str, Workers], *, brief: bool) -> dict[str, A
 
 
 def overhead_of(workers: Workers, *, brief: bool) -> dict[str, float]:
-    """What a task costs that does nothing [s], once all workers are there."""
+    """Return what a task costs that does nothing [s], once all workers are there."""
     count = EMPTY_TASKS // (10 if brief else 1)
     with contextlib.closing(results_of(sweeps_fake.nothing, range(count), workers)) as results:
         for _ in range(count // 5):
@@ -159,7 +159,7 @@ def overhead_of(workers: Workers, *, brief: bool) -> dict[str, float]:
 
 
 def memory_of(points: int) -> dict[str, Any]:
-    """The peak of a process that writes a map [MB], in a process of its own."""
+    """Return the peak of a process that writes a map [MB], in a process of its own."""
     answer = subprocess.run(
         [sys.executable, __file__, "--memory-of", str(points)], check=True, stdout=subprocess.PIPE, encoding="utf-8"
     )

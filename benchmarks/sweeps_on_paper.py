@@ -104,7 +104,7 @@ class Limit:
 
 
 def limits_of(one: Measured, chunk_s: float) -> list[Limit]:
-    """What a sweep of POINTS with chunks of that length uses, the worst first."""
+    """Return what a sweep of POINTS with chunks of that length uses, the worst first."""
     cores = MACHINES * CORES_A_MACHINE
     chunk_points = max(round(chunk_s / one.point_s), 1)
     chunks = math.ceil(POINTS / chunk_points)
@@ -134,12 +134,12 @@ def limits_of(one: Measured, chunk_s: float) -> list[Limit]:
 
 
 def _short(number: float) -> str:
-    """A number with two digits."""
+    """Return a number with two digits."""
     return f"{float(f'{number:.2g}'):.0f}" if 10 <= number < 1e5 else f"{number:.2g}"
 
 
 def page(found: dict[str, Any]) -> str:
-    """The tables of docs/sweeps-at-scale.md."""
+    """Return the tables of docs/sweeps-at-scale.md."""
     one = Measured.of(found)
     cores = MACHINES * CORES_A_MACHINE
     core_s = POINTS * one.point_s

@@ -132,13 +132,13 @@ def creep_up(
 
 
 def window_edge(scene: Scene) -> float:
-    """The upper edge of the linear window [Hz]."""
+    """Return the upper edge of the linear window [Hz]."""
     floating = stability_of(scene).floating
     return floating.spins[0][1] if floating else math.nan
 
 
 def resonance_of_three(scene: Scene) -> float:
-    """The spin [Hz] at which the two slow forward modes differ by the frequency of the motion up and down."""
+    """Return the spin [Hz] at which the two slow forward modes differ by the frequency of the motion up and down."""
     found = stability_of(scene)
     assert found.floating is not None
     height = found.floating.height
@@ -151,7 +151,7 @@ def resonance_of_three(scene: Scene) -> float:
 
 
 def balance(scene: Scene, waveform: str, field: float, rate: float) -> float:
-    """The spin [Hz] at which drag and creep take all that the drive can give."""
+    """Return the spin [Hz] at which drag and creep take all that the drive can give."""
     top, found = scene.top, stability_of(scene)
     assert found.floating is not None
     resonance = wobble_resonance(found.field, found.top, found.floating.height)
@@ -191,7 +191,7 @@ CASES = (
 
 
 def entry(case: Case) -> dict[str, Any]:
-    """A case as it is kept: with the limit and how it was lost for each angle, and what theory says."""
+    """Return a case as it is kept: with the limit and how it was lost for each angle, and what theory says."""
     scene = TOP.changed({"top.mass_kg": case.mass_kg})
     drive = case.waveform, case.field_t, case.creep_hz_per_s
     losses = [creep_up(scene, *drive, turns=angle, steps=case.steps_s) for angle in ANGLES]

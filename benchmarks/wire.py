@@ -89,12 +89,12 @@ def _time_of(call: Callable[[], object], count: int) -> float:
 
 
 def opened(address: str, library: Any) -> Any:
-    """A resource as a program that uses PyVISA alone opens it."""
+    """Return a resource as a program that uses PyVISA alone opens it."""
     return pyvisa.ResourceManager(library).open_resource(address, read_termination="\n", write_termination="\n")
 
 
 def generator() -> Virtual33500B:
-    """The instrument that is asked: it takes no time of its own."""
+    """Return the instrument that is asked: it takes no time of its own."""
     device = Virtual33500B(VirtualClock())
     device.pace = 0.0
     return device
@@ -246,7 +246,7 @@ class Stopwatch:
 
 
 def scope_bench() -> tuple[VirtualBench, Stopwatch]:
-    """A virtual DS1000Z that looks at a spinning top, and the watch on the top's light."""
+    """Return a virtual DS1000Z that looks at a spinning top, and the watch on the top's light."""
     clock = VirtualClock()
     light = Stopwatch(SpinWorld(SpinScene(), clock).light)
     return VirtualBench({ADDRESS: VirtualDS1000Z(clock, signals={1: light})}), light
@@ -330,7 +330,7 @@ def fetch_plainly(parent: Connection, way: str, traced: bool) -> None:  # noqa: 
 
 
 def _peak_rss() -> int:
-    """The most memory that this process has had [bytes].
+    """Return the most memory that this process has had [bytes].
 
     Linux knows it of the program itself; the C library's number begins with that of the process that started it.
     """

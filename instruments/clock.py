@@ -36,7 +36,7 @@ class Clock(Protocol):
         """Let time pass [s]."""
 
     def wall_duration(self, duration: float) -> float:
-        """How long the wall's clock runs until so much time may have passed here [s].
+        """Return how long the wall's clock runs until this time may have passed here [s].
 
         An event loop waits for that long.  On a clock that jumps `sleep` then returns without waiting.
         """
@@ -68,7 +68,7 @@ class WallClock:
         return 0.0 if self._start is None else self.speed * (time.monotonic() - self._start)
 
     def sleep(self, duration: float) -> None:
-        """Wait until so much time has passed on the bench [s]."""
+        """Wait until this time has passed on the bench [s]."""
         if self.meanwhile is None:
             time.sleep(self.wall_duration(duration))
             return

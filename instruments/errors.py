@@ -51,7 +51,7 @@ _LONGEST_SHOWN = 80
 class BadAnswer(InstrumentError):
     """The instrument answered something else than was expected.
 
-    question: the message that was sent; answer: what came, whole; expected: the form of an answer, in words; advice:
+    question: the message that was sent; answer: what came, whole; expected: the form of an answer, as text; advice:
     what to try.
     """
 

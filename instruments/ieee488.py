@@ -1,6 +1,6 @@
 """The forms of IEEE 488.2 answers: definite-length blocks, numbers, the identity.
 
-A block is ``#``, one digit n, n digits that say how many bytes follow, and so many bytes of any value, line feeds
+A block is ``#``, one digit n, n digits that say how many bytes follow, and these bytes, of any value, line feeds
 included (IEEE 488.2-1992, 8.7.9).
 """
 
@@ -23,7 +23,7 @@ _HEAD = re.compile(rb"#([1-9])")
 
 
 class BrokenBlock(Exception):
-    """What came is no block, or not all of one.  seen: in words."""
+    """The bytes are no block, or not all of one.  seen: a description of them."""
 
     def __init__(self, seen: str) -> None:
         self.seen = seen
@@ -49,7 +49,7 @@ PLAIN_BLOCK = BlockForm()
 def read_block(read: Callable[[int], bytes], form: BlockForm = PLAIN_BLOCK) -> bytes:
     r"""Return the block at the head of a stream, and the line end behind it.
 
-    read: exactly so many bytes, or fewer if no more come; form: what stands around it.  Raises BrokenBlock.
+    read: returns the number of bytes asked for, or fewer if no more come; form: of head and end.  Raises BrokenBlock.
 
     >>> import io
     >>> read_block(io.BytesIO(b"#15a,\x0a,b\n").read)
@@ -76,7 +76,7 @@ def _read_end(read: Callable[[int], bytes], size: int) -> None:
 
 
 def _after_header(read: Callable[[int], bytes], longest: int) -> bytes:
-    """Return the first two bytes of a block behind a header of so many signs at most."""
+    """Return the first two bytes of a block behind a header of this length at most."""
     header = b""
     while len(header) <= longest:
         sign = read(1)
@@ -143,12 +143,12 @@ class Form:
 
     def matches(self, answer: str) -> bool:
         """Whether the whole answer has this form."""
-        return _compiled(self.pattern).fullmatch(answer) is not None
+        return _compile(self.pattern).fullmatch(answer) is not None
 
     def number(self, answer: str) -> float:
         """Return the number in an answer of this form.  Raises ValueError."""
         if self.suffix:
-            found = _compiled(f"({self.pattern}){self.suffix}").fullmatch(answer)
+            found = _compile(f"({self.pattern}){self.suffix}").fullmatch(answer)
             answer = found[1] if found else ""
         if not self.matches(answer):
             raise ValueError(answer)
@@ -156,7 +156,7 @@ class Form:
 
 
 @functools.cache
-def _compiled(pattern: str) -> re.Pattern[str]:
+def _compile(pattern: str) -> re.Pattern[str]:
     return re.compile(pattern, re.ASCII)
 
 

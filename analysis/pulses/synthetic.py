@@ -102,7 +102,7 @@ class Trace:
     middle: float
 
     def truth(self, time: float) -> float:
-        """The frequency at a time [Hz]."""
+        """Return the frequency at a time [Hz]."""
         return self.frequency + CHIRP * (time - self.middle)
 
 
@@ -187,7 +187,7 @@ def _lose(share: float, samples: Array, random: Random) -> None:
 
 
 def _switch(frequency: float, duration: float, first: float, random: Random) -> Array:
-    """Times of a switch with a jitter of 1e-4 s: at 45 % of the turns it bounces up to four times, 8 % it misses."""
+    """Return times of a switch with a jitter of 1e-4 s, which bounces at 45 % of the turns and misses 8 %."""
     turn = np.arange(1, int(frequency * duration) - 1)
     since = duration / 2
     start = frequency - CHIRP * since  # at time 0

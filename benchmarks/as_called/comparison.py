@@ -31,7 +31,7 @@ class Case:
     points: tuple[Point, ...]
 
     def speed(self, method: str, error: float) -> float:
-        """The speed of one contender at an achieved error [m], at its best setting; NaN if it does not reach it."""
+        """Return the speed of one contender at an achieved error [m], at its best setting; NaN if it has none."""
         return best_speed([point for point in self.points if point.method == method], error)
 
     @property

@@ -54,7 +54,7 @@ class Contender:
 
 @cache
 def scene_of(motion: Motion) -> Scene:
-    """The motion as a scene of the simulator."""
+    """Return the motion as a scene of the simulator."""
     return preset(motion.preset).changed(dict(motion.changes))
 
 

@@ -38,7 +38,7 @@ def tops() -> tuple[Motion, ...]:
 
 
 def reference() -> Array:
-    """The true places of COMPARED at the end, shape (20, 3) [m]."""
+    """Return the true places of COMPARED at the end, shape (20, 3) [m]."""
     return np.array(references()["ensemble_m"])
 
 

@@ -102,12 +102,12 @@ def overhead(watched: Watched) -> Overhead:
 
 
 def outside_all(begin: float, end: float, kernels: list[Kernel]) -> float:
-    """The time that no kernel ran."""
+    """Return the time that no kernel ran."""
     return end - begin - sum(b - a for _, a, b in kernels)
 
 
 def before_lanes(begin: float, end: float, kernels: list[Kernel]) -> float:
-    """The time before the first kernel with lanes in which no other kernel ran."""
+    """Return the time before the first kernel with lanes in which no other kernel ran."""
     first = min((a for module, a, _ in kernels if module.endswith(".lanes")), default=end)
     return outside_all(begin, first, [kernel for kernel in kernels if kernel[2] <= first])
 

@@ -152,7 +152,7 @@ def _file_of(test: str) -> str:
 
 
 def _within(limit: float, tests: list[str], seconds: dict[str, float]) -> list[str]:
-    """The first tests that together, with the collection of their files, take so long [s]; one at least."""
+    """Return the first tests that together, with the collection of their files, take so long [s]; one at least."""
     chosen: list[str] = []
     files: set[str] = set()
     for test in tests:

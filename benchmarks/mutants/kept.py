@@ -54,7 +54,7 @@ def is_equivalent(mutation: Mutation) -> bool:
 
 
 def row_of(kind: str, mutation: Mutation, outcome: dict[str, Any], name: str = "") -> Row:
-    """The row of a mutation that has been tried."""
+    """Return the row of a mutation that has been tried."""
     known = reasons().get((mutation.file, mutation.function, mutation.text), {})
     state = outcome["state"]
     if state in {"survived", "unreached"} and known.get("equivalent"):

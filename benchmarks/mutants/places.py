@@ -84,7 +84,7 @@ def room_of(file: str) -> str:
 
 
 def mutated(file: str, edits: tuple[Edit, ...]) -> bytes:
-    """A file's content with the edits that are its own."""
+    """Return a file's content with the edits that are its own."""
     source = (trial.TREE / file).read_bytes()
     for edit in sorted(edits, key=lambda edit: -edit.start):
         if edit.file == file:
@@ -96,7 +96,7 @@ def mutated(file: str, edits: tuple[Edit, ...]) -> bytes:
 
 
 def named() -> Iterator[tuple[str, Mutation | None]]:
-    """The mutations of named.toml: name and mutation, or None where the code is gone."""
+    """Yield the mutations of named.toml: name and mutation, or None where the code is gone."""
     with (HERE / "named.toml").open("rb") as table:
         rows = tomllib.load(table)["mutation"]
     for row in rows:
@@ -130,7 +130,7 @@ def _edit(row: dict[str, str]) -> Edit:
 
 
 def function_at(file: str, line: int) -> str:
-    """The innermost function around a line, "" at the level of the module."""
+    """Return the innermost function around a line, "" at the level of the module."""
     tree = ast.parse((trial.TREE / file).read_bytes())
     around = [(last - first, name) for name, first, last in functions(tree) if first <= line <= last]
     return min(around)[1] if around else ""
@@ -343,7 +343,7 @@ def generated(seed: int) -> dict[str, list[Mutation]]:
 
 
 def _shown(source: bytes, edit: Edit) -> str:
-    """The first line of a change, before and after."""
+    """Return the first line of a change, before and after."""
     begin = source.rfind(b"\n", 0, edit.start) + 1
     end = source.find(b"\n", edit.end)
     old, new = source[begin:end], source[begin : edit.start] + edit.new + source[edit.end : end]

@@ -21,7 +21,7 @@ LEFT_OUT = ("tests/peers", "tests/test_rooms.py", "tests/test_documentation.py")
 
 
 def groups() -> dict[str, list[str]]:
-    """The files of tests, a group for each folder, and the doctests of each package; large folders come last."""
+    """Return the files of tests, a group for each folder, and the doctests of each package; large folders come last."""
     found: dict[str, list[str]] = defaultdict(list)
     for path in sorted((trial.TREE / "tests").rglob("test_*.py")):
         name = path.relative_to(trial.TREE).as_posix()
@@ -62,7 +62,7 @@ def _known(name: str) -> dict[str, Any]:
 
 
 def _part(result: dict[str, Any], name: str) -> dict[str, Any]:
-    """What is of one file of tests, or of a package's doctests."""
+    """Return what is of one file of tests, or of a package's doctests."""
     tests = {test: seconds for test, seconds in result["tests"].items() if test.startswith(name)}
     failed = [test for test in result["failed"] if test.startswith(name)]
     reached = {
@@ -136,7 +136,7 @@ class Reach:
 
 
 def load() -> Reach:
-    """The map, joined from its groups; tests that fail without any change, or are gone, are not in it."""
+    """Return the map, joined from its groups; tests that fail without any change, or are gone, are not in it."""
     reach = Reach({}, defaultdict(lambda: defaultdict(set)), defaultdict(lambda: defaultdict(list)))
     for group in filter(None, (_known(name) for files in groups().values() for name in files)):
         failed = set(group["failed"])

@@ -51,7 +51,7 @@ def compute(sweep: Sweep, path: Path) -> dict[str, Any]:
 
 
 def whole(costs: dict[str, Any]) -> dict[str, Any]:
-    """What all sweeps and their numbers took together."""
+    """Return what all sweeps and their numbers took together."""
     found = {key: sum(cost[key] for cost in costs.values()) for key in ("cpu_s", "wall_s")}
     tops = sum(cost.get("points", 0) for cost in costs.values())
     return found | {"sweeps": len(SWEEPS), "tops": tops, "alone": found["cpu_s"] > ALONE * found["wall_s"]}

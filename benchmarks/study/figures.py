@@ -64,7 +64,7 @@ def published(axes: Axes) -> None:
 
 
 def as_the_command_draws(folder: Path, name: str, column: str) -> Figure:
-    """What `levilab sweep` draws of a column beside its store."""
+    """Return what `levilab sweep` draws of a column beside its store."""
     return map_figure(Store.open(folder / f"{name}.zarr").load(), column)
 
 
@@ -113,7 +113,7 @@ def survival_by_mass(folder: Path, _: dict[str, Any]) -> Figure:
 
 
 def edge(folder: Path, numbers: dict[str, Any]) -> Figure:
-    """The upper edge closely, how the number of islands grows, and what is chance."""
+    """Return the upper edge closely, how the number of islands grows, and what is chance."""
     found, shown = load(folder, "edge"), numbers["edge"]
     figure = Figure(figsize=(11, 4.8))
     axes = figure.add_axes((0.055, 0.2, 0.5, 0.72))
@@ -175,7 +175,7 @@ def published_handles() -> list[Line2D]:
 
 
 def limits(folder: Path, numbers: dict[str, Any]) -> Figure:
-    """The lower limit by height, with its reason; and where a top with drag falls."""
+    """Return the lower limit by height, with its reason; and where a top with drag falls."""
     shown = numbers["foot"]
     figure = Figure(figsize=(11, 5))
     left, right = figure.add_axes((0.06, 0.29, 0.41, 0.64)), figure.add_axes((0.55, 0.29, 0.43, 0.64))

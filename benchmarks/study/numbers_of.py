@@ -66,7 +66,7 @@ def load(folder: Path, name: str) -> Found:
 
 
 def hole(spins: Array, up: Flags, least: float = 0.2) -> tuple[float, float] | None:
-    """The first run of lost tops that is so wide, of those that have survivors beyond it [Hz]."""
+    """Return the first run of lost tops that is so wide, of those that have survivors beyond it [Hz]."""
     for a, b in intervals(~up):
         if a > 0 and b < spins.size - 1 and spins[b] - spins[a] >= least:
             return float(spins[a]), float(spins[b])
@@ -93,12 +93,12 @@ def lowest_point(stability: Stability, height: float, speed: float) -> float:
 
 
 def sleeping_at_lowest(stability: Stability, height: float, speed: float) -> float:
-    """The sleeping top's limit where it swings deepest [Hz]; NaN if it does not come back."""
+    """Return the sleeping top's limit where it swings deepest [Hz]; NaN if it does not come back."""
     return sleeping_limit(stability.field, stability.top, lowest_point(stability, height, speed))
 
 
 def slow_resonance(scene: Scene) -> float:
-    """The spin at which the two slow forward modes differ by the frequency of the motion up and down [Hz]."""
+    """Return the spin at which the two slow forward modes differ by the frequency of the motion up and down [Hz]."""
     found = stability_of(scene)
     assert found.floating is not None
     height = found.floating.height
@@ -157,7 +157,7 @@ def aside_stiffness(moment: float, field: Any, slope: Any, bend: Any) -> Any:
 
 
 def survival(folder: Path) -> dict[str, Any]:
-    """The whole map, its borders, and how the windows of theory bound it."""
+    """Return the whole map, its borders, and how the windows of theory bound it."""
     found = load(folder, "survival")
     spins, masses, heights = found.axes
     up = found.up
@@ -304,7 +304,7 @@ def edge(folder: Path) -> dict[str, Any]:
 
 
 def foot(folder: Path) -> dict[str, Any]:
-    """The lower limit by height, and the sleeping top's limit where each top swings deepest."""
+    """Return the lower limit by height, and the sleeping top's limit where each top swings deepest."""
     found, stability = load(folder, "foot"), stability_of(TOP)
     spins, heights = found.axes
     speed = TOP.start.velocity_m_s[2]
@@ -367,12 +367,12 @@ def nothing_if_nan(x: float) -> float | None:
 
 
 def last_up(found: Found) -> float | None:
-    """The highest spin of a scan that is up [Hz]."""
+    """Return the highest spin of a scan that is up [Hz]."""
     return float(found.axes[0][found.up][-1]) if found.up.any() else None
 
 
 def neighbours(blocks: list[tuple[float, float]], spin: float) -> tuple[float, float]:
-    """The highest spin that is up at or below one, and the lowest above it [Hz]; NaN where none is."""
+    """Return the highest spin that is up at or below one, and the lowest above it [Hz]; NaN where none is."""
     edges = [min(b, spin) for a, b in blocks if a <= spin]
     later = [max(spin, a) for a, b in blocks if b > spin]
     return max(edges, default=math.nan), min(later, default=math.nan)
@@ -436,7 +436,7 @@ def beside(hole_hz: tuple[float, float] | None, spin: float) -> float | None:
 
 
 def locks(folder: Path) -> dict[str, Any]:
-    """The tongue of each wave, the start's phase, and what throws the top."""
+    """Return the tongue of each wave, the start's phase, and what throws the top."""
     found: dict[str, Any] = {}
     for wave in ("sine", "square"):
         tongue = load(folder, f"lock-{wave}")
@@ -502,7 +502,7 @@ def locks(folder: Path) -> dict[str, Any]:
 
 
 def first_lost(amplitudes: Array, up: Flags) -> float | None:
-    """The weakest drive with which a tenth of the tops of a map (frequency, amplitude) is lost [mT]."""
+    """Return the weakest drive with which a tenth of the tops of a map (frequency, amplitude) is lost [mT]."""
     lost = np.flatnonzero(np.mean(~up, axis=0) >= 0.1)
     return round(1e3 * float(amplitudes[lost[0]]), 4) if lost.size else None
 
@@ -581,7 +581,7 @@ def by_beat(folder: Path) -> list[dict[str, Any]]:
 
 
 def straight(scene: Scene) -> Scene:
-    """A top whose moment is as strong along its axis, and not tilted, 0.2 mm above where it floats."""
+    """Return a top whose moment is as strong along its axis, and not tilted, 0.2 mm above where it floats."""
     floating = stability_of(scene).floating
     assert floating is not None
     start = {"place": "given", "position_m": [0.0, 0.0, floating.height + 2e-4], "velocity_m_s": [0.0, 0.0, 0.0]}
@@ -590,7 +590,7 @@ def straight(scene: Scene) -> Scene:
 
 
 def bounce_hz(scene: Scene, seconds: float = 60.0, rate: float = 50.0) -> float:
-    """The frequency of a simulated top's motion up and down [Hz]: the highest line of its spectrum, to 1/960 Hz."""
+    """Return the frequency of a simulated top's motion up and down [Hz]: its highest line, to 1/960 Hz."""
     heights = simulate(scene, seconds, rate=rate, tolerance=1e-6).position[:, 2]
     padded = 16 * heights.size
     spectrum = np.abs(np.fft.rfft((heights - heights.mean()) * np.hanning(heights.size), padded))

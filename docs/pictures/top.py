@@ -11,8 +11,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT)]
 
-from levilab.motion.animation.film import Film, still  # noqa: E402
-from levilab.motion.animation.poses import poses_of  # noqa: E402
+from levilab.animation.film import Film, still  # noqa: E402
+from levilab.animation.poses import poses_of  # noqa: E402
 from levilab.simulator.scene import preset  # noqa: E402
 from levilab.simulator.single import simulate  # noqa: E402
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from instruments.clock import Clock
     from instruments.links.transport import TrafficLog, Transport
 
-#: Error queues hold 20 to 32 entries: an instrument that still has one after so many never answers "No error".
+#: Error queues hold 20 to 32 entries: an instrument that still has one after this number never answers "No error".
 _LONGEST_ERROR_QUEUE = 64
 #: An entry of the error queue (SCPI-1999, vol. 2, 21.8): a number and a text in quotes.
 _QUEUE_ENTRY = re.compile(r"([+-]?\d{1,5}), ?(\"[ -~]*\")", re.ASCII)
@@ -223,7 +223,7 @@ class ScpiInstrument:
         """
         rows = self.declared()
         questions = [row.question(self) for row in rows]
-        if self.ANSWERS_JOINED and self._joins is not False and (answers := self._joined_answers(questions)):
+        if self.ANSWERS_JOINED and self._joins is not False and (answers := self._ask_joined(questions)):
             self._joins = True
             return {
                 row.name_with_unit: row.read(self, question, answer)
@@ -233,7 +233,7 @@ class ScpiInstrument:
         self._joins = False
         return found
 
-    def _joined_answers(self, questions: Sequence[str]) -> list[str]:
+    def _ask_joined(self, questions: Sequence[str]) -> list[str]:
         """Ask these questions in one message.
 
         Returns:

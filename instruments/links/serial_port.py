@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from instruments.clock import Clock
     from instruments.links.transport import TrafficLog
 
-#: pyserial's letters for what bench.toml says in words.
+#: pyserial's letters for the words of bench.toml.
 PARITIES = {"none": "N", "odd": "O", "even": "E", "mark": "M", "space": "S"}
 
 #: Bytes of one read, at most.
@@ -107,9 +107,9 @@ class SerialPort:
                 # a message that follows one without an answer does not wait for that one's acknowledgement
                 link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         except Exception as error:  # pyserial lets termios.error and ValueError through
-            raise self._not_opened(port, error) from error
+            raise self._explain(port, error) from error
 
-    def _not_opened(self, port: str, error: Exception) -> NotConnected:
+    def _explain(self, port: str, error: Exception) -> NotConnected:
         number = getattr(error, "errno", None)
         refused = number == errno.EACCES or "PermissionError" in str(error)
         # Windows gives a port to one program only, and says that access is denied to the others
@@ -195,7 +195,7 @@ class SerialPort:
         return Failure.OCCUPIED if getattr(error, "errno", None) in _IN_USE else Failure.LOST
 
     def _wait_at_most(self, within: float) -> None:
-        if self.device.timeout != within:  # setting it configures the port anew
+        if self.device.timeout != within:  # setting it configures the port again
             self.device.timeout = within
 
 

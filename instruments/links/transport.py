@@ -114,7 +114,7 @@ class Port(Protocol):
 
     Attributes:
         resynchronising: how to get rid of late answers.
-        text: what an answer is expected to be, in words.
+        text: the expected answer, as text.
         silence: the error of a question without an answer.
     """
 

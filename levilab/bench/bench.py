@@ -71,7 +71,7 @@ class Bench:
         return self.instruments[kind].transport.address
 
     def reopen(self, kind: str) -> None:
-        """Make the link anew and see that the same instrument is there.  Raises InstrumentError."""
+        """Open the link again and check that the same instrument is there.  Raises InstrumentError."""
         instrument = self.instruments[kind]
         instrument.transport.reopen()
         instrument.identity()
@@ -86,7 +86,7 @@ class Bench:
             return
         try:
             self.generator.off()
-        except Exception:  # noqa: BLE001 - whatever it was, the second try decides, over a link made anew
+        except Exception:  # noqa: BLE001 - whatever it was, the second try decides, over a new link
             try:
                 self.generator.transport.reopen()
                 self.generator.off()

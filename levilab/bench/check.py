@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class Checked:
     """One instrument.
 
-    maker, model, serial_number, firmware: as it says itself; reading: in words, with value and unit where there is
+    maker, model, serial_number, firmware: as it says itself; reading: as text, with value and unit where there is
     one; trouble: what is wrong and what to try, empty if all is well.
     """
 
@@ -106,10 +106,10 @@ def check(wiring: Wiring, light: Light) -> Iterator[Checked]:
     if not kinds:
         raise ConfigError("the bench file describes no instrument: `levilab bench init` writes one from what answers")
     for kind in kinds:
-        yield _checked(kind, wiring, light)
+        yield _check(kind, wiring, light)
 
 
-def _checked(kind: str, wiring: Wiring, light: Light) -> Checked:
+def _check(kind: str, wiring: Wiring, light: Light) -> Checked:
     address = wiring.instruments[kind].address
     seen: dict[str, Any] = {}
     try:

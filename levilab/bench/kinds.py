@@ -24,7 +24,7 @@ I_co = TypeVar("I_co", bound=Instrument, covariant=True)
 
 @dataclass(frozen=True)
 class Kind(Generic[I_co]):
-    """A kind of instrument.  purpose: what it does on the bench, in words; models: its rows of the catalogue."""
+    """A kind of instrument.  purpose: its use on the bench, as text; models: its rows of the catalogue."""
 
     name: str
     purpose: str

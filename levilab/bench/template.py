@@ -29,7 +29,7 @@ class Setting:
     @property
     def line(self) -> str:
         """As it stands in the file."""
-        assignment = f"{'' if self.is_set else '# '}{self.name} = {_quoted(self.value)}"
+        assignment = f"{'' if self.is_set else '# '}{self.name} = {_quote(self.value)}"
         return f"{assignment:31} # {self.comment}" if self.comment else assignment
 
 
@@ -58,7 +58,7 @@ def bench_text(found: Sequence[Found], library: str, tables: Sequence[SettingsTa
         keep_trailing_newline=True,
     )
     # TOML's strings are JSON's; jinja's own filter would escape signs of HTML
-    environment.policies["json.dumps_function"] = lambda value, **_: _quoted(value)
+    environment.policies["json.dumps_function"] = lambda value, **_: _quote(value)
     by_kind = {kind: [one for one in found if one.kind == kind] for kind in KINDS}
     about = {
         kind.name: {
@@ -79,7 +79,7 @@ def bench_text(found: Sequence[Found], library: str, tables: Sequence[SettingsTa
     )
 
 
-def _quoted(value: Any) -> str:
+def _quote(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 

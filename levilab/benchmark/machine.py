@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 
 def processor() -> str:
-    """The processor's name, as far as the system tells it."""
+    """Return the processor's name, as far as the system tells it."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:  # noqa: PTH123 - no file of ours
             return next(line.partition(":")[2].strip() for line in file if line.startswith("model name"))
@@ -16,7 +16,7 @@ def processor() -> str:
 
 
 def version_of(package: str) -> str | None:
-    """The version that is installed; None where it is not."""
+    """Return the version that is installed; None where it is not."""
     try:
         return version(package)
     except PackageNotFoundError:

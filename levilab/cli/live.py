@@ -26,7 +26,7 @@ def live(
 ) -> None:
     """Serve the view until Ctrl-C."""
     with importing():
-        from levilab.motion.animation.three import three_js
+        from levilab.animation.three import three_js
 
         three_js("the live view")  # raises where the extra is not installed
         from levilab.interruption import watching_for_end

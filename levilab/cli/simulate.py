@@ -16,7 +16,7 @@ from levilab.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from levilab.motion.animation.request import AnimationRequest
+    from levilab.animation.request import AnimationRequest
     from levilab.motion.effects import Effect
     from levilab.motion.summary import Summary
     from levilab.simulator.scene import Scene
@@ -78,7 +78,7 @@ def simulate(
     chosen = chosen_scene(scene, settings)
     film = _animation_request(animate, animate_from, animate_to, animate_speed)
     if film:
-        from levilab.motion.animation.request import check_request
+        from levilab.animation.request import check_request
 
         check_request(film, chosen, duration)
 
@@ -123,13 +123,13 @@ def _animation_request(
         if without := [name for name, value in given.items() if value is not None]:
             raise UsageError(without[0], "it is of an animation: give `animate`, too")
         return None
-    from levilab.motion.animation.request import AnimationRequest
+    from levilab.animation.request import AnimationRequest
 
     return AnimationRequest(path, start, stop, speed)
 
 
 def _animate(request: "AnimationRequest", summary: "Summary", in_words: "Callable[[str], str]") -> None:
-    from levilab.motion.animation.request import animate
+    from levilab.animation.request import animate
     from levilab.present.progress import ShareBar
 
     with interruptible("no animation was written"), contextlib.closing(ShareBar("drawing")) as share:

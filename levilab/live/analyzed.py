@@ -117,7 +117,7 @@ class Analyses:
             thread.join(_PATIENCE_S)
 
     def about(self, folder: Path) -> dict[str, Any]:
-        """The state of a run's analysis: its state, names of figures, the verdict, whether there is a report.
+        """Return the state of a run's analysis: its state, names of figures, the verdict, whether there is a report.
 
         Results of an earlier analysis are not shown for one that is under way or has failed.
         """
@@ -136,12 +136,12 @@ class Analyses:
 
 
 def _figures(folder: Path) -> list[Path]:
-    """The figures beside a run, sorted by name."""
+    """Return the figures beside a run, sorted by name."""
     return sorted(path for path in folder.glob("*") if FIGURES.fullmatch(path.name))
 
 
 def _result(folder: Path) -> dict[str, Any]:
-    """What result.json beside a run says, in words."""
+    """Return what result.json beside a run says, in words."""
     found: Any = {}
     with contextlib.suppress(OSError, ValueError):
         found = json.loads((folder / RESULT).read_text(encoding="utf-8"))
@@ -158,7 +158,7 @@ def _result(folder: Path) -> dict[str, Any]:
 
 
 def _values(values: Any) -> list[str]:
-    """What was found, in one line, for an analysis whose result has no verdict: each value that has an uncertainty."""
+    """Return the values that have an uncertainty as one line, for a result without a verdict."""
     found = [
         f"{name.replace('_', ' ')} {with_uncertainty(Estimate(one['value'], one['u'], str(one.get('unit', ''))))}"
         for name, one in (values.items() if isinstance(values, dict) else ())

@@ -52,7 +52,7 @@ def _names(root: Path) -> Iterator[str]:
 
 
 def choices(root: Path) -> list[Choice]:
-    """The newest runs, newest first."""
+    """Return the newest runs, newest first."""
     return [_choice(root / name) for name in run_names(root)]
 
 
@@ -66,7 +66,7 @@ def _choice(folder: Path) -> Choice:
 
 
 def recorded_now(root: Path, but: Collection[Path] = ()) -> Path | None:
-    """The folder of the newest run that is running, among the newest few; None where there is none.
+    """Return the folder of the newest run that is running, among the newest few; None where there is none.
 
     Args:
         root: the folder with the runs.
@@ -77,7 +77,7 @@ def recorded_now(root: Path, but: Collection[Path] = ()) -> Path | None:
 
 
 def newest(found: list[Choice]) -> str | None:
-    """The name of the newest run that is running, else of the newest that can be read."""
+    """Return the name of the newest run that is running, else of the newest that can be read."""
     for wanted in ("running", None):
         for one in found:
             if one.status == wanted or (wanted is None and one.status != "unreadable"):

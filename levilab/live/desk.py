@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from levilab.animation.parts import parts_of
 from levilab.errors import LevilabError
 from levilab.live.practice.commands import RecordRun, command_of
-from levilab.motion.animation.parts import parts_of
 from levilab.runs.run import read_record, utc_now
 from levilab.simulator.scene import read_scene, scene_of
 
@@ -116,7 +116,7 @@ class Desk:
 
 
 def scene_of_run(folder: Path) -> dict[str, Any] | None:
-    """The scene in a run's record; None where there is none."""
+    """Return the scene in a run's record; None where there is none."""
     try:
         scene = read_record(folder).configuration.get("scene")
     except LevilabError:
@@ -125,7 +125,7 @@ def scene_of_run(folder: Path) -> dict[str, Any] | None:
 
 
 def parts_for(scene: dict[str, Any] | None) -> dict[str, Any]:
-    """What is drawn of a scene; where none is known, of the one for practice."""
+    """Return what is drawn of a scene; where none is known, of the one for practice."""
     try:
         known = scene_of(scene) if scene else read_scene("practice")
     except LevilabError:

@@ -68,7 +68,7 @@ class Doors:
         return isinstance(token, str) and hmac.compare_digest(token.encode(), self.token.encode())
 
     def headers(self, policy: str = PAGE_POLICY) -> dict[str, str]:
-        """What goes with each answer."""
+        """Return what goes with each answer."""
         sockets = " ".join(f"ws://{host}" for host in sorted(self.hosts))
         return _ALWAYS | {"content-security-policy": policy.replace("{sockets}", sockets)}
 

@@ -136,7 +136,7 @@ class Followed:
 
 
 def numbers(lines: list[bytes], columns: int) -> NDArray[np.float64]:
-    """The values in lines of readings.csv, shape (n, columns); an empty field is NaN, a damaged line is left out.
+    """Return the values of lines of readings.csv, shape (n, columns); an empty field is NaN, a damaged line none.
 
     >>> numbers([b"1,2.5", b"2,", b"3,x", b"4,5,6", b""], 2).tolist()
     [[1.0, 2.5], [2.0, nan]]
@@ -166,7 +166,7 @@ def _known(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _event(line: bytes, number: int) -> dict[str, Any]:
-    """An event as the page shows it; what is damaged is shown as a damaged line."""
+    """Return an event as the page shows it; what is damaged is shown as a damaged line."""
     try:
         event = json.loads(line)
         time_s, kind, text = event["time_s"], str(event["kind"]), str(event["text"])

@@ -147,7 +147,7 @@ def farewell(bench: PracticeBench | None, analyzed: Collection[str] = ()) -> str
 
 
 def _where(options: LiveOptions) -> tuple[Path, str]:
-    """The folder with the runs, and the name of the run to show at first."""
+    """Return the folder with the runs, and the name of the run to show at first."""
     if options.run is None:
         return options.out.absolute(), ""
     if options.mock:
@@ -161,7 +161,7 @@ def _where(options: LiveOptions) -> tuple[Path, str]:
 
 
 def _listening(port: int) -> socket.socket:
-    """A socket at the port.  Raises CannotShow."""
+    """Return a socket at the port.  Raises CannotShow."""
     opened = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
         if hasattr(socket, "SO_EXCLUSIVEADDRUSE"):  # Windows: else two servers could share a port

@@ -19,13 +19,13 @@ from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
+from levilab.animation.three import three_js
 from levilab.errors import LevilabError
 from levilab.live.analyzed import FIGURES, REPORT, Analyses
 from levilab.live.choice import choices, newest, recorded_now
 from levilab.live.desk import parts_for, scene_of_run
 from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
 from levilab.live.watch import Watch
-from levilab.motion.animation.three import three_js
 from levilab.runs.run import RECORD
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class Hall:
 
     @contextlib.contextmanager
     def watching(self, name: str) -> Iterator[Watch]:
-        """The watch of a run, shared by all pages that look at it.
+        """Yield the watch of a run, shared by all pages that look at it.
 
         Args:
             name: of the run; "" is what the bench for practice recorded last, or what another program records now;
@@ -103,7 +103,7 @@ class Hall:
                 self.watches.pop(name).close()
 
     def scene(self, name: str) -> dict[str, Any] | None:
-        """The scene of the bench that pages see with a run; None where it is not known.
+        """Return the scene of the bench that pages see with a run; None where it is not known.
 
         Args:
             name: of the run that is shown, also where no page chose it; "" is none, beside the bench for practice.
@@ -161,7 +161,7 @@ class Hall:
 
     async def _fit(self, watch: Watch, task: FitTask) -> None:
         with watch.failing_alone():
-            watch.fitted(task.folder, *await asyncio.to_thread(_timed, task.compute))
+            watch.take_fit(task.folder, *await asyncio.to_thread(_timed, task.compute))
 
     def _announce(self) -> None:
         self.new.set()
@@ -187,7 +187,7 @@ class Hall:
 
 
 def _timed(task: Callable[[], Running | None]) -> tuple[Running | None, float]:
-    """What a task returns, and the processor time of this thread for it [s]: waiting for a busy machine costs none."""
+    """Return the result of a task and the processor time of this thread [s]: waiting for others costs none."""
     begin = time.thread_time()
     return task(), time.thread_time() - begin
 
@@ -201,7 +201,7 @@ class Pages:
 
     def __init__(self, hall: Hall) -> None:
         self.hall = hall
-        top = Path(__file__).parents[1] / "motion" / "animation" / "top.js"
+        top = Path(__file__).parents[1] / "animation" / "top.js"
         self.files = {path.name: path for path in PAGE.iterdir()} | {
             "three.js": three_js("the live view"),
             "top.js": top,
@@ -216,16 +216,16 @@ class Pages:
         return JSONResponse(document, status, headers=self.hall.doors.headers())
 
     async def page(self, _: Request) -> Response:
-        """The page."""
+        """Return the page."""
         return self._file(self.files["live.html"])
 
     async def part(self, request: Request) -> Response:
-        """A module or the style sheet of the page."""
+        """Return a module or the style sheet of the page."""
         found = self.files.get(request.path_params["name"])
         return self._file(found) if found else _nothing()
 
     async def runs(self, _: Request) -> Response:
-        """The runs to choose from, and what the page has to know at first."""
+        """Return the runs to choose from, and what the page has to know at first."""
         hall = self.hall
         found = await asyncio.to_thread(choices, hall.root)
         first = hall.shown or newest(found) or ""
@@ -233,12 +233,12 @@ class Pages:
         return self._json({"runs": [asdict(one) for one in found], "first": first, "practice": practice})
 
     async def parts(self, request: Request) -> Response:
-        """What is drawn of the top."""
+        """Return what is drawn of the top."""
         scene = self.hall.scene(request.query_params.get("run", ""))
         return self._json(await asyncio.to_thread(parts_for, scene))
 
     async def of_run(self, request: Request) -> Response:
-        """A figure or the report of a run."""
+        """Return a figure or the report of a run."""
         name, wanted = request.path_params["run"], request.path_params["name"]
         path = self.hall.root / name / wanted
         known = self.hall.is_run(name) and (wanted == REPORT or FIGURES.fullmatch(wanted))
@@ -314,7 +314,7 @@ def _nothing() -> Response:
 
 
 def _table(text: str) -> dict[str, Any]:
-    """A page's question; anything else than a table asks for everything."""
+    """Return a page's question; anything else than a table asks for everything."""
     try:
         found = json.loads(text)
     except (ValueError, RecursionError):

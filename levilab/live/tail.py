@@ -52,7 +52,7 @@ class Tail:
         return []
 
     def _complete(self, piece: bytes) -> list[bytes]:
-        """The lines that end in a piece; what is left begins the next one."""
+        """Return the lines that end in a piece; what is left begins the next one."""
         complete, end, torn = piece.rpartition(b"\n")
         if not end:
             self._keep_torn(self._torn + torn)

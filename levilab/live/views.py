@@ -33,7 +33,7 @@ VIEWS = {
 
 
 def view_of(experiment: str, columns: tuple[str, ...]) -> View | None:
-    """The row of an experiment, if its columns are there; else the first two columns, as those of a simulation."""
+    """Return the row of an experiment if its columns are there, else a row of the first two columns."""
     view = VIEWS.get(experiment)
     if view and view.x in columns and view.y in columns:
         return view
@@ -42,7 +42,7 @@ def view_of(experiment: str, columns: tuple[str, ...]) -> View | None:
 
 
 def u_of(column: str) -> str:
-    """The name of the column with a column's standard uncertainty.
+    """Return the name of the column with a column's standard uncertainty.
 
     >>> u_of("spin_frequency_hz")
     'spin_frequency_u_hz'
@@ -52,7 +52,7 @@ def u_of(column: str) -> str:
 
 
 def unit_of(column: str) -> tuple[str, float]:
-    """The unit in which a column is shown, and how many of it are one of the column's.
+    """Return the unit in which a column is shown, and how many of it are one of the column's.
 
     >>> unit_of("height_m"), unit_of("spin_frequency_hz"), unit_of("record")
     (('cm', 100.0), ('Hz', 1.0), ('', 1.0))

@@ -177,7 +177,7 @@ class Watch:
     # --- the running fit, which the server computes beside the frames ---
 
     def fit_task(self) -> FitTask | None:
-        """Return what to compute in a thread, if it is time; `fitted` takes the result."""
+        """Return what to compute in a thread, if it is time; `take_fit` takes the result."""
         followed = self.followed
         ended = followed is not None and followed.status != "running"
         if (
@@ -198,7 +198,7 @@ class Watch:
 
         return FitTask(followed.folder, compute)
 
-    def fitted(self, folder: Path, found: Running | None, took_s: float) -> None:
+    def take_fit(self, folder: Path, found: Running | None, took_s: float) -> None:
         """Take in what was computed of a run, and the processor time that it took [s].
 
         It is dropped if another run is followed by now.  The time of the first fit that draws a line says nothing of
@@ -296,7 +296,7 @@ def _about(followed: Followed, failure: str) -> dict[str, Any]:
 
 
 def _settings(instrument: dict[str, Any]) -> dict[str, Any]:
-    """What an instrument was set to at the start of a run, as far as the page shows it without the bench."""
+    """Return what an instrument was set to at the start of a run, as far as the page shows it without the bench."""
     found = instrument.get("settings_start")
     found = found if isinstance(found, dict) else {}
     return {key: value for key, value in found.items() if key in _SETTINGS and isinstance(value, str | float | int)}

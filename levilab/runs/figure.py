@@ -52,7 +52,7 @@ def readings_figure(frame: pd.DataFrame, title: str) -> Figure:
 
 
 def _axis(column: str) -> str:
-    r"""A column's name for an axis: its quantity in words, its unit in brackets.
+    r"""Return a column's name for an axis: its quantity in words, its unit in brackets.
 
     >>> _axis("time_s"), _axis("precession_frequency_hz"), _axis("remark")
     ('time  [s]', 'precession frequency\n[Hz]', 'remark')
@@ -64,6 +64,6 @@ def _axis(column: str) -> str:
 
 
 def _uncertainty(frame: pd.DataFrame, name: str) -> pd.Series | None:
-    """The column of its standard uncertainty, as spin_frequency_u_hz is of spin_frequency_hz."""
+    """Return the column of its standard uncertainty, as spin_frequency_u_hz is of spin_frequency_hz."""
     quantity, _, unit = name.rpartition("_")
     return frame.get(f"{quantity}_u_{unit}")

@@ -25,7 +25,7 @@ _LATER_S = 1e-3
 
 
 def gates_event(spin: Gates, laser: Gates) -> dict[str, dict[str, list[float | None]]]:
-    """The gates of a point as they stand in an event, times to a microsecond."""
+    """Return the gates of a point as they stand in an event, times to a microsecond."""
     return {
         name: {
             "begin_s": [round(time, 6) for time in gates.begin.tolist()],
@@ -37,7 +37,7 @@ def gates_event(spin: Gates, laser: Gates) -> dict[str, dict[str, list[float | N
 
 
 def gates_of(run: Run, times: Sequence[float], drives: Sequence[float]) -> list[tuple[Gates, Gates]] | None:
-    """The gates of spin and laser behind each reading of a run; None where a reading has none, or damaged ones.
+    """Return the gates of spin and laser behind each reading of a run; None where a reading has none, or damaged ones.
 
     Args:
         run: a sweep.

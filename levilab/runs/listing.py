@@ -73,10 +73,10 @@ def list_runs(root: Path) -> list[Listed]:
         raise DataError(f"{root}: there is no such folder; levilab acquire writes runs into runs/")
     if not os.access(root, os.R_OK | os.X_OK):
         raise DataError(f"{root}: may not be searched by you; change its permissions or name another folder")
-    return sorted((_listed(folder) for folder in find_runs(root)), key=lambda run: (run.started_utc or "", run.path))
+    return sorted((_list_run(folder) for folder in find_runs(root)), key=lambda run: (run.started_utc or "", run.path))
 
 
-def _listed(folder: Path) -> Listed:
+def _list_run(folder: Path) -> Listed:
     try:
         run = _load(folder) or Run.load(folder)
         rows = _glance(run) or _read(run)
@@ -103,7 +103,7 @@ _GLANCED_BYTES = 1 << 20
 
 
 def _load(folder: Path) -> Run | None:
-    """The same as Run.load in half the time, of a run that is at its end and whose record is sound; else None."""
+    """Return a run as Run.load does in twice the time; None for one that is running or damaged."""
     content = _content(f"{folder}{os.sep}{RECORD}")
     try:
         record = RunRecord.model_validate(pydantic_core.from_json(content, allow_inf_nan=False)) if content else None
@@ -113,7 +113,7 @@ def _load(folder: Path) -> Run | None:
 
 
 def _content(path: str) -> bytes | None:
-    """What is in a file; None where it is no file, as a pipe, which would be waited for, or a long one."""
+    """Return what is in a file; None where it is no file, as a pipe, which would be waited for, or a long one."""
     try:
         about = os.stat(path)  # noqa: PTH116 - of ten thousand folders
         if not stat.S_ISREG(about.st_mode) or about.st_size >= _GLANCED_BYTES:
@@ -148,7 +148,7 @@ _PLAIN = b"0123456789+-.,eE\n"
 
 
 def _glance(run: Run) -> _Rows | None:
-    """The same in a twentieth of the time, where every line is as this program writes it; None where one is not."""
+    """Return the same as `_read` in a twentieth of the time; None where a line is not as this program writes it."""
     content = _content(f"{run.folder}{os.sep}{READINGS}")
     if content is None:
         return None
@@ -171,7 +171,9 @@ def _glance(run: Run) -> _Rows | None:
     if not (min(numbers) > -NO_READING and max(numbers) < NO_READING):
         return None
     return _Rows(
-        len(lines), _length(run, numbers[0], numbers[-len(titles)]), "record" in titles and "record" in _declared(run)
+        len(lines),
+        _length(run, numbers[0], numbers[-len(titles)]),
+        "record" in titles and "record" in _channel_names(run),
     )
 
 
@@ -180,12 +182,12 @@ def _length(run: Run, first: float, last: float) -> float:
     return last - (0.0 if run.record.time_zero_utc else first)
 
 
-def _declared(run: Run) -> set[str]:
+def _channel_names(run: Run) -> set[str]:
     return {channel.get("name", "") for channel in run.record.channels}
 
 
 def _table(of: dict[str, Any] | None, key: str) -> dict[str, Any]:
-    """A table in run.json, empty if there is none."""
+    """Return a table in run.json, empty if there is none."""
     found = (of or {}).get(key)
     return found if isinstance(found, dict) else {}
 
@@ -204,7 +206,7 @@ MOST_PROBLEMS = 5
 
 
 def print_runs(runs: Sequence[Listed], root: Path) -> None:
-    """The list of runs, and below it what is wrong with the broken ones."""
+    """Print the list of runs, and below it what is wrong with the broken ones."""
     console = terminal()
     if not runs:
         console.print(f"no runs in {escape(str(root))}")
@@ -223,7 +225,7 @@ def print_runs(runs: Sequence[Listed], root: Path) -> None:
 
 
 def _that_fit(heads: list[str], rows: list[list[str]], width: int) -> tuple[list[str], list[list[str]]]:
-    """The list without the columns for which a terminal is too narrow, even if it folds texts between their words."""
+    """Return the list without the columns for which a terminal is too narrow."""
     for left_out in DISPENSABLE:
         if _narrowest(heads, rows) <= width or left_out not in heads:
             break
@@ -233,7 +235,7 @@ def _that_fit(heads: list[str], rows: list[list[str]], width: int) -> tuple[list
 
 
 def _narrowest(heads: list[str], rows: list[list[str]]) -> int:
-    """The width that the longest words and two columns between them take."""
+    """Return the width that the longest words and two columns between them take."""
     columns = zip(heads, *rows, strict=True)
     return sum(max(cell_len(word) for text in set(column) for word in text.split()) + 2 for column in columns)
 
@@ -243,7 +245,7 @@ def _seconds(length: float | None) -> str:
 
 
 def _cells(run: Listed, above: str, room: int) -> list[str]:
-    """A row of the list; above: the folder that was searched; room: for a note, none where it is 0."""
+    """Return a row of the list; above: the folder that was searched; room: for a note, none where it is 0."""
     when = (run.started_utc or "—")[:16].replace("T", " ")
     scene = f" {run.scene}" if run.scene not in {"", run.experiment} else ""
     what = run.experiment + scene + (", synthetic" if run.synthetic else "")
@@ -254,7 +256,7 @@ def _cells(run: Listed, above: str, room: int) -> list[str]:
 
 
 def _below(path: str, above: str) -> str:
-    """A run's path as seen from the folder that was searched; a run that is that folder has its name."""
+    """Return a run's path as seen from the folder that was searched; a run that is that folder has its name."""
     below = path.removeprefix(above) if path.startswith(above) else path
     parent, _, name = below.replace(os.sep, "/").rpartition("/")
     return f"{parent}/{short_name(name)}" if parent and path.startswith(above) else short_name(name)

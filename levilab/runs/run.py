@@ -72,13 +72,13 @@ class RunRecord(BaseModel):
     synthetic_how: str | None = None
 
     def as_json(self) -> str:
-        """The file's text."""
+        """Return the file's text."""
         data = self.model_dump(mode="json", by_alias=True)
         return json.dumps(data, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def utc_now() -> str:
-    """The time as it stands in run.json.
+    """Return the time as it stands in run.json.
 
     >>> utc_now()[-1]
     'Z'
@@ -87,7 +87,7 @@ def utc_now() -> str:
 
 
 def lock_of(folder: Path) -> Any:
-    """The lock of the process that writes.  The operating system drops it when that ends, however it ends."""
+    """Return the lock of the process that writes.  The operating system drops it when that ends, however it ends."""
     from filelock import FileLock
 
     return FileLock(folder / LOCK)
@@ -141,14 +141,14 @@ class Run:
             return None, str(error)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """The readings, or a simulated motion's states: columns in SI, with the unit in the name.  Raises DataError."""
+        """Return the readings or simulated states: columns in SI, with the unit in the name.  Raises DataError."""
         if (self.folder / READINGS).exists() or not (self.folder / STATES).exists():
             return self.readings().frame.copy()
         declared = [channel["name"] for channel in self.record.channels if "name" in channel]
         return read_run_readings(self.folder / STATES, declared).frame
 
     def plot(self) -> Figure:
-        """The readings as they are, a panel for each channel.  Raises DataError."""
+        """Return the readings as they are, a panel for each channel.  Raises DataError."""
         from levilab.present.style import for_notebooks  # with matplotlib
         from levilab.runs.figure import readings_figure
 
@@ -164,12 +164,12 @@ class Run:
         return folder if folder and (folder / RECORD).exists() else None
 
     def readings(self) -> Table:
-        """The readings so far, every declared channel; a torn last line is left out, with a warning."""
+        """Return the readings so far, every declared channel; a torn last line is left out, with a warning."""
         declared = [channel["name"] for channel in self.record.channels if "name" in channel]
         return read_run_readings(self.folder / READINGS, declared)
 
     def traces(self) -> list[StoredTrace]:
-        """The oscilloscope's records so far.  Raises DataError for one that is damaged."""
+        """Return the oscilloscope's records so far.  Raises DataError for one that is damaged."""
         return load_traces(self.folder)
 
     def count(self) -> int:
@@ -197,13 +197,13 @@ class Run:
         return elapsed
 
     def events(self) -> list[dict[str, Any]]:
-        """The events so far, each with time_s (or None), kind and text; damaged lines are left out."""
+        """Return the events so far, each with time_s (or None), kind and text; damaged lines are left out."""
         path = self.folder / EVENTS
         lines = path.read_text(encoding="utf-8", errors="replace").split("\n") if path.is_file() else []
         return [event for line in lines if (event := _event(line))]
 
     def warnings(self) -> tuple[str, ...]:
-        """What the experiment warned of while it ran, each once."""
+        """Return what the experiment warned of while it ran, each once."""
         return _warnings_of(self.events())
 
 
@@ -246,7 +246,7 @@ def _is_alive(folder: Path) -> bool:
 
 
 def read_record(folder: Path) -> RunRecord:
-    """What ``run.json`` of a folder says.  Raises DataError when it is missing, cut off, or of another schema."""
+    """Return the content of ``run.json``.  Raises DataError if it is missing, cut off, or of another schema."""
     path = folder / RECORD
     rescue = f"its readings can still be analyzed: levilab analyze {path.parent / READINGS}"
     try:
@@ -269,7 +269,7 @@ def read_record(folder: Path) -> RunRecord:
 
 
 def find_run(name: Path, root: Path = Path("runs")) -> Path:
-    """The run folder that is meant: a path, or the name of a run in a folder, its time left out or not."""
+    """Return the run folder that is meant: a path, or the name of a run in a folder, its time left out or not."""
     if name.name != str(name) or name.exists() or not root.is_dir():
         return name
     named = runs_named(name.name, root)
@@ -277,17 +277,17 @@ def find_run(name: Path, root: Path = Path("runs")) -> Path:
 
 
 def runs_named(name: str, root: Path) -> list[Path]:
-    """The runs in a folder that have this name, their time left out or not."""
+    """Return the runs in a folder that have this name, their time left out or not."""
     return [folder for folder in root.iterdir() if name in {folder.name, folder.name.split("Z-", 1)[-1]}]
 
 
 def find_runs(root: Path) -> list[Path]:
-    """The run folders at or below a folder, by name; links are followed, each folder is visited once."""
+    """Return the run folders at or below a folder, by name; links are followed, each folder is visited once."""
     return [Path(folder) for folder in run_folders(root)]
 
 
 def run_folders(root: Path) -> list[str]:
-    """The same as text, of which ten thousand take little memory."""
+    """Return the same as text, of which ten thousand take little memory."""
     found: list[str] = []
     seen: set[object] = set()
     for folder, below, files in os.walk(root, followlinks=True):
@@ -302,7 +302,7 @@ def run_folders(root: Path) -> list[str]:
 
 
 def _identity(folder: str) -> object:
-    """What no two folders have in common; some file systems of networks number none."""
+    """Return what no two folders have in common; some file systems of networks number none."""
     try:
         there = os.stat(folder)  # noqa: PTH116 - of ten thousand folders
     except OSError:

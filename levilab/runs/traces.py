@@ -95,7 +95,7 @@ class StoredTrace:
 
 
 def head_of(trace: Trace, number: int, time_s: float, channel: str, announced: int | None = None) -> Head:
-    """The head of a record.
+    """Return the head of a record.
 
     Args:
         trace: the record.
@@ -148,7 +148,7 @@ def forget_arriving(folder: Path) -> None:
 
 
 def arrived(folder: Path) -> StoredTrace | None:
-    """What had come of the record that was on its way when a process was killed; None where there is nothing.
+    """Return what had come of the record that was on its way when a process was killed; None where there is nothing.
 
     Raises:
         DataError: what is there of it cannot be read.
@@ -205,7 +205,7 @@ def has_codes(folder: Path, line: str) -> bool:
 
 
 def last_number(folder: Path) -> int:
-    """The number of the last record whose codes are in a run folder, 0 where there are none.
+    """Return the number of the last record whose codes are in a run folder, 0 where there are none.
 
     A process that was killed between codes and line has left codes that no line describes: their number is not given
     again, so that they stay as they are.
@@ -229,7 +229,7 @@ def undescribed_codes(folder: Path) -> list[str]:
 
 
 def load_traces(folder: Path) -> list[StoredTrace]:
-    """The records of a run folder, in the order in which they were kept.
+    """Return the records of a run folder, in the order in which they were kept.
 
     The codes of a record are on the disk before its line: a process that was killed between the two, or in the middle
     of the line, has left codes without a line, and these are left out.  One that was killed while a long record was on
@@ -244,7 +244,7 @@ def load_traces(folder: Path) -> list[StoredTrace]:
 
 
 def _lines(folder: Path) -> list[str]:
-    """The whole lines of the index."""
+    """Return the whole lines of the index."""
     index = folder / INDEX
     try:
         text = index.read_text(encoding="utf-8", errors="replace") if index.exists() else ""

@@ -80,7 +80,7 @@ class RunWriter:
     def create(
         cls, out: Path, record: RunRecord, table: str = READINGS, *, tell: Callable[[str], None] = lambda _: None
     ) -> Self:
-        """A new folder ``<UTC>-<experiment>-<four hex digits>``.
+        """Return a new folder ``<UTC>-<experiment>-<four hex digits>``.
 
         Args:
             out: the folder below which it is made.
@@ -91,7 +91,7 @@ class RunWriter:
         Raises:
             CannotWrite: it cannot be made.
         """
-        with _told("create the run folder", out, safe=""):
+        with _explain_errors("create the run folder", out, safe=""):
             _make_folder(out)
             writer = cls(_new_folder(out, record.experiment), record, tell)
             writer._created = True
@@ -109,7 +109,7 @@ class RunWriter:
     def reopen(cls, run: Run, *, note: str = "", tell: Callable[[str], None] = lambda _: None) -> Self:
         """Go on writing an ended run; torn last lines are cut off first, a note is added.  Raises CannotWrite."""
         writer = cls(run.folder, run.record, tell)
-        with _told("reopen the run", run.folder):
+        with _explain_errors("reopen the run", run.folder):
             try:
                 writer._lock.acquire(timeout=2)
             except TimeoutError:
@@ -122,7 +122,7 @@ class RunWriter:
         return writer
 
     def _take_up(self, run: Run, note: str) -> None:
-        """The record as it is by now, the files without torn lines."""
+        """Read the record as it is by now, and cut torn lines off the files."""
         self.record = read_record(self.folder)
         if self.record.status == "finished" != run.record.status:
             raise CannotWrite(f"{self.folder}: is finished, another process has gone on with it meanwhile")
@@ -146,7 +146,7 @@ class RunWriter:
         return ",".join(channel["name"] for channel in self.record.channels)
 
     def _check_header(self) -> None:
-        """New rows must stand below the header that they are of; an empty file gets one."""
+        """Raise CannotWrite for a file with another header; an empty one gets the header."""
         path = self.folder / READINGS
         first = path.read_text(encoding="utf-8").partition("\n")[0] if path.exists() else ""
         if not first:
@@ -199,7 +199,7 @@ class RunWriter:
 
     def update(self, **changes: Any) -> None:
         """Change entries of run.json.  Raises CannotWrite."""
-        with _told("write run.json", self.folder):
+        with _explain_errors("write run.json", self.folder):
             self._rescue_if_lost()
             self.record = self.record.model_copy(update=changes)
             try:
@@ -214,13 +214,13 @@ class RunWriter:
         When it returns, this row and all earlier ones are on the disk, in `folder`.
         """
         line = ",".join(_cell(row.get(channel["name"])) for channel in self.record.channels)
-        with _told(f"write the reading {line}", self.folder):
+        with _explain_errors(f"write the reading {line}", self.folder):
             self._append(READINGS, line)
             self._rescue_if_lost()
 
     def states(self, lines: Iterable[str]) -> None:
         """Append many rows to states.csv, on the disk together.  Raises CannotWrite."""
-        with _told(f"write {STATES}", self.folder, safe=""):
+        with _explain_errors(f"write {STATES}", self.folder, safe=""):
             for line in lines:
                 self._append(STATES, line, sync=False)
             self._files[STATES].sync()
@@ -230,9 +230,9 @@ class RunWriter:
         return self._keep_record(traces.head_of(trace, self._records + 1, time_s, channel), trace)
 
     def _keep_record(self, head: traces.Head, trace: Trace) -> int:
-        """What it is, its codes, and their line: a process that is killed after the first leaves all that had come."""
+        """Write the head of a record, its codes and their line: of a process that is killed all that had come stays."""
         self._records = max(self._records, head.number)
-        with _told(f"write the record {head.number}", self.folder):
+        with _explain_errors(f"write the record {head.number}", self.folder):
             self._rescue_if_lost()
             written = None
             while written != self.folder:  # once more where the folder was removed meanwhile
@@ -260,7 +260,7 @@ class RunWriter:
         if trace.codes.size >= points:
             return
         number = self._records + 1
-        with _told(f"write the record {number}", self.folder):
+        with _explain_errors(f"write the record {number}", self.folder):
             self._rescue_if_lost()
             here, there = self._arriving or (None, 0)
             if here != self.folder:
@@ -277,7 +277,7 @@ class RunWriter:
             return None
         self._arriving = None
         if found is None:
-            with _told("clear up", self.folder):
+            with _explain_errors("clear up", self.folder):
                 traces.forget_arriving(self.folder)
             return None
         head = traces.head_of(found.trace, found.number, found.time_s, found.channel, found.announced)
@@ -287,13 +287,13 @@ class RunWriter:
     def forget_what_arrived(self) -> None:
         """Take away what has come of a record that is of no use.  Raises CannotWrite."""
         self._arriving = None
-        with _told("clear up", self.folder):
+        with _explain_errors("clear up", self.folder):
             traces.forget_arriving(self.folder)
 
     def event(self, time_s: float | None, kind: str, text: str, **data: Any) -> None:
         """Append a line to events.jsonl."""
         event = {"utc": utc_now(), "time_s": time_s, "kind": kind, "text": text} | data
-        with _told(f"write the event {text!r}", self.folder):
+        with _explain_errors(f"write the event {text!r}", self.folder):
             self._append(EVENTS, json.dumps(event, ensure_ascii=False, allow_nan=False))
             self.events += 1
             self._rescue_if_lost()
@@ -313,9 +313,9 @@ class RunWriter:
             self.record = RunRecord.model_validate(self.record.model_dump() | ended)
 
     def finish(self, status: Status, **changes: Any) -> None:
-        """The run has ended: run.json says how, datapackage.json describes the files."""
+        """End the run: run.json gets its status, datapackage.json describes the files."""
         self.update(status=status, ended_utc=utc_now(), **changes)
-        with _told("write datapackage.json", self.folder):
+        with _explain_errors("write datapackage.json", self.folder):
             replace_atomically(self.folder / PACKAGE, _datapackage(self.folder, self.record))
 
     def _append(self, name: str, line: str, *, sync: bool = True) -> None:
@@ -465,7 +465,7 @@ def _make_folder(folder: Path) -> None:
 
 
 def _folder_beside(old: Path) -> Path:
-    """A new folder whose name says that it continues another one."""
+    """Return a new folder whose name says that it continues another one."""
     _make_folder(old.parent)
     name = re.sub(r"-rescued(-\d+)?$", "", old.name)
     for number in count(1):
@@ -532,8 +532,8 @@ def _cut_torn_line(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def _told(what: str, where: Path, safe: str = "all earlier readings are kept: ") -> Iterator[None]:
-    """An OSError as one sentence that says what is safe and what to do."""
+def _explain_errors(what: str, where: Path, safe: str = "all earlier readings are kept: ") -> Iterator[None]:
+    """Raise CannotWrite for an OSError, in one sentence that says what is safe and what to do."""
     try:
         yield
     except OSError as error:
@@ -545,7 +545,7 @@ def _told(what: str, where: Path, safe: str = "all earlier readings are kept: ")
 
 
 def _datapackage(folder: Path, record: RunRecord) -> str:
-    """The Frictionless description of the folder: fields with units, and the hash of each file."""
+    """Return the Frictionless description of the folder: fields with units, and the hash of each file."""
     fields = [
         {
             "name": channel["name"],

@@ -42,9 +42,9 @@ class Publisher:
         self._folder: Path | None = None
         self._views: dict[tuple[str, int], float] = {}  # → when it asked last
         self._next, self._number = 0.0, 0
-        self._socket = self._opened()
+        self._socket = self._open_socket()
 
-    def _opened(self) -> socket.socket | None:
+    def _open_socket(self) -> socket.socket | None:
         try:
             opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         except OSError:

@@ -39,7 +39,7 @@ class Outcome:
 
 @cache
 def version_of(name: str) -> str:
-    """The version of a library in this process."""
+    """Return the version of a library in this process."""
     if name == "Python":
         return ".".join(platform.python_version_tuple()[:2])
     try:

@@ -90,7 +90,7 @@ def processes(count: int | None = None) -> Workers:
 
 
 def cores() -> int:
-    """The number of cores that this process may use: a batch system may leave it fewer than there are."""
+    """Return the number of cores that this process may use: a batch system may leave it fewer than there are."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""Calls beside their peers: that each integrates the same motion, the ratios, the document, the tables."""
+"""Calls beside their peers: that each integrates the same motion, and the ratios."""
 
 import json
 import math
@@ -8,21 +8,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from as_called import comparison, many
-from as_called.comparison import Case, measure_calls
-from as_called.contenders import CONTENDERS, Contender, scene_of
-from as_called.figure import as_called_figure
-from as_called.overhead import Overhead, Watched, before_lanes, outside_all, overhead
+from as_called import many
+from as_called.comparison import Case
+from as_called.contenders import CONTENDERS, scene_of
+from as_called.overhead import Watched, outside_all, overhead
 from as_called.tasks import TASKS
 from levilab.benchmark.simulator import motion
 from levilab.benchmark.simulator.peers import Point
 from levilab.benchmark.simulator.taylor import VARIABLES, heyoka_start, heyoka_system
-from levilab.present.terminal import Terminal
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.single import simulate
 from levilab.simulator.stops import kinks
-from simulator_as_called import as_document, print_called, print_overheads
-from support.figures import faults
 from support.paths import GOLDEN
 
 SINE = next(task for task in TASKS if task.name == "sine" and task.duration == 60)
@@ -35,7 +31,6 @@ CASE = Case(
         Point("scipy DOP853", "tolerance 1e-08", 1e-9, 50.0),
     ),
 )
-OVERHEAD = Overhead("simulate, 5 s", 2e-4, 9e-4, 1e-4)
 
 
 @pytest.mark.parametrize("name", motion.MOTIONS)
@@ -108,40 +103,12 @@ def test_the_ensemble_s_references_are_ends_of_its_tops():
     assert np.abs(ours.position - many.reference()[::7]).max() < 2e-11
 
 
-def test_a_contender_is_prepared_once_and_its_error_is_the_largest(monkeypatch):
-    prepared = []
-    monkeypatch.setattr(comparison, "best_time_and_result", lambda work, _: (0.5, work()))
-
-    def prepare(subject, tolerance):
-        prepared.append((subject, tolerance))
-        return lambda _: SINE.reference + np.array([0.0, -tolerance, tolerance / 2])
-
-    ours = Contender("simulate", "levilab", (1e-6, 1e-8), prepare)
-    absent = Contender("heyoka", "no_such_package_at_all", (1e-6,), prepare)
-    task = SimpleNamespace(**{**vars(SINE), "contenders": (ours, absent), "tops": 3})
-    longer = SimpleNamespace(**{**vars(task), "duration": 120.0})
-    one, two = measure_calls([task, longer])
-    assert prepared == [(SINE.subject, 1e-6), (SINE.subject, 1e-8)]
-    assert [(p.method, p.setting) for p in one.points] == [
-        ("simulate", "tolerance 1e-06"),
-        ("simulate", "tolerance 1e-08"),
-    ]
-    assert [p.error for p in two.points] == pytest.approx([1e-6, 1e-8])
-    assert [case.points[0].speed for case in (one, two)] == [3 * 60 / 0.5, 3 * 120 / 0.5]
-
-
 def test_a_case_compares_both_sides_at_the_same_error():
     loose, tight = CASE.ratios
     assert (loose.speed, loose.peer_speed, loose.ratio, loose.aim) == (40000.0, 5000.0, 8.0, 5.0)
     assert math.isnan(tight.ratio)  # heyoka has no point as exact
     between = 10**-0.5 * 1e-10  # half-way between the logarithms of 1e-9 and 1e-12
     assert CASE.speed("simulate", between) == pytest.approx(math.sqrt(40000 * 9000))
-
-
-def test_time_in_kernels_does_not_count_as_overhead():
-    kernels = [("levilab.simulator.kernels.splitting", 1.0, 1.5), ("levilab.simulator.kernels.lanes", 2.0, 4.0)]
-    assert outside_all(0.5, 4.25, kernels) == pytest.approx(1.25)
-    assert before_lanes(0.5, 4.25, kernels) == pytest.approx(1.0)
 
 
 def test_the_kernels_of_a_call_are_watched():
@@ -154,35 +121,3 @@ def test_the_kernels_of_a_call_are_watched():
     found = overhead(Watched("called", "x", lambda: simulate(scene_of(motion.UNDRIVEN), 0.1), outside, 1, 1.0))
     assert any(module == "levilab.simulator.kernels.splitting" for module, *_ in seen)
     assert 0 < found.outside < found.whole
-
-
-@pytest.mark.parametrize("width", [80, 120])
-def test_the_tables_fit_the_terminal(capsys, width):
-    console = Terminal(width=width, highlight=False)
-    print_called(console, [CASE])
-    print_overheads(console, [OVERHEAD])
-    lines = capsys.readouterr().out.splitlines()
-    assert max(map(len, lines)) <= width
-    row = next(line.split() for line in lines if "sine" in line)
-    assert row == ["sine", "60", "s", "1e-06", "40", "000", "5", "000", "8", "≥", "5", "50"]
-    assert any(line.split()[-6:] == ["0.2", "ms", "0.1", "ms", "0.9", "ms"] for line in lines)
-
-
-def test_the_document_has_the_calls_with_units():
-    document = json.loads(json.dumps(as_document([CASE], [OVERHEAD]), allow_nan=False))
-    (called,) = document["called"]
-    assert (called["motion"], called["duration_s"], called["tops"]) == ("sine", 60.0, 1)
-    assert called["points"][0]["simulated_s_per_s"] == 40000.0
-    assert called["ratios"][0]["ratio"] == 8.0
-    assert called["ratios"][1]["ratio"] is None
-    assert document["overheads"] == [
-        {"call": "simulate, 5 s", "outside_kernels_s": 2e-4, "whole_s": 9e-4, "aim_s": 1e-4}
-    ]
-
-
-def test_the_figure_has_a_panel_for_each_motion_and_says_its_ratios():
-    figure = as_called_figure([CASE])
-    (axes,) = figure.axes
-    assert axes.get_title("left") == "sine, 60 s"
-    assert faults(figure) == []
-    assert [text.get_text() for text in axes.texts] == ["8×\naim 5", "–\naim 3"]

@@ -27,7 +27,7 @@ class Counter(Instrument, Protocol):
         """One reading [Hz]; None when no signal crossed the trigger level.  Takes the gate time and more."""
 
     def readings(self, count: int) -> NDArray[np.float64]:
-        """So many readings one after the other, shape (count,) [Hz], NaN where there was none.
+        """Take this number of readings one after the other, shape (count,) [Hz], NaN where there was none.
 
-        Raises OutOfRange if the memory of the counter does not hold so many.
+        Raises OutOfRange if the memory of the counter does not hold that number.
         """

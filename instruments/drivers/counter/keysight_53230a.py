@@ -78,7 +78,7 @@ class Keysight53230A(ReciprocalCounter):
         self._gives_up = True
 
     def readings(self, count: int) -> NDArray[np.float64]:
-        """So many readings; see :class:`Counter`.  They are fetched as they come, each with its own patience."""
+        """Take readings; see :class:`Counter`.  They are fetched as they come, each with its own patience."""
         self._check_count(count)
         found: list[float] = []
         with self._series(f"SAMP:COUN {count}", "INIT", end=("SAMP:COUN 1",)):

@@ -91,11 +91,11 @@ class PendulumCNT91(ReciprocalCounter):
             raise OutOfRange(self.transport.address, "count", count, allowed)
 
     def readings(self, count: int) -> NDArray[np.float64]:
-        """So many readings; see :class:`Counter`.  Raises OutOfRange if they could take longer than 30 days."""
+        """Take readings; see :class:`Counter`.  Raises OutOfRange if they could take longer than 30 days."""
         return self._block(count, columns=1)[:, 0]
 
     def timed_readings(self, count: int) -> NDArray[np.float64]:
-        """So many readings and when their gates opened, shape (count, 2) [Hz, s]; NaN where there was none.
+        """Take readings with the times at which their gates opened, shape (count, 2) [Hz, s]; NaN where there was none.
 
         Times are the counter's: only their differences mean something.  Raises OutOfRange as readings() does.
         """

@@ -136,7 +136,7 @@ class ReciprocalCounter(ScpiInstrument):
             raise OutOfRange(self.transport.address, "count", count, f"1 to {self.MOST}")
 
     def _split(self, question: str, answer: str, expected: int) -> list[float]:
-        """Return the numbers of a list, NaN where there was no reading.  Raises BadAnswer if they are not so many."""
+        """Return the numbers of a list, NaN for no reading.  Raises BadAnswer if there are more or fewer."""
         words = answer.split(",")
         if len(words) != expected:
             raise BadAnswer(self.transport.address, question, answer, f"{expected} numbers, not {len(words)}")

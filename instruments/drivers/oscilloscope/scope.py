@@ -251,7 +251,7 @@ class Scope(ScpiInstrument):
             raise SettingsLost(self.transport.address, differing)
 
     @contextlib.contextmanager
-    def _reporting_changed_settings(self) -> Iterator[None]:
+    def _report_changed_settings(self) -> Iterator[None]:
         """Raise SettingsLost in the place of an error that came because the scope was changed."""
         try:
             yield
@@ -306,7 +306,7 @@ class Scope(ScpiInstrument):
     def trace(self, channel: int, arrived: Callable[[Trace, int], None] | None = None) -> Trace:
         """Return the record of one channel; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         self._check_readable(channel)
-        with self._reporting_changed_settings():
+        with self._report_changed_settings():
             preamble = self.preamble(channel)
             scaling = (preamble.dt_s, preamble.t0_s, preamble.volts_per_code, preamble.offset_v)
             codes = np.empty(preamble.points, dtype=np.uint8)
@@ -323,7 +323,7 @@ class Scope(ScpiInstrument):
         """Yield the codes of one channel in pieces; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""
         self._check_readable(channel)
         self._check_kept()
-        with self._reporting_changed_settings():
+        with self._report_changed_settings():
             yield from self._pieces(self.preamble(channel))
         self._check_kept()
 
@@ -360,7 +360,7 @@ class Scope(ScpiInstrument):
         raise NotImplementedError
 
     def _block(self, points: int, question: str = ":WAV:DATA?", form: BlockForm = PLAIN_BLOCK) -> NDArray[np.uint8]:
-        """Return the next block, which must hold so many codes.  Raises BadAnswer, CommandRefused."""
+        """Return the next block, which must hold this number of codes.  Raises BadAnswer, CommandRefused."""
         self.raise_errors(question)
         try:
             with self.clearing_on_bad_answer():

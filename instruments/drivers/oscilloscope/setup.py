@@ -10,7 +10,7 @@ from instruments.drivers.scpi import ScpiInstrument
 if TYPE_CHECKING:
     from instruments.drivers.setting import Setting
 
-#: Scopes round what they are given: by so much of a division and of the record, beside what all instruments do.
+#: Scopes round settings by these fractions of a division and of the record, beside what all instruments do.
 _OF_A_DIVISION, _OF_THE_RECORD = 0.1, 0.01
 
 SLOPES = {"rising": "POS", "falling": "NEG"}

@@ -108,7 +108,7 @@ def _head_says_less(data: bytes) -> bytes:
 
 
 def _change_head(data: bytes, more: int) -> bytes:
-    """Let the head of a block state a length that is off by so many bytes; bytes that are no block stay."""
+    """Let the head of a block state a length that is off by this number of bytes; bytes that are no block stay."""
     head = re.match(rb"#([1-9])", data)
     if not head:
         return data

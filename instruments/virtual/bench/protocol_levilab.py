@@ -85,7 +85,7 @@ class Serial(SerialBase):
             return line.waiting()
 
     def read(self, size: int = 1, /) -> bytes:
-        """Read so many bytes, or fewer when the time-out is over; without one (None) wait for an answer under way.
+        """Read bytes, fewer when the time-out is over; without one (None) wait for an answer under way.
 
         Raises SerialException where a real port would wait for ever.
         """

@@ -159,7 +159,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
         return self._use(session, act, 0)
 
     def read(self, session: VISASession, count: int) -> tuple[bytes, StatusCode]:
-        """ViRead: read up to the end of the answer, to the termination character if that is on, or so many bytes."""
+        """ViRead: read to the end of the answer, to the termination character if that is on, or `count` bytes."""
 
         def act(link: Link, attributes: Attributes) -> tuple[bytes, StatusCode]:
             timeout = _seconds(attributes[ResourceAttribute.timeout_value])

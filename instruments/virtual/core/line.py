@@ -23,7 +23,7 @@ class LineSettings:
         return 1 + self.data_bits + (self.parity != "N") + self.stop_bits
 
     def duration(self, count: int) -> float:
-        """How long so many bytes take on the line [s]."""
+        """Return how long this number of bytes takes on the line [s]."""
         return count * self.bits / self.baud_rate
 
 

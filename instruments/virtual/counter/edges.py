@@ -127,7 +127,7 @@ class EdgeFinder:
         return self._passed + int(np.searchsorted(self._times, instant))
 
     def refresh(self, instant: float) -> None:
-        """Find a level that follows the signal anew, where it is too old, at the beginning of a measurement [s]."""
+        """Find a level that follows the signal again, where it is too old, at the beginning of a measurement [s]."""
         if self._entry.ages and instant > self._found_at + _LEVEL_AGE:
             self._triggers, self._found_at = self._entry.thresholds(self._signal, instant), instant
 

@@ -48,7 +48,7 @@ class Inputs:
         return self._finders[key]
 
     def forget(self) -> None:
-        """Drop all edge finders, so that the next ones begin anew."""
+        """Drop all edge finders, so that the next ones start from the beginning."""
         self._finders.clear()
 
 

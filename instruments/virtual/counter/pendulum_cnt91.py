@@ -180,7 +180,7 @@ class VirtualCNT91(VirtualCounter):
     native = False
 
     def abandon(self) -> None:
-        """ABORt, and device clear; a free-running counter begins anew."""
+        """ABORt, and device clear; a free-running counter begins again."""
         super().abandon()
         if self.settings["continuous"]:
             self.initiate(endless=True)
@@ -329,7 +329,7 @@ class VirtualCNT91(VirtualCounter):
         return (yield from self.fetch(1))
 
     def read_array(self, parameters: list[str]) -> Steps[str]:
-        """READ:ARRay? n: as READ?, with so many results.  Raises ScpiError."""
+        """Execute READ:ARRay? n, which is READ? with n results.  Raises ScpiError."""
         count = self._size(parameters)
         if count > self._wanted():
             raise ScpiError(-221)
@@ -351,7 +351,7 @@ class VirtualCNT91(VirtualCounter):
         return float(round(number(words[0], low=-_MOST, high=_MOST, default=1)))
 
     def fetch_array(self, parameters: list[str]) -> Steps[str]:
-        """FETCh:ARRay? n, or MAX: as many as there are.  Raises ScpiError."""
+        """Execute FETCh:ARRay? n, or MAX for all there are.  Raises ScpiError."""
         count = self._size(parameters)
         if not count:
             raise ScpiError(-222)
@@ -386,7 +386,7 @@ class VirtualCNT91(VirtualCounter):
         return self._spell(*self._memory.slice(start, start + count), size_known=size_known)
 
     def _wait_until(self, held: int) -> Steps[bool]:
-        """Wait until the memory holds so many.  Raises ScpiError if it never will."""
+        """Wait until the memory holds this many.  Raises ScpiError if it never will."""
         gone = self._run.n_taken - self._memory.size if self._run else 0
         if held > self._memory.size and (self._run is None or gone + held > self._run.wanted):
             raise ScpiError(-230)

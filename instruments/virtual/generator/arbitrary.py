@@ -105,7 +105,7 @@ class Memory:
     """The memory for waveforms.
 
     Attributes:
-        room: for so many samples in all.
+        room: the number of samples that the memory holds.
         held: the waveforms, by name.
     """
 

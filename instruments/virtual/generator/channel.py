@@ -405,7 +405,7 @@ class Channel:
         """Return the voltage at the open terminals at this time [s]."""
         on = bool(self["output"])
         start, end = self.under_way
-        silent = bool(self["burst"]) and (self._gated() or (self.waits and not start <= time < end))
+        silent = bool(self["burst"]) and (self._is_gated() or (self.waits and not start <= time < end))
         short, inverted = str(self["waveform"]), self["polarity"] == "INV"
         volt = 1 / self.load_factor
         swing = 0.0 if silent or not on or short == "DC" else self.number("amplitude_vpp") / 2 * volt
@@ -422,7 +422,7 @@ class Channel:
             samples=self.samples if short == self.family.arb else None,
         )
 
-    def _gated(self) -> bool:
+    def _is_gated(self) -> bool:
         """Whether a closed gate keeps the signal in: nothing is plugged into the virtual one's gate."""
         return self["burst_mode"] == "GAT" and self["gate_polarity"] == "NORM"
 

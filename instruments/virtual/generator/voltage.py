@@ -86,7 +86,7 @@ def _triangle(turns: Array, _: Array, _output: Output) -> Array:
     return _slopes(turns, 0.5)
 
 
-def _sampled(turns: Array, _: Array, output: Output) -> Array:
+def _hold_samples(turns: Array, _: Array, output: Output) -> Array:
     """Each sample holds until the next; 1e-9: a time that is meant to be that of a sample may be a little before it."""
     samples = _samples(output)
     return samples[(((turns % 1.0) * samples.size + 1e-9).astype(np.int64)) % samples.size]
@@ -131,8 +131,8 @@ _SHAPES: dict[str, Callable[[Array, Array, Output], Array]] = {
     "PULS": _square,
     "TRI": _triangle,
     "RAMP": _ramp,
-    "ARB": _sampled,
-    "USER": _sampled,
+    "ARB": _hold_samples,
+    "USER": _hold_samples,
     "NOIS": _noise,
     "PRBS": _bits,
 }

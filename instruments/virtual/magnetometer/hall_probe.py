@@ -52,17 +52,17 @@ class HallProbe:
         if mode == 1:
             return Reading(instant, mode, steady, 0.0, steady, steady, 0.0, noise)
         step = _WINDOW / _LOOKS
-        field = self._sampled(instant - _WINDOW + step * np.arange(1, _LOOKS + 1))
+        field = self._sample(instant - _WINDOW + step * np.arange(1, _LOOKS + 1))
         rms, lowest, highest = float(field.std()), float(field.min()), float(field.max())
         return Reading(instant, mode, steady, rms, lowest, highest, _frequency(field, step), noise)
 
     def steady(self, instant: float, time_constant: float) -> float:
         """Return the mean over the time constant, the probe's own zero error included [T]."""
         step = time_constant / _STEADY_LOOKS
-        field = self._sampled(instant - step * np.arange(_STEADY_LOOKS)[::-1])
+        field = self._sample(instant - step * np.arange(_STEADY_LOOKS)[::-1])
         return float(field.mean()) + self.zero_error
 
-    def _sampled(self, times: NDArray[np.floating]) -> NDArray[np.float64]:
+    def _sample(self, times: NDArray[np.floating]) -> NDArray[np.float64]:
         return np.array([self.flux_density(time) for time in np.maximum(times, 0.0).tolist()])
 
 

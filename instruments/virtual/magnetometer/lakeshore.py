@@ -289,14 +289,14 @@ class VirtualGaussmeter(VirtualInstrument):
         self._lowest, self._highest = min(self._lowest, shown), max(self._highest, shown)
         return shown
 
-    def _overloaded(self) -> bool:
+    def _is_overloaded(self) -> bool:
         return self.probe is not None and abs(self.measured()) > self._ranges()[self.range_index()]
 
     def answer(self, value: Callable[[], float]) -> str:
         """Return a field [T] in the present unit, or why there is none."""
         if self.probe is None:
             return "NO PROBE"
-        return "OL" if self._overloaded() else self.in_unit(value())
+        return "OL" if self._is_overloaded() else self.in_unit(value())
 
     def extremes(self) -> str:
         """RDGMNMX?: both, or on the 425 zero and the greatest."""
@@ -335,7 +335,7 @@ class VirtualGaussmeter(VirtualInstrument):
             return _NO_PROBE
         new = self.reading().instant != self._answered
         return (
-            _OVERLOAD * self._overloaded()
+            _OVERLOAD * self._is_overloaded()
             + _NEW_READING * new
             + _ALARM * any(self.alarms())
             + _ZERO_DONE * self._zero_done

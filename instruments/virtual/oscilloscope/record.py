@@ -134,7 +134,7 @@ class Edge:
             found = [(i, slope) for i, slope in looks if i is not None]
             if found:
                 i, slope = min(found)
-                at = self._placed(self.position + (i - 1) * self.step, self.step, slope)
+                at = self._place(self.position + (i - 1) * self.step, self.step, slope)
                 self._armed = before  # the last look may lie behind the stop: such an edge is found again
                 return at if at < stop else None
             self.position += (n - 1) * self.step
@@ -159,7 +159,7 @@ class Edge:
         self._armed[k] = True
         return None
 
-    def _placed(self, start: float, step: float, slope: float) -> float:
+    def _place(self, start: float, step: float, slope: float) -> float:
         """Return the time of the crossing between two looks, by halving."""
         while step > self.fine:
             step /= 1000

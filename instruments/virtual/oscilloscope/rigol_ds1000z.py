@@ -195,7 +195,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
     # --- acquiring ---
 
     def clear_screen(self) -> None:
-        """CLEar: what is under way begins anew."""
+        """CLEar: begin the acquisition again."""
         if self.running():
             self.run()
 
@@ -340,9 +340,9 @@ class VirtualDS1000Z(VirtualOscilloscope):
             raise ScpiError(-222)
         channel = self._source()
         codes = record.codes(channel, first - 1, last - first + 1, of=points, start=start, step=step)
-        return self.block(self._encoded(form, codes, record, channel))
+        return self.block(self._encode(form, codes, record, channel))
 
-    def _encoded(self, form: str, codes: Codes, record: Record, channel: int) -> bytes:
+    def _encode(self, form: str, codes: Codes, record: Record, channel: int) -> bytes:
         if form == "BYTE":
             return codes.tobytes()
         if form == "WORD":  # the higher byte is always 0

@@ -106,7 +106,7 @@ class VirtualOscilloscope(VirtualInstrument):
         return float(self.middle), 8.0 * self.codes_per_division
 
     def fit(self, channel: int, middle: float, division: float) -> None:
-        """Show this voltage in the middle of the screen, with so many volts per division."""
+        """Show this voltage in the middle of the screen, with this scale [V per division]."""
         self.settings |= {f"chan{channel}_scale": division, f"chan{channel}_offset": -middle}
 
     # --- settings ---
@@ -233,7 +233,7 @@ class VirtualOscilloscope(VirtualInstrument):
             forced=False,
             rate=rate,
             points=points,
-            # a record longer than the screen goes beyond it by as much on both sides
+            # a record longer than the screen goes equally far beyond it on both sides
             origin=start - (points / rate - length) / 2,
             screen=(start, length),
             inputs={n: self._input(n, armed) for n in self.channels},

@@ -227,7 +227,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         """Return the limits of TRDL [s]."""
         return -max(5.0, 7 * self.value("time_scale")), 7 * self.value("time_scale")
 
-    def _halved(self) -> bool:
+    def _is_halved(self) -> bool:
         """Whether a pair of channels, 1 and 2 or 3 and 4, shares its converter and memory."""
         shown = self.shown()
         return {1, 2} <= set(shown) or {3, 4} <= set(shown)
@@ -243,11 +243,11 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     def depth(self) -> str:
         """MSIZ?: of one channel, or of each of two that share the memory."""
         word = str(self.settings["depth"])
-        return self.reply("MSIZ", list(_HALVES)[list(_DEPTHS).index(word)] if self._halved() else word)
+        return self.reply("MSIZ", list(_HALVES)[list(_DEPTHS).index(word)] if self._is_halved() else word)
 
     def full_scale(self) -> tuple[float, int]:
         """Return rate and points of a record that fills the screen and nothing else."""
-        share = 2 if self._halved() else 1
+        share = 2 if self._is_halved() else 1
         length = _COLUMNS * self.value("time_scale")
         rate = min(_FASTEST / share, _DEPTHS[str(self.settings["depth"])] / share / length)
         return rate, max(2, round(rate * length))
@@ -260,7 +260,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     # --- reading the record ---
 
     def set_waveform(self, parameters: list[str]) -> None:
-        """WFSU SP,4,NP,1000,FP,0: every fourth point, so many, from this one on.  Raises ScpiError."""
+        """WFSU SP,4,NP,1000,FP,0: every fourth point, 1000 of them, from the first on.  Raises ScpiError."""
         if not parameters or len(parameters) % 2:
             raise ScpiError(-109)
         given = dict(zip((name.upper() for name in parameters[::2]), parameters[1::2], strict=True))

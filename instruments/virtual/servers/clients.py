@@ -488,11 +488,11 @@ class Listener:
         while True:
             try:
                 connection, _ = await loop.sock_accept(listening)
-                self._connected(*await asyncio.open_connection(sock=connection))
+                self._begin(*await asyncio.open_connection(sock=connection))
             except OSError:  # the client has left already, or this process has too many files open
                 await asyncio.sleep(_LOOK_AGAIN)
 
-    def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    def _begin(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
             welcome = len(self._talks) < self._most and self._instrument.bench.reachable(self._instrument.device)
         except Exception:

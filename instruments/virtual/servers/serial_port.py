@@ -56,7 +56,7 @@ class PseudoTerminal:
             except LinkLost:
                 pass
             except Exception:  # noqa: BLE001 - logged; the next client shall find the line alive
-                log.exception("a virtual instrument failed; its serial line begins anew")
+                log.exception("a virtual instrument failed; its serial line begins again")
 
     async def read(self) -> bytes:
         """Wait for bytes, and return them; see :class:`instruments.virtual.servers.socket_server.Wire`."""

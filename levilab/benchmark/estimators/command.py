@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def run_and_tell(*, trials: int, cases: Sequence[str], seed: int, out: Path | None, as_json: bool) -> None:
-    """The whole command.  Raises CannotWrite, and UsageError for a case that is none."""
+    """Carry out the whole command.  Raises CannotWrite, and UsageError for a case that is none."""
     if cases and out:
         raise UsageError("out", "`out` keeps a figure of all cases: leave `case` away, or take `json` for the numbers")
     found = study(trials=trials, cases=cases, seed=seed, tell=tell)

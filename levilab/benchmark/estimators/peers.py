@@ -16,7 +16,7 @@ LOW, HIGH = 20.0, 45.0
 
 
 def fft_peak(samples: Array, rate: float) -> float:
-    """The highest line behind a Hann window, placed between the bins by a parabola through three logarithms."""
+    """Return the highest line behind a Hann window, placed between the bins by a parabola through three logarithms."""
     n = samples.size
     height = np.abs(np.fft.rfft((samples - samples.mean()) * np.hanning(n)))
     first = int(LOW * n / rate)

@@ -155,7 +155,7 @@ def _at(snr: float, trials: int, seed: int = SEED) -> list[Score]:
 
 
 def hard_case(name: str, case: Case, trials: int, seed: int = SEED) -> Score:
-    """The default on one kind of hard trace."""
+    """Study the default on one kind of hard trace."""
     found = Trials()
     random = np.random.default_rng([seed, list(HARD).index(name) + 100])
     for number in range(-1, trials):

@@ -58,12 +58,12 @@ class Motion:
         return self.spin / (1 + math.cos(TILT))
 
     def field_at(self, t: float) -> float:
-        """The drive's field along y at a time that is no kink [T]."""
+        """Return the drive's field along y at a time that is no kink [T]."""
         value = math.cos(2 * math.pi * DRIVE_HZ * t)
         return {"off": 0.0, "sine": DRIVE_T * value, "square": math.copysign(DRIVE_T, value)}[self.drive]
 
     def pieces(self, duration: float) -> list[tuple[float, float, float]]:
-        """The smooth pieces of a square wave, or the whole of another drive: begin and end [s], steady field [T]."""
+        """Return the smooth pieces of a drive, of which a square wave has many: begin and end [s], steady field [T]."""
         if self.drive != "square":
             return [(0.0, duration, 0.0)]
         inside = np.arange(1, math.ceil(2 * DRIVE_HZ * duration + 0.5)) / (2 * DRIVE_HZ) - 0.25 / DRIVE_HZ
@@ -85,7 +85,7 @@ UNDRIVEN, DURATION = MOTIONS["undriven"], 5.0
 
 
 def references() -> dict[str, Any]:
-    """The true ends, from heyoka in extended precision (`python benchmarks/references.py` writes them anew).
+    """Return the true ends, from heyoka in extended precision (`python benchmarks/references.py` writes them anew).
 
     "places_m": of each motion by its name and its length in whole seconds; "ensemble_m": of some tops of the ensemble.
     """
@@ -95,7 +95,7 @@ def references() -> dict[str, Any]:
 
 
 def reference(motion: Motion = UNDRIVEN, duration: float = DURATION) -> Array:
-    """The true place at the end, shape (3,) [m]."""
+    """Return the true place at the end, shape (3,) [m]."""
     return np.array(references()["places_m"][motion.name][f"{duration:g}"])
 
 

@@ -36,7 +36,7 @@ STEPS = {
 
 
 def problem(name: str) -> Problem:
-    """The scene `undriven` for a scheme."""
+    """Return the scene `undriven` for a scheme."""
     scene = preset("undriven")
     return Problem(scene, model_of(scene), start_of(scene), SCHEMES[name])
 

@@ -60,12 +60,12 @@ class Peer:
 
 
 def best_time(work: Callable[[], Any], least: float = 0.1) -> float:
-    """The shortest of several times [s]: as many as fit into `least`, at least one."""
+    """Return the shortest of several times [s]: as many as fit into `least`, at least one."""
     return best_time_and_result(work, least)[0]
 
 
 def best_time_and_result(work: Callable[[], Result], least: float = 0.1) -> tuple[float, Result]:
-    """That time, and what the work returned last."""
+    """Return the shortest time [s], and the last result of the work."""
     times: list[float] = []
     while not times or (sum(times) < least and len(times) < 200):
         begin = CLOCK()
@@ -75,7 +75,7 @@ def best_time_and_result(work: Callable[[], Result], least: float = 0.1) -> tupl
 
 
 def error_of(place: Array) -> float:
-    """The largest component's error [m]."""
+    """Return the largest component's error [m]."""
     return float(np.abs(np.asarray(place, dtype=np.float64) - REFERENCE).max())
 
 

@@ -30,7 +30,7 @@ class Ratio:
 
 
 def best_speed(points: Iterable[Point], error: float) -> float:
-    """The speed at which the best of the methods reaches an error, along the line between its points; NaN if none does.
+    """Return the speed at which the best method reaches an error, between two of its points; NaN if none does.
 
     Between two settings of a method the logarithm of the speed is taken as linear in that of the error; beyond the
     loosest setting nothing is assumed.

@@ -25,7 +25,7 @@ VARIABLES = ("x", "y", "z", "vx", "vy", "vz", "nx", "ny", "nz", "lx", "ly", "lz"
 
 
 def heyoka_system(motion: Motion = UNDRIVEN, *, each_pull: bool = False) -> list[Any]:
-    """The equations of a motion for heyoka, shared subexpressions written once.
+    """Return the equations of a motion for heyoka, shared subexpressions written once.
 
     heyoka's first parameter is a square wave's field; or, if `each_pull` is set, μ/m of a top.
     """
@@ -60,7 +60,7 @@ def heyoka_system(motion: Motion = UNDRIVEN, *, each_pull: bool = False) -> list
 
 
 def _moment(n: tuple[Any, ...], momentum: tuple[Any, ...], motion: Motion) -> tuple[tuple[Any, ...], list[Any]]:
-    """The moment's direction, and its equations: ṁ = ω×m with ω = L/I₁ + (1/I₃ − 1/I₁)(L·n) n."""
+    """Return the moment's direction, and its equations: ṁ = ω×m with ω = L/I₁ + (1/I₃ − 1/I₁)(L·n) n."""
     import heyoka as hy
 
     if not motion.across:
@@ -73,7 +73,7 @@ def _moment(n: tuple[Any, ...], momentum: tuple[Any, ...], motion: Motion) -> tu
 
 
 def _drive(motion: Motion) -> tuple[Any, list[Any]]:
-    """The field of the drive [T], and its equations: of a sine and the cosine beside it."""
+    """Return the field of the drive [T], and its equations: of a sine and the cosine beside it."""
     import heyoka as hy
 
     if motion.drive == "sine":
@@ -84,14 +84,14 @@ def _drive(motion: Motion) -> tuple[Any, list[Any]]:
 
 
 def heyoka_start(motion: Motion) -> Array:
-    """The numbers that heyoka starts from."""
+    """Return the numbers that heyoka starts from."""
     start = vector_start(motion)
     return np.append(start, [given.DRIVE_T, 0.0]) if motion.drive == "sine" else start
 
 
 @cache
 def heyoka_integrator(motion: Motion, tolerance: float) -> Any:
-    """An integrator of one top, built once: that takes up to a second."""
+    """Return an integrator of one top, built once: that takes up to a second."""
     import heyoka as hy
 
     return hy.taylor_adaptive(heyoka_system(motion), heyoka_start(motion), tol=tolerance, fast_math=True)
@@ -99,7 +99,7 @@ def heyoka_integrator(motion: Motion, tolerance: float) -> Any:
 
 @cache
 def heyoka_batch(motion: Motion, tolerance: float, lanes: int) -> Any:
-    """An integrator of so many tops, built once, whose μ/m is a parameter of each."""
+    """Return an integrator of so many tops, built once, whose μ/m is a parameter of each."""
     import heyoka as hy
 
     starts = np.repeat(heyoka_start(motion)[:, None], lanes, axis=1)

@@ -547,7 +547,7 @@ class PracticeProcess:
         self._report(PracticeEvent("message", text))
 
     def _free_bench(self) -> Bench:
-        """The open bench.  Raises CommandRefused while a run is recorded."""
+        """Return the open bench.  Raises CommandRefused while a run is recorded."""
         if self._session is not None or self._wanted is not None or self._bench is None:
             raise CommandRefused("a run is being recorded, and the bench is its own: stop the run first, or wait")
         return self._bench
@@ -637,7 +637,7 @@ class PracticeProcess:
 
     @staticmethod
     def _frequency(bench: Bench) -> float:
-        """The drive's frequency as it was commanded last [Hz]."""
+        """Return the drive's frequency as it was commanded last [Hz]."""
         return float(bench.generator.last_set.get("frequency_hz", 0.0))
 
     def _move_drive(self) -> None:

@@ -219,8 +219,11 @@ def test_an_identity_has_four_fields(driver, answer):
     assert bad.value.answer == answer
 
 
-@pytest.mark.parametrize("answer", ["0", "+0", '+0,No error"', '+0,"No err', '0,"No error', '\u0660,"No error"', "0,"])
-def test_half_an_entry_of_the_error_queue_is_not_taken_for_no_error(answer):
+NO_ENTRIES = ["", "+2.5E+01", "No error", "DC", "0", "+0", "0,", '+0,No error"', '+0,"No err', '0,"No error']
+
+
+@pytest.mark.parametrize("answer", [*NO_ENTRIES, '\u0660,"No error"'])
+def test_what_is_no_entry_of_the_error_queue_is_not_taken_for_no_error(answer):
     with (
         conversation(ScpiInstrument, ("FOO", None), ("SYST:ERR?", answer), (CLEAR, None)) as instrument,
         pytest.raises(BadAnswer, match="SYST:ERR"),

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 import pytest
 
+from levilab.animation.three import MissingThree, three_js
 from levilab.interruption import End
 from levilab.live.analyzed import Analyses
 from levilab.live.practice.bench import PracticeBench
 from levilab.live.serve import LiveOptions, ViewServer, farewell, serve_live
-from levilab.motion.animation.three import MissingThree, three_js
 from support.commands import command
 from support.live_pages import GrowingRun
 
@@ -53,7 +53,7 @@ def test_a_run_and_a_bench_for_practice_exclude_each_other(tmp_path: Path) -> No
 
 
 def test_without_the_extra_the_message_names_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("levilab.motion.animation.three.find_spec", lambda _: None)
+    monkeypatch.setattr("levilab.animation.three.find_spec", lambda _: None)
     with pytest.raises(MissingThree, match=r'pip install "\.\[live\]"'):
         three_js("the live view")
     ended = command("live", "--no-open", cwd=tmp_path)

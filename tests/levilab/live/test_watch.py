@@ -50,11 +50,11 @@ def test_the_first_fit_does_not_count_for_the_pause_to_the_next(tmp_path: Path, 
         run.readings(spin_down(3))
         for k, found in enumerate((Running("no fit yet"), LINE)):  # the second one imports what it needs
             assert looking(watch).fit_task()
-            watch.fitted(run.folder, found, 0.4)
+            watch.take_fit(run.folder, found, 0.4)
             run.readings(spin_down(1, first=3 + k))
             now += 1.6
         assert looking(watch).fit_task()
-        watch.fitted(run.folder, LINE, 0.4)
+        watch.take_fit(run.folder, LINE, 0.4)
         run.readings(spin_down(1, first=5))
         now += 7.9
         assert not looking(watch).fit_task()
@@ -68,12 +68,12 @@ def test_the_last_fit_of_a_run_waits_for_nothing(tmp_path: Path) -> None:
     with run.running():
         run.readings(spin_down(3))
         assert looking(watch).fit_task()
-        watch.fitted(run.folder, None, 0.1)
+        watch.take_fit(run.folder, None, 0.1)
         run.readings(spin_down(1, first=3))
         assert not looking(watch).fit_task()
     run.say(status="finished")
     assert looking(watch).fit_task()
-    watch.fitted(run.folder, None, 0.1)
+    watch.take_fit(run.folder, None, 0.1)
     assert not looking(watch).fit_task()
 
 
@@ -86,7 +86,7 @@ def test_a_fit_under_way_is_dropped_when_the_next_run_begins(tmp_path: Path) -> 
     with two.running():
         publish(watch, State(0.0, folder=str(two.folder)))
         two.readings(spin_down(3))
-        watch.fitted(task.folder, LINE, 0.4)
+        watch.take_fit(task.folder, LINE, 0.4)
         assert watch.fit is None
         assert looking(watch).fit_task()  # at once
 
@@ -174,7 +174,7 @@ def test_a_page_that_waits_is_sent_a_fit_when_it_is_there(tmp_path: Path, monkey
             page = asyncio.create_task(hall.wait_for_news(watch, watch.tick))
             for _ in range(5):  # both wait now
                 await asyncio.sleep(0)
-            watch.fitted(folder, LINE, 0.1)
+            watch.take_fit(folder, LINE, 0.1)
             await asyncio.wait_for(page, HANG_GUARD_S)
         reading.cancel()
 

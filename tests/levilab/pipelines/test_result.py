@@ -26,16 +26,6 @@ def saved(*paths: Path) -> list[str]:
     return [file.name for file in save_found(ANALYSES["spindown"], analyze_spindowns(paths, SpinDownOptions()))]
 
 
-@pytest.mark.usefixtures("undrawn_figures")
-def test_results_of_two_files_in_one_folder_stand_side_by_side(tmp_path: Path) -> None:
-    for k, name in enumerate(("monday.csv", "tuesday.csv")):
-        saved(spin_down_csv(tmp_path / name, seed=k))
-    for name in ("monday.csv", "tuesday.csv"):
-        result = json.loads((tmp_path / f"{name}.result.json").read_text(encoding="utf-8"))
-        assert result["inputs"][0]["path"] == name
-        assert (tmp_path / f"{name}.spindown.png").is_file()
-
-
 #: Names that come near one another: with dots, without an ending, like results themselves.
 WORDS = st.sampled_from(["x", "run", "csv", "txt", "log", "001", "002", "result", "json", "spindown", "png", ""])
 NAMES = st.lists(WORDS, min_size=1, max_size=4).map(".".join).filter(lambda name: name.strip("."))

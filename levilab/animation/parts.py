@@ -115,7 +115,7 @@ def _part(name: str, label: str, colour: str, outline: Outline) -> dict[str, Any
 
 
 def _edged(radius: float, low: float, high: float, edge: float) -> Outline:
-    """The outline of a cylinder whose edges are broken."""
+    """Return the outline of a cylinder whose edges are broken."""
     rim = [[radius - edge, low], [radius, low + edge], [radius, high - edge], [radius - edge, high]]
     return [[0.0, low], *rim, [0.0, high]]
 

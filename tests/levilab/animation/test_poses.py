@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from levilab.motion.animation.parts import COLOURS, parts_of
-from levilab.motion.animation.poses import drive_share, matrices, poses_of, quaternions_of, turn_rate
+from levilab.animation.parts import COLOURS, parts_of
+from levilab.animation.poses import drive_share, matrices, poses_of, quaternions_of, turn_rate
 from levilab.simulator.parts import Drive
 from levilab.simulator.scene import preset, presets
 from levilab.simulator.single import simulate

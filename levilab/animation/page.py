@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.numbers import digits
+from levilab.animation.film import Film, in_mm, nice_length, still, table_of_colours
+from levilab.animation.parts import COLOURS, parts_of
+from levilab.animation.poses import height_for_camera
+from levilab.animation.three import MissingThree, three_js
+from levilab.animation.words import bind_units, short_speed, span_in_words, speed_in_words
 from levilab.errors import UsageError
-from levilab.motion.animation.film import Film, in_mm, nice_length, still, table_of_colours
-from levilab.motion.animation.parts import COLOURS, parts_of
-from levilab.motion.animation.poses import height_for_camera
-from levilab.motion.animation.three import MissingThree, three_js
-from levilab.motion.animation.words import bind_units, short_speed, span_in_words, speed_in_words
 from levilab.present.numbers import plain, with_decimals
 from levilab.software import software_versions
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from PIL.Image import Image
 
-    from levilab.motion.animation.poses import Poses
+    from levilab.animation.poses import Poses
     from levilab.motion.summary import Summary
 
 #: The largest page [bytes].
@@ -97,7 +97,7 @@ def as_page(page: Page) -> bytes:
     three = three_for_page().read_bytes()
     files = {name: _text(name) for name in ("page.css", "player.js", "top.js")}
     poses = page.poses
-    folder = str(resources.files("levilab.motion.animation"))
+    folder = str(resources.files("levilab.animation"))
     environment = Environment(
         loader=FileSystemLoader(folder), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
@@ -143,7 +143,7 @@ def as_page(page: Page) -> bytes:
 
 
 def _text(name: str) -> str:
-    return resources.files("levilab.motion.animation").joinpath(name).read_text(encoding="utf-8")
+    return resources.files("levilab.animation").joinpath(name).read_text(encoding="utf-8")
 
 
 def _hash(text: str) -> str:
@@ -223,7 +223,7 @@ def _legend(poses: Poses) -> list[tuple[str, str]]:
 
 
 def _swatches(poses: Poses) -> str:
-    """The colours of the legend, by day and by night."""
+    """Return the colours of the legend, by day and by night."""
     names = [name for name, _ in _legend(poses)]
     rules = {
         theme: "".join(f".colour-{name} span{{background:{COLOURS[theme][name]}}}" for name in names)
@@ -233,7 +233,7 @@ def _swatches(poses: Poses) -> str:
 
 
 def _numbers(page: Page) -> list[tuple[str, str]]:
-    """The table of numbers."""
+    """Return the table of numbers."""
     poses, motion = page.poses, page.summary.motion
     scene, accuracy = poses.scene, page.summary.motion.accuracy
     tilts, heights = np.degrees(poses.tilts), 100 * poses.positions[:, 2]
@@ -261,7 +261,7 @@ def _numbers(page: Page) -> list[tuple[str, str]]:
 
 
 def _licence(three: bytes) -> str:
-    """The licence's lines at the head of three.js."""
+    """Return the licence's lines at the head of three.js."""
     head = re.match(rb"/\*\*?(.*?)\*/", three, re.DOTALL)
     if head is None:
         raise MissingThree("three.js out of nicegui has no licence at its head: install nicegui 3.18 or a later one")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from levilab.present.numbers import with_decimals
 
 if TYPE_CHECKING:
-    from levilab.motion.animation.poses import Poses
+    from levilab.animation.poses import Poses
 
 
 #: The space between a number and its unit, or within a unit.
@@ -17,7 +17,7 @@ _BEFORE_A_UNIT = re.compile(r"(?<=\d) (?=(?:A m²|[mckµ]?m|s|Hz|m?T|k?g|rad|tur
 
 
 def speed_in_words(speed: float) -> str:
-    """A film's speed, as a part of the real one.
+    """Return a film's speed, as a part of the real one.
 
     >>> [speed_in_words(x) for x in (0.05, 1.0, 0.3, 2.0)]
     ['1/20 of real speed', 'real speed', '0.3 of real speed', '2 times real speed']
@@ -31,7 +31,7 @@ def speed_in_words(speed: float) -> str:
 
 
 def short_speed(speed: float) -> str:
-    """A film's speed in a list of them.
+    """Return a film's speed in a list of them.
 
     >>> [short_speed(x) for x in (0.05, 1.0, 0.3)]
     ['1/20', '1', '0.3']
@@ -40,7 +40,7 @@ def short_speed(speed: float) -> str:
 
 
 def span_in_words(poses: Poses) -> str:
-    """The seconds of the motion that are shown."""
+    """Return the seconds of the motion that are shown."""
     last = ", where it is lost" if poses.fell else ""
     return f"from {poses.times[0]:.4g} s to {poses.times[-1]:.4g} s{last}"
 

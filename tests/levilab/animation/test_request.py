@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from levilab.motion.animation import request
+from levilab.animation import request
 from support.commands import command
 
 #: A twentieth of a second, in 20 pictures.
@@ -85,7 +85,7 @@ def test_a_missing_library_is_named_before_anything_is_simulated(
     found = importlib.util.find_spec
     for module in ("three", "film"):
         monkeypatch.setattr(
-            f"levilab.motion.animation.{module}.find_spec", lambda name: None if name == library else found(name)
+            f"levilab.animation.{module}.find_spec", lambda name: None if name == library else found(name)
         )
     monkeypatch.setattr("levilab.motion.simulation.simulate", None)
     ended = command("simulate", "undriven", "--animate", name, cwd=tmp_path)

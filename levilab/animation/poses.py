@@ -119,7 +119,7 @@ def _with_attitude(scene: Scene) -> Scene:
 
 
 def _state_at(motion: Trajectory, time: float) -> Array:
-    """The state at a time between the trajectory's samples, with an arm at right angles to the axis, shape (18,)."""
+    """Return the state at a time between two samples, with an arm at right angles to the axis, shape (18,)."""
     scene = _with_attitude(motion.scene)
     k = max(int(np.searchsorted(motion.time, time, side="right")) - 1, 0)
     state = motion.states[k].copy()
@@ -133,7 +133,7 @@ def _state_at(motion: Trajectory, time: float) -> Array:
 
 
 def _across(arm: Array, axis: Array) -> Array:
-    """The unit vector at right angles to the axis that is nearest to the arm."""
+    """Return the unit vector at right angles to the axis that is nearest to the arm."""
     for other in (arm, np.array([0.0, 1.0, 0.0])):
         across = other - (other @ axis) * axis
         if (length := float(np.linalg.norm(across))) > 0.1:

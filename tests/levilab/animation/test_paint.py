@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from levilab.motion.animation.film import Film, as_gif, as_mp4, still
-from levilab.motion.animation.paint import Painter, Pose
-from levilab.motion.animation.parts import parts_of
-from levilab.motion.animation.poses import Poses, poses_of
+from levilab.animation.film import Film, as_gif, as_mp4, still
+from levilab.animation.paint import Painter, Pose
+from levilab.animation.parts import parts_of
+from levilab.animation.poses import Poses, poses_of
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 

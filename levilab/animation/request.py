@@ -6,10 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from levilab.errors import UsageError
-from levilab.files import replace_atomically, writing
-from levilab.motion.animation.film import Film, as_gif, as_mp4, check_encoder
-from levilab.motion.animation.page import (
+from levilab.animation.film import Film, as_gif, as_mp4, check_encoder
+from levilab.animation.page import (
     FEWEST_A_TURN,
     POSES_A_TURN,
     Page,
@@ -18,8 +16,10 @@ from levilab.motion.animation.page import (
     most_poses,
     three_for_page,
 )
-from levilab.motion.animation.poses import poses_of, turn_rate
-from levilab.motion.animation.words import span_in_words, speed_in_words
+from levilab.animation.poses import poses_of, turn_rate
+from levilab.animation.words import span_in_words, speed_in_words
+from levilab.errors import UsageError
+from levilab.files import replace_atomically, writing
 from levilab.simulator.compilation import announce_compilation
 
 if TYPE_CHECKING:
@@ -233,7 +233,7 @@ def _count_for_page(scene: Scene, span: float, turns: float) -> int:
 
 
 def _stroboscopic(turns: float, speed: float, pictures_per_s: float) -> str:
-    """What to know of a film that shows too few pictures of a turn; empty for others."""
+    """Return what to know of a film that shows too few pictures of a turn; empty for others."""
     if turns * speed * _PICTURES_A_TURN <= pictures_per_s:
         return ""
     seen, slower = pictures_per_s / turns / speed, pictures_per_s / turns / _PICTURES_A_TURN

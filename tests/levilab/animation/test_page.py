@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from levilab.motion.animation.page import LARGEST, Page, as_page, columns_of, most_poses
-from levilab.motion.animation.poses import poses_of
+from levilab.animation.page import LARGEST, Page, as_page, columns_of, most_poses
+from levilab.animation.poses import poses_of
 from levilab.motion.summary import summarise
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate

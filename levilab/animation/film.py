@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from levilab.animation.paint import Painter, Pose, font
+from levilab.animation.parts import COLOURS, parts_of
+from levilab.animation.poses import height_for_camera, matrices
+from levilab.animation.words import readout, span_in_words, speed_in_words
 from levilab.errors import LevilabError
-from levilab.motion.animation.paint import Painter, Pose, font
-from levilab.motion.animation.parts import COLOURS, parts_of
-from levilab.motion.animation.poses import height_for_camera, matrices
-from levilab.motion.animation.words import readout, span_in_words, speed_in_words
 from levilab.software import how_to_install
 
 if TYPE_CHECKING:
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
     from PIL.ImageFont import FreeTypeFont, ImageFont
 
-    from levilab.motion.animation.paint import Colour
-    from levilab.motion.animation.poses import Poses
+    from levilab.animation.paint import Colour
+    from levilab.animation.poses import Poses
 
     BaseFont = FreeTypeFont | ImageFont
     Progress = Callable[[float], None]
@@ -93,7 +93,7 @@ def as_gif(film: Film, progress: Progress) -> bytes:
 
 
 def table_of_colours(samples: list[Image], theme: str) -> Image:
-    """An image whose palette has the colours of some pictures, and of small parts that would else lose theirs."""
+    """Return an image whose palette has the colours of some pictures and of all small parts."""
     from PIL import Image
 
     width, height = samples[0].size
@@ -148,7 +148,7 @@ def still(film: Film, k: int, *, with_words: bool = True) -> Image:
 
 
 def _artist(film: Film, *, with_words: bool = True) -> Callable[[int], Image]:
-    """A function that draws the k-th picture."""
+    """Return a function that draws the k-th picture."""
     poses, parts = film.poses, parts_of(film.poses.scene, height_for_camera(film.poses))
     painter = Painter(parts, film.size, film.theme)
     turns = matrices(poses.quaternions)
@@ -218,7 +218,7 @@ class _Words:
         self._inset.draw(pen, k, self._colours, self._small)
 
     def _veil_behind(self, size: tuple[int, int], rows: list[tuple[float, float]]) -> Image:
-        """What hides a path behind lines of text, of these heights and widths, and behind the inset's frame."""
+        """Return what hides a path behind lines of text, of these heights and widths, and behind the inset's frame."""
         from PIL import Image, ImageDraw
 
         veil, edge, line = Image.new("L", size), self._line, self._line
@@ -275,7 +275,7 @@ def nice_length(length: float) -> float:
 
 
 def in_mm(length: float) -> str:
-    """A length [m] in words.
+    """Return a length [m] in words.
 
     >>> in_mm(0.002), in_mm(5e-5)
     ('2 mm', '0.05 mm')

@@ -253,7 +253,7 @@ class Painter:
         self._draw_arrow(pen, np.array([start, tip]), self.colours["drive"], thick)
 
     def _draw_arrow(self, pen: ImageDraw, points: Array, colour: Colour, thick: float) -> None:
-        """A line along points [m] with a head at its end."""
+        """Draw a line along points [m] with a head at its end."""
         flat = self._camera.project(points)
         width = max(round(thick * self._camera.size_at(points[-1])), _FINER)
         pen.line(_flat(flat), fill=colour, width=width, joint="curve")
@@ -348,7 +348,7 @@ class Painter:
             pen.polygon(polygon, fill=tuple(colour))
 
     def _lit(self, normals: Array, colour: Colour) -> list[list[int]]:
-        """The colour under the lights, for facets with these normals, shape (n, 3)."""
+        """Return the colour under the lights, for facets with these normals, shape (n, 3)."""
         bright = np.full(len(normals), _EVERYWHERE) + 0.10 * normals[:, 2]
         for direction, strength in _LIGHTS:
             bright += strength * np.clip(normals @ direction / np.linalg.norm(direction), 0, 1)
@@ -377,7 +377,7 @@ class Painter:
 def _revolve(
     outline: Sequence[Sequence[float]], around: int, start: float = 0.0, width: float = 2 * math.pi
 ) -> tuple[Array, Array]:
-    """The facets that an outline of points (radius, height) sweeps about z: corners (n, 4, 3), normals (n, 3)."""
+    """Return the facets that an outline (radius, height) sweeps about z: corners (n, 4, 3), normals (n, 3)."""
     angles = start + width * np.arange(around + 1) / around
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     middle = start + width * (np.arange(around) + 0.5) / around
@@ -394,7 +394,7 @@ def _revolve(
 
 
 def _patch(mark: dict[str, Any], out: float) -> tuple[Array, Array]:
-    """The facets of a mark, a little outside of its part."""
+    """Return the facets of a mark, a little outside of its part."""
     outline = np.array(mark["outline"])
     steps = np.diff(outline, axis=0)
     outwards = np.stack([steps[:, 1], -steps[:, 0]], axis=1) / np.linalg.norm(steps, axis=1)[:, None]
@@ -408,7 +408,7 @@ def _circle(radius: float, height: float, around: int) -> Array:
 
 
 def _lean(axis: Array) -> Array:
-    """The shortest turn that takes z to an axis, shape (3, 3): it leans and does not twist."""
+    """Return the shortest turn that takes z to an axis, shape (3, 3): it leans and does not twist."""
     x, y, z = axis
     if z < -0.999999:
         return np.diag([1.0, -1.0, -1.0])
