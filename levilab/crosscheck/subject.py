@@ -41,6 +41,24 @@ class Pull:
 
 
 @dataclass(frozen=True)
+class Trial:
+    """One set of readings that was made and analyzed.
+
+    Attributes:
+        pulls: of the quantities.
+        law: that the analysis favours; empty where no laws compete.
+        excluded: whether the analysis excludes what is true; None where it tests nothing.
+        widened: degrees of freedom of u, where that comes from few readings and was multiplied by Student's factor, so
+            that 68 % lie within it; None: it was not.
+    """
+
+    pulls: list[Pull]
+    law: str = ""
+    excluded: bool | None = None
+    widened: float | None = None
+
+
+@dataclass(frozen=True)
 class Subject:
     """One way from a world whose numbers are known to what the analysis says of them.
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from levilab.crosscheck.own.stored import read_own
-from levilab.crosscheck.own.study import OWN, own_blocks, quick_check
+from levilab.crosscheck.own.study import OWN, quick_study
+from levilab.crosscheck.stored import read_study
+from levilab.crosscheck.table import blocks_of
 from levilab.present.document.blocks import Code, Paragraph, Section
 from levilab.report.reproduction import named_in_commands
 
@@ -27,8 +28,8 @@ def budget(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
 def stored_trials(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
     """Return the cross-check that `levilab crosscheck --like` made of this result."""
     settings = analysis.settings_of(found)
-    known = read_own(found.place, analysis.name, [source.sha256 for source in found.sources], settings)
-    return () if known is None else (_section(*own_blocks(known, analysis.symbols)),)
+    known = read_study(found.place, analysis.name, [source.sha256 for source in found.sources], settings)
+    return () if known is None else (_section(*blocks_of(known, analysis.symbols)),)
 
 
 def trials(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
@@ -36,9 +37,9 @@ def trials(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
     stored = stored_trials(analysis, found)
     if stored or analysis.name not in OWN:
         return stored
-    made = quick_check(analysis.name, found, analysis.settings_of(found))
+    made = quick_study(analysis.name, found, analysis.settings_of(found))
     if made is not None:
-        return (_section(*own_blocks(made, analysis.symbols)),)
+        return (_section(*blocks_of(made, analysis.symbols)),)
     named = " ".join(named_in_commands(found.sources))
     advice = Code(f"levilab crosscheck {analysis.name} --like {named}")
     return (_section(Paragraph("Not made: it takes longer than a report. This makes and keeps it:"), advice),)

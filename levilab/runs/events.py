@@ -29,6 +29,7 @@ class RunEvent(StrEnum):
     LOOK_AT_THE_SCALE = "look at the scale"
     SCANNED = "scanned"
     ANOTHER_HEIGHT = "another height"
+    HEIGHT_READ_AGAIN = "height read again"
     NOT_UNDERSTOOD = "not understood"
     # the drive
     DRIVE_ON = "drive on"

@@ -131,7 +131,7 @@ class Plan:
         tolerance: float = 1e-6,
         seed: int = 0,
     ) -> Plan:
-        """Make a plan whose chunks suit ends of motions in lanes; `levilab.sweeps.cost.cut` suits them to any plan."""
+        """Make a plan whose chunks suit ends of motions in lanes; `observables.cut` suits them to any plan."""
         plan = cls(scene, axes, observables, duration_s, tolerance, seed)
         return replace(plan, chunk=chunk_shape(plan.shape, QUICKLY / duration_s))
 

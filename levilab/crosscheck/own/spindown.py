@@ -13,9 +13,11 @@ from analysis.spindown.combine import combine
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import fit_spin_down, is_correlated
 from analysis.spindown.tilt import counted
-from levilab.crosscheck.own.model import OF_ONE_RUN, Own, Trial, pull
+from levilab.crosscheck.own.model import OF_ONE_RUN, Own, pull
+from levilab.crosscheck.subject import Trial
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.spindown.analysis import EXPERIMENT, TILTED
+from levilab.simulator import laws
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,8 +34,6 @@ _COST_S, _COST_OF_READING_S, _COST_OF_PAIR_S = 0.03, 1.6e-5, 5e-6
 _COST_OF_TILT_S, _TILTED_READING_S = 0.25, 3e-4
 #: Runs that scatter by so many times what their readings leave give u from their scatter alone.
 _SCATTERS = 1.5
-#: The exponent of a law of one power.
-_EXPONENTS = {"stokes": 1.0, "disc": 1.5, "newton": 2.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +189,7 @@ def _trial(
     if not several:
         truth = runs[0].fit.parameters["start_frequency"].value or 0.0
         pulls.append(pull("start_frequency", found["start_frequency"], truth))
-    exponent = _EXPONENTS.get(law)
+    exponent = laws.LAWS[law].exponent if law in laws.LAWS else None
     if law == "power":
         exponent = float(np.mean([run.fit.parameters["exponent"].value or 0.0 for run in runs]))
     if exponent is not None:
