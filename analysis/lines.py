@@ -66,7 +66,7 @@ def spectral_lines(signal: Signal, rate: float, *, most: int = 12, weakest: floa
     Args:
         signal: shape (n,).
         rate: samples per second, above twice the highest frequency or lines are seen at a wrong place [Hz].
-        most: so many lines at most.
+        most: greatest number of lines.
         weakest: amplitude of the weakest in parts of the strongest.
 
     Raises:
@@ -95,7 +95,7 @@ def lines_of_signals(signals: Signal, rate: float, *, most: int = 12, weakest: f
 
 
 def amplitude_spectrum(signal: Signal, rate: float) -> tuple[Array, Array]:
-    """Frequencies [Hz], rising from −rate/2, and amplitudes: a line of amplitude 1 stands 1 high, to 1 % below.
+    """Return frequencies [Hz], rising from −rate/2, and amplitudes: a line of amplitude 1 stands 1 high, to 1 % below.
 
     Args:
         signal: shape (n,).
@@ -125,7 +125,7 @@ def _checked(signal: Signal) -> Signal:
 
 
 def _hann(n: int) -> Array:
-    """The window, with a sum of 1."""
+    """Return the window, with a sum of 1."""
     return np.asarray((1 - np.cos(2 * np.pi * np.arange(n) / n)) / n)
 
 
@@ -172,7 +172,7 @@ def _find(rest: _Spectra, most: int, weakest: float) -> tuple[_Waves, Bins]:
 
     Args:
         rest: transforms, from which the lines are taken away.
-        most: so many lines at most.
+        most: greatest number of lines.
         weakest: amplitude of the weakest in parts of the strongest.
     """
     rows, n = np.arange(len(rest.re))[:, None], rest.re.shape[-1]

@@ -19,7 +19,7 @@ from analysis.errors import TooFewReadings
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-#: A difference counts from so many standard uncertainties on (by chance once in 10 000 runs), and from so many Hz on:
+#: A difference counts from this number of standard uncertainties on (by chance once in 10 000 runs), and of Hz:
 #: less is the beginning and the end of a swing about the drive, a third of a turn in 20 s.
 _SIGNIFICANT, LEAST_HZ = 4.0, 0.02
 
@@ -62,7 +62,7 @@ class Slip:
 
 
 def _u(u: float) -> str:
-    """A standard uncertainty in the second digit behind the point."""
+    """Return a standard uncertainty in the second digit behind the point."""
     return f"{max(round(100 * u), 1)}"
 
 

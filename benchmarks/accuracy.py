@@ -153,7 +153,7 @@ def shares(trials: list[Trial]) -> dict[str, float | int]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=int, default=100, help="of each kind and seed")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[2, 3], help="1 tuned the forecast's constants")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[2, 3])
     parser.add_argument("--out", type=Path, help="folder of accuracy.json")
     parser.add_argument("--list", action="store_true", help="print the scenes whose estimate is too small")
     options = parser.parse_args()

@@ -27,6 +27,7 @@ from analysis.spindown.verdict import CHANGED
 from instruments.clock import VirtualClock
 from instruments.virtual.bench.visa_library import library_for
 from levilab.simulator import preset
+from levilab.simulator.laws import LAWS
 from levilab.world.bench import virtual_bus
 from levilab.world.motion_world import MotionWorld
 
@@ -35,20 +36,11 @@ T = 10.0 * np.arange(20)
 NOISE_HZ = 0.03
 
 
-#: Law → its usual constants (SI), the names of them in a result, the exponent.
-LAWS: dict[str, tuple[tuple[float, ...], tuple[str, ...], float]] = {
-    "disc": ((2.34e-4,), ("c32",), 1.5),
-    "newton": ((1.72e-5,), ("c2",), 2.0),
-    "stokes": ((3.2e-3,), ("c1",), 1.0),
-    "mixed": ((1.6e-3, 0.86e-5), ("c1", "c2"), float("nan")),
-}
-
-
 def draw_top(rng: np.random.Generator) -> dict[str, Any]:
     """Keys of a scene."""
     size = rng.uniform(0.88, 1.12)
     law = str(rng.choice(["disc", "disc", "newton", "stokes", "mixed"]))
-    constants = [float(c * rng.uniform(0.85, 1.15)) for c in LAWS[law][0]]
+    constants = [float(c * rng.uniform(0.85, 1.15)) for c in LAWS[law].usual]
     return {
         "start.spin_hz": float(rng.uniform(37.0, 42.0)),
         "start.tilt_rad": float(rng.uniform(0.001, 0.02)),
@@ -103,7 +95,7 @@ def motion(counts: list[tuple[dict[str, Any], np.ndarray, np.ndarray]], noise_hz
     for keys, times, counted in counts:
         run = fit_spin_down(times, counted + rng.normal(0, noise_hz, counted.size))
         law = keys["drag.law"]
-        _, names, exponent = LAWS[law]
+        names, exponent = LAWS[law].names, LAWS[law].exponent or float("nan")
         delta = float(np.arctan(keys["top.moment_tilt"][0] / keys["top.moment_tilt"][1]))
         c = keys["drag.coefficient"] if len(names) == 1 else float("nan")
         pulls.append([

@@ -35,7 +35,7 @@ import sweeps_fake
 from levilab.benchmark.machine import processor
 from levilab.simulator import preset
 from levilab.sweeps.axes import parse_axis
-from levilab.sweeps.cost import cut
+from levilab.sweeps.observables import cut
 from levilab.sweeps.plan import Plan
 from levilab.sweeps.run import compile_for, compute, tasks_of, with_step
 from levilab.sweeps.store import Store

@@ -22,7 +22,7 @@ from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_at
 from levilab.bench.config import Limits
 from levilab.live.desk import EXPERIMENTS
-from levilab.present.progress import Mute
+from levilab.present.progress import Display
 from levilab.runs.run import Run
 from levilab.simulator.scene import read_scene
 from levilab.world.bench import scene_world, virtual_wiring
@@ -43,7 +43,7 @@ def tries_of_a_run(seed: int, alone_s: float, out: Path) -> int | None:
     clock.sleep(alone_s)
     options = AcquisitionOptions(mock=True, out=out, seed=seed, settings=(*EXPERIMENTS["spin"], "spin.longest_s=4"))
     try:
-        acquire(request_at(virtual_wiring(world, Limits()), scene, "spin", options), Mute())
+        acquire(request_at(virtual_wiring(world, Limits()), scene, "spin", options), Display())
     except DidNotFollow:
         return None
     (folder,) = out.iterdir()

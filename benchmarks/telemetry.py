@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.onlooker import publishing
 from levilab.acquisition.request import AcquisitionOptions, request_for
-from levilab.present.progress import Mute
+from levilab.present.progress import Display
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -94,7 +94,7 @@ def cost(out: Path, experiment: str, scene: str | None, settings: tuple[str, ...
     """Processor time of this process [s] and readings of one acquisition."""
     options = AcquisitionOptions(mock=True, out=out, seed=1, scene=scene, settings=settings)
     begin = time.process_time()
-    run = acquire(request_for(experiment, options), Mute(), watch)
+    run = acquire(request_for(experiment, options), Display(), watch)
     return time.process_time() - begin, run.count()
 
 

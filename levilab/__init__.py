@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from levilab.bench.person import Task
     from levilab.notebook.motion import SimulatedMotion
     from levilab.notebook.result import AnalysisResult
+    from levilab.pipelines.options import Method, Tilt
     from levilab.runs.run import Run
     from levilab.simulator.scene import Scene
 
@@ -121,8 +122,8 @@ def analyze(
     rate: float | None = None,
     reading_u: float | None = None,
     keep_outliers: bool = False,
-    tilt: Literal["auto", "none", "fitted"] = "auto",
-    method: Literal["auto", "edges", "matched", "likelihood"] = "auto",
+    tilt: Tilt = "auto",
+    method: Method = "auto",
     orthogonal: bool = False,
     device: str | PathLike[str] | None = None,
     height_m: float | None = None,
@@ -160,27 +161,10 @@ def analyze(
         UsageError: an argument is wrong, or the data suit several analyses equally.
         DataError: the data suit none, or cannot be used; the text names file and line.
     """
+    options = {name: value for name, value in locals().items() if name not in {"data", "kind"}}
     from levilab.notebook.analysis import analyze_data
 
-    return analyze_data(
-        data,
-        kind,
-        {
-            "columns": columns,
-            "channel": channel,
-            "rate": rate,
-            "reading_u": reading_u,
-            "keep_outliers": keep_outliers,
-            "tilt": tilt,
-            "method": method,
-            "orthogonal": orthogonal,
-            "device": device,
-            "height_m": height_m,
-            "height_u_m": height_u_m,
-            "free_radii": free_radii,
-            "clock_u": clock_u,
-        },
-    )
+    return analyze_data(data, kind, options)
 
 
 def simulate(

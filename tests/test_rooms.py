@@ -65,8 +65,8 @@ def late_imports(tree: ast.Module) -> Iterator[tuple[int, list[str]]]:
 
 
 def is_a_door(name: str) -> bool:
-    """The front door and the command line import all that they need inside of functions, to open at once."""
-    return name == "levilab" or name.startswith("levilab.cli")
+    """Whether a module imports inside of functions, to open at once: front door, command line, their options."""
+    return name in {"levilab", "levilab.pipelines.options"} or name.startswith("levilab.cli")
 
 
 @pytest.mark.parametrize("name", [name for name, _ in modules() if not is_a_door(name)])

@@ -23,7 +23,7 @@ LOCKED_P = 1e-3
 _LOCKED_TURNS = 1.0
 #: Phases are means over this [s]: short against the swing of a locked top, some seconds.
 _WINDOW_S = 0.4
-#: A part of the drive's record needs so many samples for a phase.
+#: Samples of a part of the drive's record that a phase needs, at least.
 _FEWEST_SAMPLES = 8
 #: The signal must fall back by this part of its height before a new pulse can begin, so that noise makes no pulses.
 _HYSTERESIS = 0.25

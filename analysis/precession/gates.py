@@ -28,16 +28,16 @@ Array = NDArray[np.float64]
 
 #: With fewer gates no swing is searched: rate, swing and its frequency are four numbers.
 FEWEST = 7
-#: The swing's frequency is searched from so many periods in the series, in steps of so many, up to so many in a gate.
+#: Periods of the swing: in the series from this number on, in steps of this number; in a gate up to this number.
 _LEAST_PERIODS, _STEP_PERIODS, _MOST_IN_A_GATE = 1.5, 0.1, 0.9
 #: Gates times frequencies that are worked out at once, at most: a megabyte for each of the numbers in between.
 _MOST_GATES_TIMES_FREQUENCIES = 40_000
-#: A gate has miscounted if it is off by whole pulses to within this, and by so many standard deviations; at most this
+#: A gate has miscounted if it is off by whole pulses to within this and by these standard deviations; at most this
 #: share of the gates is left out.
 _OF_A_PULSE, _STANDS_OUT, _MOST_WRONG = 0.25, 5.0, 0.25
 #: A swing is clear if the scatter of a gate is less than this share of its size.
 _CLEAR = 0.3
-#: With so many points or more, their scatter is modelled as a power of the drive's frequency.
+#: From this number of points on, their scatter is modelled as a power of the drive's frequency.
 _FEWEST_POINTS = 5
 #: A point keeps its own scatter if chance makes it so much larger than the common one with less than this probability.
 _LARGER_P = 1e-3
@@ -174,7 +174,7 @@ def shared_scatter(rates: Sequence[Rate], drive: Array) -> Array:
 
 
 def _columns(gates: Gates, frequency: float | None) -> Array:
-    """The periods of a gate by the rate and, with a frequency, by the swing, shape (n, 1) or (n, 3)."""
+    """Return the periods of a gate by the rate and, with a frequency, by the swing, shape (n, 1) or (n, 3)."""
     if frequency is None:
         return gates.length[:, None]
     begin, end = (2 * np.pi * frequency * (times - gates.begin[0]) for times in (gates.begin, gates.end))

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 #: From more points every k-th, in the order of x, is used: there are n²/2 pairs.
 MOST_PAIRED = 500
-#: A point so many standard deviations off the line is examined.
+#: A point farther off the line, in standard deviations, is examined.
 FAR = 5.0
 #: Counted over true frequency when a threshold sees each period twice, misses every other one, and the like.
 RATIOS = ((1, 2), (2, 1), (1, 3), (3, 1), (2, 3), (3, 2))

@@ -32,7 +32,7 @@ _FAR, _HEAVY = 3.5, 3.0
 _MATTERS = 0.3
 #: Relative uncertainties of the drive's frequency that differ by less than this are those of one clock.
 _ONE_CLOCK = 1e-3
-#: A spin that differs from the drive's frequency by so many u, and by this share, deserves a warning.
+#: A spin that differs from the drive's frequency by this number of u, and by this share, deserves a warning.
 _SPIN_FAR, _SPIN_SHARE = 5.0, 1e-3
 
 

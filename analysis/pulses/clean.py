@@ -25,25 +25,25 @@ MAINS, STRAYS = (50.0, 60.0), 0.25
 HIGHEST, SHORTEST = 210.0, 1.0
 #: The spectrum of a trace without noise counts as this part of the trace's range at least.
 FAINTEST = 3e-4
-#: A line of the mains holds so many times the power of all within 1.5 Hz beside it ...
+#: Least power of a line of the mains over that of all within 1.5 Hz beside it.
 NARROW = 2.0
-#: ... and is so many times as high as its next multiples, which those of a pulse train nearly equal.
+#: Least height of such a line over that of its next multiples; those of a pulse train are nearly equal.
 SINGLE = 2.5
-#: A line at a harmonic of the pulses is their own if it is no more than so many times as high as those beside it.
+#: Greatest height of a harmonic of the pulses over that of the harmonics beside it; hum is higher.
 OWN = 1.5
-#: In a third of the record it is at least this part of its height in all of it.
+#: Least height of hum in a third of the record over that in all of it.
 STAYS = 0.6
-#: Hum is fitted to pieces of so many seconds, half overlapping.
+#: Length of the pieces that hum is fitted to [s]; they overlap by half.
 PIECE = 1.0
 #: The baseline is the median of blocks of this length [s]; it wanders if it leaves this many standard errors.
 BLOCK, WANDERS = 0.1, 6.0
-#: A detector whose signal stays the same for so long is dead [s].
+#: A detector whose signal stays the same for longer is dead [s].
 DEAD = 0.3
 
 
 @dataclass(frozen=True)
 class Clean:
-    """samples and the shortened bins without what is no pulse; bad: samples that do not count, None: all do.
+    """samples and the shortened bins without hum and baseline; bad: samples that do not count, None: all do.
 
     lines: of hum, frequency [Hz] and amplitude.
     """
@@ -56,7 +56,7 @@ class Clean:
 
 
 def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
-    """Remove hum and a wandering baseline; a trace without them comes back unchanged.
+    """Remove hum and a wandering baseline; a trace without them is returned unchanged.
 
     samples: shape (n,); rate: of them [1/s]; bins: means of n // len(bins) samples; bad: which samples are no numbers.
     """
@@ -126,7 +126,7 @@ def _own_lines(lines: Lines, bins: Array, rate: float, fit: Fit) -> Lines:
         return ()
 
     def harmonic(place: float) -> int:
-        """Which harmonic passes a frequency during the record; 0: none does."""
+        """Return which harmonic passes a frequency during the record; 0: none does."""
         k = round(2 * place / (slowest + fastest))
         near = k * slowest - 3 / duration < place < k * fastest + 3 / duration
         return k if near else 0
@@ -159,7 +159,7 @@ def _own_lines(lines: Lines, bins: Array, rate: float, fit: Fit) -> Lines:
 
 
 def _dead(bins: Array, rate: float, whole: Mask | None) -> Mask:
-    """Bins in runs of one and the same value that last too long; whole: those with all their samples."""
+    """Return bins in runs of one and the same value that last too long; whole: those with all their samples."""
     dead = np.zeros(bins.size, dtype=bool)
     place = np.arange(bins.size) if whole is None else np.flatnonzero(whole)
     values = bins if whole is None else bins[whole]
@@ -227,7 +227,7 @@ def _narrow(amplitude: Array, peak: int, beside: slice) -> bool:
 
 
 def _stays(thin: Array, frequency: float, height: float) -> bool:
-    """Whether a line is as high in a third of the record.
+    """Return whether a line is as high in a third of the record.
 
     frequency: in parts of the rate.
     """
@@ -240,7 +240,7 @@ def _stays(thin: Array, frequency: float, height: float) -> bool:
 
 
 def _peak(amplitude: Array, peak: int) -> float:
-    """The place of a line between the bins: parabola through the logarithms."""
+    """Return the place of a line between the bins: parabola through the logarithms."""
     a, b, c = np.log(amplitude[peak - 1 : peak + 2] + 1e-300)
     return peak + float(0.5 * (a - c) / (a - 2 * b + c))
 
@@ -248,7 +248,7 @@ def _peak(amplitude: Array, peak: int) -> float:
 def _without_hum(
     samples: Array, rate: float, bins: Array, counted: Mask, frequencies: list[float]
 ) -> tuple[Array, Array]:
-    """Samples and bins less the hum, whose amplitude and phase may change along the record."""
+    """Return samples and bins less the hum, whose amplitude and phase may change along the record."""
     factor = samples.size // bins.size
     bin_rate = rate / factor
     count = max(int(2 * bins.size / bin_rate / PIECE), 3)
@@ -271,7 +271,7 @@ def _without_hum(
 
 
 def _hum_of(bins: Array, use: Mask, first: int, half: int, frequencies: list[float]) -> Array:
-    """Complex amplitude and its slope of each line in a piece, shape (lines, 2), by least squares over `use`.
+    """Return complex amplitude and its slope of each line in a piece, shape (lines, 2), by least squares over `use`.
 
     first: place of the piece [bins]; half: half the length of pieces; frequencies [1/bin].
     """
@@ -296,7 +296,7 @@ def _blend(
     half: float,
     waves: list[tuple[float, float]],
 ) -> Array:
-    """The hum at places [bins], each piece, of twice `half` bins, with a weight that falls to 0 at its ends.
+    """Return the hum at places [bins], each piece, of twice `half` bins, with a weight that falls to 0 at its ends.
 
     place: rising; waves: frequency [1/bin], and what amplitude is divided by, of each line.
     """
@@ -317,7 +317,7 @@ def _blend(
 
 
 def _baseline(bins: Array, rate: float, counted: Mask) -> tuple[Array, Array] | None:
-    """Times [s] and values of the baseline where it wanders; None where it does not."""
+    """Return times [s] and values of the baseline where it wanders; None where it does not."""
     size = int(BLOCK * rate)
     count = bins.size // size if size else 0
     if count < 8:

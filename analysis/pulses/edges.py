@@ -77,7 +77,7 @@ def place_edges(
 
 
 def _steepness(x: Array, side: int, height: float) -> float:
-    """Part of its height that a flank climbs between two samples: 1 for a step, 1/k for an even one of k samples.
+    """Return the part of its height that a flank climbs between two samples: 1 for a step, 1/k for k even ones.
 
     From the squares of the steps in each piece, since in the mean of pieces that lie a sample apart a step is two
     smaller ones; those on either side of the pulse are noise.  x: pieces of 4 side + 1 samples, shape (turns, …).
@@ -90,7 +90,7 @@ def _steepness(x: Array, side: int, height: float) -> float:
 
 
 def _sums(side: int) -> Array:
-    """What a piece of 4 side + 1 samples is multiplied by for left, right and height, shape (4 side + 1, 3)."""
+    """Return what a piece of 4 side + 1 samples is multiplied by for left, right and height, shape (4 side + 1, 3)."""
     sums = np.zeros((4 * side + 1, 3))
     sums[side : 2 * side, 0] = 1.0
     sums[2 * side + 1 : 3 * side + 1, 1] = 1.0

@@ -26,7 +26,7 @@ SHORT, COHERENT = 0.25, (1, 2, 4, 8)
 
 
 def search(bins: Array, rate: float) -> Fit | None:
-    """The phase of greatest likelihood, about right; None: the record is shorter than four of the slowest turns.
+    """Return the phase of greatest likelihood, about right; None: the record is shorter than four of the slowest turns.
 
     bins: shape (n,), without what is no pulse; rate: bins per second.
     """
@@ -55,7 +55,7 @@ def search(bins: Array, rate: float) -> Fit | None:
 
 
 def _apart(y: Array, rate: float, lowest: float, highest: float) -> tuple[float, float]:
-    """Frequency at the middle and slope from the powers of pieces."""
+    """Return frequency at the middle and slope from the powers of pieces."""
     count = max(int(y.size / rate / PIECE), 1)
     size = y.size // count
     pieces = y[: count * size].reshape(count, size)

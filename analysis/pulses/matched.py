@@ -25,18 +25,18 @@ Array = NDArray[np.float64]
 TABLE = 4096
 #: Bins of a coarse profile of the whole turn.
 COARSE = 128
-#: A turn farther off than this many standard deviations is no pulse of the top; than more of them by few turns, which
-#: say little of their standard deviation.
+#: A turn farther off than this number of standard deviations is no pulse of the top; with few turns the limit is the
+#: quantile of Student's t of the same probability.
 GROSS = 4.5
 ROUNDS = 8
-#: A pulse train exists where its mean pulse lowers the sum of squares by so many variances of the noise; the best of
-#: all frequencies in noise alone reaches about 100.
+#: Least decrease of the sum of squares by a mean pulse that exists, in variances of the noise; the best of all
+#: frequencies in noise alone reaches about 100.
 EVIDENCE = 160.0
-#: Harmonics of the pulse are kept as long as on average their power is so many times that of noise.
+#: Least mean power of the harmonics of the pulse that are kept, over that of noise.
 NOISY = 3.0
 #: Flanks that climb more than this part of the height from one sample to the next lie where the samples are.
 SHARP = 0.25
-#: A piece has three parameters, height, shift and a constant: so few samples leave two for the noise.
+#: A piece has three parameters, height, shift and a constant: five samples leave two for the noise.
 FEWEST_SAMPLES = 5
 #: A piece with less of the pulse's power, or of its slope's, than this part of the median is none.
 LEAST = 0.3
@@ -80,7 +80,7 @@ class Pieces:
 class Match:
     """What a matched filter found.
 
-    fit: phase against time; turns: so many were used.
+    fit: phase against time; turns: number of those used.
     numbers, heights, shifts, used: of all turns, shape (m,): whole part of the phase, height in units of the mean
     pulse, what the fit leaves of the phase [turns], whether it was used.
     evidence: by how many variances of the noise the pulses lower the sum of squares.
@@ -114,7 +114,7 @@ class Match:
 
 
 def window_of(bins: Array, phase: Array) -> Window | None:
-    """Where in the turn the trace stands out; bins and their phases of shape (n,); None where it nowhere does."""
+    """Return where in the turn the trace stands out, None where it nowhere does; bins, phase: shape (n,)."""
     place = ((phase - np.floor(phase)) * COARSE).astype(np.intp)
     counts = np.bincount(place, minlength=COARSE)
     profile = np.bincount(place, bins, COARSE) / np.maximum(counts, 1)
@@ -229,7 +229,7 @@ def turn_times(fit: Fit, middle: float, duration: float) -> tuple[Array, Array, 
 
 
 def learn(x: Array, cell: NDArray[np.intp], valid: NDArray[np.bool_] | None, width: float) -> Pulse:
-    """The mean pulse from pieces x and their places in the table, both of shape (turns, n); width: of it [turns]."""
+    """Return the mean pulse; x: pieces, and cell: their places in the table, shape (turns, n); width: [turns]."""
     # bins hold four samples or more, and are no finer than the samples: missing pulses would leave a comb at those
     most = min(x.size / 4, 1.5 * x.shape[1])
     if valid is not None:
@@ -257,7 +257,7 @@ def learn(x: Array, cell: NDArray[np.intp], valid: NDArray[np.bool_] | None, wid
 
 
 def _flat(x: Array) -> bool:
-    """Whether more than half of the turns reach one and the same greatest value three times or more."""
+    """Return whether more than half of the turns reach one and the same greatest value three times or more."""
     return bool(np.count_nonzero(np.count_nonzero(x == x.max(), axis=1) > 2) > 0.5 * len(x))
 
 

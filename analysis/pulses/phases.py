@@ -16,9 +16,9 @@ Kind = Literal["speeding-up", "held", "coasting", "nothing"]
 
 #: A frequency that changes by less than this part of itself in a second is held; a top that coasts loses 3e-3.
 STILL = 6e-4
-#: The slope is that of so many neighbouring windows.
+#: Number of neighbouring windows that a slope is taken from.
 NEIGHBOURS = 3
-#: A phase shorter than so many windows belongs to what is before it.
+#: A phase of fewer windows belongs to the one before.
 SHORTEST = 2
 
 
@@ -81,7 +81,7 @@ def _gap_before(track: Track, i: int) -> bool:
 
 
 def _edge(track: Track, i: int, side: int) -> float:
-    """The time half-way to the next window, or as far beyond the last one."""
+    """Return the time half-way to the next window, or as far beyond the last one."""
     j = i + side
     if 0 <= j < track.time.size:
         return float(0.5 * (track.time[i] + track.time[j]))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.pulses.jump import Jump
 from analysis.uncertainty import Estimate
 
 Array = NDArray[np.float64]
@@ -31,36 +32,14 @@ FEWEST_BESIDE = 2
 #: Scatter over long times is about that from one turn to the next, within a factor of 2, before it is seen; and so is
 #: the scatter of pulses about the noise of the samples: a variance known to a factor of 2 has four degrees of freedom.
 PRIOR_FREEDOM = 4.0
-#: Turns of a block, and most blocks: over one they are added, so that what goes to and fro from turn to turn vanishes.
+#: Least number of turns of a block, and greatest number of blocks.  Residuals are added over a block, so that shifts to
+#: and fro from turn to turn vanish.
 BLOCK, BLOCKS = 6, 50
-#: Roundings that would leave residuals of more than so many times those that are seen, and this part of a rounding, did
-#: not happen.
+#: Roundings did not happen that would leave residuals larger than the sum of this multiple of the residuals seen and
+#: this part of a rounding.
 UNLIKE, UNSEEN = 1.2, 0.05
 #: Rounded times of turns shift the phase gained in half the record by no more than this part of their rounding.
 GRID_AT_MOST = 0.6
-
-
-@dataclass(frozen=True)
-class Jump:
-    """A place where the record's time jumps.
-
-    Attributes:
-        at: the record's time there [s].
-        lost: time that is missing there, below 0 where samples were repeated [s]; whole turns cannot be seen.
-        u: its standard uncertainty [s].
-    """
-
-    at: float
-    lost: float
-    u: float = 0.0
-
-    def mend(self, times: Array) -> Array:
-        """Return what a clock would have shown at times of the record."""
-        return times + self.lost * (times > self.at)
-
-    def spoil(self, times: Array) -> Array:
-        """Return the record's times of what passed at times of the clock."""
-        return times - self.lost * (times > self.at + max(self.lost, 0.0))
 
 
 @dataclass(frozen=True)
@@ -204,7 +183,7 @@ class Fit:
         return float(correlation[0, 1]), float(correlation[0, 2]), float(correlation[1, 2])
 
     def _rows(self, time: float) -> Array:
-        """Derivatives of the phase by time: frequency, slope, bend, shape (3, 4)."""
+        """Return derivatives of the phase by time: frequency, slope, bend, shape (3, 4)."""
         u, h = (time - self.centre) / self.half, self.half
         return np.array([
             [0.0, 1 / h, 2 * u / h, 3 * u**2 / h],

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from analysis.pulses.jump import Jump  # noqa: TC001 - results are read by the types of their fields
 from analysis.uncertainty import Estimate
 
 Method = Literal["edges", "matched", "likelihood"]
@@ -32,10 +33,10 @@ class SpinFrequency:
         chirp: its slope there [Hz/s].
         phase: there [turns], from 0 to 1; the middle of a pulse passes at 0.
         reference_time: [s]; the middle of the record, moved a little where pulses are missing on one side.
-        method: that found it.
+        method: by which it was found.
         bound: Cramér–Rao bound of the frequency [Hz], for the noise and the pulse as estimated; None for lists of
             times, where it is the uncertainty itself.
-        pulses: so many were used.
+        pulses: number of those used.
         missing: turns without a pulse.
         doubled: pulses beyond one a turn.
         scatter: standard deviation of one pulse's time [s].
@@ -46,6 +47,7 @@ class SpinFrequency:
         u_of_pulses: standard uncertainties of frequency [Hz] and slope [Hz/s], had the bend been known; None: not
             known.
         freedom: degrees of freedom of the scatter that u comes from; u has Student's factor for them.  None: not known.
+        jump: of the record's time; None: there is none.
     """
 
     frequency: Estimate
@@ -64,9 +66,10 @@ class SpinFrequency:
     correlations: tuple[float, float, float] = (0.0, 0.0, 0.0)
     u_of_pulses: tuple[float, float] | None = None
     freedom: float | None = None
+    jump: Jump | None = None
 
     def at(self, time: float) -> Estimate:
-        """The frequency at another time [s], along the slope and its bend."""
+        """Return the frequency at another time [s], along the slope and its bend."""
         away = time - self.reference_time
         frequency, chirp, bend = self.frequency, self.chirp, self.bend or Estimate(0.0, 0.0, "Hz/s^2")
         assert frequency.value is not None

@@ -15,11 +15,11 @@ Array = NDArray[np.float64]
 WIDTHS = (1, 2, 4, 8, 16)
 #: Of this many values the quantiles are taken.
 SAMPLE = 2048
-#: What exceeds so many standard deviations of the noise is an event; more are asked for where pulses have them.
+#: Height of an event in standard deviations of the noise, at least, and where pulses are higher.
 STANDS_OUT, CLEARLY = 3.3, 4.2
 
 
-#: A sixth of the values farther from the middle than so many times the noise: pulses about as long as their pauses.
+#: Pulses last about as long as their pauses where a sixth of the values are farther from the middle, in units of noise.
 WIDE = 4.0
 
 
@@ -38,7 +38,7 @@ class Events:
 
 
 def shorten(samples: Array, factor: int) -> Array:
-    """Means of `factor` samples each, shape (n // factor,); NaN where one of them is."""
+    """Return means of `factor` samples each, shape (n // factor,); NaN where one of them is."""
     whole = samples.size // factor * factor
     if factor == 1:
         return samples
@@ -46,14 +46,14 @@ def shorten(samples: Array, factor: int) -> Array:
 
 
 def noise_of(bins: Array) -> float:
-    """Standard deviation of a bin's noise, from the differences of neighbours."""
+    """Return standard deviation of a bin's noise, from the differences of neighbours."""
     step = max(bins.size // SAMPLE, 1)
     steps = np.abs(bins[1::step] - bins[:-1:step][: bins[1::step].size])
     return float(np.sqrt(np.mean(np.sort(steps)[: steps.size * 2 // 3] ** 2))) / 0.753 + 1e-30
 
 
 def find_events(bins: Array, rate: float) -> Events:
-    """Centres of what stands out of the bins; rate: bins per second."""
+    """Return centres of what stands out of the bins; rate: bins per second."""
     total = np.zeros(bins.size + 1)
     np.cumsum(bins - bins[0], out=total[1:])
     noise = noise_of(bins)
@@ -84,13 +84,13 @@ def find_events(bins: Array, rate: float) -> Events:
 
 
 def _crossing(smooth: Array, at: NDArray[np.intp], threshold: float) -> Array:
-    """Where the line between a value and the next crosses the threshold."""
+    """Return where the line between a value and the next crosses the threshold."""
     a, b = smooth[at], smooth[at + 1]
     return np.asarray(at + (threshold - a) / (b - a))
 
 
 def _contrast(thin: Array, noise: float) -> tuple[float, int, float]:
-    """How far the highest (or lowest) values stand from the middle, which of them, and a threshold between."""
+    """Return how far the highest (or lowest) values stand from the middle, which of them, and a threshold between."""
     n = thin.size
     middle = thin[n // 2]
     low, high = middle - thin[n // 6], thin[n - 1 - n // 6] - middle

@@ -9,18 +9,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewPulses
 from analysis.numbers import digits
-from analysis.pulses.regression import Fit, Jump, fit_turns, median, student
+from analysis.pulses.jump import Jump
+from analysis.pulses.regression import Fit, fit_turns, median, student
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.turns import Numbering, number_turns
 
 Array = NDArray[np.float64]
 
 FEWEST = 4
-#: A pulse farther from its place than this many standard deviations of the others is no pulse of the top; than more of
-#: them by few pulses, which say little of their standard deviation.
+#: A pulse farther from its place than this number of standard deviations of the others is no pulse of the top; with
+#: few pulses the limit is the quantile of Student's t of the same probability.
 GROSS = 4.5
 ROUNDS = 12
-#: Independent residuals that differ as much over long times from those over short ones are as seldom as this.
+#: `correlated` is reported where independent residuals would do it with less than this probability.
 SELDOM = 1e-3
 
 
@@ -31,7 +32,7 @@ CERTAIN = 8.0
 FROM_ENDS = 8
 #: The smallest buffer of a sound card, 64 samples at 48 kHz, lasts longer [s]; a rounding has fewer steps of a clock.
 LEAST_LOST, STEPS = 1e-3, 2.5
-#: The place of a jump is looked for again with the fit that has one, until it stays: that many times at most.
+#: The place of a jump is looked for again with the fit that has one, until it stays: four times at most.
 TRIES = 4
 #: Pulses on each side that show a jump alone: to a quarter of its size and twice their uncertainty.
 BESIDE = 12
@@ -94,11 +95,12 @@ def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None) -> SpinF
         correlations=fit.correlations(fit.reference),
         u_of_pulses=fit.u_of_pulses(fit.reference),
         freedom=fit.scatter.freedom,
+        jump=fit.jump,
     )
 
 
 def checked_times(pulse_times: ArrayLike) -> Array:
-    """The times as an array of floats.  Raises what is wrong with them."""
+    """Return the times as an array of floats.  Raises what is wrong with them."""
     times = np.asarray(pulse_times, dtype=np.float64)
     if times.ndim != 1:
         raise ShapesDiffer(quantity="pulse times", seen=times.shape, expected=(times.size,))
@@ -113,7 +115,7 @@ def checked_times(pulse_times: ArrayLike) -> Array:
 
 
 def fit_train(times: Array, *, degree: int | None = None, step: float = 0.0) -> Train:
-    """Number the turns and fit the phase, leaving out what does not belong.
+    """Find the turns of pulses and fit the phase, without the pulses that belong to none.
 
     Args:
         times: shape (n,), increasing [s].
@@ -154,7 +156,7 @@ def _is_sudden(times: Array, train: Train, jump: Jump) -> bool:
 
 
 def _with_whole_turns(times: Array, train: Train, degree: int | None) -> Train:
-    """Return the train with as many turns lost at its jump as fit best: the slope shows it."""
+    """Return the train with the number of turns lost at its jump that fits best: the slope shows it."""
     jump = train.fit.jump
     assert jump is not None
     behind = (times[train.used] > jump.at).astype(np.int64)
@@ -224,7 +226,7 @@ def _fit_numbered(times: Array, numbering: Numbering, degree: int | None, jump: 
 
 
 def _one_a_turn(numbering: Numbering, away: Array | None = None) -> NDArray[np.intp]:
-    """Indices of the pulses that belong, the nearest of each turn."""
+    """Return indices of the pulses that belong, the nearest of each turn."""
     index = np.flatnonzero(numbering.belongs)
     turns = numbering.turns[index]
     if index.size < 2 or np.all(np.diff(turns) > 0):
@@ -237,7 +239,7 @@ def _one_a_turn(numbering: Numbering, away: Array | None = None) -> NDArray[np.i
 
 
 def findings_of(train: Train) -> tuple[Finding, ...]:
-    """The findings about a train."""
+    """Return the findings about a train."""
     notes = []
     if train.missing:
         rare = ", more than have one: is the spin a part of this?" if train.missing > train.used.size else ""
@@ -249,13 +251,13 @@ def findings_of(train: Train) -> tuple[Finding, ...]:
     return (*notes, *findings_of_fit(train.fit, "pulses"))
 
 
-def findings_of_fit(fit: Fit, what: str) -> tuple[Finding, ...]:
+def findings_of_fit(fit: Fit, what: str, start: float = 0.0) -> tuple[Finding, ...]:
     """Return what is to be said of a fit to turns or pulses."""
     notes = []
     if (jump := fit.jump) is not None:
         size = f"{digits(abs(1e3 * jump.lost), 3)} ms, or that and whole turns,"
         did = "misses" if jump.lost > 0 else "repeats"
-        notes.append(Finding("jump", f"the record {did} {size} at {jump.at:.5g} s: allowed for"))
+        notes.append(Finding("jump", f"the record {did} {size} at {start + jump.at:.5g} s: allowed for"))
     if fit.scatter.correlated_p < SELDOM:
         alike = "resemble each other" if fit.scatter.inflation > 1 else "differ from each other, which averages out"
         notes.append(Finding("correlated", f"neighbouring {what} {alike}: variance x {digits(fit.scatter.inflation)}"))

@@ -31,9 +31,9 @@ Choice = Literal["auto", "edges", "matched", "likelihood"]
 
 #: Samples per second of the shortened trace in which pulses are searched for.
 SEARCH_RATE = 2500.0
-#: A trace that moves by no more than this part of its values is constant: sums of them are rounded by as much.
+#: A trace that moves by no more than this part of its values is constant: that is the rounding of their sums.
 ROUNDING = 1e-12
-#: Fewer edges than this have to stand out of the noise so many times, or they may be noise.
+#: Fewer edges than this may be noise, unless they are higher than this multiple of it.
 FEW, CLEAR = 16, 3.0
 #: Pulses that last longer than this part of a turn are placed by their edges alone.
 WIDE = 0.2
@@ -41,14 +41,13 @@ WIDE = 0.2
 MOST_MISSING, MOST_WRONG = 0.5, 0.15
 #: Nor where the frequency would change by more than this part of it.
 MOST_SWEPT = 1.0
-#: Nor where so many times as many pulses lie beside the turns as at them: a reflection is one of them for each turn.
+#: Nor where the pulses beside the turns outnumber those at them by this factor: a reflection is one for each turn.
 MOST_DOUBLED = 1.5
-#: Pulses that scatter by more than this part of their width are placed one by one, and so are those that scatter by so
-#: many times what the match leaves: a mean pulse that is learnt from few of them fits each where it happens to be.
+#: Pulses are placed one by one if they scatter by more than this part of their width, or by this multiple of the
+#: residuals of the match: a mean pulse that is learnt from few of them fits each where it happens to be.
 SCATTERED, UNDERSTATED = 0.25, 3.0
-#: But only where noise would move each by no more than a quarter of that (0.8 widths over the contrast, by simulation),
-#: where they scatter by more than this part of a bin, which the bins themselves do not, and where no more than this
-#: part of the turns is without its own pulse.
+#: But only if they scatter by more than four times the shift by noise (0.8 widths over the contrast, by simulation) and
+#: by more than this part of a bin, and if no more than this part of the turns lacks its pulse.
 BY_NOISE, BY_BINS, MOST_ODD = 3.2, 0.25, 0.1
 #: A likelihood that is as great at half the frequency may be so at a quarter.
 MOST_DOUBLINGS = 2
@@ -56,7 +55,7 @@ MOST_DOUBLINGS = 2
 SAME = 0.1
 #: With fewer samples a turn, a line at 1/k of the frequency or beyond half the rate leaves samples that look the same.
 COARSE = 12.0
-#: And not where every second pulse lies so many standard deviations from the others.
+#: Standard deviations between every second pulse and the others from which on they are two marks.
 APART = 4.0
 
 
@@ -68,7 +67,7 @@ def spin_of_trace(
     method: Choice = "auto",
     degree: int | None = None,
 ) -> SpinFrequency:
-    """Frequency and chirp of a top from evenly sampled light pulses.
+    """Return frequency and chirp of a top from evenly sampled light pulses.
 
     Args:
         samples: shape (n,), any unit; NaN where there is none.
@@ -94,7 +93,7 @@ def spin_of_trace(
         raise TooFewPulses(seen=0, needed=FEWEST, duration=x.size / rate)
     cleaned = clean(x, rate, bins, bad)
     try:
-        found = _found(Trace(cleaned, rate), method, degree)
+        found = _found(Trace(cleaned, rate, degree), method)
     except TooFewPulses as error:
         if cleaned.lines:
             raise OnlyHum(seen=error.seen, needed=error.needed, duration=error.duration) from None
@@ -103,18 +102,25 @@ def spin_of_trace(
 
 
 class Trace:
-    """A trace that was cleaned, with the rates of its samples and bins [1/s]."""
+    """A trace that was cleaned, the rates of its samples and bins [1/s], and the degree of the phase."""
 
-    def __init__(self, cleaned: Clean, rate: float) -> None:
+    def __init__(self, cleaned: Clean, rate: float, degree: int | None = None) -> None:
         self.samples, self.bins, self.bad = cleaned.samples, cleaned.bins, cleaned.bad
-        self.notes = cleaned.notes
-        self.trains: dict[int | None, Train] = {}
+        self.notes, self.degree = cleaned.notes, degree
         self.rate, self.bin_rate = rate, rate / (self.samples.size // self.bins.size)
 
     @cached_property
     def events(self) -> Events:
-        """The pulses that stand out of the noise."""
-        return find_events(self.bins, self.bin_rate)
+        """The pulses that stand out of the noise.  Raises TooFewPulses."""
+        events = find_events(self.bins, self.bin_rate)
+        if events.times.size < FEWEST:
+            raise self.too_few(events.times.size)
+        return events
+
+    @cached_property
+    def train(self) -> Train:
+        """The events, numbered and fitted.  Raises TooFewPulses."""  # the centre of a bin is that of its samples
+        return fit_train(self.events.times - 0.5 / self.rate, degree=self.degree, step=1 / self.rate)
 
     @property
     def duration(self) -> float:
@@ -127,15 +133,15 @@ class Trace:
         return (np.arange(self.bins.size, dtype=np.float64) + 0.5) / self.bin_rate - 0.5 / self.rate
 
     def too_few(self, seen: int) -> TooFewPulses:
-        """The error of a trace without enough pulses."""
+        """Return the error of a trace without enough pulses."""
         return TooFewPulses(seen=seen, needed=FEWEST, duration=self.duration)
 
-    def match(self, fit: Fit, degree: int | None) -> Match | None:
-        """The matched filter from a phase that is about right; None where there are no pulses."""
+    def match(self, fit: Fit) -> Match | None:
+        """Return the matched filter from a phase that is about right; None where there are no pulses."""
         window = window_of(self.bins, fit.phase(self.middles))
         if window is None:
             return None
-        return match(self.samples, self.rate, fit, window, bad=self.bad, degree=degree)
+        return match(self.samples, self.rate, fit, window, bad=self.bad, degree=self.degree)
 
 
 @dataclass(frozen=True)
@@ -154,18 +160,18 @@ class Found:
     one_by_one: Fit | None = None
 
 
-def _found(trace: Trace, method: Choice, degree: int | None) -> Found:
+def _found(trace: Trace, method: Choice) -> Found:
     """Return the pulses by a method.  Raises TooFewPulses."""
     if method == "edges":
-        if train := _scattered(trace, math.inf, degree):
+        if train := _scattered(trace, math.inf):
             return _one_by_one(trace, train)
-        edges, doubled = _by_edges(trace, degree)
+        edges, doubled = _by_edges(trace)
         return Found(edges, doubled, "edges", 0.0, trace.notes)
-    found, doubled, used, why = _by_pulse(trace, method, degree)
-    train = _scattered(trace, 1.4826 * median(np.abs(found.shifts[found.used])), degree)
+    found, doubled, used, why = _by_pulse(trace, method)
+    train = _scattered(trace, 1.4826 * median(np.abs(found.shifts[found.used])))
     if train and method == "auto":
         return _one_by_one(trace, train)
-    found, trap = _without_trap(trace, found, degree)
+    found, trap = _without_trap(trace, found)
     notes = (*why, *trap, *trace.notes)
     if train is None or not _same(found.fit, train.fit):
         return Found(found, doubled, used, found.origin, notes)
@@ -184,25 +190,15 @@ def _scatters(train: Train, text: str) -> Finding:
     return Finding("scattered", f"the pulses come early or late by {digits(_scatter(train), 2)} turns (rms): {text}")
 
 
-def _events(trace: Trace, degree: int | None) -> tuple[Events, Train]:
-    """The pulses that stand out of the noise, numbered.  Raises TooFewPulses."""
-    events = trace.events
-    if events.times.size < FEWEST:
-        raise trace.too_few(events.times.size)
-    if degree not in trace.trains:  # a bin's centre is that of its samples
-        trace.trains[degree] = fit_train(events.times - 0.5 / trace.rate, degree=degree, step=1 / trace.rate)
-    return events, trace.trains[degree]
-
-
-def _scattered(trace: Trace, left: float, degree: int | None) -> Train | None:
-    """The pulses numbered, if they stand out but not at their places: a mean pulse cannot show how far they are off.
+def _scattered(trace: Trace, left: float) -> Train | None:
+    """Return the train if pulses stand out but are not at their places: a mean pulse does not show how far they are.
 
     left: how far a match leaves them from their places, as a standard deviation [turns].
     None where the match is to be trusted: at noise, at gaps, and where every second pulse is off by the same, which is
     a trap of its own.
     """
     try:
-        events, train = _events(trace, degree)
+        events, train = trace.events, trace.train
     except TooFewPulses:
         return None
     width, bin_width = events.width * train.fit.middle_frequency, train.fit.middle_frequency / trace.bin_rate  # [turns]
@@ -221,40 +217,40 @@ def _scattered(trace: Trace, left: float, degree: int | None) -> Train | None:
 
 
 def _scatter(train: Train) -> float:
-    """Standard deviation of the pulses about their fit [turns]."""
+    """Return standard deviation of the pulses about their fit [turns]."""
     return float(np.sqrt(train.fit.scatter.variance))
 
 
 def _same(one: Fit, other: Fit) -> bool:
-    """Whether two fits count the same turns."""
+    """Return whether two fits count the same turns."""
     return abs(one.middle_frequency - other.middle_frequency) < SAME * other.middle_frequency
 
 
-def _by_edges(trace: Trace, degree: int | None) -> tuple[Edges, int]:
-    """The edges, and the number of pulses beside the turns' own.  Raises TooFewPulses."""
-    events, train = _events(trace, degree)
+def _by_edges(trace: Trace) -> tuple[Edges, int]:
+    """Return the edges, and the number of pulses beside the turns' own.  Raises TooFewPulses."""
+    events, train = trace.events, trace.train
     if events.width * train.fit.middle_frequency > WIDE:
         times = events.times[train.used] - 0.5 / trace.rate
         grid = Grid(1 / trace.rate, 1.0)
-        fit = fit_turns(times, train.turns.astype(np.float64), degree=degree, jump=train.fit.jump, grid=grid)
+        fit = fit_turns(times, train.turns.astype(np.float64), degree=trace.degree, jump=train.fit.jump, grid=grid)
         return Edges(fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0), train.doubled
-    edges = place_edges(trace.samples, trace.rate, train.fit, width=events.width, sign=events.sign, degree=degree)
+    edges = place_edges(trace.samples, trace.rate, train.fit, width=events.width, sign=events.sign, degree=trace.degree)
     if edges is None or (edges.turns < FEW and edges.height < CLEAR * edges.noise):
         raise trace.too_few(train.used.size)
     return edges, train.doubled
 
 
-def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, int, Method, tuple[Finding, ...]]:
+def _by_pulse(trace: Trace, method: Choice) -> tuple[Match, int, Method, tuple[Finding, ...]]:
     """Return the match, the number of pulses beside the turns' own, the method, and why it is not the other one.
 
     Raises TooFewPulses.
     """
     found, doubled, seen, astray, why = None, 0, 0, False, "no pulses stand out that return regularly"
     try:
-        _, train = _events(trace, degree)
+        train = trace.train
         doubled, seen = train.doubled, train.used.size
         astray = doubled > MOST_DOUBLED * seen
-        found = trace.match(train.fit, degree)
+        found = trace.match(train.fit)
     except TooFewPulses as error:
         seen = error.seen
     if method == "matched":
@@ -265,7 +261,7 @@ def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, 
         why = "more pulses lie beside the turns than at them" if astray else _doubt(found)
         if not why:
             return found, doubled, "matched", ()
-    other = _of_greatest_likelihood(trace, found, degree)
+    other = _of_greatest_likelihood(trace, found)
     if other is None or _sweep(other) > MOST_SWEPT:
         raise trace.too_few(seen)
     notes = (
@@ -274,10 +270,10 @@ def _by_pulse(trace: Trace, method: Choice, degree: int | None) -> tuple[Match, 
     return other, doubled, "likelihood", notes
 
 
-def _of_greatest_likelihood(trace: Trace, found: Match | None, degree: int | None) -> Match | None:
+def _of_greatest_likelihood(trace: Trace, found: Match | None) -> Match | None:
     """Return the match at the frequency of greatest likelihood, or the one that was found, if that is likelier."""
     fit = search(trace.bins, trace.bin_rate)
-    other = None if fit is None else trace.match(fit, degree)
+    other = None if fit is None else trace.match(fit)
     return max((each for each in (other, found) if each), key=lambda each: each.evidence, default=None)
 
 
@@ -299,13 +295,13 @@ def _doubt(found: Match) -> str:
     return ""
 
 
-def _without_trap(trace: Trace, found: Match, degree: int | None) -> tuple[Match, tuple[Finding, ...]]:
-    """The match at half or twice the frequency where that is the top's, and the findings about it."""
+def _without_trap(trace: Trace, found: Match) -> tuple[Match, tuple[Finding, ...]]:
+    """Return the match at half or twice the frequency where that is the top's, and the findings about it."""
     notes: tuple[Finding, ...] = ()
     for _ in range(MOST_DOUBLINGS):
         if not traps.repeats(found):
             break
-        twice = trace.match(found.fit.times(2.0), degree)
+        twice = trace.match(found.fit.times(2.0))
         if twice is None or traps.alternates(twice):
             break
         found = twice  # which may be half of it in turn: a quarter of the frequency fits, too
@@ -313,7 +309,7 @@ def _without_trap(trace: Trace, found: Match, degree: int | None) -> tuple[Match
     if notes:
         return found, notes
     if why := traps.alternates(found) or traps.elsewhere(trace.bins, found.fit.phase(trace.middles)):
-        half = trace.match(found.fit.times(0.5), degree)
+        half = trace.match(found.fit.times(0.5))
         if half is not None:
             return half, (
                 Finding("double", f"every second pulse {why}: two marks a turn, twice the frequency was not taken"),
@@ -327,7 +323,7 @@ def _constant(values: Array) -> bool:
 
 
 def _checked(samples: ArrayLike, rate: float) -> tuple[Array, Array, NDArray[np.bool_] | None]:
-    """The samples, their shortened trace, and which of them are no finite numbers (None: all are)."""
+    """Return the samples, their shortened trace, and which of them are no finite numbers (None: all are)."""
     x = np.ascontiguousarray(samples, dtype=np.float64)
     if x.ndim != 1:
         raise ShapesDiffer(quantity="samples", seen=x.shape, expected=(x.size,))
@@ -369,7 +365,7 @@ def _result(pulses: Found, start: float, rate: float, degree: int | None) -> Spi
         more.append(Finding("missing", f"{found.missing} turn{have} no pulse"))
     if found.wrong:
         more.append(Finding("wrong", f"{found.wrong} pulses are not at their place and were left out"))
-    more += findings_of_fit(fit, "turns")
+    more += findings_of_fit(fit, "turns", start)
     return SpinFrequency(
         frequency=frequency,
         chirp=chirp,
@@ -387,11 +383,12 @@ def _result(pulses: Found, start: float, rate: float, degree: int | None) -> Spi
         correlations=(own or fit).correlations(reference),
         u_of_pulses=u_of_pulses,
         freedom=(own or fit).scatter.freedom,
+        jump=None if fit.jump is None else replace(fit.jump, at=start + fit.jump.at),
     )
 
 
 def _wider(found: Estimate, own: Estimate) -> Estimate:
-    """The estimate of a method, with the scatter of the pulses' own places, and the distance to them, in its u."""
+    """Return the estimate of a method with the scatter of the pulses' own places, and the distance to them, in u."""
     assert found.value is not None
     assert found.u is not None
     assert own.value is not None

@@ -141,7 +141,7 @@ def track_of_blocks(
 
 
 def _pieces(blocks: Iterable[ArrayLike], size: int) -> Iterator[Array]:
-    """The same samples in pieces of one size; the last has up to one and a half."""
+    """Yield the same samples in pieces of one size; the last has up to one and a half."""
     held: list[Array] = []
     count = 0
     for block in blocks:
@@ -197,7 +197,7 @@ def _connect(found: Iterable[SpinFrequency | tuple[float, float]], seen: int, du
     )
     fraction = np.diff(phase)
     off = ahead - fraction - np.rint(ahead - fraction)
-    sound = np.array([all(note.name != "jump" for note in spin.notes) for spin in spins[:-1]], dtype=bool)
+    sound = np.array([spin.jump is None for spin in spins[:-1]], dtype=bool)
     certain = sound & (ahead_u < CERTAIN) & (np.abs(off) < 0.25)
     turns = phase[0] + np.concatenate([[0.0], np.cumsum(np.rint(ahead - fraction) + fraction)])
     return Track(

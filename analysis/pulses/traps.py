@@ -18,25 +18,25 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Every second pulse differs where the means of both halves are so many standard errors apart, or, by few pulses, as
-#: many as chance as seldom makes of it ...
+#: Every second pulse differs where the means of both halves are this number of standard errors apart (with few pulses
+#: the quantile of Student's t of the same probability) ...
 CERTAIN = 6.0
-#: ... and by so much, in parts of the height, or in turns.
+#: ... and by more than this part of the height, or of a turn.
 HIGHER, ASIDE = 0.1, 2e-3
 #: Two pulses of a turn are equal where the turn resembles itself half a turn later like this.
 EQUAL = 0.7
 #: Every second pulse lies elsewhere where the profiles of even and odd turns are less alike than this,
 ALIKE = 0.5
-#: smoothed over so many of their places, for pulses that scatter about theirs,
+#: smoothed over this number of places, for pulses that scatter about theirs,
 BLUR = 7
-#: and one of them stands out so many times its noise.
+#: and one of them is higher than this multiple of its noise.
 STANDS_OUT = 8.0
 #: The frequency is that of the mains where it is so near to a multiple and changes so little, as parts of it [1, 1/s].
 NEAR, STEADY = 2e-3, 3e-4
 
 
 def repeats(found: Match) -> bool:
-    """Whether a turn has two nearly equal pulses, half a turn apart."""
+    """Return whether a turn has two nearly equal pulses, half a turn apart."""
     if found.window.half < 0.5:
         return False
     shape = found.pulse.shape - found.pulse.shape.mean()
@@ -44,7 +44,7 @@ def repeats(found: Match) -> bool:
 
 
 def alternates(found: Match) -> str:
-    """How every second pulse differs from the others; empty if it does not.
+    """Return how every second pulse differs from the others; empty if it does not.
 
     Turns of 167½ samples have flanks that lie on either side of a sample by turns: that is no second mark.
     """
@@ -64,7 +64,7 @@ def alternates(found: Match) -> str:
 
 
 def elsewhere(bins: Array, phase: Array) -> str:
-    """How every second pulse lies at another place, too far for `alternates`; empty if it does not.
+    """Return how every second pulse lies at another place, too far for `alternates`; empty if it does not.
 
     bins: of the trace, and their phases [turns], shape (n,).
     """
@@ -82,7 +82,7 @@ def elsewhere(bins: Array, phase: Array) -> str:
 
 
 def mains(frequency: Estimate, chirp: Estimate) -> tuple[Finding, ...]:
-    """The finding where the frequency is that of the mains or twice that, and stays."""
+    """Return the finding where the frequency is that of the mains or twice that, and stays."""
     assert frequency.value is not None
     assert chirp.value is not None
     for nominal in [multiple * line for line in MAINS for multiple in (0.5, 1, 2)]:

@@ -22,11 +22,11 @@ TOLERANCE = 0.12
 CORE = 0.03
 #: One frequency and slope is good enough if this share of the pulses is near their turns.
 NEARLY = 0.9
-#: Pulses to a window, and pairs of a pulse with as many of its followers.
+#: Pulses to a window, and followers that a pulse is paired with.
 WINDOW, FOLLOWERS = 32, 8
 #: Width of a class of periods, as a part of the period.
 CLASS = 0.03
-#: Pairs farther apart than so many mean intervals are not counted: their classes hold several multiples of a period.
+#: Greatest distance of a pair in mean intervals: classes of longer ones hold several multiples of a period.
 LONGEST = 5.0
 #: A multiple of a window's frequency is taken only where the pulses lie that much better at their place.
 SHARP = 0.7
@@ -53,12 +53,12 @@ class Numbering:
 
 
 def number_turns(times: Array) -> Numbering:
-    """Turn numbers of pulse times, shape (n,), increasing [s], n above 2."""
+    """Return turn numbers of pulse times, shape (n,), increasing [s], n above 2."""
     return _from_intervals(times) or _from_windows(times)
 
 
 def _from_intervals(times: Array) -> Numbering | None:
-    """Numbers of a list in which nearly each interval is one turn, or several; None where that does not fit."""
+    """Return numbers of a list in which nearly each interval is one turn, or several; None where that does not fit."""
     intervals = np.diff(times)
     period = median(intervals)
     if not period > 0:
@@ -84,7 +84,7 @@ def _from_intervals(times: Array) -> Numbering | None:
 
 
 def _line(x: Array, y: Array) -> tuple[float, float, float]:
-    """Value at, slope about, and place of the mean of x, without what lies off the line."""
+    """Return value at, slope about, and place of the mean of x, without what lies off the line."""
     value, slope, origin = median(y), 0.0, float(x.mean())
     keep = np.abs(y / value - 1) < 0.25
     for _ in range(3):
@@ -117,7 +117,7 @@ class Windows:
 
 
 def windows_of(times: Array, size: int = WINDOW) -> Windows:
-    """Frequency and phase of overlapping windows of pulses."""
+    """Return frequency and phase of overlapping windows of pulses."""
     n = times.size
     size = min(size, n)
     starts = np.arange(0, max(n - size, 0) + 1, max(size // 2, 1))
@@ -140,14 +140,14 @@ def windows_of(times: Array, size: int = WINDOW) -> Windows:
 
 
 def _smooth(values: Array) -> Array:
-    """Each row with its two neighbours on either side, weighted 1 2 3 2 1."""
+    """Return each row with its two neighbours on either side, weighted 1 2 3 2 1."""
     padded = np.concatenate([values[:1], values[:1], values, values[-1:], values[-1:]])
     n = len(values)
     return np.asarray(sum(w * padded[i : i + n] for i, w in enumerate((1, 2, 3, 2, 1))) / 9)
 
 
 def _periods(since: Array) -> Array:
-    """The period that most pairs of each window share, shape (m,)."""
+    """Return the period that most pairs of each window share, shape (m,)."""
     count, size = since.shape
     pairs = [since[:, lag:] - since[:, :-lag] for lag in range(1, min(FOLLOWERS, size - 1) + 1)]
     differences = np.concatenate(pairs, axis=1)
@@ -181,7 +181,7 @@ def _periods(since: Array) -> Array:
 
 
 def _refine(since: Array, frequency: Array) -> tuple[Array, Array, Array]:
-    """Frequency, phase at the centre and sharpness, from the sum of the pulses' phase vectors and of their squares."""
+    """Return frequency, phase at the centre and sharpness, by sums of the pulses' phase vectors and their squares."""
     half = CLASS * 1.5
     for step in (half, half / 8):
         grid = np.linspace(-step, step, 33 if step == half else 9)
@@ -196,7 +196,7 @@ def _refine(since: Array, frequency: Array) -> tuple[Array, Array, Array]:
 
 
 def _densest(phases: Array) -> Array:
-    """Where most phases [turns] lie, for each row."""
+    """Return where most phases [turns] lie, for each row."""
     bins = 32
     fraction = phases - np.floor(phases)
     rows = np.arange(phases.shape[0])[:, None] * bins
@@ -213,7 +213,7 @@ def _densest(phases: Array) -> Array:
 
 
 def _from_windows(times: Array) -> Numbering:
-    """The better of two: windows joined one by one, or one frequency and slope for all of them."""
+    """Return the better of two: windows joined one by one, or one frequency and slope for all of them."""
     found = windows_of(times)
     joined, common = _joined(times, found), _common(times, found)
     # a joined phase can bend to whatever lies near: it has to be much better
@@ -221,7 +221,7 @@ def _from_windows(times: Array) -> Numbering:
 
 
 def _common(times: Array, found: Windows) -> Numbering:
-    """Numbers by the frequency and the slope about the windows' at which the pulses' phases agree best."""
+    """Return numbers by the frequency and the slope about the windows' at which the pulses' phases agree best."""
     if found.centre.size >= 4:
         frequency, slope, origin = _line(found.centre, found.frequency)
     else:
@@ -271,7 +271,7 @@ def _joined(times: Array, found: Windows) -> Numbering:
 
 
 def phase_between(times: Array, knots: Array, counts: Array, frequency: Array) -> Array:
-    """Phase [turns] at times from phases and frequencies at knots: cubic between them, straight beyond."""
+    """Return phase [turns] at times from phases and frequencies at knots: cubic between them, straight beyond."""
     if knots.size == 1:
         return np.asarray(counts[0] + frequency[0] * (times - knots[0]))
     i = np.clip(np.searchsorted(knots, times) - 1, 0, knots.size - 2)

@@ -14,6 +14,7 @@ Z. angew. Math. Mech. 1, 233 (1921)) and of Newton's drag (2).
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import partial
 from types import MappingProxyType
 
@@ -122,7 +123,9 @@ class DragLaw:
         name: its name in every result.
         constants: names of its constants; with the start frequency these are its parameters, in this order.
         units: of the constants.
+        symbols: of the constants.
         orders: m = n − 1 of each term, none where the exponent is itself a parameter.
+        torque: to what the drag's torque is proportional, and where that is so.
         spin: dimensionless closed form, (τ, q) → x, shapes (n,), (p,) → (n,).
         gradient: its slopes with respect to q, (τ, q) → (p, n).
         slowing: −dx/dτ at spins x, (x, q) → (n,), shapes (n,), (p,); of several tops (r, n), (p, r, 1) → (r, n).
@@ -131,16 +134,12 @@ class DragLaw:
     name: str
     constants: tuple[str, ...]
     units: tuple[str, ...]
+    symbols: tuple[str, ...]
     orders: tuple[float, ...]
+    torque: str
     spin: Callable[[Array, Array], Array]
     gradient: Callable[[Array, Array], Array]
     slowing: Callable[[Array, Array], Array]
-
-    def contains(self, other: "DragLaw") -> bool:
-        """Return whether the other law is this one with some constants at fixed values."""
-        if not self.orders:
-            return len(other.orders) == 1
-        return bool(other.orders) and set(other.orders) < set(self.orders)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -151,6 +150,34 @@ class DragLaw:
     def parameter_units(self) -> tuple[str, ...]:
         """Their units."""
         return ("Hz", *self.units)
+
+    @property
+    def exponent(self) -> float | None:
+        """N of a law of one fixed power, else None."""
+        return self.orders[0] + 1 if len(self.orders) == 1 else None
+
+    @property
+    def equation(self) -> str:
+        """The law in plain notation: what follows ^ in brackets is raised.
+
+        >>> [LAWS[name].equation for name in ("disc", "mixed", "power")]
+        ['ω̇ = −C₃/₂ω^(3/2)', 'ω̇ = −C₁ω − C₂ω^(2)', 'ω̇ = −cω^(n)']
+        """
+        powers = [str(_fraction(m + 1)) for m in self.orders] or [self.symbols[1]]
+        terms = zip(self.symbols, powers, strict=False)
+        return "ω̇ = −" + " − ".join(f"{symbol}ω" + (f"^({n})" if n != "1" else "") for symbol, n in terms)
+
+    def contains(self, other: "DragLaw") -> bool:
+        """Return whether another law is this one with fewer constants.
+
+        >>> LAWS["mixed"].contains(LAWS["newton"]), LAWS["power"].contains(LAWS["disc"])
+        (True, True)
+        >>> LAWS["mixed"].contains(LAWS["disc"]), LAWS["power"].contains(LAWS["mixed"])
+        (False, False)
+        """
+        if not self.orders:
+            return other.exponent is not None
+        return bool(other.orders) and set(other.orders) < set(self.orders)
 
     def natural(self, q: Array, reference_hz: float, duration: float) -> tuple[Array, Array]:
         """Start frequency [Hz] and constants for dimensionless parameters q, and their slopes with q.
@@ -187,17 +214,64 @@ class DragLaw:
         return q
 
 
-def _of_order(m: float, name: str, constant: str, unit: str) -> DragLaw:
-    spin, gradient = partial(_power, m=m), partial(_power_gradient, m=m)
-    return DragLaw(name, (constant,), (unit,), (m,), spin, gradient, partial(_power_slowing, m=m))
+def _fraction(x: float) -> Fraction:
+    return Fraction(x).limit_denominator(100)
 
 
+_LOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
+
+def _of_power(name: str, exponent: str, torque: str) -> DragLaw:
+    """Return the law ω̇ = −C ωⁿ, with its constant's name, unit and symbol.
+
+    Args:
+        name: of the law.
+        exponent: n, as "3/2".
+        torque: see `DragLaw`.
+    """
+    n = Fraction(exponent)
+    m = float(n - 1)
+    units = {Fraction(1): "1/s", Fraction(2): "1/rad"}
+    return DragLaw(
+        name=name,
+        constants=(f"c{exponent.replace('/', '')}",),
+        units=(units.get(n, f"(rad/s)^{1 - n}/s"),),
+        symbols=(f"C{exponent.translate(_LOW)}",),
+        orders=(m,),
+        torque=torque,
+        spin=partial(_power, m=m),
+        gradient=partial(_power_gradient, m=m),
+        slowing=partial(_power_slowing, m=m),
+    )
+
+
+#: One row a law.  Everything that names, shows, nests or explains laws is made from these rows.
 _TABLE = (
-    _of_order(0.0, "stokes", "c1", "1/s"),
-    _of_order(1.0, "newton", "c2", "1/rad"),
-    _of_order(0.5, "disc", "c32", "(rad/s)^-1/2/s"),
-    DragLaw("mixed", ("c1", "c2"), ("1/s", "1/rad"), (0.0, 1.0), _mixed, _mixed_gradient, _mixed_slowing),
-    DragLaw("power", ("c", "exponent"), ("(rad/s)^(1-exponent)/s", "1"), (), _power, _power_gradient, _power_slowing),
+    _of_power("stokes", "1", "the spin, as of eddy currents, or of air that creeps"),
+    _of_power("newton", "2", "the square of the spin, as of air that is stirred up"),
+    _of_power("disc", "3/2", "the spin to the power 3/2, as of the laminar layer of air on a disc (von Kármán, 1921)"),
+    DragLaw(
+        name="mixed",
+        constants=("c1", "c2"),
+        units=("1/s", "1/rad"),
+        symbols=("C₁", "C₂"),
+        orders=(0.0, 1.0),
+        torque="the spin in one part, and to its square in another",
+        spin=_mixed,
+        gradient=_mixed_gradient,
+        slowing=_mixed_slowing,
+    ),
+    DragLaw(
+        name="power",
+        constants=("c", "exponent"),
+        units=("(rad/s)^(1-exponent)/s", "1"),
+        symbols=("c", "n"),
+        orders=(),
+        torque="a power n of the spin, which the fit chose",
+        spin=_power,
+        gradient=_power_gradient,
+        slowing=_power_slowing,
+    ),
 )
 LAWS = MappingProxyType({law.name: law for law in _TABLE})
 

@@ -1,4 +1,4 @@
-"""The page of all commands, from the help that each of them has."""
+"""What pages take from the program: the help of all commands, the columns of tables of many runs, the drag laws."""
 
 from __future__ import annotations
 
@@ -9,9 +9,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from sphinx.application import Sphinx
-
-PAGE = "reference/commands"
-MARK = "<!-- all commands -->"
 
 
 def reference() -> str:
@@ -60,9 +57,46 @@ def _in_plain_text(text: str) -> str:
     return re.sub(r"([\\*_<>`$\[\]])", r"\\\1", re.sub(r"[ \t]+", " ", text)).strip()
 
 
+def columns() -> str:
+    """Return the columns of every analysis in a table of many runs, in Markdown."""
+    from levilab.pipelines.catalogue import ANALYSES
+
+    return "\n".join(_columns_of(name, analysis.row) for name, analysis in ANALYSES.items())
+
+
+def _columns_of(name: str, row: Any) -> str:
+    heads = f"\n`{name}`:\n\n| column | content |\n|---|---|\n"
+    # the column of a standard uncertainty stands behind that of its value
+    own = [one for one in row if not one.meaning.startswith("its standard uncertainty")]
+    return heads + "".join(f"| `{one.name}` | {one.meaning} |\n" for one in own)
+
+
+def laws() -> str:
+    """Return the drag laws with their constants, in Markdown."""
+    from analysis.spindown.drag import LAWS
+
+    return "| law | equation | constants |\n|---|---|---|\n" + "".join(
+        f"| `{law.name}` | {_raised(law.equation)} | "
+        + ", ".join(f"`{name}` [{unit}]" for name, unit in zip(law.constants, law.units, strict=True))
+        + " |\n"
+        for law in LAWS.values()
+    )
+
+
+def _raised(equation: str) -> str:
+    return re.sub(r"\^\(([^()]*)\)", r"<sup>\1</sup>", equation)
+
+
+#: Page → mark in it → what takes its place.
+MADE = {
+    "reference/commands": {"<!-- all commands -->": reference},
+    "data": {"<!-- all columns -->": columns, "<!-- all laws -->": laws},
+}
+
+
 def _read(_: Sphinx, page: str, source: list[str]) -> None:
-    if page == PAGE:
-        source[0] = source[0].replace(MARK, reference())
+    for mark, text in MADE.get(page, {}).items():
+        source[0] = source[0].replace(mark, text())
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -34,11 +34,11 @@ GRAPHICS = """for (const kind of [WebGLRenderingContext, WebGL2RenderingContext]
 
 
 def take_picture(page: Page, name: str) -> None:
-    """Write NAME.png, with 128 colours to keep it small."""
+    """Write NAME.png, with 256 colours to keep it small."""
     path = PICTURES / f"{name}.png"
     page.screenshot(path=path)
     with Image.open(path) as picture:
-        small = picture.convert("RGB").quantize(128)
+        small = picture.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=2)
     small.save(path, optimize=True)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 from instruments.errors import InstrumentError
 from levilab.acquisition.experiment import CounterSettings
 from levilab.acquisition.session import ExperimentFailed
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from levilab.acquisition.session import Row, Session
@@ -156,7 +157,7 @@ class FreeTop(Generic[S]):
         if first and self._is_plausible(first):
             return first
         what = "no reading" if first is None else f"{first['spin_frequency_hz']:.4g} Hz does not follow"
-        self.session.event("asked again", f"{what}, asking once more", **_spin_of(first))
+        self.session.event(RunEvent.ASKED_AGAIN, f"{what}, asking once more", **_spin_of(first))
         second = self._count()
         if second and self._is_plausible(second):
             return second
@@ -164,7 +165,7 @@ class FreeTop(Generic[S]):
             return self._agreed(second)
         if second:
             text = f"{second['spin_frequency_hz']:.4g} Hz is not credible either"
-            self.session.event("not taken", text, **_spin_of(second))
+            self.session.event(RunEvent.NOT_TAKEN, text, **_spin_of(second))
         return Missed.UNSTEADY if first or second else Missed.DARK
 
     def _agreed(self, reading: Row) -> Row | Missed:
@@ -174,14 +175,14 @@ class FreeTop(Generic[S]):
             return reading
         if any(_is_drop(row, last) and is_plausible(row, reading) for row in self.before[:-1]):
             text = f"the reading before, {last['spin_frequency_hz']:.4g} Hz, was a miscount"
-            self.session.event("miscounted", text, **_spin_of(last))
+            self.session.event(RunEvent.MISCOUNTED, text, **_spin_of(last))
             return reading
         times = next((k for k in (2, 3) if _coasts(last, reading, k)), None)
         seen, before = reading["spin_frequency_hz"], last["spin_frequency_hz"]
         if times is None:
             self._faster = reading
             text = f"{seen:.4g} Hz after {before:.4g} Hz: a top that coasts gains no spin; no reading"
-            self.session.event("not taken", text, **_spin_of(reading))
+            self.session.event(RunEvent.NOT_TAKEN, text, **_spin_of(reading))
             return Missed.FASTER
         if not self._warned:
             self._warned = True

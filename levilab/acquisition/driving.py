@@ -23,6 +23,7 @@ from levilab.bench.config import ConfigError
 from levilab.bench.person import FloatTop
 from levilab.present.numbers import signed
 from levilab.present.panel import clock
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -150,7 +151,7 @@ def drive_until(session: Session[D], steps: Callable[[Session[D]], None]) -> Non
 def drive_up_and_let_go(session: Session[D]) -> None:
     """Drive the top up, hold it while its motion settles, and let it go."""
     drive_until(session, lambda _: None)
-    session.event("drive off", "drive off, the top spins down freely")
+    session.event(RunEvent.DRIVE_OFF, "drive off, the top spins down freely")
 
 
 def drive_off(session: Session[D]) -> None:
@@ -188,17 +189,19 @@ def drive_up(session: Session[D], to: float | None = None) -> None:
         session.bench.generator.prepare(
             waveform=settings.drive_waveform, frequency_hz=spin, amplitude_vpp=settings.drive_amplitude_vpp
         )
-        session.event("drive on", f"drive on at the top's spin, {spin:.2f} Hz", frequency_hz=spin)
+        session.event(RunEvent.DRIVE_ON, f"drive on at the top's spin, {spin:.2f} Hz", frequency_hz=spin)
         session.bench.generator.output = True
         try:
             held = _ramp(session, _take_hold(session, spin), target)
             text = f"the top follows the drive at {target:.2f} Hz: {held:.2f} Hz counted"
-            session.event("locked", text, frequency_hz=held)
+            session.event(RunEvent.LOCKED, text, frequency_hz=held)
             _hold(session, target)
         except NotHeld as lost:
             session.bench.outputs_off()
             seen = str(lost)
-            session.event("not held", f"try {tries} of {_TRIES_TO_HOLD}: the drive does not hold the top, {seen}")
+            session.event(
+                RunEvent.NOT_HELD, f"try {tries} of {_TRIES_TO_HOLD}: the drive does not hold the top, {seen}"
+            )
         else:
             return
     raise _did_not_follow(session, target, seen)
@@ -323,7 +326,7 @@ def has_drifted(counts: Sequence[float]) -> bool:
 def compare_with_drive(session: Session[D], slip: Slip) -> None:
     """Write down how the counted spin of a held top compares with its drive; a tape that slips is warned of."""
     text = f"held at {slip.drive:.2f} Hz: counted {slip.spin:.3f} Hz, {signed(slip.difference, 3)} Hz beside the drive"
-    session.event("held", text, spin_frequency_hz=slip.spin, drive_frequency_hz=slip.drive, u_hz=slip.u)
+    session.event(RunEvent.HELD, text, spin_frequency_hz=slip.spin, drive_frequency_hz=slip.drive, u_hz=slip.u)
     if slip.warning:
         session.warn(slip.warning)
 
@@ -359,7 +362,7 @@ def is_over(session: Session[D]) -> bool:
     longest = session.settings.longest_s
     if session.spent() <= longest:
         return False
-    session.event("longest", f"{longest:g} s are over ({session.writer.record.experiment}.longest_s)")
+    session.event(RunEvent.LONGEST, f"{longest:g} s are over ({session.writer.record.experiment}.longest_s)")
     return True
 
 
@@ -415,7 +418,7 @@ def sweep_drive(
         if in_a_row == most_failed:
             left = ", ".join(f"{drive:g}" for drive in points[k:])
             text = f"{most_failed} points one after the other failed: the sweep ends here; not tried: {left} Hz"
-            session.event("ended", text)
+            session.event(RunEvent.ENDED, text)
             break
         reason = sweep.carry_out(drive)
         if reason is None:
@@ -423,7 +426,9 @@ def sweep_drive(
         in_a_row = in_a_row + 1 if reason else 0
         if reason:
             failed.append(FailedPoint(drive, reason))
-            session.event("left out", f"the point of {drive:g} Hz is left out: {reason}", drive_frequency_hz=drive)
+            session.event(
+                RunEvent.LEFT_OUT, f"the point of {drive:g} Hz is left out: {reason}", drive_frequency_hz=drive
+            )
     drive_off(session)
     return tuple(failed)
 
@@ -455,7 +460,7 @@ class _Sweep:
             except (NotHeld, DidNotFollow) as lost:
                 self.at, tries, reason = None, tries + 1, str(lost)
                 text = f"the top was lost at the point of {drive:g} Hz, or on the way to it: {reason}"
-                session.event("lock lost", f"{text}; try {tries} of {TRIES}", drive_frequency_hz=drive)
+                session.event(RunEvent.LOCK_LOST, f"{text}; try {tries} of {TRIES}", drive_frequency_hz=drive)
                 drive_off(session)
             except InstrumentError as error:
                 self.at = None

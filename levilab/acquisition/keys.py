@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.acquisition.table import settings_of, tables_to_write
 from levilab.errors import UsageError
 from levilab.present.tables import Table, table
+from levilab.present.units import split
 from levilab.settings import hint_about
 
 if TYPE_CHECKING:
@@ -19,19 +20,6 @@ if TYPE_CHECKING:
 
     from levilab.bench.config import BenchConfig
 
-#: How a key ends → its unit.  The first that fits counts.
-_UNITS = {
-    "_hz_per_s": "Hz/s",
-    "_hz": "Hz",
-    "_vpp": "V peak to peak",
-    "_v": "V",
-    "volts_per_division": "V",
-    "_s": "s",
-    "_u_m": "m",
-    "_m": "m",
-    "_u_t": "T",
-    "_t": "T",
-}
 _TYPES = {"number": "a number", "integer": "a whole number", "string": "a text", "boolean": "true or false"}
 #: Lists as they are typed, by the type of what stands in them.
 _LISTS = {"integer": "[1, 3]", "number": "[44.0, 38.0]", "string": '["tape", "laser"]'}
@@ -86,9 +74,9 @@ def expected(name: str, schema: Mapping[str, Any]) -> str:
     >>> expected("which", {"enum": ["lower", "upper"], "type": "string"})
     'lower or upper'
     """
-    unit = next((f" [{unit}]" for ending, unit in _UNITS.items() if name.endswith(ending)), "")
+    _, unit = split(name)
     kinds = [schema | one for one in schema.get("anyOf", [{}]) if one.get("type") != "null"]
-    return " or ".join(_in_words(one) for one in kinds) + unit
+    return " or ".join(_in_words(one) for one in kinds) + (f" [{unit.text}]" if unit else "")
 
 
 def _in_words(schema: Mapping[str, Any]) -> str:

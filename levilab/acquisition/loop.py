@@ -19,6 +19,7 @@ from levilab.bench.bench import open_bench
 from levilab.errors import LevilabError, unquoted
 from levilab.files import CannotWrite
 from levilab.interruption import Interrupted, watching_for_interruption
+from levilab.runs.events import RunEvent
 from levilab.runs.run import Run, RunRecord, utc_now
 from levilab.runs.writer import RunWriter
 from levilab.software import software_versions
@@ -84,14 +85,14 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
             status: Status = "finished"
         except Interrupted as interruption:
             text = f"interrupted by {interruption.by}, outputs are off"
-            writer.event(None, "interrupted", text)
+            writer.event(None, RunEvent.INTERRUPTED, text)
             show.close()  # what it shows of the bench is from before the outputs went off
             show.message(text)
             status = "interrupted"
         except Exception as error:
             # the disk may be full: the first thing that went wrong is what counts
             with contextlib.suppress(CannotWrite):
-                writer.event(None, "failed", _in_words(error))
+                writer.event(None, RunEvent.FAILED, _in_words(error))
                 writer.finish("failed")
             if not writer.record.instruments and not request.wire_log:
                 writer.discard()

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from instruments.errors import InstrumentError, SettingsLost
 from levilab.bench.person import ask_no_person
 from levilab.errors import LevilabError
-from levilab.runs.run import WARNING, utc_now
+from levilab.present.units import unit
+from levilab.runs.events import RunEvent
+from levilab.runs.run import utc_now
 from levilab.settings import Settings
 
 if TYPE_CHECKING:
@@ -173,7 +175,7 @@ class Session(Generic[S]):
             self.zero = self.bench.clock.now() - self.earlier.run.elapsed()
         self.began = self.now()
         count = len(self.rows)
-        self.event("resumed", f"resumed after {count} {self.called}{'s' * (count != 1)}, {resumed}")
+        self.event(RunEvent.RESUMED, f"resumed after {count} {self.called}{'s' * (count != 1)}, {resumed}")
 
     @contextlib.contextmanager
     def _replay(self) -> Iterator[None]:
@@ -196,12 +198,12 @@ class Session(Generic[S]):
             k = max(k + 1, math.ceil(self.now() / interval_s)) if self._lost else k + 1
             if self.now() > longest_s:
                 name = self.writer.record.experiment
-                self.event("longest", f"{longest_s:g} s are over ({name}.longest_s)")
+                self.event(RunEvent.LONGEST, f"{longest_s:g} s are over ({name}.longest_s)")
                 return
 
     # --- what the person sees, and what is written down ---
 
-    def event(self, kind: str, text: str, **data: Any) -> None:
+    def event(self, kind: RunEvent, text: str, **data: Any) -> None:
         """Write down and show what happened."""
         if not self._replaying:
             self._write_event(kind, text, **data)
@@ -209,12 +211,12 @@ class Session(Generic[S]):
             self.show.message(text)
             self.look()
 
-    def _write_event(self, kind: str, text: str, **data: Any) -> None:
+    def _write_event(self, kind: RunEvent, text: str, **data: Any) -> None:
         self.writer.event(None if self.zero is None else self.now(), kind, text, **data)
 
     def warn(self, text: str) -> None:
         """Write down and show what to know before the readings are used; every result of the run repeats it."""
-        self.event(WARNING, text)
+        self.event(RunEvent.WARNING, text)
 
     def progress(self, text: str, share: float) -> None:
         """Show how far the bench is on the way to the first reading.
@@ -246,11 +248,11 @@ class Session(Generic[S]):
         Returns the answer, empty where nothing but Enter was typed or no person is at the bench.  The first Ctrl-C
         ends the wait.
         """
-        self._write_event("asked the person", task.text)
+        self._write_event(RunEvent.ASKED_THE_PERSON, task.text)
         with self.stop.at_once():
             answer = self.person(task).strip()
         if answer:
-            self._write_event("answered", answer)
+            self._write_event(RunEvent.ANSWERED, answer)
         return answer
 
     def keep(self, row: Row, time_left_s: float | tuple[float, float]) -> None:
@@ -303,7 +305,7 @@ class Session(Generic[S]):
             raise
         except InstrumentError:
             if cut_short := self.writer.keep_what_arrived():
-                self.event("cut short", cut_short)
+                self.event(RunEvent.CUT_SHORT, cut_short)
             raise
         number = self.writer.trace(time_s, trace, channel)
         self.doing.records[channel] = number, time_s + (self.zero or 0.0), trace
@@ -333,7 +335,7 @@ class Session(Generic[S]):
         """
         self._losses, self._lost = self._losses + 1, True
         self.doing.lost.add(kind)
-        self.event("instrument lost", f"{kind}: {error}")
+        self.event(RunEvent.INSTRUMENT_LOST, f"{kind}: {error}")
         if self._losses > MOST_LOSSES:
             raise error
         for tries, pause in enumerate(REOPENING_S, 1):
@@ -342,18 +344,15 @@ class Session(Generic[S]):
                 self.bench.reopen(kind)
                 set_up()
             except InstrumentError as again:
-                self.event("not reached", f"{kind}, try {tries} of {len(REOPENING_S)}: {again}")
+                self.event(RunEvent.NOT_REACHED, f"{kind}, try {tries} of {len(REOPENING_S)}: {again}")
             else:
                 self.doing.lost.discard(kind)
-                self.event("found again", f"{kind} answers again and is set up as before")
+                self.event(RunEvent.FOUND_AGAIN, f"{kind} answers again and is set up as before")
                 return
         raise error
 
 
 # --- the line of a reading ---
-
-#: Unit → how its values are written: with so many decimals that points stand below each other.
-_DIGITS = {"s": ".2f", "Hz": ".4f", "m": ".5f", "T": ".7f", "V": ".4f"}
 
 
 def _head(channel: Channel) -> str:
@@ -369,4 +368,5 @@ def _width(channel: Channel) -> int:
 
 
 def _with_unit(value: float, channel: Channel) -> str:
-    return f"{value:{_DIGITS.get(channel.unit, '.6g')}} {channel.unit}".rstrip()
+    decimals = unit(channel.unit).decimals  # so many that points stand below each other
+    return f"{value:{'.6g' if decimals is None else f'.{decimals}f'}} {channel.unit}".rstrip()

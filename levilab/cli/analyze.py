@@ -1,8 +1,7 @@
 """Analyze: runs and data files.  Heavy imports happen inside the commands that need them."""
 
 import inspect
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path, PurePath
@@ -12,10 +11,11 @@ import typer
 import typer.core
 
 from levilab.cli.later import Later
-from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
+from levilab.cli.options import Json, Paths
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.errors import DoesNotSuit, LevilabError, NoneUsable, UsageError
+from levilab.pipelines.options import KINDS, OPTIONS, Option, options_of, read_options, typed_name
 
 if TYPE_CHECKING:
     from levilab.pipelines.catalogue import Analysis
@@ -56,204 +56,58 @@ class AnalyzeGroup(typer.core.TyperGroup):
 analyze_app = typer.Typer(cls=AnalyzeGroup, no_args_is_help=True, add_completion=False)
 
 
-class Tilt(StrEnum):
-    """Whether the count of a spin-down holds the tilt of the top's moment."""
-
-    AUTO = "auto"
-    NONE = "none"
-    FITTED = "fitted"
-
-
-class Method(StrEnum):
-    """How the pulses of a trace are found."""
-
-    AUTO = "auto"
-    EDGES = "edges"
-    MATCHED = "matched"
-    LIKELIHOOD = "likelihood"
-
-
-class Option(NamedTuple):
-    """An option of some analyses.
-
-    Attributes:
-        kind: its type, as typer reads it.
-        default: its value without the option.
-        read: turns a value of the command line, other than None, into the analysis's; raises UsageError.
-        to: its name in the analysis; empty: the same name.
-    """
-
-    kind: Any
-    default: Any = None
-    read: Callable[[Any], Any] = lambda given: given
-    to: str = ""
-
-
-def _columns(text: str) -> Any:
-    from levilab.formats.table import parse_columns
-
-    return parse_columns(text) or None  # none named: those of an earlier result count
-
-
-def _device(path: Path) -> Any:
-    from levilab.formats.device import read_device
-
-    return read_device(path)
-
-
-def _positive(name: str, what: str) -> Callable[[float], float]:
-    """Return a check that a number is above 0."""
-
-    def check(value: float) -> float:
-        if not 0 < value < math.inf:
-            raise UsageError(name, what, value=value)
-        return value
-
-    return check
-
-
-def _metres(name: str, lowest: float) -> Callable[[float], float]:
-    """Return a function from millimetres to metres, which checks the range."""
-
-    def read(value: float) -> float:
-        if not lowest <= value <= 2000.0:
-            raise UsageError(name, f"a number of millimetres from {lowest:g} to 2000 is expected", value=value)
-        return value / 1000
-
-    return read
-
-
-OPTIONS = {
-    "columns": Option(Columns, "", _columns),
-    "channel": Option(Channel),
-    "rate": Option(
-        Rate,
-        read=_positive("rate", "samples per second are expected, a number above 0 [Hz]"),
-    ),
-    "reading_u": Option(
-        ReadingU,
-        read=_positive("reading_u", "a standard uncertainty above 0 [Hz] is expected"),
-    ),
-    "keep_outliers": Option(KeepOutliers, False),
-    "tilt": Option(
-        Annotated[
-            Tilt,
-            typer.Option(
-                "--tilt",
-                help="Whether counts hold the tilt of the top's moment.  auto: as fitted, but for a mock run whose top "
-                "only spins.  none: a top that only spins.",
-            ),
-        ],
-        Tilt.AUTO,
-        str,
-    ),
-    "method": Option(
-        Annotated[
-            Method,
-            typer.Option("--method", help="How pulses are found: edges is the fastest, likelihood for weak ones."),
-        ],
-        Method.AUTO,
-        str,
-    ),
-    "orthogonal": Option(
-        Annotated[bool, typer.Option("--orthogonal", help="Use the uncertainty of the drive's frequency, too.")],
-        False,
-    ),
-    "device": Option(
-        Annotated[
-            Path | None,
-            typer.Option(
-                metavar="FILE", help="Describes base and top, as sample_data/device.toml does; see levilab top."
-            ),
-        ],
-        read=_device,
-    ),
-    "height": Option(
-        Annotated[
-            float | None,
-            typer.Option(
-                metavar="MM", help="Height at which the top floats; its moment follows, if its mass is known."
-            ),
-        ],
-        read=_metres("height", -1000.0),
-        to="height_m",
-    ),
-    "height_u": Option(
-        Annotated[
-            float | None,
-            typer.Option(
-                metavar="MM",
-                help="Standard uncertainty of --height.",
-                show_default="that of the scan's heights",
-            ),
-        ],
-        read=_metres("height_u", 0.0),
-        to="height_u_m",
-    ),
-    "clock_u": Option(
-        Annotated[
-            float | None,
-            typer.Option(
-                "--clock-u",
-                metavar="PART",
-                help="Relative standard uncertainty of the clock that counts or samples, as 2e-6, from its manual; the "
-                "budgets show what it does.",
-            ),
-        ],
-        read=_positive("clock_u", "a relative standard uncertainty above 0 is expected, such as 2e-6"),
-    ),
-    "free_radii": Option(
-        Annotated[
-            bool,
-            typer.Option("--free-radii", help="Fit the radii, too, within the calliper's uncertainty."),
-        ],
-        False,
-    ),
-}
-
-
-class Command(NamedTuple):
-    """An analysis: what its command does, and its options."""
-
-    help: str
-    options: tuple[str, ...]
-
-
 #: The command without a name; the help does not list it.  Each analysis takes those options that it knows.
 _EACH = "each"
-#: The catalogue itself takes too long to import for a help page.
+#: What the command of each analysis does; the catalogue itself takes too long to import for a help page.
 COMMANDS = {
-    "spindown": Command(
-        "Drag laws from spin-downs: stokes, newton, disc, mixed and power law, and which of them the data exclude.",
-        ("columns", "channel", "rate", "reading_u", "keep_outliers", "tilt", "device", "clock_u"),
-    ),
-    "spin": Command(
-        "Spin frequency and slope from traces of a detector (WAV, scopes' CSV, .npy), lists of pulse times, runs with "
-        "traces.",
-        ("columns", "channel", "rate", "method", "clock_u"),
-    ),
-    "field": Command(
-        "The base from a Hall scan: strength, origin, thickness; heights, masses and spins of tops that float.",
-        ("columns", "device", "height", "height_u", "free_radii"),
-    ),
-    "precession": Command(
-        "Precession against drive: slope and intercept, tested against a locked top, and what 1.05 would take.",
-        ("columns", "reading_u", "keep_outliers", "orthogonal", "clock_u"),
-    ),
-    "limit": Command(
-        "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
-        ("columns", "reading_u", "clock_u"),
-    ),
-    _EACH: Command(
-        "Each analysis that suits the runs or data files; --json prints a list where several suit.",
-        ("columns", "channel", "rate", "reading_u", "keep_outliers", "tilt", "device", "method", "clock_u"),
-    ),
+    "spindown": "Drag laws from spin-downs: the constants of each, and which laws the data exclude.",
+    "spin": "Spin frequency and slope from traces of a detector (WAV, scopes' CSV, .npy), lists of pulse times, runs "
+    "with traces.",
+    "field": "The base from a Hall scan: strength, origin, thickness; heights, masses and spins of tops that float.",
+    "precession": "Precession against drive: slope and intercept, tested against a locked top, and what 1.05 would "
+    "take.",
+    "limit": "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
+    _EACH: "Each analysis that suits the runs or data files; --json prints a list where several suit.",
 }
 
 
-def _command(options: Sequence[str]) -> Callable[..., None]:
-    """Return the command of an analysis, with these options in its signature, before --save, where typer reads them."""
+def takes_options(names: Iterable[str]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that puts options of analyses into the signature of a command, where typer reads them.
 
+    They stand behind the paths, and the command has them in `**given`.
+    """
+    own = [_parameter(typed_name(name), OPTIONS[name]) for name in names if OPTIONS[name].typed is not None]
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        context, paths, *shared, _ = inspect.signature(command).parameters.values()
+        shared = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in shared]
+        command.__signature__ = inspect.Signature([context, paths, *own, *shared])  # type: ignore[attr-defined]
+        return command
+
+    return decorate
+
+
+def _parameter(name: str, option: Option) -> inspect.Parameter:
+    """Return the parameter of a command by which typer reads an option."""
+    kind: Any = bool if option.kind is bool else option.kind | None
+    default: Any = False if option.kind is bool else None
+    if option.choices:
+        words = {word.upper(): word for word in option.choices}
+        kind = StrEnum(name.title(), words)  # type: ignore[misc,no-redef] # a class that is made here
+        default = kind(option.choices[0])
+    about = typer.Option(
+        f"--{name.replace('_', '-')}",
+        metavar=option.metavar,
+        help=option.help.replace("[", r"\["),
+        show_default=option.default_text or True,
+    )
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, about])
+
+
+def _command(options: Iterable[str]) -> Callable[..., None]:
+    """Return the command of an analysis with these options."""
+
+    @takes_options(options)
     def analyze(
         context: typer.Context,
         paths: Paths,
@@ -287,43 +141,26 @@ def _command(options: Sequence[str]) -> Callable[..., None]:
     ) -> None:
         if table is not None:
             writing = Writing(table, cores=cores, resume=resume, save=bool(save))
-            _tabulate(context, paths, analysis_options(given), writing, out=out, as_json=as_json)
+            _tabulate(context, paths, read_options(given, typed=True), writing, out=out, as_json=as_json)
             return
         for name, value in (("cores", cores), ("resume", resume or None)):
             if value is not None:
                 raise UsageError(name, "goes with `table` alone")
-        _analyze(context, paths, analysis_options(given), save=save is not False, out=out, as_json=as_json)
+        _analyze(context, paths, read_options(given, typed=True), save=save is not False, out=out, as_json=as_json)
 
-    context, paths, *shared, _ = inspect.signature(analyze).parameters.values()
-    own = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=option.default, annotation=option.kind)
-        for name, option in OPTIONS.items()
-        if name in options
-    ]
-    shared = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in shared]
-    analyze.__signature__ = inspect.Signature([context, paths, *own, *shared])  # type: ignore[attr-defined]
     return analyze
 
 
-def _add(name: str, row: Command) -> None:
+def _add(name: str, text: str) -> None:
     words = "levilab analyze" if name == _EACH else f"levilab analyze {name}"
 
-    @analyze_app.command(name, cls=Later, help=row.help, epilog=f"Example: {words} sample_data/", hidden=name == _EACH)
+    @analyze_app.command(name, cls=Later, help=text, epilog=f"Example: {words} sample_data/", hidden=name == _EACH)
     def command() -> Callable[..., None]:
-        return _command(row.options)
+        return _command(OPTIONS if name == _EACH else options_of(KINDS[name]))
 
 
-for _name, _row in COMMANDS.items():
-    _add(_name, _row)
-
-
-def analysis_options(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the analyses' options, in SI, from those of the command line.  Raises UsageError."""
-    if given.get("height_u") is not None and given.get("height") is None:
-        raise UsageError("height_u", "goes with `height` alone")
-    return {
-        OPTIONS[name].to or name: None if value is None else OPTIONS[name].read(value) for name, value in given.items()
-    }
+for _name, _text in COMMANDS.items():
+    _add(_name, _text)
 
 
 def _analyze(

@@ -36,35 +36,21 @@ def crosscheck(
 ) -> None:
     """Check the analyses, and end with 1 where an estimate or an uncertainty is wrong."""
     from levilab.crosscheck import command
+    from levilab.crosscheck.stored import as_json as as_text
 
     if like:
         if seed is not None:
             raise UsageError("seed", "does not go with `like`: its trials follow from the readings")
-        _like(like, subjects or [], trials, out, as_json=as_json)
-        return
-    checked = command.check(subjects or [], trials, seed or 0)
-    if as_json:
-        result(command.as_json(checked))
+        found = command.study_results(subjects or [], like, trials)
+        studies, written = [one for one, _ in found], command.store_beside(found, out)
     else:
-        command.print_checked(checked)
-    if out is not None:
-        for path in command.write(checked, out):
-            message(f"wrote {path}")
-    if not all(one.holds for one in checked):
-        raise typer.Exit(exit_codes.FAILED)
-
-
-def _like(paths: list[Path], names: list[str], trials: int | None, out: Path | None, *, as_json: bool) -> None:
-    """Return the trials with the parameters of results, stored beside these."""
-    from levilab.crosscheck import command
-
-    checked = command.check_like(names, paths, trials)
-    written = command.store_like(checked, out)
+        studies = command.study_worlds(subjects or [], trials, seed or 0)
+        written = [] if out is None else command.write(studies, out)
     if as_json:
-        result(command.like_as_json(checked))
+        result(as_text(studies))
     else:
-        command.print_like(checked)
+        command.print_studies(studies)
     for path in written:
         message(f"wrote {path}")
-    if not all(one.holds for one, _ in checked):
+    if not all(one.holds for one in studies):
         raise typer.Exit(exit_codes.FAILED)

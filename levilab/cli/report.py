@@ -1,16 +1,18 @@
 """Report, and the list of runs.  Heavy imports happen inside the commands that need them."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from levilab.cli.analyze import analysis_options
-from levilab.cli.options import Channel, Columns, Json, KeepOutliers, Paths, Rate, ReadingU
+from levilab.cli.analyze import takes_options
+from levilab.cli.options import Json, Paths
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.cli.quantities import with_options
+from levilab.pipelines.options import OF_REPORT, read_options
 
 
+@takes_options(OF_REPORT)
 def report(
     context: typer.Context,
     paths: Paths,
@@ -31,11 +33,6 @@ def report(
             "CSV with all digits, LaTeX as shown.",
         ),
     ] = False,
-    columns: Columns = "",
-    channel: Channel = None,
-    rate: Rate = None,
-    reading_u: ReadingU = None,
-    keep_outliers: KeepOutliers = False,
     crosscheck: Annotated[
         bool,
         typer.Option(
@@ -43,24 +40,18 @@ def report(
             help="Make a cross-check with the result's own parameters where none is stored and it takes seconds.",
         ),
     ] = True,
+    **given: Any,
 ) -> None:
     """Write the report."""
     from levilab.report.page import write_report
 
-    given = {
-        "columns": columns,
-        "channel": channel,
-        "rate": rate,
-        "reading_u": reading_u,
-        "keep_outliers": keep_outliers,
-    }
     app = context.find_root().command
     place = place_of_report(output)
     with interruptible("no report is written"):
         written = write_report(
             paths,
             output,
-            analysis_options(given),
+            read_options(given, typed=True),
             lambda text: message(with_options(text, app)),
             tables=tables,
             crosscheck=crosscheck,

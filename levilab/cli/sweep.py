@@ -170,7 +170,15 @@ def _show(store: Store, *, as_json: bool) -> list[Path]:
     """Print the summary; draw the figures and return their paths."""
     from levilab.sweeps.adaptive import report_in
     from levilab.sweeps.drawing import draw_figures
-    from levilab.sweeps.summary import as_document, summarise
+    from levilab.sweeps.summary import (
+        FEW_POINTS,
+        as_document,
+        axes_lines,
+        columns_table,
+        headline,
+        points_table,
+        summarise,
+    )
 
     summary, report = summarise(store), report_in(store)
     pictures = draw_figures(store)
@@ -180,7 +188,6 @@ def _show(store: Store, *, as_json: bool) -> list[Path]:
         return pictures
     from levilab.present.terminal import draw, terminal
     from levilab.sweeps.adaptive import in_words
-    from levilab.sweeps.table import FEW_POINTS, axes_lines, columns_table, headline, points_table
 
     result(headline(summary))
     for line in axes_lines(summary):

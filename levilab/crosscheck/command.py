@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
 from levilab.crosscheck.catalogue import SUBJECTS
-from levilab.crosscheck.own.stored import as_text, store
-from levilab.crosscheck.own.study import OWN, TRIALS, check_own, in_words, own_table
-from levilab.crosscheck.study import as_document, crosscheck
-from levilab.crosscheck.table import crosscheck_table, failures_in_words
+from levilab.crosscheck.own.study import OWN, TRIALS, study_result
+from levilab.crosscheck.stored import NAME, as_json, store
+from levilab.crosscheck.study import study_world
+from levilab.crosscheck.table import as_text, crosscheck_table, failures_as_text
 from levilab.errors import UsageError
 from levilab.files import replace_atomically, writing
 from levilab.pipelines.catalogue import ANALYSES
@@ -21,40 +20,40 @@ from levilab.present.progress import ShareBar
 from levilab.present.terminal import draw, terminal
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-    from levilab.crosscheck.own.study import OwnCheck
-    from levilab.crosscheck.study import Checked
+    from levilab.crosscheck.study import Study
     from levilab.pipelines.result import Place
 
-JSON, FIGURE = "crosscheck.json", "crosscheck.png"
+FIGURE = "crosscheck.png"
 
 
-def check(names: Sequence[str], trials: int | None, seed: int) -> list[Checked]:
+def study_worlds(names: Sequence[str], trials: int | None, seed: int) -> list[Study]:
     """Make the trials of some subjects, or of all where none is named.  Raises UsageError for an unknown name."""
-    for name in names:
-        if name not in SUBJECTS:
-            raise UsageError("subject", f"known are {', '.join(SUBJECTS)}", value=name)
+    _check(names, SUBJECTS, "known are")
     found = []
     for name in names or SUBJECTS:
         subject = SUBJECTS[name]
         progress = ShareBar(f"cross-checking {name}")
         try:
-            found.append(crosscheck(subject, trials or subject.trials, seed, progress))
+            found.append(study_world(subject, trials or subject.trials, seed, progress))
         finally:
             progress.close()
     return found
 
 
-def check_like(names: Sequence[str], paths: Sequence[Path], trials: int | None) -> list[tuple[OwnCheck, Place]]:
-    """Make trials with the parameters of results, of the named analyses or of all, with its place.
+def study_results(names: Sequence[str], paths: Sequence[Path], trials: int | None) -> list[tuple[Study, Place]]:
+    """Make the trials with the parameters of results; of analyses that are named, or of all.
 
-    Raises UsageError for a name that is unknown, DataError for what cannot be analyzed.
+    Returns:
+        The trials, and where each result lies.
+
+    Raises:
+        UsageError: a name is unknown.
+        DataError: a path cannot be analyzed.
     """
-    for name in names:
-        if name not in OWN:
-            raise UsageError("subject", f"with `like` known are {', '.join(OWN)}", value=name)
+    _check(names, OWN, "with `like` known are")
     if names:
         found = [(ANALYSES[name], ANALYSES[name].recall(paths, ANALYSES[name].options_from({}))) for name in names]
     else:
@@ -64,30 +63,38 @@ def check_like(names: Sequence[str], paths: Sequence[Path], trials: int | None) 
         progress = ShareBar(f"cross-checking {analysis.name}")
         try:
             settings = analysis.settings_of(result)
-            done.append((check_own(analysis.name, result, settings, trials or TRIALS, progress), result.place))
+            done.append((study_result(analysis.name, result, settings, trials or TRIALS, progress), result.place))
         finally:
             progress.close()
     return done
 
 
-def like_as_json(checked: Sequence[tuple[OwnCheck, Place]]) -> str:
-    """Return the trials as a document."""
-    return as_text([one for one, _ in checked])
+def _check(names: Iterable[str], known: Iterable[str], words: str) -> None:
+    for name in names:
+        if name not in known:
+            raise UsageError("subject", f"{words} {', '.join(known)}", value=name)
 
 
-def print_like(checked: Sequence[tuple[OwnCheck, Place]]) -> None:
-    """Print the table of each result, and a sentence."""
+def print_studies(studies: Sequence[Study]) -> None:
+    """Print the tables: one of all worlds, with a note on failures; one of each result, with its text."""
     console = terminal()
-    for one, _ in checked:
-        shown = ANALYSES[one.analysis].symbols
-        console.print(draw(replace(own_table(one, shown), title=f"{one.analysis}: pulls, (estimate − truth)/u")))
-        console.print(escape(in_words(one, shown)))
+    worlds = [one for one in studies if not one.inputs]
+    if worlds:
+        console.print(draw(crosscheck_table(worlds)))
+    for one in worlds:
+        for text in failures_as_text(one):
+            console.print(f"[yellow]note:[/yellow] {escape(f'{one.name}: {text}')}")
+    for one in studies:
+        if one.inputs:
+            symbols = ANALYSES[one.name].symbols
+            console.print(draw(crosscheck_table([one], symbols)))
+            console.print(escape(as_text(one, symbols)))
 
 
-def store_like(checked: Sequence[tuple[OwnCheck, Place]], out: Path | None) -> list[Path]:
+def store_beside(found: Sequence[tuple[Study, Place]], out: Path | None) -> list[Path]:
     """Write crosscheck.json beside each result, or into a folder; returns the files.  Raises CannotWrite."""
     files = []
-    for one, place in checked:
+    for one, place in found:
         there = replace(place, folder=out) if out else place
         with writing(f"{there.folder}: the result cannot be written"):
             there.folder.mkdir(parents=True, exist_ok=True)
@@ -95,20 +102,7 @@ def store_like(checked: Sequence[tuple[OwnCheck, Place]], out: Path | None) -> l
     return list(dict.fromkeys(files))
 
 
-def as_json(checked: Sequence[Checked]) -> str:
-    """Return the trials as a document."""
-    return json.dumps(as_document(checked), indent=2, allow_nan=False)
-
-
-def print_checked(checked: Sequence[Checked]) -> None:
-    """Print the table, and the trials without an estimate."""
-    console = terminal()
-    console.print(draw(crosscheck_table(checked)))
-    for text in failures_in_words(checked):
-        console.print(f"[yellow]note:[/yellow] {escape(text)}")
-
-
-def write(checked: Sequence[Checked], out: Path) -> list[Path]:
+def write(studies: Sequence[Study], out: Path) -> list[Path]:
     """Write JSON and figure into a folder; returns the files.  Raises CannotWrite."""
     # matplotlib, which a cross-check that is not written does not need
     from levilab.crosscheck.figure import crosscheck_figure
@@ -116,6 +110,6 @@ def write(checked: Sequence[Checked], out: Path) -> list[Path]:
 
     with writing(f"{out}: the result cannot be written"):
         out.mkdir(parents=True, exist_ok=True)
-        replace_atomically(out / JSON, as_json(checked) + "\n")
-        save_png(crosscheck_figure(checked), out / FIGURE)
-    return [out / JSON, out / FIGURE]
+        replace_atomically(out / NAME, as_json(studies) + "\n")
+        save_png(crosscheck_figure(studies), out / FIGURE)
+    return [out / NAME, out / FIGURE]

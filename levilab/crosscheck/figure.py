@@ -10,6 +10,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from levilab.crosscheck.study import Verdict
 from levilab.present.drawing import SMALL, headline, panel, write
 from levilab.present.looks import BLUE, VERMILION
 from levilab.present.numbers import signed
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from levilab.crosscheck.study import Checked, Spread
+    from levilab.crosscheck.study import Spread, Study
 
 _COLUMNS = 3
 #: Left edge of the first panel, a panel's size, and from one to the next [inch].
@@ -29,9 +30,9 @@ _LEFT, _TOP, _SIZE, _ACROSS, _DOWN = 0.5, 1.1, (1.82, 1.15), 2.2, 2.05
 _FARTHEST = 4.0
 
 
-def crosscheck_figure(checked: Sequence[Checked]) -> Figure:
+def crosscheck_figure(checked: Sequence[Study]) -> Figure:
     """Histograms of pulls; vermilion and hatched where they are not as wanted."""
-    panels = [(one.subject.name, spread) for one in checked for spread in one.spreads]
+    panels = [(one.name, spread) for one in checked for spread in one.spreads]
     rows = max(1, math.ceil(len(panels) / _COLUMNS))
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, _TOP + _DOWN * (rows - 1) + _SIZE[1] + 0.55))
@@ -48,8 +49,10 @@ def crosscheck_figure(checked: Sequence[Checked]) -> Figure:
     return figure
 
 
-def _finding(checked: Sequence[Checked]) -> str:
-    wrong = [f"{one.subject.name}: {spread.quantity}" for one in checked for spread in one.spreads if not spread.holds]
+def _finding(checked: Sequence[Study]) -> str:
+    wrong = [
+        f"{one.name}: {spread.quantity}" for one in checked for spread in one.spreads if spread.verdict is Verdict.WRONG
+    ]
     count = sum(len(one.spreads) for one in checked)
     if not wrong:
         return f"All {count} quantities lie about the truth as their uncertainties say"
@@ -58,7 +61,7 @@ def _finding(checked: Sequence[Checked]) -> str:
 
 def _draw(axis: Axes, name: str, spread: Spread) -> None:
     edges = np.linspace(-_FARTHEST, _FARTHEST, 17)
-    color, hatch = (BLUE, None) if spread.holds else (VERMILION, "///")
+    color, hatch = (BLUE, None) if spread.verdict is not Verdict.WRONG else (VERMILION, "///")
     axis.hist(
         np.clip(spread.pulls, -_FARTHEST + 1e-9, _FARTHEST - 1e-9), edges.tolist(), color=color, alpha=0.6, hatch=hatch
     )

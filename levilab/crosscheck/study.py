@@ -1,112 +1,269 @@
-"""Many trials of each subject: do the estimates lie about the truth as their uncertainties say?"""
+"""Many trials of a subject: do the estimates lie about the truth as their uncertainties say?
+
+A study is of a world whose numbers are drawn at random, or of readings that are made with the values of a result
+(`levilab.crosscheck.own`).  Both have the same spreads, the same criterion and the same document.
+"""
 
 from __future__ import annotations
 
 import math
 import re
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Mapping  # noqa: TC003  # pydantic reads the fields of Study from it
+from dataclasses import dataclass, field, replace
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from analysis.errors import AnalysisError
+from analysis.pulses.regression import student
 from instruments.errors import InstrumentError
+from levilab.crosscheck.subject import Trial, TrialFailed
 from levilab.errors import LevilabError
-from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from levilab.crosscheck.subject import Pull, Subject
 
-SCHEMA = "levilab-crosscheck/1"
-#: What is wanted of the mean and of the standard deviation of pulls, and how likely a true value lies within 1 u.
-MEAN_WITHIN, DEVIATION_WITHIN, COVERAGE = 0.1, 0.1, math.erf(1 / math.sqrt(2))
-#: What chance alone may add to that, in standard errors.
-CHANCE = 3.0
+#: How likely a true value lies within 1 u.
+COVERAGE = math.erf(1 / math.sqrt(2))
+#: How often chance alone may condemn a right study: the room of each of its numbers follows from that.
+FALSE_ALARM = 0.01
+#: Up to so many degrees of freedom a standard deviation of pulls says nothing.
+LONG_TAILS = 8
 _NUMBER = re.compile(r"(\d+(?:\.\d+)?)")
+
+
+class Verdict(Enum):
+    """What the pulls of a quantity say."""
+
+    RIGHT = "yes"
+    TOO_LARGE = "yes, u is too large"
+    WRONG = "NO"
 
 
 @dataclass(frozen=True)
 class Spread:
-    """How the pulls of one quantity lie.
+    """How the pulls of one quantity lie, and how they should.
 
-    pulls: shape (n,); relative_u: the median of u over the estimate.
+    Attributes:
+        quantity: its name.
+        pulls: shape (n,).
+        relative_u: the median of u over the estimate; None where that is 0.
+        freedom: degrees of freedom of u, where that is the scatter of few values; None: u is as if known.
+        widened: degrees of freedom of u, where that was multiplied by Student's factor, so that it covers 68 %.
+        among: how many quantities the study has, of which chance may condemn each.
     """
 
     quantity: str
     pulls: tuple[float, ...]
-    relative_u: float
+    relative_u: float | None = None
+    freedom: int | None = None
+    widened: float | None = None
+    among: int = 1
 
     @property
     def n(self) -> int:
-        """How many there are."""
+        """Number of pulls."""
         return len(self.pulls)
 
     @property
     def mean(self) -> float:
-        """Of the pulls; 0 is wanted.  Its standard error is 1/√n."""
+        """Mean of the pulls; 0 is wanted."""
         return float(np.mean(self.pulls))
 
     @property
     def deviation(self) -> float:
-        """Standard deviation of the pulls; 1 is wanted.  Its standard error is about 1/√(2n)."""
+        """Standard deviation of the pulls; NaN of a single one."""
         return float(np.std(self.pulls, ddof=1)) if self.n > 1 else math.nan
 
     @property
     def coverage(self) -> float:
-        """Share of the truths within one standard uncertainty; 0.683 is wanted."""
+        """Share of the truths within one standard uncertainty."""
         return float(np.mean(np.abs(self.pulls) <= 1))
 
     @property
-    def holds(self) -> bool:
-        """Whether nothing speaks against what is wanted, with room for chance; one trial has no scatter."""
-        of_mean, of_deviation = CHANCE / math.sqrt(self.n), CHANCE / math.sqrt(2 * self.n)
-        of_coverage = CHANCE * math.sqrt(COVERAGE * (1 - COVERAGE) / self.n)
-        return (
-            abs(self.mean) <= MEAN_WITHIN + of_mean
-            and (self.n == 1 or abs(self.deviation - 1) <= DEVIATION_WITHIN + of_deviation)
-            and abs(self.coverage - COVERAGE) <= 0.05 + of_coverage
-        )
+    def wanted_deviation(self) -> float:
+        """Standard deviation of pulls by Student's law; infinite where its tails are too long to judge it.
+
+        >>> Spread("x", ()).wanted_deviation, round(Spread("x", (), freedom=12).wanted_deviation, 2)
+        (1.0, 1.1)
+        """
+        few = self.freedom if self.freedom is not None else self.widened
+        if few is None:
+            return 1.0
+        if few <= LONG_TAILS:
+            return math.inf
+        return math.sqrt(few / (few - 2)) / (student(few) if self.freedom is None else 1.0)
+
+    @property
+    def wanted_coverage(self) -> float:
+        """Share of true values within 1 u, by Student's law.
+
+        >>> round(Spread("x", ()).wanted_coverage, 3), round(Spread("x", (), freedom=3).wanted_coverage, 3)
+        (0.683, 0.609)
+        """
+        if self.freedom is None:
+            return COVERAGE
+        from scipy.special import stdtr
+
+        return float(2 * stdtr(self.freedom, 1.0) - 1)
+
+    @property
+    def u_mean(self) -> float:
+        """Standard error of the mean."""
+        scale = self.wanted_deviation
+        return (scale if math.isfinite(scale) else max(self.deviation, 1.0)) / math.sqrt(self.n)
+
+    @property
+    def u_deviation(self) -> float:
+        """Standard error of the standard deviation, with the kurtosis of Student's law."""
+        few = self.freedom if self.freedom is not None else self.widened
+        excess = 0.0 if few is None or few <= LONG_TAILS else 3 / (few - 4)
+        return self.wanted_deviation * math.sqrt((1 + excess) / (2 * self.n))
+
+    @property
+    def u_coverage(self) -> float:
+        """Standard error of the share."""
+        return math.sqrt(self.wanted_coverage * (1 - self.wanted_coverage) / self.n)
+
+    @property
+    def room(self) -> float:
+        """Standard errors that each of the three numbers of each quantity may be off, on either side.
+
+        >>> round(Spread("x", ()).room, 2), round(Spread("x", (), among=8).room, 2)
+        (2.94, 3.53)
+        """
+        from scipy.special import ndtri
+
+        return float(-ndtri(FALSE_ALARM / (2 * 3 * self.among)))
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the pulls say: a bias or a u that is too small is wrong, a u that is too large is on the safe side."""
+        if self.n < 2:  # one trial has no scatter
+            return Verdict.RIGHT
+        judged = math.isfinite(self.wanted_deviation)
+        wider = (self.deviation - self.wanted_deviation) / self.u_deviation if judged else 0.0
+        fewer = (self.wanted_coverage - self.coverage) / self.u_coverage
+        if abs(self.mean) > self.room * self.u_mean or max(wider, fewer) > self.room:
+            return Verdict.WRONG
+        return Verdict.TOO_LARGE if min(wider, fewer) < -self.room else Verdict.RIGHT
 
 
 @dataclass(frozen=True)
-class Checked:
+class Study:
     """A subject with its trials.
 
-    trials: how many were made; spreads: a quantity each; failures: why trials came to no estimate, and how often; for
-    one reason with other numbers in it there is one entry.
+    Attributes:
+        name: of the subject, or of the analysis of a result.
+        about: what is drawn.
+        trials, seed: number of trials, and seed of the random numbers.
+        spreads: of the pulls, one a quantity.
+        failures: why trials came to no estimate → how often; one entry for a reason with other numbers in it.
+        inputs: sha256 of a result's readings, in the order of the inputs; none of a world.
+        settings: of the result's analysis, as result.json has them.
+        law: that was true; empty where none competes.
+        laws: law → how often it was favoured.
+        excluded, tested: in how many trials the analysis excluded what is true, of how many that tested it.
+        hypothesis, expected_share: what that is where it is no law, and the share that chance excludes.
+        more: what to know of the pulls.
     """
 
-    subject: Subject
+    name: str
+    about: str
     trials: int
     seed: int
-    spreads: tuple[Spread, ...]
-    failures: dict[str, int]
+    spreads: tuple[Spread, ...] = ()
+    failures: Mapping[str, int] = field(default_factory=dict)
+    inputs: tuple[str, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    law: str = ""
+    laws: Mapping[str, int] = field(default_factory=dict)
+    excluded: int = 0
+    tested: int = 0
+    hypothesis: str = ""
+    expected_share: float = 0.0
+    more: tuple[str, ...] = ()
 
     @property
     def holds(self) -> bool:
-        """Whether every quantity's pulls are as they should be."""
-        return bool(self.spreads) and all(spread.holds for spread in self.spreads)
+        """Whether no quantity is wrong."""
+        return bool(self.spreads) and all(spread.verdict is not Verdict.WRONG for spread in self.spreads)
 
 
-def crosscheck(subject: Subject, trials: int, seed: int, progress: Callable[[float], None]) -> Checked:
-    """Make the trials of a subject, each with a seed of its own.  progress: called with the share that is done."""
-    pulls: list[Pull] = []
-    failures: list[str] = []
-    for k in range(trials):
+def study_world(subject: Subject, trials: int, seed: int, progress: Callable[[float], None]) -> Study:
+    """Make the trials of a world, each with a seed of its own.
+
+    Args:
+        subject: what is drawn and compared.
+        trials: number of trials.
+        seed: of the first trial.
+        progress: called with the share that is done.
+    """
+
+    def trial(k: int) -> Trial:
         with tempfile.TemporaryDirectory(prefix="levilab-crosscheck-") as folder:
             try:
-                pulls += subject.trial(seed + k, Path(folder))
+                return Trial(subject.trial(seed + k, Path(folder)))
             except (LevilabError, InstrumentError) as error:
-                failures.append(str(error).replace(folder, ""))
-        progress((k + 1) / trials)
-    return Checked(subject, trials, seed, tuple(spreads_of(pulls)), by_reason(failures))
+                raise TrialFailed(str(error).replace(folder, "")) from error
+
+    return make_trials(Study(subject.name, subject.about, trials, seed), trial, {}, progress)
+
+
+def make_trials(
+    study: Study, trial: Callable[[int], Trial], freedom: Mapping[str, int], progress: Callable[[float], None]
+) -> Study:
+    """Return a study with its trials.
+
+    Args:
+        study: without trials.
+        trial: makes the trial of a number; raises LevilabError or AnalysisError where it comes to no estimate.
+        freedom: quantity → degrees of freedom of its u, where these are few.
+        progress: called with the share that is done.
+    """
+    done, failures = [], []
+    for k in range(study.trials):
+        try:
+            with np.errstate(all="ignore"):
+                done.append(trial(k))
+        except (LevilabError, AnalysisError) as error:
+            failures.append(str(error))
+        progress((k + 1) / study.trials)
+    laws = [one.law for one in done if one.law]
+    tested = [one.excluded for one in done if one.excluded is not None]
+    widened = [one.widened for one in done if one.widened is not None]
+    return replace(
+        study,
+        spreads=tuple(
+            spreads_of(
+                [pull for one in done for pull in one.pulls], freedom, float(np.median(widened)) if widened else None
+            )
+        ),
+        failures=by_reason(failures),
+        laws={law: laws.count(law) for law in sorted(set(laws), key=lambda one: (-laws.count(one), one))},
+        excluded=sum(tested),
+        tested=len(tested),
+    )
+
+
+def spreads_of(pulls: Sequence[Pull], freedom: Mapping[str, int], widened: float | None) -> Iterator[Spread]:
+    """Yield the pulls of each quantity."""
+    quantities = dict.fromkeys(pull.quantity for pull in pulls)
+    for quantity in quantities:
+        some = [pull for pull in pulls if pull.quantity == quantity]
+        relative = [pull.u / abs(pull.estimate) for pull in some if pull.estimate]
+        values = tuple(pull.value for pull in some)
+        median = float(np.median(relative)) if relative else None
+        yield Spread(quantity, values, median, freedom.get(quantity), widened, len(quantities))
 
 
 def by_reason(texts: Sequence[str]) -> dict[str, int]:
-    """How often each text comes, texts that differ in their numbers alone as one, with the range of these.
+    """Return how often each text comes, texts that differ in their numbers alone as one, with the range of these.
 
     >>> by_reason(["lost at 31.3 Hz of 40 Hz", "dark", "lost at 29.9 Hz of 40 Hz"])
     {'lost at 29.9 to 31.3 Hz of 40 Hz': 2, 'dark': 1}
@@ -125,43 +282,3 @@ def by_reason(texts: Sequence[str]) -> dict[str, int]:
 def _range(numbers: Sequence[str]) -> str:
     least, most = min(numbers, key=float), max(numbers, key=float)
     return least if least == most else f"{least} to {most}"
-
-
-def spreads_of(pulls: Sequence[Pull]) -> Iterable[Spread]:
-    """The pulls of each quantity."""
-    for quantity in dict.fromkeys(pull.quantity for pull in pulls):
-        some = [pull for pull in pulls if pull.quantity == quantity]
-        relative = np.median([pull.u / abs(pull.estimate) if pull.estimate else math.nan for pull in some])
-        yield Spread(quantity, tuple(pull.value for pull in some), float(relative))
-
-
-def as_document(checked: Sequence[Checked]) -> dict[str, Any]:
-    """All numbers, as JSON has them."""
-    return {
-        "schema": SCHEMA,
-        "software": software_versions(),
-        "wanted": {"mean_within": MEAN_WITHIN, "deviation_within": DEVIATION_WITHIN, "coverage": COVERAGE},
-        "subjects": [
-            {
-                "name": one.subject.name,
-                "trials": one.trials,
-                "seed": one.seed,
-                "holds": one.holds,
-                "failures": one.failures,
-                "quantities": [
-                    {
-                        "name": spread.quantity,
-                        "n": spread.n,
-                        "mean": spread.mean,
-                        "deviation": None if math.isnan(spread.deviation) else spread.deviation,
-                        "coverage": spread.coverage,
-                        "relative_u": None if math.isnan(spread.relative_u) else spread.relative_u,
-                        "holds": spread.holds,
-                        "pulls": list(spread.pulls),
-                    }
-                    for spread in one.spreads
-                ],
-            }
-            for one in checked
-        ],
-    }

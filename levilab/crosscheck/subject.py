@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.errors import LevilabError
-from levilab.present.progress import Mute
+from levilab.present.progress import Display
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,6 +41,24 @@ class Pull:
 
 
 @dataclass(frozen=True)
+class Trial:
+    """One set of readings that was made and analyzed.
+
+    Attributes:
+        pulls: of the quantities.
+        law: that the analysis favours; empty where no laws compete.
+        excluded: whether the analysis excludes what is true; None where it tests nothing.
+        widened: degrees of freedom of u, where that comes from few readings and was multiplied by Student's factor, so
+            that 68 % lie within it; None: it was not.
+    """
+
+    pulls: list[Pull]
+    law: str = ""
+    excluded: bool | None = None
+    widened: float | None = None
+
+
+@dataclass(frozen=True)
 class Subject:
     """One way from a world whose numbers are known to what the analysis says of them.
 
@@ -62,7 +80,7 @@ def acquired(
     Raises TrialFailed; KeyboardInterrupt where Ctrl-C ended the run: it is meant for the whole cross-check.
     """
     request = request_for(experiment, AcquisitionOptions(mock=True, out=folder, seed=seed))
-    run = acquire(change(request), Mute())
+    run = acquire(change(request), Display())
     if run.status == "interrupted":
         raise KeyboardInterrupt
     if run.status != "finished":

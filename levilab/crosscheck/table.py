@@ -1,54 +1,71 @@
-"""What a cross-check found, as a table."""
+"""A cross-check as people see it: the table, what it says as text, the blocks of a report."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
-from levilab.crosscheck.study import COVERAGE
-from levilab.present.numbers import signed
+from analysis.numbers import digits
+from levilab.crosscheck.own.model import OF_ONE_RUN
+from levilab.crosscheck.own.study import ENOUGH, TRIALS
+from levilab.crosscheck.study import LONG_TAILS, Spread, Verdict
+from levilab.present.document.blocks import Note, Paragraph, Tabular
+from levilab.present.numbers import enumeration, signed
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
-    from levilab.crosscheck.study import Checked, Spread
+    from levilab.crosscheck.study import Study
+    from levilab.present.document.blocks import Block
 
-_NUMBERS = ("trials", "mean pull", "s.d. of pulls", "within 1 u", "u/value")
+_NUMBERS = ("pulls", "mean pull", "s.d. of pulls\n(wanted)", "within 1 u\n(wanted)", "u/value")
+#: From so many degrees of freedom on u is as if known.
+_MANY = 30
 
 
-def crosscheck_table(checked: Sequence[Checked]) -> Table:
-    """A row a quantity; the parentheses hold the standard errors that so few trials leave."""
+def crosscheck_table(studies: Sequence[Study], symbols: Mapping[str, str] | None = None) -> Table:
+    """Return a table with a row a quantity; behind ± stands the standard error, in parentheses what is wanted.
+
+    Args:
+        studies: with their trials.
+        symbols: quantity → its symbol.
+    """
     return table(
-        "Pulls: (estimate − truth)/u; wanted are 0, 1 and 68 %",
+        "Pulls: (estimate − truth)/u",
         ("", "quantity", *_NUMBERS, "as wanted"),
-        _rows(checked),
+        _rows(studies, symbols or {}),
         numbers=_NUMBERS,
     )
 
 
-def _rows(checked: Sequence[Checked]) -> Iterator[Row]:
-    for one in checked:
-        for k, spread in enumerate(one.spreads):
-            cells = _cells(spread)
-            yield Row((one.subject.name if k == 0 else "", *cells), "together" if k == 0 else "")
+def _rows(studies: Sequence[Study], symbols: Mapping[str, str]) -> Iterator[Row]:
+    for study in studies:
+        for k, one in enumerate(study.spreads):
+            cells = (
+                study.name if k == 0 else "",
+                _name(one.quantity, symbols),
+                str(one.n),
+                f"{signed(one.mean, 2)} ± {one.u_mean:.2f}",
+                _deviation(one),
+                f"{100 * one.coverage:.0f} ± {100 * one.u_coverage:.0f} % ({100 * one.wanted_coverage:.0f} %)",
+                "–" if one.relative_u is None else _percent(one.relative_u),
+                one.verdict.value,
+            )
+            yield Row(cells, "together" if k == 0 else "")
 
 
-def _cells(spread: Spread) -> tuple[str, ...]:
-    n = spread.n
-    return (
-        spread.quantity,
-        str(n),
-        f"{signed(spread.mean, 2)} ± {1 / math.sqrt(n):.2f}",
-        "–" if math.isnan(spread.deviation) else f"{spread.deviation:.2f} ± {1 / math.sqrt(2 * n):.2f}",
-        f"{100 * spread.coverage:.0f} ± {100 * math.sqrt(COVERAGE * (1 - COVERAGE) / n):.0f} %",
-        _percent(spread.relative_u),
-        "yes" if spread.holds else "NO",
-    )
+def _deviation(spread: Spread) -> str:
+    """Return the standard deviation of pulls, and the wanted one; without a judgement where tails are long."""
+    if math.isnan(spread.deviation):
+        return "–"
+    if math.isinf(spread.wanted_deviation):
+        return f"{spread.deviation:.2f} (not judged)"
+    return f"{spread.deviation:.2f} ± {spread.u_deviation:.2f} ({digits(spread.wanted_deviation, 3)})"
 
 
 def _percent(part: float) -> str:
-    """Two digits, and no power of ten.
+    """Return two digits, and no power of ten.
 
     >>> _percent(0.00041), _percent(1.34)
     ('0.041 %', '134 %')
@@ -56,10 +73,101 @@ def _percent(part: float) -> str:
     return f"{100 * part:.0f} %" if abs(part) >= 1 else f"{100 * part:.2g} %"
 
 
-def failures_in_words(checked: Sequence[Checked]) -> list[str]:
-    """A line for each reason for which trials came to no estimate."""
+def _name(quantity: str, symbols: Mapping[str, str]) -> str:
+    """Return the symbol or the name of a quantity.
+
+    >>> _name("c32_of_one_run", {"c32": "C₃/₂"}), _name("start_frequency", {})
+    ('C₃/₂ of one run', 'start frequency')
+    """
+    name = quantity.removesuffix(OF_ONE_RUN)
+    return symbols.get(name, name.replace("_", " ")) + quantity[len(name) :].replace("_", " ")
+
+
+def failures_as_text(study: Study) -> list[str]:
+    """Return a sentence for each reason for which trials came to no estimate."""
     return [
-        f"{one.subject.name}: {count} of {one.trials} trials came to no estimate: {reason}"
-        for one in checked
-        for reason, count in sorted(one.failures.items(), key=lambda item: -item[1])
+        f"{count} of {study.trials} trials came to no estimate: {reason}"
+        for reason, count in sorted(study.failures.items(), key=lambda item: -item[1])
     ]
+
+
+def as_text(study: Study, symbols: Mapping[str, str] | None = None) -> str:
+    """Return what the trials with the parameters of a result say.
+
+    Args:
+        study: the trials.
+        symbols: quantity → its symbol.
+    """
+    texts = [f"{study.trials} trials: {study.about}."]
+    if not study.spreads:
+        texts.append("No trial came to an estimate.")
+    elif study.holds:
+        so_far = "" if study.trials >= ENOUGH else f", as far as so few trials show ({study.trials} of {TRIALS})"
+        texts.append(f"Values and uncertainties of this analysis are right for readings such as these{so_far}.")
+    else:
+        wrong = ", ".join(_name(one.quantity, {}) for one in study.spreads if one.verdict is Verdict.WRONG)
+        texts.append(f"For readings such as these the analysis is not right in {wrong}: trust its u the less.")
+    texts += [*_about_laws(study), *_about_student(study, symbols or {})]
+    texts += [f"{text[0].upper()}{text[1:]}." for text in (*study.more, *failures_as_text(study))]
+    return " ".join(texts)
+
+
+def _about_laws(study: Study) -> Iterator[str]:
+    """Yield how often the best law is the true one, or the true hypothesis is excluded."""
+    if study.law and study.laws:
+        n, again = sum(study.laws.values()), study.laws.get(study.law, 0)
+        others = ", ".join(
+            f"{law} {'once' if count == 1 else f'{count} times'}"
+            for law, count in study.laws.items()
+            if law != study.law
+        )
+        yield (
+            f"The {study.law} law, which is true there, is the best one in {again} of {n} trials"
+            + (f" (else {others})" if others else "")
+            + f", and is excluded in {study.excluded}."
+        )
+    elif study.hypothesis and study.tested:
+        chance = study.expected_share * study.tested
+        yield (
+            f"The test excludes {study.hypothesis} in {study.excluded} of {study.tested} trials; chance alone does so "
+            f"in {chance:.0f} ± {math.sqrt(chance * (1 - study.expected_share)):.0f}."
+        )
+
+
+def _about_student(study: Study, symbols: Mapping[str, str]) -> Iterator[str]:
+    """Yield what Student's law makes of the pulls."""
+    few = {one.quantity: one for one in study.spreads if one.freedom is not None and one.freedom < _MANY}
+    if few:
+        fewest = min(few.values(), key=lambda one: one.freedom or 0)
+        freedom = fewest.freedom or 0
+        share = f"{100 * fewest.wanted_coverage:.0f} %"
+        of = enumeration([_name(name, symbols) for name in few])
+        yield f"As u of {of} comes from the scatter of few values, {share} within 1 u are right (Student's t)."
+        if freedom <= LONG_TAILS:
+            degrees = f"{freedom} degree{'s' * (freedom > 1)} of freedom"
+            # the variance of Student's t is n/(n − 2)
+            tails = "has no finite standard deviation" if freedom <= 2 else "has long tails"
+            yield f"Student's t with {degrees} {tails}, so the standard deviation of these pulls is not judged."
+    widened = next((one for one in study.spreads if one.widened is not None and one.widened < _MANY), None)
+    if widened is not None:
+        wanted = widened.wanted_deviation
+        pulls = f"pulls have a standard deviation of {wanted:.2f}" if math.isfinite(wanted) else "pulls have long tails"
+        yield f"As u comes from few pulses and holds 68 % by Student's factor, {pulls}."
+
+
+def blocks_of(study: Study, symbols: Mapping[str, str] | None = None) -> tuple[Block, ...]:
+    """Return the trials as blocks of a report."""
+    room = max((one.room for one in study.spreads), default=0.0)
+    note = (
+        "A pull is (estimate − truth)/u. Wanted is a mean of 0; the wanted standard deviation and share within 1 u "
+        "stand in parentheses: 1 and 68 %, or what Student's t gives where u comes from few values. Behind ± stands "
+        f"one standard error. Yes: no number misses what is wanted by more than {room:.1f} standard errors, which "
+        "chance does in one right study of a hundred; a smaller standard deviation and a larger share mean that u is "
+        "on the safe side."
+    )
+    return (
+        Paragraph(as_text(study, symbols)),
+        # the readings of the trials are synthetic, whatever the result is of
+        Tabular(f"crosscheck-{study.name}", crosscheck_table([study], symbols), mark="SYNTHETIC."),
+        Note(note),
+    )

@@ -14,6 +14,7 @@ from scipy.special import stdtrit
 from analysis.errors import AnalysisError, TooFewReadings
 from analysis.limits import Sample, summarize
 from analysis.precession.sweep import Sweep, fit_sweep
+from analysis.spindown.drag import LAWS
 from analysis.spindown.fall import times_of_fall
 from analysis.spindown.fit import fit_spin_down
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
@@ -34,14 +35,6 @@ _BEYOND = 4.0
 _NOT_OF_THE_LAW = {"start_frequency", *WOBBLE}
 #: What a head says while readings come, and no more once the run has ended.
 _SO_FAR = re.compile(r"(, the best)? so far")
-#: Equations as the page sets them: what follows ^ in brackets is raised.
-EQUATIONS = {
-    "stokes": "ω̇ = −C₁ ω",
-    "newton": "ω̇ = −C₂ ω^(2)",
-    "disc": "ω̇ = −C ω^(3/2)",
-    "mixed": "ω̇ = −C₁ ω − C₂ ω^(2)",
-    "power": "ω̇ = −c ω^(n)",
-}
 
 
 @dataclass(frozen=True)
@@ -143,7 +136,7 @@ def spin_down(columns: Mapping[str, Array], size: int, _: Mapping[str, Any] = Ma
         f"excluded: {', '.join(found.verdict.excluded)}" if found.verdict.excluded else "",
     ]
     return Running(
-        f"{found.best} law, the best so far   {EQUATIONS[found.best]}",
+        f"{found.best} law, the best so far   {LAWS[found.best].equation}",
         tuple(filter(None, lines)),
         Curve(x, y, solid_to=last),
         end,

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-#: Unit in the files → unit in this laboratory, and how many of it are one of the former.
-LAB_UNITS = {"m": ("cm", 100.0), "T": ("mT", 1000.0)}
+from levilab.present.units import split
 
 
 @dataclass(frozen=True)
@@ -47,15 +46,15 @@ def u_of(column: str) -> str:
     >>> u_of("spin_frequency_hz")
     'spin_frequency_u_hz'
     """
-    quantity, _, unit = column.rpartition("_")
-    return f"{quantity}_u_{unit}"
+    quantity, unit = split(column)
+    return f"{quantity}_u_{unit.ending if unit else ''}"
 
 
 def unit_of(column: str) -> tuple[str, float]:
     """Return the unit in which a column is shown, and how many of it are one of the column's.
 
-    >>> unit_of("height_m"), unit_of("spin_frequency_hz"), unit_of("record")
-    (('cm', 100.0), ('Hz', 1.0), ('', 1.0))
+    >>> [tuple(unit_of(column)) for column in ("height_m", "spin_frequency_hz", "record")]
+    [('cm', 100.0), ('Hz', 1.0), ('', 1.0)]
     """
-    unit = {"hz": "Hz", "s": "s", "v": "V", "t": "T", "m": "m"}.get(column.rpartition("_")[2] if "_" in column else "")
-    return LAB_UNITS.get(unit or "", (unit or "", 1.0))
+    _, unit = split(column)
+    return unit.shown if unit else ("", 1.0)

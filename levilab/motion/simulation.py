@@ -15,6 +15,7 @@ from levilab.files import writing
 from levilab.interruption import interruption_postponed
 from levilab.motion.lines import rate_for
 from levilab.motion.summary import as_document, summarise
+from levilab.runs.events import RunEvent
 from levilab.runs.run import STATES, RunRecord, utc_now
 from levilab.runs.writer import RunWriter
 from levilab.simulator.compilation import announce_compilation
@@ -187,7 +188,7 @@ def _write(summary: Summary, factor: int, writer: RunWriter) -> None:
     rows = kept_rows(summary.motion, factor)
     writer.states(state_rows(summary.motion, rows))
     if summary.motion.fell is not None:
-        writer.event(summary.motion.fell.time, "fell", f"the top {summary.fell}")
+        writer.event(summary.motion.fell.time, RunEvent.FELL, f"the top {summary.fell}")
     with writing(f"could not write {FIGURE} in {writer.folder}", "free space, or choose another place with `out`"):
         save_png(motion_figure(summary), writer.folder / FIGURE)
     writer.finish("finished", simulation=as_document(summary) | {"states": len(rows)})

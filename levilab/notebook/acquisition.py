@@ -11,7 +11,7 @@ from levilab.acquisition.request import request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.errors import DataError, UsageError
-from levilab.present.progress import Mute
+from levilab.present.progress import Display
 from levilab.runs.run import RECORD, Run, find_run
 from levilab.simulator.keys import plain
 
@@ -27,7 +27,7 @@ def acquire_run(experiment: str, options: AcquisitionOptions) -> Run:
     """Run an experiment without a word on the terminal; see `levilab.acquire`."""
     if experiment not in EXPERIMENTS:
         raise UsageError("experiment", f"{', '.join(EXPERIMENTS)} are known", value=experiment)
-    return acquire(request_for(experiment, options), Mute())
+    return acquire(request_for(experiment, options), Display())
 
 
 def as_path(place: str | PathLike[str] | Run | None) -> Path | None:

@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from levilab.errors import DoesNotSuit, LevilabError, UsageError
-from levilab.formats.device import read_device
-from levilab.formats.table import parse_columns
 from levilab.notebook.frame import has_numbers_for_titles, in_rows, is_frame, write_frame
 from levilab.notebook.result import AnalysisResult
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.options import read_options
 from levilab.pipelines.suits import suiting
 from levilab.runs.run import Run, find_run
 
@@ -31,15 +30,6 @@ if TYPE_CHECKING:
 
     One: TypeAlias = "Run | str | PathLike[str] | pd.DataFrame"
 
-_CHOICES = {
-    "tilt": ("auto", "none", "fitted"),
-    "method": ("auto", "edges", "matched", "likelihood"),
-}
-#: Options that are above 0 where they are given, in words.
-_POSITIVE = {
-    "rate": "samples per second are expected, a number above 0 [Hz]",
-    "reading_u": "a standard uncertainty above 0 [Hz] is expected",
-}
 #: What DataFrames are called, in messages and beside saved results.
 _FRAME = "DataFrame"
 
@@ -56,7 +46,7 @@ def analyze_data(data: One | Sequence[One], kind: str | None, given: Mapping[str
         UsageError: an option or `kind` is wrong, or the data suit several analyses equally.
         DataError: the data suit none, or cannot be used.
     """
-    options = _options(given)
+    options = read_options(given)
     items: list[Any] = [data] if _is_one(data) else list(data)  # type: ignore[arg-type]
     if not items:
         raise UsageError("data", "a run, a path or a DataFrame is expected", value="nothing")
@@ -117,28 +107,6 @@ def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
 
 
 # --- options -------------------------------------------------------------------------------------------
-
-
-def _options(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return options as analyses take them, without those that are None.  Raises UsageError, DataError."""
-    options = {name: value for name, value in given.items() if value is not None}
-    for name, choices in _CHOICES.items():
-        if options.get(name, choices[0]) not in choices:
-            raise UsageError(name, f"{', '.join(choices)} are known", value=options[name])
-    for name, expected in _POSITIVE.items():
-        if name in options and not 0 < options[name] < float("inf"):
-            raise UsageError(name, expected, value=options[name])
-    if "height_u_m" in options and "height_m" not in options:
-        raise UsageError("height_u_m", "goes with `height_m` alone")
-    for name, read in (("columns", _columns), ("device", lambda path: read_device(Path(path)))):
-        if name in options:
-            options[name] = read(options[name])
-    return options
-
-
-def _columns(given: Mapping[str, str | int] | str) -> dict[str, str]:
-    """Return names of columns, given as text or as a mapping.  Raises UsageError."""
-    return parse_columns(given) if isinstance(given, str) else {name: str(title) for name, title in given.items()}
 
 
 def _refuse_foreign(analysis: Analysis[Any], options: Mapping[str, Any]) -> None:

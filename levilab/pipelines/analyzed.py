@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from levilab.errors import DataError
+from levilab.pipelines.options import InputOptions
 from levilab.pipelines.result import Place, place_of
-from levilab.pipelines.sources import InputOptions, Needs, Readings, Remark, Skipped, Source, collect
+from levilab.pipelines.sources import Needs, Readings, Remark, Skipped, Source, collect
 from levilab.runs.run import find_run
 
 if TYPE_CHECKING:

@@ -12,8 +12,9 @@ from analysis.uncertainty import Estimate
 from instruments.time_bases import TIME_BASES
 from levilab.pipelines.sources import mark_of
 from levilab.present.document.blocks import Bullets, Details, Note, Paragraph, Tabular
-from levilab.present.numbers import enumeration, in_words, with_uncertainty
+from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.tables import Row, Table, table
+from levilab.present.units import unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -33,7 +34,7 @@ _LEAST_SHARE = 0.001
 
 
 def time_base(source: Source[Any], kind: str, sensitivity: float, given: float | None, *, what: str = "") -> Component:
-    """The row of an instrument's clock, which no repetition shows, so that it is in no u.
+    """Return the row of an instrument's clock, which no repetition shows, so that it is in no u.
 
     Args:
         source: the input.
@@ -63,7 +64,7 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
 
 
 def bench_clock(sensitivity: float) -> Component:
-    """The row of the clock by which readings have their times; see `time_base`."""
+    """Return the row of the clock by which readings have their times; see `time_base`."""
     return Component(
         "bench_clock",
         "clock of the readings' times",
@@ -88,19 +89,19 @@ def direct_row(  # noqa: PLR0917 - the fields of a row
     *,
     included: bool = True,
 ) -> Component:
-    """A row whose size is known in the result's own unit alone [`unit`]; see `Component`."""
+    """Return a row whose size is known in the result's own unit alone [`unit`]; see `Component`."""
     return Component(name, what, kind, part, unit, 1.0, included, note, remedy)
 
 
 def gate_of(source: Source[Any], experiment: str) -> float | None:
-    """The counter's gate [s], where a run says it."""
+    """Return the counter's gate [s], where a run says it."""
     settings = source.run.record.configuration.get(experiment) if source.run else None
     gate = settings.get("gate_s") if isinstance(settings, dict) else None
     return float(gate) if isinstance(gate, int | float) and 0 < gate < _LONGEST_GATE_S else None
 
 
 def setting_of(source: Source[Any], experiment: str, name: str) -> float | None:
-    """A setting of the run's experiment, where that is a number."""
+    """Return a setting of the run's experiment, where that is a number."""
     settings = source.run.record.configuration.get(experiment) if source.run else None
     value = settings.get(name) if isinstance(settings, dict) else None
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
@@ -108,46 +109,44 @@ def setting_of(source: Source[Any], experiment: str, name: str) -> float | None:
 
 # --- how people are shown it ---------------------------------------------------------------------------
 
-#: Unit of results → the one in which people of this laboratory read it, and how many of them make one.
-_SHOWN_UNITS = {"T m": ("mT cm", 1e5), "m": ("mm", 1e3), "T": ("mT", 1e3)}
-
 #: Heads of the table, of which the numbers stand to the right.
 HEADS = ("source", "type", "u of it", "sensitivity", "adds to u", "share of u²")
-#: Unit of a sensitivity where the input has no unit, or the result.
-_NO_UNIT = "1"
+#: Shown unit of a sensitivity where the input has no unit, or the result.
+_NO_UNIT = ""
 
 
 def budget_table(budget: Budget, shown: Mapping[str, str] | None = None) -> Table:
-    """A row for each component: what u is made of, u, and what it does not contain.
+    """Return a row for each component: what u is made of, u, and what it does not contain.
 
     Args:
         budget: of one result.
         shown: quantity → its symbol; by default its name.
     """
     budget = _in_shown_units(budget)
-    unit = in_words(budget.unit)
     rows = [Row(_cells(budget, one)) for one in budget.included]
-    rows.append(Row(("combined: u", "", "", "", _number(budget.u, unit), "100 %"), "together"))
+    rows.append(Row(("combined: u", "", "", "", _number(budget.u, budget.unit), "100 %"), "together"))
     left_out = budget.left_out
     rows += [Row((f"{cells[0]} (not in u)", *cells[1:])) for one in left_out if (cells := _cells(budget, one))]
     if any(one.contribution for one in left_out):
-        rows.append(Row(("u with all that is known", "", "", "", _number(budget.u_with_all, unit), ""), "together"))
+        rows.append(
+            Row(("u with all that is known", "", "", "", _number(budget.u_with_all, budget.unit), ""), "together")
+        )
     return table(title_of(budget, shown), HEADS, rows, numbers=HEADS[2:])
 
 
 def _in_shown_units(budget: Budget) -> Budget:
-    """The same in the units that people read."""
-    unit, factor = _SHOWN_UNITS.get(budget.unit, (budget.unit, 1.0))
+    """Return the same in the units that people read."""
+    shown, factor = unit(budget.unit).fine
     rows = []
     for one in budget.components:
-        of_input, times = _SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+        of_input, times = unit(one.unit).fine
         u = None if one.u is None else one.u * times
         rows.append(replace(one, u=u, unit=of_input, sensitivity=one.sensitivity * factor / times))
-    return replace(budget, value=budget.value * factor, u=budget.u * factor, unit=unit, components=tuple(rows))
+    return replace(budget, value=budget.value * factor, u=budget.u * factor, unit=shown, components=tuple(rows))
 
 
 def title_of(budget: Budget, shown: Mapping[str, str] | None = None) -> str:
-    """The result, with its uncertainty."""
+    """Return the result, with its uncertainty."""
     name = (shown or {}).get(budget.quantity, budget.quantity.replace("_", " "))
     of = f" ({budget.model})" if budget.model else ""
     return f"{name} = {with_uncertainty(Estimate(budget.value, budget.u, budget.unit))}{of}"
@@ -158,9 +157,9 @@ def _cells(budget: Budget, one: Component) -> tuple[str, ...]:
     return (
         one.source,
         one.kind,
-        "not known" if one.u is None else _number(one.u, in_words(one.unit)),
+        "not known" if one.u is None else _number(one.u, one.unit),
         _number(abs(one.sensitivity), _ratio(budget.unit, one.unit)),
-        "—" if one.contribution is None else _number(one.contribution, in_words(budget.unit)),
+        "—" if one.contribution is None else _number(one.contribution, budget.unit),
         _percent(share) if one.included else "",
     )
 
@@ -171,16 +170,16 @@ def _number(value: float, unit: str) -> str:
 
 
 def _ratio(above: str, below: str) -> str:
-    """The unit of a sensitivity."""
+    """Return the unit of a sensitivity."""
     if above == below:
         return ""
     if below == _NO_UNIT:
-        return in_words(above)
-    return f"per {in_words(below)}" if above == _NO_UNIT else f"{in_words(above)} per {in_words(below)}"
+        return above
+    return f"per {below}" if above == _NO_UNIT else f"{above} per {below}"
 
 
 def _percent(share: float | None) -> str:
-    """A share of u².
+    """Return a share of u².
 
     >>> _percent(0.9312), _percent(0.00002), _percent(None)
     ('93 %', '< 0.1 %', '—')
@@ -191,7 +190,7 @@ def _percent(share: float | None) -> str:
 
 
 def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str:
-    """What dominates u of a result, what would make it smaller, and what it does not contain."""
+    """Return what dominates u of a result, what would make it smaller, and what it does not contain."""
     name = (shown or {}).get(budget.quantity, budget.quantity.replace("_", " "))
     budget = _in_shown_units(budget)
     largest, texts = budget.largest, []
@@ -200,7 +199,7 @@ def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str
         texts.append(f"{text}. It gets smaller with {largest.remedy}." if largest.remedy else f"{text}.")
     known = [one for one in budget.left_out if one.contribution]
     if known and not budget.misses_nothing:
-        whole = _number(budget.u_with_all, in_words(budget.unit))
+        whole = _number(budget.u_with_all, budget.unit)
         texts.append(f"Not in u: {enumeration([one.source for one in known])}; with all that is known u is {whole}.")
     elif known:
         texts.append(f"Not in u, and negligible: {enumeration([one.source for one in known])}.")
@@ -208,14 +207,14 @@ def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str
     clocks = [one for one in unknown if one.unit == _NO_UNIT]
     if clocks:
         most = max(abs(one.sensitivity) for one in clocks) * _TEN_PPM
-        size = "less than 1 % of u" if most < 0.01 * budget.u else _number(most, in_words(budget.unit))
+        size = "less than 1 % of u" if most < 0.01 * budget.u else _number(most, budget.unit)
         texts.append(f"Not known: {enumeration([one.source for one in clocks])}; an error of 10⁻⁵ would add {size}.")
     texts += [f"Not known: {one.source}; it takes {one.remedy}." for one in unknown if one not in clocks]
     return " ".join(texts)
 
 
 def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, str] | None = None) -> tuple[Block, ...]:
-    """The budgets of what was found: of all inputs together, and of each.
+    """Return the budgets of what was found: of all inputs together, and of each.
 
     Args:
         found: by an analysis.
@@ -234,7 +233,7 @@ def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, s
     if printed < len(each) and not found.budget:
         each.append(Note("Only the first of them is printed; all are in the report as HTML, and in result.json."))
     if not found.budget and not each:
-        return (Paragraph("The result was written before budgets were kept with it: levilab analyze makes them."),)
+        return (Paragraph("No uncertainty was determined, so that there is none to divide."),)
     together = budget_blocks(found.budget, shown, mark=lambda budget: mark_of(found.inputs_of(budget.group)))
     return (*together, *each)
 
@@ -242,7 +241,7 @@ def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, s
 def _by_itself(
     source: Source[Any], budgets: Sequence[Budget], shown: Mapping[str, str] | None, *, is_printed: bool
 ) -> Details:
-    """The budgets of one input among several."""
+    """Return the budgets of one input among several."""
     blocks = budget_blocks(budgets, shown, source.name, lambda _: mark_of([source]))
     return Details(f"{source.name} by itself", blocks, on_paper="whole" if is_printed else "out")
 

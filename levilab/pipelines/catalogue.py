@@ -9,34 +9,33 @@ from typing import TYPE_CHECKING, Any, Generic
 from levilab.errors import unquoted
 from levilab.pipelines.analyzed import A
 from levilab.pipelines.budget import budgets_of_result
-from levilab.pipelines.field.columns import field_columns
 from levilab.pipelines.field.document import DOCUMENT as FIELD
-from levilab.pipelines.field.quantities import SHOWN
+from levilab.pipelines.field.quantities import FIELD_ROW
+from levilab.pipelines.field.quantities import QUANTITIES as FIELD_QUANTITIES
 from levilab.pipelines.field.report import field_part
-from levilab.pipelines.field.row import FIELD_ROW
-from levilab.pipelines.field.table import field_tables
-from levilab.pipelines.limit.columns import limit_columns
+from levilab.pipelines.field.table import field_columns, field_tables
 from levilab.pipelines.limit.document import DOCUMENT as LIMIT
+from levilab.pipelines.limit.quantities import LIMIT_ROW
+from levilab.pipelines.limit.quantities import QUANTITIES as LIMIT_QUANTITIES
 from levilab.pipelines.limit.report import limit_part
-from levilab.pipelines.limit.row import LIMIT_ROW
-from levilab.pipelines.limit.table import limit_tables
-from levilab.pipelines.precession.columns import precession_columns
+from levilab.pipelines.limit.table import limit_columns, limit_tables
 from levilab.pipelines.precession.document import DOCUMENT as PRECESSION
+from levilab.pipelines.precession.quantities import PRECESSION_ROW
+from levilab.pipelines.precession.quantities import QUANTITIES as PRECESSION_QUANTITIES
 from levilab.pipelines.precession.report import precession_part
-from levilab.pipelines.precession.row import PRECESSION_ROW
-from levilab.pipelines.precession.table import precession_tables
+from levilab.pipelines.precession.table import precession_columns, precession_tables
 from levilab.pipelines.result import Place
-from levilab.pipelines.spin.columns import spin_columns
+from levilab.pipelines.row import symbols_of
 from levilab.pipelines.spin.document import DOCUMENT as SPIN
+from levilab.pipelines.spin.quantities import QUANTITIES as SPIN_QUANTITIES
+from levilab.pipelines.spin.quantities import SPIN_ROW
 from levilab.pipelines.spin.report import spin_part
-from levilab.pipelines.spin.row import SPIN_ROW
-from levilab.pipelines.spin.table import spin_tables
-from levilab.pipelines.spindown.columns import spindown_columns
+from levilab.pipelines.spin.table import spin_columns, spin_tables
 from levilab.pipelines.spindown.document import DOCUMENT as SPINDOWN
 from levilab.pipelines.spindown.laws import SYMBOLS
+from levilab.pipelines.spindown.quantities import SPINDOWN_ROW
 from levilab.pipelines.spindown.report import spindown_part
-from levilab.pipelines.spindown.row import SPINDOWN_ROW
-from levilab.pipelines.spindown.table import spindown_tables
+from levilab.pipelines.spindown.table import spindown_columns, spindown_tables
 from levilab.present.clock import moment
 from levilab.present.numbers import short_name
 
@@ -48,9 +47,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from levilab.pipelines.document import Document
+    from levilab.pipelines.options import InputOptions
     from levilab.pipelines.part import ReportPart
     from levilab.pipelines.row import Column
-    from levilab.pipelines.sources import InputOptions, Needs
+    from levilab.pipelines.sources import Needs
     from levilab.present.document.blocks import Block
     from levilab.present.style import Figure
     from levilab.present.tables import Table
@@ -72,8 +72,6 @@ class Analysis(Generic[A]):
         columns: the readings of each input as columns of a table, with residuals.
         row: the columns that an input has as one row of a table of many.
         symbols: of its quantities, for people.
-
-    Its figure is in `levilab.pipelines.figures`.
     """
 
     result: Document[Any, Any, Any, A, Any]
@@ -123,10 +121,21 @@ class Analysis(Generic[A]):
 
     def figure(self, found: A) -> Figure:
         """Draw the figure."""
-        from levilab.pipelines.figures import FIGURES  # with matplotlib
+        # with matplotlib
+        from levilab.pipelines.field.figure import field_figure
+        from levilab.pipelines.limit.figure import limit_figure
+        from levilab.pipelines.precession.figure import precession_figure
+        from levilab.pipelines.spin.figure import spin_figure
+        from levilab.pipelines.spindown.figure import spindown_figure
 
-        figure: Figure = FIGURES[self.name](found)
-        return figure
+        figures: dict[str, Callable[[Any], Figure]] = {
+            "spindown": spindown_figure,
+            "spin": spin_figure,
+            "field": field_figure,
+            "limit": limit_figure,
+            "precession": precession_figure,
+        }
+        return figures[self.name](found)
 
     def png(self, found: A) -> bytes:
         """Draw the figure, as PNG."""
@@ -135,18 +144,19 @@ class Analysis(Generic[A]):
         return as_png(self.figure(found))
 
 
-#: What a scan's quantities are called.
-FIELD_WORDS = MappingProxyType({name: one.words for name, one in SHOWN.items()})
-
-#: The chirp of result.json is the slope of the tables.
-SPIN_WORDS = MappingProxyType({"chirp": "slope"})
-
 _TABLE: tuple[Analysis[Any], ...] = (
     Analysis(SPINDOWN, spindown_tables, spindown_part, spindown_columns, SPINDOWN_ROW, SYMBOLS),
-    Analysis(SPIN, spin_tables, spin_part, spin_columns, SPIN_ROW, SPIN_WORDS),
-    Analysis(FIELD, field_tables, field_part, field_columns, FIELD_ROW, FIELD_WORDS),
-    Analysis(LIMIT, limit_tables, limit_part, limit_columns, LIMIT_ROW),
-    Analysis(PRECESSION, precession_tables, precession_part, precession_columns, PRECESSION_ROW),
+    Analysis(SPIN, spin_tables, spin_part, spin_columns, SPIN_ROW, symbols_of(SPIN_QUANTITIES)),
+    Analysis(FIELD, field_tables, field_part, field_columns, FIELD_ROW, symbols_of(FIELD_QUANTITIES.values())),
+    Analysis(LIMIT, limit_tables, limit_part, limit_columns, LIMIT_ROW, symbols_of(LIMIT_QUANTITIES)),
+    Analysis(
+        PRECESSION,
+        precession_tables,
+        precession_part,
+        precession_columns,
+        PRECESSION_ROW,
+        symbols_of(PRECESSION_QUANTITIES),
+    ),
 )
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
     from analysis.budget import Budget
     from analysis.uncertainty import Estimate
+    from levilab.pipelines.options import InputOptions
     from levilab.pipelines.result import Place
-    from levilab.pipelines.sources import Found, InputOptions, Source
+    from levilab.pipelines.sources import Found, Source
 
 #: The data file's own names of columns: an empty table where none were given.
 Columns = Annotated[
@@ -206,7 +207,6 @@ def _budget(budgets: Sequence[Budget]) -> dict[str, Any]:
 #: Statistics that a result has of each model; None where a model has no such number.
 _STATISTICS = (
     "n", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson", "runs_test_p", "difference",
-    "n_effective",
 )  # fmt: skip
 
 

@@ -3,10 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from analysis.numbers import digits
+from levilab.present.numbers import short_name
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from levilab.pipelines.analyzed import Analyzed
+    from levilab.pipelines.sources import Source
     from levilab.present.document.blocks import Block, Points
+
+#: How an estimate is written.
+VALUE_U = "value(u): the digits in parentheses are the standard uncertainty of the last digits."
 
 
 @dataclass(frozen=True)
@@ -77,3 +90,57 @@ def first_of(shown: int, count: int) -> str:
     ('The first 200 of 20000; all of them are in the data.', '')
     """
     return f"The first {shown} of {count}; all of them are in the data." if count > shown else ""
+
+
+def input_parts(
+    analysis: Analyzed[Any, Any, Any, Any],
+    readings: Callable[[Source[Any], Any, Any], tuple[str, ...]],
+    blocks: Callable[[Source[Any], Any, Any], tuple[Block, ...]],
+    alone: Callable[[Any], str] = lambda run: str(run.text),
+) -> tuple[InputPart, ...]:
+    """Return the part of each input.
+
+    Args:
+        analysis: of all inputs.
+        readings: from an input, what was found of it, and the options that this was found with.
+        blocks: likewise.
+        alone: from what was found of an input.
+    """
+    return tuple(
+        InputPart(readings(source, run, origin.options), origin.text, alone(run), blocks(source, run, origin.options))
+        for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
+    )
+
+
+def title_of(subject: str, sources: Sequence[Source[Any]], noun: str = "run") -> str:
+    """Return the title of a first table: the subject, the number of inputs, and how many are synthetic."""
+    total, synthetic = len(sources), sum(source.synthetic for source in sources)
+    mark = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
+    return f"{subject}, {total} {noun}{'s' * (total > 1)}{mark}"
+
+
+def labels_of(sources: Sequence[Source[Any]]) -> list[str]:
+    """Return the names of several inputs; of a single one an empty text."""
+    return [short_name(source.name) if len(sources) > 1 else "" for source in sources]
+
+
+def size_of_u(u: NDArray[np.float64]) -> str:
+    """Return the least and the greatest standard uncertainty of readings [Hz], as text."""
+    low, high = float(u.min()), float(u.max())
+    return f"{digits(low)} Hz" if low == high else f"{digits(low)} Hz to {digits(high)} Hz"
+
+
+def origin_of_u(source: Source[Any], column: str, options: Any) -> str:
+    """Return where the uncertainties of readings come from.
+
+    Args:
+        source: the input.
+        column: of the uncertainties.
+        options: of the analysis.
+    """
+    if options.reading_u is not None:
+        return "as given to the analysis"
+    channels = source.run.record.channels if source.run else []
+    return next(
+        (str(c["source"]) for c in channels if c.get("name") == column and c.get("source")), "from a column of the data"
+    )

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, Self, TypeVa
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from analysis.budget import Budget, Component
-from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.files import parse_json, replace_atomically, writing
 from levilab.pipelines.dump import Dump
@@ -59,11 +58,6 @@ class Value(Part):
         if self.scatter is not None and self.runs is None:
             raise ValueError("a scatter does not say of how many runs it is")
         return self
-
-    @property
-    def estimate(self) -> Estimate:
-        """The quantity as the analyses know it."""
-        return Estimate(self.value, self.u, self.unit, self.interval_68)
 
 
 class Input(Part):

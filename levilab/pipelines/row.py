@@ -1,28 +1,26 @@
-"""The columns that an analysis has in a table of many runs, and the values in them.
+"""The quantities of an analysis: one row each, from which result.json, tables, budgets and columns are made.
 
-A column is read from the input's part of result.json, so that the table and the result say the same.
+A column of a table of many runs is read from the input's part of result.json, so that both say the same.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from types import MappingProxyType
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
+from analysis.uncertainty import Estimate
+from levilab.present.numbers import column
+from levilab.present.units import name_with_unit, unit
+
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+    from levilab.present.units import Scale
 
 #: The type of a column: a float, a whole number, true or false, text.
 Kind = Literal["number", "count", "truth", "text"]
 
 Cell = str | float | int | bool | None
-
-#: Units of results → the end of a column's name.
-UNITS_IN_NAMES = MappingProxyType({
-    "Hz": "hz", "s": "s", "1": "", "1/s": "per_s", "1/rad": "per_rad", "(rad/s)^-1/2/s": "per_sqrt_rad_s",
-    "(rad/s)^(1-exponent)/s": "si", "Hz/s": "hz_per_s", "Hz/s^2": "hz_per_s2", "turns": "turns", "dB": "db",
-    "T": "t", "T m": "t_m", "m": "m", "m/kg": "m_per_kg", "kg": "kg", "rad": "rad",
-})  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -41,13 +39,104 @@ class Column:
     read: Callable[[Mapping[str, Any]], Any]
 
 
-def name_with_unit(name: str, unit: str) -> str:
-    """A quantity's name with its unit.
+@dataclass(frozen=True)
+class Quantity:
+    """A number that an analysis finds.
 
-    >>> name_with_unit("newton_c2_u", "1/rad"), name_with_unit("slope", "1")
-    ('newton_c2_u_per_rad', 'slope')
+    Attributes:
+        name: in result.json, and with its unit of the column.
+        unit: of results; see `levilab.present.units`.
+        meaning: for people.
+        symbol: in tables and budgets, by default the name.
+        of: attribute path from what the analysis found to an Estimate or a number; empty: the name; or a function.
+        u: attribute path to the standard uncertainty of a number.
+        has_u: whether it has a standard uncertainty, and a column for that.
+        optional: whether it is left out where it is not found, in the place of null.
+        fine: whether people read it in the fine unit, as dimensions, rather than in that of the bench.
+        column: whether a table of many runs has it.
     """
-    return f"{name}_{UNITS_IN_NAMES[unit]}".removesuffix("_")
+
+    name: str
+    unit: str
+    meaning: str
+    symbol: str = ""
+    of: str | Callable[[Any], Estimate | float | None] = ""
+    u: str = ""
+    has_u: bool = True
+    optional: bool = False
+    fine: bool = False
+    column: bool = True
+
+    @property
+    def shown_symbol(self) -> str:
+        """Its symbol, or its name."""
+        return self.symbol or self.name.replace("_", " ")
+
+    @property
+    def head(self) -> str:
+        """Symbol and unit, above a column."""
+        return f"{self.shown_symbol} [{self._scale.unit}]" if self._scale.unit else self.shown_symbol
+
+    @property
+    def _scale(self) -> Scale:
+        return unit(self.unit).fine if self.fine else unit(self.unit).shown
+
+    def find(self, found: Any) -> Estimate | None:
+        """Return the quantity of what was found; None where it is left out."""
+        value = self.of(found) if callable(self.of) else _at(found, self.of or self.name)
+        if value is None and self.optional:
+            return None
+        if isinstance(value, Estimate):
+            return replace(value, unit=self.unit)
+        return Estimate(value, _at(found, self.u) if self.u else None, self.unit)
+
+    def show(self, estimate: Estimate) -> Estimate:
+        """Return an estimate in the unit that people read."""
+        text, factor = self._scale
+        value, u = (None if one is None else one * factor for one in (estimate.value, estimate.u))
+        return Estimate(value, u, text)
+
+    def show_all(self, of_each: Sequence[Any]) -> tuple[Estimate | None, ...]:
+        """Return the quantity of each of several things that were found, in the unit that people read."""
+        return tuple(self.show(value) if (value := self.find(found)) else None for found in of_each)
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """The columns of its value and of its standard uncertainty."""
+        if not self.has_u:
+            return (_of_value(self.name, self.name, self.unit, self.meaning, "value"),)
+        return estimate(self.name, self.unit, self.meaning)
+
+
+def _at(found: Any, path: str) -> Any:
+    """Return what stands at an attribute path; None where something on the way is None."""
+    for name in path.split("."):
+        if found is None:
+            return None
+        found = getattr(found, name)
+    return found
+
+
+def find_all(quantities: Iterable[Quantity], found: Any) -> dict[str, Estimate]:
+    """Return the quantities of what was found, by their names."""
+    return {one.name: value for one in quantities if (value := one.find(found)) is not None}
+
+
+def cells_of(quantities: Iterable[Quantity], of_each: Sequence[Any]) -> list[list[str]]:
+    """Return a column of cells for each quantity, with a row for each of several things that were found."""
+    return [column(one.show_all(of_each)) for one in quantities]
+
+
+def symbols_of(quantities: Iterable[Quantity]) -> dict[str, str]:
+    """Return how budgets and tables name quantities."""
+    return {one.name: one.shown_symbol for one in quantities}
+
+
+def columns_of(quantities: Iterable[Quantity]) -> Iterator[Column]:
+    """Yield the columns of quantities."""
+    for one in quantities:
+        if one.column:
+            yield from one.columns
 
 
 def estimate(
@@ -56,29 +145,39 @@ def estimate(
     meaning: str,
     read: Callable[[Mapping[str, Any]], Mapping[str, Any] | None] | None = None,
 ) -> tuple[Column, Column]:
-    """The columns of a quantity: its value and its standard uncertainty.
+    """Return the columns of an estimate: its value and its standard uncertainty.
 
     Args:
         name: of the column, without the unit.
         unit: as results have it.
         meaning: for people.
-        read: from the input's part to the quantity; by default that of the same name among its values.
+        read: from the input's part to the estimate; by default that of the same name among its values.
     """
+    of_u = f"its standard uncertainty ({meaning})"
+    return _of_value(name, name, unit, meaning, "value", read), _of_value(name, f"{name}_u", unit, of_u, "u", read)
+
+
+def _of_value(  # noqa: PLR0917 - the fields of a column
+    name: str,
+    heading: str,
+    unit: str,
+    meaning: str,
+    key: str,
+    read: Callable[[Mapping[str, Any]], Mapping[str, Any] | None] | None = None,
+) -> Column:
     find = read or (lambda part: part["values"].get(name))
-    return (
-        Column(name_with_unit(name, unit), "number", meaning, lambda part: (find(part) or {}).get("value")),
-        Column(name_with_unit(f"{name}_u", unit), "number", f"its standard uncertainty ({meaning})",
-               lambda part: (find(part) or {}).get("u")),
-    )  # fmt: skip
+    return Column(name_with_unit(heading, unit), "number", meaning, lambda part: (find(part) or {}).get(key))
 
 
-def value(name: str, unit: str, meaning: str, *, kind: Kind = "number") -> Column:
-    """The column of a value that has no uncertainty."""
-    return Column(name_with_unit(name, unit), kind, meaning, lambda part: (part["values"].get(name) or {}).get("value"))
+def statistic(name: str, unit: str, meaning: str, heading: str = "", *, kind: Kind = "number") -> Column:
+    """Return the column of a statistic of an analysis with one model."""
+    return Column(
+        name_with_unit(heading or name, unit), kind, meaning, lambda part: part["models"][0]["statistics"][name]
+    )
 
 
 def entry(name: str, kind: Kind, meaning: str, key: str = "") -> Column:
-    """The column of what stands beside the values, by its dotted key, by default the name; of a list its length."""
+    """Return the column of what stands beside the values, by its dotted key or its name; of a list its length."""
 
     def read(part: Mapping[str, Any]) -> Any:
         found: Any = part
@@ -101,7 +200,7 @@ def plain(found: Any, kind: Kind) -> Cell:
 
 
 def text_of(cell: Cell) -> str:
-    """A value as text, empty for None; a float with all its digits.
+    """Return a value as text, empty for None; a float with all its digits.
 
     >>> text_of(0.1 + 0.2), text_of(True), text_of(None)
     ('0.30000000000000004', 'true', '')
@@ -112,7 +211,7 @@ def text_of(cell: Cell) -> str:
 
 
 def value_of_text(text: str, kind: Kind) -> Cell:
-    """The value of a text.  Raises ValueError."""
+    """Return the value of a text.  Raises ValueError."""
     if not text:
         return None
     if kind == "text":

@@ -20,25 +20,10 @@ from levilab.present.numbers import list_in_words
 from levilab.runs.run import READINGS, RECORD, Run, find_runs
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from datetime import datetime
 
-
-@dataclass(frozen=True)
-class InputOptions:
-    """How inputs are read, whatever is done with them; each analysis adds its own options.
-
-    Attributes:
-        columns: the data file's own names.
-        channel: of a record with several.
-        rate: samples per second [Hz], in the place of what the file says.
-        guess: whether a file without titles is taken for what it looks like.
-    """
-
-    columns: Mapping[str, str] | None = None
-    channel: str | None = None
-    rate: float | None = None
-    guess: bool = True
+    from levilab.pipelines.options import InputOptions
 
 
 class Readings(Protocol):

@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 
     from levilab.pipelines.analyzed import A
     from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.options import InputOptions
     from levilab.pipelines.result import Archive, Written
-    from levilab.pipelines.sources import InputOptions, Remark, Source
+    from levilab.pipelines.sources import Remark, Source
 
     Tell = Callable[[str], None]
 

@@ -26,7 +26,7 @@ _STEERING = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u2
 
 
 def printable(text: str) -> str:
-    r"""A text of unknown origin as it is printed: nothing in it steers the terminal; line feeds stay.
+    r"""Return a text of unknown origin as it is printed: nothing in it steers the terminal; line feeds stay.
 
     >>> print(printable("a file's name \x1b[31min red\x1b]0;and a title\x07"))
     a file's name �[31min red�]0;and a title�
@@ -35,7 +35,7 @@ def printable(text: str) -> str:
 
 
 def for_encoding(text: str, encoding: str | None) -> str:
-    """The text itself where the encoding has all its characters, else the nearest that it has.
+    """Return the text itself where the encoding has all its characters, else the nearest that it has.
 
     >>> for_encoding("C₃/₂ = 2.339(26)×10⁻⁴ (rad/s)^−½/s", "ascii")
     'C3/2 = 2.339(26)e-4 (rad/s)^-1/2/s'

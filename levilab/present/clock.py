@@ -13,7 +13,7 @@ _LONGEST_S = 1e9
 
 
 def local(utc: str | None) -> datetime | None:
-    """A time of run.json on the local clock; None for what is no time."""
+    """Return a time of run.json on the local clock; None for what is no time."""
     try:
         return datetime.fromisoformat(utc).astimezone() if utc else None
     except (ValueError, OverflowError):
@@ -30,7 +30,7 @@ def moment(when: datetime) -> str:
 
 
 def offset(when: datetime) -> str:
-    """The offset from UTC.
+    """Return the offset from UTC.
 
     >>> offset(datetime.fromisoformat("2026-11-21T01:52:00-03:30"))
     '-03:30'

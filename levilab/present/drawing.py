@@ -62,7 +62,7 @@ def headline(figure: Figure, text: str, synthetic: str = "") -> None:
 
 
 def synthetic_mark(made_up: Sequence[bool]) -> str:
-    """What stands in the mark, for inputs of which some are synthetic; empty where none is.
+    """Return what stands in the mark, for inputs of which some are synthetic; empty where none is.
 
     >>> synthetic_mark([True, True]), synthetic_mark([True, False]), synthetic_mark([False])
     ('SYNTHETIC', '1 of 2 SYNTHETIC', '')

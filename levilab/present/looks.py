@@ -7,9 +7,12 @@ what stands together differs in its dashes, markers or hatch as well, for print 
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
+
+from analysis.spindown.drag import LAWS
 
 BLACK, GREY, PALE = "#000000", "#6E6E6E", "#D9D9D9"
 BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
@@ -17,6 +20,7 @@ ORANGE, SKY, YELLOW = "#E69F00", "#56B4E9", "#F0E442"
 
 #: Lines as (offset, dashes) in parts of their width.
 _SOLID, _DASHED, _DOTTED, _DASH_DOT, _LONG = "-", (0, (4, 2)), (0, (1, 1.6)), (0, (6, 2, 1, 2)), (0, (9, 2))
+_DASH_DOT_DOT = (0, (6, 2, 1, 2, 1, 2))
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,11 @@ class Look:
         return {"color": self.colour, "linestyle": "none", "marker": self.marker, "markerfacecolor": face}
 
 
+#: Of the drag laws, in the order of their table.
+_LAWS = (
+    Look(BLUE, _DASH_DOT), Look(VERMILION, _DASHED), Look(GREEN), Look(PURPLE, _LONG), Look(ORANGE, _DOTTED),
+    Look(SKY, _DASH_DOT_DOT), Look(YELLOW, _DASHED),
+)  # fmt: skip
 #: By the thing's name.
 LOOKS = MappingProxyType({
     # what was measured
@@ -71,11 +80,7 @@ LOOKS = MappingProxyType({
     "precession": Look(PURPLE, _DASH_DOT, "D"),
     "pulses": Look(VERMILION, _DASHED),
     # drag laws
-    "stokes": Look(BLUE, _DASH_DOT),
-    "newton": Look(VERMILION, _DASHED),
-    "disc": Look(GREEN, _SOLID),
-    "mixed": Look(PURPLE, _LONG),
-    "power": Look(ORANGE, _DOTTED),
+    **dict(zip(LAWS, itertools.cycle(_LAWS), strict=False)),
     # phases of a run
     "coasting": Look(GREEN, _SOLID, hatch=""),
     "held": Look(VERMILION, _SOLID, hatch="///"),
@@ -99,7 +104,7 @@ LOOKS = MappingProxyType({
 #: Things that stand in one figure.
 TOGETHER = (
     ("readings", "left out", "fit", "robust", "locked"),
-    ("readings", "stokes", "newton", "disc", "mixed", "power"),
+    ("readings", *LAWS),
     ("readings", "pulses", "fit"),
     ("coasting", "held", "speeding-up"),
     ("drive", "top", "washers"),

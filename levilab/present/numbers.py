@@ -7,28 +7,12 @@ import re
 from typing import TYPE_CHECKING
 
 from analysis.numbers import digits, with_minus
+from levilab.present.units import unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from analysis.uncertainty import Estimate
-
-#: Units as people write them, where the files' plain text is harder to read.
-UNITS = {
-    "1": "",
-    "1/s": "s⁻¹",
-    "Hz/s^2": "Hz/s²",
-    "1/rad": "rad⁻¹",
-    "(rad/s)^-1/2/s": "(rad/s)^−½/s",
-    "(rad/s)^(1-exponent)/s": "(rad/s)^(1−n)/s",
-}
-
-#: Units that people are shown; no other text behind a number is a unit.
-KNOWN_UNITS = frozenset({
-    *filter(None, UNITS.values()), "%", "°", "dB", "rad", "mrad", "s", "ms", "µs", "min", "h",
-    "Hz", "kHz", "MHz", "mHz", "µHz", "Hz/s", "mHz/s", "m", "cm", "mm", "µm", "m/s", "m/kg", "kg", "g", "mg",
-    "T", "mT", "µT", "T m", "mT cm", "A m²", "V", "mV", "µV", "Vpp", "A", "Ω", "kΩ", "MΩ", "K", "J", "turns",
-})  # fmt: skip
 
 #: Names that a sentence lists at most.
 MOST_NAMES = 4
@@ -48,7 +32,7 @@ def with_uncertainty(estimate: Estimate) -> str:
     >>> with_uncertainty(Estimate(1.047e-5, None, "1/rad"))
     '1.047×10⁻⁵ rad⁻¹, u not determined'
     """
-    text = f"{without_unit(estimate)} {in_words(estimate.unit)}".strip()
+    text = f"{without_unit(estimate)} {unit(estimate.unit).text}".strip()
     return text if estimate.u is not None or estimate.value is None else f"{text}, u not determined"
 
 
@@ -93,7 +77,7 @@ def column(estimates: Iterable[Estimate | None]) -> list[str]:
 
 
 def ends(estimate: Estimate) -> tuple[str, str] | None:
-    """The ends of the 68 % interval, where there is one, with the digits that u gives the value.
+    """Return the ends of the 68 % interval, where there is one, with the digits that u gives the value.
 
     >>> from analysis.uncertainty import Estimate
     >>> ends(Estimate(2.3687e-4, 3.0e-7, "1/s", (2.365e-4, 2.371e-4)))
@@ -103,23 +87,6 @@ def ends(estimate: Estimate) -> tuple[str, str] | None:
         return None
     low, high = (re.sub(r"\(.*?\)", "", _number(end, estimate.u)) for end in estimate.interval)
     return low, high
-
-
-def in_words(unit: str) -> str:
-    """A unit as people write it."""
-    return UNITS.get(unit, unit)
-
-
-def is_unit(text: str) -> bool:
-    """Whether a text is a unit that people are shown, or such units with "per" between them or before one.
-
-    >>> [is_unit(text) for text in ("mT cm", "Hz per s", "per Hz", "%")]
-    [True, True, True, True]
-    >>> [is_unit(text) for text in ("s ago", "Hz (u not known)", "of 120", "Hz per", "")]
-    [False, False, False, False, False]
-    """
-    above, per, below = f" {text}".rpartition(" per ")
-    return below.strip() in KNOWN_UNITS and (not per or above.strip() in {"", *KNOWN_UNITS})
 
 
 def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> str:
@@ -141,7 +108,7 @@ def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> s
 
 
 def enumeration(names: Sequence[str]) -> str:
-    """The names one after the other, in a sentence.
+    """Return the names one after the other, in a sentence.
 
     >>> enumeration(["disc"]), enumeration(["disc", "stokes", "newton"])
     ('disc', 'disc, stokes and newton')
@@ -150,7 +117,7 @@ def enumeration(names: Sequence[str]) -> str:
 
 
 def list_in_words(names: Sequence[str]) -> str:
-    """The names, or the first of them.
+    """Return the names, or the first of them.
 
     >>> list_in_words(["a", "b", "c", "d", "e", "f"])
     'a, b, c, d and 2 more'
@@ -160,7 +127,7 @@ def list_in_words(names: Sequence[str]) -> str:
 
 
 def with_decimals(value: float, decimals: int) -> str:
-    """A number with so many digits after the point; a zero has no sign.
+    """Return a number with so many digits after the point; a zero has no sign.
 
     >>> with_decimals(-0.254, 2), with_decimals(-0.001, 2)
     ('−0.25', '0.00')
@@ -169,7 +136,7 @@ def with_decimals(value: float, decimals: int) -> str:
 
 
 def signed(value: float, decimals: int) -> str:
-    """A number with its sign, and none where it rounds to zero.
+    """Return a number with its sign, and none where it rounds to zero.
 
     >>> signed(0.471, 2), signed(-0.002, 2), signed(-1.614, 2)
     ('+0.47', '0.00', '−1.61')
@@ -205,7 +172,7 @@ def off(value: float, u: float | None) -> str:
 
 
 def reading(value: float, u: float | None, residual: float | None) -> tuple[str, str, str]:
-    """A reading, its uncertainty and what a fit leaves over, for three columns; a dash for what is not known.
+    """Return a reading, its uncertainty and what a fit leaves over, for three columns; a dash for what is not known.
 
     >>> reading(39.93661, 0.03, -0.012), reading(39.9, None, None)
     (('39.937', '0.030', '−0.012'), ('39.90000', '—', '—'))
@@ -218,7 +185,7 @@ def reading(value: float, u: float | None, residual: float | None) -> tuple[str,
 
 
 def short_name(name: str) -> str:
-    """A run's name without the time that it begins with.
+    """Return a run's name without the time that it begins with.
 
     >>> short_name("20261120T101500Z-spin-7f3a")
     'spin-7f3a'
@@ -227,7 +194,7 @@ def short_name(name: str) -> str:
 
 
 def plain(value: float | None, count: int = 3) -> str:
-    """A statistic in so many digits, zeros at the end included; a larger number in whole ones; a dash for none.
+    """Return a statistic in so many digits, zeros at the end included; a larger number in whole ones; a dash for none.
 
     >>> plain(0.0312345), plain(0.21), plain(4478.2), plain(2.34e-14, 2), plain(None)
     ('0.0312', '0.210', '4478', '2.3×10⁻¹⁴', '—')

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from levilab.present.characters import for_encoding, printable
 from levilab.present.panel import Trend, bench_lines, time_left_in_words
@@ -25,8 +25,8 @@ _DRAWN_EVERY_S = 0.25
 _STYLES = {"plain": "", "strong": "bold", "on": "green", "off": "dim", "alarm": "bold red"}
 
 
-class Display(Protocol):
-    """What an acquisition reports to."""
+class Display:
+    """The progress of an acquisition; this one shows nothing, others override what they show."""
 
     def preparing(self, text: str, fraction: float) -> None:
         """Show how far the bench is prepared."""
@@ -44,7 +44,8 @@ class Display(Protocol):
         """Show a line of its own."""
 
     def is_due(self) -> bool:
-        """Whether it wants to show the state of the bench now."""
+        """Return whether the state of the bench is to be shown now."""
+        return False
 
     def state(self, state: State) -> None:
         """Show the state of the bench."""
@@ -53,30 +54,7 @@ class Display(Protocol):
         """End the display."""
 
 
-class Mute:
-    """Shows nothing."""
-
-    def preparing(self, text: str, fraction: float) -> None:
-        """Nothing."""
-
-    def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
-        """Nothing."""
-
-    def message(self, text: str) -> None:
-        """Nothing."""
-
-    def is_due(self) -> bool:
-        """Never."""
-        return False
-
-    def state(self, state: State) -> None:
-        """Nothing."""
-
-    def close(self) -> None:
-        """Nothing is open."""
-
-
-class LineDisplay:
+class LineDisplay(Display):
     """One line a reading, for logs, pipes and tests.
 
     Args:
@@ -88,14 +66,14 @@ class LineDisplay:
         self._fifths, self._prepared = 0, ""
 
     def preparing(self, text: str, fraction: float) -> None:
-        """A line each fifth of the way, of each part of it; none that is as the last."""
+        """Print a line each fifth of the way, of each part of it; none that is as the last."""
         before, self._fifths = self._fifths, int(5 * fraction)
         if self._fifths > before and text != self._prepared:
             self._prepared = text
             self.message(text)
 
     def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
-        """A line."""
+        """Print a line."""
         left = time_left_in_words(*remaining, bench_time=self._bench_time)
         self.message(f"{text}   {left}" if remaining[1] >= 0.5 else text)
 
@@ -108,18 +86,8 @@ class LineDisplay:
         except OSError:
             self._gone = True
 
-    def is_due(self) -> bool:
-        """Never."""
-        return False
 
-    def state(self, state: State) -> None:
-        """Nothing: a log has the readings and the events."""
-
-    def close(self) -> None:
-        """Nothing is open."""
-
-
-class BarDisplay:
+class BarDisplay(Display):
     """The readings as lines, and below them the bench as it is: last value, trend, instruments, time left.
 
     It has no thread: it is drawn anew when the bench has something to show, at most four times a second.  A
@@ -174,20 +142,17 @@ class BarDisplay:
                 text.append(for_encoding(piece.text, console.encoding), style=_STYLES[piece.style])
         return text
 
-    def preparing(self, text: str, fraction: float) -> None:
-        """The state of the bench has it."""
-
     def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
-        """A line above; time left stands below."""
+        """Print a line above; time left stands below."""
         self.message(text)
         self._next = 0.0
 
     def message(self, text: str) -> None:
-        """A line above."""
+        """Print a line above."""
         self._draw(lambda: self._console.print(printable(text), markup=False, highlight=False))
 
     def is_due(self) -> bool:
-        """Whether the last drawing is long enough ago, or a reading came since."""
+        """Return whether the last drawing is long enough ago, or a reading came since."""
         return time.monotonic() >= self._next
 
     def state(self, state: State) -> None:
@@ -203,7 +168,7 @@ class BarDisplay:
 
 
 def to_stderr(*, bench_time: bool = False) -> Display:
-    """A bar on a terminal, lines elsewhere.  bench_time: see LineDisplay."""
+    """Return a bar on a terminal, lines elsewhere.  bench_time: see LineDisplay."""
     return BarDisplay() if sys.stderr.isatty() else LineDisplay(bench_time=bench_time)
 
 
@@ -251,7 +216,7 @@ class ShareBar:
         self._last = share
         left = self._time_left(share, now)
         if self._bar is None and sys.stderr.isatty() and (now - self._begin > 1 or self._attempt > 1):
-            self._bar = self._opened()
+            self._bar = self._open()
         if self._bar is not None:
             again = f", attempt {self._attempt} with shorter steps" if self._attempt > 1 else ""
             self._bar.update(self._task, description=self._description + again, completed=share, left=left)
@@ -268,7 +233,7 @@ class ShareBar:
             return ""
         return f"about {time_in_words(passed * (1 - share) / since)} left"
 
-    def _opened(self) -> Progress:
+    def _open(self) -> Progress:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn
 

@@ -46,7 +46,7 @@ STYLE: Any = _sheet()
 
 
 def as_png(figure: Figure, dpi: float = 150) -> bytes:
-    """A figure as a picture."""
+    """Return a figure as a picture."""
     buffer = io.BytesIO()
     with mpl.rc_context(STYLE):
         figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})
@@ -59,7 +59,7 @@ def save_png(figure: Figure, path: Path) -> None:
 
 
 def as_pdf(figure: Figure) -> bytes:
-    """A figure as a page of PDF of its own size, with its fonts."""
+    """Return a figure as a page of PDF of its own size, with its fonts."""
     buffer = io.BytesIO()
     with mpl.rc_context(STYLE):
         figure.savefig(buffer, format="pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
@@ -67,7 +67,7 @@ def as_pdf(figure: Figure) -> bytes:
 
 
 def as_svg(figure: Figure, prefix: str = "", title: str = "", description: str = "") -> str:
-    """A figure as one <svg> element, for a page that may hold others, or as a file of its own.
+    """Return a figure as one <svg> element, for a page that may hold others, or as a file of its own.
 
     An artist whose points answer to the pointer has ``set_gid("readings-NAME")``.  Matplotlib writes each marker of a
     `Line2D` as a ``<use>`` element inside of the group ``<g id="PREFIX-readings-NAME">``, in the order of the line's
@@ -118,7 +118,7 @@ def for_notebooks(figure: Figure) -> Figure:
 
 
 def label_of_run(name: str, k: int, total: int, alone: str) -> str | None:
-    """What the legend says of the k-th of several runs: its name, where each has a marker of its own.
+    """Return what the legend says of the k-th of several runs: its name, where each has a marker of its own.
 
     Args:
         name: of the run.
@@ -144,12 +144,12 @@ def row(figure: Figure, bottom: float, height: float, n: int = 1, gap: float = 0
 
 
 def font_folder() -> Path:
-    """The folder of the fonts that matplotlib contains, for documents, so that they are the same on every machine."""
+    """Return the folder of matplotlib's fonts, with which documents are the same on every machine."""
     return Path(mpl.get_data_path()) / "fonts" / "ttf"
 
 
 def figure_of_png(png: bytes) -> Figure:
-    """A picture as a figure of the same size, for documents, which want figures."""
+    """Return a picture as a figure of the same size, for documents, which want figures."""
     from matplotlib.figure import Figure as NewFigure
     from matplotlib.image import imread
 

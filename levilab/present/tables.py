@@ -40,7 +40,7 @@ class Table:
 def table(
     title: str, heads: Sequence[str], rows: Iterable[Row | Sequence[str]], *, numbers: Iterable[str] = ()
 ) -> Table:
-    """A table from rows of cells.
+    """Return a table from rows of cells.
 
     Args:
         title: above it, empty for none.

@@ -100,7 +100,7 @@ def terminal() -> Terminal:
 
 
 def as_text(show: Callable[[Console], object]) -> str:
-    """What a function prints, as text of at most `TEXT_WIDTH` columns without colours."""
+    """Return what a function prints, as text of at most `TEXT_WIDTH` columns without colours."""
     written = io.StringIO()
     # in a notebook rich would show it at once instead
     show(Terminal(file=written, width=TEXT_WIDTH, highlight=False, color_system=None, force_jupyter=False))
@@ -108,7 +108,7 @@ def as_text(show: Callable[[Console], object]) -> str:
 
 
 def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> RichTable:
-    """An empty table.
+    """Return an empty table.
 
     Args:
         title: above it.

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from levilab.present.units import split
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-#: How the last word of a key is written as a unit.
-UNITS = {
-    "s": "s", "hz": "Hz", "v": "V", "vpp": "Vpp", "ohm": "Ω", "t": "T", "m": "m", "a": "A", "k": "K", "db": "dB",
-    "kg": "kg",
-}  # fmt: skip
-#: The end of a key of a rate, whose unit is of two words.
-_RATE = "_hz_per_s"
 #: Instruments say infinite as 9.9e37 (SCPI-99 volume 1, §7.2.1.4).
 INFINITE = 9e37
 #: What makes up a generator's drive; the other settings are named one by one.
 _DRIVE = ("frequency_hz", "amplitude_vpp", "waveform")
-#: Units as this lab uses them where the number is between the two: what one of them is, and its name.
-_OF_THE_LAB = {"m": (1e-4, 1.0, 1e-3, "mm"), "T": (1e-4, 1.0, 1e-3, "mT"), "kg": (1e-6, 1.0, 1e-3, "g")}
+#: Numbers that are written in the finest unit of this laboratory.
+_LEAST, _MOST = 0.1, 1000.0
+#: Prefixes of units that have no scale of their own in this laboratory, and below 0.1 of its finest.
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
@@ -41,27 +37,18 @@ def settings_in_words(settings: Mapping[str, Any]) -> str:
 
 
 def setting_in_words(key: str, value: Any) -> str:
-    """A setting and its value.
+    """Return a setting and its value.
 
     >>> setting_in_words("load_ohm", 9.9e37)
     'load high impedance'
     >>> setting_in_words("creep_hz_per_s", 0.1), setting_in_words("shows", ["tape", "laser"])
     ('creep 0.1 Hz/s', 'shows tape, laser')
     """
-    name, unit = _split(key)
-    return f"{(name if unit else key).replace('_', ' ')} {value_in_words(key, value)}"
-
-
-def _split(key: str) -> tuple[str, str]:
-    """The name in a key, and the unit that the key ends in; empty where it ends in none."""
-    if key.endswith(_RATE) and key != _RATE:
-        return key.removesuffix(_RATE), "Hz/s"
-    name, _, last = key.rpartition("_")
-    return name, UNITS.get(last, "") if name else ""
+    return f"{split(key)[0].replace('_', ' ')} {value_in_words(key, value)}"
 
 
 def value_in_words(key: str, value: Any) -> str:
-    """A setting's value with the unit that its key ends in; other units stand as they are typed.
+    """Return a setting's value with the unit that its key ends in; other units stand as they are typed.
 
     >>> value_in_words("trigger_level_v", 0.6), value_in_words("slope", "POS"), value_in_words("interval_s", 0.005)
     ('0.6 V', 'POS', '5 ms')
@@ -73,13 +60,15 @@ def value_in_words(key: str, value: Any) -> str:
     if not isinstance(value, int | float):
         several = value if isinstance(value, list | tuple) else ("not known" if value is None else str(value),)
         return ", ".join(one if isinstance(one, str) else value_in_words(key, one) for one in several)
-    _, unit = _split(key)
+    unit = split(key)[1]
+    text = unit.text if unit else ""
     if abs(value) >= INFINITE:
-        return "high impedance" if unit == "Ω" else "infinite"
-    if unit in _OF_THE_LAB and _OF_THE_LAB[unit][0] <= abs(value) < _OF_THE_LAB[unit][1]:
-        _, _, one, own = _OF_THE_LAB[unit]
-        return f"{value / one:g} {own}"
-    if not unit or 0.01 <= abs(value) < 1000 or value == 0:
-        return f"{value:g} {unit}".strip()
+        return "high impedance" if text == "Ω" else "infinite"
+    if unit and unit.fine.factor > 1:
+        fine = abs(value) * unit.fine.factor
+        if fine < _MOST and (fine >= _LEAST or unit.si == "kg"):  # its prefixes are those of the gram
+            return f"{value * unit.fine.factor:g} {unit.fine.unit}"
+    if not text or 0.01 <= abs(value) < 1000 or value == 0:
+        return f"{value:g} {text}".strip()
     factor, prefix = next(((f, p) for f, p in _PREFIXES if abs(value) >= f), _PREFIXES[-1])
-    return f"{value / factor:g} {prefix}{unit}"
+    return f"{value / factor:g} {prefix}{text}"

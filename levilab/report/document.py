@@ -49,7 +49,7 @@ def document_of(
     supplements: Sequence[Supplement] = SUPPLEMENTS,
     asked: Asked | None = None,
 ) -> Document:
-    """The report.
+    """Return the report.
 
     Args:
         results: of measurements: analyses with what they found.
@@ -68,7 +68,7 @@ def document_of(
     blocks += others
     if results:
         blocks += [_measured(results, parts), reproduction(results, asked)]
-    counts = counted(sources)
+    counts = count_inputs(sources)
     subjects = ", ".join([*(part.subject for part in parts), *(one.title.lower() for one in others)])
     return Document(
         title=parts[0].heading if alone else _title(counts, others),
@@ -88,7 +88,7 @@ def blocks_of_part(
     deeper: bool = False,
     supplements: Sequence[Supplement] = SUPPLEMENTS,
 ) -> list[Block]:
-    """What one analysis found: warnings, result, figure, what else is known, run by run.
+    """Return what one analysis found: warnings, result, figure, what else is known, run by run.
 
     Args:
         analysis: the row of the catalogue.
@@ -116,7 +116,7 @@ def blocks_of_part(
 
 
 def _verdict(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
-    """The verdict, which says itself if its numbers are of real and synthetic inputs together: it is read alone."""
+    """Return the verdict; it is read alone, and says itself that real and synthetic inputs are mixed."""
     if not _mixes(found):
         return part.verdict
     made_up = sum(source.synthetic for source in found.sources)
@@ -124,7 +124,7 @@ def _verdict(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
 
 
 def picture_of(analysis: Analysis[A], found: A, part: ReportPart) -> Picture:
-    """The analysis's figure."""
+    """Return the analysis's figure."""
     many = len(found.sources) > MOST_IN_FULL
     return Picture(
         name=analysis.name,
@@ -162,7 +162,7 @@ def _title(counts: str, others: Sequence[Section]) -> str:
 def _lead(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
     """How much was used."""
     warnings = "" if found.grouped_warnings else ", no warnings"
-    return f"{counted(found.sources)}, {part.lead}{warnings}"
+    return f"{count_inputs(found.sources)}, {part.lead}{warnings}"
 
 
 def _measured(results: Results, parts: Sequence[ReportPart]) -> Section:
@@ -184,14 +184,14 @@ def _overview(inputs: Sequence[Input]) -> Iterable[Block]:
     common = in_common(inputs)
     if common:
         yield Section("All of them alike", (Facts(common),))
-    yield Section("Each by itself", tuple(one.without(common).folded() for one in inputs))
+    yield Section("Each by itself", tuple(one.without(common).fold() for one in inputs))
 
 
 # --- what is synthetic ---------------------------------------------------------------------------------
 
 
 def _document_banner(results: Results, sources: Sequence[Source[Any]], others: Sequence[Section]) -> Banner | None:
-    """The mark of the whole document."""
+    """Return the mark of the whole document."""
     if not results:
         return Banner("SYNTHETIC.", "All of it was simulated on a computer; nothing was measured.") if others else None
     mixed = _mixes(results[0][1]) if len(results) == 1 else False
@@ -220,7 +220,7 @@ def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner | 
         return Banner("SYNTHETIC.", f"None of these {total} runs came from a real bench.", *where)
     said = f"{len(made_up)} of {total} runs did not come from a real bench ({list_in_words(made_up)})."
     if not mixed and files:
-        said = f"Of {counted(sources)} {len(made_up)} did not come from a real bench ({list_in_words(made_up)})."
+        said = f"Of {count_inputs(sources)} {len(made_up)} did not come from a real bench ({list_in_words(made_up)})."
         return Banner("SYNTHETIC IN PART.", f"{said} A data file does not say where it is from.", *where)
     if not mixed:
         return Banner("REAL AND SYNTHETIC RUNS.", said, *where)
@@ -232,7 +232,7 @@ def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner | 
 
 
 def notebook_blocks(analysis: Analysis[A], found: A) -> tuple[Block, ...]:
-    """What one analysis found, for a page that is not ours: below a heading, with how synthetic inputs were made."""
+    """Return the blocks of one analysis for another page: below a heading, with the origin of synthetic inputs."""
     part = analysis.part(found)
     mark = _banner(found.sources, mixed=_mixes(found))
     made_up = [
@@ -248,7 +248,7 @@ def notebook_blocks(analysis: Analysis[A], found: A) -> tuple[Block, ...]:
 # --- words ---------------------------------------------------------------------------------------------
 
 
-def counted(sources: Sequence[Source[Any]]) -> str:
+def count_inputs(sources: Sequence[Source[Any]]) -> str:
     """How many inputs of which kind: "4 runs and 1 data file"."""
     files = sum(source.run is None for source in sources)
     kinds = ((len(sources) - files, "run"), (files, "data file"))

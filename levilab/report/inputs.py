@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from datetime import UTC
 from typing import TYPE_CHECKING, Any
 
 from levilab.pipelines.sources import mark_of
-from levilab.present.clock import moment
+from levilab.present.clock import local, moment
 from levilab.present.document.blocks import Details, Fact, Facts, Note, Section, Tabular
 from levilab.present.document.marks import with_marks
 from levilab.present.tables import table
+from levilab.present.units import split
 from levilab.present.words import setting_in_words, settings_in_words, value_in_words
 
 if TYPE_CHECKING:
@@ -72,11 +73,11 @@ class Input:
         return replace(self, facts=tuple(fact for fact in self.facts if fact not in common))
 
     def section(self) -> Section:
-        """The input below a heading of its own."""
+        """Return the input below a heading of its own."""
         return Section(self.name, (Facts(self.facts), *self.blocks))
 
-    def folded(self) -> Details:
-        """The input as one of many: on a screen it can be opened, on paper it is one line, or it would fill a book."""
+    def fold(self) -> Details:
+        """Return the input as one of many: it can be opened on a screen, and is one line on paper."""
         return Details(self.name, (Facts(self.facts), *self.blocks), more=self.more, on_paper="summary")
 
 
@@ -87,7 +88,7 @@ def in_common(inputs: Sequence[Input]) -> tuple[Fact, ...]:
 
 
 def describe(parts: Sequence[About]) -> Input:
-    """What is known of an input, of which several analyses may say something."""
+    """Return what is known of an input, of which several analyses may say something."""
     source = parts[0].source
     own = (block for one in parts for block in one.part.blocks)
     return Input(
@@ -118,13 +119,13 @@ def _facts(source: Source[Any], parts: Sequence[About]) -> list[Fact]:
 
 
 def _of_one(about: About) -> list[Fact]:
-    """What the only analysis says."""
+    """Return what the only analysis says."""
     alone = [Fact("This run alone", (about.part.alone,))] if about.several else []
     return [*alone, Fact("Readings", about.part.readings), Fact("Analysis", (about.part.origin,))]
 
 
 def _of_several(about: About) -> Fact:
-    """What one of several analyses says."""
+    """Return what one of several analyses says."""
     subject = about.whole.subject
     alone = (about.part.alone,) if about.several else ()
     return Fact(subject[0].upper() + subject[1:], (*alone, *about.part.readings, about.part.origin))
@@ -146,22 +147,20 @@ def _when(record: RunRecord) -> tuple[str, ...]:
 
 
 def _local_start(source: Source[Any]) -> tuple[str, ...]:
-    """The start on the clock of the person who reads."""
+    """Return the start on the clock of the person who reads."""
     if source.start is None:
         return ()
     return (f"{'time zero' if source.time_zero else 'started'} at {moment(source.start)}, local time",)
 
 
 def _time(utc: str) -> str:
-    """A time of run.json to the second; what is no time stands as it is."""
-    try:
-        return datetime.fromisoformat(utc).astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
-    except (ValueError, OverflowError):
-        return utc
+    """Return a time of run.json to the second; what is no time stands as it is."""
+    found = local(utc)
+    return f"{found.astimezone(UTC):%Y-%m-%d %H:%M:%S UTC}" if found else utc
 
 
 def _events(source: Source[Any]) -> tuple[Block, ...]:
-    """What happened, in the order of time."""
+    """Return what happened, in the order of time."""
     events = source.run.events() if source.run else []
     if not events or source.run is None:
         return ()
@@ -187,7 +186,7 @@ def _moment(event: Mapping[str, Any], zero: str | None) -> str:
 
 
 def _drive(record: RunRecord) -> tuple[str, ...]:
-    """What drove the top before the readings, and what the bench stands."""
+    """Return what drove the top before the readings, and what the bench stands."""
     settings, limits = (record.configuration.get(name) for name in (record.experiment, "limits"))
     if not isinstance(settings, dict) or settings.get(_DRIVE[1], 0) is None:  # nothing drives the top
         return ()
@@ -200,7 +199,7 @@ def _drive(record: RunRecord) -> tuple[str, ...]:
 
 
 def _conditions(record: RunRecord) -> tuple[str, ...]:
-    """The other settings of the experiment."""
+    """Return the other settings of the experiment."""
     settings = record.configuration.get(record.experiment)
     if not isinstance(settings, dict):
         return ()
@@ -242,7 +241,7 @@ def _changes(source: Source[Any]) -> tuple[Block, ...]:
 
 
 def _differences(kind: str, start: Mapping[str, Any], end: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:
-    """A row for each setting that both have; the name of the instrument stands in its first alone."""
+    """Yield a row for each setting that both have; the name of the instrument stands in its first alone."""
     name = kind
     for key in (key for key in end if key in start and start[key] != end[key]):
         yield name, setting_name(key), value_in_words(key, start[key]), value_in_words(key, end[key])
@@ -250,9 +249,9 @@ def _differences(kind: str, start: Mapping[str, Any], end: Mapping[str, Any]) ->
 
 
 def setting_name(key: str) -> str:
-    """A setting's name without its unit.
+    """Return a setting's name without its unit.
 
     >>> setting_name("trigger_level_v"), setting_name("sweep")
     ('trigger level', 'sweep')
     """
-    return setting_in_words(key, "").strip()
+    return split(key)[0].replace("_", " ")

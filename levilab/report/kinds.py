@@ -88,7 +88,7 @@ def _motion_tables(folders: Sequence[Path]) -> tuple[Values, ...]:
 
 
 def _stores(path: Path) -> list[Path]:
-    """Stores at or below a path; nothing inside of one is looked at.  A folder NAME.zarr is named for one."""
+    """Return stores at or below a path; nothing inside of one is looked at.  A folder NAME.zarr is named for one."""
     if path.is_dir() and (path.suffix == ".zarr" or _is_store(path)):
         return [path]
     found: list[str] = []
@@ -139,7 +139,7 @@ def _stability_sections(files: Sequence[Path]) -> tuple[Section, ...]:
 
 
 def _json_in(file: Path) -> dict[str, Any]:
-    """The table in a file of JSON; an empty one where there is none."""
+    """Return the table in a file of JSON; an empty one where there is none."""
     try:
         found = parse_json(file.read_text(encoding="utf-8")) if file.is_file() else None
     except (OSError, ValueError):

@@ -15,6 +15,7 @@ from levilab.errors import DoesNotSuit, NoneUsable, UsageError
 from levilab.files import check_writable, replace_atomically, writing
 from levilab.pipelines.sources import SkippedRuns, data_files
 from levilab.pipelines.suits import recall_suiting, remarks
+from levilab.present.clock import local
 from levilab.present.numbers import list_in_words
 from levilab.report.document import document_of, notebook_blocks
 from levilab.report.html.page import fragment_of, page_of
@@ -136,7 +137,7 @@ def _sorted_by_kind(paths: Sequence[Path]) -> tuple[Found, list[Path]]:
 def _results(
     paths: Sequence[Path], given: Mapping[str, Any], tell: Callable[[str], None] | None, *, needed: bool
 ) -> Results:
-    """What was found of the measurements at the paths; none where there are none and none are needed."""
+    """Return what was found of the measurements at the paths; none where there are none and none are needed."""
     try:
         return recall_suiting(paths, given, tell) if paths or needed else []
     except (DoesNotSuit, NoneUsable):
@@ -155,18 +156,12 @@ def _newest(results: Results, others: Found) -> datetime | None:
     records = [source.run.record for _, found in results for source in found.sources if source.run]
     texts = [record.ended_utc or record.started_utc for record in records]
     texts += [kind.when(path) for kind, found in others for path in found]
-    return max(filter(None, map(_moment, texts)), default=None)
-
-
-def _moment(utc: str | None) -> datetime | None:
-    try:
-        return datetime.fromisoformat(utc).astimezone(UTC) if utc else None
-    except (ValueError, OverflowError):
-        return None
+    newest = max(filter(None, map(local, texts)), default=None)
+    return newest.astimezone(UTC) if newest else None
 
 
 def _values(results: Results, others: Found, folder: Path) -> Iterator[Values]:
-    """The tables for programs."""
+    """Yield the tables for programs."""
     for analysis, found in results:
         yield from of_analysis(analysis, found, folder)
     for kind, places in others:
@@ -174,7 +169,7 @@ def _values(results: Results, others: Found, folder: Path) -> Iterator[Values]:
 
 
 def _remarks(results: Results, others: Found) -> Iterator[str]:
-    """What lies there and is not in the report, and what has no result."""
+    """Yield what lies there and is not in the report, and what has no result."""
     reported = {kind.experiment for kind, _ in others}
     for remark in remarks([found.remarks for _, found in results]):
         if not (isinstance(remark, SkippedRuns) and remark.experiment in reported):
@@ -183,7 +178,7 @@ def _remarks(results: Results, others: Found) -> Iterator[str]:
 
 
 def _without_result(results: Results) -> Iterator[str]:
-    """What was analyzed for the page since it has no result where it lies."""
+    """Yield what was analyzed for the page since it has no result where it lies."""
     lacking = {
         source.name: None
         for _, found in results
@@ -198,12 +193,12 @@ def _without_result(results: Results) -> Iterator[str]:
 
 
 def render(results: Results) -> str:
-    """The HTML page of results."""
+    """Return the HTML page of results."""
     return page_of(document_of(results))
 
 
 def render_part(analysis: Analysis[A], found: A) -> str:
-    """What one analysis found, as a part of a page that is not ours, such as a notebook."""
+    """Return what one analysis found, as a part of a page that is not ours, such as a notebook."""
     return fragment_of(notebook_blocks(analysis, found), prefix=f"levilab-{_digest(found)}-")
 
 

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass, field, fields, replace
-from pathlib import PurePath
-from types import MappingProxyType
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError
 from levilab.formats.table import parse_columns
+from levilab.pipelines.options import OF_REPORT, OPTIONS, options_of, typed_name
 from levilab.present.document.blocks import Code, Details, Fact, Facts, Note, Paragraph, Section, Tabular
 from levilab.present.tables import table
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
-    from pathlib import Path
 
     from levilab.pipelines.catalogue import Analysis
     from levilab.pipelines.sources import Source
@@ -24,15 +23,6 @@ if TYPE_CHECKING:
 
 #: With more inputs the commands of analyses name none, and the inputs are folded away.
 _MOST_NAMED = 12
-#: Options of analyses that the command line gives as they are.
-SAME_IN_COMMANDS = (
-    "columns", "channel", "rate", "reading_u", "keep_outliers", "tilt", "method", "orthogonal",
-    "clock_u", "free_radii"
-)  # fmt: skip
-#: Those of them that `levilab report` has, too.
-OF_REPORT = ("columns", "channel", "rate", "reading_u", "keep_outliers")
-#: Options of analyses that have other names on the command line.
-_AS_TYPED = MappingProxyType({"height_m": "--height", "height_u_m": "--height-u"})
 
 
 @dataclass(frozen=True)
@@ -52,7 +42,7 @@ class Asked:
     crosscheck: bool = True
 
     def command(self, sources: Sequence[Source[Any]]) -> str:
-        """The command that makes the report again."""
+        """Return the command that makes the report again."""
         paths = [shlex.quote(str(path)) for path in self.paths] or named_in_commands(sources)
         options = [word for name in OF_REPORT for word in _option(name, self.given.get(name))]
         no_crosscheck = [] if self.crosscheck else ["--no-crosscheck"]
@@ -60,7 +50,7 @@ class Asked:
 
 
 def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked | None = None) -> Section:
-    """The section at the end of a report of measurements."""
+    """Return the section at the end of a report of measurements."""
     asked = asked or Asked()
     sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
     many = len(sources) > _MOST_NAMED
@@ -105,9 +95,9 @@ def named_in_commands(sources: Sequence[Source[Any]], typed: Sequence[Path] = ()
 
 
 def _options(options: Any) -> tuple[str, ...]:
-    """The options that are not at their defaults, as one types them; those that are no plain words are left out."""
+    """Return the options that are not at their defaults, as one types them, if they are plain words."""
     usual, typed = type(options)(), []
-    for name in SAME_IN_COMMANDS:
+    for name in filter(_is_plain, OPTIONS):
         value = getattr(options, name, None)
         if value != getattr(usual, name, None):
             typed += _option(name, value)
@@ -115,7 +105,7 @@ def _options(options: Any) -> tuple[str, ...]:
 
 
 def _option(name: str, value: Any) -> list[str]:
-    """An option as one types it.
+    """Return an option as one types it.
 
     >>> _option("keep_outliers", True), _option("columns", {"t": "1", "f": "a b"}), _option("rate", None)
     (['--keep-outliers'], ['--columns', "'t=1,f=a b'"], [])
@@ -127,7 +117,13 @@ def _option(name: str, value: Any) -> list[str]:
 
 
 def _flag(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
+    return f"--{typed_name(name).replace('_', '-')}"
+
+
+def _is_plain(name: str) -> bool:
+    """Return whether the command line gives an option as it is: not by a file, and in the same unit."""
+    one = OPTIONS[name]
+    return one.typed == "" and one.kind is not Path
 
 
 def _columns(names: Mapping[str, str]) -> str:
@@ -140,18 +136,18 @@ def _columns(names: Mapping[str, str]) -> str:
 
 
 def _others(results: Sequence[tuple[Analysis[Any], Any]]) -> tuple[Note, ...]:
-    """The names of options that are no plain words, such as a file of the top's sizes."""
+    """Return the names of options that are no plain words, such as a file of the top's sizes."""
     options = [origin.options for _, found in results for origin in found.origins]
-    names = sorted({_AS_TYPED.get(name, _flag(name)) for one in options for name in _given(one)})
+    names = sorted({_flag(name) for one in options for name in _given(one)})
     return (Note(f"Besides, these options were given: {', '.join(names)}."),) if names else ()
 
 
 def _given(options: Any) -> Iterator[str]:
     """Names of the options that are not at their defaults and do not stand in the commands."""
     usual = type(options)()
-    for name in (one.name for one in fields(options) if one.name != "guess"):
+    for name in options_of(type(options)):
         value = getattr(options, name)
-        if value != getattr(usual, name) and not (name in SAME_IN_COMMANDS and _option(name, value)):
+        if value != getattr(usual, name) and not (_is_plain(name) and _option(name, value)):
             yield name
 
 
@@ -171,7 +167,7 @@ def _data(sources: Sequence[Source[Any]]) -> Tabular:
 
 
 def _recorded(sources: Sequence[Source[Any]]) -> tuple[Block, ...]:
-    """The commands by which the runs were recorded, and the versions that did, said once if they are the same."""
+    """Return the commands and versions by which the runs were recorded, once if they are the same."""
     facts: list[Fact] = []
     for source in sources:
         record = source.run.record if source.run else None
@@ -187,7 +183,7 @@ def _recorded(sources: Sequence[Source[Any]]) -> tuple[Block, ...]:
 
 
 def _typed(words: Sequence[str]) -> str:
-    """A recorded command as one types it.
+    """Return a recorded command as one types it.
 
     >>> _typed(["/usr/lib/levilab/__main__.py", "acquire", "spin", "--note", "a b"])
     "levilab acquire spin --note 'a b'"

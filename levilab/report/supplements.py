@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from levilab.crosscheck.own.stored import read_own
-from levilab.crosscheck.own.study import OWN, own_blocks, quick_check
+from levilab.crosscheck.own.study import OWN, quick_study
+from levilab.crosscheck.stored import read_study
+from levilab.crosscheck.table import blocks_of
 from levilab.present.document.blocks import Code, Paragraph, Section
 from levilab.report.reproduction import named_in_commands
 
@@ -19,26 +20,26 @@ if TYPE_CHECKING:
 
 
 def budget(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
-    """What the uncertainties are made of."""
+    """Return what the uncertainties are made of."""
     lead = "What u of each result is made of, what would make it smaller, and what it does not contain."
     return (Section("Uncertainty budget", analysis.budgets(found), anchor="budget", lead=lead),)
 
 
 def stored_trials(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
-    """The cross-check that `levilab crosscheck --like` made of this result."""
+    """Return the cross-check that `levilab crosscheck --like` made of this result."""
     settings = analysis.settings_of(found)
-    known = read_own(found.place, analysis.name, [source.sha256 for source in found.sources], settings)
-    return () if known is None else (_section(*own_blocks(known, analysis.symbols)),)
+    known = read_study(found.place, analysis.name, [source.sha256 for source in found.sources], settings)
+    return () if known is None else (_section(*blocks_of(known, analysis.symbols)),)
 
 
 def trials(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
-    """The same; where there is none a shorter one, of as many trials as a report has time for."""
+    """Return the same; where there is none a shorter one, of as many trials as a report has time for."""
     stored = stored_trials(analysis, found)
     if stored or analysis.name not in OWN:
         return stored
-    made = quick_check(analysis.name, found, analysis.settings_of(found))
+    made = quick_study(analysis.name, found, analysis.settings_of(found))
     if made is not None:
-        return (_section(*own_blocks(made, analysis.symbols)),)
+        return (_section(*blocks_of(made, analysis.symbols)),)
     named = " ".join(named_in_commands(found.sources))
     advice = Code(f"levilab crosscheck {analysis.name} --like {named}")
     return (_section(Paragraph("Not made: it takes longer than a report. This makes and keeps it:"), advice),)

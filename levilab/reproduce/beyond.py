@@ -12,13 +12,12 @@ import numpy as np
 from analysis.precession.sweep import Sweep, fit_sweep
 from analysis.spindown.fit import fit_spin_down
 from analysis.stability import wobble_resonance
-from analysis.uncertainty import Estimate
 from levilab.motion.lines import lines_of, rate_for
 from levilab.motion.lock import body_angle
 from levilab.present.document.blocks import Note, Picture
 from levilab.present.numbers import enumeration, signed
 from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Because, Check, Statement
+from levilab.reproduce.check import Because, check, statement
 from levilab.reproduce.figure import counter_figure, window_figure
 from levilab.reproduce.tops import DURATION_S, MASS_KG, THESIS, Array, many, started
 from levilab.simulator.equilibrium import modes_at, stability_of, windows_over
@@ -90,14 +89,14 @@ def about_window() -> list[Finding]:
     beyond = "; ".join(f"{name} lies {off:.2f} Hz above it" for name, off in above.items())
     place = f"quartic, {1e3 * MASS_KG:.3f} g at {100 * found.floating.height:.2f} cm"
     return [
-        Statement(
+        statement(
             "the exact window of small motions: lower edge",
             "Table 4.2 (simulated limits)",
             f"{lower.min():.2f} to {lower.max():.2f} Hz, from four starts",
             f"{low:.2f} Hz ({place}), {lower.min() - low:.2f} Hz below the lowest of the four",
             holds=bool(low < lower.min()),
         ),
-        Statement(
+        statement(
             "the exact window of small motions: upper edge",
             "Table 4.2 (simulated limits)",
             f"{upper.min():.2f} to {upper.max():.2f} Hz, from four starts",
@@ -119,8 +118,8 @@ def _why_above(edge: float) -> str:
     return (
         f"beyond the edge small motions grow, but they need not carry the top away: from {ABOVE} at {BEYOND_HZ:g} Hz, "
         f"where they grow by e in {1 / rate:.1f} s, a simulated top is still up after {DURATION_S:g} s; at {limit:.2f} "
-        f"Hz it is lost after {float(tops.time[1]):.1f} s. A limit belongs to one start of "
-        "finite size, the window to small motions"
+        f"Hz it is lost after {float(tops.time[1]):.1f} s. A limit belongs to one start of finite size, the window to "
+        "small motions"
     )
 
 
@@ -142,22 +141,21 @@ def about_counter(seen: Counted) -> list[Finding]:
     assert found.floating is not None
     resonance = wobble_resonance(found.field, found.top, found.floating.height)
     return [
-        Statement(
+        statement(
             "what a mark on the rim counts",
             "chapter on the spin counter",
             "",
             f"turns about the vertical, ω₃/cos θ: {signed(1e3 * high[0], 0)} mHz at {seen.spin[0]:.0f} Hz, "
-            f"{signed(1e3 * high[-1], 0)} mHz at "
-            f"{seen.spin[-1]:.1f} Hz; 1/cos θ explains all but {1e3 * np.sqrt(np.mean(rest**2)):.0f} mHz (rms)",
+            f"{signed(1e3 * high[-1], 0)} mHz at {seen.spin[-1]:.1f} Hz; 1/cos θ explains all but "
+            f"{1e3 * np.sqrt(np.mean(rest**2)):.0f} mHz (rms)",
             holds=bool(high[-1] > 0.02 and np.sqrt(np.mean(rest**2)) < 0.3 * high.max()),
         ),
-        Statement(
+        statement(
             "what that does to the law of drag",
             "the spin-downs' figures",
             "",
             f"true n = 1.5: the spin ω₃ itself gives n = {of_spin.value:.2f}, the counts n = {of_count.value:.2f}; "
-            "the tilt "
-            f"grows towards the resonance at {resonance:.1f} Hz, to {seen.tilt[-1]:.3f} rad",
+            f"the tilt grows towards the resonance at {resonance:.1f} Hz, to {seen.tilt[-1]:.3f} rad",
             holds=abs(of_spin.value - 1.5) < 0.03 and of_count.value > of_spin.value + 0.02,
         ),
     ]
@@ -178,19 +176,18 @@ def about_lock() -> list[Finding]:
     printed = THESIS["measured.slope"]
     p = fit.p_locked
     return [
-        Check(
+        check(
             f"slope of precession over drive, nine drives from {DRIVES_HZ[0]:g} to {DRIVES_HZ[-1]:g} Hz, simulated",
             printed,
-            Estimate(line.slope, line.u_slope, ""),
+            line.slope,
             Because(
                 "a locked top wobbles at the drive's frequency: slope 1 and intercept 0 jointly (here "
-                f"{line.slope:.6f} and "
-                f"{1e3 * line.intercept:.2f} mHz, p = {p:.2f}); 1.05 is printed without uncertainty, number of "
-                "readings and "
-                f"range, so how far it is from 1 cannot be said: from {DRIVES_HZ[0]:g} to {DRIVES_HZ[-1]:g} Hz it "
-                f"would be {0.05 * float(np.ptp(DRIVES_HZ)):.1f} Hz",
+                f"{line.slope:.6f} and {1e3 * line.intercept:.2f} mHz, p = {p:.2f}); 1.05 is printed without "
+                "uncertainty, number of readings and range, so how far it is from 1 cannot be said: from "
+                f"{DRIVES_HZ[0]:g} to {DRIVES_HZ[-1]:g} Hz it would be {0.05 * float(np.ptp(DRIVES_HZ)):.1f} Hz",
                 abs(line.slope - 1) < 1e-3 and (p or 0.0) > 0.01,
             ),
+            u=line.u_slope,
         )
     ]
 
@@ -214,8 +211,7 @@ def make() -> Found:
             "counter",
             "A counter counts turns about the vertical.",
             "By how much a counter's reading exceeds the spin of a simulated top (dots), and what 1/cos θ makes of "
-            "the tilt "
-            "(line), up to the fall.",
+            "the tilt (line), up to the fall.",
             "Count less spin over the spin",
             partial(counter_figure, seen.spin, seen.count, seen.cosine),
         ),

@@ -1,23 +1,23 @@
 """A published value beside ours: what is compared with what, how, and the verdict.
 
-Three kinds of findings, with the same properties: a number (`Check`), an equation with a slip (`Erratum`), a sentence
-that can be tried (`Statement`).
+A number is compared by `check`, an equation with a slip by `erratum`, a sentence that can be tried by `statement`.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from analysis.numbers import digits
-from levilab.present.numbers import in_words, with_uncertainty
+from analysis.uncertainty import Estimate
+from levilab.present.numbers import with_uncertainty
+from levilab.present.units import unit as unit_row
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
-    from analysis.uncertainty import Estimate
     from levilab.stability.published.printed import Printed
 
 #: What a float loses in a difference of two numbers with few digits.
@@ -37,6 +37,7 @@ class Comparison(Enum):
     """What a comparison is worth: what ours is compared with, and whether ours could have come out otherwise."""
 
     INDEPENDENT = "published"
+    RANGE = "published; a range"
     FITTED = "published; fitted"
     CONSTRUCTED = "published; by construction"
     RECOMPUTED = "our second way"
@@ -95,122 +96,191 @@ class Because:
 Way = Rounding | Within | Among | Because
 
 
-class Finding(Protocol):
-    """What the table of a chapter shows."""
+class Kind(Enum):
+    """What is compared: a number, an equation with a slip, a sentence that can be tried."""
 
-    @property
-    def name(self) -> str:
-        """What is compared."""
-        ...
-
-    @property
-    def place(self) -> str:
-        """Where it stands in the source."""
-        ...
-
-    @property
-    def published_text(self) -> str:
-        """As published."""
-        ...
-
-    @property
-    def ours_text(self) -> str:
-        """As found here."""
-        ...
-
-    @property
-    def comparison(self) -> Comparison | None:
-        """What the comparison is worth; None where nothing is compared."""
-        ...
-
-    @property
-    def verdict(self) -> Verdict:
-        """What the comparison says."""
-        ...
-
-    @property
-    def why(self) -> str:
-        """How it was compared, or why it differs."""
-        ...
+    NUMBER = "number"
+    EQUATION = "equation"
+    SENTENCE = "sentence"
 
 
 @dataclass(frozen=True)
-class Check:
-    """A number.
+class Finding:
+    """A row of a chapter's table.
 
     Attributes:
+        kind: of what is compared.
         name: what is compared.
-        published: as printed.
-        ours: in the unit of the published one.
-        way: how they are compared.
-        how: what the comparison is worth, of a number that the source prints.
+        place: where it stands in the source.
+        published_text: as published; a dash for nothing.
+        ours_text: as found here.
+        verdict: what the comparison says.
+        comparison: what the comparison is worth; None for a fact that the source does not have.
+        why: how it was compared, or why it differs.
+        values: the numbers with full precision, for JSON; none of a sentence.
     """
 
+    kind: Kind
     name: str
-    published: Printed
-    ours: Estimate
-    way: Way = Rounding()
-    how: Comparison = Comparison.INDEPENDENT
+    place: str
+    published_text: str
+    ours_text: str
+    verdict: Verdict
+    comparison: Comparison | None
+    why: str
+    values: Mapping[str, Any] = field(default_factory=dict)
 
-    @property
-    def comparison(self) -> Comparison:
-        """What the comparison is worth: a number that the source does not print is ours."""
-        return Comparison.RECOMPUTED if self.published.recomputed else self.how
 
-    @property
-    def difference(self) -> float:
-        """Ours less the published number, in its unit; NaN where we have none."""
-        return math.nan if self.ours.value is None else self.ours.value - self.published.value
+def check(
+    name: str,
+    published: Printed,
+    value: float | None,
+    way: Way = Rounding(),
+    how: Comparison = Comparison.INDEPENDENT,
+    *,
+    u: float | None = None,
+) -> Finding:
+    """Compare a number.
 
-    @property
-    def verdict(self) -> Verdict:
-        """What the comparison says."""
-        off, room = abs(self.difference), self.published.rounding + (self.ours.u or 0.0)
-        if off <= room * (1 + _FLOAT):
-            return Verdict.AGREES
-        if isinstance(self.way, Within) and off <= self.way.tolerance * (1 + _FLOAT):
-            return Verdict.AGREES
-        if isinstance(self.way, Among) and self._is_among(self.way):
-            return Verdict.AGREES
-        return Verdict.DIFFERS if isinstance(self.way, Because) and self._is_explained(self.way) else Verdict.UNEXPECTED
+    Args:
+        name: what is compared.
+        published: as printed.
+        value: ours, in the unit of the published one.
+        way: how they are compared.
+        how: what the comparison is worth, of a number that the source prints; one that it does not print is ours.
+        u: standard uncertainty of ours.
+    """
+    ours = Estimate(value, u, published.unit)
+    off = math.nan if ours.value is None else abs(ours.value - published.value)
+    verdict = _judge(published, ours, way, off)
+    beyond = off > published.rounding * (1 + _FLOAT)
+    if isinstance(way, Because):
+        why = way.why if verdict is not Verdict.AGREES else ""
+    elif isinstance(way, Among):
+        why = f"{way.why}: any value from {_like(way.low, published)} to {_like(way.high, published)} would agree"
+        how = Comparison.RANGE
+    elif isinstance(way, Within) and beyond:
+        why = f"within {digits(way.tolerance, 2)}: {way.why}"
+    else:
+        why = "within our u" if beyond else ""
+    values = {
+        "published": published.value,
+        "rounding": published.rounding,
+        "recomputed": published.recomputed,
+        "ours": _finite(ours.value),
+        "u": ours.u,
+        "unit": ours.unit,
+    }
+    in_print = ours.value is not None and not ours.u  # with one digit more than the print has
+    return Finding(
+        Kind.NUMBER,
+        name,
+        published.place,
+        _with_unit(_raised(published.text), published.unit),
+        _with_unit(_like(ours.value or 0.0, published), ours.unit) if in_print else with_uncertainty(ours),
+        verdict,
+        Comparison.RECOMPUTED if published.recomputed else how,
+        why,
+        values,
+    )
 
-    def _is_among(self, way: Among) -> bool:
-        room = (self.published.rounding + way.step) * (1 + _FLOAT)
-        return way.low - room <= self.published.value <= way.high + room
 
-    def _is_explained(self, way: Because) -> bool:
-        if isinstance(way.explained, bool):
-            return way.explained
-        off = abs(way.explained - self.published.value)
-        return off <= (self.published.rounding + way.tolerance) * (1 + _FLOAT)
+def _judge(published: Printed, ours: Estimate, way: Way, off: float) -> Verdict:
+    """Return what a comparison of numbers says, `off` being their distance."""
+    if off <= (published.rounding + (ours.u or 0.0)) * (1 + _FLOAT):
+        return Verdict.AGREES
+    if isinstance(way, Within) and off <= way.tolerance * (1 + _FLOAT):
+        return Verdict.AGREES
+    if isinstance(way, Among):
+        room = (published.rounding + way.step) * (1 + _FLOAT)
+        return Verdict.AGREES if way.low - room <= published.value <= way.high + room else Verdict.UNEXPECTED
+    return Verdict.DIFFERS if isinstance(way, Because) and _explains(way, published) else Verdict.UNEXPECTED
 
-    @property
-    def place(self) -> str:
-        """Where it stands in the source."""
-        return self.published.place
 
-    @property
-    def published_text(self) -> str:
-        """As printed, with its unit."""
-        return _with_unit(_raised(self.published.text), self.published.unit)
+def _explains(way: Because, published: Printed) -> bool:
+    if isinstance(way.explained, bool):
+        return way.explained
+    return abs(way.explained - published.value) <= (published.rounding + way.tolerance) * (1 + _FLOAT)
 
-    @property
-    def ours_text(self) -> str:
-        """Ours with u, or with one digit more than the print has."""
-        if self.ours.value is None or self.ours.u:
-            return with_uncertainty(self.ours)
-        return _with_unit(_like(self.ours.value, self.published), self.ours.unit)
 
-    @property
-    def why(self) -> str:
-        """The tolerance with its reason, or why it differs; empty within the rounding of the print."""
-        if isinstance(self.way, Because):
-            return self.way.why if self.verdict is not Verdict.AGREES else ""
-        if isinstance(self.way, Among):
-            return self.way.why if abs(self.difference) > self.published.rounding * (1 + _FLOAT) else ""
-        if isinstance(self.way, Within) and abs(self.difference) > self.published.rounding:
-            return f"within {digits(self.way.tolerance, 2)}: {self.way.why}"
-        return "within our u" if abs(self.difference) > self.published.rounding * (1 + _FLOAT) else ""
+def erratum(
+    place: str,
+    printed: str,
+    corrected: str,
+    test: str,
+    *,
+    truth: float,
+    by_printed: float | None,
+    by_corrected: float,
+    tolerance: float,
+    unit: str = "",
+    reading: str = "",
+) -> Finding:
+    """Try an equation as printed and as corrected on a number that neither of them decides.
+
+    The source prints the equation, and nothing here was fitted to it.  The verdict is DIFFERS where the corrected
+    equation is right and the printed one is wrong.
+
+    Args:
+        place: of the equation.
+        printed: what is wrong in it.
+        corrected: what it should be.
+        test: what the number is.
+        truth: the number, from elsewhere: a simulation, an exact field, a dimension.
+        by_printed: what the printed equation gives for it; None where it gives nothing that can be compared.
+        by_corrected: what the corrected one gives.
+        tolerance: relative, of by_corrected.
+        unit: of the numbers.
+        reading: how the correction was read where it says little, or what else the print has for the number.
+    """
+
+    def is_true(value: float | None) -> bool:
+        return value is not None and math.isclose(value, truth, rel_tol=tolerance, abs_tol=0.0)
+
+    def text(value: float | None) -> str:
+        return "—" if value is None else _with_unit(digits(value, 5), unit)
+
+    return Finding(
+        Kind.EQUATION,
+        test,
+        place,
+        text(by_printed),
+        f"{text(by_corrected)}; true: {text(truth)}",
+        Verdict.DIFFERS if is_true(by_corrected) and not is_true(by_printed) else Verdict.UNEXPECTED,
+        Comparison.INDEPENDENT,
+        f"{printed}; {corrected}" + (f" ({reading})" if reading else ""),
+        {"printed": _finite(by_printed), "corrected": by_corrected, "true": truth, "unit": unit},
+    )
+
+
+def statement(
+    name: str,
+    place: str,
+    said: str,
+    found: str,
+    *,
+    holds: bool,
+    reason: str = "",
+    how: Comparison = Comparison.INDEPENDENT,
+) -> Finding:
+    """Try a sentence of a source.
+
+    Args:
+        name: what is tried.
+        place: of the sentence.
+        said: the sentence, in our words; empty for a fact that the source does not have.
+        found: what we found, with its numbers.
+        holds: whether that is what the sentence says.
+        reason: why it differs, where it does and the reason was found to hold; empty: it must hold.
+        how: what trying it is worth, of a sentence that the source has.
+    """
+    if holds:
+        verdict = Verdict.AGREES if said else Verdict.ADDED
+    else:
+        verdict = Verdict.DIFFERS if reason else Verdict.UNEXPECTED
+    return Finding(
+        Kind.SENTENCE, name, place, said or "—", found, verdict, how if said else None, "" if holds else reason
+    )
 
 
 def _with_unit(number: str, unit: str) -> str:
@@ -219,7 +289,7 @@ def _with_unit(number: str, unit: str) -> str:
     >>> _with_unit("1.5", "°"), _with_unit("0.0032", "1/s"), _with_unit("82", "")
     ('1.5°', '0.0032 s⁻¹', '82')
     """
-    return f"{number}{unit}" if unit == "°" else f"{number} {in_words(unit)}".strip()
+    return f"{number}{unit}" if unit == "°" else f"{number} {unit_row(unit).text}".strip()
 
 
 def _like(value: float, published: Printed) -> str:
@@ -245,122 +315,6 @@ def _raised(text: str) -> str:
 _HIGH = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-@dataclass(frozen=True)
-class Erratum:
-    """An equation as printed and as corrected, tried on a number that neither of them decides.
-
-    Attributes:
-        place: of the equation.
-        printed: what is wrong in it.
-        corrected: what it should be.
-        test: what the number is.
-        truth: the number, from elsewhere: a simulation, an exact field, a dimension.
-        by_printed: what the printed equation gives for it; None where it gives nothing that can be compared.
-        by_corrected: what the corrected one gives.
-        tolerance: relative, of by_corrected.
-        unit: of the numbers.
-        reading: how the correction was read where it says little, or what else the print has for the number.
-    """
-
-    place: str
-    printed: str
-    corrected: str
-    test: str
-    truth: float
-    by_printed: float | None
-    by_corrected: float
-    tolerance: float
-    unit: str = ""
-    reading: str = ""
-
-    @property
-    def comparison(self) -> Comparison:
-        """The source prints the equation, and nothing here was fitted to it."""
-        return Comparison.INDEPENDENT
-
-    @property
-    def name(self) -> str:
-        """What is compared."""
-        return self.test
-
-    @property
-    def published_text(self) -> str:
-        """What the printed equation gives."""
-        return self._shown(self.by_printed)
-
-    @property
-    def ours_text(self) -> str:
-        """What the corrected equation gives, and the truth."""
-        return f"{self._shown(self.by_corrected)}; true: {self._shown(self.truth)}"
-
-    def _shown(self, value: float | None) -> str:
-        return "—" if value is None else _with_unit(digits(value, 5), self.unit)
-
-    def _is_true(self, value: float) -> bool:
-        return math.isclose(value, self.truth, rel_tol=self.tolerance, abs_tol=0.0)
-
-    @property
-    def verdict(self) -> Verdict:
-        """DIFFERS where the corrected equation is right and the printed one is wrong."""
-        wrong = self.by_printed is None or not self._is_true(self.by_printed)
-        return Verdict.DIFFERS if self._is_true(self.by_corrected) and wrong else Verdict.UNEXPECTED
-
-    @property
-    def why(self) -> str:
-        """What is wrong, and what is right."""
-        return f"{self.printed}; {self.corrected}" + (f" ({self.reading})" if self.reading else "")
-
-
-@dataclass(frozen=True)
-class Statement:
-    """A sentence of a source that can be tried.
-
-    Attributes:
-        name: what is tried.
-        place: of the sentence.
-        said: the sentence, in our words; empty for a fact that the source does not have.
-        found: what we found, with its numbers.
-        holds: whether that is what the sentence says.
-        reason: why it differs, where it does and the reason was found to hold; empty: it must hold.
-        how: what trying it is worth, of a sentence that the source has.
-    """
-
-    name: str
-    place: str
-    said: str
-    found: str
-    holds: bool
-    reason: str = ""
-    how: Comparison = Comparison.INDEPENDENT
-
-    @property
-    def comparison(self) -> Comparison | None:
-        """What trying it is worth; None for a fact that the source does not have."""
-        return self.how if self.said else None
-
-    @property
-    def published_text(self) -> str:
-        """The sentence, a dash for none."""
-        return self.said or "—"
-
-    @property
-    def ours_text(self) -> str:
-        """What we found."""
-        return self.found
-
-    @property
-    def verdict(self) -> Verdict:
-        """What trying it says."""
-        if self.holds:
-            return Verdict.AGREES if self.said else Verdict.ADDED
-        return Verdict.DIFFERS if self.reason else Verdict.UNEXPECTED
-
-    @property
-    def why(self) -> str:
-        """Why it differs; empty where it holds."""
-        return "" if self.holds else self.reason
-
-
 def counts(findings: Iterable[Finding]) -> dict[Verdict, int]:
     """How many of each verdict, in their order."""
     found = [one.verdict for one in findings]
@@ -384,22 +338,8 @@ def as_document(finding: Finding) -> dict[str, Any]:
         "comparison": finding.comparison.name.lower() if finding.comparison else None,
         "why": finding.why,
     }
-    if isinstance(finding, Check):
-        document["values"] = {
-            "published": finding.published.value,
-            "rounding": finding.published.rounding,
-            "recomputed": finding.published.recomputed,
-            "ours": _finite(finding.ours.value),
-            "u": finding.ours.u,
-            "unit": finding.ours.unit,
-        }
-    if isinstance(finding, Erratum):
-        document["values"] = {
-            "printed": _finite(finding.by_printed),
-            "corrected": finding.by_corrected,
-            "true": finding.truth,
-            "unit": finding.unit,
-        }
+    if finding.values:
+        document["values"] = dict(finding.values)
     return document
 
 

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.uncertainty import Estimate
 from levilab.motion.lines import lines_of, rate_for
 from levilab.motion.lock import is_locked
 from levilab.present.document.blocks import Note, Picture
 from levilab.present.numbers import with_decimals
 from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Check, Statement, Within
+from levilab.reproduce.check import Within, check, statement
 from levilab.reproduce.figure import Azimuth, azimuth_figure, driven_figure
 from levilab.reproduce.tops import THESIS, TOLERANCE
 from levilab.simulator.scene import preset
@@ -71,7 +70,7 @@ def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
     )
     precession = wave(early, "precession")
     return [
-        Statement(
+        statement(
             "the top is locked",
             THESIS["driven.duration"].place,
             f"the spin oscillates about ν_d for {RUN_S:g} s and more",
@@ -79,30 +78,32 @@ def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
             f"{spin.max():.2f} Hz",
             holds=motion.survived and bool(locked),
         ),
-        Check(
+        check(
             "mean of the spin ω₃/2π",
             drive,
-            Estimate(turns, None, "Hz"),
+            turns,
             Within(
                 0.1,
                 "the body turns about the vertical as the drive does; ω₃ is that rate times cos θ, here lower by "
                 f"{1e3 * (drive.value - turns):.0f} mHz on the average",
             ),
         ),
-        Check(
+        check(
             "line of n_x + i n_y at the drive, which a laser beside the stem counts",
             drive,
-            Estimate(wave(lines, "drive"), lines.resolution / 2, "Hz"),
+            wave(lines, "drive"),
+            u=lines.resolution / 2,
         ),
-        Check(
+        check(
             f"free precession, in the first {WINDOW_S:g} s",
             THESIS["driven.precession"],
-            Estimate(precession, early.resolution / 2, "Hz"),
+            precession,
+            u=early.resolution / 2,
         ),
-        Check(
+        check(
             "distance of the sidebands, the spin's swing about the drive",
             THESIS["driven.sideband"],
-            Estimate(sideband(lines), None, "Hz"),
+            sideband(lines),
             Within(
                 1 / WINDOW_S,
                 f"a bin of a record of {WINDOW_S:g} s is {1e3 / WINDOW_S:.0f} mHz wide; the place of a line between "
@@ -130,7 +131,7 @@ def of_azimuth(found: Azimuth, lines: AxisLines) -> list[Finding]:
     near = {width: power_near(lines, width) for width in NEAR_LINES_HZ}
     parts = ", ".join(f"{100 * share:.1f} % lie within {width:g} Hz" for width, share in near.items())
     return [
-        Statement(
+        statement(
             "φ̇ of the driven top",
             "figure of the driven precession",
             "φ̇ looks chaotic",
@@ -138,7 +139,7 @@ def of_azimuth(found: Azimuth, lines: AxisLines) -> list[Finding]:
             "frequency of the axis",
             holds=bool(found.rate.max() > 100 and found.rate.min() < -20),
         ),
-        Statement(
+        statement(
             "its irregularity comes from passages near θ = 0",
             "figure of the driven precession",
             "",
@@ -146,13 +147,13 @@ def of_azimuth(found: Azimuth, lines: AxisLines) -> list[Finding]:
             f"{1e3 * found.tilt_then:.0f} mrad, and {1e3 * found.tilt_ever:.0f} mrad at all times",
             holds=found.tilt_then < 0.7 * found.tilt_ever,
         ),
-        Statement(
+        statement(
             "n_x + i n_y of the same run keeps to lines",
             "figure of the driven precession",
             "",
-            f"{len(named)} steady lines, each with a name, hold {100 * power / all_power:.0f} % of its power; of "
-            f"all of it {parts} of them. "
-            "Whether what the lines do not hold is further sidebands or lines that wander is not told apart",
+            f"{len(named)} steady lines, each with a name, hold {100 * power / all_power:.0f} % of its power; of all "
+            f"of it {parts} of them. Whether what the lines do not hold is further sidebands or lines that wander is "
+            "not told apart",
             holds=power > 0.8 * all_power and near[NEAR_LINES_HZ[-1]] > 0.99,
         ),
     ]
@@ -169,9 +170,8 @@ def make() -> Found:
         Picture(
             "driven",
             "The spin of a locked top swings about its drive.",
-            "Spin ω₃/2π of the thesis's driven top (ν₀ = 30.03 Hz, ν_d = 30 Hz, 24.45 g, 0.4 mT), as the band "
-            "between its "
-            "least and greatest values over the whole run, and its first 20 s below; dashed: the drive.",
+            "Spin ω₃/2π of the thesis's driven top (ν₀ = 30.03 Hz, ν_d = 30 Hz, 24.45 g, 0.4 mT), as the band between "
+            "its least and greatest values over the whole run, and its first 20 s below; dashed: the drive.",
             "Spin of the driven top over 300 s",
             partial(driven_figure, motion),
         ),
@@ -179,10 +179,8 @@ def make() -> Found:
             "azimuth",
             "The azimuth's rate is wild, the axis is not.",
             "Above: φ̇/2π over five seconds, cut at ±120 Hz, and its values over the tilt θ at the same time: large "
-            "where θ "
-            "is small, since the azimuth turns by half a turn when the axis passes the vertical. Below: the spectrum "
-            "of "
-            "n_x + i n_y of the whole run, with the names of its lines.",
+            "where θ is small, since the azimuth turns by half a turn when the axis passes the vertical. Below: the "
+            "spectrum of n_x + i n_y of the whole run, with the names of its lines.",
             "Rate of the azimuth over time and tilt, and the spectrum of the axis",
             partial(azimuth_figure, motion, rates, lines),
             raster=True,

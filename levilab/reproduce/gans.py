@@ -14,7 +14,7 @@ import numpy as np
 
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Statement
+from levilab.reproduce.check import statement
 from levilab.reproduce.figure import gans_figure
 from levilab.reproduce.tops import Array, Flags, many
 from levilab.simulator.equilibrium import stability_of
@@ -120,39 +120,37 @@ def make() -> Found:
     least_lost = float(TILTS[np.argmin(up[row])]) if not up[row].all() else math.nan
     given = {key: GANS[f"model.{key}"] for key in ("height", "spin")}
     findings = (
-        Statement(
+        statement(
             "stable heights over a ring of dipoles",
             "the model's polynomials",
             "",
             f"{low:.5f} to {high:.5f} R (windows of the base's field), {by_hand[0]:.5f} to {by_hand[1]:.5f} R (zeros "
-            "of the "
-            "polynomials)",
+            "of the polynomials)",
             holds=abs(low / by_hand[0] - 1) < 1e-5 and abs(high / by_hand[1] - 1) < 1e-5,
         ),
-        Statement(
+        statement(
             "height of the start",
             given["height"].place,
             f"{given['height'].text} R",
             f"the top floats at {height:.3f} R; stable from {low:.3f} to {high:.3f} R",
             holds=low < given["height"].value < high and abs(height / given["height"].value - 1) < 0.03,
         ),
-        Statement(
+        statement(
             "spin of the start",
             given["spin"].place,
             f"{given['spin'].text} √(g/R)",
             f"small motions are stable from {spins[0]:.2f} to {spins[1]:.2f} √(g/R)",
             holds=spins[0] < given["spin"].value < spins[1] and bool(up[row, 0]),
         ),
-        Statement(
+        statement(
             "three modes of failure",
             ABSTRACT,
             "insufficient spin, too large a tilt, too great a spin",
-            f"calm tops are up from {calm.min():.1f} to {calm.max():.1f} √(g/R); at {SPINS[row]:.1f} √(g/R) the "
-            "first tilt that "
-            f"is lost is {least_lost:.2f} rad",
+            f"calm tops are up from {calm.min():.1f} to {calm.max():.1f} √(g/R); at {SPINS[row]:.1f} √(g/R) the first "
+            f"tilt that is lost is {least_lost:.2f} rad",
             holds=bool(not up[0, 0] and not up[-1, 0] and not up[row, -1] and up[row, 0]),
         ),
-        Statement(
+        statement(
             "the amplitude of the motion scales with the tilt of the start",
             ABSTRACT,
             "linearly",
@@ -165,14 +163,13 @@ def make() -> Found:
         "gans",
         "Three ways to be lost over a ring of dipoles.",
         f"Which tops are up after {DURATION_S:g} s (filled) over spin and tilt of the start, where the top floats; "
-        "lines: the "
-        "window of small motions. Below a spin, beyond a tilt, above a spin: the paper's three modes of failure.",
+        "lines: the window of small motions. Below a spin, beyond a tilt, above a spin: the paper's three modes of "
+        "failure.",
         "Survival over spin and tilt over a ring of dipoles",
         partial(gans_figure, SPINS, TILTS, up, (spins[0], spins[1])),
     )
     note = Note(
         "What could not be had: the numbers of the paper's edges. Its abstract has none, and its tables and figures "
-        "are "
-        "not freely to read; the model's parameters are those of Scilab's demonstration, which names the paper."
+        "are not freely to read; the model's parameters are those of Scilab's demonstration, which names the paper."
     )
     return Found(findings, (picture, note), "What the abstract says, tried with the paper's model.")

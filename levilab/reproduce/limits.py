@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Among, Because, Check, Comparison, Statement, Within
+from levilab.reproduce.check import Among, Because, Comparison, Within, check, statement
 from levilab.reproduce.figure import Scans, limits_figure
 from levilab.reproduce.tops import DURATION_S, FALL_M, MASS_KG, THESIS, Array, Flags, many, scan, started, survivors
 from levilab.simulator.equilibrium import stability_of
@@ -86,7 +85,7 @@ def lower_checks(lower: dict[str, Array], mass: float) -> list[Finding]:
     """The lower limits at the mass that fits all."""
     at = int(np.argmin(np.abs(MASSES_KG - mass)))
     found: list[Finding] = [
-        Statement(
+        statement(
             "the one mass behind the four lower limits",
             "Table 3.1 and Table 4.2",
             "",
@@ -98,10 +97,10 @@ def lower_checks(lower: dict[str, Array], mass: float) -> list[Finding]:
         near = lower[name][max(at - 1, 0) : at + 2]
         room = 2 * STEP_HZ + float(np.nanmax(near) - np.nanmin(near)) / 2
         found.append(
-            Check(
+            check(
                 f"{name}: lower limit",
                 THESIS[f"limits.lower.{name}"],
-                Estimate(float(lower[name][at]), None, "Hz"),
+                float(lower[name][at]),
                 Within(room, f"a step of {STEP_HZ:g} Hz in each of two scans, and half a step of mass, 0.0025 g"),
                 Comparison.FITTED,
             )
@@ -122,19 +121,13 @@ def upper_checks(uppers: dict[str, Upper]) -> list[Finding]:
             "is still up" if one.printed_lasts >= DURATION_S else f"is lost after {one.printed_lasts:.1f} s"
         )
         why = (
-            f"there is no single limit: every top is up to {one.until:.2f} Hz and the last one has {one.last:.2f} "
-            "Hz, with "
-            f"{islands} islands between at a step of {UPPER_STEP_HZ:g} Hz; the nearest edge from up to lost is at "
+            f"there is no single limit: every top is up to {one.until:.2f} Hz and the last one has {one.last:.2f} Hz, "
+            f"with {islands} islands between at a step of {UPPER_STEP_HZ:g} Hz; the nearest edge from up to lost is at "
             f"{nearest:.2f} Hz, and {late}. Small motions are stable up to {edge.spins[0][1]:.2f} Hz"
         )
         inside = one.until - 0.5 <= printed.value <= one.last + 0.5
         found.append(
-            Check(
-                f"{name}: upper limit, all tops up to",
-                printed,
-                Estimate(one.until, None, "Hz"),
-                Because(why, inside and islands > 0),
-            )
+            check(f"{name}: upper limit, all tops up to", printed, one.until, Because(why, inside and islands > 0))
         )
     return found
 
@@ -148,15 +141,15 @@ def drag_checks() -> tuple[list[Finding], dict[str, Array]]:
         printed = THESIS[f"limits.drag.{name}"]
         below = int(np.sum(ends < printed.value))
         found.append(
-            Check(
+            check(
                 f"{name}: spin at the fall, with drag",
                 printed,
-                Estimate(middle, None, "Hz"),
+                middle,
                 Among(
                     float(ends.min()),
                     float(ends.max()),
                     0.0,
-                    f"it is one of the falls that the phase leaves open: {ends.size} starts from "
+                    f"the phase at the fall decides: {ends.size} starts from "
                     f"{DRAG_STARTS_HZ[0]:.3f} to {DRAG_STARTS_HZ[-1]:.3f} Hz fall at {ends.min():.2f} to "
                     f"{ends.max():.2f} Hz, {below} of them below the printed value; their median is given",
                 ),
@@ -182,27 +175,27 @@ def misprint(with_030: Array) -> tuple[list[Finding], Array]:
     by_x = {round(100 * x, 2): limit for x, limit in zip(ASIDE_M.tolist(), lower.tolist(), strict=True)}
     drag = falls("IC3", "start.position_m=[0.005,0,0.0725]")
     found: list[Finding] = [
-        Check(
+        check(
             "IC3: the start's place beside the axis that gives the printed lower limit",
             THESIS["limits.start.IC3_x"],
-            Estimate(100 * aside, 100 * u_aside, "cm"),
+            100 * aside,
             Because(
                 f"the lower limit is {by_x[0.5]:.2f} Hz from x = 0.50 cm as printed and {by_x[0.3]:.2f} Hz from 0.30 "
-                "cm, "
-                f"with steps of {COARSE_HZ:g} Hz; printed is {printed.text} Hz: a 3 read or printed as 5",
+                f"cm, with steps of {COARSE_HZ:g} Hz; printed is {printed.text} Hz: a 3 read or printed as 5",
                 abs(by_x[0.3] - printed.value) < COARSE_HZ and by_x[0.5] - printed.value > 1.0,
             ),
+            u=100 * u_aside,
         ),
-        Check(
+        check(
             "IC3 with x = 0.50 cm as printed: lower limit",
             printed,
-            Estimate(by_x[0.5], None, "Hz"),
+            by_x[0.5],
             Because(f"with x = 0.30 cm it is {by_x[0.3]:.2f} Hz", by_x[0.3], COARSE_HZ),
         ),
-        Check(
+        check(
             "IC3 with x = 0.50 cm as printed: spin at the fall, with drag",
             THESIS["limits.drag.IC3"],
-            Estimate(float(np.median(drag)), None, "Hz"),
+            float(np.median(drag)),
             Because(
                 f"with x = 0.30 cm tops fall at {with_030.min():.2f} to {with_030.max():.2f} Hz",
                 float(np.median(with_030)),
@@ -235,23 +228,19 @@ def make() -> Found:
         "limits",
         "One mass fits four lower limits; upper limits are torn.",
         f"Above: from each start, which tops are up after 30 s (filled) in a scan of {UPPER_STEP_HZ:g} Hz; triangles "
-        "are "
-        "the thesis's upper limits. Below, from the left: the simulated lower limit over the mass (lines) with the "
-        "thesis's figures (dashed), which meet at one mass; the spin at the fall with drag from 48 starts alike (dots) "
-        "with the thesis's (dashes); the lower limit of IC3 over its place beside the axis, which is the printed one "
-        "at "
-        "0.30 cm and not at 0.50 cm.",
+        "are the thesis's upper limits. Below, from the left: the simulated lower limit over the mass (lines) with "
+        "the thesis's figures (dashed), which meet at one mass; the spin at the fall with drag from 48 starts alike "
+        "(dots) with the thesis's (dashes); the lower limit of IC3 over its place beside the axis, which is the "
+        "printed one at 0.30 cm and not at 0.50 cm.",
         "Scans of survival over spin, and lower limits over mass, with drag, and over the place of the third start",
         partial(limits_figure, scans),
     )
     said = (
         f"Survival over 30 s, scanned in steps of {STEP_HZ:g} Hz (lower) and {UPPER_STEP_HZ:g} Hz (upper), in the "
-        "thesis's "
-        f"field to r², with a mass of {1e3 * mass:.3f} g."
+        f"thesis's field to r², with a mass of {1e3 * mass:.3f} g."
     )
     note = Note(
-        "The mass is the only number that was fitted: to the four lower limits, which it meets within "
-        f"{min(rms):.3f} Hz "
-        "(rms). Upper limits are given as the spin up to which every top of the scan is up."
+        f"The mass is the only number that was fitted: to the four lower limits, which it meets within {min(rms):.3f} "
+        "Hz (rms). Upper limits are given as the spin up to which every top of the scan is up."
     )
     return Found(tuple(findings), (picture, note), said)

@@ -10,17 +10,16 @@ import numpy as np
 
 from analysis.numbers import digits
 from analysis.stability import sleeping_limit
-from analysis.uncertainty import Estimate
 from levilab.motion.lines import lines_of, rate_for
 from levilab.present.document.blocks import Picture
 from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Because, Check, Statement
+from levilab.reproduce.check import Because, Within, check, statement
 from levilab.reproduce.figure import fall_figure, paths_figure, tilted_figure
-from levilab.reproduce.tops import DURATION_S, FALL_M, THESIS, started
+from levilab.reproduce.tops import DURATION_S, FALL_M, THESIS, many, started
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
-from levilab.stability.thesis import STARTS
+from levilab.stability.thesis import SIMULATED_HZ, STARTS
 
 if TYPE_CHECKING:
     from levilab.reproduce.check import Finding
@@ -31,6 +30,8 @@ if TYPE_CHECKING:
 PATH_S, PATH_HZ = 10.0, 400.0
 #: How long a fall with drag takes at most, how much of it is shown [s], and samples per second.
 FALL_S, SHOWN_S, FALL_HZ = 150.0, 6.0, 400.0
+#: A tilt that is very large [rad]; the mass of the tilted runs [kg], and how much shorter they are said to be [%].
+LARGE_RAD, TILTED_KG, SHORTER_PERCENT = 0.5, 0.02445, 35.0
 #: A line is that of theory within this part of its frequency: the swings are not small.
 NEAR = 0.06
 
@@ -44,7 +45,7 @@ def paths() -> tuple[list[Finding], dict[str, Trajectory]]:
         place = 100 * motion.position
         x, z = (float(np.abs(place[:, 0]).max()), (float(place[:, 2].min()), float(place[:, 2].max())))
         found.append(
-            Statement(
+            statement(
                 f"{name}: path over x and z at 30 Hz",
                 "figures of the paths",
                 "the top stays in the trap",
@@ -65,7 +66,7 @@ def modes() -> list[Finding]:
     theory = dict(zip(("nutation", "precession"), sorted(found.modes.real, key=abs)[:1:-1], strict=True))
     off = {name: lines.get(name, math.nan) / frequency - 1 for name, frequency in theory.items()}
     return [
-        Statement(
+        statement(
             f"IC2: {name} in the spectrum of n_x + i n_y",
             "theory of small motions",
             "",
@@ -103,19 +104,60 @@ def fall() -> tuple[Finding, Trajectory]:
     before, last = float(motion.tilt[early].max()), float(motion.tilt[-1])
     limit, words, explained = compare_sleeping_limits(scene)
     return (
-        Statement(
+        statement(
             "tilt at the fall, IC1 with drag from 30 Hz",
             "figure of the tilt",
             "the tilt stays small until the spin is too slow, and grows within a second",
-            f"up to {math.degrees(before):.1f}° until {SHOWN_S:g} s before the fall, {math.degrees(last):.0f}° when "
-            "z is 6 "
-            f"cm, at {motion.spin_hz[-1]:.2f} Hz; the sleeping top's limit is {words}",
+            f"up to {math.degrees(before):.1f}° until {SHOWN_S:g} s before the fall, {math.degrees(last):.0f}° when z "
+            f"is 6 cm, at {motion.spin_hz[-1]:.2f} Hz; the sleeping top's limit is {words}",
             holds=not motion.survived
             and last > 3 * before
             and abs(float(motion.spin_hz[-1]) - limit) < 0.5
             and explained,
         ),
         motion,
+    )
+
+
+def sudden_fall() -> Finding:
+    """Without drag, just below the lower limit: when the tilt is very large."""
+    limit = SIMULATED_HZ["IC1"][0]
+    spins = limit - 0.01 * np.arange(1, 4)
+    times = []
+    for spin in spins.tolist():
+        motion = simulate(started("IC1").changed({"start.spin_hz": spin}), DURATION_S, tolerance=1e-7, rate=200.0)
+        times.append(float(motion.time[np.argmax(motion.tilt > LARGE_RAD)]))
+    return check(
+        f"IC1 without drag, {limit - spins[0]:.2f} Hz below its lower limit: the tilt exceeds {LARGE_RAD:g} rad after",
+        THESIS["fall.time"],
+        times[0],
+        Within(
+            max(times) - min(times), "a hundredth and two below it: " + ", ".join(f"{time:.2f} s" for time in times)
+        ),
+    )
+
+
+def shorter_run() -> Finding:
+    """How much earlier a top with a tilted moment falls, with drag: of starts alike, for several masses."""
+    aligned = started("IC1", "friction", f"escape.height_m={FALL_M}")
+    leaning = aligned.changed({"top.moment_tilt": list(preset("tilted").top.moment_tilt)})
+    spins = 30.0 + 0.001 * np.arange(24)
+    lasts = float(np.median(many(aligned, {"start.spin_hz": spins}, FALL_S).time))
+    masses = np.array([TILTED_KG, *(TILTED_KG - 1e-6 * np.array([50.0, 75.0, 100.0]))])
+    falls = many(leaning, {"start.spin_hz": spins[None, :], "top.mass_kg": masses[:, None]}, FALL_S).time
+    shorter = 100 * (1 - falls / lasts)
+    parts = "; ".join(
+        f"{1e3 * mass:.3f} g: {row.min():.0f} to {row.max():.0f} %"
+        for mass, row in zip(masses.tolist(), shorter, strict=True)
+    )
+    reached = bool(shorter[1:].min() < SHORTER_PERCENT + 0.5 < shorter[0].min())
+    return statement(
+        "a tilted moment shortens the run with drag, IC1 from 30 Hz",
+        "§4.3",
+        f"by approximately {SHORTER_PERCENT:g} %",
+        f"{np.median(shorter[0]):.0f} % for the {1e3 * TILTED_KG:.2f} g of its tilted runs, {spins.size} starts alike",
+        holds=abs(float(np.median(shorter[0])) - SHORTER_PERCENT) < 5,
+        reason=f"the phase at the fall and 0.1 g decide how early the top is lost ({parts})" if reached else "",
     )
 
 
@@ -133,19 +175,18 @@ def tilted() -> tuple[list[Finding], tuple[Trajectory, Trajectory]]:
     spin = scene.start.spin_hz
     wobble = [max((x.amplitude for x in one.lines if abs(x.frequency - spin) < 0.05), default=0.0) for one in lines]
     found: list[Finding] = [
-        Check(
+        check(
             "angle between moment and axis",
             printed,
-            Estimate(angle, None, "°"),
+            angle,
             Because(
-                f"μ·(0.03, 0, 0.97) leans by arctan(0.03/0.97) = {angle:.4f}°, and it has {norm:.6f} of the length "
-                "of μ, "
-                f"{100 * (1 - norm):.0f} % less, so that a lighter top floats; 1.5° would be "
+                f"μ·(0.03, 0, 0.97) leans by arctan(0.03/0.97) = {angle:.4f}°, and it has {norm:.6f} of the length of "
+                f"μ, {100 * (1 - norm):.0f} % less, so that a lighter top floats; 1.5° would be "
                 f"({along * math.tan(math.radians(printed.value)):.4f}, 0, 0.97)",
                 abs(angle - 1.7715) < 1e-3 and abs(norm - 0.970464) < 1e-6,
             ),
         ),
-        Statement(
+        statement(
             "a tilted moment makes the top wobble once a turn",
             "figures of the tilted and the aligned dipole",
             "the tilted one wobbles, the aligned one does not",
@@ -174,9 +215,8 @@ def make() -> Found:
         Picture(
             "fall",
             "A top that slows down tilts at the very end.",
-            "Tilt (band between its least and greatest value, and on the right the last second), height and spin of "
-            "a top "
-            "with the thesis's drag, from 30 Hz, up to its fall.",
+            "Tilt (band between its least and greatest value, and on the right the last second), height and spin of a "
+            "top with the thesis's drag, from 30 Hz, up to its fall.",
             "Tilt, height and spin up to the fall",
             partial(fall_figure, falling),
         ),
@@ -184,11 +224,11 @@ def make() -> Found:
             "tilted",
             "A tilted moment wobbles with the spin.",
             "The axis seen from above, n_x and n_y, in the first 4 s at 30 Hz: with the moment tilted by 1.77° and "
-            "with one "
-            "that is as strong along the axis, but not tilted.",
+            "with one that is as strong along the axis, but not tilted.",
             "The axis seen from above with a tilted and with an aligned moment",
             partial(tilted_figure, both),
         ),
     )
     said = "Figures without numbers: what they show is said in a sentence and tried; the motions are simulated anew."
-    return Found((*about_paths, *modes(), about_fall, *about_tilt), pictures, said)
+    findings = (*about_paths, *modes(), about_fall, sudden_fall(), *about_tilt, shorter_run())
+    return Found(findings, pictures, said)

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.stability import SymmetricTop, sleeping_limit, spin_windows
-from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
 from levilab.present.numbers import signed
 from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Among, Because, Check, Statement
+from levilab.reproduce.check import Among, Because, check, statement
 from levilab.reproduce.figure import simon_figure
 from levilab.reproduce.tops import Array, Flags, many, scan
 from levilab.simulator.field import field_of, on_axis
@@ -147,8 +146,8 @@ def _among(values: list[float]) -> Among:
     low, high = min(values), max(values)
     starts = " and ".join(f"{1e3 * away:g} mm, {1e3 * tilt:g} mrad" for away, tilt in (STARTS[0], STARTS[-1]))
     why = (
-        f"within a step of {STEP_RAD_S:g} rad/s of what starts give, of which the paper's is not known: "
-        f"{len(STARTS)} starts between {starts} give {low:.0f} to {high:.0f} rad/s; that of the calm one is given"
+        f"within a step of {STEP_RAD_S:g} rad/s of what starts give, of which the paper's is not known: {len(STARTS)} "
+        f"starts between {starts} give {low:.0f} to {high:.0f} rad/s; that of the calm one is given"
     )
     return Among(low, high, STEP_RAD_S, why)
 
@@ -169,36 +168,29 @@ def make() -> Found:
         lasts = lasting(simon, last)
         beyond = Because(
             f"over a ring with its B, B′, B″ every calm top is up to {calm[1]:.0f} rad/s, those that start farther "
-            f"away to {' and '.join(f'{one[1]:.0f}' for one in others)}; the "
-            f"quartic ends at {high:.0f}. At {printed['upper'].text} rad/s a calm top takes {lasts:.1f} s to be "
-            "lost: a shorter "
-            "simulation has it up",
+            f"away to {' and '.join(f'{one[1]:.0f}' for one in others)}; the quartic ends at {high:.0f}. At "
+            f"{printed['upper'].text} rad/s a calm top takes {lasts:.1f} s to be lost: a shorter simulation has it up",
             1.0 < lasts < DURATION_S,
         )
         near = _among(highest)
         upper = near if near.low - STEP_RAD_S <= last <= near.high + STEP_RAD_S else beyond
         findings += [
-            Check(f"{name}: lower edge of the quartic", printed["lower_quartic"], Estimate(low, None, "rad/s")),
-            Check(f"{name}: upper edge of the quartic", printed["upper_quartic"], Estimate(high, None, "rad/s")),
-            Check(
-                f"{name}: lower limit, simulated",
-                printed["lower"],
-                Estimate(calm[0], None, "rad/s"),
-                _among(lowest),
-            ),
-            Check(f"{name}: upper limit, simulated", printed["upper"], Estimate(calm[1], None, "rad/s"), upper),
+            check(f"{name}: lower edge of the quartic", printed["lower_quartic"], low),
+            check(f"{name}: upper edge of the quartic", printed["upper_quartic"], high),
+            check(f"{name}: lower limit, simulated", printed["lower"], calm[0], _among(lowest)),
+            check(f"{name}: upper limit, simulated", printed["upper"], calm[1], upper),
         ]
     three = row("3")
     rpm = {key: SIMON[f"abstract.{key}"].value * TURN / 60 for key in ("upper_simulated", "upper_measured")}
     findings.append(
-        Statement(
+        statement(
             "the upper limits of the abstract beside Table I",
             SIMON["abstract.upper_simulated"].place,
             f"{SIMON['abstract.upper_simulated'].text} rpm = {rpm['upper_simulated']:.0f} rad/s simulated, "
             f"{SIMON['abstract.upper_measured'].text} rpm = {rpm['upper_measured']:.0f} rad/s measured",
             f"the quartic ends at {three.window[1]:.0f} rad/s: "
-            f"{signed(100 * (three.window[1] / rpm['upper_simulated'] - 1), 0)} % of "
-            f"the simulated, {signed(100 * (three.window[1] / rpm['upper_measured'] - 1), 0)} % of the measured one",
+            f"{signed(100 * (three.window[1] / rpm['upper_simulated'] - 1), 0)} % of the simulated, "
+            f"{signed(100 * (three.window[1] / rpm['upper_measured'] - 1), 0)} % of the measured one",
             holds=abs(three.window[1] / rpm["upper_simulated"] - 1) < 0.05,
         )
     )
@@ -206,14 +198,12 @@ def make() -> Found:
         "simon",
         "Three tops of Simon, Heflinger and Ridgway.",
         f"Which tops are up after {DURATION_S:g} s (filled) over a ring that has the paper's B, B′ and B″ where the "
-        "top "
-        f"floats, in steps of {STEP_RAD_S:g} rad/s; lines: the window of the quartic; triangles: Table I.",
+        f"top floats, in steps of {STEP_RAD_S:g} rad/s; lines: the window of the quartic; triangles: Table I.",
         "Survival of three tops over their spin",
         partial(simon_figure, tuple(scans)),
     )
     note = Note(
-        "The second derivative in Table I is half of B″. The weight is taken as the force of the table's own "
-        "numbers, which "
-        f"are rounded: gravity comes out as {', '.join(f'{row(k).gravity:.2f}' for k in TOPS)} m/s²."
+        "The second derivative in Table I is half of B″. The weight is taken as the force of the table's own numbers, "
+        f"which are rounded: gravity comes out as {', '.join(f'{row(k).gravity:.2f}' for k in TOPS)} m/s²."
     )
     return Found(tuple(findings), (picture, note), "The first simulated limits of a Levitron, of three tops and bases.")

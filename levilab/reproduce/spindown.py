@@ -14,7 +14,7 @@ from analysis.spindown.fit import fit_spin_down
 from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Check, Comparison, Statement, Within
+from levilab.reproduce.check import Comparison, Within, check, statement
 from levilab.reproduce.figure import spindown_figure
 from levilab.reproduce.synthetic import NOISE_HZ, READINGS, MadeUp, solve, straight_lines
 from levilab.reproduce.tops import THESIS
@@ -53,13 +53,13 @@ def straight(runs: tuple[MadeUp, ...]) -> list[Finding]:
     found: list[Finding] = []
     for number, run in enumerate(runs):
         c1, c2 = straight_lines(run.time, run.spin)
-        for name, key, value, unit in (("C₁", "c1", c1, "1/s"), ("|C₂|", "c2", c2, "1/rad")):
+        for name, key, value in (("C₁", "c1", c1), ("|C₂|", "c2", c2)):
             printed = several("thesis", f"spindown.{key}")[number]
             line = f"run {number + 1}: {name}, straight line"
-            found.append(Check(line, printed, Estimate(value, None, unit), how=Comparison.CONSTRUCTED))
+            found.append(check(line, printed, value, how=Comparison.CONSTRUCTED))
     average = mean([Estimate(straight_lines(run.time, run.spin)[0], None, "1/s") for run in runs])
-    ours = Estimate(average.value, average.u, "1/s")
-    found.append(Check("mean of C₁", THESIS["spindown.mean_c1"], ours, how=Comparison.CONSTRUCTED))
+    printed = THESIS["spindown.mean_c1"]
+    found.append(check("mean of C₁", printed, average.value, how=Comparison.CONSTRUCTED, u=average.u))
     return found
 
 
@@ -72,11 +72,12 @@ def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
         assert c32.u is not None
         room = 2 * math.sqrt(2) * c32.u
         found.append(
-            Check(
+            check(
                 f"run {number + 1}: C of the disc's law",
                 printed,
-                Estimate(c32.value, c32.u, printed.unit),
+                c32.value,
                 Within(room, f"the noise of these readings is another one: twice √2 times our u of {digits(c32.u, 2)}"),
+                u=c32.u,
             )
         )
     exponents = [fit.fit("power").parameters["exponent"] for fit in fits]
@@ -85,27 +86,26 @@ def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
     assert average.u is not None
     worst = {law: max(fit.fit(law).statistics.rms_residual for fit in fits) for law in ("stokes", "newton", "disc")}
     found += [
-        Statement(
+        statement(
             "neither model is a perfect fit",
             "the spin-downs' figures",
             "neither exponential (n = 1) nor 1/(A + Ct) (n = 2) fits well",
             f"n = {average.value:.2f} ± {average.u:.2f} fits; the scatter left over is up to "
-            f"{1e3 * worst['disc']:.0f} mHz "
-            f"under n = 3/2, {1e3 * worst['stokes']:.0f} under n = 1, {1e3 * worst['newton']:.0f} under n = 2 "
-            f"(noise: {1e3 * NOISE_HZ:.0f})",
+            f"{1e3 * worst['disc']:.0f} mHz under n = 3/2, {1e3 * worst['stokes']:.0f} under n = 1, "
+            f"{1e3 * worst['newton']:.0f} under n = 2 (noise: {1e3 * NOISE_HZ:.0f})",
             holds=abs(average.value - 1.5) < 3 * average.u and worst["stokes"] > 2 * worst["disc"] < worst["newton"],
             how=Comparison.CONSTRUCTED,
         ),
-        Check(
+        check(
             "von Kármán's disc of the top's radius in air",
             THESIS["spindown.karman"],
-            Estimate(karman_disc(), None, "(rad/s)^-1/2/s"),
+            karman_disc(),
             Within(
                 karman_disc() * (0.005 / AIR_KG_M3 + 0.005e-5 / (2 * AIR_M2_S)),
                 f"{AIR_KG_M3:.2f} kg/m³ and {AIR_M2_S:.2e} m²/s of the air are rounded to three digits",
             ),
         ),
-        Statement(
+        statement(
             "the flow about the top is laminar",
             "von Kármán's disc",
             "ω R²/ν ≈ 1700 to 5200, far below 3×10⁵",
@@ -143,12 +143,9 @@ def make() -> Found:
     )
     note = Note(
         f"SYNTHETIC: law of a laminar disc, a reading each 10 s, noise of {NOISE_HZ:g} Hz, start and constant solved "
-        "for so "
-        f"that the straight lines return the printed C₁ and C₂; rounded to 0.01 Hz ({how}). That both constants of a "
-        "run "
-        "can be had from one law with n = 3/2 and 40 Hz is the finding; the agreement of C₁ and C₂ with the print is "
-        "how "
-        "the readings were made."
+        f"for so that the straight lines return the printed C₁ and C₂; rounded to 0.01 Hz ({how}). That both constants "
+        "of a run can be had from one law with n = 3/2 and 40 Hz is the finding; the agreement of C₁ and C₂ with the "
+        "print is how the readings were made."
     )
     said = "The thesis prints the constants of four spin-downs, and no readings. SYNTHETIC readings stand for them."
     synthetic = (

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.limits import Sample, compare, summarize
-from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Picture
 from levilab.present.numbers import signed
 from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Check, Statement
+from levilab.reproduce.check import check, statement
 from levilab.reproduce.figure import statistics_figure
 from levilab.reproduce.tops import THESIS
 from levilab.simulator.equilibrium import stability_of
@@ -65,31 +64,30 @@ def make() -> Found:
     assert found.trend.value is not None
     assert found.trend_p is not None
     findings: list[Finding] = [
-        Check("mean of ten", THESIS["measured.mean"], Estimate(found.mean.value, None, "Hz")),
-        Check("scatter of one", THESIS["measured.scatter"], Estimate(found.scatter.value, None, "Hz")),
-        Check("standard error of the mean", THESIS["measured.standard_error"], Estimate(found.mean.u, None, "Hz")),
-        Statement(
+        check("mean of ten", THESIS["measured.mean"], found.mean.value),
+        statement(
             "rounding to 0.1 Hz",
             THESIS["measured.limits.0"].place,
             "",
             f"adds {1e3 * step:.0f} mHz to the scatter, "
-            f"{100 * (1 - math.sqrt(1 - (step / found.scatter.value) ** 2)):.1f} % "
-            f"of it, and {1e3 * step / math.sqrt(10):.0f} mHz to the mean: nothing to correct",
+            f"{100 * (1 - math.sqrt(1 - (step / found.scatter.value) ** 2)):.1f} % of it, and "
+            f"{1e3 * step / math.sqrt(10):.0f} mHz to the mean: nothing to correct",
             holds=step < 0.2 * found.scatter.value,
         ),
-        Statement(
+        statement(
             "are the ten normal?",
             THESIS["measured.limits.0"].place,
             "",
             f"Shapiro and Wilk: W = {w:.3f}, p = {p:.2f}; no outlier; {_trend(found.trend_p)} "
-            f"({signed(1e3 * found.trend.value, 0)} mHz a top, p = {found.trend_p:.3f}); "
-            f"ten values leave the scatter ± {found.scatter.u:.2f} Hz",
+            f"({signed(1e3 * found.trend.value, 0)} mHz a top, p = {found.trend_p:.3f}); ten values leave the scatter "
+            f"± {found.scatter.u:.2f} Hz",
             holds=p > 0.05 and not found.outliers,
         ),
-        Statement(
+        statement(
             "against the exact edge of small motions",
             THESIS["measured.mean"].place,
-            "21.86(8) Hz measured; 14.005 Hz by its own estimate",
+            "21.86 Hz measured; 14.005 Hz by its own estimate",
+            f"scatter {found.scatter.value:.2f} Hz, standard error {found.mean.u:.2f} Hz; "
             f"{signed(edge.difference.value, 2)} Hz above the edge at {edge.expected:.2f} Hz (p = {edge.p:.2f}), "
             f"{found.mean.value - THESIS['stability.estimate'].value:.1f} Hz above the estimate",
             holds=0 < edge.difference.value < 0.5,
@@ -99,10 +97,8 @@ def make() -> Found:
         "ten",
         "Ten falls beside what theory and simulation say.",
         "The ten limits in their order; band: the mean with its standard error, dashed: the scatter of one; dotted: "
-        "the "
-        "lower edge of the window of small motions. On the right, the values in order over normal quantiles: on a "
-        "line, "
-        "as normal ones are.",
+        "the lower edge of the window of small motions. On the right, the values in order over normal quantiles: on a "
+        "line, as normal ones are.",
         "Ten lower limits and their normal quantiles",
         partial(statistics_figure, values, found, edge.expected),
     )

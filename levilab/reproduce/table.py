@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from levilab.present.tables import Row, Table, table
-from levilab.reproduce.check import Comparison, Erratum, Verdict, agreeing, counts
+from levilab.reproduce.check import Comparison, Kind, Verdict, agreeing, counts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,6 +24,7 @@ HEADS = ("", "compared with", "here", "agreement")
 #: Heads of the overview for those that agree.
 KINDS = {
     Comparison.INDEPENDENT: "agree with\nthe source",
+    Comparison.RANGE: "agree,\na range",
     Comparison.FITTED: "agree,\nfitted",
     Comparison.CONSTRUCTED: "agree by\nconstruction",
     Comparison.RECOMPUTED: "agree with our\nsecond way",
@@ -46,7 +47,7 @@ def _compared_with(one: Finding) -> str:
     """What ours is compared with, and below it what that is."""
     if one.comparison is None:
         return one.published_text
-    what = "what the print gives" if isinstance(one, Erratum) else one.comparison.value
+    what = "what the print gives" if one.kind is Kind.EQUATION else one.comparison.value
     return f"{one.published_text}\n{what}"
 
 
@@ -70,11 +71,12 @@ def numbers(findings: Sequence[Finding]) -> list[str]:
 def in_words(found: Reproduction) -> str:
     """The counts in a sentence."""
     agree, differ, added, unexpected = (found.counts[verdict] for verdict in Verdict)
-    independent, fitted, constructed, recomputed = agreeing(found.findings).values()
+    independent, ranges, fitted, constructed, recomputed = agreeing(found.findings).values()
     said = (
         f"{independent} values and statements agree with what a source prints or says; {agree - independent} more "
-        f"agree, but prove less: {recomputed} with a second computation of our own, {constructed} by construction, "
-        f"{fitted} after a fit to them. {differ} differ for a reason that was computed, too"
+        f"agree, but prove less: {ranges} within the range that starts alike leave open, {recomputed} with a second "
+        f"computation of our own, {constructed} by construction, {fitted} after a fit to them. {differ} differ for a "
+        "reason that was computed, too"
     )
     facts = "1 fact stands" if added == 1 else f"{added} facts stand"
     more = f", and {facts} beside them that the sources do not have" if added else ""

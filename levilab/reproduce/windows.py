@@ -9,23 +9,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.stability import floating_mass, reduced_mass
-from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Because, Check, Comparison
+from levilab.reproduce.check import Because, Comparison, check
 from levilab.reproduce.figure import Contours, contour_figure
 from levilab.reproduce.tops import ESTIMATE_KG, THESIS, estimate_hz
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset
 
 if TYPE_CHECKING:
+    from levilab.reproduce.check import Finding
     from levilab.simulator.scene import Scene
 
 #: The base with b = 2a has the inner radius of the thesis's: only the ratio matters.
 TWICE = {"base.outer_radius_m": 0.060}
 
+#: Effective mass of the top whose resting place the thesis shows.
+RESTING = 0.0360
 
-def heights_and_masses(scene: Scene, prefix: str) -> list[Check]:
+
+def heights_and_masses(scene: Scene, prefix: str) -> list[Finding]:
     """The edges of the heights in parts of the inner radius, as the reference has them."""
     found, a = stability_of(scene), scene.base.inner_radius_m
     low, high = found.windows
@@ -33,28 +36,28 @@ def heights_and_masses(scene: Scene, prefix: str) -> list[Check]:
     title = {"twice": "b = 2a", "own": "b/a = 5.5/3"}[prefix]
     names = ("lower region from", "lower region to", "upper region from", "upper region to")
     return [
-        Check(f"{title}: {name}", THESIS[f"stability.{prefix}_{key}"], Estimate(z / a, None, "a"))
+        check(f"{title}: {name}", THESIS[f"stability.{prefix}_{key}"], z / a)
         for name, (key, z) in zip(names, edges.items(), strict=True)
     ]
 
 
-def effective_masses() -> list[Check]:
-    """M = m g a²/(2π|μ|ρ) of the lightest and the heaviest top of the upper region, b = 2a."""
+def effective_masses() -> list[Finding]:
+    """Compare M = m g a²/(2π|μ|ρ) of the lightest and the heaviest top of the upper region, and a height, b = 2a."""
     scene = preset("undriven").changed(TWICE)
     found = stability_of(scene)
-    window = found.windows[-1]
-    base = scene.base
-    return [
-        Check(
-            f"b = 2a: effective mass of the {word} top",
-            THESIS[f"stability.twice_{key}"],
-            Estimate(reduced_mass(mass, found.top, base.inner_radius_m, base.strength_t_m), None, ""),
-        )
+    window, base = found.windows[-1], scene.base
+    per_kg = reduced_mass(1.0, found.top, base.inner_radius_m, base.strength_t_m)
+    masses = [
+        check(f"b = 2a: effective mass of the {word} top", THESIS[f"stability.twice_{key}"], mass * per_kg)
         for word, key, mass in (("lightest", "light", window.light), ("heaviest", "heavy", window.heavy))
     ]
+    resting = stability_of(scene.changed({"top.mass_kg": RESTING / per_kg})).floating
+    assert resting is not None
+    height = resting.height / base.inner_radius_m
+    return [*masses, check(f"b = 2a: height of the top with M = {RESTING:.4f}", THESIS["stability.twice_rest"], height)]
 
 
-def device() -> list[Check]:
+def device() -> list[Finding]:
     """What the thesis says of its own top: masses, height, and its estimate of the least spin."""
     found = stability_of(preset("undriven"))
     window = found.lifted[-1]
@@ -63,41 +66,41 @@ def device() -> list[Check]:
     lifted = floating_mass(found.field, found.top, THESIS["device.height"].value / 100)
     factor = 2 * math.sqrt(found.top.transverse / found.top.axial)
     exact = found.floating.spins[0][0]
-    true = Check(
+    true = check(
         "least spin of the thesis's own estimate against the exact one",
         THESIS["stability.estimate"],
-        Estimate(exact, None, "Hz"),
+        exact,
         Because(
-            f"the estimate lacks the factor 2√(I₁/I₃) = {factor:.3f}: with it, for {found.scene.top.mass_kg * 1e3:.2f} "
-            f"g at {100 * found.floating.height:.2f} cm, where they float, it is {found.sleeping:.2f} Hz, the sleeping "
-            f"top's limit, and the sideways motion moves that to {exact:.2f} Hz; without it, for "
-            f"{1e3 * ESTIMATE_KG:.2f} g at 7.3 cm, it is {estimate:.3f} Hz, as printed",
+            f"the estimate lacks the factor 2√(I₁/I₃) = {factor:.3f}: with it, for "
+            f"{found.scene.top.mass_kg * 1e3:.2f} g at {100 * found.floating.height:.2f} cm, where they float, it is "
+            f"{found.sleeping:.2f} Hz, the sleeping top's limit, and the sideways motion moves that to {exact:.2f} "
+            f"Hz; without it, for {1e3 * ESTIMATE_KG:.2f} g at 7.3 cm, it is {estimate:.3f} Hz, as printed",
             estimate,
         ),
     )
     return [
-        Check("lightest top that floats", THESIS["stability.lightest"], Estimate(1e3 * window.light, None, "g")),
-        Check("heaviest top that floats", THESIS["stability.heaviest"], Estimate(1e3 * window.heavy, None, "g")),
-        Check(
+        check("lightest top that floats", THESIS["stability.lightest"], 1e3 * window.light),
+        check("heaviest top that floats", THESIS["stability.heaviest"], 1e3 * window.heavy),
+        check(
             "mass of the top that floats at the measured 7.3 cm",
             THESIS["device.mass"],
-            Estimate(1e3 * found.scene.top.mass_kg, None, "g"),
+            1e3 * found.scene.top.mass_kg,
             Because(
                 f"the field of Table 3.1 lifts {1e3 * window.heavy:.3f} g at most: 25.5 g fall. At 7.3 cm it lifts "
                 f"{1e3 * lifted:.2f} g",
                 THESIS["device.mass"].value > 1e3 * window.heavy and abs(lifted / found.scene.top.mass_kg - 1) < 1e-3,
             ),
         ),
-        Check(
+        check(
             f"height of a top of {1e3 * found.scene.top.mass_kg:.2f} g",
             THESIS["device.height"],
-            Estimate(100 * found.floating.height, None, "cm"),
+            100 * found.floating.height,
             how=Comparison.FITTED,
         ),
-        Check(
+        check(
             f"the thesis's estimate, for {1e3 * ESTIMATE_KG:.2f} g at 7.3 cm",
             THESIS["stability.estimate"],
-            Estimate(estimate, None, "Hz"),
+            estimate,
             how=Comparison.FITTED,
         ),
         true,
@@ -135,20 +138,18 @@ def make() -> Found:
         "contours",
         "The trap is shallow, and deepest in the middle of the masses.",
         "Contours of mgz + |μ||B| over the distance from the axis and the height, in steps of 2 µJ from the place "
-        "where "
-        "the top rests (cross), in the exact field of the base. The bold line is the rim over which a top "
+        "where the top rests (cross), in the exact field of the base. The bold line is the rim over which a top "
         "escapes: sideways and up for light tops, down for heavy ones.",
         "Contours of the potential for tops of three masses",
         partial(contour_figure, tuple(shown), tuple(f"{1e3 * mass:.2f} g" for mass in masses)),
     )
     said = (
         "A fast top whose moment follows the field floats stably in two regions of height, of which the upper one is "
-        "the "
-        "Levitron's. The edges are zeros of three conditions on the field of the base, found here to the last digits."
+        "the Levitron's. The edges are zeros of three conditions on the field of the base, found here to the last "
+        "digits."
     )
     note = Note(
         "The masses of 24.742 to 25.485 g are those of the thesis's field and moment. Its estimate of the least spin "
-        "is "
-        "a sleeping top's limit without the factor 2√(I₁/I₃)."
+        "is a sleeping top's limit without the factor 2√(I₁/I₃)."
     )
     return Found(tuple(findings), (picture, note), said)

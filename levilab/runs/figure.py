@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from levilab.present.drawing import headline, panel
 from levilab.present.looks import LOOKS
 from levilab.present.style import STYLE, WIDE
-from levilab.present.words import UNITS
+from levilab.present.units import split
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,13 +37,13 @@ def readings_figure(frame: pd.DataFrame, title: str) -> Figure:
         figure = Figure(figsize=(WIDE, _TOP + _PITCH * (max(len(names), 1) - 1) + _HEIGHT + _BOTTOM))
         headline(figure, title.replace("\\", "\\\\").replace("$", r"\$"))
         panels = [panel(figure, _LEFT, _TOP + _PITCH * k, _WIDTH, _HEIGHT) for k in range(max(len(names), 1))]
-        x = frame[against] if against else frame.index + 1
+        x = _shown(frame, against) if against else frame.index + 1
         colour = LOOKS["readings"].colour
         for axes, name in zip(panels, names, strict=False):
             u = _uncertainty(frame, name)
             if u is not None:
-                axes.errorbar(x, frame[name], yerr=u, fmt="none", color=colour, elinewidth=0.8)
-            axes.plot(x, frame[name], ".", color=colour, gid=f"readings-{name}")
+                axes.errorbar(x, _shown(frame, name), yerr=u, fmt="none", color=colour, elinewidth=0.8)
+            axes.plot(x, _shown(frame, name), ".", color=colour, gid=f"readings-{name}")
             axes.set_ylabel(_axis(name), fontsize=8)
             axes.set_xlim(panels[0].get_xlim())
             axes.tick_params(labelbottom=axes is panels[-1])
@@ -54,16 +54,23 @@ def readings_figure(frame: pd.DataFrame, title: str) -> Figure:
 def _axis(column: str) -> str:
     r"""Return a column's name for an axis: its quantity in words, its unit in brackets.
 
-    >>> _axis("time_s"), _axis("precession_frequency_hz"), _axis("remark")
-    ('time  [s]', 'precession frequency\n[Hz]', 'remark')
+    >>> _axis("height_m"), _axis("precession_frequency_hz"), _axis("remark")
+    ('height  [cm]', 'precession frequency\n[Hz]', 'remark')
     """
-    quantity, _, unit = column.rpartition("_")
-    if unit not in UNITS or not quantity:
+    quantity, unit = split(column)
+    if unit is None:
         return column.replace("_", " ")
-    return f"{quantity.replace('_', ' ')}{'  ' if len(quantity) < _LONG else chr(10)}[{UNITS[unit]}]"
+    return f"{quantity.replace('_', ' ')}{'  ' if len(quantity) < _LONG else chr(10)}[{unit.shown.unit}]"
+
+
+def _shown(frame: pd.DataFrame, name: str) -> pd.Series:
+    """Return a column in the unit of its axis."""
+    _, unit = split(name)
+    return frame[name] * unit.shown.factor if unit else frame[name]
 
 
 def _uncertainty(frame: pd.DataFrame, name: str) -> pd.Series | None:
     """Return the column of its standard uncertainty, as spin_frequency_u_hz is of spin_frequency_hz."""
-    quantity, _, unit = name.rpartition("_")
-    return frame.get(f"{quantity}_u_{unit}")
+    quantity, unit = split(name)
+    column = f"{quantity}_u_{unit.ending}" if unit else ""
+    return _shown(frame, column) if column in frame else None

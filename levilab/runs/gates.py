@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.precession.gates import Gates
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from levilab.runs.run import Run
 
-#: The kind of the event; its keys beside the drive's frequency; those of each of them.
-COUNTED = "counted"
 SERIES = ("spin", "laser")
 _COLUMNS = ("begin_s", "end_s", "frequency_hz")
 #: Counts of a series, at least.
@@ -44,7 +43,7 @@ def gates_of(run: Run, times: Sequence[float], drives: Sequence[float]) -> list[
         times: of its readings [s].
         drives: their drive frequencies [Hz].
     """
-    events = [event for event in run.events() if event["kind"] == COUNTED]
+    events = [event for event in run.events() if event["kind"] == RunEvent.COUNTED]
     found = []
     before = -math.inf
     for time, drive in zip(times, drives, strict=True):

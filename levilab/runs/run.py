@@ -20,6 +20,7 @@ from levilab.errors import DataError
 from levilab.files import parse_json
 from levilab.formats.table import read_run_readings
 from levilab.present.html import facts_as_html
+from levilab.runs.events import RunEvent
 from levilab.runs.traces import load_traces
 from levilab.settings import in_one_line
 
@@ -41,8 +42,6 @@ READINGS, STATES, EVENTS, RECORD, LOCK, WIRE, PACKAGE = (
     "datapackage.json",
 )
 
-#: The kind of an event that says what to know before the readings are used.
-WARNING = "warning"
 #: Rows of readings that a notebook shows.
 SHOWN_ROWS = 5
 _NUMBERS = re.compile(r"[\d.]+(\(\d+\))?")
@@ -211,7 +210,7 @@ class Run:
 
 def _warnings_of(events: list[dict[str, Any]]) -> tuple[str, ...]:
     """Each warning once; of those that differ in their numbers alone the first, and how many there are."""
-    texts = [str(event["text"]) for event in events if event["kind"] == WARNING]
+    texts = [str(event["text"]) for event in events if event["kind"] == RunEvent.WARNING]
     alike = Counter(_NUMBERS.sub("#", text) for text in texts)
     firsts = {_NUMBERS.sub("#", text): text for text in reversed(texts)}
     return tuple(

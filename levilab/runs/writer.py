@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, Self
 from levilab.errors import DataError
 from levilab.files import CannotWrite, replace_atomically, sync_folder
 from levilab.runs import traces
+from levilab.runs.events import RunEvent
 from levilab.runs.run import (
     EVENTS,
     LOCK,
@@ -140,7 +141,7 @@ class RunWriter:
         notes = "; ".join(filter(None, (self.record.note, note)))
         self.update(status="running", ended_utc=None, note=notes)
         if cut_short:
-            self.event(None, "cut short", cut_short)
+            self.event(None, RunEvent.CUT_SHORT, cut_short)
 
     def _header(self) -> str:
         return ",".join(channel["name"] for channel in self.record.channels)
@@ -290,7 +291,7 @@ class RunWriter:
         with _explain_errors("clear up", self.folder):
             traces.forget_arriving(self.folder)
 
-    def event(self, time_s: float | None, kind: str, text: str, **data: Any) -> None:
+    def event(self, time_s: float | None, kind: RunEvent, text: str, **data: Any) -> None:
         """Append a line to events.jsonl."""
         event = {"utc": utc_now(), "time_s": time_s, "kind": kind, "text": text} | data
         with _explain_errors(f"write the event {text!r}", self.folder):

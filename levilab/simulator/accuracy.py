@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from levilab.simulator.field import flux_density
 from levilab.simulator.kernels import braking
 from levilab.simulator.kernels.motion import CLOCK, L, R
+from levilab.simulator.laws import LAWS
 from levilab.simulator.numbers import largest, length, smallest, sqrt
+from levilab.simulator.spin import DECAYS
 
 if TYPE_CHECKING:
     from levilab.simulator.kernels.motion import Model
@@ -72,14 +74,16 @@ def _strongest_damping(drag: Any, start: Array) -> Any:
 def has_kink(drag: Any) -> bool:
     """Whether the drag's law has |ω| in it: then it is not smooth at ω = 0, and a step across that loses its order."""
     if isinstance(drag, braking.WasherDragFlow):
-        return any(_law_has_kink(law) for law in (drag.washers, drag.core))
-    return isinstance(drag, braking.DragFlow) and _law_has_kink(drag.law)
+        return not (_is_linear(drag.washers) and _is_linear(drag.core))
+    return isinstance(drag, braking.DragFlow) and not _is_linear(drag.law)
 
 
-def _law_has_kink(law: Any) -> bool:
-    if isinstance(law, braking.Mixed):
-        return law.c2 != 0
-    return not isinstance(law, braking.Stokes) and law.c != 0
+def _is_linear(law: Any) -> bool:
+    return LAWS[_name_of(law)].is_linear(law)
+
+
+def _name_of(law: Any) -> str:
+    return next(name for name, (kind, *_) in braking.LAWS.items() if kind is type(law))
 
 
 def comes_near_zero(spins: Array) -> NDArray[np.bool_]:
@@ -94,13 +98,7 @@ def comes_near_zero(spins: Array) -> NDArray[np.bool_]:
 
 def _damping_rate(law: Any, spin: Any) -> Any:
     """Return |ω̇/ω| of a drag law at a spin [1/s]."""
-    if isinstance(law, braking.Stokes):
-        return law.c
-    if isinstance(law, braking.Newton):
-        return law.c * spin
-    if isinstance(law, braking.LaminarDisc):
-        return law.c * sqrt(spin)
-    return law.c1 + law.c2 * spin
+    return DECAYS[_name_of(law)].damping(spin, *law)
 
 
 #: An estimate is to bound the true error; with this factor it is about six times as large.

@@ -375,8 +375,8 @@ def _check_counts(some: Batch, duration: float, steps: Array) -> None:
     rate = some.runs[:, RATE].max()
     if 2 * rate * duration > MOST_KINKS:
         raise SimulationError(
-            f"drive.frequency_hz = {rate:g}: it has {2 * rate * duration:.2g} corners in {duration:g} s, "
-            f"at most {MOST_KINKS:.0e} are gone through: take a sine, a lower frequency or a shorter duration"
+            f"drive.frequency_hz = {rate:g}: it has {2 * rate * duration:.2g} corners in {duration:g} s, at most "
+            f"{MOST_KINKS:.0e} are gone through: take a sine, a lower frequency or a shorter duration"
         )
 
 

@@ -401,13 +401,13 @@ def advice(found: Stability) -> str:
         )
     if found.nearest is None:
         return (
-            "no top with this moment floats over this base, whatever its mass: "
-            "the moment must point against the field (top.moment_a_m2 of the other sign)"
+            "no top with this moment floats over this base, whatever its mass: the moment must point against the field "
+            "(top.moment_a_m2 of the other sign)"
         )
     kilograms = found.scene.top.mass_kg
     said = (
-        f"a top of {1000 * kilograms:.6g} g does not float over this base; "
-        f"the nearest that does has {1000 * found.nearest:.2f} g"
+        f"a top of {1000 * kilograms:.6g} g does not float over this base; the nearest that does has "
+        f"{1000 * found.nearest:.2f} g"
     )
     asked = f".  Were grams meant?  {kilograms:g} g are top.mass_kg = {kilograms / 1000:g}"
     return said + (asked if kilograms > HEAVIEST_KG else "")

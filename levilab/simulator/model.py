@@ -88,21 +88,13 @@ def _turning(scene: Scene) -> Any:
     return Rigid(1 / axial - 1 / scene.top.inertia_transverse_kg_m2)
 
 
-_LAWS = {
-    "stokes": braking.Stokes,
-    "newton": braking.Newton,
-    "disc": braking.LaminarDisc,
-    "mixed": braking.Mixed,
-}
-
-
 def _drag(scene: Scene) -> Any:
     constants = scene.drag.constants
     if scene.washers.inertia_kg_m2 > 0:
         return _loose_drag(scene)
     if scene.drag.law == "none" or not any(constants):
         return None
-    law = _LAWS[scene.drag.law](*constants)
+    law = braking.LAWS[scene.drag.law][0](*constants)
     return braking.DragFlow(law) if has_attitude(scene) else braking.PrescribedDrag(law)
 
 
@@ -110,8 +102,8 @@ def _loose_drag(scene: Scene) -> braking.WasherDragFlow:
     """The torque of the air is shared: each part slows as by a law of its own, scaled by I₃ over its inertia."""
     axial, washers = scene.top.inertia_axial_kg_m2, scene.washers.inertia_kg_m2
     core, share = axial - washers, scene.washers.drag_share
-    law = _LAWS.get(scene.drag.law, braking.Stokes)
-    constants = scene.drag.constants if scene.drag.law != "none" else (0.0,)
+    law = braking.Stokes if scene.drag.law == "none" else braking.LAWS[scene.drag.law][0]
+    constants = scene.drag.constants or (0.0,)
     return braking.WasherDragFlow(
         washers=law(*(c * share * axial / washers for c in constants)),
         core=law(*(c * (1 - share) * axial / core for c in constants)),

@@ -8,29 +8,22 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, NonNegativeFloat, model_validator
 from pydantic_core import PydanticCustomError
 
 from levilab.settings import Settings
+from levilab.simulator.laws import LAWS
 
 FieldKind = Literal[
     "exact", "paraxial-2", "paraxial-4", "paraxial-6", "paraxial-8", "paraxial-10", "paraxial-12", "paraxial-14",
     "paraxial-16", "paraxial-18", "paraxial-20",
 ]  # fmt: skip
-Law = Literal["none", "stokes", "newton", "disc", "mixed"]
-
-#: Constants of the drag laws where a scene gives none, from the four spin-downs of the thesis (40 Hz to the fall
-#: near 22 Hz): the means of its C₁ [1/s] and C₂ [1/rad], and of the disc law's constant refitted to each run
-#: [(rad/s)^-1/2/s].  The thesis has no fit of C₁ and C₂ together: mixed is half of the first mean and half of the
-#: second, and thereby, each to 1.4 %, the tangent to the disc law at 30 Hz, √ω ≈ √ω₀/2 + ω/(2√ω₀).
-CONSTANTS: dict[str, float | tuple[float, float]] = {
-    "stokes": 0.00318175,
-    "newton": 1.7270e-5,
-    "disc": 2.340e-4,
-    "mixed": (0.5 * 0.00318175, 0.5 * 1.7270e-5),
-}
+if TYPE_CHECKING:
+    Law = str
+else:
+    Law = Literal["none", *LAWS]
 
 
 def _numbers(count: int) -> BeforeValidator:
@@ -152,7 +145,8 @@ class Drag(Part):
     @classmethod
     def _usual(cls, table: Any) -> Any:
         if isinstance(table, dict) and table.get("coefficient") is None:
-            return table | {"coefficient": CONSTANTS.get(str(table.get("law")))}
+            usual = LAWS[law].usual if (law := str(table.get("law"))) in LAWS else (None,)
+            return table | {"coefficient": usual if len(usual) > 1 else usual[0]}
         return table
 
     @property

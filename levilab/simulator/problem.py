@@ -203,9 +203,9 @@ def _escape(problem: Problem, state: Array, interval: Stops) -> tuple[Array, Eve
     after, through = problem.advance_to_stops(states[-1], single.part(at, at + 1), NO_LIMITS)
     if not (through and np.all(np.isfinite(after[-1]))):
         raise LeftRange(
-            f"the motion cannot be followed beyond {states[-1][TIME]:.6g} s, where its numbers leave their range; "
-            f"the last place was ({', '.join(f'{x:.4g}' for x in states[-1][R])}) m: "
-            "start farther from the base's edges, or end at a greater escape.height_m"
+            f"the motion cannot be followed beyond {states[-1][TIME]:.6g} s, where its numbers leave their range; the "
+            f"last place was ({', '.join(f'{x:.4g}' for x in states[-1][R])}) m: start farther from the base's edges, "
+            "or end at a greater escape.height_m"
         )
     step = one_step_map(problem, single.part(at, at + 1))
     length = float(single.times[at + 1] - single.times[at])

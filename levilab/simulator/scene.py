@@ -17,6 +17,7 @@ from pydantic import NonNegativeFloat, ValidationError, model_validator
 from levilab.files import parse_toml
 from levilab.settings import in_one_line
 from levilab.simulator.keys import SceneError, Table, UnknownScene, as_toml, nearest, parse_setting, set_key, short_text
+from levilab.simulator.laws import LAWS
 from levilab.simulator.parts import Base, Drag, Drive, Escape, Part, Start, Top, Washers
 
 if TYPE_CHECKING:
@@ -99,7 +100,7 @@ def _place_is_given(s: Scene) -> bool:
 
 
 def _as_many_coefficients_as_the_law_has(s: Scene) -> bool:
-    return s.drag.law == "none" or len(s.drag.constants) == (2 if s.drag.law == "mixed" else 1)
+    return s.drag.law == "none" or len(s.drag.constants) == len(LAWS[s.drag.law].names)
 
 
 RULES: tuple[Rule, ...] = (
@@ -224,7 +225,7 @@ SWITCHES: tuple[Switch, ...] = (
         "drag",
         lambda s: s.drag.law == "none",
         ("coefficient",),
-        "drag.law = none; stokes, newton, disc or mixed switches the drag on",
+        f"drag.law = none; one of {', '.join(LAWS)} switches the drag on",
     ),
     Switch(
         "washers",
@@ -324,8 +325,8 @@ def _read_file(file: Traversable | Path, name: str) -> Scene:
         table = parse_toml(file.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
         raise SceneError(
-            f"{file}: there is no such file; scenes that come with levilab are {', '.join(presets())}, "
-            "each a TOML file to copy and change"
+            f"{file}: there is no such file; scenes that come with levilab are {', '.join(presets())}, each a TOML "
+            "file to copy and change"
         ) from None
     except OSError as error:
         if file.is_dir():

@@ -11,13 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.errors import SimulationError
-from levilab.simulator.accuracy import NODES_ORDER, comes_near_zero, estimate, has_kink, longest_step, rounding_error
+from levilab.simulator.accuracy import (
+    NODES_ORDER,
+    SAFETY_FACTOR,
+    comes_near_zero,
+    estimate,
+    has_kink,
+    longest_step,
+    rounding_error,
+)
 from levilab.simulator.energy import spins_of
 from levilab.simulator.escape import exit_speed, locate_zero, margins
-from levilab.simulator.forecast import run_by_forecast
 from levilab.simulator.kernels.loads import Disc
 from levilab.simulator.kernels.motion import CLOCK, TIME, L, N, R, V
 from levilab.simulator.model import model_of
+from levilab.simulator.pilot import Pilot, pilot_of, step_power
 from levilab.simulator.problem import (
     Problem,
     integrate,
@@ -44,8 +52,18 @@ SMALLEST_STEP_SHARE = 1 / 256
 #: may be chance in the estimates.
 MAX_FAILED_REFINEMENTS = 2
 
-#: The first step of the careful way, as a part of the longest one: there is room for four times as much.
-FIRST_STEP_SHARE = 1 / 4
+#: The longest step over the steps of a result: room for a second run with longer steps, which is the cheaper one.
+ROOM = 1.4
+
+#: With less than this ratio of stepᵖ between two runs their difference is smaller than the error.
+LEAST_RATIO = 2.0
+
+#: Above this ratio of the error to the one that a pilot run shows neighbours may part exponentially, and rounding with
+#: them: two further runs then show whether the scheme's order is reached.
+MOST_GROWTH = 10.0
+
+#: The longest step for these two runs, as a part of the longest one: they have steps twice and four times as long.
+LONGEST_SHARE_OF_THREE = 1 / 4
 
 #: The longest simulation, thirty years [s].
 LONGEST_S = 1e9
@@ -69,12 +87,21 @@ class _Wanted:
 
 @dataclass(frozen=True)
 class Run:
-    """States at the samples, shape (n, 18), the fall that ended them, events on the way, and the steps taken."""
+    """A motion integrated once.
+
+    Attributes:
+        states: at the samples, shape (n, 18).
+        fell: the fall that ended it.
+        events: on the way.
+        steps: how many were taken.
+        step_power: mean of stepᵖ over the time [sᵖ], p the scheme's order.
+    """
 
     states: Array
     fell: Event | None
     events: tuple[Event, ...]
     steps: int
+    step_power: float
 
 
 def simulate(
@@ -118,8 +145,8 @@ def simulate(
         given = {"events": events, "scheme": scheme, "step": step, "start": start}
         if useless := [name for name, value in given.items() if value is not None]:
             raise SimulationError(
-                f"{useless[0]}: a scene with observed = spin has a closed form, nothing is integrated: "
-                "take observed = motion"
+                f"{useless[0]}: a scene with observed = spin has a closed form, nothing is integrated: take observed = "
+                "motion"
             )
         return spin_alone(scene, duration, tolerance, rate)
     state = start_of(scene) if start is None else np.array(start, dtype=np.float64)
@@ -127,8 +154,8 @@ def simulate(
         raise SimulationError("the start has a value that is no number: 18 finite numbers are expected")
     if start is None and min(margins(state, (scene.escape.radius_m, scene.escape.height_m)).values()) < 0:
         raise SimulationError(
-            f"escape.height_m = {scene.escape.height_m}: the top starts at {state[R][2]:.4g} m, outside of the "
-            "limits of the escape, where it would be lost before it began"
+            f"escape.height_m = {scene.escape.height_m}: the top starts at {state[R][2]:.4g} m, outside of the limits "
+            "of the escape, where it would be lost before it began"
         )
     model = model_of(scene, state[R])
     problem = Problem(scene, model, state, scheme_for(scheme, model))
@@ -152,23 +179,22 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
     Returns:
         The run within the tolerance, else the best one; its accuracy.
     """
-    samples = _samples(float(problem.start[TIME]), wanted.duration, wanted.rate)
-    if step is None and not wanted.events:
-        found = run_by_forecast(problem, wanted.duration, tolerance, samples, wanted.progress)
-        if found is not None:
-            accuracy = Accuracy(
-                *found.errors, tolerance, problem.scheme.name, found.step, found.steps, tries=found.tries
-            )
-            kept = found.states[_are_wanted(found.states[:, TIME], samples, abs(wanted.duration) * 1e-11)]
-            return Run(kept, None, (), found.steps), accuracy
-    longest = longest_step(problem.scene, problem.model, problem.start, problem.scheme)
-    h = step or min(longest * FIRST_STEP_SHARE, abs(wanted.duration) / 2)
+    longest, order = longest_step(problem.scene, problem.model, problem.start, problem.scheme), problem.scheme.order
+    pilot = None if step else pilot_of(problem, wanted.duration, tolerance, longest / ROOM)
+    h = step or min(pilot.step if pilot else longest / ROOM, abs(wanted.duration) / 2)
+    with_three = step is not None
     best: tuple[Run, Accuracy] | None = None
     smallest, failed, tries = math.inf, 0, 0
     while True:
         tries += 1
         run = _run(problem, wanted, h)
-        of_steps, of_nodes = _errors(problem, run, h)
+        found = None if with_three else _errors_by_two(problem, run, pilot, longest)
+        if found is None:
+            if not with_three and h > longest * LONGEST_SHARE_OF_THREE:
+                with_three, h = True, longest * LONGEST_SHARE_OF_THREE
+                continue
+            with_three, found = True, _errors(problem, run, h)
+        of_steps, of_nodes = found
         position, axis = (float(error) for error in of_steps + of_nodes)
         accuracy = Accuracy(position, axis, tolerance, problem.scheme.name, h, run.steps, float(max(of_nodes)), tries)
         worst = float(max(of_steps))
@@ -178,11 +204,36 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
             failed += 1
         if accuracy.reached:
             return run, accuracy
-        if max(of_steps) <= tolerance / 2:  # the rest is the nodes', of a magnet that has come near the base
+        if worst <= tolerance / 2:  # the rest is the nodes', of a magnet that has come near the base
             return run, accuracy
         if step or failed == MAX_FAILED_REFINEMENTS or h < longest * SMALLEST_STEP_SHARE:
             return best
-        h *= min(max(0.9 * (tolerance / worst) ** (1 / problem.scheme.order), 0.1), 0.7)
+        h *= min(max(0.9 * (tolerance / worst) ** (1 / order), 0.1), 0.7)
+
+
+def _errors_by_two(problem: Problem, run: Run, pilot: Pilot | None, longest: float) -> tuple[Array, Array] | None:
+    """Estimate the error of the last state from a second run, with longer steps where these are short enough.
+
+    Returns:
+        As `_errors`; None where the scheme's order may not be reached.
+    """
+    if run.fell is not None or isinstance(problem.model.magnet, Disc):
+        return None
+    begin, end, order = float(problem.start[TIME]), run.states[-1], problem.scheme.order
+    mean_step = run.step_power ** (1 / order)
+    if _crosses_kink(problem, run, mean_step):
+        return None
+    for step in (min(2 * mean_step, longest), mean_step / 2):
+        stops = stops_between(begin, end[TIME], step, problem.scene.drive)
+        ratio = step_power(stops, order) / run.step_power
+        if ratio >= LEAST_RATIO:
+            break
+    other = integrate_to_end(problem, stops)
+    errors = np.array([np.linalg.norm(end[part] - other[part]) for part in (R, N)]) / abs(ratio - 1)
+    expected = pilot.error_at(end[TIME] - begin) * run.step_power if pilot else math.inf
+    if not max(errors) <= MOST_GROWTH * expected:  # neither where it is no number
+        return None
+    return SAFETY_FACTOR * errors + rounding_error(problem.scheme, run.steps, end), np.zeros(2)
 
 
 def _errors(problem: Problem, run: Run, step: float) -> tuple[Array, Array]:
@@ -264,7 +315,7 @@ def _run(problem: Problem, wanted: _Wanted, step: float) -> Run:
         states = np.concatenate([states, fell.state[None]])
     found = _events(problem, states, stops, wanted.events) if wanted.events else ()
     kept = states[_are_wanted(states[:, TIME], samples, abs(wanted.duration) * 1e-11)]
-    return Run(kept, fell, found, steps)
+    return Run(kept, fell, found, steps, step_power(stops, problem.scheme.order))
 
 
 def _are_wanted(times: Array, samples: Array, apart: float) -> NDArray[np.bool_]:
@@ -325,8 +376,8 @@ def spin_alone(scene: Scene, duration: float, tolerance: float, rate: float | No
         longest_ago = since_infinity(scene.drag.law, spin, scene.drag.constants)
         if -duration >= longest_ago:
             raise SimulationError(
-                f"duration = {duration} s: under this drag the spin was infinite {longest_ago:.6g} s ago; "
-                "a shorter way back is expected"
+                f"duration = {duration} s: under this drag the spin was infinite {longest_ago:.6g} s ago; a shorter "
+                "way back is expected"
             )
         now = DECAYS[scene.drag.law].after(spin, times, *scene.drag.constants)
         states[:, L] = start[L] * (now / spin)[:, None]

@@ -6,17 +6,20 @@ Where only the spin is observed nothing has to be integrated: with an aligned di
     time to fall from ω₀ to ω     ∫ dω/g(ω)
     angle turned meanwhile        ∫ ω dω/g(ω)
 
-so a law is a row of three functions, and the laws share no algebra with the ones that are fitted in
-`analysis.spindown.drag`.  Spins in rad/s, angles in rad, times in s.
+so a law is a row of functions.  The laws share no algebra with the ones that are fitted in
+ `analysis.spindown.drag`.  Spins in rad/s, angles in rad, times in s.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from levilab.simulator.laws import LAWS
+from levilab.simulator.numbers import sqrt
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,17 +29,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SpinDecay:
-    """One law of drag in closed form.
+    """A law of drag in closed form.
 
     Attributes:
         after: (ω₀, t, *constants) → ω.
         elapsed: (ω₀, ω, *constants) → t.
         turned: (ω₀, ω, *constants) → angle.
+        damping: (|ω|, *constants) → |ω̇/ω| [1/s].
     """
 
     after: Callable[..., Array]
     elapsed: Callable[..., float]
     turned: Callable[..., Array]
+    damping: Callable[..., Any]
 
 
 def _mixed_after(spin: float, t: ArrayLike, c1: float, c2: float) -> Array:
@@ -63,33 +68,41 @@ def _over_its_argument(function: Callable[[Array], Array], x: ArrayLike) -> Arra
     return np.where(x == 0, 1.0, function(other) / other)
 
 
-#: Stokes −C₁ω, Newton −C₂ω², laminar disc −Cω^(3/2), mixed −C₁ω − C₂ω² (one of them may be 0).
+#: Law → its closed form.
 DECAYS: dict[str, SpinDecay] = {
     "stokes": SpinDecay(
         after=lambda spin, t, c: spin * np.exp(-c * np.asarray(t)),
         elapsed=lambda spin, end, c: np.log(spin / end) / c,
         turned=lambda spin, end, c: (spin - end) / c,
+        damping=lambda _, c: c,
     ),
     "newton": SpinDecay(
         after=lambda spin, t, c: 1 / (1 / spin + c * np.asarray(t)),
         elapsed=lambda spin, end, c: (1 / end - 1 / spin) / c,
         turned=lambda spin, end, c: np.log(spin / end) / c,
+        damping=lambda spin, c: c * spin,
     ),
     "disc": SpinDecay(
         after=lambda spin, t, c: (spin**-0.5 + 0.5 * c * np.asarray(t)) ** -2,
         elapsed=lambda spin, end, c: 2 * (end**-0.5 - spin**-0.5) / c,
         turned=lambda spin, end, c: 2 * (spin**0.5 - end**0.5) / c,
+        damping=lambda spin, c: c * sqrt(spin),
     ),
     "mixed": SpinDecay(
         after=_mixed_after,
         elapsed=_mixed_elapsed,
         turned=_mixed_turned,
+        damping=lambda spin, c1, c2: c1 + c2 * spin,
     ),
 }
 
 
 def since_infinity(law: str, spin: float, constants: tuple[float, ...]) -> float:
-    """So long ago [s] a spin [rad/s] was infinite, by the law: further back there is none.  inf under Stokes's law."""
-    if law == "stokes" or (law == "mixed" and constants[-1] == 0):
-        return np.inf
-    return float(DECAYS[law].elapsed(np.inf, spin, *constants))
+    """Return how long ago a spin was infinite, by the law [s]; inf under a linear drag.
+
+    Args:
+        law: its name.
+        spin: now [rad/s].
+        constants: of the law.
+    """
+    return np.inf if LAWS[law].is_linear(constants) else float(DECAYS[law].elapsed(np.inf, spin, *constants))

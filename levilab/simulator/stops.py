@@ -95,8 +95,8 @@ def stops_between(start: float, end: float, step: float, drive: Drive, samples: 
     low, high = min(start, end), max(start, end)
     if not (high - low) / step < MOST_STEPS:
         raise SimulationError(
-            f"{(high - low) / step:.2g} steps of {step:.2g} s would be needed, at most {MOST_STEPS:.0e} are taken: "
-            "a shorter duration, a slower spin or heavier inertias are expected"
+            f"{(high - low) / step:.2g} steps of {step:.2g} s would be needed, at most {MOST_STEPS:.0e} are taken: a "
+            "shorter duration, a slower spin or heavier inertias are expected"
         )
     corners = kinks(drive, low, high)
     if corners is NO_TIMES and (samples is None or samples.size == 0):
@@ -146,8 +146,8 @@ def kinks(drive: Drive, low: float, high: float) -> Array:
         first, last = math.ceil(2 * (f * low + turns - offset)), math.floor(2 * (f * high + turns - offset))
         if last - first > MOST_KINKS:
             raise SimulationError(
-                f"drive.frequency_hz = {f:g}: the {drive.waveform} has {last - first} corners in {high - low:g} s, "
-                f"at most {MOST_KINKS:.0e} are gone through: take a sine, a lower frequency or a shorter duration"
+                f"drive.frequency_hz = {f:g}: the {drive.waveform} has {last - first} corners in {high - low:g} s, at "
+                f"most {MOST_KINKS:.0e} are gone through: take a sine, a lower frequency or a shorter duration"
             )
         found.extend(((np.arange(first, last + 1) / 2 + offset - turns) / f).tolist())
     times = np.array(found, dtype=np.float64)

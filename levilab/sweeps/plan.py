@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from levilab.present.units import split
 from levilab.simulator.scene import Scene, scene_of
 
 if TYPE_CHECKING:
@@ -61,21 +62,14 @@ def _digest(values: NDArray[Any]) -> str:
     return hashlib.sha256(plain).hexdigest()
 
 
-#: The ending of a key → its unit; the first that matches.
-_UNITS = (
-    ("_kg_m2", "kg m^2"), ("_a_m2", "A m^2"), ("_m_s2", "m/s^2"), ("_n_m_s", "N m s"), ("_m_s", "m/s"), ("_t_m", "T m"),
-    ("_hz", "Hz"), ("_kg", "kg"), ("_rad", "rad"), ("_m", "m"), ("_t", "T"), ("_s", "s"),
-)  # fmt: skip
-
-
 def unit_of(key: str) -> str:
     """Return the unit at the end of a key, "1" where there is none.
 
     >>> unit_of("start.spin_hz"), unit_of("start.position_m.2"), unit_of("base.strength_t_m"), unit_of("drag.law")
     ('Hz', 'm', 'T m', '1')
     """
-    name = key.rstrip(".0123456789")
-    return next((unit for ending, unit in _UNITS if name.endswith(ending)), "1")
+    _, unit = split(key.rstrip(".0123456789"))
+    return unit.si if unit else "1"
 
 
 @dataclass(frozen=True)
@@ -137,7 +131,7 @@ class Plan:
         tolerance: float = 1e-6,
         seed: int = 0,
     ) -> Plan:
-        """Make a plan whose chunks suit ends of motions in lanes; `levilab.sweeps.cost.cut` suits them to any plan."""
+        """Make a plan whose chunks suit ends of motions in lanes; `observables.cut` suits them to any plan."""
         plan = cls(scene, axes, observables, duration_s, tolerance, seed)
         return replace(plan, chunk=chunk_shape(plan.shape, QUICKLY / duration_s))
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from levilab.present.units import split, unit
 from levilab.sweeps.observables import OBSERVABLES
-from levilab.sweeps.plan import unit_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,19 +36,6 @@ class Quantity:
         return f"{value * self.factor:.4g} {self.unit}".strip()
 
 
-#: Unit in SI → the one that is shown, and the factor.
-_UNITS = {
-    "kg": ("g", 1e3),
-    "m": ("cm", 1e2),
-    "T": ("mT", 1e3),
-    "rad": ("mrad", 1e3),
-    "m/s": ("cm/s", 1e2),
-    "T m": ("mT cm", 1e5),
-    "kg m^2": ("g cm²", 1e7),
-    "A m^2": ("A m²", 1.0),
-    "m/s^2": ("m/s²", 1.0),
-    "1": ("", 1.0),
-}
 _NAMES = {
     "start.spin_hz": "spin at the start",
     "start.tilt_rad": "tilt at the start",
@@ -78,9 +65,10 @@ def quantity_of(name: str) -> Quantity:
     >>> quantity_of("precession_line_hz").label, quantity_of("escape.radius_m").label
     ('precession line  [Hz]', 'escape.radius  [cm]')
     """
-    unit = OBSERVABLES[name].unit if name in OBSERVABLES else unit_of(name)
-    shown, factor = _UNITS.get(unit, (unit, 1.0))
-    return Quantity(_NAMES.get(name) or _plain(name, unit), shown, factor)
+    of_name, found = split(name.rstrip(".0123456789"))
+    si = OBSERVABLES[name].unit if name in OBSERVABLES else found.si if found else "1"
+    plain = of_name.replace("_", " ") if name in OBSERVABLES else of_name
+    return Quantity(_NAMES.get(name) or plain, *unit(si).shown)
 
 
 def step_in_words(key: str, values: NDArray[Any], count: int = 1, *, logarithmic: bool = False) -> str:
@@ -97,10 +85,3 @@ def step_in_words(key: str, values: NDArray[Any], count: int = 1, *, logarithmic
         return f"a factor {(values[-1] / values[0]) ** (count / steps):.3g} ({quantity.name})"
     step = abs(values[-1] - values[0]) * quantity.factor * count / steps
     return f"{f'{step:.3g} {quantity.unit}'.strip()} ({quantity.name})"
-
-
-def _plain(name: str, unit: str) -> str:
-    """A name without its unit; words of a column have spaces between them."""
-    ending = "_" + unit.lower().replace("^", "").replace("/", "_").replace(" ", "_")
-    plain = name.removesuffix(ending)
-    return plain.replace("_", " ") if name in OBSERVABLES else plain

@@ -26,8 +26,7 @@ from levilab.sweeps.axes import in_words as axis_in_words
 from levilab.sweeps.drawing import MOST_POINTS
 from levilab.sweeps.observables import GROUPS, columns_of
 from levilab.sweeps.store import Store
-from levilab.sweeps.summary import summarise
-from levilab.sweeps.table import columns_table, headline, points_table
+from levilab.sweeps.summary import columns_table, headline, points_table, summarise
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

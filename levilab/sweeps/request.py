@@ -11,8 +11,7 @@ from levilab.simulator.keys import parse_setting
 from levilab.simulator.single import LONGEST_S
 from levilab.sweeps.adaptive import begin_adaptive, is_adaptive
 from levilab.sweeps.axes import check_axes, parse_axis, read_points
-from levilab.sweeps.cost import cut
-from levilab.sweeps.observables import check_observables, columns_of
+from levilab.sweeps.observables import check_observables, columns_of, cut
 from levilab.sweeps.plan import Plan
 from levilab.sweeps.run import with_step
 from levilab.sweeps.store import Store, differences
@@ -114,8 +113,8 @@ def _existing_store(request: SweepRequest, plan: Plan, path: Path, *, resume: bo
         more = f" (and {len(other) - 3} more)" if len(other) > 3 else ""
         raise UsageError(
             "resume",
-            f"{path} is of another sweep: {'; '.join(other[:3])}{more}.  Take `out` for another store, or "
-            f"levilab sweep {path} --resume to go on with that one",
+            f"{path} is of another sweep: {'; '.join(other[:3])}{more}.  Take `out` for another store, or levilab "
+            f"sweep {path} --resume to go on with that one",
         )
     return store
 

@@ -11,8 +11,7 @@ from levilab.interruption import interruption_postponed
 from levilab.simulator.compilation import announce_compilation
 from levilab.simulator.ensemble import grid, simulate_many, step_share_of
 from levilab.sweeps.axes import first_error
-from levilab.sweeps.cost import seconds_per_point
-from levilab.sweeps.observables import observe
+from levilab.sweeps.observables import observe, seconds_per_point
 from levilab.workers import cluster, processes, results_of, this_process
 from levilab.workers.ways import cores as available_cores
 

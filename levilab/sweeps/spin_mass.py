@@ -11,7 +11,7 @@ from levilab.errors import UsageError
 from levilab.files import CannotWrite, replace_atomically, writing
 from levilab.settings import hint_about
 from levilab.simulator.equilibrium import HEAVIEST_KG, stability_of
-from levilab.sweeps.cost import cut
+from levilab.sweeps.observables import cut
 from levilab.sweeps.plan import Axis, Plan
 
 if TYPE_CHECKING:
@@ -103,8 +103,8 @@ def _check(spins: Span, masses: Span) -> None:
     if (tops := spins[2] * masses[2]) > MOST_TOPS:
         raise UsageError(
             "masses",
-            f"{spins[2]} spins and {masses[2]} masses are {tops} tops, at most {MOST_TOPS} are possible: "
-            "take longer steps in `spins` or `masses`",
+            f"{spins[2]} spins and {masses[2]} masses are {tops} tops, at most {MOST_TOPS} are possible: take longer "
+            "steps in `spins` or `masses`",
         )
 
 

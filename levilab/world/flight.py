@@ -83,11 +83,15 @@ class _Samples:
     lift: NDArray[np.float32]
 
     @property
-    def rate(self) -> float:
-        """The mean rate of turns [Hz]; wobble and drag change it by some per cent within the piece."""
+    def counted(self) -> tuple[Array, float]:
+        """Turns that increase, and their mean rate [Hz]; wobble and drag change it by some per cent within the piece.
+
+        The light has no sense: a top that spins backwards shows the pulses of its mirror image.
+        """
         if self.times.size < 2:
-            return 1.0
-        return float((self.turns[-1] - self.turns[0]) / (self.times[-1] - self.times[0]))
+            return self.turns, 1.0
+        rate = float((self.turns[-1] - self.turns[0]) / (self.times[-1] - self.times[0]))
+        return self.turns * math.copysign(1.0, rate), abs(rate)
 
 
 @dataclass(frozen=True)
@@ -198,14 +202,16 @@ class Flight:
             times: shape (n,) [s].
 
         Returns:
-            Turns, see `turns`; their rate [Hz], 0 without a top; height of the rim above the base at that spot [m].
+            Turns, counted upwards whatever the sense; their rate [Hz], 0 without a top; height of the rim above the
+            base at that spot [m].
         """
         self.simulate_until(float(times.max(initial=0.0)))
         turns, rate, lift = np.zeros_like(times), np.zeros_like(times), np.zeros_like(times)
         for piece, part in self._pieces.pieces(times):
             if isinstance(piece, _Flying):
                 samples = self._samples_of(piece)
-                turns[part], rate[part] = np.interp(times[part], samples.times, samples.turns), samples.rate
+                counted, rate[part] = samples.counted
+                turns[part] = np.interp(times[part], samples.times, counted)
                 lift[part] = np.interp(times[part], samples.times, samples.lift)
         return turns, rate, lift
 
@@ -229,7 +235,8 @@ class Flight:
         found = [np.empty(0)]
         for piece, end in self._pieces.between(start, stop):
             if isinstance(piece, _Flying) and (samples := self._samples_of(piece)).times.size > 1:
-                turns, at = samples.turns, place(samples.rate)
+                turns, rate = samples.counted
+                at = place(rate)
                 whole = np.arange(math.floor(turns[0]) - 1, math.ceil(turns[-1]) + 1) + at
                 whole = whole[(whole >= turns[0]) & (whole < turns[-1])]
                 times = np.interp(whole, turns, samples.times)

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import pytest
 import typer.main
 
-from building.commands import reference
+from building.commands import MADE, columns, reference
 from building.docstrings import as_markup
 from building.outside_pages import lead_to_site
 from building.requests import loaded_from_elsewhere
 from levilab.cli.main import app
+from levilab.pipelines.catalogue import ANALYSES
 from support.paths import DOCS
 
 if TYPE_CHECKING:
@@ -26,6 +27,15 @@ def test_the_page_of_commands_has_each_command_with_its_options() -> None:
     assert [name for name in group.commands if f"\n## `levilab {name}`\n" not in text] == []  # type: ignore[attr-defined]
     assert "### `levilab acquire spin`" in text
     assert "`--tolerance X`\n: Error that is accepted" in text
+
+
+def test_the_page_of_data_has_each_column_and_each_mark_stands_in_its_page() -> None:
+    made = columns()
+    names = [column.name for analysis in ANALYSES.values() for column in analysis.row]
+    assert [name for name in names if f"| `{name}` |" not in made and "_u" not in name] == []
+    for page, marks in MADE.items():
+        text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
+        assert [mark for mark in marks if text.count(mark) != 1] == []
 
 
 @pytest.mark.parametrize(("page", "written", "led"), [

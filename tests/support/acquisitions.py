@@ -11,6 +11,7 @@ from levilab.acquisition.experiments.spin import SpinSettings
 from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.table import Configuration, with_settings
+from levilab.present.progress import Display
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
 
@@ -31,7 +32,7 @@ RAISED_QUICKLY = (*LET_GO_AT_ONCE, "spin.ramp_hz_per_s=0.2", "spin.drive_frequen
 QUICKLY = [word for setting in RAISED_QUICKLY for word in ("--set", setting)]
 
 
-class Silent:
+class Silent(Display):
     """Shows nothing, remembers what it was to show."""
 
     def __init__(self) -> None:
@@ -41,8 +42,6 @@ class Silent:
         self.closed = False
         self.after_close: list[str] = []
 
-    def preparing(self, text: str, fraction: float) -> None: ...
-
     def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
         self.readings.append(text)
         self.left.append(remaining[1])
@@ -51,11 +50,6 @@ class Silent:
         self.messages.append(text)
         if self.closed:
             self.after_close.append(text)
-
-    def is_due(self) -> bool:
-        return False
-
-    def state(self, state: object) -> None: ...
 
     def close(self) -> None:
         self.closed = True

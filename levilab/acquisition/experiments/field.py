@@ -16,6 +16,7 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.bench.person import PlaceProbe, ShieldProbe
 from levilab.runs.channel import Channel
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from typing import Self
@@ -34,6 +35,9 @@ _TYPED = re.compile(r"([+-]?\d+(?:[.,]\d+)?)\s*(mm|cm|m)?", re.IGNORECASE)
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 #: Before the first height there is only a guess of how long one takes [s].
 _USUAL_S = 10.0
+
+#: A larger drift [u] is hardly chance: one scan in 400 has it.
+_MOST_DRIFT_U = 3.0
 
 
 class FieldSettings(ExperimentSettings):
@@ -122,7 +126,7 @@ def channels(settings: FieldSettings) -> tuple[Channel, ...]:
 
 
 def run(session: Session[FieldSettings]) -> None:
-    """Zero the probe, then measure at one height after the other; a resumed run goes on at the next one."""
+    """Zero the probe, measure at one height after the other, and at one of them again; a resumed run goes on."""
     heights = session.settings.heights_m
     _set_up(session)
     _zero(session)
@@ -132,8 +136,48 @@ def run(session: Session[FieldSettings]) -> None:
         height = _place(session, heights[k], f"{k + 1} of {len(heights)}")
         row = _measure(session, height)
         each = (session.now() - since) / (k + 1 - done) or _USUAL_S
-        session.keep(row, time_left_s=each * (len(heights) - k - 1))
-    session.event("scanned", f"{len(session.rows)} heights are measured")
+        session.keep(row, time_left_s=each * (len(heights) - k))
+    _read_again(session)
+    session.event(RunEvent.SCANNED, f"{len(session.rows)} heights are measured")
+
+
+def _read_again(session: Session[FieldSettings]) -> None:
+    """Read a height of the first half again: by hand a scan takes a quarter of an hour, in which base and probe drift.
+
+    Ferrite loses 0.2 % of its field per kelvin; half a kelvin moves origin and background of the fit by their u, and
+    nothing else in the readings shows it.  It shows best where the field is strong and hardly changes with the height:
+    the lowest height, where the field is about 0 and steep, would show nothing.
+    """
+    rows = session.rows
+    k = max(range((len(rows) + 1) // 2), key=lambda k: abs(rows[k]["flux_density_t"]) / _u_of_setting(session, k))
+    before = rows[k]
+    height = _place(session, before["height_m"], f"{k + 1} again, as the last")
+    row = _measure(session, height)
+    drift = row["flux_density_t"] - before["flux_density_t"] - _slope(session, k) * (height - before["height_m"])
+    u = math.hypot(row["flux_density_mean_u_t"], _u_of_setting(session, k))
+    size = f"{1e6 * drift:+.1f} µT at the end of the scan, {abs(drift) / u:.1f} u"
+    text = f"the field at {1e3 * height:.1f} mm changed by {size}"
+    session.event(RunEvent.HEIGHT_READ_AGAIN, text, drift_t=drift, u_t=u)
+    if abs(drift) > _MOST_DRIFT_U * u:
+        session.warn(
+            f"base or probe drifted: {text}, at most {_MOST_DRIFT_U:g} u "
+            f"are expected; let both come to one temperature, and scan again in less than "
+            f"{math.ceil(session.now() / 60)} min"
+        )
+
+
+def _slope(session: Session[FieldSettings], k: int) -> float:
+    """Return how the field changes with the height [T/m], from the rows beside one."""
+    rows = session.rows
+    low, high = rows[max(k - 1, 0)], rows[min(k + 1, len(rows) - 1)]
+    rise = high["height_m"] - low["height_m"]
+    return (high["flux_density_t"] - low["flux_density_t"]) / rise if rise else 0.0
+
+
+def _u_of_setting(session: Session[FieldSettings], k: int) -> float:
+    """Return the u of a difference of two readings at one height by setting that twice, and by its last digit [T]."""
+    by_setting = math.sqrt(2) * _slope(session, k) * session.settings.height_u_m
+    return math.hypot(by_setting, session.rows[k]["flux_density_mean_u_t"])
 
 
 def _set_up(session: Session[FieldSettings]) -> None:
@@ -167,9 +211,9 @@ def _place(session: Session[FieldSettings], height: float, which: str) -> float:
             return height
         typed = typed_height(answer)
         if typed is not None:
-            session.event("another height", f"the probe stands at {1e3 * typed:.2f} mm", height_m=typed)
+            session.event(RunEvent.ANOTHER_HEIGHT, f"the probe stands at {1e3 * typed:.2f} mm", height_m=typed)
             return typed
-        session.event("not understood", f"{answer[:40]!r} is no height: a number in mm is expected, as 61.5")
+        session.event(RunEvent.NOT_UNDERSTOOD, f"{answer[:40]!r} is no height: a number in mm is expected, as 61.5")
 
 
 def typed_height(answer: str) -> float | None:

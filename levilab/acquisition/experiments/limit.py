@@ -30,6 +30,7 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.channel import Channel
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -131,7 +132,7 @@ def _with_a_top(
             falls += fell
             if falls >= _MOST_FALLS:
                 raise
-            session.event("once more", f"{failed}; it {'fell' if fell else 'is still up'}, once more")
+            session.event(RunEvent.ONCE_MORE, f"{failed}; it {'fell' if fell else 'is still up'}, once more")
     return False
 
 
@@ -154,7 +155,7 @@ def _spins_freely(session: Session[LimitSettings]) -> bool:
 def _coast_down(session: Session[LimitSettings]) -> None:
     """Let a top that was too fast for the drive come down by itself."""
     settings = session.settings
-    session.event("coasts", "the top is still up and comes down by itself")
+    session.event(RunEvent.COASTS, "the top is still up and comes down by itself")
     while (spin := spin_now(session)) is not None and spin > settings.drive_frequency_hz:
         if session.spent() > settings.longest_s:
             return
@@ -206,7 +207,7 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_sinc
     words = f"a line through the last counts gives {with_uncertainty(limit)}; the lowest count is {lowest:.2f} Hz"
     if lowest < limit.value:  # not the bound that it seems to be
         words += ", below the line by its scatter"
-    session.event("fell", f"{text}; {words}", spin_frequency_hz=limit.value)
+    session.event(RunEvent.FELL, f"{text}; {words}", spin_frequency_hz=limit.value)
     return {
         "time_s": session.now(),
         "spin_frequency_hz": limit.value,
@@ -286,7 +287,7 @@ def _say_how_it_was_lost(
     """Whether the top is still up, and whether its tape slipped on the way; once the limit is kept."""
     top = FreeTop(session)
     is_up = lost.spin is not None or top.read() is not None or top.missed[-1] is Missed.UNSTEADY
-    kind, what = ("lock lost", "the drive lost the top") if is_up else ("top lost", "the top fell")
+    kind, what = (RunEvent.LOCK_LOST, "the drive lost the top") if is_up else (RunEvent.TOP_LOST, "the top fell")
     spin, held = limit["spin_frequency_hz"], limit["drive_frequency_hz"]
     session.event(kind, f"{what} at {spin:.2f} Hz: {lost}", spin_frequency_hz=spin, drive_frequency_hz=lost.drive)
     safely_held = [(spin, drive) for spin, drive in seen if drive < held - _BELOW_HZ][-_COMPARED:]

@@ -18,7 +18,8 @@ from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.person import Task
 from levilab.runs.channel import Channel
-from levilab.runs.gates import COUNTED, gates_event
+from levilab.runs.events import RunEvent
+from levilab.runs.gates import gates_event
 
 if TYPE_CHECKING:
     from typing import Self
@@ -145,7 +146,7 @@ def run(session: Session[PrecessionSettings]) -> None:
     session.begin(lambda: None, resumed="the top is driven up anew")
     left = settings.sweep[_points_done(session.rows, settings.sweep) :]
     sweep_drive(session, left, lambda drive: _point(session, drive))
-    session.event("drive off", f"drive off, {len(session.rows)} of {len(settings.sweep)} points were measured")
+    session.event(RunEvent.DRIVE_OFF, f"drive off, {len(session.rows)} of {len(settings.sweep)} points were measured")
 
 
 def _points_done(rows: list[Row], sweep: tuple[float, ...]) -> int:
@@ -176,7 +177,7 @@ def _point(session: Session[PrecessionSettings], drive: float) -> None:
     _wait_for_lock(session, drive)
     row, counts = _measure(session, drive)
     text = f"spin and laser were counted at {drive:g} Hz"
-    session.writer.event(session.now(), COUNTED, text, drive_frequency_hz=drive, **counts)
+    session.writer.event(session.now(), RunEvent.COUNTED, text, drive_frequency_hz=drive, **counts)
     left = _time_left(settings, _points_done([*session.rows, row], settings.sweep))
     session.keep(row | {"time_s": session.now()}, left)
     if settings.record_s:  # last: what was counted is kept where the record is broken off
@@ -193,7 +194,7 @@ def _wait_for_lock(session: Session[PrecessionSettings], drive: float) -> None:
         seen.append(held_spin(session, drive))
         mean = math.fsum(seen[-_LOOKS:]) / _LOOKS
         if len(seen) >= _LOOKS and abs(mean - drive) < _LOCKED_WITHIN_HZ:
-            session.event("locked", f"locked at {drive:g} Hz", drive_frequency_hz=drive, spin_frequency_hz=mean)
+            session.event(RunEvent.LOCKED, f"locked at {drive:g} Hz", drive_frequency_hz=drive, spin_frequency_hz=mean)
             return
         session.wait(settings.interval_s - (session.now() - asked))
     raise NotHeld(seen[-1], drive)
@@ -243,7 +244,9 @@ def _calm(session: Session[PrecessionSettings], drive: float, swing: Swing | Non
     session.bench.generator.frequency = frequency
     session.wait(_STEP_S)
     session.bench.generator.frequency = drive
-    session.event("calmed", f"the top swung {swing.size:.2f} turns about the drive: the drive was moved by as much")
+    session.event(
+        RunEvent.CALMED, f"the top swung {swing.size:.2f} turns about the drive: the drive was moved by as much"
+    )
 
 
 def calming_step(swing: Swing, drive: float, now: float, limits: DriveLimits) -> tuple[float, float] | None:
@@ -345,7 +348,7 @@ def _say_what_was_miscounted(session: Session[PrecessionSettings], laser: Gates,
         said.append(f"{found.missing} of {len(laser)} gates have no count")
     if said:
         text = f"the laser's gates at {drive:g} Hz: {', '.join(said)}; left out"
-        session.event("miscounted", text, drive_frequency_hz=drive)
+        session.event(RunEvent.MISCOUNTED, text, drive_frequency_hz=drive)
 
 
 def _u(rate: Rate, settings: PrecessionSettings) -> float:
@@ -373,7 +376,7 @@ def _record(session: Session[PrecessionSettings], drive: float) -> None:
         for what, channel in shown.items():
             session.keep_trace(channel, what, now)
     except InstrumentError as error:
-        session.event("no record", f"no record at {drive:g} Hz: {error}", drive_frequency_hz=drive)
+        session.event(RunEvent.NO_RECORD, f"no record at {drive:g} Hz: {error}", drive_frequency_hz=drive)
 
 
 EXPERIMENT = Experiment(

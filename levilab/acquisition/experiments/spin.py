@@ -10,6 +10,7 @@ from levilab.acquisition.counting import FreeTop, prepare_counter
 from levilab.acquisition.driving import DriveSettings, drive_up_and_let_go
 from levilab.acquisition.experiment import Experiment
 from levilab.runs.channel import Channel
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from levilab.acquisition.session import Row, Session
@@ -58,9 +59,9 @@ def run(session: Session[SpinSettings]) -> None:
             session.keep(reading, time_left(rows[0], rows[len(rows) // 2], reading, settings.longest_s))
             if not said and keeps_its_spin(rows[0], reading):
                 said = True
-                session.event("does not fall", _why_it_keeps_its_spin(session, rows[0], reading))
+                session.event(RunEvent.DOES_NOT_FALL, _why_it_keeps_its_spin(session, rows[0], reading))
         elif end := top.fall(asked):
-            session.event("fell", end)
+            session.event(RunEvent.FELL, end)
             return
 
 

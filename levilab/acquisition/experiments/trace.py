@@ -16,6 +16,7 @@ from levilab.acquisition.experiment import Experiment, ExperimentSettings
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.runs.channel import Channel
+from levilab.runs.events import RunEvent
 from levilab.runs.traces import INDEX, described_times, undescribed_codes
 
 if TYPE_CHECKING:
@@ -148,14 +149,14 @@ def _note_what_was_cut_short(session: Session[TraceSettings]) -> None:
     folder = session.writer.folder
     if left := undescribed_codes(folder):
         text = f"{', '.join(left)}: the run was cut short before {INDEX} said how to read it; it stays, and is left out"
-        session.event("cut short", text)
+        session.event(RunEvent.CUT_SHORT, text)
     number, channels = len(session.rows) + 1, len(session.settings.channels)
     last = session.rows[-1]["time_s"] if session.rows else -math.inf
     # the channels of a record are kept after its time was noted, and before its row
     more = sum(time >= last for time in described_times(folder)) - (channels if session.rows else 0)
     if more > 0:
         text = f"record {number} was cut short after {more} of {channels} channels; it is taken anew"
-        session.event("cut short", text, record=number)
+        session.event(RunEvent.CUT_SHORT, text, record=number)
 
 
 # --- setting up ---
@@ -190,7 +191,7 @@ def _drive(session: Session[TraceSettings]) -> None:
     session.bench.generator.prepare(
         waveform="SIN", frequency_hz=settings.drive_frequency_hz, amplitude_vpp=settings.drive_amplitude_vpp
     )
-    session.event("drive on", f"drive on at {settings.drive_frequency_hz:g} Hz")
+    session.event(RunEvent.DRIVE_ON, f"drive on at {settings.drive_frequency_hz:g} Hz")
     session.bench.generator.output = True
     session.bench.record_settings("generator")
 
@@ -226,7 +227,9 @@ class _Watch:
         if spin is not None and lost and not self.lost:
             session.warn(f"record {number} shows a tape of {spin:.2f} Hz: the drive of {drive:g} Hz lost the top")
         elif spin is not None and self.lost and not lost:
-            session.event("locked", f"record {number} shows a tape of {spin:.2f} Hz: the top follows the drive again")
+            session.event(
+                RunEvent.LOCKED, f"record {number} shows a tape of {spin:.2f} Hz: the top follows the drive again"
+            )
         self.lost = lost
 
 
@@ -262,7 +265,9 @@ def _take(session: Session[TraceSettings]) -> list[Trace]:
             trace = session.keep_trace(channel, settings.label(channel), now)
             traces.append(trace)
             if problem := _problem(trace, settings):
-                session.event("look at the scale", f"record {number}: {problem}", record=number, channel=trace.channel)
+                session.event(
+                    RunEvent.LOOK_AT_THE_SCALE, f"record {number}: {problem}", record=number, channel=trace.channel
+                )
     except NeverTriggered as never:
         raise ExperimentFailed(_why_no_trigger(session)) from never
     except OutOfRange:
@@ -270,7 +275,7 @@ def _take(session: Session[TraceSettings]) -> list[Trace]:
     except InstrumentError as error:
         if traces:
             text = f"record {number} was cut short after {len(traces)} of {len(settings.channels)} channels"
-            session.event("cut short", f"{text}; it is taken anew", record=number)
+            session.event(RunEvent.CUT_SHORT, f"{text}; it is taken anew", record=number)
         session.reconnect("oscilloscope", error, lambda: _prepare_scope(session))
         return []
     _keep(session, traces, now)

@@ -9,7 +9,8 @@ import numpy as np
 
 from analysis.field.fit import PARAMETERS, Prior, fit_scan
 from analysis.field.ring import on_axis
-from levilab.crosscheck.own.model import Own, Trial, pull
+from levilab.crosscheck.own.model import Own, pull
+from levilab.crosscheck.subject import Trial
 
 if TYPE_CHECKING:
     from analysis.field.fit import FieldScan, Known

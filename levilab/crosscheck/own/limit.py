@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.limits import Sample, combine
-from levilab.crosscheck.own.model import Own, Trial, pull
-from levilab.crosscheck.subject import TrialFailed
+from levilab.crosscheck.own.model import Own, pull
+from levilab.crosscheck.subject import Trial, TrialFailed
 
 if TYPE_CHECKING:
     from levilab.pipelines.limit.analysis import LimitAnalysis, Limits

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from levilab.crosscheck.subject import Pull, TrialFailed
 
@@ -13,28 +13,11 @@ if TYPE_CHECKING:
     import numpy as np
 
     from analysis.uncertainty import Estimate
+    from levilab.crosscheck.subject import Trial
 
 
 #: Ends the name of a quantity that each run of several has: its pulls are as many as runs and trials together.
 OF_ONE_RUN = "_of_one_run"
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One set of readings that was made up and analyzed.
-
-    Attributes:
-        pulls: of the quantities.
-        law: that the analysis favours; empty where no laws compete.
-        excluded: whether the analysis excludes what is true; None where it tests nothing.
-        widened: degrees of freedom of u, where that comes from few readings and was multiplied by Student's factor, so
-            that 68 % lie within it; None: it was not.
-    """
-
-    pulls: list[Pull]
-    law: str = ""
-    excluded: bool | None = None
-    widened: float | None = None
 
 
 @dataclass(frozen=True)
@@ -68,9 +51,3 @@ def pull(quantity: str, found: Estimate | None, truth: float) -> Pull:
     if found is None or found.value is None or not found.u:
         raise TrialFailed(f"{quantity}: the analysis gives no value with an uncertainty")
     return Pull(quantity, found.value, found.u, truth)
-
-
-def one_of(found: Any) -> Any:
-    """The only run of an analysis."""
-    (run,) = found.runs
-    return run

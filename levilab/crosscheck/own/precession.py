@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.precession.sweep import EXCLUDED_P, Sweep, fit_sweep
-from levilab.crosscheck.own.model import Own, Trial, pull
+from levilab.crosscheck.own.model import Own, pull
+from levilab.crosscheck.subject import Trial
 from levilab.pipelines.precession.analysis import intercept_of, slope_of
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import numpy as np
 
 from analysis.budget import rest
 from analysis.pulses import spin_of_times, spin_of_trace
-from levilab.crosscheck.own.model import Own, Trial, pull
-from levilab.crosscheck.subject import TrialFailed
+from levilab.crosscheck.own.model import Own, pull
+from levilab.crosscheck.subject import Trial, TrialFailed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -12,9 +12,11 @@ from analysis.spindown.combine import combine
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import fit_spin_down
 from analysis.spindown.tilt import counted
-from levilab.crosscheck.own.model import OF_ONE_RUN, Own, Trial, pull
+from levilab.crosscheck.own.model import OF_ONE_RUN, Own, pull
+from levilab.crosscheck.subject import Trial
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.spindown.analysis import EXPERIMENT
+from levilab.simulator import laws
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,13 +28,11 @@ if TYPE_CHECKING:
     Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
 #: Processor time of the fits of one run [s]: of any, and for a reading.
-_COST_S, _COST_OF_READING_S = 0.009, 2e-5
-#: What the tilt adds to that, for any run and for a reading.
-_COST_OF_TILT_S, _TILTED_READING_S = 0.02, 1e-4
+_COST_S, _COST_OF_READING_S = 0.006, 2e-5
+#: What fitting the tilt adds to that, for any run and for a reading.
+_COST_OF_TILT_S, _TILTED_READING_S = 0.015, 1e-4
 #: Runs that scatter by so many times what their readings leave give u from their scatter alone.
 _SCATTERS = 1.5
-#: The exponent of a law of one power.
-_EXPONENTS = {"stokes": 1.0, "disc": 1.5, "newton": 2.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +185,7 @@ def _trial(
     if not several:
         truth = runs[0].fit.parameters["start_frequency"].value or 0.0
         pulls.append(pull("start_frequency", found["start_frequency"], truth))
-    exponent = _EXPONENTS.get(law)
+    exponent = laws.LAWS[law].exponent if law in laws.LAWS else None
     if law == "power":
         exponent = float(np.mean([run.fit.parameters["exponent"].value or 0.0 for run in runs]))
     if exponent is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
 from levilab.formats.device import Device
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.field.device import FieldOptions
+from levilab.pipelines.options import FieldOptions
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import Scene
 from levilab.world.base import random_base

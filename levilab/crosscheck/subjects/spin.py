@@ -11,9 +11,9 @@ import numpy as np
 from instruments.clock import VirtualClock
 from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
-from levilab.crosscheck.subjects.spindown import LAWS
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.runs.waveforms import run_waveforms
+from levilab.simulator.laws import LAWS
 from levilab.world.bench import virtual_wiring
 from levilab.world.light import Tape
 from levilab.world.spin_world import Array, SpinScene, SpinWorld
@@ -44,11 +44,10 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     """One record: spin, drag, tape, noise, jitter of the pulses and the record's length are drawn by the seed."""
     random = np.random.default_rng((seed, 5))
     law = sorted(LAWS)[int(random.integers(len(LAWS)))]
-    usual, *_ = LAWS[law]
     scene = SpinScene(
         start_hz=float(random.uniform(24.0, 45.0)),
         drag=law,
-        constants=tuple(constant * float(random.uniform(0.7, 1.3)) for constant in usual),
+        constants=tuple(constant * float(random.uniform(0.7, 1.3)) for constant in LAWS[law].usual),
         fall_hz=20.0,
         tape=Tape(width=float(random.uniform(0.02, 0.05)), noise=float(10 ** random.uniform(-2.5, -1.0))),
         jitter=float(10 ** random.uniform(-5, -2)),

@@ -11,6 +11,7 @@ import numpy as np
 from instruments.clock import VirtualClock
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.simulator.laws import LAWS
 from levilab.simulator.scene import Scene
 from levilab.simulator.single import simulate
 from levilab.simulator.spin import DECAYS
@@ -22,13 +23,6 @@ if TYPE_CHECKING:
 
     from levilab.acquisition.loop import AcquisitionRequest
 
-#: Law of drag → its constants (SI) for about 0.3 %/s at 30 Hz, their names in result.json, the exponent of its power.
-LAWS: dict[str, tuple[tuple[float, ...], tuple[str, ...], float | None]] = {
-    "stokes": ((3.2e-3,), ("c1",), 1.0),
-    "newton": ((1.72e-5,), ("c2",), 2.0),
-    "disc": ((2.34e-4,), ("c32",), 1.5),
-    "mixed": ((1.6e-3, 0.86e-5), ("c1", "c2"), None),
-}
 #: The spin at which the drive goes off [Hz].
 START_HZ = 40.0
 #: States of the simulated spin per second, for the moment of the fall.
@@ -39,7 +33,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     """One spin-down: drag, fall and scatter of the pulses are drawn by the seed."""
     random = np.random.default_rng((seed, 2))
     law = sorted(LAWS)[int(random.integers(len(LAWS)))]
-    usual, names, exponent = LAWS[law]
+    usual, names, exponent = LAWS[law].usual, LAWS[law].names, LAWS[law].exponent
     scene = SpinScene(
         start_hz=float(random.uniform(28.0, 33.0)),
         drag=law,

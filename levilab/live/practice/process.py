@@ -41,7 +41,7 @@ from levilab.live.practice.commands import (
     event_to_bytes,
     from_bytes,
 )
-from levilab.present.progress import Mute
+from levilab.present.progress import Display
 from levilab.simulator.scene import read_scene
 from levilab.telemetry.messages import State
 from levilab.telemetry.publisher import Publisher
@@ -207,7 +207,7 @@ class Reporter:
             self._pipe.send_bytes(event_to_bytes(event))
 
 
-class LinesToReport(Mute):
+class LinesToReport(Display):
     """The display of a run that is recorded: what it says goes to the person at the bench."""
 
     def __init__(self, report: Reporter) -> None:

@@ -13,9 +13,10 @@ from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
-from levilab.pipelines.field.device import FieldOptions, known_of, known_top, usual
-from levilab.pipelines.field.quantities import SHOWN
+from levilab.pipelines.field.device import known_of, known_top, usual
+from levilab.pipelines.field.quantities import QUANTITIES
 from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
+from levilab.pipelines.options import FieldOptions
 from levilab.pipelines.sources import Needs
 from levilab.present.numbers import enumeration, with_uncertainty
 
@@ -92,7 +93,7 @@ class FieldAnalysis(Analyzed[FieldReadings, FieldRun, None, FieldOptions]):
         return f"{len(self.runs)} scans: {_shown('strength', strength)} in the mean; {agree}. {_advice(self.values)}"
 
     def about_run(self, run: FieldRun) -> Iterable[str]:
-        """What to know of one scan."""
+        """Return what to know of one scan."""
         return run.warnings
 
 
@@ -154,7 +155,7 @@ def means(runs: Sequence[Mapping[str, Estimate]]) -> dict[str, Mean]:
 
 
 def _shown(name: str, estimate: Estimate) -> str:
-    return with_uncertainty(SHOWN[name].of(estimate))
+    return with_uncertainty(QUANTITIES[name].show(estimate))
 
 
 def _scatter_in_words(strength: Estimate) -> str:
@@ -178,7 +179,7 @@ def _pole(scan: FieldScan) -> str:
 
 
 def _learned_in_words(scan: FieldScan) -> str:
-    """What the scan can tell, and what it cannot."""
+    """Return what the scan can tell, and what it cannot."""
     words = {
         "origin": "origin",
         "thickness": "thickness",
@@ -209,14 +210,14 @@ def _advice(values: Mapping[str, Estimate]) -> str:
     """Which mass to set, and what to mind."""
     if "mass_to_set" not in values:
         return ""
-    shown = {name: _shown(name, value) for name, value in values.items() if name in SHOWN}
-    per_mass = SHOWN["height_per_mass"].of(values["height_per_mass"]).value or 0.0
+    shown = {name: _shown(name, value) for name, value in values.items() if name in QUANTITIES}
+    per_mass = QUANTITIES["height_per_mass"].show(values["height_per_mass"]).value or 0.0  # mm/g
     mass = values["mass_to_set"].value or 0.0
     per_kelvin = 2 * FERRITE_PER_K * mass * 1e3
     tops = (
         f"Tops float from {shown['lowest_height']} to {shown['highest_height']} if they weigh {shown['lightest_mass']} "
         f"to {shown['heaviest_mass']}. Set {shown['mass_to_set']}: such a top floats at {shown['height_at_mass']}, "
-        f"0.1 g more lowers it by {abs(per_mass):.2f} mm, and it must spin at {shown['slowest_spin']} to "
+        f"0.1 g more lowers it by {0.1 * abs(per_mass):.2f} mm, and it must spin at {shown['slowest_spin']} to "
         f"{shown['fastest_spin']}."
     )
     texts = [tops]
@@ -225,7 +226,7 @@ def _advice(values: Mapping[str, Estimate]) -> str:
     if "mass_to_add" in values:
         add = values["mass_to_add"].value or 0.0
         word = "add" if add > 0 else "take off"
-        amount = with_uncertainty(SHOWN["mass_to_add"].of(Estimate(abs(add), values["mass_to_add"].u, "kg")))
+        amount = with_uncertainty(QUANTITIES["mass_to_add"].show(Estimate(abs(add), values["mass_to_add"].u, "kg")))
         texts.append(f"To this top {word} {amount}." if add > 0 else f"From this top {word} {amount}.")
     texts.append(
         f"Ferrite loses 0.2 % of its strength per kelvin, base and top alike: 1 K warmer, and the mass to set is "

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from analysis.field.fit import FieldScan, UPart
     from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun
-    from levilab.pipelines.field.device import FieldOptions
     from levilab.pipelines.field.readings import FieldReadings
+    from levilab.pipelines.options import FieldOptions
     from levilab.pipelines.sources import Source
 
 EXPERIMENT = "field"
@@ -55,7 +55,7 @@ def budget_of_run(source: Source[FieldReadings], run: FieldRun, _: FieldOptions)
 
 
 def _row(source: Source[FieldReadings], scan: FieldScan, unit: str, part: UPart) -> Component:
-    """A part as a row: by the input's own u where it has one."""
+    """Return a part as a row: by the input's own u where it has one."""
     what, remedy = _WORDS[part.name]
     kind: Literal["A", "B"] = "A" if part.name in _TYPE_A else "B"
     u, unit_u, note = _input(source, scan, part)
@@ -65,7 +65,7 @@ def _row(source: Source[FieldReadings], scan: FieldScan, unit: str, part: UPart)
 
 
 def _input(source: Source[FieldReadings], scan: FieldScan, part: UPart) -> tuple[float | None, str, str]:
-    """The input quantity's standard uncertainty, its unit, and where it is from; None where that says too little."""
+    """Return an input's standard uncertainty, its unit and its origin; None where that says too little."""
     if part.name == "gain":
         return scan.known.gain_u, "1", "relative, common to all readings"
     prior = scan.known.prior(part.name)

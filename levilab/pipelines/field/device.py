@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,29 +14,13 @@ from analysis.top import Cylinder, top_of
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.formats.device import BaseTable, Device
-from levilab.pipelines.sources import InputOptions
 from levilab.settings import in_one_line
 
 if TYPE_CHECKING:
     from levilab.formats.device import TopTable
     from levilab.pipelines.field.readings import FieldReadings
+    from levilab.pipelines.options import FieldOptions
     from levilab.pipelines.sources import Source
-
-
-@dataclass(frozen=True)
-class FieldOptions(InputOptions):
-    """How scans are analyzed.
-
-    Attributes:
-        device: what calliper and data sheet say.
-        height_m, height_u_m: where the top was seen to float.
-        free_radii: let the scan move the radii.
-    """
-
-    device: Device | None = None
-    height_m: float | None = None
-    height_u_m: float | None = None
-    free_radii: bool = False
 
 
 #: The thesis's top: what is taken where nothing is known, with a warning.
@@ -47,7 +30,7 @@ _OF_BASE = "base_"
 
 
 def known_of(source: Source[FieldReadings], device: Device | None) -> Known:
-    """What is known of the base and the instrument: what the file says, else the run.  Raises DataError."""
+    """Return what is known of the base and the instrument: what the file says, else the run.  Raises DataError."""
     run = source.run.record.configuration.get("field", {}) if source.run else {}
     of_run = run if isinstance(run, dict) else {}
     base = _base(source, of_run, device)
@@ -74,7 +57,7 @@ def known_of(source: Source[FieldReadings], device: Device | None) -> Known:
 
 
 def _base(source: Source[FieldReadings], of_run: dict[str, Any], device: Device | None) -> BaseTable:
-    """The run's, and over it what the file sets."""
+    """Return the run's, and over it what the file sets."""
     table = {key.removeprefix(_OF_BASE): value for key, value in of_run.items() if key.startswith(_OF_BASE)}
     given = device.base.model_dump(exclude_unset=True) if device else {}
     try:
@@ -92,7 +75,7 @@ def _number(table: dict[str, Any], key: str, default: float) -> float:
 
 
 def parts_of(top: TopTable) -> list[Cylinder]:
-    """The parts as cylinders."""
+    """Return the parts as cylinders."""
     return [
         Cylinder(
             part.name,
@@ -112,7 +95,7 @@ def parts_of(top: TopTable) -> list[Cylinder]:
 
 
 def known_top(options: FieldOptions, height_u: float | None) -> tuple[KnownTop, list[str]]:
-    """What is known of the top, the thesis's where nothing is, and what to know of that.
+    """Return what is known of the top, the thesis's where nothing is, and what to know of that.
 
     Args:
         options: with what calliper and data sheet say.
@@ -171,5 +154,5 @@ def _estimate(value: float | None, u: float, unit: str) -> Estimate | None:
 
 
 def usual(values: np.ndarray | None) -> float | None:
-    """The median; None where there are none."""
+    """Return the median; None where there are none."""
     return None if values is None else float(np.median(values))

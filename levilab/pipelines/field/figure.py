@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from analysis.field.floating import floating_spins, floating_top
 from analysis.field.magnet import axial_field
-from levilab.pipelines.field.quantities import SHOWN
+from levilab.pipelines.field.quantities import QUANTITIES
 from levilab.present.drawing import SMALL, band, headline, panel, sigma_bands, synthetic_mark
 from levilab.present.looks import BLUE, GREY, LOOKS, PURPLE, SKY, VERMILION
 from levilab.present.numbers import short_name, with_uncertainty
@@ -61,11 +61,11 @@ def field_figure(analysis: FieldAnalysis) -> Figure:
 
 def _finding(analysis: FieldAnalysis) -> str:
     values = analysis.values
-    strength = with_uncertainty(SHOWN["strength"].of(values["strength"]))
+    strength = with_uncertainty(QUANTITIES["strength"].show(values["strength"]))
     said = f"Field of the base on its axis: ρ = {strength}"
     if "lowest_height" not in values:
         return said
-    mass = with_uncertainty(SHOWN["mass_to_set"].of(values["mass_to_set"]))
+    mass = with_uncertainty(QUANTITIES["mass_to_set"].show(values["mass_to_set"]))
     low, high = (1e2 * (values[name].value or 0.0) for name in ("lowest_height", "highest_height"))
     return f"{said}; tops float from {low:.2f} to {high:.2f} cm, set {mass}"
 
@@ -112,12 +112,12 @@ def _mark_window(axes: Axes, analysis: FieldAnalysis) -> None:
         1e2 * (values[name].value or 0.0) for name in ("lowest_height", "highest_height", "height_at_mass")
     )
     axes.axvspan(low, high, color=FLOATS, alpha=0.15, linewidth=0, label=f"tops float:\n{low:.2f} to {high:.2f} cm")
-    mass = with_uncertainty(SHOWN["mass_to_set"].of(values["mass_to_set"]))
+    mass = with_uncertainty(QUANTITIES["mass_to_set"].show(values["mass_to_set"]))
     axes.axvline(middle, linewidth=1.3, label=f"a top of {mass}", **LOOKS["to set"].as_line)
 
 
 def _draw_residuals(axes: Axes, analysis: FieldAnalysis, limits: tuple[float, float]) -> None:
-    """What the fit leaves over should be noise: two thirds within the dark band."""
+    """Draw what the fit leaves over should be noise: two thirds within the dark band."""
     sigma_bands(axes)
     most = 2.5
     for k, run in enumerate(analysis.runs):
@@ -155,7 +155,7 @@ def _draw_masses(axes: Axes, run: FieldRun) -> None:
     for name, height in (("heaviest_mass", low), ("lightest_mass", high)):
         axes.plot(1e2 * height, 1e3 * floating[name], marker="s", color=FLOATS)
     set_at = 1e2 * floating["height_at_mass"], 1e3 * floating["mass_to_set"]
-    mass_to_set = with_uncertainty(SHOWN["mass_to_set"].of(floating.values["mass_to_set"]))
+    mass_to_set = with_uncertainty(QUANTITIES["mass_to_set"].show(floating.values["mass_to_set"]))
     axes.plot(*set_at, marker="D", color=SET, linestyle="none", markersize=5, zorder=4, label=f"to set: {mass_to_set}")
     axes.set(xlabel="height at which it floats  [cm]", ylabel="mass of the top  [g]")
     bottom, top_of = axes.get_ylim()
@@ -180,7 +180,9 @@ def _draw_spins(axes: Axes, run: FieldRun) -> None:
     at = 1e3 * floating["mass_to_set"]
     for name in ("slowest_spin", "fastest_spin"):
         axes.plot(at, floating[name], linestyle="none", marker="D", color=SET, markersize=5, zorder=4)
-    texts = [with_uncertainty(SHOWN[name].of(floating.values[name])) for name in ("slowest_spin", "fastest_spin")]
+    texts = [
+        with_uncertainty(QUANTITIES[name].show(floating.values[name])) for name in ("slowest_spin", "fastest_spin")
+    ]
     axes.set(xlabel="mass of the top  [g]", ylabel="spin  [Hz]", ylim=(0, 1.35 * float(np.nanmax(fast))))
     axes.set_title("Spins at which small motions stay small", loc="left")
     about = f"at the mass to set:\n{texts[0]} to {texts[1]}"

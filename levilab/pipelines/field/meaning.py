@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.field.ring import on_axis
 from analysis.numbers import digits
-from levilab.pipelines.field.quantities import SHOWN
+from levilab.pipelines.field.quantities import QUANTITIES
 from levilab.present.numbers import plain, with_uncertainty
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ _HEIGHT_M = 0.073
 
 
 def meaning(analysis: FieldAnalysis) -> tuple[str, ...]:
-    """The sentences; of several scans those of the first, and how far they agree."""
+    """Return the sentences; of several scans those of the first, and how far they agree."""
     return tuple(_sentences(analysis))
 
 
@@ -32,7 +32,7 @@ def _sentences(analysis: FieldAnalysis) -> Iterator[str]:
         return
     b, slope = (float(each[0]) for each in on_axis(scan.ring, np.array([_HEIGHT_M]))[:2])
     yield (
-        f"The base is as strong as ρ = {with_uncertainty(SHOWN['strength'].of(strength))}, known to "
+        f"The base is as strong as ρ = {with_uncertainty(QUANTITIES['strength'].show(strength))}, known to "
         f"{digits(100 * strength.u / abs(strength.value))} %; {1e2 * _HEIGHT_M:g} cm up that is "
         f"{plain(abs(1e3 * b))} mT, and {plain(abs(10 * slope))} mT less for each centimetre higher."
     )

@@ -1,56 +1,51 @@
-"""What people are shown of each quantity: its symbol, its words, its unit."""
+"""The quantities of scans of the field, and their readings as columns."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from analysis.uncertainty import Estimate
+from levilab.pipelines.row import Column, Quantity, columns_of, entry, statistic
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
-@dataclass(frozen=True)
-class Shown:
-    """How people are shown a quantity.
-
-    Attributes:
-        words: of the quantity.
-        unit: that it is shown in.
-        factor: as many of them make one in SI.
-    """
-
-    words: str
-    unit: str = ""
-    factor: float = 1.0
-
-    def of(self, estimate: Estimate) -> Estimate:
-        """The estimate in the unit that people read."""
-        value, u = (None if one is None else one * self.factor for one in (estimate.value, estimate.u))
-        return Estimate(value, u, self.unit)
-
-
-#: Heights in cm; what a calliper measures, and what moves a height, in mm.
-SHOWN: Mapping[str, Shown] = MappingProxyType(
-    {
-        "strength": Shown("strength ρ", "mT cm", 1e5),
-        "origin": Shown("origin z₀", "mm", 1e3),
-        "thickness": Shown("thickness h", "mm", 1e3),
-        "background": Shown("background", "mT", 1e3),
-        "inner_radius": Shown("inner radius a", "mm", 1e3),
-        "outer_radius": Shown("outer radius b", "mm", 1e3),
-        "lowest_height": Shown("lowest height", "cm", 1e2),
-        "highest_height": Shown("highest height", "cm", 1e2),
-        "lightest_mass": Shown("lightest top", "g", 1e3),
-        "heaviest_mass": Shown("heaviest top", "g", 1e3),
-        "mass_to_set": Shown("mass to set", "g", 1e3),
-        "height_at_mass": Shown("it floats at", "cm", 1e2),
-        "height_per_mass": Shown("0.1 g more moves it by", "mm", 1e3 * 1e-4),
-        "slowest_spin": Shown("slowest spin", "Hz"),
-        "fastest_spin": Shown("fastest spin", "Hz"),
-        "moment": Shown("moment of the top", "A m²"),
-        "mass_to_add": Shown("mass to add to this top", "g", 1e3),
-    }
+#: Of the base.
+_BASE = (
+    Quantity("strength", "T m", "ρ of the ring", "strength ρ"),
+    Quantity("origin", "m", "height of the ring's middle on the scale of the scan", "origin z₀", fine=True),
+    Quantity("thickness", "m", "thickness of the ring", "thickness h", fine=True),
+    Quantity("background", "T", "field without the ring: zero of the probe, the earth's field"),
+    Quantity("inner_radius", "m", "inner radius of the ring", "inner radius a", fine=True),
+    Quantity("outer_radius", "m", "outer radius of the ring", "outer radius b", fine=True),
 )
+#: Of the tops that float above it.
+_TOPS = (
+    Quantity("lowest_height", "m", "lowest height at which a top floats"),
+    Quantity("highest_height", "m", "highest height at which a top floats"),
+    Quantity("lightest_mass", "kg", "lightest top that floats", "lightest top"),
+    Quantity("heaviest_mass", "kg", "heaviest top that floats", "heaviest top"),
+    Quantity("mass_to_set", "kg", "mass of a top in the middle of the window"),
+    Quantity("height_at_mass", "m", "height at which such a top floats", "it floats at"),
+    Quantity("height_per_mass", "m/kg", "change of its height with its mass", "it moves with its mass by"),
+    Quantity("slowest_spin", "Hz", "slowest spin of such a top"),
+    Quantity("fastest_spin", "Hz", "fastest spin of such a top"),
+    Quantity("moment", "A m^2", "moment of the top by the height at which it floats", "moment of the top",
+             column=False),
+    Quantity("mass_to_add", "kg", "mass to add to the top that was measured", "mass to add to this top",
+             column=False),
+)  # fmt: skip
+QUANTITIES: Mapping[str, Quantity] = MappingProxyType({one.name: one for one in (*_BASE, *_TOPS)})
+#: The names of those that follow for a top.
+OF_TOPS = tuple(one.name for one in _TOPS)
+
+FIELD_ROW = (
+    statistic("n", "1", "readings in the fit", "readings_used", kind="count"),
+    *columns_of(QUANTITIES.values()),
+    statistic("reduced_chi_square", "1", "χ² per degree of freedom"),
+    statistic("rms_residual", "T", "root mean square of the residuals"),
+    Column("floats", "truth", "whether any top floats above the ring",
+           lambda part: part["result"]["floating"] is not None),
+    entry("text", "text", "what the scan says", "result.text"),
+)  # fmt: skip

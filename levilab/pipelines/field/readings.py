@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from levilab.formats.table import Table
-    from levilab.pipelines.sources import InputOptions
+    from levilab.pipelines.options import InputOptions
     from levilab.runs.run import Run
 
     Array = NDArray[np.float64]
@@ -71,7 +71,7 @@ class FieldReadings:
 
 
 def field_readings(table: Table) -> FieldReadings:
-    """The readings of a scan.  Raises TableError, which names the line where there is one."""
+    """Return the readings of a scan.  Raises TableError, which names the line where there is one."""
     height, flux_density = table.column("height_m"), table.column("flux_density_t")
     if not len(height):
         raise TableError(table.path, "holds no readings yet: scan at least four heights")
@@ -117,11 +117,11 @@ NEEDED = ("height_m", "flux_density_t")
 
 
 def read_scan_file(path: Path, options: InputOptions) -> FieldReadings:
-    """The scan in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
+    """Return the scan in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
     table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=options.guess)
     return field_readings(table)
 
 
 def read_scan_run(run: Run, _: InputOptions) -> FieldReadings:
-    """The scan of a run."""
+    """Return the scan of a run."""
     return field_readings(run.readings())

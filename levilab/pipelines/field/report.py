@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 from analysis.uncertainty import Estimate
 from levilab.pipelines.field.meaning import meaning
 from levilab.pipelines.field.table import base_table, by_run_table, follows_table, scans_table
-from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
+from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, first_of, input_parts, labels_of
 from levilab.present.document.blocks import Listing, Note, Paragraph, Points, Section, Tabular
-from levilab.present.numbers import off, short_name, signed, with_decimals, with_uncertainty
+from levilab.present.numbers import off, signed, with_decimals, with_uncertainty
 from levilab.present.tables import table
 
 if TYPE_CHECKING:
     from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun
+    from levilab.pipelines.field.readings import FieldReadings
+    from levilab.pipelines.sources import Source
     from levilab.present.document.blocks import Block
 
 #: Readings printed in the page; more stay in the run folder.
@@ -22,7 +24,7 @@ MOST_READINGS = 200
 
 
 def field_part(analysis: FieldAnalysis) -> ReportPart:
-    """What the scans say, the base, what follows, and the readings."""
+    """Return what the scans say, the base, what follows, and the readings."""
     several = len(analysis.runs) > 1
     means = " Of several scans these are means; what is common to them makes no mean more certain." if several else ""
     return ReportPart(
@@ -46,15 +48,12 @@ def field_part(analysis: FieldAnalysis) -> ReportPart:
         ),
         runs_title="Scan by scan" if several else "The base",
         runs=_bases(analysis),
-        inputs=tuple(
-            InputPart(_in_words(run), origin.text, run.text, (_readings(run),))
-            for run, origin in zip(analysis.runs, analysis.origins, strict=True)
-        ),
+        inputs=input_parts(analysis, _in_words, _readings),
     )
 
 
 _FOLLOWS = (
-    "value(u): the digits in parentheses are the standard uncertainty of the last digits. All of what calliper, scales "
+    f"{VALUE_U} All of what calliper, scales "
     "and scan leave open is in it, to first order. Masses and heights are those at which a moment that follows the "
     "field is stable; spins those at which small motions of the whole top stay small, for a top of the mass to set."
 )
@@ -69,7 +68,7 @@ _BASE = (
 
 
 def _bases(analysis: FieldAnalysis) -> tuple[Block, ...]:
-    """The base as each scan finds it."""
+    """Return the base as each scan finds it."""
     if len(analysis.runs) == 1:
         return (Tabular("field-base", replace(base_table(analysis.runs[0].scan), title=""), _BASE),)
     bases = (
@@ -80,7 +79,7 @@ def _bases(analysis: FieldAnalysis) -> tuple[Block, ...]:
     return by_run, *bases, Note(_BASE)
 
 
-def _in_words(run: FieldRun) -> tuple[str, ...]:
+def _in_words(_: Source[FieldReadings], run: FieldRun, *__: object) -> tuple[str, ...]:
     scan = run.scan
     low, high = 1e2 * scan.height[0], 1e2 * scan.height[-1]
     text = f"{scan.statistics.n} heights, {with_decimals(low, 2)} cm to {with_decimals(high, 2)} cm"
@@ -88,8 +87,8 @@ def _in_words(run: FieldRun) -> tuple[str, ...]:
     return text, f"{u}, that of its height included"
 
 
-def _readings(run: FieldRun) -> Listing:
-    """The first readings; rows of height [cm], flux density [mT] and residual [u]."""
+def _readings(_: Source[FieldReadings], run: FieldRun, *__: object) -> tuple[Listing]:
+    """Return the first readings; rows of height [cm], flux density [mT] and residual [u]."""
     scan = run.scan
     shown = min(len(scan.height), MOST_READINGS)
     scaled = scan.residuals / scan.u
@@ -99,15 +98,13 @@ def _readings(run: FieldRun) -> Listing:
     ]
     heads = ("z [cm]", "B [mT]", "residual [u]")
     note = f"Residual: reading − fit, in units of u. {first_of(shown, len(scan.height))}".rstrip()
-    return Listing("field-readings", table("Readings", heads, rows, numbers=heads), note)
+    return (Listing("field-readings", table("Readings", heads, rows, numbers=heads), note),)
 
 
 def _points(analysis: FieldAnalysis) -> tuple[Points, ...]:
-    """What each reading of the figure answers."""
-    several = len(analysis.runs) > 1
+    """Return what each reading of the figure answers."""
     found = []
-    for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True)):
-        name = short_name(source.name) if several else ""
+    for k, (name, run) in enumerate(zip(labels_of(analysis.sources), analysis.runs, strict=True)):
         texts = tuple(_point(name, run, i) for i in range(len(run.scan.height)))
         found += [Points(f"readings-{k}", texts), Points(f"residuals-{k}", texts)]
     return tuple(found)

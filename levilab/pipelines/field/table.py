@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from analysis.field.fit import LEARNS_NOTHING
-from levilab.pipelines.field.quantities import SHOWN
+from levilab.pipelines.field.quantities import OF_TOPS, QUANTITIES
+from levilab.pipelines.part import title_of
 from levilab.present.numbers import plain, short_name, with_decimals, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     import numpy as np
     from numpy.typing import NDArray
@@ -25,16 +28,14 @@ _BY_RUN = ("strength", "origin", "lightest_mass", "heaviest_mass", "mass_to_set"
 
 
 def field_tables(analysis: FieldAnalysis) -> tuple[Table, ...]:
-    """The scans, the base, and what follows.  Each fits a terminal of 80 columns."""
+    """Return the scans, the base, and what follows.  Each fits a terminal of 80 columns."""
     if len(analysis.runs) > 1:
         return scans_table(analysis), by_run_table(analysis), follows_table(analysis.values)
     return scans_table(analysis), base_table(analysis.runs[0].scan), follows_table(analysis.values)
 
 
 def scans_table(analysis: FieldAnalysis) -> Table:
-    """What was measured, and how well the model fits."""
-    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
-    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
+    """Return what was measured, and how well the model fits."""
     rows = []
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
         scan, statistics = run.scan, run.scan.statistics
@@ -51,30 +52,37 @@ def scans_table(analysis: FieldAnalysis) -> Table:
         )
     heads = ("scan", "readings", "heights [cm]", "field [mT]", "rms [µT]", "χ²/dof", "order p")
     numbers = ("readings", "rms [µT]", "χ²/dof", "order p")
-    return table(f"Field of the base, {total} scan{'s' * (total > 1)}{made_up}", heads, rows, numbers=numbers)
+    return table(title_of("Field of the base", analysis.sources, "scan"), heads, rows, numbers=numbers)
 
 
 def _range(values: NDArray[np.float64], decimals: int) -> str:
-    """The least and the greatest value, which need not be the first and the last."""
+    """Return the least and the greatest value, which need not be the first and the last."""
     return " … ".join(with_decimals(float(end), decimals) for end in (values.min(), values.max()))
 
 
 def base_table(scan: FieldScan) -> Table:
-    """What the scan says of the base, beside what was known before."""
+    """Return what the scan says of the base, beside what was known before."""
     rows = []
     for name, estimate in scan.parameters.items():
         prior = scan.known.prior(name)
         before = "" if prior is None else _prior(name, prior.value, prior.u, estimate)
-        rows.append((SHOWN[name].words, with_uncertainty(SHOWN[name].of(estimate)), before, _learned(scan, name)))
+        rows.append(
+            (
+                QUANTITIES[name].shown_symbol,
+                with_uncertainty(QUANTITIES[name].show(estimate)),
+                before,
+                _learned(scan, name),
+            )
+        )
     return table("The base", ("", "found", "known before", "what the scan adds"), rows)
 
 
 def _prior(name: str, value: float, u: float, like: Estimate) -> str:
-    return with_uncertainty(SHOWN[name].of(replace(like, value=value, u=u)))
+    return with_uncertainty(QUANTITIES[name].show(replace(like, value=value, u=u)))
 
 
 def _learned(scan: FieldScan, name: str) -> str:
-    """What the scan adds to what was known."""
+    """Return what the scan adds to what was known."""
     left = scan.learned(name)
     if name not in scan.fitted:
         return "held"
@@ -84,18 +92,15 @@ def _learned(scan: FieldScan, name: str) -> str:
 
 
 def follows_table(values: Mapping[str, Estimate]) -> Table:
-    """What follows for the tops that float there."""
-    names = [name for name in SHOWN if name in values and name not in _OF_BASE]
-    rows = [(SHOWN[name].words, with_uncertainty(SHOWN[name].of(values[name]))) for name in names]
+    """Return what follows for the tops that float there."""
+    names = [name for name in OF_TOPS if name in values]
+    rows = [(QUANTITIES[name].shown_symbol, with_uncertainty(QUANTITIES[name].show(values[name]))) for name in names]
     return table("What follows for a top", ("", ""), rows or [("no top floats above this base", "")])
 
 
-_OF_BASE = ("strength", "origin", "thickness", "background", "inner_radius", "outer_radius")
-
-
 def by_run_table(analysis: FieldAnalysis) -> Table:
-    """The main results, scan by scan, and their means."""
-    heads = ["scan", *(f"{SHOWN[name].words}\n[{SHOWN[name].unit}]" for name in _BY_RUN)]
+    """Return the main results, scan by scan, and their means."""
+    heads = ["scan", *(QUANTITIES[name].head.replace(" [", "\n[") for name in _BY_RUN)]
     rows = [
         Row((short_name(source.name), *_cells(run.values)))
         for source, run in zip(analysis.sources, analysis.runs, strict=True)
@@ -106,4 +111,19 @@ def by_run_table(analysis: FieldAnalysis) -> Table:
 
 
 def _cells(values: Mapping[str, Estimate]) -> list[str]:
-    return [without_unit(SHOWN[name].of(values[name])) if name in values else "—" for name in _BY_RUN]
+    return [without_unit(QUANTITIES[name].show(values[name])) if name in values else "—" for name in _BY_RUN]
+
+
+# --- readings as columns of tables for programs ---
+
+
+def field_columns(analysis: FieldAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
+    """Yield the readings of each scan by rising height; flux_density_u_t contains the uncertainty of the height."""
+    for run in analysis.runs:
+        scan = run.scan
+        yield {
+            "height_m": scan.height,
+            "flux_density_t": scan.flux_density,
+            "flux_density_u_t": scan.u,
+            "residual_t": scan.residuals,
+        }

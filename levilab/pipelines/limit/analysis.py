@@ -16,8 +16,10 @@ from analysis.numbers import digits
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.limit.readings import LimitReadings, read_limit_file, read_limit_run
-from levilab.pipelines.sources import InputOptions, Needs
+from levilab.pipelines.options import LimitOptions
+from levilab.pipelines.sources import Needs
 from levilab.present.numbers import with_uncertainty
+from levilab.runs.events import RunEvent
 from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import Scene, scene_of
 
@@ -37,25 +39,16 @@ NEEDS = Needs(
     read_run=read_limit_run,
 )
 #: Kinds of events that say how a top was lost, in words.
-ENDS = {"fell": "fell freely", "lock lost": "was lost by the drive", "top lost": "fell under the drive"}
+ENDS: Mapping[str, str] = {
+    RunEvent.FELL: "fell freely",
+    RunEvent.LOCK_LOST: "was lost by the drive",
+    RunEvent.TOP_LOST: "fell under the drive",
+}
 #: Waveforms of a drive in words.
 _WAVEFORMS = {"SIN": "sine", "SQU": "square", "TRI": "triangle"}
 #: Names of what theory says, of each limit.
 LOWER_EDGE, UPPER_EDGE = "lower edge of the linear window", "upper edge of the linear window"
 RESONANCE = "resonance of the wobble"
-
-
-@dataclass(frozen=True)
-class LimitOptions(InputOptions):
-    """How limits are analyzed.
-
-    Attributes:
-        reading_u: of every limit [Hz], in the place of what the data say.
-        clock_u: of the counter's clock, relative; budgets say what it does, it is in no u.
-    """
-
-    reading_u: float | None = None
-    clock_u: float | None = None
 
 
 @dataclass(frozen=True)
@@ -172,19 +165,19 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
         return self.sources if group is None else self.averaged[group]
 
     def prefix(self, group: Limits) -> str:
-        """What the names of a group's values begin with; empty where it is the only group."""
+        """Return what the names of a group's values begin with; empty where it is the only group."""
         if len(self.groups) == 1:
             return ""
         of_kind = self.number(group)
         return f"{group.which}_" if of_kind is None else f"{group.which}_{of_kind}_"
 
     def number(self, group: Limits) -> int | None:
-        """The number of a group among those of its kind, from 1; None where it is the only one."""
+        """Return the number of a group among those of its kind, from 1; None where it is the only one."""
         alike = [one for one in self.groups if one.which == group.which]
         return alike.index(group) + 1 if len(alike) > 1 else None
 
     def about_all(self) -> Iterable[str]:
-        """What to know of the limits of the same conditions, and of conditions that differ."""
+        """Return what to know of the limits of the same conditions, and of conditions that differ."""
         for which in ("lower", "upper"):
             texts = [group.conditions_text for group in self.groups if group.which == which]
             if len(texts) > 1:
@@ -195,7 +188,7 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
                 yield from warnings_of(group.statistics)
 
     def about_run(self, run: Limits) -> Iterable[str]:
-        """What to know of one run."""
+        """Return what to know of one run."""
         return warnings_of(run.statistics)
 
 
@@ -208,7 +201,7 @@ def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error
     kinds = Counter(str(event["kind"]) for event in source.run.events()) if source.run else Counter[str]()
-    ends = {kind: kinds[kind] for kind in ENDS if kinds[kind]}
+    ends = {str(kind): kinds[kind] for kind in ENDS if kinds[kind]}
     return Limits(
         which,
         _conditions(source, which, device),
@@ -222,7 +215,7 @@ def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
 def together(
     sources: Sequence[Source[LimitReadings]], runs: Sequence[Limits], options: LimitOptions
 ) -> tuple[Limits, ...]:
-    """The limits of each of the conditions, lower ones first, else in the order in which they are given.
+    """Return the limits of each of the conditions, lower ones first, else in the order in which they are given.
 
     What was made up says nothing about a real top: it makes a group of its own.
     """
@@ -239,7 +232,7 @@ def together(
 
 
 def tell_apart(groups: Iterable[Limits]) -> tuple[Limits, ...]:
-    """The groups; those that differ only in what is SYNTHETIC say it in their text."""
+    """Return the groups; those that differ only in what is SYNTHETIC say it in their text."""
     keyed = [((replace(group.conditions, synthetic=None), group.device), group) for group in groups]
     alike = Counter(key for key, _ in keyed)
     return tuple(replace(group, told_apart=alike[key] > 1) for key, group in keyed)
@@ -272,7 +265,7 @@ def _combined(
 
 
 def _sample(source: Source[LimitReadings], which: Which, options: LimitOptions) -> Sample:
-    """The limits of a source; of an upper limit that levilab measured, u is a step of the drive over √12."""
+    """Return the limits of a source; of an upper limit that levilab measured, u is a step of the drive over √12."""
     readings = source.readings
     if options.reading_u is not None:
         return Sample(readings.limit, np.full(len(readings), options.reading_u))
@@ -300,7 +293,7 @@ def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> 
 
 
 def _settings_of(source: Source[LimitReadings]) -> Mapping[str, Any]:
-    """The settings of the experiment, empty of a file."""
+    """Return the settings of the experiment, empty of a file."""
     table = source.run.record.configuration.get(LIMIT) if source.run else None
     return table if isinstance(table, dict) else {}
 
@@ -323,7 +316,7 @@ def _which(source: Source[LimitReadings], device: Device) -> Which:
 
 
 def device_of(source: Source[LimitReadings]) -> Device:
-    """The top that was measured: that of the run's scene, or else the thesis's.  Raises DataError for an odd scene."""
+    """Return the top of the run's scene, or else the thesis's.  Raises DataError for an odd scene."""
     table: Any = source.run.record.configuration.get("scene") if source.run else None
     if not isinstance(table, dict):
         return described_device(Scene(), "the thesis's top, 25.26 g")
@@ -335,7 +328,7 @@ def device_of(source: Source[LimitReadings]) -> Device:
 
 
 def described_device(scene: Scene, name: str) -> Device:
-    """What theory says of a scene's top, where it floats.  Raises NoWindow, SceneError."""
+    """Return what theory says of a scene's top, where it floats.  Raises NoWindow, SceneError."""
     from levilab.simulator.equilibrium import stability_of  # with numba, which no other analysis needs
 
     found = stability_of(scene)
@@ -347,7 +340,7 @@ def described_device(scene: Scene, name: str) -> Device:
 
 
 def warnings_of(statistics: Statistics) -> list[str]:
-    """What to know before using the mean."""
+    """Return what to know before using the mean."""
     texts = []
     if statistics.outliers:
         numbers = ", ".join(str(i + 1) for i in statistics.outliers)

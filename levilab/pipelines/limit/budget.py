@@ -13,8 +13,9 @@ from levilab.pipelines.budget import time_base
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from levilab.pipelines.limit.analysis import LimitAnalysis, LimitOptions, Limits
+    from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
     from levilab.pipelines.limit.readings import LimitReadings
+    from levilab.pipelines.options import LimitOptions
     from levilab.pipelines.sources import Source
 
 #: Four times as many tops halve what scatters from one to the next.

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from levilab.pipelines.document import Document, Settings, number, values_of
+from levilab.pipelines.document import Document, Settings, values_of
 from levilab.pipelines.dump import Dump
 from levilab.pipelines.limit.analysis import METHOD, LimitAnalysis, Limits
 from levilab.pipelines.limit.budget import budget_of_all, budget_of_run
+from levilab.pipelines.limit.quantities import QUANTITIES
 from levilab.pipelines.result import Result, RunPart
+from levilab.pipelines.row import find_all
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -68,10 +70,7 @@ def _run_entries(run: Limits) -> dict[str, Any]:
 
 
 def _values(found: Statistics) -> dict[str, Any]:
-    named = {"mean": found.mean, "scatter": found.scatter, "trend": found.trend, "between_runs": found.between}
-    values = values_of({name: estimate for name, estimate in named.items() if estimate})
-    values["standard_error"] = number(found.mean.u if found.scatter else None, "Hz")
-    return values | ({"step_error": number(found.step, "Hz")} if found.step else {})
+    return values_of(find_all(QUANTITIES, found))
 
 
 def _renumber(groups: tuple[Limits, ...], order: Sequence[int]) -> tuple[Limits, ...]:

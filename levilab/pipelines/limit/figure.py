@@ -14,6 +14,7 @@ from levilab.present.drawing import SMALL, headline, panel, synthetic_mark
 from levilab.present.looks import BLACK, GREEN, GREY, LOOKS, MARKERS, ORANGE, PURPLE, SKY, VERMILION, YELLOW
 from levilab.present.numbers import with_uncertainty
 from levilab.present.style import STYLE, WIDE, label_of_run
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,7 +57,7 @@ def limit_figure(analysis: LimitAnalysis) -> Figure:
 
 
 def _finding(analysis: LimitAnalysis) -> str:
-    """The means of the groups, while there are few."""
+    """Return the means of the groups, while there are few."""
     found = [f"{group.which} {with_uncertainty(group.statistics.mean)}" for group in analysis.groups]
     more = f" and {len(found) - 3} more conditions" if len(found) > 3 else ""
     return f"Limit{'s' if len(found) > 1 else ''} of levitation: {', '.join(found[:3])}{more}"
@@ -71,7 +72,7 @@ def _legend_lines(group: Limits) -> int:
 
 
 def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
-    """The limits of a group top by top."""
+    """Draw the limits of a group top by top."""
     found, mean = group.statistics, group.statistics.mean.value or 0.0
     every = _limits(analysis, group)
     start = 1
@@ -117,7 +118,7 @@ def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
 
 
 def _draw_run(axes: Axes, analysis: LimitAnalysis, group: Limits, k: int, start: int) -> int:
-    """The limits of a group's run, and where there are several its mean; returns the number of the next top."""
+    """Draw the limits of a group's run, and where there are several its mean; returns the number of the next top."""
     source = analysis.sources[group.runs[k]]
     limit, u = source.readings.limit, source.readings.u
     colour = _COLOURS[k % len(_COLOURS)]
@@ -136,7 +137,7 @@ def _draw_run(axes: Axes, analysis: LimitAnalysis, group: Limits, k: int, start:
 
 
 def _draw_theory(axes: Axes, name: str, expected: float) -> None:
-    """A line where it is within the panel, else its name at the edge beyond which it lies."""
+    """Draw a line where it is within the panel, else its name at the edge beyond which it lies."""
     colour, dashes = _THEORY[name]
     low, high = axes.get_ylim()
     text = f"{name}, {expected:.2f} Hz"
@@ -167,7 +168,7 @@ def _shade_beyond_window(axes: Axes, group: Limits) -> None:
 
 
 def _upper_title(group: Limits) -> str:
-    lock, top = group.ends.get("lock lost", 0), group.ends.get("top lost", 0)
+    lock, top = group.ends.get(RunEvent.LOCK_LOST, 0), group.ends.get(RunEvent.TOP_LOST, 0)
     how = f" (lost by the drive {lock} ×, fell {top} ×)" if lock or top else ""
     return f"Upper limit of a driven top{how}"
 
@@ -177,7 +178,7 @@ def _limits(analysis: LimitAnalysis, group: Limits) -> Array:
 
 
 def _draw_distribution(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
-    """A histogram on its side, with the normal law of the same mean and scatter."""
+    """Draw a histogram on its side, with the normal law of the same mean and scatter."""
     limits, mean = _limits(analysis, group), group.statistics.mean.value or 0.0
     s = float(np.std(limits, ddof=1)) if len(limits) >= _FEWEST else 0.0
     axes.tick_params(labelleft=False)

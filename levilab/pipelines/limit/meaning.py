@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
+from analysis.uncertainty import Estimate
 from levilab.present.numbers import with_uncertainty
+from levilab.stability.published.printed import published
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,12 +22,10 @@ _WHY = MappingProxyType({
     "upper": "above it the top is so stiff that its axis no longer follows the field, or the drive "
     "cannot take it along",
 })  # fmt: skip
-#: The mean of ten lower limits in the thesis [Hz], with its standard error.
-_THESIS, _THESIS_U = 21.86, 0.08
 
 
 def meaning(analysis: LimitAnalysis) -> tuple[str, ...]:
-    """The sentences, of each of the conditions."""
+    """Return the sentences, of each of the conditions."""
     return tuple(text for group in analysis.groups for text in _sentences(group))
 
 
@@ -43,11 +44,8 @@ def _sentences(group: Limits) -> Iterator[str]:
         f"mean of {found.n} is {digits(ratio)} times as good."
     )
     if group.which == "lower":
-        off = mean.value - _THESIS
-        u = (mean.u**2 + _THESIS_U**2) ** 0.5
-        if abs(off) < 2 * u:
-            yield f"The thesis's ten tops have {_THESIS:g}(8) Hz, which agrees."
-        else:
-            yield (
-                f"The thesis's ten tops have {_THESIS:g}(8) Hz, {digits(abs(off) / u)} u from it: another top, or mass."
-            )
+        thesis = published("thesis")
+        value, u = thesis["measured.mean"].value, thesis["measured.standard_error"].value
+        away = abs(mean.value - value) / math.hypot(mean.u, u)
+        said = "which agrees" if away < 2 else f"{digits(away)} u from it: another top, or mass"
+        yield f"The thesis's ten tops have {with_uncertainty(Estimate(value, u, 'Hz'))}, {said}."

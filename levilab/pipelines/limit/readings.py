@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from levilab.pipelines.sources import InputOptions
+    from levilab.pipelines.options import InputOptions
     from levilab.runs.run import Run
 
     Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ class LimitReadings:
 
 
 def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
-    """The limits in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
+    """Return the limits in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
     try:
         table = read_table(
             path, columns=options.columns, quantities=QUANTITIES, needed=QUANTITIES[:1], guess=options.guess
@@ -86,7 +86,7 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
 
 
 def _single_column(path: Path, *, guess: bool) -> Table | None:
-    """The table of a file with one number a line, which are limits by its title or, if guess, for want of one.
+    """Return the table of a file with one number a line, which are limits by its title or, if guess, for want of one.
 
     None of a file that holds anything else.
     """
@@ -111,12 +111,12 @@ def _single_column(path: Path, *, guess: bool) -> Table | None:
 
 
 def read_limit_run(run: Run, _: InputOptions) -> LimitReadings:
-    """The limits of a run."""
+    """Return the limits of a run."""
     return limit_readings(run.readings())
 
 
 def limit_readings(table: Table) -> LimitReadings:
-    """The limits of a run or of a data file.
+    """Return the limits of a run or of a data file.
 
     Args:
         table: with `spin_frequency_hz`, one row a repetition.

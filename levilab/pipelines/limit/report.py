@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.limit.meaning import meaning
 from levilab.pipelines.limit.table import runs_table, theory_table
-from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
+from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, first_of, input_parts, labels_of, size_of_u
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
-from levilab.present.numbers import off, reading, short_name, with_uncertainty
+from levilab.present.numbers import off, reading, with_uncertainty
 from levilab.present.tables import Row, table
 
 if TYPE_CHECKING:
@@ -48,15 +47,12 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
             Paragraph("What theory says of the top, and how far the mean is from it."),
             Tabular("limit-theory", theory_table(analysis), _THEORY, first_column_wraps=True),
         ),
-        inputs=tuple(
-            InputPart(_in_words(source, run), origin.text, run.text, (_readings(source, run),))
-            for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
-        ),
+        inputs=input_parts(analysis, _in_words, _readings),
     )
 
 
 _STATISTICS = (
-    "value(u): the digits in parentheses are the standard uncertainty of the last digits. That of the mean is the "
+    f"{VALUE_U} That of the mean is the "
     "standard error: s/√n from the scatter s of the tops, and what the steps of the drive leave, up to step/√12 where "
     "the tops scatter less than that. Several runs of the same conditions have a random-effects mean, whose standard "
     "error holds the scatter between them; runs of other conditions are no repetitions, and stand apart. Trend: slope "
@@ -69,15 +65,14 @@ _THEORY = (
 )
 
 
-def _in_words(source: Source[LimitReadings], run: Limits) -> tuple[str, ...]:
+def _in_words(source: Source[LimitReadings], run: Limits, *_: object) -> tuple[str, ...]:
     limit, u = source.readings.limit, source.readings.u
     span = f"{run.statistics.n} {run.which} limits, {limit.min():.2f} Hz to {limit.max():.2f} Hz"
-    known = "not known" if u is None else f"{digits(u.min())} Hz to {digits(u.max())} Hz"
-    return span, f"u of a limit: {known}"
+    return span, f"u of a limit: {'not known' if u is None else size_of_u(u)}"
 
 
-def _readings(source: Source[LimitReadings], run: Limits) -> Listing:
-    """The limits; rows of number, limit, u and its distance from the mean of the run [Hz]."""
+def _readings(source: Source[LimitReadings], run: Limits, *_: object) -> tuple[Listing]:
+    """Return the limits; rows of number, limit, u and its distance from the mean of the run [Hz]."""
     limit, u = source.readings.limit, source.readings.u
     shown = min(limit.size, _MOST_SHOWN)
     heads = ("top", "limit [Hz]", "u [Hz]", "− mean [Hz]")
@@ -89,21 +84,18 @@ def _readings(source: Source[LimitReadings], run: Limits) -> Listing:
         )
         for i, x in enumerate(limit[:shown].tolist())
     ]
-    return Listing("limit-readings", table("Limits", heads, rows, numbers=heads), first_of(shown, limit.size))
+    return (Listing("limit-readings", table("Limits", heads, rows, numbers=heads), first_of(shown, limit.size)),)
 
 
 def _points(analysis: LimitAnalysis) -> tuple[Points, ...]:
-    """What each top of the figure answers."""
-    several = len(analysis.runs) > 1
+    """Return what each top of the figure answers."""
+    each = zip(labels_of(analysis.sources), analysis.sources, analysis.runs, strict=True)
     return tuple(
         Points(
             f"readings-{run.which}-{k}",
-            tuple(
-                _point(short_name(source.name) if several else "", source.readings, run, i)
-                for i in range(source.readings.limit.size)
-            ),
+            tuple(_point(name, source.readings, run, i) for i in range(source.readings.limit.size)),
         )
-        for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
+        for k, (name, source, run) in enumerate(each)
     )
 
 

@@ -4,24 +4,27 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from levilab.pipelines.part import title_of
 from levilab.present.numbers import share, short_name, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
     from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
 
 HEADS = ("limits", "tops", "mean [Hz]", "scatter [Hz]", "trend [Hz/top]", "outliers")
 
 
 def limit_tables(analysis: LimitAnalysis) -> tuple[Table, ...]:
-    """The runs, and theory beside them.  Each fits a terminal of 80 columns."""
+    """Return the runs, and theory beside them.  Each fits a terminal of 80 columns."""
     return runs_table(analysis), theory_table(analysis)
 
 
 def runs_table(analysis: LimitAnalysis) -> Table:
-    """The statistics, run by run and of each kind together."""
-    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
-    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
+    """Return the statistics, run by run and of each kind together."""
     rows = [
         Row((f"{short_name(source.name)} ({_group(analysis, k)})", *_cells(run)))
         for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
@@ -31,7 +34,7 @@ def runs_table(analysis: LimitAnalysis) -> Table:
         for group in analysis.groups
         if len(group.runs) > 1
     ]
-    return table(f"Limits of the spin, {total} run{'s' * (total > 1)}{made_up}", HEADS, rows, numbers=["tops"])
+    return table(title_of("Limits of the spin", analysis.sources), HEADS, rows, numbers=["tops"])
 
 
 def _cells(limits: Limits) -> tuple[str, ...]:
@@ -47,7 +50,7 @@ def _cells(limits: Limits) -> tuple[str, ...]:
 
 
 def theory_table(analysis: LimitAnalysis) -> Table:
-    """What theory says, and how far the mean is from it."""
+    """Return what theory says, and how far the mean is from it."""
     rows = [
         Row(
             (
@@ -68,7 +71,25 @@ def theory_table(analysis: LimitAnalysis) -> Table:
 
 
 def _group(analysis: LimitAnalysis, run: int) -> str:
-    """The group that a run is of: its kind, and its number where there are several, as in result.json."""
+    """Return the group that a run is of: its kind, and its number where there are several, as in result.json."""
     group = next(group for group in analysis.groups if run in group.runs)
     number = analysis.number(group)
     return group.which if number is None else f"{group.which} {number}"
+
+
+# --- readings as columns of tables for programs ---
+
+
+def limit_columns(analysis: LimitAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
+    """Yield the tops of each run; residual_hz: limit less the mean of the run, which includes outliers."""
+    for source, run in zip(analysis.sources, analysis.runs, strict=True):
+        limit, n = source.readings.limit, len(source.readings)
+        given, found = analysis.options.reading_u, run.statistics
+        u = np.full(n, np.nan) if source.readings.u is None else source.readings.u
+        yield {
+            "top": np.arange(1, n + 1),
+            "spin_frequency_hz": limit,
+            "spin_frequency_u_hz": u if given is None else np.full(n, given),
+            "residual_hz": limit - (np.nan if found.mean.value is None else found.mean.value),
+            "outlier": np.isin(np.arange(n), found.outliers),
+        }

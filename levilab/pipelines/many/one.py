@@ -17,7 +17,7 @@ from levilab.runs.run import Run
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from levilab.pipelines.sources import InputOptions
+    from levilab.pipelines.options import InputOptions
 
 
 @dataclass(frozen=True)

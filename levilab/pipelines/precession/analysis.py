@@ -16,8 +16,10 @@ from analysis.precession.sweep import EXCLUDED_P, Sweep, SweepFit, fit_sweep
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.budget import gate_of
+from levilab.pipelines.options import PrecessionOptions
 from levilab.pipelines.precession.readings import Readings, read_sweep_file, read_sweep_run
-from levilab.pipelines.sources import InputOptions, Needs
+from levilab.pipelines.sources import Needs
 from levilab.present.numbers import plain, with_uncertainty
 
 if TYPE_CHECKING:
@@ -38,23 +40,6 @@ NEEDS = Needs(
     read_run=read_sweep_run,
     particular=True,
 )
-
-
-@dataclass(frozen=True)
-class PrecessionOptions(InputOptions):
-    """How sweeps are analyzed.
-
-    Attributes:
-        reading_u: of every count of the precession [Hz], in the place of what the data say.
-        keep_outliers: points that miscounted are kept.
-        orthogonal: the uncertainty of the drive's frequency counts, too.
-        clock_u: of the counter's clock, relative; budgets say what it does, it is in no u.
-    """
-
-    reading_u: float | None = None
-    keep_outliers: bool = False
-    orthogonal: bool = False
-    clock_u: float | None = None
 
 
 #: A record that is kept at the moment of a reading is that reading's [s].
@@ -98,16 +83,16 @@ class PrecessionAnalysis(Analyzed[Readings, PrecessionRun, SweepFit, PrecessionO
         return verdict(self.combined)
 
     def about_all(self) -> Iterable[str]:
-        """What to know of the line through all points."""
+        """Return what to know of the line through all points."""
         return self.combined.warnings if len(self.runs) > 1 else ()
 
     def about_run(self, run: PrecessionRun) -> Iterable[str]:
-        """What to know of one sweep."""
+        """Return what to know of one sweep."""
         return (*run.fit.warnings, *run.warnings)
 
 
 def fit_source(source: Source[Readings], options: PrecessionOptions) -> PrecessionRun:
-    """The line through one sweep, and the coherence of its records.  Raises DataError, which names the file."""
+    """Return the line through one sweep, and the coherence of its records.  Raises DataError, which names the file."""
     readings = source.readings
     u = readings.u if options.reading_u is None else np.full(len(readings), options.reading_u)
     sweep = Sweep(
@@ -117,7 +102,7 @@ def fit_source(source: Source[Readings], options: PrecessionOptions) -> Precessi
         u_drive=readings.u_drive,
         spin=readings.spin,
         u_spin=readings.u_spin,
-        gate_s=_gate(source),
+        gate_s=gate_of(source, PRECESSION),
         gates=readings.laser,
     )
     try:
@@ -128,15 +113,8 @@ def fit_source(source: Source[Readings], options: PrecessionOptions) -> Precessi
     return PrecessionRun(fit, coherences, warnings)
 
 
-def _gate(source: Source[Readings]) -> float | None:
-    """The counter's gate [s], where a run says it."""
-    settings = source.run.record.configuration.get(PRECESSION) if source.run else None
-    gate = settings.get("gate_s") if isinstance(settings, dict) else None
-    return float(gate) if isinstance(gate, int | float) and gate > 0 else None
-
-
 def combine(runs: Sequence[PrecessionRun], options: PrecessionOptions) -> SweepFit:
-    """The line through the points of all runs that their own lines go through; of one run it is that run's."""
+    """Return the line through the points of all runs that their own lines go through; of one run it is that run's."""
     if len(runs) == 1:
         return runs[0].fit
     fits = [run.fit for run in runs]
@@ -160,7 +138,7 @@ def _with_warnings(fit: SweepFit, texts: Iterable[str]) -> SweepFit:
 
 
 def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[str]:
-    """A word where the slopes of the runs differ by more than their u."""
+    """Yield a word where the slopes of the runs differ by more than their u."""
     slopes = [(fit.line.slope, fit.line.u_slope) for fit in fits if fit.line.u_slope]
     if len(slopes) < 2:
         return
@@ -190,7 +168,7 @@ METHOD = Method(
 
 
 def _coherences(source: Source[Readings]) -> tuple[tuple[PointCoherence, ...], tuple[str, ...]]:
-    """How firmly the pulses follow the drive in each pair of records of a run, laser and drive."""
+    """Return how firmly the pulses follow the drive in each pair of records of a run, laser and drive."""
     if source.run is None or source.readings.time is None:
         return (), ()
     try:
@@ -226,17 +204,17 @@ def _coherence(laser: StoredTrace, drive: StoredTrace, frequency: float) -> Cohe
 
 
 def slope_of(fit: SweepFit) -> Estimate:
-    """The slope."""
+    """Return the slope."""
     return Estimate(fit.line.slope, fit.line.u_slope, "1")
 
 
 def intercept_of(fit: SweepFit) -> Estimate:
-    """The intercept."""
+    """Return the intercept."""
     return Estimate(fit.line.intercept, fit.line.u_intercept, "Hz")
 
 
 def verdict(fit: SweepFit) -> str:
-    """What a sweep says, in a few sentences."""
+    """Return what a sweep says, in a few sentences."""
     head = f"Slope {with_uncertainty(slope_of(fit))}, intercept {with_uncertainty(intercept_of(fit))}."
     return " ".join((head, _about_lock(fit), *([_about_power(fit.power)] if fit.power else [])))
 
@@ -276,5 +254,5 @@ def _about_power(power: Power) -> str:
 
 
 def at_most(probability: float) -> str:
-    """A probability, never shown as certainty."""
+    """Return a probability, never shown as certainty."""
     return "more than 0.999" if probability > 0.999 else f"{math.floor(1000 * probability) / 1000:.3f}"

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from analysis.precession.sweep import SweepFit
-    from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionOptions, PrecessionRun
+    from levilab.pipelines.options import PrecessionOptions
+    from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
     from levilab.pipelines.precession.readings import Readings
     from levilab.pipelines.sources import Source
 
@@ -75,7 +76,7 @@ def _of_points(
     whole: float,
     influence: tuple[Array, Array, Array],
 ) -> Iterator[Component]:
-    """What the points scatter.
+    """Yield what the points scatter.
 
     Args:
         source: the sweep.
@@ -119,7 +120,7 @@ def _unit(fit: SweepFit, whole: float) -> str:
 
 
 def _what_points(options: PrecessionOptions, *, stated: bool) -> tuple[str, Literal["A", "B"], str]:
-    """What the scatter is called, its type, and where its size comes from."""
+    """Return what the scatter is called, its type, and where its size comes from."""
     if not stated:
         return "scatter of the points", "A", "standard deviation about the line"
     if options.reading_u:
@@ -137,7 +138,7 @@ def _better(source: Source[Readings], fit: SweepFit) -> str:
 
 
 def _of_clocks(source: Source[Readings], fit: SweepFit, options: PrecessionOptions, name: str) -> Iterator[Component]:
-    """The clocks of counter and generator: their ratio is a factor of the slope, and common to all points."""
+    """Yield the clocks of counter and generator: their ratio is a factor of the slope, and common to all points."""
     line = fit.line
     value = line.slope if name == "slope" else line.intercept
     used = [point for point in fit.points if point.used]

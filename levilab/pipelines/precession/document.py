@@ -20,19 +20,12 @@ from levilab.pipelines.precession.analysis import (
     verdict,
 )
 from levilab.pipelines.precession.budget import budget_of_all, budget_of_run
+from levilab.pipelines.precession.quantities import QUANTITIES
 from levilab.pipelines.result import Result, RunPart
+from levilab.pipelines.row import find_all
 
 if TYPE_CHECKING:
     from analysis.precession.line import Line
-
-#: Attribute of SweepFit.power → name and unit of the value.
-_POWER_VALUES = {
-    "now": ("power", "1"),
-    "smallest_difference": ("smallest_slope_difference", "1"),
-    "points_needed": ("points_needed", "1"),
-    "range_needed_hz": ("range_needed", "Hz"),
-    "u_needed_hz": ("u_needed", "Hz"),
-}
 
 
 class PrecessionPart(RunPart):
@@ -68,18 +61,11 @@ def _run_entries(run: PrecessionRun) -> dict[str, Any]:
 
 
 def _about(fit: SweepFit) -> dict[str, Any]:
-    return {"values": _values(fit), "models": [_line(fit), _robust(fit)], "verdict": verdict(fit)}
-
-
-def _values(fit: SweepFit) -> dict[str, Any]:
-    robust = {"robust_slope": fit.robust.slope, "robust_intercept": fit.robust.intercept}
-    values = values_of({"slope": slope_of(fit), "intercept": intercept_of(fit)} | robust)
-    values["p_locked"] = number(fit.p_locked, "1")
-    if fit.spin_offset is not None:
-        values["spin_offset"] = number(fit.spin_offset, "Hz", fit.u_spin_offset)
-    if fit.power:
-        values |= {name: number(getattr(fit.power, key), unit) for key, (name, unit) in _POWER_VALUES.items()}
-    return values
+    return {
+        "values": values_of(find_all(QUANTITIES, fit)),
+        "models": [_line(fit), _robust(fit)],
+        "verdict": verdict(fit),
+    }
 
 
 def _line(fit: SweepFit) -> dict[str, Any]:

@@ -74,7 +74,7 @@ def _draw_line(axes: Axes, analysis: PrecessionAnalysis) -> None:
 
 
 def median_line(fit: SweepFit, x: Array) -> Array:
-    """The median line at x [Hz]."""
+    """Return the median line at x [Hz]."""
     return np.asarray(float(fit.robust.intercept.value or 0.0) + float(fit.robust.slope.value or 0.0) * x)
 
 
@@ -102,7 +102,7 @@ def _usual_u(fit: SweepFit) -> float:
 
 
 def _draw_bands(axes: Axes, x: Array, y: Array, fit: SweepFit, *, labels: bool = False) -> None:
-    """The bands of 95 % about a line at y [Hz]."""
+    """Draw the bands of 95 % about a line at y [Hz]."""
     if fit.line.u_slope is None:
         return
     usual = fit.line.scale * _usual_u(fit)
@@ -133,7 +133,7 @@ def _draw_points(
 
 
 def _draw_left_out(axes: Axes, fit: SweepFit) -> None:
-    """A cross where a point lies; an arrow at the edge, with its value, where it lies beyond."""
+    """Draw a cross where a point lies; an arrow at the edge, with its value, where it lies beyond."""
     low, high = axes.get_ylim()
     for point in fit.points:
         if point.miscount is None or point.used:
@@ -211,7 +211,7 @@ def _draw_changes(axes: Axes, analysis: PrecessionAnalysis) -> None:
 
 
 def _draw_phases(axes: Axes, analysis: PrecessionAnalysis) -> None:
-    """The mean vector of the pulses at each point that has a record."""
+    """Draw the mean vector of the pulses at each point that has a record."""
     for k, run in enumerate(analysis.runs):
         drive = [run.fit.points[one.point].drive for one in run.coherences]
         length = [one.coherence.length for one in run.coherences]

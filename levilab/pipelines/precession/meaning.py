@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from analysis.numbers import digits
 from levilab.pipelines.precession.analysis import slope_of
 from levilab.present.numbers import plain, with_uncertainty
+from levilab.stability.published.printed import published
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -14,14 +15,12 @@ if TYPE_CHECKING:
     from analysis.precession.sweep import SweepFit
     from levilab.pipelines.precession.analysis import PrecessionAnalysis
 
-#: The slope that the thesis gives, without an uncertainty.
-THESIS_SLOPE = 1.05
 #: A difference of so many u is one.
 _DIFFERS = 2.0
 
 
 def meaning(analysis: PrecessionAnalysis) -> tuple[str, ...]:
-    """The sentences, of the line through all points."""
+    """Return the sentences, of the line through all points."""
     return tuple(_sentences(analysis.combined))
 
 
@@ -42,12 +41,13 @@ def _sentences(fit: SweepFit) -> Iterator[str]:
             f"exclude 1 and 0 (p = {plain(fit.p_locked, 1)}). A top that is not locked, or a counter that misses or "
             "doubles pulses, does that; the free precession does not follow the drive at all."
         )
-    away = abs(line.slope - THESIS_SLOPE) / line.u_slope
+    theirs = published("thesis")["measured.slope"]  # printed without an uncertainty
+    away = abs(line.slope - theirs.value) / line.u_slope
     if away > _DIFFERS:
-        yield f"The slope of {THESIS_SLOPE:g} that the thesis gives lies {digits(away)} u away from this one."
+        yield f"The slope of {theirs.text} that the thesis gives lies {digits(away)} u away from this one."
     else:
         yield (
-            f"The slope of {THESIS_SLOPE:g} that the thesis gives lies within {digits(away)} u: these points cannot "
+            f"The slope of {theirs.text} that the thesis gives lies within {digits(away)} u: these points cannot "
             "distinguish it from a locked top's."
         )
     if fit.spin_offset is not None and fit.u_spin_offset:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from analysis.precession.gates import Gates, Rate
     from levilab.formats.table import Table
-    from levilab.pipelines.sources import InputOptions
+    from levilab.pipelines.options import InputOptions
     from levilab.runs.run import Run
 
     Array = NDArray[np.float64]
@@ -79,13 +79,13 @@ class Readings:
 
 
 def read_sweep_file(path: Path, options: InputOptions) -> Readings:
-    """The sweep in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
+    """Return the sweep in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
     table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=options.guess)
     return sweep_readings(table)
 
 
 def read_sweep_run(run: Run, _: InputOptions) -> Readings:
-    """The sweep of a run; where it holds the gates, rates and uncertainties are computed from those of all points."""
+    """Return the sweep of a run; where it holds the gates, rates and uncertainties come from all of them."""
     readings = sweep_readings(run.readings())
     if readings.time is None:
         return readings
@@ -94,14 +94,14 @@ def read_sweep_run(run: Run, _: InputOptions) -> Readings:
 
 
 def _given_u(run: Run) -> float | None:
-    """What the configuration says a count scatters by [Hz]."""
+    """Return what the configuration says a count scatters by [Hz]."""
     settings = run.record.configuration.get("precession")
     u = settings.get("reading_u_hz") if isinstance(settings, dict) else None
     return float(u) if isinstance(u, int | float) else None
 
 
 def _from_gates(readings: Readings, gates: Sequence[tuple[Gates, Gates]], given_u: float | None) -> Readings:
-    """The points with the rates of their gates.  given_u: if the points keep the u that follows from it [Hz]."""
+    """Return the points with the rates of their gates.  given_u: if the points keep the u that follows from it [Hz]."""
     spins, lasers = zip(*(rates_at_point(spin, laser) for spin, laser in gates), strict=True)
     counted = np.array([rate.value for rate in lasers])
     if not np.allclose(counted, readings.precession, rtol=_SAME_RATE, atol=0):
@@ -132,7 +132,7 @@ def _about_gates(readings: Readings, lasers: Sequence[Rate]) -> Iterable[str]:
 
 
 def sweep_readings(table: Table) -> Readings:
-    """The points of a sweep.
+    """Return the points of a sweep.
 
     Args:
         table: with `drive_frequency_hz` and `precession_frequency_hz`; their uncertainties, the spin and the time are
@@ -192,7 +192,7 @@ def _check(table: Table, values: Array, what: str) -> None:
 
 
 def _check_u(table: Table, values: Array, of: str, size: Array) -> None:
-    """An uncertainty that is not above 0, or below the rounding of the number itself, is a mistake."""
+    """Refuse an uncertainty that is not above 0, or below the rounding of the number itself, is a mistake."""
     wrong = np.flatnonzero(~((values > 1e-15 * size) & (values < 1e15 * size)))
     if wrong.size:
         i = int(wrong[0])

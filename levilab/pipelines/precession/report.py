@@ -7,20 +7,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.numbers import digits
 from analysis.uncertainty import Estimate
-from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
+from levilab.pipelines.part import (
+    VALUE_U,
+    FigureText,
+    ReportPart,
+    first_of,
+    input_parts,
+    labels_of,
+    origin_of_u,
+    size_of_u,
+)
 from levilab.pipelines.precession.analysis import verdict
 from levilab.pipelines.precession.meaning import meaning
 from levilab.pipelines.precession.table import coherence_table, lines_table, points_table, power_table
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Note, Paragraph, Points, Tabular
-from levilab.present.numbers import off, short_name, with_uncertainty
+from levilab.present.numbers import off, with_uncertainty
 
 if TYPE_CHECKING:
     from analysis.precession.sweep import Point
-    from levilab.pipelines.analyzed import Origin
-    from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionOptions, PrecessionRun
+    from levilab.pipelines.options import PrecessionOptions
+    from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
     from levilab.pipelines.precession.readings import Readings
     from levilab.pipelines.sources import Source
     from levilab.present.document.blocks import Block
@@ -52,15 +60,12 @@ def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
         ),
         runs_title="Phase of the laser's pulses",
         runs=_phases(analysis),
-        inputs=tuple(
-            _input(source, run, origin)
-            for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
-        ),
+        inputs=input_parts(analysis, _in_words, _readings, lambda run: verdict(run.fit)),
     )
 
 
 _LINES = (
-    "value(u): the digits in parentheses are the standard uncertainty of the last digits. p locked: how probable it is "
+    f"{VALUE_U} p locked: how probable it is "
     "that the points of a locked top, slope 1 and intercept 0, lie as far off as these; below 0.01 that is excluded. "
     "Slope and intercept are tested together, as they are correlated. The median line (Theil and Sen) goes through all "
     "points, those left out of the fit as well; it stands up to a few wild ones."
@@ -77,7 +82,7 @@ _POINTS = (
 
 
 def _power(analysis: PrecessionAnalysis) -> tuple[Block, ...]:
-    """What it takes to tell the published slope from 1."""
+    """Return what it takes to tell the published slope from 1."""
     found = power_table(analysis.combined)
     note = "The slope of 1.05 was published without an uncertainty."
     return (Tabular("precession-power", found, note, first_column_wraps=True),) if found.rows else ()
@@ -98,22 +103,19 @@ def _phases(analysis: PrecessionAnalysis) -> tuple[Block, ...]:
     return *tables, Note(_PHASES)
 
 
-def _input(source: Source[Readings], run: PrecessionRun, origin: Origin[PrecessionOptions]) -> InputPart:
+def _readings(source: Source[Readings], run: PrecessionRun, _: PrecessionOptions) -> tuple[Block, ...]:
     count = len(run.fit.points)
     time = source.readings.time
     clock = with_clock(source.time_zero, None if time is None else time.tolist(), ())
     found = replace(points_table(run, most=MOST_POINTS, clock=clock), title="Points")
     more = first_of(min(count, MOST_POINTS), count)
-    blocks = (Tabular("precession-points", found, f"{_POINTS} {more}".rstrip()),)
-    return InputPart(_in_words(source, run, origin), origin.text, verdict(run.fit), blocks)
+    return (Tabular("precession-points", found, f"{_POINTS} {more}".rstrip()),)
 
 
 def _figure_points(analysis: PrecessionAnalysis) -> tuple[Points, ...]:
-    """What each point of the figure that the line goes through answers."""
-    several = len(analysis.runs) > 1
+    """Return what each point of the figure that the line goes through answers."""
     found = []
-    for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True)):
-        name = short_name(source.name) if several else ""
+    for k, (name, run) in enumerate(zip(labels_of(analysis.sources), analysis.runs, strict=True)):
         texts = tuple(_point(name, point) for point in run.fit.points if point.used)
         found += [Points(f"readings-{k}", texts), Points(f"residuals-{k}", texts)]
     return tuple(found)
@@ -127,23 +129,17 @@ def _point(name: str, point: Point) -> str:
     return "\n".join(filter(None, lines))
 
 
-def _in_words(source: Source[Readings], run: PrecessionRun, origin: Origin[PrecessionOptions]) -> tuple[str, ...]:
+def _in_words(source: Source[Readings], run: PrecessionRun, options: PrecessionOptions) -> tuple[str, ...]:
     drive, out = run.fit.column("drive"), sum(not point.used for point in run.fit.points)
     text = f"{len(drive)} points, {drive.min():.4g} Hz to {drive.max():.4g} Hz"
-    return text + (f", {out} left out as miscounts" if out else ""), _uncertainty(source, run, origin)
+    return text + (f", {out} left out as miscounts" if out else ""), _uncertainty(source, run, options)
 
 
-def _uncertainty(source: Source[Readings], run: PrecessionRun, origin: Origin[PrecessionOptions]) -> str:
+def _uncertainty(source: Source[Readings], run: PrecessionRun, options: PrecessionOptions) -> str:
     """How large u of a point is, and where it comes from."""
     u = run.fit.column("u")
     if not np.isfinite(u).all():
         return "u of a point: not known, taken from the scatter about the line"
-    low, high = float(u.min()), float(u.max())
-    size = f"{digits(low)} Hz" if low == high else f"{digits(low)} Hz to {digits(high)} Hz"
-    if origin.options.reading_u is not None:
-        return f"u of a point: {size}, as given to the analysis"
-    if source.readings.laser is not None:
-        return f"u of a point: {size}, from the gates of all points, the swing about the drive taken off"
-    channels = source.run.record.channels if source.run else []
-    where = next((c.get("source") for c in channels if c.get("name") == "precession_frequency_u_hz"), None)
-    return f"u of a point: {size}, {where or 'from a column of the data'}"
+    if options.reading_u is None and source.readings.laser is not None:
+        return f"u of a point: {size_of_u(u)}, from the gates of all points, the swing about the drive taken off"
+    return f"u of a point: {size_of_u(u)}, {origin_of_u(source, 'precession_frequency_u_hz', options)}"

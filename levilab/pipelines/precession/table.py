@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from analysis.uncertainty import Estimate
+from levilab.pipelines.part import title_of
 from levilab.pipelines.precession.analysis import at_most, intercept_of, slope_of
 from levilab.present.numbers import column, plain, short_name, signed, with_decimals, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from analysis.precession.sweep import Point, SweepFit
     from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
@@ -23,7 +26,7 @@ POINT_HEADS = ("ν_d [Hz]", "ν_p [Hz]", "spin [Hz]", "ν_p − ν_d [Hz]", "lev
 
 
 def precession_tables(analysis: PrecessionAnalysis) -> tuple[Table, ...]:
-    """The lines, what it takes to tell a slope of 1.05 from 1, the points.  Each fits a terminal of 80 columns."""
+    """Return tables of the lines, of the power of the test, and of the points.  Each fits a terminal of 80 columns."""
     tables = [lines_table(analysis), power_table(analysis.combined)]
     tables += [points_table(run, name) for run, name in _names(analysis)]
     tables += [coherence_table(run, name) for run, name in _names(analysis)]
@@ -39,9 +42,8 @@ def _names(analysis: PrecessionAnalysis) -> list[tuple[PrecessionRun, str]]:
 
 
 def lines_table(analysis: PrecessionAnalysis) -> Table:
-    """The line of each run and of all together, and the median line beside it."""
-    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
-    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
+    """Return the line of each run and of all together, and the median line beside it."""
+    total = len(analysis.runs)
     rows = []
     if total > 1:
         for run, source in zip(analysis.runs, analysis.sources, strict=True):
@@ -57,7 +59,7 @@ def lines_table(analysis: PrecessionAnalysis) -> Table:
     rows.append(Row(("median line, robust", without_unit(robust.slope), without_unit(robust.intercept), "—", "—")))
     rows.append(Row(("locked top", "1", "0", "—", "—")))
     heads = ("line", "slope", "intercept [Hz]", "χ²/dof", "p locked")
-    title = f"Precession against drive, {total} sweep{'s' * (total > 1)}{made_up}"
+    title = title_of("Precession against drive", analysis.sources, "sweep")
     return table(title, heads, rows, numbers=heads[1:])
 
 
@@ -74,7 +76,7 @@ def _line_cells(fit: SweepFit) -> tuple[str, ...]:
 
 
 def power_table(fit: SweepFit) -> Table:
-    """What tells a slope of 1.05 from 1; without an uncertainty of the slope no rows."""
+    """Return what tells a slope of 1.05 from 1; without an uncertainty of the slope no rows."""
     power = fit.power
     if power is None:
         return table("", (), ())
@@ -100,7 +102,7 @@ def points_table(
     most: int = MOST_POINTS,
     clock: tuple[Sequence[str], Sequence[tuple[str, ...]]] = ((), ()),
 ) -> Table:
-    """The points, the first of many.
+    """Return the points, the first of many.
 
     Args:
         run: the sweep.
@@ -153,3 +155,24 @@ def coherence_table(run: PrecessionRun, name: str = "") -> Table:
     ]
     heads = ("ν_d [Hz]", "pulses", "mean vector", "phase [°]", "drift [mHz]", "turns", "locked")
     return table(f"Phase of the laser's pulses on the drive{name}", heads, rows, numbers=heads[:6])
+
+
+# --- readings as columns of tables for programs ---
+
+#: Name of the column → attribute of a point.
+_COLUMNS = {
+    "drive_frequency_hz": "drive",
+    "drive_frequency_u_hz": "u_drive",
+    "precession_frequency_hz": "precession",
+    "precession_frequency_u_hz": "u",
+    "spin_frequency_hz": "spin",
+    "spin_frequency_u_hz": "u_spin",
+    "residual_hz": "residual",
+}
+
+
+def precession_columns(analysis: PrecessionAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
+    """Yield the points of each sweep; residual_hz: point less the sweep's own line, of unused points too."""
+    for run in analysis.runs:
+        used = np.array([point.used for point in run.fit.points])
+        yield {name: run.fit.column(attribute) for name, attribute in _COLUMNS.items()} | {"used": used}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping  # noqa: TC003 - pydantic reads the types of a result when it runs
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,8 @@ from analysis.pulses import (
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
-from levilab.pipelines.sources import InputOptions, Needs
+from levilab.pipelines.options import SpinOptions
+from levilab.pipelines.sources import Needs
 from levilab.pipelines.spin.readings import Records, read_spin_file, read_spin_run
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.traces import INDEX
@@ -56,17 +57,6 @@ NEEDS = Needs(
 LONGEST_WHOLE_S = 12.0
 #: Length of a window of a longer record [s].
 WINDOW_S = 2.0
-
-
-@dataclass(frozen=True)
-class SpinOptions(InputOptions):
-    """How pulses are found, see `analysis.pulses.spin_of_trace`.
-
-    clock_u: of the clock of the oscilloscope or sound card, relative; budgets say what it does, it is in no u.
-    """
-
-    method: Literal["auto", "edges", "matched", "likelihood"] = "auto"
-    clock_u: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,13 +160,13 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
         return ()
 
     def about_all(self) -> Iterable[str]:
-        """What to know of the method."""
+        """Yield what to know of the method."""
         method = self.options.method
         if method != "auto" and all(source.readings.pulses for source in self.sources):
             yield f"the method {method} was chosen, but a list of pulse times leaves no choice"
 
     def about_run(self, run: SpinRun) -> Iterable[str]:
-        """What to know of one input."""
+        """Return what to know of one input."""
         return (f"{note.text} ({note.name})" for note in run.notes)
 
 
@@ -187,7 +177,7 @@ MOST_SENTENCES, MOST_DRAWN = 4, 3
 
 
 def spin_of_source(source: Source[Records], options: SpinOptions) -> SpinRun:
-    """The spin of one input.  Raises DataError, which names the file."""
+    """Return the spin of one input.  Raises DataError, which names the file."""
     records = source.readings
     try:
         if records.pulses:
@@ -237,7 +227,7 @@ def _of_waveform(waveform: Waveform, channel: str, options: SpinOptions) -> Spin
 
 
 def _with_rate(spin: SpinFrequency, waveform: Waveform) -> SpinFrequency:
-    """The same with the uncertainty of the sampling rate in that of the frequency."""
+    """Return the same with the uncertainty of the sampling rate in that of the frequency."""
     value, u = spin.frequency.value, spin.frequency.u
     if waveform.step_u == 0 or value is None or u is None:
         return spin
@@ -245,7 +235,7 @@ def _with_rate(spin: SpinFrequency, waveform: Waveform) -> SpinFrequency:
 
 
 def _of_several(records: Records, options: SpinOptions) -> SpinRun:
-    """A spin for each record of a run; what has no pulses is left out with a note, unless none has."""
+    """Return a spin for each record of a run; what has no pulses is left out with a note, unless none has."""
     spins: list[SpinFrequency] = []
     parts: list[tuple[Mapping[str, UParts], float | None]] = []
     numbers: list[int] = []  # of the records that gave them
@@ -293,14 +283,14 @@ def _code(samples: Array, spin: SpinFrequency) -> float | None:
 
 
 def _with_start(series: Series, u_s: float) -> Series:
-    """The same with the uncertainty of the times [s] in that of the frequencies at them, by their slope."""
+    """Return the same with the uncertainty of the times [s] in that of the frequencies at them, by their slope."""
     if u_s == 0 or len(series) < 2:
         return series
     return replace(series, u=np.hypot(series.u, u_s * np.gradient(series.frequency, series.time)))
 
 
 def _by_record(spins: Mapping[int, SpinFrequency], all_of_them: int) -> tuple[Finding, ...]:
-    """Each finding once, with the records that it is of: the table shows the record in the middle, which may lack it.
+    """Return each finding once, with its records: the table shows the record in the middle, which may lack it.
 
     spins: the number of a record, from 1 → its spin.
     """
@@ -341,7 +331,7 @@ def _columns(spins: Sequence[SpinFrequency]) -> tuple[Array, Array, Array]:
 
 
 def in_a_sentence(run: SpinRun) -> str:
-    """What the data say of one input."""
+    """Return what the data say of one input."""
     spin, series = run.spin, run.series
     at = f"{with_uncertainty(spin.frequency)} at {spin.reference_time:.4g} s"
     if len(series) == 1:

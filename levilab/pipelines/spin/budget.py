@@ -14,8 +14,9 @@ if TYPE_CHECKING:
 
     from analysis.pulses import SpinFrequency
     from analysis.uncertainty import Estimate
+    from levilab.pipelines.options import SpinOptions
     from levilab.pipelines.sources import Source
-    from levilab.pipelines.spin.analysis import SpinOptions, SpinRun, UParts
+    from levilab.pipelines.spin.analysis import SpinRun, UParts
     from levilab.pipelines.spin.readings import Records
 
 #: Powers of the record's length by which u falls, with as much noise, and pulses as often.
@@ -37,7 +38,7 @@ def budget_of_run(source: Source[Records], run: SpinRun, options: SpinOptions) -
 
 
 def _of_pulses(run: SpinRun, name: str, parts: UParts, estimate: Estimate) -> Iterator[Component]:
-    """What the places of the pulses leave: noise of the samples, which bounds it, and what they scatter beyond."""
+    """Yield the parts of the pulses: noise of the samples, which is a bound, and the scatter beyond it."""
     spin = run.spin
     longer = f"a record twice as long (u falls by {_BY_LENGTH[name]})"
     bound = _bound(spin, name)
@@ -67,7 +68,7 @@ def _of_pulses(run: SpinRun, name: str, parts: UParts, estimate: Estimate) -> It
 
 
 def _bound(spin: SpinFrequency, name: str) -> float | None:
-    """The Cramér–Rao bound of a frequency [Hz], and of a slope [Hz/s]: √60/T times as large."""
+    """Return the Cramér–Rao bound of a frequency [Hz], and of a slope [Hz/s]: √60/T times as large."""
     if spin.bound is None or not spin.frequency.value:
         return None
     span = (spin.pulses + spin.missing - 1) / spin.frequency.value

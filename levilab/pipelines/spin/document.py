@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from levilab.pipelines.document import Document, Settings, number, value_of
+from levilab.pipelines.document import Document, Settings, values_of
 from levilab.pipelines.dump import Dump
+from levilab.pipelines.options import Method  # noqa: TC001 - pydantic reads the type when it runs
 from levilab.pipelines.result import Result, RunPart
+from levilab.pipelines.row import find_all
 from levilab.pipelines.spin.analysis import METHOD, SpinAnalysis, SpinRun
 from levilab.pipelines.spin.budget import budget_of_run
-
-if TYPE_CHECKING:
-    from analysis.pulses import SpinFrequency
-
-#: With a bend: what the frequency at another time needs for its uncertainty.
-_CORRELATIONS = ("correlation_frequency_chirp", "correlation_frequency_bend", "correlation_chirp_bend")
+from levilab.pipelines.spin.quantities import QUANTITIES
 
 
 class SpinPart(RunPart):
@@ -31,7 +28,7 @@ class SettingsPart(Settings):
 
     channel: str | None
     rate: float | None = Field(gt=0, alias="rate_hz")
-    method: Literal["auto", "edges", "matched", "likelihood"]
+    method: Method
     clock_u: float | None = Field(default=None, gt=0)
 
 
@@ -48,22 +45,7 @@ def _entries(analysis: SpinAnalysis) -> dict[str, Any]:
 
 
 def _run_entries(run: SpinRun) -> dict[str, Any]:
-    return {"values": _values(run.spin), "method": run.spin.method}
-
-
-def _values(spin: SpinFrequency) -> dict[str, Any]:
-    values = {"frequency": value_of(spin.frequency), "chirp": value_of(spin.chirp)}
-    values |= {
-        "phase": number(spin.phase.value, "1", spin.phase.u),
-        "reference_time": number(spin.reference_time, "s"),
-        "bound": number(spin.bound, "Hz"),
-        "scatter": number(spin.scatter, "s"),
-        "snr": number(spin.snr_db, "dB"),
-    }
-    if spin.bend:
-        correlations = zip(_CORRELATIONS, spin.correlations, strict=True)
-        values |= {"bend": value_of(spin.bend)} | {name: number(value, "1") for name, value in correlations}
-    return values
+    return {"values": values_of(find_all(QUANTITIES, run.spin)), "method": run.spin.method}
 
 
 DOCUMENT = Document(

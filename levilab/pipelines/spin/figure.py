@@ -109,7 +109,7 @@ def _draw(panels: list[Axes], source: Source[Records], run: SpinRun, k: int) -> 
 
 
 def turns_of(spin: SpinFrequency, time: Array) -> Array:
-    """Turns at given times [s] since the pulse before the reference time."""
+    """Return turns at given times [s] since the pulse before the reference time."""
     away = time - spin.reference_time
     values = spin.phase.value, spin.frequency.value, spin.chirp.value
     phase, frequency, chirp = (value or 0.0 for value in values)
@@ -123,7 +123,7 @@ def _bend(spin: SpinFrequency) -> float:
 
 
 def _excerpt(records: Records, spin: SpinFrequency) -> _Excerpt:
-    """The part about the reference time to which the numbers belong."""
+    """Return the part about the reference time to which the numbers belong."""
     if records.pulses:
         times = records.pulses.times
         times = times[_near(times, spin)]
@@ -147,7 +147,7 @@ def _excerpt(records: Records, spin: SpinFrequency) -> _Excerpt:
 
 
 def _middle(late: Array, scatter: float) -> float:
-    """The mean of what the pulses' times leave over [s], without those that stand alone."""
+    """Return the mean of what the pulses' times leave over [s], without those that stand alone."""
     if not len(late):
         return 0.0
     median = float(np.median(late))
@@ -162,7 +162,7 @@ def _near(times: Array, spin: SpinFrequency) -> NDArray[np.bool_]:
 
 
 def _part(waveform: Waveform, channel: str | None, first: int, count: int) -> Array:
-    """Samples from one number on, read in blocks."""
+    """Return samples from one number on, read in blocks."""
     kept: list[Array] = []
     seen = 0
     for block in waveform.blocks(channel):
@@ -176,7 +176,7 @@ def _part(waveform: Waveform, channel: str | None, first: int, count: int) -> Ar
 
 
 def _arrivals(time: Array, signal: Array, turns: Array, spin: SpinFrequency) -> tuple[Array, Array]:
-    """Times of pulses [s] and how far they are from the fit [s]: the centre of what rises out of the noise."""
+    """Return times of pulses [s] and how far they are from the fit [s]: the centre of what rises out of the noise."""
     base, height = _levels(signal, turns)
     level = (signal - base) / height
     noise = 1.4826 * float(np.nanmedian(np.abs(level)))  # most of a turn is between the pulses
@@ -195,7 +195,7 @@ def _arrivals(time: Array, signal: Array, turns: Array, spin: SpinFrequency) -> 
 
 
 def _levels(signal: Array, turns: Array) -> tuple[float, float]:
-    """The level between pulses and the height of a pulse, which may be negative."""
+    """Return the level between pulses and the height of a pulse, which may be negative."""
     folded = _fold(signal, turns)[1]
     base = float(np.nanmedian(folded))
     k = len(folded) // 2
@@ -223,7 +223,7 @@ def _thin(n: int) -> slice:
 
 
 def _draw_trace(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
-    """A few turns about the reference time, and where the fit has the pulses."""
+    """Draw a few turns about the reference time, and where the fit has the pulses."""
     frequency = spin.frequency.value or 1.0
     half = TURNS_SHOWN / 2 / frequency
     near = np.abs(excerpt.time - spin.reference_time) <= half
@@ -270,7 +270,7 @@ def _draw_phases_of_pulses(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -
 
 
 def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
-    """What the pulses' times leave over: noise about zero, without a shape."""
+    """Draw what the pulses' times leave over: noise about zero, without a shape."""
     axes.axhline(0, color="black", linewidth=0.6)
     limit = 6 * 1e6 * max(spin.scatter, float(np.median(np.abs(excerpt.residuals))) if len(excerpt.residuals) else 0.0)
     scale, unit = (1e-3, "ms") if limit >= 5e3 else (1.0, "µs")  # five digits would not find room beside the axis

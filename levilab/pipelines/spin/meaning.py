@@ -27,7 +27,7 @@ _MOST = 4
 
 
 def meaning(analysis: SpinAnalysis) -> tuple[str, ...]:
-    """The sentences, of each input."""
+    """Return the sentences, of each input."""
     several = len(analysis.runs) > 1
     made = (
         (source.name, " ".join(_sentences(run)))
@@ -51,7 +51,7 @@ class _Change:
 
 
 def _change(run: SpinRun) -> _Change | None:
-    """The slope through all records, or of the one; None where it is not known."""
+    """Return the slope through all records, or of the one; None where it is not known."""
     spin, trend = run.spin, run.trend
     if trend and trend.value is not None and trend.u is not None:
         return _Change(trend.value, trend.u, float(np.ptp(run.series.time)))
@@ -83,7 +83,7 @@ def _sentences(run: SpinRun) -> Iterator[str]:
 
 
 def _about_change(change: _Change, frequency: float) -> Iterator[str]:
-    """What the change of a spin [Hz] means."""
+    """Yield what the change of a spin [Hz] means."""
     share = change.slope / frequency
     lost = with_uncertainty(Estimate(100 * abs(share), 100 * change.u / frequency, "%"))
     if abs(change.slope) < _SEEN * change.u:

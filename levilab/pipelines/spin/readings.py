@@ -17,7 +17,7 @@ from levilab.runs.waveforms import run_waveforms
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from levilab.pipelines.sources import InputOptions
+    from levilab.pipelines.options import InputOptions
     from levilab.runs.run import Run
 
 
@@ -65,7 +65,7 @@ class Records:
 
 
 def read_spin_file(path: Path, options: InputOptions) -> Records:
-    """A data file.
+    """Return a data file.
 
     Raises:
         DoesNotSuit: it holds neither samples nor pulse times.
@@ -85,7 +85,7 @@ def read_spin_file(path: Path, options: InputOptions) -> Records:
 
 
 def read_spin_run(run: Run, options: InputOptions) -> Records:
-    """The records of a run: of one channel, the one with the most records unless it is named.
+    """Return the records of a run: of one channel, the one with the most records unless it is named.
 
     A laser and a drive are taken where they are named alone: theirs is the frequency of something else.
 
@@ -119,7 +119,7 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
 
 
 def _shows_a_spin(run: Run, names: Counter[str]) -> str:
-    """The channel with the most records of those that show a spin.  Raises DoesNotSuit."""
+    """Return the channel with the most records of those that show a spin.  Raises DoesNotSuit."""
     spins = [name for name, _ in names.most_common() if name.casefold() not in NO_SPIN]
     if spins:
         return spins[0]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
-from levilab.pipelines.part import FigureText, InputPart, ReportPart
+from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts
 from levilab.pipelines.spin.analysis import MOST_DRAWN, in_a_sentence
 from levilab.pipelines.spin.meaning import meaning
 from levilab.pipelines.spin.table import frequency_table, pulse_table, series_table
@@ -48,15 +48,12 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
         ),
         runs_title="The pulses",
         runs=(Tabular("spin-pulses", replace(pulse_table(analysis), title=""), _PULSES, first_column_wraps=True),),
-        inputs=tuple(
-            InputPart(_in_words(source, run), origin.text, in_a_sentence(run), _series(source, run))
-            for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
-        ),
+        inputs=input_parts(analysis, _in_words, _series, in_a_sentence),
     )
 
 
 def _used(analysis: SpinAnalysis) -> str:
-    """What the results come from: pulses of single records, else records or windows, of which each has its pulses."""
+    """Return the number of pulses of single records, and of records or windows, of which each has its pulses."""
     pulses = sum(run.spin.pulses for run in analysis.runs if not run.which)
     counts = {"pulse": pulses} if pulses else {}
     for run in analysis.runs:
@@ -67,7 +64,7 @@ def _used(analysis: SpinAnalysis) -> str:
 
 
 _FREQUENCIES = (
-    "value(u): the digits in parentheses are the standard uncertainty of the last digits. The spin is that at the time "
+    f"{VALUE_U} The spin is that at the time "
     "given, its slope the change of the spin in a second. bound: no method does better with this noise (Cramér–Rao). "
     "Of several records or windows this table, that of the pulses and the budgets are of the one in the middle; the "
     "text gives the slope through all."
@@ -78,14 +75,14 @@ _PULSES = (
 )
 
 
-def _in_words(source: Source[Records], run: SpinRun) -> tuple[str, ...]:
+def _in_words(source: Source[Records], run: SpinRun, *_: object) -> tuple[str, ...]:
     records, count = source.readings, len(source.readings)
     of = f"{run.which}: " if run.which else ""
     what = "pulse times" if records.pulses else f"samples of {records.channel}"
     return f"{records.kind}; {count} {what}", f"{of}{run.spin.pulses} pulses, {run.spin.missing} missing"
 
 
-def _series(source: Source[Records], run: SpinRun) -> tuple[Block, ...]:
+def _series(source: Source[Records], run: SpinRun, *_: object) -> tuple[Block, ...]:
     """Frequency against time, where there is more than one value."""
     if len(run.series) <= 1:
         return ()
@@ -93,7 +90,7 @@ def _series(source: Source[Records], run: SpinRun) -> tuple[Block, ...]:
 
 
 def _points(analysis: SpinAnalysis) -> tuple[Points, ...]:
-    """What each value of the frequency against time answers, of the inputs that are drawn."""
+    """Return what each value of the frequency against time answers, of the inputs that are drawn."""
     return tuple(
         Points(f"readings-{k}", tuple(map(_point, run.series.time, run.series.frequency, run.series.u)))
         for k, run in enumerate(analysis.runs[:MOST_DRAWN])

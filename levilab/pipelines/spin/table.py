@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from levilab.pipelines.part import title_of
 from levilab.present.clock import with_clock
 from levilab.present.numbers import column, plain, short_name, with_decimals
 from levilab.present.tables import Table, table
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    import numpy as np
+
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spin.analysis import SpinAnalysis, SpinRun
     from levilab.pipelines.spin.readings import Records
@@ -26,9 +31,7 @@ def spin_tables(analysis: SpinAnalysis) -> tuple[Table, ...]:
 
 
 def frequency_table(analysis: SpinAnalysis) -> Table:
-    """The result."""
-    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
-    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
+    """Return the result."""
     spins, slopes = (column(getattr(run.spin, name) for run in analysis.runs) for name in ("frequency", "chirp"))
     several = any(run.which for run in analysis.runs)
     rows = [
@@ -44,9 +47,7 @@ def frequency_table(analysis: SpinAnalysis) -> Table:
         for source, run, spin, slope in zip(analysis.sources, analysis.runs, spins, slopes, strict=True)
     ]
     heads = ("input", "spin [Hz]", "slope [Hz/s]", *(["of"] * several), "at [s]", "method", "bound\n[mHz]")
-    return table(
-        f"Spin frequency, {total} input{'s' * (total > 1)}{made_up}", heads, rows, numbers=["at [s]", heads[-1]]
-    )
+    return table(title_of("Spin frequency", analysis.sources, "input"), heads, rows, numbers=["at [s]", heads[-1]])
 
 
 def pulse_table(analysis: SpinAnalysis) -> Table:
@@ -80,3 +81,16 @@ def series_table(source: Source[Records], run: SpinRun, most: int) -> Table:
     ]
     which = "each" if step == 1 else f"every {step}th"
     return table(f"Frequency against time, {which} of {len(series)} {series.of}s", heads, rows, numbers=heads)
+
+
+# --- readings as columns of tables for programs ---
+
+
+def spin_columns(analysis: SpinAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
+    """Yield the series of each input: a row for each window of a long record, or for each of several records."""
+    for run in analysis.runs:
+        yield {
+            "time_s": run.series.time,
+            "spin_frequency_hz": run.series.frequency,
+            "spin_frequency_u_hz": run.series.u,
+        }

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from analysis.errors import AnalysisError
 from analysis.spindown.combine import Combined, combine
@@ -14,7 +14,8 @@ from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.field.device import THESIS, inertias
-from levilab.pipelines.sources import InputOptions, Needs
+from levilab.pipelines.options import SpinDownOptions
+from levilab.pipelines.sources import Needs
 from levilab.pipelines.spindown.readings import Readings, read_run_readings, read_spin_file
 from levilab.pipelines.spindown.words import remark, verdict_of_all
 
@@ -37,29 +38,6 @@ NEEDS = Needs(
     read_file=read_spin_file,
     read_run=read_run_readings,
 )
-
-
-#: Whether the count holds the tilt of the top's moment.
-Tilt = Literal["auto", "none", "fitted"]
-
-
-@dataclass(frozen=True)
-class SpinDownOptions(InputOptions):
-    """How spin-downs are analyzed.
-
-    Attributes:
-        reading_u: of every reading [Hz], in the place of what the data say.
-        tilt: whether the count holds the tilt of the top's moment, auto: always, but for a run whose
-            world says that its top only spins.
-        device: that describes the top; None: the thesis's.
-        clock_u: of the counter's clock, relative; budgets say what it does, it is in no u.
-    """
-
-    reading_u: float | None = None
-    keep_outliers: bool = False
-    tilt: Tilt = "auto"
-    device: Device | None = None
-    clock_u: float | None = None
 
 
 class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from analysis.spindown.lawfit import LawFit, Parts
     from analysis.spindown.verdict import Verdict
     from analysis.uncertainty import Estimate
+    from levilab.pipelines.options import SpinDownOptions
     from levilab.pipelines.sources import Source
-    from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions
+    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
     from levilab.pipelines.spindown.readings import Readings
 
 #: The law whose exponent is a result beside the constants of the best one.

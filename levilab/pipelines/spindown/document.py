@@ -14,9 +14,12 @@ from analysis.spindown.fit import SpinDown  # noqa: TC001 - as above
 from levilab.formats.device import Device  # noqa: TC001 - as above
 from levilab.pipelines.document import Document, Settings, number, statistics_of, value_of, values_of
 from levilab.pipelines.dump import Dump
+from levilab.pipelines.options import Tilt  # noqa: TC001 - as above
 from levilab.pipelines.result import Result, RunPart
+from levilab.pipelines.row import find_all
 from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
 from levilab.pipelines.spindown.budget import budget_of_all, budget_of_run
+from levilab.pipelines.spindown.quantities import CORRELATION, QUANTITIES
 from levilab.pipelines.spindown.words import remark, verdict_of_run
 
 if TYPE_CHECKING:
@@ -24,7 +27,6 @@ if TYPE_CHECKING:
 
     from analysis.spindown.combine import CombinedLaw, Mean
     from analysis.spindown.verdict import Verdict
-    from analysis.uncertainty import Estimate
 
 
 class SpinDownPart(RunPart):
@@ -40,7 +42,7 @@ class SettingsPart(Settings):
     rate: float | None = Field(default=None, gt=0, alias="rate_hz")
     reading_u: float | None = Field(gt=0, alias="reading_u_hz")
     keep_outliers: bool
-    tilt: Literal["auto", "none", "fitted"] = "auto"
+    tilt: Tilt = "auto"
     device: Device | None = None
     clock_u: float | None = Field(default=None, gt=0)
 
@@ -64,8 +66,7 @@ def _entries(analysis: SpinDownAnalysis) -> dict[str, Any]:
 
 
 def _run_entries(run: SpinDown) -> dict[str, Any]:
-    values = {"start_time": number(run.start_time, "s"), "duration": number(float(run.time[-1] - run.time[0]), "s")}
-    values |= values_of(run.fit(run.best).parameters) | _residual_correlation(run.correlation)
+    values = values_of(run.fit(run.best).parameters | find_all(QUANTITIES, run))
     return {"values": values, "models": _models(run)} | _verdict(run.best, run.verdict, verdict_of_run(run))
 
 
@@ -84,11 +85,7 @@ def _combined_values(combined: Combined) -> dict[str, Any]:
         if mean.scatter is not None
     }
     tilt = {"moment_tilt": _mean_value(combined.tilt)} if combined.tilt else {}
-    return _means(best.constants) | scatter | tilt | _residual_correlation(combined.correlation)
-
-
-def _residual_correlation(found: Estimate | None) -> dict[str, Any]:
-    return {"residual_correlation": value_of(found)} if found else {}
+    return _means(best.constants) | scatter | tilt | values_of(find_all([CORRELATION], combined))
 
 
 def _combined_model(fit: CombinedLaw) -> dict[str, Any]:

@@ -14,8 +14,9 @@ from matplotlib.font_manager import findfont, get_font
 from matplotlib.lines import Line2D
 
 from analysis.numbers import digits
-from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
-from levilab.pipelines.spindown.table import tilt_part
+from analysis.spindown.drag import LAWS
+from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS, in_mathtext
+from levilab.pipelines.spindown.table import laws_of, tilt_part
 from levilab.present.drawing import (
     SMALL,
     band,
@@ -28,8 +29,9 @@ from levilab.present.drawing import (
     write,
 )
 from levilab.present.looks import GREY, LOOKS, MARKERS
-from levilab.present.numbers import enumeration, in_words, short_name
+from levilab.present.numbers import enumeration, short_name
 from levilab.present.style import STYLE, WIDE
+from levilab.present.units import unit as unit_row
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,8 +43,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: The laws that have a straight line.
-STRAIGHT_LINES = {name: law.straight for name, law in SHOWN_LAWS.items() if law.straight}
 #: More points than a panel can show are thinned out evenly; up to so many have bars each; so many means of more.
 MOST_POINTS, MOST_BARS, MEANS = 600, 200, 40
 #: A bar longer than the marker's radius, as part of the panel's height, is seen; outliers with their value written.
@@ -92,14 +92,14 @@ def _finding(analysis: SpinDownAnalysis) -> str:
     """The verdict in one sentence."""
     verdict, best = analysis.combined.verdict, analysis.combined.best
     together = f" of {len(analysis.runs)} runs" if len(analysis.runs) > 1 else ""
-    equation = SHOWN_LAWS[best].equation
+    equation = in_mathtext(LAWS[best].equation)
     if not verdict.describes:
         return f"Spin-down{together}: no drag law describes these readings; the {best} law comes nearest"
     if not verdict.decided:
         others = [name for name in (*verdict.indistinguishable, *verdict.needless, *verdict.weak) if name != best]
         also = f"; {enumeration(others)} cannot be excluded" if others else ""
         return f"Spin-down{together}: the readings do not single out a drag law, {best} comes first{also}"
-    excluded = [name for name in SHOWN_LAWS if name in verdict.excluded]
+    excluded = [name for name in laws_of(analysis) if name in verdict.excluded]
     also = f"; {enumeration(excluded)} {'is' if len(excluded) == 1 else 'are'} excluded" if excluded else ""
     return f"Spin-down{together}: the {best} law, {equation}, describes the readings{also}"
 
@@ -126,7 +126,7 @@ def _draw_spin(axes: Axes, analysis: SpinDownAnalysis) -> None:
     for k, run in enumerate(analysis.runs):
         t = np.linspace(run.time[0], run.time[-1], 200)
         width = 1.4 if several == 1 else 0.9 if several <= len(MARKERS) else 0.4
-        label = f"best law: {best}, {SHOWN_LAWS[best].equation}" if k == 0 else None
+        label = f"best law: {best}, {in_mathtext(LAWS[best].equation)}" if k == 0 else None
         axes.plot(t, run.fit(best).spin_frequency(t), linewidth=width, zorder=2.5, label=label, **LOOKS[best].as_line)
         name = _run_label(analysis, k)
         _draw_readings(axes, analysis, k, run.frequency, span=span, label=name, gid=f"readings-{k}")
@@ -193,7 +193,8 @@ def _draw_outliers(axes: Axes, analysis: SpinDownAnalysis, k: int) -> None:
 
 def _draw_weights(axes: Axes, analysis: SpinDownAnalysis) -> None:
     """How the criterion weighs the laws: a bar each, with its number and the verdict."""
-    for place, name in enumerate(SHOWN_LAWS):
+    laws = laws_of(analysis)
+    for place, name in enumerate(laws):
         weight = analysis.combined.fit(name).statistics.weight
         look = LOOKS[name]
         axes.barh(-place, weight or 0.0, height=0.3, color=look.colour, linewidth=0)
@@ -202,7 +203,7 @@ def _draw_weights(axes: Axes, analysis: SpinDownAnalysis) -> None:
         axes.text(0.03, 0.22 - place, said, fontsize=SMALL, va="bottom", color="black")
     known = analysis.combined.fit(analysis.combined.best).statistics.weight is not None
     about = "weight of the law" if known else "too few readings to weigh"
-    axes.set(xlim=(0, 1), ylim=(-len(SHOWN_LAWS) + 0.6, 0.75), yticks=[], xlabel=about)
+    axes.set(xlim=(0, 1), ylim=(-len(laws) + 0.6, 0.75), yticks=[], xlabel=about)
     axes.xaxis.set_major_locator(mpl.ticker.FixedLocator([0, 0.5, 1]))
     axes.tick_params(axis="y", which="both", left=False)
     axes.set_title("AICc weights" if analysis.combined.fits[0].statistics.aicc is not None else "weights", pad=3)
@@ -242,7 +243,7 @@ def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
     few = len(found) <= MOST_BARS
     axes.errorbar(number, value, u if few else None, color="black", linestyle="none", elinewidth=0.6)
     axes.plot(number, value, color="black", linestyle="none", marker="o", markersize=2.5 if few else 1.2)
-    unit = in_words(mean.unit).replace("^−½", "$^{−1/2}$").replace("^(1−n)", "$^{1−n}$")
+    unit = in_mathtext(unit_row(mean.unit).text)
     times = f"$10^{{{power}}}$ ".replace("-", "−") if power else ""
     axes.set(xlabel="run", ylabel=f"{SYMBOLS[name]}  [{times}{unit}]")
     axes.set_title(f"{SYMBOLS[name]}, {best.name}: mean, ±s", pad=3, fontsize=8)
@@ -268,7 +269,7 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
         _draw_means(axes, analysis, run.fit(best).residuals)
     run = max(analysis.runs, key=lambda one: float(one.time[-1] - one.time[0]))
     t = np.linspace(run.time[0], run.time[-1], 200)
-    curves = {name: run.fit(name).spin_frequency(t) - run.fit(best).spin_frequency(t) for name in SHOWN_LAWS}
+    curves = {name: run.fit(name).spin_frequency(t) - run.fit(best).spin_frequency(t) for name in laws_of(analysis)}
     for name, difference in curves.items():
         if name not in excluded and np.isfinite(difference).all():
             found += [1.3 * float(difference.min()), 1.3 * float(difference.max())]
@@ -317,18 +318,18 @@ def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit
     tilt = _tilt_in_words(analysis)
     if tilt:
         write(figure, 0.08, top - 0.26, tilt, fontsize=SMALL, color=GREY)
+    laws = laws_of(analysis)
     values = {
-        name: [run.fit(name).residuals / of for run, of in zip(analysis.runs, unit.of, strict=True)]
-        for name in SHOWN_LAWS
+        name: [run.fit(name).residuals / of for run, of in zip(analysis.runs, unit.of, strict=True)] for name in laws
     }
     reach = {name: max(float(np.abs(one).max()) for one in of) for name, of in values.items()}
     excluded = analysis.combined.verdict.excluded
-    good = [reach[name] for name in SHOWN_LAWS if name not in excluded] or [reach[analysis.combined.best]]
+    good = [reach[name] for name in laws if name not in excluded] or [reach[analysis.combined.best]]
     common = max(_LEAST_SCALE, _ROOM * max(good))
-    far = {name for name in SHOWN_LAWS if reach[name] > _BEYOND * common}
-    common = max(common, _ROOM * max((reach[name] for name in SHOWN_LAWS if name not in far), default=0.0))
-    width, gap = 1.02, (_FULL - 5 * 1.02) / 4
-    for place, name in enumerate(SHOWN_LAWS):
+    far = {name for name in laws if reach[name] > _BEYOND * common}
+    common = max(common, _ROOM * max((reach[name] for name in laws if name not in far), default=0.0))
+    width, gap = _share(len(laws), 0.29)
+    for place, name in enumerate(laws):
         axes = panel(figure, _LEFT + place * (width + gap), top, width, 1.05)
         own = name in far
         most = _ROOM * reach[name] if own else common
@@ -345,7 +346,14 @@ def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit
         axes.locator_params(nbins=4)
         axes.set_title(name, loc="left", color=LOOKS[name].of_text, fontsize=8, fontweight="bold", pad=3)
         if own:
-            axes.set_title("own scale", loc="right", color="black", fontsize=SMALL, fontstyle="italic", pad=3)
+            axes.set_title(
+                "own scale" if width > 1 else "own",
+                loc="right",
+                color="black",
+                fontsize=SMALL,
+                fontstyle="italic",
+                pad=3,
+            )
             axes.set_facecolor("#F4F4F4")
         if place == 0:
             axes.set_ylabel(f"residual / {unit.symbol}")
@@ -378,14 +386,21 @@ def _draw_straight_lines(figure: Figure, top: float, analysis: SpinDownAnalysis)
         figure, 0.08, top - 0.3, "Straight lines as drawn on paper, and below each how far the points lie from it",
         fontsize=9,
     )  # fmt: skip
-    width, gap, strips = 1.68, 0.62, []
-    for place, (law, straight) in enumerate(STRAIGHT_LINES.items()):
+    lines = [(law, STRAIGHT_LINES[law]) for law in laws_of(analysis) if law in STRAIGHT_LINES]
+    (width, gap), strips = _share(len(lines), 0.61), []
+    for place, (law, straight) in enumerate(lines):
         left = _LEFT + place * (width + gap)
         above, strip = panel(figure, left, top, width, 0.95), panel(figure, left, top + 1.03, width, 0.45)
         strips.append(strip)
         _draw_straight(above, strip, analysis, straight.transform, law)
         above.set_ylabel(straight.axis, fontsize=8)
-        above.set_title(f"straight if {law} holds", color=LOOKS[law].of_text, fontsize=8, fontweight="bold", pad=3)
+        above.set_title(
+            f"straight if {law} holds" if width > 1.5 else law,
+            color=LOOKS[law].of_text,
+            fontsize=8,
+            fontweight="bold",
+            pad=3,
+        )
         for axes in (above, strip):
             axes.tick_params(labelsize=SMALL)
         above.tick_params(labelbottom=False)
@@ -408,6 +423,11 @@ def _draw_straight(
         off = 100 * (y - line) / (np.ptp(y) or 1.0)
         _draw_readings(strip, analysis, k, off)
         _draw_means(strip, analysis, off)
+
+
+def _share(panels: int, gap: float) -> tuple[float, float]:
+    """Return the width of each of some panels beside each other, and the gap between them [inch]."""
+    return (_FULL - (panels - 1) * gap) / panels, gap
 
 
 # --- what the panels share -----------------------------------------------------------------------------

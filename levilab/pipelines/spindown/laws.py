@@ -1,24 +1,31 @@
-"""What people are shown of each drag law: one row a law, for tables, figures and reports."""
+"""What people are shown of each drag law, made from the rows of `analysis.spindown.drag.LAWS`."""
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import dataclass
+from fractions import Fraction
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from analysis.spindown.drag import LAWS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
+    from analysis.spindown.drag import DragLaw
+
     Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class StraightLine:
-    """What falls or rises in a straight line where a law holds.
+    """The function of ω that is a straight line in time where a law of one power holds.
 
     Attributes:
         quantity: for text.
@@ -31,51 +38,42 @@ class StraightLine:
     transform: Callable[[Array], Array]
 
 
-@dataclass(frozen=True)
-class ShownLaw:
-    """How people are shown a law.
+def straight_line(law: DragLaw) -> StraightLine | None:
+    """Return the straight line of a law; None for a law of several terms or of a free exponent.
 
-    Attributes:
-        equation: as a figure's label.
-        meaning: what takes the spin where it holds, in a sentence.
-        straight: None if nothing is.
+    >>> [straight_line(LAWS[name]).quantity for name in ("stokes", "newton", "disc")]
+    ['ln ω', '1/ω', 'ω^−½']
     """
+    if law.exponent is None:
+        return None
+    (m,) = law.orders
+    if m == 0:
+        return StraightLine("ln ω", "ln ω   (ω in rad/s)", np.log)
+    if m == 1:
+        return StraightLine("1/ω", "1/ω  [s/rad]", lambda omega: 1 / omega)
+    power = str(Fraction(m).limit_denominator(100))
+    text = "½" if math.isclose(m, 0.5) else power
+    return StraightLine(f"ω^−{text}", f"ω$^{{−{power}}}$  [(s/rad)$^{{{power}}}$]", lambda omega: np.asarray(omega**-m))
 
-    equation: str
-    meaning: str
-    straight: StraightLine | None = None
+
+#: A power in brackets, or a fraction without them.
+_RAISED = re.compile(r"\^(?:\(([^()]+)\)|(−?(?:½|\d+/\d+)))")
 
 
-#: By the names of `analysis.spindown.drag.LAWS`, in their order.
-#: Their colours are in `levilab.present.looks`.
-SHOWN_LAWS = MappingProxyType({
-    "stokes": ShownLaw(
-        "ω̇ = −C₁ω",
-        "The torque of the drag is proportional to the spin, as of eddy currents, or of air that creeps.",
-        StraightLine("ln ω", "ln ω   (ω in rad/s)", np.log),
-    ),
-    "newton": ShownLaw(
-        "ω̇ = −C₂ω²",
-        "The torque of the drag is proportional to the square of the spin, as of air that is stirred up.",
-        StraightLine("1/ω", "1/ω  [s/rad]", lambda omega: 1 / omega),
-    ),
-    "disc": ShownLaw(
-        "ω̇ = −Cω$^{3/2}$",
-        "The torque of the drag is proportional to the spin to the power 3/2, as of the laminar layer of air on a disc "
-        "(von Kármán, 1921).",
-        StraightLine("ω^−½", "ω$^{−1/2}$  [(s/rad)$^{1/2}$]", lambda omega: omega**-0.5),
-    ),
-    "mixed": ShownLaw(
-        "ω̇ = −C₁ω − C₂ω²",
-        "The torque of the drag has a part that is proportional to the spin and one that is to its square.",
-    ),
-    "power": ShownLaw(
-        "ω̇ = −cωⁿ", "The torque of the drag is proportional to a power n of the spin, which the fit chose.",
-    ),
-})  # fmt: skip
+def in_mathtext(text: str) -> str:
+    """Return plain notation as matplotlib's labels have it: what follows ^ is raised.
 
-#: The laws' parameters in the field's letters.
-SYMBOLS = MappingProxyType({
-    "start_frequency": "ν₀", "c1": "C₁", "c2": "C₂", "c32": "C₃/₂", "c": "c", "exponent": "n",
-    "moment_tilt": "δ", "resonance": "ν_r", "wobble": "K",
-})  # fmt: skip
+    >>> in_mathtext(LAWS["disc"].equation), in_mathtext("(rad/s)^−½/s")
+    ('ω̇ = −C₃/₂ω$^{3/2}$', '(rad/s)$^{−1/2}$/s')
+    """
+    return _RAISED.sub(lambda found: f"$^{{{(found[1] or found[2]).replace('½', '1/2')}}}$", text)
+
+
+#: The laws that have a straight line.
+STRAIGHT_LINES = MappingProxyType({law.name: line for law in LAWS.values() if (line := straight_line(law))})
+#: Parameters of the laws in the field's letters, then of what the counter sees beside the spin.
+SYMBOLS = MappingProxyType(
+    {"start_frequency": "ν₀"}
+    | {name: symbol for law in LAWS.values() for name, symbol in zip(law.constants, law.symbols, strict=True)}
+    | {"moment_tilt": "δ", "resonance": "ν_r", "wobble": "K"}
+)

@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
-from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
+from levilab.pipelines.spindown.laws import SYMBOLS
 from levilab.pipelines.spindown.words import is_seen
 from levilab.present.numbers import enumeration, plain, with_uncertainty
 
@@ -20,10 +20,14 @@ if TYPE_CHECKING:
     from analysis.uncertainty import Estimate
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 
-#: Laws of one power, and the power.
-_POWERS: Mapping[str, float] = MappingProxyType({"stokes": 1.0, "disc": 1.5, "newton": 2.0})
+#: Laws of one power, and the power, in its order.
+_POWERS: Mapping[str, float] = MappingProxyType(
+    {law.name: n for law in sorted(LAWS.values(), key=lambda one: one.orders) if (n := law.exponent) is not None}
+)
 #: C₃/₂ of a bare disc as large as the thesis's top in laminar air, without a free parameter (PHYSICS.md §5) [SI].
 KARMAN = 2.235e-4
+#: Power of the laminar layer of air on a disc.
+_LAMINAR = 1.5
 #: A difference of so many u is one.
 _DIFFERS = 2.0
 #: Runs that scatter by so many times what their readings explain differ.
@@ -43,7 +47,12 @@ def _law(analysis: SpinDownAnalysis) -> Iterator[str]:
             "something else."
         )
     elif verdict.decided:
-        yield SHOWN_LAWS[verdict.best].meaning
+        yield _torque(verdict.best)
+
+
+def _torque(law: str) -> str:
+    """Return what the drag's torque depends on, as a sentence."""
+    return f"The torque of the drag is proportional to {LAWS[law].torque}."
 
 
 def _loss(analysis: SpinDownAnalysis) -> Iterator[str]:
@@ -73,9 +82,10 @@ def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
     ((name, value),) = _constants(analysis).items()
     if value.value is None or not value.u or value.value <= 0:
         return
-    if name == "c1":
+    n = _POWERS[combined.best]
+    if n == 1:
         yield f"The spin halves in {plain(math.log(2) / value.value)} s, whatever it is."
-    elif name == "c32":
+    elif n == _LAMINAR:
         off = value.value / KARMAN - 1
         u = value.u / KARMAN
         way = "above" if off > 0 else "below"

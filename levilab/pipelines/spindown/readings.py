@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from analysis.pulses import Track
     from levilab.formats.waveforms.waveform import Waveform
-    from levilab.pipelines.sources import InputOptions
+    from levilab.pipelines.options import InputOptions
     from levilab.runs.run import Run
 
 #: Columns of a table that are looked at.

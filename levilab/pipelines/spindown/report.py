@@ -8,30 +8,42 @@ from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
-from levilab.pipelines.part import FigureText, InputPart, ReportPart, first_of
-from levilab.pipelines.spindown.laws import SYMBOLS
+from levilab.pipelines.part import (
+    VALUE_U,
+    FigureText,
+    ReportPart,
+    first_of,
+    input_parts,
+    labels_of,
+    origin_of_u,
+    size_of_u,
+)
+from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
 from levilab.pipelines.spindown.meaning import meaning
+from levilab.pipelines.spindown.quantities import OF_RUN
 from levilab.pipelines.spindown.table import (
     QUALITY_IN_WORDS,
     count_table,
     is_best,
     law_constants,
     quality_table,
-    straight_quantity,
 )
 from levilab.pipelines.spindown.words import verdict_of_run
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Details, Listing, Note, Paragraph, Points, Tabular
-from levilab.present.numbers import column, in_words, off, reading, short_name, with_decimals, with_uncertainty
+from levilab.present.numbers import column, off, reading, short_name, with_decimals, with_uncertainty
 from levilab.present.tables import Row, Table, table
+from levilab.present.units import unit as unit_row
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from analysis.spindown.combine import CombinedLaw, Mean
     from analysis.spindown.fit import SpinDown
+    from levilab.pipelines.options import SpinDownOptions
     from levilab.pipelines.sources import Source
-    from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions
+    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
     from levilab.pipelines.spindown.readings import Readings
     from levilab.present.document.blocks import Block
 
@@ -43,8 +55,6 @@ MOST_POINTS = 300
 MOST_COUNTS = 12
 #: Most falls that are listed; of more the range is given.
 MOST_FALLS = 8
-#: The event that says when the top fell.
-FELL = "fell"
 
 
 def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
@@ -68,14 +78,11 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
         ),
         runs_title="Run by run",
         runs=_run_by_run(analysis),
-        inputs=tuple(
-            InputPart(
-                _in_words(source, run, origin.options),
-                origin.text,
-                verdict_of_run(run),
-                (_readings(source, run, origin.options, combined.best),),
-            )
-            for source, run, origin in zip(analysis.sources, analysis.runs, analysis.origins, strict=True)
+        inputs=input_parts(
+            analysis,
+            _in_words,
+            lambda source, run, options: (_readings(source, run, options, combined.best),),
+            verdict_of_run,
         ),
     )
 
@@ -110,7 +117,7 @@ def _laws(analysis: SpinDownAnalysis) -> tuple[Tabular, Tabular]:
     n = analysis.combined.fit(analysis.combined.best).statistics.n
     low, high = max(2 - 4 / math.sqrt(n), 0), min(2 + 4 / math.sqrt(n), 4)
     u = "Of a mean it comes from the scatter s of the runs, u = s/√N." if several else "ν₀: the spin at first."
-    constants = f"value(u): the digits in parentheses are the standard uncertainty of the last digits. {u}"
+    constants = f"{VALUE_U} {u}"
     quality = (
         "constants: how many were fitted, beside the start of each run; the exponent is common to all runs."
         " χ²/dof is near 1 where a law leaves nothing but the readings' own "
@@ -182,7 +189,7 @@ class _Column:
     """A constant, run by run.  head: where it comes from, its symbol and unit; estimates: one a run."""
 
     head: str
-    estimates: tuple[Estimate, ...]
+    estimates: tuple[Estimate | None, ...]
     mean: Mean | None = None
 
     @property
@@ -210,11 +217,12 @@ def _by_run_table(analysis: SpinDownAnalysis) -> Table:
 
 def _columns(analysis: SpinDownAnalysis) -> list[_Column]:
     """The straight lines' constants and those of the best law's fit."""
-    combined, columns = analysis.combined, []
+    combined = analysis.combined
+    columns = [_Column(one.head, one.show_all(analysis.runs)) for one in OF_RUN]
     for law in combined.fits:
         if law.linearised:
             lines = [run.fit(law.name).linearised or {} for run in analysis.runs]
-            columns += _of_law(f"{straight_quantity(law.name)} against t", law.linearised, lines)
+            columns += _of_law(f"{STRAIGHT_LINES[law.name].quantity} against t", law.linearised, lines)
     best = combined.fit(combined.best)
     fits = [run.fit(best.name).parameters for run in analysis.runs]
     starts = tuple(fit["start_frequency"] for fit in fits)
@@ -227,7 +235,7 @@ def _of_law(of: str, means: Mapping[str, Mean], runs: Sequence[Mapping[str, Esti
 
 
 def _head(of: str, name: str, unit: str) -> str:
-    shown = in_words(unit)
+    shown = unit_row(unit).text
     return f"{of}\n{SYMBOLS[name]}" + (f" [{shown}]" if shown else "")
 
 
@@ -255,13 +263,7 @@ def _uncertainty(source: Source[Readings], fit: SpinDown, options: SpinDownOptio
     """How large u of a reading is, and where it comes from."""
     if fit.u is None:
         return "u of a reading: not known, taken from the scatter about each law"
-    low, high = float(fit.u.min()), float(fit.u.max())
-    size = f"{digits(low)} Hz" if low == high else f"{digits(low)} Hz to {digits(high)} Hz"
-    if options.reading_u is not None:
-        return f"u of a reading: {size}, as given to the analysis"
-    channels = source.run.record.channels if source.run else []
-    origin = next((c.get("source") for c in channels if c.get("name") == "spin_frequency_u_hz"), None)
-    return f"u of a reading: {size}, {origin or 'from a column of the data'}"
+    return f"u of a reading: {size_of_u(fit.u)}, {origin_of_u(source, 'spin_frequency_u_hz', options)}"
 
 
 def _residuals(source: Source[Readings], fit: SpinDown, law: str) -> dict[int, float]:
@@ -294,9 +296,9 @@ def _points(analysis: SpinDownAnalysis) -> tuple[Points, ...]:
     """What each reading of the figure answers: of run k, its readings, and what every law leaves over."""
     return tuple(
         points
-        for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
+        for k, (name, run) in enumerate(zip(labels_of(analysis.sources), analysis.runs, strict=True))
         if len(run.time) <= MOST_POINTS
-        for points in _points_of_run(k, short_name(source.name) if len(analysis.runs) > 1 else "", run, analysis)
+        for points in _points_of_run(k, name, run, analysis)
     )
 
 
@@ -318,7 +320,7 @@ def _points_of_run(k: int, name: str, run: SpinDown, analysis: SpinDownAnalysis)
 def _fall(source: Source[Readings], fit: SpinDown) -> str:
     """What was seen of the fall."""
     events = source.run.events() if source.run else []
-    text = next((str(event["text"]) for event in reversed(events) if event["kind"] == FELL), None)
+    text = next((str(event["text"]) for event in reversed(events) if event["kind"] == RunEvent.FELL), None)
     if text is None:
         return ""
     return f"{text}; last reading that was fitted {fit.frequency[-1]:.2f} Hz at {fit.time[-1]:.1f} s"

@@ -4,26 +4,30 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from analysis.numbers import digits
+from analysis.spindown.drag import LAWS
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.tilt import counted
-from levilab.pipelines.spindown.laws import SHOWN_LAWS, SYMBOLS
+from levilab.pipelines.part import title_of
+from levilab.pipelines.row import cells_of
+from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
+from levilab.pipelines.spindown.quantities import OF_RUN
 from levilab.present.numbers import (
     column,
-    in_words,
     plain,
     share,
     short_name,
-    with_decimals,
     with_uncertainty,
     without_unit,
 )
 from levilab.present.tables import Row, Table, table
+from levilab.present.units import unit
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from analysis.spindown.lawfit import LawFit
@@ -48,20 +52,18 @@ def spindown_tables(analysis: SpinDownAnalysis) -> tuple[Table, ...]:
 
 
 def _runs_table(analysis: SpinDownAnalysis) -> Table:
-    total, synthetic = len(analysis.runs), sum(source.synthetic for source in analysis.sources)
-    made_up = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
     rows = [
         (
             source.name,
             str(len(run.time)),
-            f"{with_decimals(run.time[0], 1)} … {with_decimals(run.time[-1], 1)}",
+            *cells,
             f"{run.frequency[0]:.2f} → {run.frequency[-1]:.2f}",
             run.best if run.verdict.decided else "undecided",
         )
-        for source, run in zip(analysis.sources, analysis.runs, strict=True)
+        for source, run, *cells in zip(analysis.sources, analysis.runs, *cells_of(OF_RUN, analysis.runs), strict=True)
     ]
-    heads = ("run", "readings", "time [s]", "spin [Hz]", "best law")
-    return table(f"Spin-down, {total} run{'s' * (total > 1)}{made_up}", heads, rows, numbers=["readings"])
+    heads = ("run", "readings", *(one.head for one in OF_RUN), "spin [Hz]", "best law")
+    return table(title_of("Spin-down", analysis.sources), heads, rows, numbers=["readings"])
 
 
 def _laws_table(analysis: SpinDownAnalysis) -> Table:
@@ -75,6 +77,12 @@ def _laws_table(analysis: SpinDownAnalysis) -> Table:
         for fit in analysis.combined.fits
     ]
     return table(f"Drag laws{of}", ("law", "", "constants"), rows)
+
+
+def laws_of(analysis: SpinDownAnalysis) -> list[str]:
+    """Return the laws that were fitted, in the order of their table; a result of earlier may lack some."""
+    fitted = {fit.name for fit in analysis.combined.fits}
+    return [name for name in LAWS if name in fitted]
 
 
 def is_best(analysis: SpinDownAnalysis, law: str) -> bool:
@@ -162,7 +170,7 @@ def _lines_table(analysis: SpinDownAnalysis) -> Table:
     """The thesis's straight lines, run by run, beside the fit of the favoured law."""
     best = analysis.combined.fit(analysis.combined.best)
     lines = [fit for fit in analysis.combined.fits if fit.linearised]
-    heads = [f"{straight_quantity(fit.name)}\n{_head(fit.linearised or {})}" for fit in lines]
+    heads = [f"{STRAIGHT_LINES[fit.name].quantity}\n{_head(fit.linearised or {})}" for fit in lines]
     means = [_first(fit.linearised or {}) for fit in lines] + [_first(best.constants)]
     of_runs = [
         [_first(run.fit(fit.name).linearised or {}) for fit in lines]
@@ -180,20 +188,35 @@ def _lines_table(analysis: SpinDownAnalysis) -> Table:
     return table(title, ("run", *heads, f"{best.name} fit\n{_head(best.constants)}"), rows)
 
 
-def straight_quantity(law: str) -> str:
-    """What is drawn against time to make a law a straight line."""
-    straight = SHOWN_LAWS[law].straight
-    return straight.quantity if straight else ""
-
-
 def _equations(estimates: Mapping[str, Estimate]) -> list[str]:
     return [f"{SYMBOLS[name]} = {with_uncertainty(estimate)}" for name, estimate in estimates.items()]
 
 
 def _head(estimates: Mapping[str, Estimate]) -> str:
     name, estimate = next(iter(estimates.items()))
-    return f"{SYMBOLS[name]} [{in_words(estimate.unit)}]"
+    return f"{SYMBOLS[name]} [{unit(estimate.unit).text}]"
 
 
 def _first(estimates: Mapping[str, Estimate]) -> Estimate:
     return next(iter(estimates.values()))
+
+
+# --- readings as columns of tables for programs ---
+
+
+def spindown_columns(analysis: SpinDownAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
+    """Yield the readings of each run; residual_hz: reading less the best law of all runs, NaN for unused readings."""
+    for source, run in zip(analysis.sources, analysis.runs, strict=True):
+        readings, n = source.readings, len(source.readings)
+        used = np.isin(readings.time, run.time)
+        residual = np.full(n, np.nan)
+        residual[used] = run.fit(analysis.combined.best).residuals
+        given = analysis.options.reading_u
+        own = np.full(n, np.nan) if readings.u is None else readings.u
+        yield {
+            "time_s": readings.time,
+            "spin_frequency_hz": readings.frequency,
+            "spin_frequency_u_hz": own if given is None else np.full(n, given),
+            "residual_hz": residual,
+            "used": used,
+        }

@@ -16,7 +16,7 @@ B = TypeVar("B", bound="Block")
 
 
 def with_marks(blocks: Iterable[B], mark: str) -> list[B]:
-    """The blocks; each table in them that has no mark of its own gets this one.
+    """Return the blocks; each table in them that has no mark of its own gets this one.
 
     Args:
         blocks: of a document.

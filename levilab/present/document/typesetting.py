@@ -16,11 +16,11 @@ Level = Literal["", "high", "low"]
 _MINUS = re.compile(r"(?:(?<=[\s(\[=±×])|(?<!.))-(?=\d)")
 _HIGH = str.maketrans("⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ-", "+−0123456789n−")
 _LOW = str.maketrans("₊₋₀₁₂₃₄₅₆₇₈₉", "+−0123456789")
-#: Powers by raised characters, and those that no raised character exists for: ^−½, ^½ and ^(1−n).
+#: Powers by raised characters, and those that no raised character exists for: ^−½, ^½, ^−4/5 and ^(1−n).
 #: Indices by lowered characters, the fraction of C₃/₂ among them; ν_r: a Greek letter, a low line, one letter; and
 #: B_z: a plain letter with the name of a component, which is no part of a file's name and no column (x_m, time_s).
 _RUNS = re.compile(
-    r"(?P<raised>[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ]+)|\^(?P<half>−?½)|(?<=rad/s\))\^(?P<ascii>-1/2)|\^\((?P<power>1−n)\)"
+    r"(?P<raised>[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ]+)|\^(?P<half>−?½|−\d+/\d+)|(?<=rad/s\))\^(?P<ascii>-\d+/\d+)|\^\((?P<power>[^()]+)\)"
     r"|(?P<lowered>[₊₋₀₁₂₃₄₅₆₇₈₉]+(?:/[₀₁₂₃₄₅₆₇₈₉]+)?)|(?<=[α-ωΑ-Ω])_(?P<index>[a-zA-Z0-9])(?![a-zA-Z0-9_])"
     r"|(?<=(?<![\w./\\-])[a-zA-Z])_(?P<component>[xyz])(?![\w/\\-]|\.\w)"
 )
@@ -35,7 +35,7 @@ class Run:
 
 
 def typeset(text: str) -> tuple[Run, ...]:
-    """A plain text as runs.
+    """Return a plain text as runs.
 
     >>> [(run.text, run.level) for run in typeset("2.34(3)×10⁻⁴ (rad/s)^−½/s")]
     [('2.34(3)×10', ''), ('−4', 'high'), (' (rad/s)', ''), ('−½', 'high'), ('/s', '')]

@@ -24,7 +24,7 @@ from levilab.present.document.blocks import (
     Verdict,
     Warnings,
 )
-from levilab.report.html.elements import Html, element, joined, lines, words
+from levilab.report.html.elements import Html, element, join, lines, words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -55,7 +55,7 @@ class Writer:
     is_alive: bool = False
 
     def new_id(self, name: str) -> str:
-        """An id that no other element has: the name, and from the second use on a number."""
+        """Return an id that no other element has: the name, and from the second use on a number."""
         plain = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "part"
         self.names[plain] += 1
         count = self.names[plain]
@@ -63,14 +63,14 @@ class Writer:
 
     def blocks(self, blocks: Iterable[Block], level: int) -> Html:
         """Blocks below each other; level: of the headings among them."""
-        return joined((_RENDERERS[type(block)](self, block, level), "\n") for block in blocks)
+        return join((_RENDERERS[type(block)](self, block, level), "\n") for block in blocks)
 
 
 # --- words ---------------------------------------------------------------------------------------------
 
 
 def _paragraph(_: Writer, block: Paragraph, __: int) -> Html:
-    lead = joined([element("strong", words(block.lead)), " "]) if block.lead else ""
+    lead = join([element("strong", words(block.lead)), " "]) if block.lead else ""
     return element("p", lead, words(block.text))
 
 
@@ -104,7 +104,7 @@ def _warnings(_: Writer, block: Warnings, __: int) -> Html:
 
 def _alike(group: tuple[str, ...]) -> Html:
     if len(group) <= MOST_ALIKE:
-        return joined(element("li", words(text)) for text in group)
+        return join(element("li", words(text)) for text in group)
     others = element("ul", [element("li", words(text)) for text in group[1:]])
     summary = element("summary", f"and {len(group) - 1} more like this one")
     return element("li", words(group[0]), element("details", summary, others))
@@ -133,12 +133,12 @@ def _listing(_: Writer, block: Listing, __: int) -> Html:
     whole = replace(block.table, title="")
     pieces = [_table(whole, rows[k : k + size], classes) for k in range(0, len(rows), size)]
     title = element("strong", words(block.table.title)) if block.table.title else ""
-    shown = _moved_sideways(joined(pieces), block.table.title or block.name.replace("-", " "), "scroll pieces")
+    shown = _moved_sideways(join(pieces), block.table.title or block.name.replace("-", " "), "scroll pieces")
     return element("div", title, shown, _small_print(block.note), class_="listing")
 
 
 def _moved_sideways(drawn: Html, name: str, kind: str = "scroll") -> Html:
-    """What is too wide is moved sideways, also from the keyboard."""
+    """Return what is too wide is moved sideways, also from the keyboard."""
     return element("div", drawn, class_=kind, tabindex="0", role="region", aria_label=name)
 
 
@@ -217,7 +217,7 @@ def _section(writer: Writer, block: Section, level: int) -> Html:
 
 
 def _details(writer: Writer, block: Details, level: int) -> Html:
-    more = joined([" ", element("small", words(block.more))]) if block.more else ""
+    more = join([" ", element("small", words(block.more))]) if block.more else ""
     writer.is_alive = True  # browsers print what is folded only where the script opens it
     summary = element("summary", element("strong", words(block.summary)), more)
     body = element("div", writer.blocks(block.blocks, level), class_="body")

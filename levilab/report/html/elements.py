@@ -28,7 +28,7 @@ Child: TypeAlias = "str | Html | Iterable[Child]"
 
 
 def element(name: str, /, *children: Child, **attributes: str | bool | None) -> Html:
-    """An element.
+    """Return an element.
 
     Args:
         name: such as "p".
@@ -42,7 +42,7 @@ def element(name: str, /, *children: Child, **attributes: str | bool | None) -> 
     given = "".join(_attribute(key, value) for key, value in attributes.items())
     if name in _EMPTY:
         return Html(f"<{name}{given}>")
-    return Html(f"<{name}{given}>{joined(children).markup}</{name}>")
+    return Html(f"<{name}{given}>{join(children).markup}</{name}>")
 
 
 def _attribute(key: str, value: str | bool | None) -> str:  # noqa: FBT001 - an attribute's value
@@ -52,7 +52,7 @@ def _attribute(key: str, value: str | bool | None) -> str:  # noqa: FBT001 - an 
     return f" {name}" if value is True else f' {name}="{escape(value)}"'
 
 
-def joined(children: Iterable[Child]) -> Html:
+def join(children: Iterable[Child]) -> Html:
     """Elements and texts one after the other."""
     return Html("".join(_markup(child) for child in children))
 
@@ -60,23 +60,23 @@ def joined(children: Iterable[Child]) -> Html:
 def _markup(child: Child) -> str:
     if isinstance(child, Html):
         return child.markup
-    return escape(child) if isinstance(child, str) else joined(child).markup
+    return escape(child) if isinstance(child, str) else join(child).markup
 
 
 def words(text: str) -> Html:
-    """A text with powers and indices set high and low.
+    """Return a text with powers and indices set high and low.
 
     >>> words("3×10⁻⁴ <b>").markup
     '3×10<sup>−4</sup> &lt;b&gt;'
     """
-    return joined(element(_LEVELS[run.level], run.text) if run.level else run.text for run in typeset(text))
+    return join(element(_LEVELS[run.level], run.text) if run.level else run.text for run in typeset(text))
 
 
 def lines(text: str) -> Html:
-    r"""The same of several lines.
+    r"""Return the same of several lines.
 
     >>> lines("ν₀\n[Hz]").markup
     'ν<sub>0</sub><br>[Hz]'
     """
     first, *others = text.split("\n")
-    return joined([words(first), *((element("br"), words(line)) for line in others)])
+    return join([words(first), *((element("br"), words(line)) for line in others)])

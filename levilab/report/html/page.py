@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from levilab.present.document.blocks import Section
 from levilab.report.html.blocks import Writer
-from levilab.report.html.elements import Html, element, joined, words
+from levilab.report.html.elements import Html, element, join, words
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 
 def page_of(document: Document) -> str:
-    """The whole page; the same document always has the same text."""
+    """Return the whole page; the same document always has the same text."""
     writer = Writer()
-    body = joined(
+    body = join(
         [
             element("header", _head(document, writer)),
             "\n",
@@ -30,7 +30,7 @@ def page_of(document: Document) -> str:
             element("footer", words(document.footer)) if document.footer else "",
         ]
     )
-    head = joined([
+    head = join([
         element("meta", charset="utf-8"),
         element("meta", name="viewport", content="width=device-width, initial-scale=1"),
         element("meta", http_equiv="Content-Security-Policy", content=_policy()),
@@ -56,8 +56,8 @@ def fragment_of(blocks: Iterable[Block], prefix: str = "") -> str:
 
 
 def _head(document: Document, writer: Writer) -> list[Html]:
-    banner = writer.blocks([document.banner], level=2) if document.banner else joined([])
-    lead = element("p", words(document.lead), class_="lead") if document.lead else joined([])
+    banner = writer.blocks([document.banner], level=2) if document.banner else join([])
+    lead = element("p", words(document.lead), class_="lead") if document.lead else join([])
     return [element("h1", words(document.title)), lead, banner, _contents(document)]
 
 
@@ -65,14 +65,14 @@ def _contents(document: Document) -> Html:
     """Links to the sections of the first depth."""
     sections = [block for block in document.blocks if isinstance(block, Section) and block.anchor]
     if not document.contents or not sections:
-        return joined([])
+        return join([])
     writer = Writer()
     links = [element("a", words(one.title), href=f"#{writer.new_id(one.anchor)}") for one in sections]
     return element("nav", links, aria_label="Contents")
 
 
 def _island(writer: Writer) -> Html:
-    """The texts of the points, as data that no browser takes for markup or runs."""
+    """Return the texts of the points, as data that no browser takes for markup or runs."""
     text = json.dumps(writer.points, ensure_ascii=False, sort_keys=True).replace("<", "\\u003c").replace("&", "\\u0026")
     return element("script", Html(text), type="application/json", id="points")
 
@@ -90,11 +90,11 @@ def _policy() -> str:
 
 @cache
 def style() -> str:
-    """The page's style sheet."""
+    """Return the page's style sheet."""
     return files("levilab.report.html").joinpath("style.css").read_text(encoding="utf-8")
 
 
 @cache
 def script() -> str:
-    """The page's script."""
+    """Return the page's script."""
     return files("levilab.report.html").joinpath("script.js").read_text(encoding="utf-8")

@@ -79,7 +79,7 @@ def check_typst() -> None:
 
 
 def as_pdf(document: Document) -> bytes:
-    """A document as PDF; the same bytes for the same document.
+    """Return a document as PDF; the same bytes for the same document.
 
     Raises:
         NoTypst: the extra `pdf` is not installed.
@@ -98,7 +98,7 @@ def as_pdf(document: Document) -> bytes:
 
 
 def with_places(files: dict[str, bytes]) -> dict[str, bytes]:
-    """The files, with the figures that go to the top of the next page: those that do not fit where they are called.
+    """Return the files, with the figures that do not fit where they are called at the top of the next page.
 
     The document is set anew after each of them, since one that moves makes room for the text behind it.  Where the
     template queries each figure's own place, typst's five attempts do not suffice for several figures.
@@ -129,7 +129,7 @@ def fonts() -> list[Path]:
 
 
 def files_of(document: Document) -> dict[str, bytes]:
-    """The files that typst sets: the template, the document as data, the figures."""
+    """Return the files that typst sets: the template, the document as data, the figures."""
     drawing = _Drawing()
     content = _content(document, drawing)
     template = (resources.files("levilab.report.pdf") / TEMPLATE).read_bytes()
@@ -229,13 +229,13 @@ def _date(date: datetime) -> dict[str, int]:
 
 
 def _plain(text: str) -> str:
-    """A text of one line, without what no PDF may contain."""
+    """Return a text of one line, without what no PDF may contain."""
     clean = _NO_CHARACTERS.sub("\N{REPLACEMENT CHARACTER}", printable(text.replace("\t", " ")))
     return " ".join(clean.encode(errors="replace").decode().split("\n"))
 
 
 def _text(text: str) -> Text:
-    """A text as its parts, with superscripts, subscripts and places where long words may be divided.
+    """Return a text as its parts, with superscripts, subscripts and places where long words may be divided.
 
     >>> _text("3.2(1)×10⁻³ s⁻¹")
     ['3.2(1)×10', ['high', '−3'], ' s', ['high', '−1']]
@@ -257,7 +257,7 @@ _LONG_WORD = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
 
 
 def _divisible(text: str) -> list[str | None]:
-    """A text with None wherever a word of more than so many letters may be divided.
+    """Return a text with None wherever a word of more than so many letters may be divided.
 
     >>> _divisible("in runs/20261120T101500Z-spin-7f3a or x.csv")
     ['in runs/', None, '20261120T101500Z-', None, 'spin-', None, '7f3a or x.csv']
@@ -276,17 +276,17 @@ def _divisible(text: str) -> list[str | None]:
 
 
 def _short(piece: str) -> list[str]:
-    """A part of a word in letters one by one where it is long."""
+    """Return a part of a word in letters one by one where it is long."""
     return [*piece] if len(piece) > LONGEST_WORD else [piece]
 
 
 def _lines(text: str) -> list[Text]:
-    """The lines of a cell."""
+    """Return the lines of a cell."""
     return [_text(line) for line in text.split("\n")]
 
 
 def _fixed(text: str) -> Text:
-    """A line in letters of one width, divided anywhere; nothing is typeset."""
+    """Return a line in letters of one width, divided anywhere; nothing is typeset."""
     parts = _divisible(_plain(text))
     return parts[0] if len(parts) == 1 else parts
 
@@ -305,7 +305,7 @@ def _section(block: Section, drawing: _Drawing) -> Drawn:
 
 
 def _inside(section: Section, drawing: _Drawing) -> list[Drawn]:
-    """What stands below a heading, which does not stay behind alone when its only figure leaves."""
+    """Return what stands below a heading, which does not stay behind alone when its only figure leaves."""
     match section.blocks:
         case (Picture() as picture,):
             return [_picture(picture, drawing, floats=False)]
@@ -358,7 +358,7 @@ def _listing(block: Listing, _: _Drawing) -> Drawn:
 
 
 def _table(table: Table, wraps: Collection[str] = ()) -> Drawn:
-    """A table: which of its columns are numbers, and which of the others are folded."""
+    """Return a table: which of its columns are numbers, and which of the others are folded."""
     return {
         "title": _text(table.title),
         "heads": [_lines(head) for head in table.heads],

@@ -27,7 +27,7 @@ _OURS = re.compile(r"[a-z0-9][a-z0-9_-]*\.(csv|tex)")
 
 
 def folder_of(report: Path) -> Path:
-    """The folder of a report's tables.
+    """Return the folder of a report's tables.
 
     >>> from pathlib import Path
     >>> folder_of(Path("out/report.pdf")).as_posix()
@@ -64,7 +64,7 @@ def write_tables(document: Document, values: Iterable[Values], folder: Path) -> 
 
 
 def _listed_before(contents: Path) -> set[str]:
-    """The files of an earlier report."""
+    """Return the files of an earlier report."""
     if not contents.is_file():
         return set()
     text = contents.read_text(encoding="utf-8", errors="replace")
@@ -103,7 +103,7 @@ class _Names:
         self._used: dict[str, int] = {}
 
     def new(self, name: str) -> str:
-        """The name, and from the second use on a number."""
+        """Return the name, and from the second use on a number."""
         plain = re.sub(r"[^a-z0-9_]+", "-", name.lower()).strip("-_") or "table"
         self._used[plain] = self._used.get(plain, 0) + 1
         return plain if self._used[plain] == 1 else f"{plain}-{self._used[plain]}"

@@ -1,4 +1,4 @@
-r"""A table as LaTeX, for an article that loads booktabs and nothing else.
+r"""A table as LaTeX, for an article that loads booktabs and graphicx.
 
 All of it is ASCII, so that it compiles with every engine and every input encoding.  What a person typed is escaped;
 a character that LaTeX's own fonts lack is spelled as `levilab.present.characters` spells it.
@@ -6,14 +6,16 @@ a character that LaTeX's own fonts lack is spelled as `levilab.present.character
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from levilab.present.characters import for_encoding, printable
 from levilab.present.document.typesetting import typeset
-from levilab.report.tables.widths import PARAGRAPH, SMALL_SEPARATION, fit
+from levilab.present.units import is_unit
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from levilab.present.tables import Table
 
@@ -39,11 +41,17 @@ _OTHERS = {
 }  # fmt: skip
 #: φ with a dot, of two characters.
 _PHI_DOT = "φ\N{COMBINING DOT ABOVE}"
+#: A number, and what stands behind it.
+_WITH_UNIT = re.compile(r"(?:< )?[−+-]?\d[\d.]*(?:\([\d.]+\))?(?:×10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)? (?P<behind>.+)")
+#: A column of texts longer than this is a paragraph [characters] of so much of the line.
+_LONG, _PARAGRAPH = 48, 0.4
+#: The width of a table: its own, or that of the line, to which LaTeX scales a wider one.
+_WIDTH = r"\ifdim\width>\linewidth\linewidth\else\width\fi"
 _LEVELS = {"high": r"\textsuperscript{%s}", "low": r"\raisebox{-.4ex}{\scriptsize %s}", "": "%s"}
 
 
 def as_latex(name: str, table: Table, *, note: str = "", mark: str = "") -> str:
-    """A table as a float with caption and label; folded, in small letters and in parts where it is wider than a line.
+    """Return a table as a float with caption and label, scaled to the line where it is wider.
 
     Args:
         name: of the file; the label is ``tab:NAME``.
@@ -53,27 +61,64 @@ def as_latex(name: str, table: Table, *, note: str = "", mark: str = "") -> str:
     """
     title = table.title or title_of(name)
     marks = [mark] if mark and mark.rstrip(".") not in title else []  # which may say it itself
-    caption = escaped(" ".join([*marks, title]))
-    fitted = fit(table)
-    aligned = ["r" if k in table.numbers else "p" if k in fitted.paragraphs else "l" for k in range(len(table.heads))]
-    parts = [_tabular(fitted.table, part, aligned) for part in fitted.parts]
+    caption = to_latex(" ".join([*marks, title]))
+    table = units_in_heads(table)
+    aligned = ["r" if k in table.numbers else "p" if _is_long(table, k) else "l" for k in range(len(table.heads))]
     lines = [
-        "% levilab report --tables; in the preamble: \\usepackage{booktabs}",
+        "% levilab report --tables; in the preamble: \\usepackage{booktabs,graphicx}",
         r"\begin{table}[htbp]",
         r"  \centering",
         rf"  \caption{{{caption}}}",
         rf"  \label{{tab:{name}}}",
-        *([rf"  \footnotesize\setlength{{\tabcolsep}}{{{SMALL_SEPARATION:g}pt}}"] if fitted.small else []),
-        *parts[0],
-        *(line for part in parts[1:] for line in (r"  \par\medskip", *part)),
-        *([rf"  \par\smallskip{{\footnotesize {escaped(note)}\par}}"] if note else []),
+        *_tabular(table, aligned),
+        *([rf"  \par\smallskip{{\footnotesize {to_latex(note)}\par}}"] if note else []),
         r"\end{table}",
     ]
     return "\n".join(lines) + "\n"
 
 
+def units_in_heads(table: Table) -> Table:
+    r"""Return the table with the unit that all numbers of a column have in its head, once.
+
+    >>> from levilab.present.tables import table
+    >>> found = units_in_heads(table("", ["u"], [["0.96 mT"], ["1.2(3)×10⁻³ mT"], ["—"]], numbers=["u"]))
+    >>> found.heads, [row.cells for row in found.rows]
+    (('u\n[mT]',), [('0.96',), ('1.2(3)×10⁻³',), ('—',)])
+    >>> units_in_heads(table("", ["a", "b"], [["0.10 ± 0.07", "3 of 5"]], numbers=["a", "b"])).heads
+    ('a', 'b')
+    """
+    columns = [[row.cells[k] for row in table.rows] for k in range(len(table.heads))]
+    heads = list(table.heads)
+    for k in sorted(table.numbers):
+        units = {_unit(cell) for cell in columns[k] if _counts(cell)}
+        if len(units) == 1 and heads[k] and (unit := units.pop()):
+            heads[k] = f"{heads[k]}\n[{unit}]"
+            columns[k] = [cell.removesuffix(f" {unit}") for cell in columns[k]]
+    rows = (replace(row, cells=tuple(column[i] for column in columns)) for i, row in enumerate(table.rows))
+    return replace(table, heads=tuple(heads), rows=tuple(rows))
+
+
+def _unit(cell: str) -> str:
+    """Return the unit of the number of a cell; empty where something else stands behind it, or nothing.
+
+    >>> _unit("0.87(2) mT cm per mm"), _unit("1.2 Hz (u not known)"), _unit("1.5 s ago")
+    ('mT cm per mm', '', '')
+    """
+    found = _WITH_UNIT.fullmatch(cell)
+    return found["behind"] if found and is_unit(found["behind"]) else ""
+
+
+def _counts(cell: str) -> bool:
+    """Return whether a number stands in a cell."""
+    return any(one.isdigit() for one in cell)
+
+
+def _is_long(table: Table, k: int) -> bool:
+    return max((len(line) for row in table.rows for line in row.cells[k].split("\n")), default=0) > _LONG
+
+
 def title_of(name: str) -> str:
-    """What a table without a title is called, by its name.
+    """Return what a table without a title is called, by its name.
 
     >>> title_of("spindown-laws")
     'Spindown laws'
@@ -82,35 +127,33 @@ def title_of(name: str) -> str:
 
 
 #: What stands for a column in the head of a tabular.
-_COLUMNS = {"r": "r", "l": "l", "p": f"p{{{PARAGRAPH:g}\\linewidth}}"}
+_COLUMNS = {"r": "r", "l": "l", "p": f"p{{{_PARAGRAPH:g}\\linewidth}}"}
 
 
-def _tabular(table: Table, columns: Sequence[int], aligned: Sequence[str]) -> Iterable[str]:
-    """Some columns of a table, each line indented for the float."""
-    yield rf"  \begin{{tabular}}{{{''.join(_COLUMNS[aligned[k]] for k in columns)}}}"
-    yield r"    \toprule"
+def _tabular(table: Table, aligned: Sequence[str]) -> list[str]:
+    """Return the lines of a tabular, indented for the float."""
+    lines = [rf"  \resizebox{{{_WIDTH}}}{{!}}{{\begin{{tabular}}{{{''.join(_COLUMNS[one] for one in aligned)}}}"]
+    lines.append(r"    \toprule")
     if any(table.heads):
-        yield rf"    {_row(table.heads, columns, aligned, bold=True)} \\"
-        yield r"    \midrule"
+        lines += [rf"    {_row(table.heads, aligned, bold=True)} \\", r"    \midrule"]
     for k, row in enumerate(table.rows):
         if row.kind == "together" and k and table.rows[k - 1].kind != "together":
-            yield r"    \midrule"
-        yield rf"    {_row(row.cells, columns, aligned)} \\"
-    yield r"    \bottomrule"
-    yield r"  \end{tabular}"
+            lines.append(r"    \midrule")
+        lines.append(rf"    {_row(row.cells, aligned)} \\")
+    return [*lines, r"    \bottomrule", r"  \end{tabular}}"]
 
 
-def _row(cells: Sequence[str], columns: Sequence[int], aligned: Sequence[str], *, bold: bool = False) -> str:
-    return " & ".join(_cell(cells[k], aligned[k], bold=bold) for k in columns)
+def _row(cells: Sequence[str], aligned: Sequence[str], *, bold: bool = False) -> str:
+    return " & ".join(_cell(cell, one, bold=bold) for cell, one in zip(cells, aligned, strict=True))
 
 
 def _cell(cell: str, aligned: str, *, bold: bool) -> str:
-    r"""A cell, of several lines perhaps: the first stands in the line of the row, of a head the last.
+    r"""Return a cell, of several lines perhaps: the first stands in the line of the row, of a head the last.
 
     >>> _cell("c₁\n[s⁻¹]", "l", bold=False)
     '\\begin{tabular}[t]{@{}l@{}}c\\raisebox{-.4ex}{\\scriptsize 1}\\\\{[}s\\textsuperscript{$-$1}{]}\\end{tabular}'
     """
-    lines = [escaped(line) for line in cell.split("\n")]
+    lines = [to_latex(line) for line in cell.split("\n")]
     lines = [rf"\textbf{{{line}}}" if bold and line else line for line in lines]
     if len(lines) == 1:
         return lines[0]
@@ -120,12 +163,12 @@ def _cell(cell: str, aligned: str, *, bold: bool) -> str:
     return rf"\begin{{tabular}}[{'b' if bold else 't'}]{{@{{}}{aligned}@{{}}}}{stacked}\end{{tabular}}"
 
 
-def escaped(text: str) -> str:
-    r"""A plain text as LaTeX, in ASCII.
+def to_latex(text: str) -> str:
+    r"""Return a plain text as LaTeX, in ASCII.
 
-    >>> escaped("50 % of {x}_1 & \\input{a}")
+    >>> to_latex("50 % of {x}_1 & \\input{a}")
     '50 \\% of \\{x\\}\\_1 \\& \\textbackslash{}input\\{a\\}'
-    >>> escaped("3.2(1)×10⁻³, ν_r, é and 中")
+    >>> to_latex("3.2(1)×10⁻³, ν_r, é and 中")
     '3.2(1)$\\times$10\\textsuperscript{$-$3}, $\\nu$\\raisebox{-.4ex}{\\scriptsize r}, e and ?'
     """
     clean = " ".join(printable(text.replace("\t", " ")).split("\n"))

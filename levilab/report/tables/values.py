@@ -6,10 +6,10 @@ import csv
 import io
 import re
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from levilab.pipelines.row import Column, plain, text_of
+from levilab.present.units import split
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 #: A spreadsheet takes a text that begins with one of these for a formula.
 _FORMULA = re.compile(r"\s*[=+\-@\t\r]")
-#: Units of residuals by the name of the analysis.
-RESIDUALS = MappingProxyType({"spindown": "Hz", "precession": "Hz", "field": "T"})
 #: The first columns of both kinds of tables.
 INPUT, SYNTHETIC = "input", "synthetic"
 
@@ -45,7 +43,7 @@ class Values:
 
 
 def as_csv(values: Values) -> str:
-    """The table as CSV; no text in it is a formula to a spreadsheet.
+    """Return the table as CSV; no text in it is a formula to a spreadsheet.
 
     >>> print(as_csv(Values("x", "", ("input", "c1_per_s"), (("=1+1", -0.5), ("a, b", None)))), end="")
     input,c1_per_s
@@ -60,7 +58,7 @@ def as_csv(values: Values) -> str:
 
 
 def _harmless(cell: Cell) -> str:
-    """A cell as text; an apostrophe, which spreadsheets do not show, keeps a text from being a formula."""
+    """Return a cell as text; an apostrophe, which spreadsheets do not show, keeps a text from being a formula."""
     if isinstance(cell, str):
         text = " ".join(cell.split("\n")).replace("\r", " ")
         return f"'{text}" if _FORMULA.match(text) else text
@@ -86,8 +84,15 @@ def of_analysis(analysis: Analysis[Any], found: Any, folder: Path) -> Iterator[V
         f"{analysis.name}: a row for each quantity of each input, and of all inputs together",
         (INPUT, SYNTHETIC, "model", "quantity", "value", "u", "unit", "interval_68_low", "interval_68_high",
          "scatter", "runs"),
-        tuple(_quantities(found, document)),
+        tuple(_quantities(found, document, _unit_of_residuals(analysis))),
     )  # fmt: skip
+
+
+def _unit_of_residuals(analysis: Analysis[Any]) -> str:
+    """Return the unit in the name of the column of their root mean square; empty where there is no such column."""
+    names = [column.name for column in analysis.row if "rms_residual" in column.name]
+    unit = split(names[0])[1] if names else None
+    return unit.si if unit else ""
 
 
 def _by_input(analysis: Analysis[Any], document: Mapping[str, Any], names: Sequence[str]) -> Values:
@@ -100,25 +105,25 @@ def _by_input(analysis: Analysis[Any], document: Mapping[str, Any], names: Seque
     return Values(f"{analysis.name}-inputs", f"{analysis.name}: a row for each input", heads, tuple(rows))
 
 
-def _quantities(found: Any, document: Mapping[str, Any]) -> Iterator[tuple[Cell, ...]]:
-    analysis = str(document["analysis"])
+def _quantities(found: Any, document: Mapping[str, Any], residuals: str) -> Iterator[tuple[Cell, ...]]:
+    """Yield a row for each quantity.  residuals: their unit."""
     if len(found.sources) > 1:
-        yield from _of_part("all together", analysis, document, found.inputs_of)
+        yield from _of_part("all together", residuals, document, found.inputs_of)
     for source, part in zip(found.sources, document["runs"], strict=True):
-        yield from _of_part(source.name, analysis, part)
+        yield from _of_part(source.name, residuals, part)
 
 
 def _of_part(
     name: str,
-    analysis: str,
+    residuals: str,
     part: Mapping[str, Any],
     inputs_of: Callable[[int | None], Sequence[Source[Any]]] | None = None,
 ) -> Iterator[tuple[Cell, ...]]:
-    """A row for each value.
+    """Yield a row for each value.
 
     inputs_of: returns the inputs of a group, whose values are synthetic where one of them is; None: as the part is.
     """
-    for model, quantity, found in _values_in(part, analysis):
+    for model, quantity, found in _values_in(part, residuals):
         of = inputs_of(found.get("group")) if inputs_of else ()
         synthetic = any(source.synthetic for source in of) if inputs_of else bool(part["synthetic"])
         low, high = found.get("interval_68") or (None, None)
@@ -126,7 +131,7 @@ def _of_part(
         yield name, synthetic, model, quantity, value, u, unit, low, high, found.get("scatter"), found.get("runs")
 
 
-def _values_in(part: Mapping[str, Any], analysis: str) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+def _values_in(part: Mapping[str, Any], residuals: str) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
     """Model, name and value of each quantity; values without a model come first."""
     for name, value in part["values"].items():
         yield "", name, value
@@ -136,6 +141,6 @@ def _values_in(part: Mapping[str, Any], analysis: str) -> Iterator[tuple[str, st
         for name, value in (model.get("linearised") or {}).items():
             yield model["name"], f"{name}_linearised", value
         for name, value in (model.get("statistics") or {}).items():
-            unit = RESIDUALS.get(analysis) if name == "rms_residual" else "1"
+            unit = residuals if name == "rms_residual" else "1"
             if unit and value is not None:
                 yield model["name"], name, {"value": value, "unit": unit}

@@ -104,13 +104,16 @@ def _mixed_rate(law: Any, spin: Any) -> Any:
     return -(law.c1 + law.c2 * abs(spin)) * spin
 
 
-#: The spin [rad/s] after drag alone has acted for the time d [s], of either sign: (law, spin, d).
-spin_after = by_type(
-    {Stokes: _spin_after_stokes, Newton: _spin_after_newton, LaminarDisc: _spin_after_disc, Mixed: _spin_after_mixed}
-)
-
+#: Law → its constants; the spin [rad/s] after drag alone has acted for the time d [s], of either sign: (law, spin, d);
 #: dω/dt [rad/s²] at this spin: (law, spin).
-spin_rate = by_type({Stokes: _stokes_rate, Newton: _newton_rate, LaminarDisc: _disc_rate, Mixed: _mixed_rate})
+LAWS = {
+    "stokes": (Stokes, _spin_after_stokes, _stokes_rate),
+    "newton": (Newton, _spin_after_newton, _newton_rate),
+    "disc": (LaminarDisc, _spin_after_disc, _disc_rate),
+    "mixed": (Mixed, _spin_after_mixed, _mixed_rate),
+}
+spin_after = by_type({law: after for law, after, _ in LAWS.values()})
+spin_rate = by_type({law: rate for law, _, rate in LAWS.values()})
 
 
 # --- how a law acts in a model ---

@@ -97,30 +97,3 @@ def advance(
         s = renormalize(s, stops[i + 1])
         store_state(states[i + 1], 1, 0, s)
     return counts.size
-
-
-@kernel
-def mean_squares(states: Array, every: int, others: Array) -> tuple[float, float, float, float, float, float]:
-    """Mean squares of the time since the start and of the differences of place and axis, in earlier and later halves.
-
-    states: of one run at its stops, shape (n·every + 1, 18); others: of another one at each of these stops in turn
-    that is a multiple of `every`, shape (n + 1, 18).  Returns time, place, axis in the earlier half, then in the later.
-    """
-    n = others.shape[0] - 1
-    half = n // 2
-    sums = np.zeros((2, 3))
-    for i in range(1, n + 1):
-        part = 0 if i <= half else 1
-        a, b = states[i * every], others[i]
-        time = b[17] - others[0, 17]
-        sums[part, 0] += time * time
-        for j in range(3):
-            sums[part, 1] += (a[j] - b[j]) * (a[j] - b[j])
-            sums[part, 2] += (a[j + 6] - b[j + 6]) * (a[j + 6] - b[j + 6])
-    # one by one: a row divided in place would bring numba's texts of shapes that differ into the kernel, which takes
-    # four times as long to compile as all the rest of it
-    first, second = float(half), float(n - half)
-    return (
-        sums[0, 0] / first, sums[0, 1] / first, sums[0, 2] / first,
-        sums[1, 0] / second, sums[1, 1] / second, sums[1, 2] / second,
-    )  # fmt: skip

@@ -591,7 +591,8 @@ def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path: Path, monk
 
 
 def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(in_full_motion: Run) -> None:
-    from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+    from levilab.pipelines.options import SpinDownOptions
+    from levilab.pipelines.spindown.analysis import analyze_spindowns
     from levilab.simulator import preset
 
     run = in_full_motion

@@ -129,8 +129,7 @@ def test_a_terminal_that_wants_it_sees_the_state(tmp_path: Path) -> None:
         def is_due(self) -> bool:
             return True
 
-        def state(self, state: object) -> None:
-            assert isinstance(state, State)
+        def state(self, state: State) -> None:
             self.states += (state,)
 
     acquire(request(tmp_path, "field", "field.highest_m=0.065"), screen := Screen())

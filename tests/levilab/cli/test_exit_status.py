@@ -32,7 +32,7 @@ WRONG_USAGE = {
     "acquire spin --scene spindown": "--mock",
     "acquire trace --mock --set trace.duration=1": "did you mean trace.duration_s",
     "acquire trace --mock --set trace.points=1.5": "--set trace.points=1.5: a whole number above 0 is expected",
-    "acquire trace --mock --set trace.volts_per_division=50": "a number from 0.001 to 10 [V] is expected",
+    "acquire trace --mock --set trace.volts_per_division=50": "a number from 0.001 to 10 is expected",
     "acquire trace --mock --set trace.trigger_level_v=5": "beyond what the oscilloscope records, -0.35 to 1.65 V",
     "acquire trace --mock --set records=two": "--set trace.records=two: a whole number above 0 is expected",
     f"analyze spindown {SAMPLE} --reading-u 0": "--reading-u 0: ",

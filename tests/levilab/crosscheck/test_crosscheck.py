@@ -12,10 +12,10 @@ import pytest
 
 from levilab.crosscheck.catalogue import SUBJECTS
 from levilab.crosscheck.figure import crosscheck_figure
-from levilab.crosscheck.study import crosscheck
+from levilab.crosscheck.study import Verdict, study_world
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
 from levilab.crosscheck.subjects.motion import nutation
-from levilab.crosscheck.table import crosscheck_table, failures_in_words
+from levilab.crosscheck.table import crosscheck_table, failures_as_text
 from levilab.present.style import as_png
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
@@ -39,7 +39,7 @@ def made_up(off: float = 0.0, scale: float = 1.0) -> Subject:
 
 
 def of(subject: Subject, trials: int = 400):
-    return crosscheck(subject, trials, 0, lambda _: None)
+    return study_world(subject, trials, 0, lambda _: None)
 
 
 def test_true_estimates_pass():
@@ -74,9 +74,15 @@ def test_the_count_of_a_nutating_top_is_as_the_analysis_has_it():
     assert scene.start.tilt_rad == pytest.approx(0.03, abs=0.01)
 
 
-@pytest.mark.parametrize(("off", "scale"), [(0.4, 1.0), (-0.4, 1.0), (0.0, 1.4), (0.0, 0.7)])
+@pytest.mark.parametrize(("off", "scale"), [(0.4, 1.0), (-0.4, 1.0), (0.0, 1.4)])
 def test_estimates_that_are_off_or_too_sure_do_not_pass(off, scale):
     assert not of(made_up(off, scale)).holds
+
+
+def test_an_uncertainty_that_is_too_large_is_named_and_no_error():
+    found = of(made_up(0.0, 0.7))
+    assert found.holds
+    assert found.spreads[0].verdict is Verdict.TOO_LARGE
 
 
 def test_the_table_and_the_notes_show_what_failed():
@@ -84,7 +90,7 @@ def test_the_table_and_the_notes_show_what_failed():
     (row,) = crosscheck_table(found).rows
     assert row.cells[0:3] == ("made-up", "five", "392")
     assert row.cells[-1] == "NO"
-    assert failures_in_words(found) == ["made-up: 8 of 400 trials came to no estimate: the top fell"]
+    assert failures_as_text(found[0]) == ["8 of 400 trials came to no estimate: the top fell"]
     assert as_png(crosscheck_figure(found)).startswith(b"\x89PNG")
 
 
@@ -148,9 +154,9 @@ def test_the_command_prints_writes_and_judges(levilab: Callable[..., object], tm
     done = levilab("crosscheck", "good", "--trials", "40", "--out", "kept")
     assert "five" in done.stdout
     document = json.loads((tmp_path / "kept/crosscheck.json").read_text(encoding="utf-8"))
-    assert document["subjects"][0]["holds"] is True
+    assert document["checks"][0]["holds"] is True
     assert (tmp_path / "kept/crosscheck.png").stat().st_size > 5000
     failed = levilab("crosscheck", "bad", "--json", "--trials", "40", check=1)
-    assert json.loads(failed.stdout)["subjects"][0]["quantities"][0]["mean"] > 1.5
+    assert json.loads(failed.stdout)["checks"][0]["spreads"][0]["mean"] > 1.5
     refused = levilab("crosscheck", "nonsense", check=2)
     assert refused.stderr == "levilab: subject nonsense: known are good, bad\n"

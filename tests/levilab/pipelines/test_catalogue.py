@@ -13,8 +13,9 @@ import pytest
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines import catalogue
 from levilab.pipelines.catalogue import ANALYSES, Analysis
+from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Archive
-from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+from levilab.pipelines.spindown.analysis import analyze_spindowns
 from levilab.pipelines.spindown.document import SpinDownResult
 from levilab.pipelines.suits import analyze_suiting, recall_suiting, suiting
 from levilab.pipelines.suits import save as save_found

@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from levilab.errors import DataError
 from levilab.files import replace_atomically
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Place, beside, read_result, save
-from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+from levilab.pipelines.spindown.analysis import analyze_spindowns
 from levilab.pipelines.spindown.document import DOCUMENT, SpinDownResult
 from levilab.pipelines.suits import save as save_found
 from support.spin_downs import spin_down_csv
@@ -24,16 +25,6 @@ from support.spin_downs import spin_down_csv
 
 def saved(*paths: Path) -> list[str]:
     return [file.name for file in save_found(ANALYSES["spindown"], analyze_spindowns(paths, SpinDownOptions()))]
-
-
-@pytest.mark.usefixtures("undrawn_figures")
-def test_results_of_two_files_in_one_folder_stand_side_by_side(tmp_path: Path) -> None:
-    for k, name in enumerate(("monday.csv", "tuesday.csv")):
-        saved(spin_down_csv(tmp_path / name, seed=k))
-    for name in ("monday.csv", "tuesday.csv"):
-        result = json.loads((tmp_path / f"{name}.result.json").read_text(encoding="utf-8"))
-        assert result["inputs"][0]["path"] == name
-        assert (tmp_path / f"{name}.spindown.png").is_file()
 
 
 #: Names that come near one another: with dots, without an ending, like results themselves.

@@ -12,8 +12,9 @@ import pytest
 
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.sources import Skipped, SkippedRuns, collect, sha256_of
-from levilab.pipelines.spindown.analysis import NEEDS, SpinDownOptions, analyze_spindowns
+from levilab.pipelines.spindown.analysis import NEEDS, analyze_spindowns
 from levilab.pipelines.spindown.readings import Readings
 from support.spin_downs import spin_down_csv
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-import re
 import shutil
 import subprocess
 import sys
@@ -17,8 +16,11 @@ import pytest
 
 from levilab.errors import DataError, LevilabError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
+from levilab.pipelines.options import SpinDownOptions
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.suits import save
+from levilab.present.document.blocks import Tabular
 from levilab.present.numbers import with_uncertainty
 from levilab.report.html.page import script
 from levilab.report.inputs import _drive
@@ -37,8 +39,23 @@ def render(found: SpinDownAnalysis) -> str:
 
 
 @pytest.fixture(scope="module")
-def page() -> Page:
-    return Page(render(analyze_spindowns([SAMPLE_DATA], SpinDownOptions())))
+def found() -> SpinDownAnalysis:
+    return analyze_spindowns([SAMPLE_DATA], SpinDownOptions())
+
+
+@pytest.fixture(scope="module")
+def page(found: SpinDownAnalysis) -> Page:
+    return Page(render(found))
+
+
+def column(found: SpinDownAnalysis, name: str, head: str) -> dict[str, str]:
+    """Return a column of a table of the report, by the first cell of each row."""
+    part = spindown_part(found)
+    (shown,) = (
+        block.table for block in (*part.result, *part.runs) if isinstance(block, Tabular) and block.name == name
+    )
+    k = shown.heads.index(head)
+    return {row.cells[0]: row.cells[k] for row in shown.rows}
 
 
 def test_nothing_is_fetched_when_the_report_is_opened(page: Page) -> None:
@@ -66,13 +83,16 @@ def test_no_script_runs_but_ours_which_the_policy_names_by_its_hash(page: Page) 
     assert f"script-src 'sha256-{digest}';" in policy
 
 
-def test_numbers_have_uncertainties_and_the_published_constants_are_there(page: Page) -> None:
-    text = page.text
-    assert "SYNTHETIC" in text
-    assert re.search(r"spin-down-1 20 3\.199\(\d+\)×10⁻³ 1\.760\(\d+\)×10⁻⁵", text)
-    assert re.search(r"mean 3\.182\(\d+\)×10⁻³", text)  # 0.00318175
-    assert "exclude" in text
-    assert "scatters between the runs" in text
+def test_each_run_has_its_own_constants_and_the_scatter_stands_beside_the_mean(found: SpinDownAnalysis) -> None:
+    stokes = column(found, "spindown-runs", "ln ω against t\nC₁ [s⁻¹]")
+    assert stokes["spin-down-1"].startswith("3.199(")
+    assert (stokes["mean"], stokes["scatter s"]) == ("3.182(31)×10⁻³", "6.1(2.5)×10⁻⁵")  # u: s/√4, and s/√6 of s
+    assert column(found, "spindown-runs", "1/ω against t\nC₂ [rad⁻¹]")["spin-down-1"].startswith("1.760(")
+    fits = column(found, "spindown-runs", "disc fit\nC₃/₂ [(rad/s)^−½/s]")
+    assert [fits[f"spin-down-{k}"] for k in (1, 2, 3, 4)] == [
+        "2.3687(35)×10⁻⁴", "2.3077(30)×10⁻⁴", "2.283(4)×10⁻⁴", "2.3971(32)×10⁻⁴",
+    ]  # fmt: skip
+    assert column(found, "spindown-models-compared", "order test p")["stokes"] == "2.3×10⁻¹⁴"
 
 
 def changed(run: Path, **entries: object) -> Path:
@@ -191,16 +211,6 @@ def test_a_mixture_of_real_and_synthetic_runs_is_no_measurement_and_says_so(tmp_
     assert "MIXED, and so no measurement (1 of 2 inputs are SYNTHETIC): " in text, "the verdict is read alone"
 
 
-def test_each_run_has_its_own_constants_and_the_scatter_stands_beside_the_mean(page: Page) -> None:
-    text = page.text
-    for own in ("2.369(4)×10⁻⁴", "2.3077(28)×10⁻⁴", "2.2829(31)×10⁻⁴", "2.3972(35)×10⁻⁴"):
-        assert own in text
-    assert re.search(r"mean 3\.182\(31\)×10⁻³", text)
-    assert re.search(r"scatter s 6\.1\(2\.5\)×10⁻⁵", text)  # s/√4 is the mean's u, s/√6 its own
-    assert "ν₀: the spin at the first reading" in text
-    assert "1.55 to 2.45" in text  # 2 ± 4/√78
-
-
 @pytest.mark.usefixtures("undrawn_figures")
 @pytest.mark.parametrize("readings", [3, 20])
 def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, readings: int) -> None:
@@ -222,9 +232,7 @@ def test_the_report_shows_what_analyze_found(run: Path, tmp_path: Path) -> None:
     analysis = analyze_spindowns([run], SpinDownOptions(tilt="none"))
     save(ANALYSES["spindown"], analysis)
     text = reported(run, output=tmp_path / "report.html")
-    assert (
-        with_uncertainty(analysis.runs[0].fit("disc").parameters["c32"]).split()[0] in text
-    )  # as the terminal shows it
+    assert with_uncertainty(analysis.runs[0].fit("disc").parameters["c32"]).split()[0] in text
     assert f"as levilab analyze found it: {run / 'result.json'}" in text
 
 
@@ -259,10 +267,6 @@ def test_the_page_needs_nothing_of_the_terminal() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=HANG_GUARD_S
     )
     assert done.stdout == "False\n"
-
-
-def test_one_p_value_is_the_same_number_on_the_page_and_the_terminal(page: Page) -> None:
-    assert "1.9×10⁻¹³" in page.text
 
 
 @pytest.mark.usefixtures("undrawn_figures")

@@ -3,31 +3,23 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
 import json
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from levilab.cli.analyze import OPTIONS, analysis_options
-from levilab.cli.report import report
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.options import read_options
 from levilab.present.document.blocks import Code, Facts, Note, Tabular
-from levilab.report.reproduction import OF_REPORT, SAME_IN_COMMANDS, Asked, named_in_commands, reproduction
+from levilab.report.reproduction import Asked, named_in_commands, reproduction
 from support.paths import SAMPLE_DATA
-
-
-def test_the_options_in_commands_are_those_of_the_command_line() -> None:
-    assert set(SAME_IN_COMMANDS) <= OPTIONS.keys()
-    assert all(OPTIONS[name].to in {"", name} for name in SAME_IN_COMMANDS)
-    assert set(OF_REPORT) == {*SAME_IN_COMMANDS} & inspect.signature(report).parameters.keys()
 
 
 def test_columns_that_are_not_named_are_not_given() -> None:
     # or the names that an earlier result has would be replaced by none, and stand in the page as an option
-    assert analysis_options({"columns": ""}) == {"columns": None}
-    assert analysis_options({"columns": "t=1,f=2"}) == {"columns": {"t": "1", "f": "2"}}
+    assert read_options({"columns": ""}) == {}
+    assert read_options({"columns": "t=1,f=2"}) == {"columns": {"t": "1", "f": "2"}}
 
 
 def test_the_command_of_a_report_has_the_paths_the_options_and_the_format_that_were_asked_for() -> None:
@@ -47,7 +39,7 @@ def test_of_many_inputs_the_paths_are_named_that_were_typed() -> None:
 
 def test_options_that_no_command_can_hold_are_named_as_they_are_typed() -> None:
     field = ANALYSES["field"]
-    given = analysis_options({"device": SAMPLE_DATA / "device.toml", "height": 75.8, "free_radii": True})
+    given = read_options({"device": SAMPLE_DATA / "device.toml", "height": 75.8, "free_radii": True}, typed=True)
     found = field.analyze([SAMPLE_DATA / "field-scan"], field.options_from(given))
     section = reproduction([(field, found)])
     assert [block.text for block in section.blocks if isinstance(block, Note)] == [

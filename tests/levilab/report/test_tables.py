@@ -6,23 +6,18 @@ import csv
 import io
 import json
 import re
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
 
 from levilab.errors import LevilabError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.field.quantities import SHOWN as FIELD
-from levilab.pipelines.row import UNITS_IN_NAMES
 from levilab.present.document.blocks import Banner, Details, Document, Section, Tabular
-from levilab.present.numbers import in_words
 from levilab.present.tables import Row, table
-from levilab.present.words import UNITS as WORDS
+from levilab.present.units import UNITS
 from levilab.report.tables.folder import CONTENTS, folder_of, write_tables
-from levilab.report.tables.latex import as_latex, escaped
+from levilab.report.tables.latex import as_latex, to_latex, units_in_heads
 from levilab.report.tables.values import Values, as_csv, of_analysis
-from levilab.report.tables.widths import LINE, PARAGRAPH, SMALL_SEPARATION, Fitted, fit, units_in_heads, width
 from support.paths import SAMPLE_DATA
 
 if TYPE_CHECKING:
@@ -76,7 +71,8 @@ HOSTILE = "\\input{/etc/passwd} \\write18{x} $ & # % _ ^ ~ { } < > | \" ` ' [x] 
 KNOWN = {
     "begin", "end", "centering", "caption", "label", "toprule", "midrule", "bottomrule", "textbf", "textsuperscript",
     "raisebox", "scriptsize", "setlength", "tabcolsep", "par", "smallskip", "footnotesize", "textbackslash",
-    "textasciicircum", "textasciitilde", "times", "nu", "frac", "ldots", "linewidth",
+    "textasciicircum", "textasciitilde", "times", "nu", "frac", "ldots", "linewidth", "resizebox", "ifdim", "width",
+    "else", "fi",
 }  # fmt: skip
 
 
@@ -101,76 +97,24 @@ def test_what_a_person_typed_is_no_command_of_latex() -> None:
 
 
 def test_numbers_are_typeset_as_in_the_report() -> None:
-    assert escaped("2.34(3)×10⁻⁴") == r"2.34(3)$\times$10\textsuperscript{$-$4}"
-    assert escaped("φ̇ and χ²") == r"$\dot\varphi$ and $\chi$\textsuperscript{2}"
+    assert to_latex("2.34(3)×10⁻⁴") == r"2.34(3)$\times$10\textsuperscript{$-$4}"
+    assert to_latex("φ̇ and χ²") == r"$\dot\varphi$ and $\chi$\textsuperscript{2}"
 
 
-def test_a_wide_table_is_folded_and_small_until_it_fits_a_line() -> None:
-    heads = ("source", "type", "u of it", "sensitivity", "adds to u", "share of u²")
-    rows = [
-        ("setting of the heights (not in u)", "B", "0.2 mm", "0.87 mT cm per mm", "0.17 mT cm", "2.9 %"),
-        ("combined: u", "", "", "", "1 mT cm", "< 0.1 %"),
-        ("temperature of the base (not in u)", "B", "not known", "0.28 mT cm per K", "—", ""),
-    ]
-    shown = table("", heads, rows, numbers=heads[2:])
-    fitted = fit(shown)
-    assert fitted.small
-    assert not fit(table("", heads[:2], [row[:2] for row in rows])).small
-    assert fitted.table.heads[4:] == ("adds to u\n[mT cm]", "share of u²\n[%]")
-    assert [row.cells[4] for row in fitted.table.rows] == ["0.17", "1", "—"]
-    assert set_width(fitted) < LINE
-    text = as_latex("budget", shown)
-    assert r"\footnotesize\setlength{\tabcolsep}{3pt}" in text
-    assert text.count(r"\begin{tabular}[b]{@{}r@{}}") >= 2, "heads end in one line"
-    assert r"\begin{tabular}[t]{@{}l@{}}" in text, "folded names begin in the line of their row"
-    assert text.index(r"\caption") < text.index(r"\footnotesize"), "all captions of a thesis are of one size"
-
-
-def test_a_paragraph_is_as_wide_in_small_letters() -> None:
-    heads = ("source", "where it comes from", "type", "sensitivity", "adds to u")
+def test_a_unit_stands_in_the_head_and_long_texts_are_paragraphs() -> None:
+    heads = ("source", "where it comes from", "type", "adds to u", "share of u²")
     remark = "the standard deviation of one top from another, of eight tops and two runs"
-    rows = [("temperature of the base", remark, "B", "0.28 mT cm per K", "not known"), ("u", "", "", "1", "2")]
-    fitted = fit(table("", heads, rows, numbers=heads[3:]))
-    assert fitted.paragraphs == {1}
-    assert fitted.table.rows[0].cells[1] == remark
-    assert set_width(fitted) < LINE
-
-
-def test_a_table_that_cannot_be_folded_stands_in_parts_each_with_its_first_column() -> None:
-    heads = ("run", "readings used", "C₁ [s⁻¹]", "C₂ [rad⁻¹]", "C₃/₂ [(rad/s)^−½/s]", "ν₀ [Hz]", "fit [(rad/s)^−½/s]")
-    row = ("spin-down-1", "20", "3.199(33)×10⁻³", "1.760(16)×10⁻⁵", "2.367(5)×10⁻⁴", "39.941(16)", "2.3687(35)×10⁻⁴")
-    shown = table("", heads, [row, Row(("mean", *row[1:]), "together")], numbers=heads[1:])
-    fitted = fit(shown)
-    assert fitted.parts == ((0, 1, 2, 3), (0, 4, 5, 6))
-    for part in fitted.parts:
-        rows = tuple(replace(one, cells=tuple(one.cells[k] for k in part)) for one in fitted.table.rows)
-        cut = replace(fitted.table, heads=tuple(fitted.table.heads[k] for k in part), rows=rows)
-        assert set_width(replace(fitted, table=cut)) < LINE
-    text = as_latex("runs", shown)
-    assert text.count(r"\toprule") == text.count(r"\bottomrule") == 2
-    assert text.count(r"\textbf{run}") == 2
-    assert text.count(r"\caption") == text.count(r"\label") == 1
-
-
-def test_a_number_leaves_its_unit_only_where_the_table_would_not_fit() -> None:
-    heads = ("source", "type", "u of it", "sensitivity", "adds to u", "share of u²")
-    unit = "(rad/s)^−½/s"
-    wide = ("last digit of the readings", "B", f"1.9×10⁻⁷ {unit}", f"9.9×10⁻⁶ {unit} per Hz", f"3×10⁻⁷ {unit}", "70 %")
-    rows = [wide, ("readings, by their stated u", "B", "0.03 Hz", "1", f"2.9×10⁻⁸ {unit}", "0.66 %")]
-    fitted = fit(table("", heads, rows, numbers=heads[2:]))
-    assert len(fitted.parts) == 1
-    assert set_width(fitted) < LINE
-    assert fitted.table.rows[1].cells[2] == "0.03 Hz"
-    roomy = fit(table("", heads[1:4], [row[1:4] for row in rows], numbers=heads[2:4]))
-    assert roomy.table.rows[0].cells[1] == wide[2]
-
-
-def set_width(fitted: Fitted) -> float:
-    """Width of a table in small letters [pt]; a paragraph is a part of the line, whatever the letters are."""
-    rows = (fitted.table.heads, *(row.cells for row in fitted.table.rows))
-    columns = [max(width(line) for cell in column for line in cell.split("\n")) for column in zip(*rows, strict=True)]
-    set_columns = (PARAGRAPH * LINE if k in fitted.paragraphs else 0.85 * found for k, found in enumerate(columns))
-    return sum(set_columns) + 2 * SMALL_SEPARATION * len(columns)
+    rows = [
+        ("setting of the heights", remark, "B", "0.17 mT cm", "2.9 %"),
+        ("combined: u", "", "", "1 mT cm", "< 0.1 %"),
+    ]
+    shown = units_in_heads(table("", heads, rows, numbers=heads[3:]))
+    assert shown.heads[3:] == ("adds to u\n[mT cm]", "share of u²\n[%]")
+    assert [row.cells[3] for row in shown.rows] == ["0.17", "1"]
+    text = as_latex("budget", shown)
+    assert r"\begin{tabular}{lp{0.4\linewidth}lrr}" in text
+    assert text.count(r"\begin{tabular}[b]{@{}r@{}}") == 2, "heads end in one line"
+    assert text.count("{") == text.count("}"), "the box that scales a wide table is closed"
 
 
 def test_of_trials_each_cell_keeps_what_chance_leaves_to_it() -> None:
@@ -183,8 +127,8 @@ def test_only_units_go_to_the_head() -> None:
     for behind in ("Hz (u not known)", "s ago", "tops", "of 120", "per"):
         shown = table("", ("x",), [(f"1.2 {behind}",), (f"3 {behind}",)], numbers=["x"])
         assert units_in_heads(shown) == shown
-    of_results = {in_words(unit) for unit in UNITS_IN_NAMES} | {shown.unit for shown in FIELD.values()}
-    for unit in of_results - {""} | set(WORDS.values()) | {"mT cm per K", "per Hz"}:
+    of_results = {text for unit in UNITS for text in (unit.text, unit.shown.unit, unit.fine.unit)} - {""}
+    for unit in of_results | {"(rad/s)^−4/5/s", "mT cm per K", "per Hz"}:
         found = units_in_heads(table("", ("x",), [(f"< −1.2(3)×10⁻³ {unit}",)], numbers=["x"]))
         assert found.heads == (f"x\n[{unit}]",)
 

@@ -7,8 +7,18 @@ import math
 
 import pytest
 
-from analysis.uncertainty import Estimate
-from levilab.reproduce.check import Among, Because, Check, Erratum, Statement, Verdict, Within, as_document
+from levilab.reproduce.check import (
+    Among,
+    Because,
+    Comparison,
+    Finding,
+    Verdict,
+    Within,
+    as_document,
+    erratum,
+    statement,
+)
+from levilab.reproduce.check import check as checked
 from levilab.stability.published.printed import Printed, published, several
 from support.paths import ROOT
 
@@ -16,9 +26,9 @@ PUBLISHED = ROOT / "levilab/stability/published"
 MEAN = Printed("21.86", "Hz", "ten", "a thesis")
 
 
-def check(value: float | None, way=None, u: float | None = None) -> Check:
+def check(value: float | None, way=None, u: float | None = None) -> Finding:
     given = () if way is None else (way,)
-    return Check("mean", MEAN, Estimate(value, u, "Hz"), *given)
+    return checked("mean", MEAN, value, *given, u=u)
 
 
 @pytest.mark.parametrize(
@@ -46,7 +56,8 @@ def test_a_tolerance_has_a_reason_and_an_edge():
 def test_a_number_that_the_start_decides_agrees_within_the_range_of_starts():
     falls = Among(21.6, 22.4, 0.0, "48 starts fall there")
     assert check(22.2, falls).verdict is Verdict.AGREES
-    assert check(22.2, falls).why == "48 starts fall there"
+    assert check(22.2, falls).comparison is Comparison.RANGE  # which is worth less, and the row says what it proves
+    assert "21.600 to 22.400" in check(22.2, falls).why
     assert check(22.2, Among(21.9, 22.4, 0.0, "")).verdict is Verdict.UNEXPECTED
     assert check(22.2, Among(21.9, 22.4, 0.04, "")).verdict is Verdict.AGREES
 
@@ -60,27 +71,28 @@ def test_a_difference_needs_a_reason_that_gives_the_published_value():
     assert check(21.86, Because("no reason is needed", explained=False)).why == ""
 
 
-def erratum(truth: float, by_printed: float | None, by_corrected: float) -> Erratum:
-    return Erratum("(1)", "lacks ½", "with ½", "energy", truth, by_printed, by_corrected, 1e-6)
+def slip(truth: float, by_printed: float | None, by_corrected: float) -> Finding:
+    numbers = {"truth": truth, "by_printed": by_printed, "by_corrected": by_corrected}
+    return erratum("(1)", "lacks ½", "with ½", "energy", tolerance=1e-6, **numbers)
 
 
 def test_an_erratum_holds_if_the_correction_is_right_and_the_print_is_wrong():
-    assert erratum(1.0, 2.0, 1.0).verdict is Verdict.DIFFERS
-    assert erratum(1.0, None, 1.0).verdict is Verdict.DIFFERS
-    assert erratum(2.0, 2.0, 1.0).verdict is Verdict.UNEXPECTED  # the print was right after all
-    assert erratum(1.0, 1.0, 1.0).verdict is Verdict.UNEXPECTED
-    assert erratum(1.0, 2.0, 1.1).verdict is Verdict.UNEXPECTED
+    assert slip(1.0, 2.0, 1.0).verdict is Verdict.DIFFERS
+    assert slip(1.0, None, 1.0).verdict is Verdict.DIFFERS
+    assert slip(2.0, 2.0, 1.0).verdict is Verdict.UNEXPECTED  # the print was right after all
+    assert slip(1.0, 1.0, 1.0).verdict is Verdict.UNEXPECTED
+    assert slip(1.0, 2.0, 1.1).verdict is Verdict.UNEXPECTED
 
 
 def test_a_statement_agrees_differs_for_a_reason_or_is_ours_alone():
-    assert Statement("a", "b", "it is", "it is", holds=True).verdict is Verdict.AGREES
-    assert Statement("a", "b", "", "it is", holds=True).verdict is Verdict.ADDED
-    assert Statement("a", "b", "it is", "it is not", holds=False).verdict is Verdict.UNEXPECTED
-    assert Statement("a", "b", "it is", "it is not", holds=False, reason="that").verdict is Verdict.DIFFERS
+    assert statement("a", "b", "it is", "it is", holds=True).verdict is Verdict.AGREES
+    assert statement("a", "b", "", "it is", holds=True).verdict is Verdict.ADDED
+    assert statement("a", "b", "it is", "it is not", holds=False).verdict is Verdict.UNEXPECTED
+    assert statement("a", "b", "it is", "it is not", holds=False, reason="that").verdict is Verdict.DIFFERS
 
 
 def test_a_document_has_no_number_that_json_has_not():
-    for one in (check(math.nan), check(21.8), erratum(1.0, math.nan, 1.0), Statement("a", "b", "c", "d", holds=True)):
+    for one in (check(math.nan), check(21.8), slip(1.0, math.nan, 1.0), statement("a", "b", "c", "d", holds=True)):
         json.dumps(as_document(one), allow_nan=False)
 
 

@@ -16,7 +16,6 @@ import levilab.simulator
 from levilab.errors import LevilabError
 from levilab.simulator.keys import SYNONYMS, as_toml
 from levilab.simulator.model import unit_vector
-from levilab.simulator.parts import CONSTANTS
 from levilab.simulator.scene import (
     Base,
     Drag,
@@ -34,6 +33,7 @@ from levilab.simulator.scene import (
     scene_of,
     with_settings,
 )
+from levilab.simulator.spin import DECAYS
 from support.paths import DOCS
 
 SCENES = Path(levilab.simulator.__file__).parent / "scenes"
@@ -393,7 +393,7 @@ def test_the_usual_mixed_drag_brakes_as_the_disc_does_in_the_range_that_was_meas
     np.testing.assert_allclose([c1, c2], [disc * math.sqrt(at) / 2, disc / math.sqrt(at) / 2], rtol=0.014)
 
 
-@pytest.mark.parametrize("law", ["none", *CONSTANTS])
+@pytest.mark.parametrize("law", ["none", *DECAYS])
 def test_another_law_takes_its_own_constant_and_not_that_of_the_law_before(law):
     assert with_settings(preset("friction"), [f"drag.law={law}"]).drag == Drag(law=law)
 
@@ -421,7 +421,7 @@ def test_a_drive_without_amplitude_and_a_constant_without_a_law_are_remarked_upo
     scene = with_settings(preset("driven"), ["drive.amplitude_t=0", "drag.coefficient=0.003"])
     assert remarks(scene) == [
         "the drive does nothing: drive.amplitude_t = 0",
-        "drag.coefficient = 0.003 does nothing: drag.law = none; stokes, newton, disc or mixed switches the drag on",
+        f"drag.coefficient = 0.003 does nothing: drag.law = none; one of {', '.join(DECAYS)} switches the drag on",
     ]
 
 
@@ -432,7 +432,7 @@ def test_a_drive_without_amplitude_and_a_constant_without_a_law_are_remarked_upo
         ("driven", ["drive.waveform=off", "drive.frequency_hz=29", "drive.off_s=3"], ["frequency_hz = 29.0 and drive"]),
         ("driven", ["drive.frequency_hz=29"], []),
         ("driven", ["drive.waveform=off"], []),
-        ("undriven", ["drag.coefficient=0.003"], ["drag.coefficient = 0.003 does nothing: drag.law = none; stokes"]),
+        ("undriven", ["drag.coefficient=0.003"], ["drag.coefficient = 0.003 does nothing: drag.law = none;"]),
         ("friction", ["drag.law=none"], []),
         ("undriven", ["washers.drag_share=0.5"], ["washers.drag_share = 0.5 does nothing: washers.inertia_kg_m2 = 0;"]),
         ("loose-washers", ["washers.drag_share=0.5"], []),
@@ -471,7 +471,7 @@ FROM_ZERO = st.floats(0.0, 999.0)
 ANY = finite(-9e5, 9e5)
 VECTORS = st.tuples(ANY, ANY, ANY)
 DRAGS = st.one_of(
-    st.builds(Drag, law=st.sampled_from(["none", *CONSTANTS])),
+    st.builds(Drag, law=st.sampled_from(["none", *DECAYS])),
     st.builds(Drag, law=st.sampled_from(["none", "stokes", "newton", "disc"]), coefficient=FROM_ZERO),
     st.builds(Drag, law=st.sampled_from(["none", "mixed"]), coefficient=st.tuples(FROM_ZERO, FROM_ZERO)),
 )

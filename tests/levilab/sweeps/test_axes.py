@@ -71,15 +71,6 @@ def test_axes_that_the_scene_lacks_or_that_are_invalid_are_named(axes: tuple[str
     assert said in refused.value.text
 
 
-def test_a_key_may_be_without_effect_in_some_rows_but_not_in_all(tmp_path: Path) -> None:
-    path = tmp_path / "points.csv"
-    path.write_text("drive.waveform,drive.amplitude_t\nsine,4e-4\noff,0\n", encoding="utf-8")
-    check_axes(preset("driven"), read_points(path))
-    path.write_text("drive.waveform,drive.amplitude_t\noff,4e-4\noff,0\n", encoding="utf-8")
-    with pytest.raises(UsageError, match="it changes nothing, since drive"):
-        check_axes(preset("driven"), read_points(path))
-
-
 def test_a_start_at_equilibrium_is_refused_where_the_top_floats_nowhere() -> None:
     scene = preset("undriven").changed({"start.place": "equilibrium"})
     with pytest.raises(UsageError, match=r"top\.mass_kg = 0\.0265.*does not float"):

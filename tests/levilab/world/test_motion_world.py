@@ -270,6 +270,19 @@ def test_the_light_is_one_pulse_a_turn_and_dark_without_a_top():
     assert np.all(top.light(-1.0, 1e-4, 1000) == 0.1)
 
 
+def test_a_top_that_spins_backwards_gives_the_pulses_of_its_mirror_image():
+    # mirrored at the x–z plane, in which it starts: moments and spins across it change their sign
+    upright = preset("undriven").changed({"start.tilt_rad": 0.0})
+    there, back = (upright.changed({"start.spin_hz": spin}) for spin in (30.0, -30.0))
+    forwards, backwards = (MotionWorld(scene, VirtualClock(), tape=Tape(noise=0.0)) for scene in (there, back))
+    light = backwards.light(0.0, 1e-4, 10_000)
+    assert np.count_nonzero((light[1:] > 0.6) & (light[:-1] <= 0.6)) == 30
+    assert light == pytest.approx(forwards.light(0.0, 1e-4, 10_000), abs=1e-3)  # the tape's place is interpolated
+    seen = [world.crossings(0.0, 1.0, Thresholds(0.6, 0.5, 1)) for world in (forwards, backwards)]
+    assert seen[1] == pytest.approx(seen[0], abs=1e-6)
+    assert seen[1].size == 30
+
+
 def test_a_pulse_is_lower_while_the_tape_bobs_out_of_the_lenss_view():
     light = world(tape=Tape(noise=0.0, view_m=0.005)).light(0.0, 2e-5, 100_000)
     starts = np.flatnonzero((light[1:] > 0.3) & (light[:-1] <= 0.3))

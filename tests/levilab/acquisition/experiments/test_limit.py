@@ -21,8 +21,9 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration, settings_of, with_settings
 from levilab.bench.config import ConfigError
 from levilab.errors import UsageError
-from levilab.pipelines.limit.analysis import METHOD, LimitOptions
-from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+from levilab.pipelines.limit.analysis import METHOD
+from levilab.pipelines.options import LimitOptions, SpinDownOptions
+from levilab.pipelines.spindown.analysis import analyze_spindowns
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 from support.acquisitions import Impatient, Silent, in_world
 

@@ -20,7 +20,8 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration, with_settings
 from levilab.interruption import Interrupted
-from levilab.pipelines.precession.analysis import METHOD, PrecessionOptions
+from levilab.pipelines.options import PrecessionOptions
+from levilab.pipelines.precession.analysis import METHOD
 from levilab.runs.run import Run
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld

@@ -11,22 +11,12 @@ import numpy as np
 import pytest
 
 from analysis.pulses.regression import student
-from levilab.crosscheck.own.model import Own, Trial
-from levilab.crosscheck.own.stored import file_of, read_own, store
-from levilab.crosscheck.own.study import (
-    ENOUGH,
-    FEWEST,
-    OWN,
-    TRIALS,
-    check_own,
-    holds,
-    in_words,
-    own_table,
-    seed_of,
-    trials_of_report,
-    wanted_deviation,
-)
-from levilab.crosscheck.study import Spread
+from levilab.crosscheck.own.model import Own
+from levilab.crosscheck.own.study import ENOUGH, FEWEST, OWN, TRIALS, seed_of, study_result, trials_of_report
+from levilab.crosscheck.stored import file_of, read_study, store
+from levilab.crosscheck.study import Spread, Verdict
+from levilab.crosscheck.subject import Trial
+from levilab.crosscheck.table import as_text, crosscheck_table
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
 from support.paths import ROOT
@@ -44,8 +34,8 @@ def result(name: str, *paths: Path) -> Any:
 
 @pytest.mark.parametrize("name", CHEAP)
 def test_estimates_and_uncertainties_are_right_for_the_samples(sample_data: Path, name: str):
-    found = check_own(name, result(name, *(sample_data / part for part in CHEAP[name])), {}, 150)
-    assert found.holds, in_words(found)
+    found = study_result(name, result(name, *(sample_data / part for part in CHEAP[name])), {}, 150)
+    assert found.holds, as_text(found)
     assert {one.n for one in found.spreads} == {150}
     assert not found.failures
 
@@ -84,18 +74,18 @@ def test_the_cost_of_a_spin_down_grows_with_its_runs_and_its_tilt(runs: Any, mon
 
 
 def test_one_spin_down_and_one_scan_come_to_their_own_values(sample_data: Path):
-    spin_down = check_own("spindown", result("spindown", sample_data / "spin-down-3"), {}, 6)
+    spin_down = study_result("spindown", result("spindown", sample_data / "spin-down-3"), {}, 6)
     assert [one.quantity for one in spin_down.spreads] == ["c32", "start_frequency", "exponent"]
     assert spin_down.laws.get("disc", 0) >= 3
     assert spin_down.excluded == 0
-    scan = check_own("field", result("field", sample_data / "field-scan"), {}, 12)
+    scan = study_result("field", result("field", sample_data / "field-scan"), {}, 12)
     assert [one.quantity for one in scan.spreads] == ["strength", "origin", "thickness", "background"]
     assert max(abs(value) for one in [*spin_down.spreads, *scan.spreads] for value in one.pulls) < 5
 
 
 def test_the_same_readings_have_the_same_trials_and_others_have_others(sample_data: Path):
     found = result("limit", sample_data / "lower-limits")
-    assert check_own("limit", found, {}, 20) == check_own("limit", found, {}, 20)
+    assert study_result("limit", found, {}, 20) == study_result("limit", found, {}, 20)
     assert seed_of("limit", ["a"]) != seed_of("limit", ["b"])
 
 
@@ -104,45 +94,62 @@ def spread(mean: float, deviation: float, n: int = 400) -> Spread:
     return Spread("x", tuple(mean + deviation * (z - z.mean()) / z.std(ddof=1)), 0.1)
 
 
-def test_a_bias_and_a_u_that_is_too_small_are_noticed_and_a_u_too_large_is_not():
-    assert holds(spread(0.0, 1.0))
-    assert not holds(spread(0.4, 1.0))
-    assert not holds(spread(0.0, 1.4))
-    assert holds(spread(0.0, 0.5))
+def test_a_bias_and_a_u_that_is_too_small_are_noticed_and_a_u_too_large_is_named():
+    assert spread(0.0, 1.0).verdict is Verdict.RIGHT
+    assert spread(0.4, 1.0).verdict is Verdict.WRONG
+    assert spread(0.0, 1.4).verdict is Verdict.WRONG
+    assert spread(0.0, 0.5).verdict is Verdict.TOO_LARGE
+
+
+@pytest.mark.parametrize("freedom", [None, 12])
+def test_chance_condemns_one_right_quantity_of_a_hundred(freedom: int | None):
+    random = np.random.default_rng(8)
+    draws = random.standard_normal((2000, 60)) if freedom is None else random.standard_t(freedom, (2000, 60))
+    verdicts = [Spread("x", tuple(pulls), freedom=freedom).verdict for pulls in draws.tolist()]
+    # a bound, not a rate: three numbers that hang together; with 60 pulls a deviation is skew, so up to twice as often
+    assert sum(one is Verdict.WRONG for one in verdicts) <= 2000 * 0.02
 
 
 def test_pulls_of_few_pulses_are_compared_with_students_law():
     t = np.random.default_rng(6).standard_t(9, 4000) / student(9)  # u with Student's factor
-    pulls = Spread("x", tuple(t), 0.1)
+    pulls = Spread("x", tuple(t), widened=9)
     assert pulls.coverage == pytest.approx(0.683, abs=0.022)  # 3 standard errors
-    assert pulls.deviation == pytest.approx(wanted_deviation(None, 9), abs=0.06)
-    assert holds(replace(pulls, pulls=tuple(1.08 * t)), widened=9)
-    assert not holds(replace(pulls, pulls=tuple(1.08 * t)))
-    assert not holds(replace(pulls, pulls=tuple(1.3 * t)), widened=9)
+    assert pulls.deviation == pytest.approx(pulls.wanted_deviation, abs=3 * pulls.u_deviation)
+    assert pulls.verdict is Verdict.RIGHT
+    assert replace(pulls, widened=None).verdict is Verdict.WRONG
+    assert replace(pulls, pulls=tuple(1.1 * t)).verdict is Verdict.WRONG
 
 
 def test_a_record_of_few_pulses_says_by_how_much_pulls_scatter(sample_data: Path):
-    checked = check_own("spin", result("spin", sample_data / "trace-laser"), {}, 150)
-    assert checked.widened == pytest.approx(15, abs=0.3)  # 19 pulses, four coefficients; the noise counts for nothing
+    checked = study_result("spin", result("spin", sample_data / "trace-laser"), {}, 150)
+    # 19 pulses, four coefficients; the noise counts for nothing
+    assert [one.widened for one in checked.spreads] == pytest.approx([15, 15], abs=0.3)
     assert checked.holds
-    assert "pulls have a standard deviation of 1.04" in in_words(checked)
+    assert "pulls have a standard deviation of 1.04" in as_text(checked)
     # single bends that were not fitted made it 1.3 to 1.5, single records at half the frequency 1000
     assert {round(one.deviation, 1) for one in checked.spreads} <= {0.9, 1.0, 1.1}
 
 
 def test_the_table_says_what_is_wanted_of_each_row(runs: Any):
-    found = check_own("spindown", runs, {}, 6)
-    assert found.freedom == {"c32": 1}  # two runs that differ by more than their readings explain
-    one_run, together, exponent = (row.cells for row in own_table(found).rows)
-    assert one_run[3].endswith(" (1)")
-    assert one_run[4].endswith(" % (68 %)")
-    assert together[3].endswith(" (not judged)")
-    assert together[4].endswith(" % (50 %)")  # Student's t with one degree of freedom: 2 arctan(1)/π
-    assert exponent[4].endswith(" % (68 %)")
-    assert "Student's t with 1 degree of freedom has no finite standard deviation" in in_words(found)
-    few = replace(found, freedom={"c32": 6})
-    assert "Student's t with 6 degrees of freedom has long tails" in in_words(few)
-    assert "not judged" not in in_words(replace(found, freedom={"c32": 20}))
+    found = study_result("spindown", runs, {}, 6)
+    assert [one.freedom for one in found.spreads] == [
+        None,
+        1,
+        None,
+    ]  # two runs that differ by more than their readings explain
+    one_run, together, exponent = (row.cells for row in crosscheck_table([found]).rows)
+    assert one_run[4].endswith(" (1)")
+    assert one_run[5].endswith(" % (68 %)")
+    assert together[4].endswith(" (not judged)")
+    assert together[5].endswith(" % (50 %)")  # Student's t with one degree of freedom: 2 arctan(1)/π
+    assert exponent[5].endswith(" % (68 %)")
+    assert "Student's t with 1 degree of freedom has no finite standard deviation" in as_text(found)
+    few, many = (
+        replace(found, spreads=tuple(replace(one, freedom=n if one.freedom else None) for one in found.spreads))
+        for n in (6, 20)
+    )
+    assert "Student's t with 6 degrees of freedom has long tails" in as_text(few)
+    assert "not judged" not in as_text(many)
 
 
 def test_a_wrong_analysis_is_named(monkeypatch: pytest.MonkeyPatch, sample_data: Path):
@@ -153,27 +160,27 @@ def test_a_wrong_analysis_is_named(monkeypatch: pytest.MonkeyPatch, sample_data:
     found = result("limit", sample_data / "lower-limits")
     real = OWN["limit"](found)
     monkeypatch.setattr("levilab.crosscheck.own.study.OWN", {"limit": lambda _: Own("wrong", off, 0.001)})
-    checked = check_own("limit", found, {}, 100)
+    checked = study_result("limit", found, {}, 100)
     assert not checked.holds
-    assert "not right in mean" in in_words(checked)
-    assert own_table(checked).rows[0].cells[-1] == "NO"
+    assert "not right in mean" in as_text(checked)
+    assert crosscheck_table([checked]).rows[0].cells[-1] == "NO"
 
 
 def test_trials_are_kept_beside_the_run_and_read_for_just_this_result(sample_data: Path, tmp_path: Path):
     shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
     row, found = ANALYSES["limit"], result("limit", tmp_path / "run")
     settings = row.settings_of(found)
-    checked = check_own("limit", found, settings, 10)
+    checked = study_result("limit", found, settings, 10)
     store([checked], found.place)
     file = file_of(found.place)
     assert file == tmp_path / "run" / "crosscheck.json"
-    assert json.loads(file.read_text(encoding="utf-8"))["schema"] == "levilab-crosscheck-own/1"
+    assert json.loads(file.read_text(encoding="utf-8"))["schema"] == "levilab-crosscheck/1"
     inputs = list(checked.inputs)
-    assert read_own(found.place, "limit", inputs, settings) == checked
-    assert read_own(found.place, "limit", ["other readings"], settings) is None
-    assert read_own(found.place, "limit", inputs, settings | {"reading_u_hz": 0.1}) is None
-    file.write_text('{"schema": "levilab-crosscheck-own/1", "checks": [{}]}', encoding="utf-8")
+    assert read_study(found.place, "limit", inputs, settings) == checked
+    assert read_study(found.place, "limit", ["other readings"], settings) is None
+    assert read_study(found.place, "limit", inputs, settings | {"reading_u_hz": 0.1}) is None
+    file.write_text('{"schema": "levilab-crosscheck/1", "checks": [{}]}', encoding="utf-8")
     with pytest.raises(DataError, match=r"crosscheck\.json.*--like"):
-        read_own(found.place, "limit", inputs, settings)
-    file.write_text('{"schema": "levilab-crosscheck/1"}', encoding="utf-8")  # of `levilab crosscheck --out`
-    assert read_own(found.place, "limit", inputs, settings) is None
+        read_study(found.place, "limit", inputs, settings)
+    file.write_text('{"schema": "another program\'s"}', encoding="utf-8")
+    assert read_study(found.place, "limit", inputs, settings) is None

@@ -15,11 +15,12 @@ from levilab.formats.device import Device, DeviceError, read_device
 from levilab.formats.table import parse_columns
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.field.analysis import METHOD, NEEDS, FieldAnalysis
-from levilab.pipelines.field.device import FieldOptions, known_of
+from levilab.pipelines.field.device import known_of
 from levilab.pipelines.field.document import DOCUMENT
 from levilab.pipelines.field.figure import field_figure
 from levilab.pipelines.field.report import field_part
 from levilab.pipelines.field.table import scans_table
+from levilab.pipelines.options import FieldOptions
 from levilab.pipelines.result import save
 from levilab.pipelines.sources import collect
 from levilab.pipelines.top import calculate_top
@@ -248,7 +249,7 @@ def test_the_commands_print_and_refuse_in_one_line(
     assert top["values"]["mass"]["value"] == pytest.approx(0.02505)
     assert "I₃/I₁" in levilab("top", device).stdout
     for words, status, says in (
-        (("analyze", "field", scan, "--height", "1e9"), 2, "--height 1e+09: a number of millimetres"),
+        (("analyze", "field", scan, "--height", "1e9"), 2, "--height 1e+09: a number from -1000 to 2000 [mm]"),
         (("analyze", "field", scan, "--height-u", "1"), 2, "--height-u: goes with --height alone"),
         (("analyze", "field", scan, "--height", "73"), 1, "give it with --device"),
         (("analyze", "field", scan, "--device", "none.toml"), 1, "none.toml: there is no such file"),

@@ -11,13 +11,15 @@ import pytest
 from analysis.precession.gates import Gates, rates_at_point
 from instruments.drivers.oscilloscope import Trace
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.precession.analysis import METHOD, PrecessionAnalysis, PrecessionOptions
+from levilab.pipelines.options import PrecessionOptions
+from levilab.pipelines.precession.analysis import METHOD, PrecessionAnalysis
 from levilab.pipelines.precession.document import DOCUMENT
 from levilab.pipelines.precession.figure import precession_figure
 from levilab.pipelines.result import save
 from levilab.pipelines.suits import analyze_suiting
 from levilab.report.page import render
-from levilab.runs.gates import COUNTED, gates_event
+from levilab.runs.events import RunEvent
+from levilab.runs.gates import gates_event
 from levilab.runs.run import RunRecord, utc_now
 from levilab.runs.writer import RunWriter
 from support.commands import command
@@ -177,7 +179,9 @@ def test_a_reading_that_is_not_that_of_its_gates_is_believed_itself(tmp_path: Pa
             for k, drive in enumerate((44.0, 40.0, 36.0)):
                 length = random.uniform(0.75, 1.25, 10)
                 spin, laser = (Gates(begin, begin + length, drive + 0.02 * random.standard_normal(10)) for _ in "ab")
-                writer.event(20.0 * k + 19, COUNTED, "counted", drive_frequency_hz=drive, **gates_event(spin, laser))
+                writer.event(
+                    20.0 * k + 19, RunEvent.COUNTED, "counted", drive_frequency_hz=drive, **gates_event(spin, laser)
+                )
                 counted = rates_at_point(spin, laser)[1].value + change
                 writer.reading(dict(zip(names, (20.0 * (k + 1), drive, counted, 0.5), strict=True)))
             writer.finish("finished")

@@ -14,12 +14,13 @@ import levilab
 from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.spin.analysis import Series, SpinOptions, analyze_spins
+from levilab.pipelines.options import SpinDownOptions, SpinOptions
+from levilab.pipelines.spin.analysis import Series, analyze_spins
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spin.meaning import meaning
 from levilab.pipelines.spin.report import spin_part
 from levilab.pipelines.spin.table import spin_tables
-from levilab.pipelines.spindown.analysis import SpinDownOptions, analyze_spindowns
+from levilab.pipelines.spindown.analysis import analyze_spindowns
 from levilab.pipelines.suits import analyze_suiting
 from levilab.pipelines.suits import save as save_found
 from levilab.runs.run import Run, RunRecord, utc_now

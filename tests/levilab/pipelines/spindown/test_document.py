@@ -14,8 +14,9 @@ from analysis.spindown import drag
 from analysis.spindown.drag import LAWS
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import save
-from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis, SpinDownOptions, analyze_spindowns
+from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis, analyze_spindowns
 from levilab.pipelines.spindown.document import DOCUMENT
 from support.equal import differences
 from support.spin_downs import spin_down_csv

@@ -9,15 +9,16 @@ import pytest
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_hex
 
-from levilab.pipelines.spindown.analysis import SpinDownAnalysis, SpinDownOptions, analyze_spindowns
+from analysis.spindown.drag import LAWS
+from levilab.pipelines.options import SpinDownOptions
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
 from levilab.pipelines.spindown.figure import MOST_POINTS, spindown_figure
-from levilab.pipelines.spindown.laws import SHOWN_LAWS
 from levilab.present.looks import LOOKS
 from levilab.present.style import as_svg
 from support.figures import faults
 from support.spin_downs import spin_down_csv
 
-COLOURS = {name: LOOKS[name].colour for name in SHOWN_LAWS}
+COLOURS = {name: LOOKS[name].colour for name in LAWS}
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,18 +1,22 @@
-"""The step by forecast: errors near to the tolerance and below their estimates, and where the careful way is taken."""
+"""The step that a tolerance takes: errors near to the tolerance and below their estimates, no step too long."""
 
 import numpy as np
 import pytest
 
 from accuracy import KINDS, trial
-from levilab.simulator import forecast
+from levilab.simulator.accuracy import longest_step
+from levilab.simulator.model import model_of
+from levilab.simulator.problem import Problem, scheme_for
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
+from levilab.simulator.start import start_of
+from support.scenes import KINDS as KINDS_OF_SCENES
 
 UNDRIVEN = preset("undriven")
 
 
 def test_random_scenes_end_near_their_tolerance_and_below_their_estimate():
-    # 5 to 60 s, 1e-5 to 1e-10; benchmarks/accuracy.py has 1000 scenes
+    # 5 to 60 s, 1e-5 to 1e-10; benchmarks/accuracy.py has 1000 scenes: 74 % sharp, 98 % honest, 85 % at the first run
     draws = (np.random.default_rng([7, number]) for number in range(len(KINDS)))
     tried = [trial(kind, draw) for kind, draw in zip(KINDS, draws, strict=True) for _ in range(4)]
     found = [one for one in tried if one is not None]  # the others have fallen
@@ -30,13 +34,13 @@ def test_a_looser_tolerance_takes_longer_steps_also_between_samples(rate):
     assert loose.accuracy.step >= tight.accuracy.step
     assert loose.time.size == tight.time.size
     assert np.linalg.norm(loose.axis[-1] - tight.axis[-1]) <= loose.accuracy.axis
-    assert loose.accuracy.tries == tight.accuracy.tries == 1
 
 
-def test_backwards_the_forecast_is_as_good_as_forwards():
+def test_backwards_the_estimate_is_as_good_as_forwards():
     there = simulate(UNDRIVEN, 20.0, tolerance=1e-8, rate=None)
     back = simulate(UNDRIVEN, -20.0, tolerance=1e-8, rate=None, start=there.states[-1])
-    assert back.accuracy.tries == 1
+    assert there.accuracy.reached
+    assert back.accuracy.reached
     assert np.linalg.norm(back.axis[-1] - there.axis[0]) <= there.accuracy.axis + back.accuracy.axis
 
 
@@ -49,20 +53,30 @@ def test_backwards_the_forecast_is_as_good_as_forwards():
     ],
     ids=["disc", "fall", "drive that goes off"],
 )
-def test_where_the_law_may_not_hold_the_careful_way_is_taken(changes, monkeypatch):
-    found = []
-    real = forecast.run_by_forecast
-
-    def watch(*values):
-        found.append(real(*values))
-        return found[-1]
-
-    monkeypatch.setattr("levilab.simulator.single.run_by_forecast", watch)
+def test_the_estimate_bounds_the_error_where_the_motion_changes_on_the_way(changes):
     scene = UNDRIVEN.changed(changes)
     motion = simulate(scene, 3.0, tolerance=1e-8, rate=None)
-    assert found == [None]
+    assert motion.accuracy.reached
     exact = simulate(scene, 3.0, tolerance=1e-8, rate=None, step=motion.accuracy.step / 4)
     assert np.linalg.norm(motion.axis[-1] - exact.axis[-1]) <= motion.accuracy.axis + exact.accuracy.axis
+
+
+@pytest.mark.parametrize("kind", KINDS_OF_SCENES)
+def test_no_step_is_beyond_the_longest_that_the_kernels_hold_for(kind, monkeypatch):
+    scene = KINDS_OF_SCENES[kind]
+    longest = longest_step(scene, model_of(scene), start_of(scene), scheme_for(None, model_of(scene)))
+    taken, real = [], Problem.advance_to_stops
+
+    def watch(problem, start, stops, escape):
+        taken.append(float(np.max(np.abs(np.diff(stops.times)) / stops.counts)))
+        return real(problem, start, stops, escape)
+
+    monkeypatch.setattr(Problem, "advance_to_stops", watch)
+    for duration in (0.3, 3.0, 12.0):
+        for tolerance in (1.0, 1e-4, 1e-9):
+            for rate in (None, 30.0):
+                simulate(scene, duration, tolerance=tolerance, rate=rate)
+    assert max(taken) <= longest * (1 + 1e-9)  # rounding of the stops' times
 
 
 @pytest.mark.parametrize("duration", [9.0, 10.0, 12.0])

@@ -1,0 +1,33 @@
+"""A jump of a record's time, where a recorder lost or repeated samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A place where the record's time jumps.
+
+    Attributes:
+        at: the record's time there [s].
+        lost: time that is missing there, below 0 where samples were repeated [s]; whole turns cannot be seen.
+        u: its standard uncertainty [s].
+    """
+
+    at: float
+    lost: float
+    u: float = 0.0
+
+    def mend(self, times: Array) -> Array:
+        """Return what a clock would have shown at times of the record."""
+        return times + self.lost * (times > self.at)
+
+    def spoil(self, times: Array) -> Array:
+        """Return the record's times of what passed at times of the clock."""
+        return times - self.lost * (times > self.at + max(self.lost, 0.0))

@@ -1,0 +1,257 @@
+"""The options of the analyses: one field each, from which the command line, the notebook and reports take them.
+
+Nothing heavy is imported here: the help of the command line reads these fields.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from levilab.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from os import PathLike
+
+    from levilab.formats.device import Device
+
+Tilt = Literal["auto", "none", "fitted"]
+Method = Literal["auto", "edges", "matched", "likelihood"]
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option.
+
+    Attributes:
+        help: for people.
+        kind: type of the value on the command line.
+        metavar: its placeholder there.
+        typed: its name there; empty: that of the field; None: the command line lacks it.
+        unit: of the value there.
+        factor: from that unit to that of the field.
+        low, high: least and greatest value, in the unit of the field.
+        above: the value is greater than this.
+        choices: the values; empty: any.
+        default_text: the default where it is no value.
+        needs: the field of the option that it goes with.
+        read: from a given value to the field's; raises UsageError, DataError.
+    """
+
+    help: str
+    kind: type = str
+    metavar: str | None = None
+    typed: str | None = ""
+    unit: str = ""
+    factor: float = 1.0
+    low: float = -math.inf
+    high: float = math.inf
+    above: float | None = None
+    choices: tuple[str, ...] = ()
+    default_text: str | None = None
+    needs: str = ""
+    read: Callable[[Any], Any] | None = None
+
+    @property
+    def expected(self) -> str:
+        """The values that are allowed, with the unit of the command line."""
+        if self.choices:
+            return f"{', '.join(self.choices)} are known"
+        unit = f" [{self.unit}]" if self.unit else ""
+        if self.above is not None:
+            return f"a number above {self.above:g}{unit} is expected"
+        return f"a number from {self.low / self.factor:g} to {self.high / self.factor:g}{unit} is expected"
+
+    def allows(self, value: Any) -> bool:
+        """Return whether a value, in the unit of the field, is allowed."""
+        if self.choices:
+            return value in self.choices
+        if self.kind is not float:
+            return True
+        return self.low <= value <= self.high and math.isfinite(value) and (self.above is None or value > self.above)
+
+
+def _about(help: str, **more: Any) -> dict[str, Option]:  # noqa: A002 - as the attribute
+    """Return the metadata of a field of options; see `Option`."""
+    return {"option": Option(help, **more)}
+
+
+def _read_columns(given: Mapping[str, str | int] | str) -> dict[str, str] | None:
+    """Return the names of columns; None where none is named: those of an earlier result count."""
+    from levilab.formats.table import parse_columns
+
+    return (parse_columns(given) if isinstance(given, str) else {key: str(to) for key, to in given.items()}) or None
+
+
+def _read_device(path: str | PathLike[str]) -> Device:
+    from levilab.formats.device import read_device
+
+    return read_device(Path(path))
+
+
+_READING_U = _about(
+    "Standard uncertainty of every reading; goes before what the data say.",
+    kind=float, metavar="HZ", unit="Hz", above=0.0,
+)  # fmt: skip
+_KEEP_OUTLIERS = _about("Fit readings that look like miscounts, too.", kind=bool)
+_DEVICE = _about(
+    "Describes base and top, as sample_data/device.toml does; see levilab top.",
+    kind=Path, metavar="FILE", read=_read_device,
+)  # fmt: skip
+_CLOCK_U = _about(
+    "Relative standard uncertainty of the clock that counts or samples, as 2e-6, from its manual; the budgets show "
+    "what it does, it is in no u.",
+    kind=float, metavar="PART", above=0.0,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class InputOptions:
+    """Options of every analysis.
+
+    Attributes:
+        guess: whether a file without titles is taken for what it looks like.
+    """
+
+    columns: Mapping[str, str] | None = field(default=None, metadata=_about(
+        'Columns of your file: "t=Zeit,f=Kanal2" or "t=1,f=3"; with a unit in brackets: "f=Drehzahl [rpm]".',
+        metavar="NAME=COLUMN,…", read=_read_columns,
+    ))  # fmt: skip
+    channel: str | None = None
+    rate: float | None = None
+    guess: bool = True
+
+
+@dataclass(frozen=True)
+class RecordOptions(InputOptions):
+    """Options of analyses that read records of a detector."""
+
+    channel: str | None = field(default=None, metadata=_about(
+        "Channel of a record with several, by its name or number.", metavar="NAME",
+    ))  # fmt: skip
+    rate: float | None = field(default=None, metadata=_about(
+        "Samples per second, of files that do not say it, as .npy; goes before the file's.",
+        kind=float, metavar="HZ", unit="Hz", above=0.0,
+    ))  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SpinDownOptions(RecordOptions):
+    """Options of spin-downs."""
+
+    reading_u: float | None = field(default=None, metadata=_READING_U)
+    keep_outliers: bool = field(default=False, metadata=_KEEP_OUTLIERS)
+    tilt: Tilt = field(default="auto", metadata=_about(
+        "Whether counts hold the tilt of the top's moment.  auto: as fitted, but for a mock run whose top only spins.  "
+        "none: a top that only spins.",
+        choices=get_args(Tilt),
+    ))  # fmt: skip
+    device: Device | None = field(default=None, metadata=_DEVICE)
+    clock_u: float | None = field(default=None, metadata=_CLOCK_U)
+
+
+@dataclass(frozen=True)
+class SpinOptions(RecordOptions):
+    """Options of spin frequencies; see `analysis.pulses.spin_of_trace`."""
+
+    method: Method = field(default="auto", metadata=_about(
+        "How pulses are found: edges is the fastest, likelihood for weak ones.", choices=get_args(Method),
+    ))  # fmt: skip
+    clock_u: float | None = field(default=None, metadata=_CLOCK_U)
+
+
+@dataclass(frozen=True)
+class FieldOptions(InputOptions):
+    """Options of scans of the field."""
+
+    device: Device | None = field(default=None, metadata=_DEVICE)
+    height_m: float | None = field(default=None, metadata=_about(
+        "Height at which the top floats; its moment follows, if its mass is known.",
+        kind=float, metavar="MM", typed="height", unit="mm", factor=1e-3, low=-1.0, high=2.0,
+    ))  # fmt: skip
+    height_u_m: float | None = field(default=None, metadata=_about(
+        "Standard uncertainty of --height.", default_text="that of the scan's heights", needs="height_m",
+        kind=float, metavar="MM", typed="height_u", unit="mm", factor=1e-3, low=0.0, high=2.0,
+    ))  # fmt: skip
+    free_radii: bool = field(default=False, metadata=_about(
+        "Fit the radii, too, within the calliper's uncertainty.", kind=bool,
+    ))  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PrecessionOptions(InputOptions):
+    """Options of sweeps of the drive."""
+
+    reading_u: float | None = field(default=None, metadata=_READING_U)
+    keep_outliers: bool = field(default=False, metadata=_KEEP_OUTLIERS)
+    orthogonal: bool = field(default=False, metadata=_about(
+        "Use the uncertainty of the drive's frequency, too.", kind=bool,
+    ))  # fmt: skip
+    clock_u: float | None = field(default=None, metadata=_CLOCK_U)
+
+
+@dataclass(frozen=True)
+class LimitOptions(InputOptions):
+    """Options of limits of the spin."""
+
+    reading_u: float | None = field(default=None, metadata=_READING_U)
+    clock_u: float | None = field(default=None, metadata=_CLOCK_U)
+
+
+def options_of(kind: type[InputOptions]) -> dict[str, Option]:
+    """Return the options of an analysis by the names of their fields."""
+    return {one.name: one.metadata["option"] for one in fields(kind) if "option" in one.metadata}
+
+
+#: Name of the analysis → its options.
+KINDS: Mapping[str, type[InputOptions]] = MappingProxyType({
+    "spindown": SpinDownOptions, "spin": SpinOptions, "field": FieldOptions, "precession": PrecessionOptions,
+    "limit": LimitOptions,
+})  # fmt: skip
+#: All options by the names of their fields.
+OPTIONS: Mapping[str, Option] = MappingProxyType(
+    {name: one for kind in KINDS.values() for name, one in options_of(kind).items()}
+)
+#: Those that `levilab report` has, too.
+OF_REPORT = ("columns", "channel", "rate", "reading_u", "keep_outliers")
+
+
+def typed_name(name: str) -> str:
+    """Return the name of an option on the command line, without dashes.
+
+    >>> typed_name("height_m"), typed_name("reading_u")
+    ('height', 'reading_u')
+    """
+    return OPTIONS[name].typed or name
+
+
+def read_options(given: Mapping[str, Any], *, typed: bool = False) -> dict[str, Any]:
+    """Return options as analyses take them, without those that are None.
+
+    Args:
+        given: values by the names of the fields, in SI.
+        typed: the names and units are those of the command line.
+
+    Raises:
+        UsageError: a value is not allowed, or goes with another option alone.
+        DataError: of a file that an option names.
+    """
+    names = {typed_name(name) if typed else name: name for name in OPTIONS}
+    found: dict[str, Any] = {}
+    for shown, value in given.items():
+        one = OPTIONS[names[shown]]
+        if value is None:
+            continue
+        if one.needs and given.get(typed_name(one.needs) if typed else one.needs) is None:
+            raise UsageError(shown, f"goes with `{typed_name(one.needs) if typed else one.needs}` alone")
+        in_si = value * one.factor if typed and one.factor != 1 else value
+        if not one.allows(in_si):
+            raise UsageError(shown, one.expected, value=value)
+        read = one.read(in_si) if one.read else str(in_si) if one.choices else in_si
+        if read is not None:
+            found[names[shown]] = read
+    return found
