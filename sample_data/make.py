@@ -428,6 +428,7 @@ def main() -> None:
                 "note": f"run {number} of four; a stand-in for the thesis's run {number}",
                 "synthetic": True,
                 "synthetic_how": HOW.format(c1=c1, c2=c2, **how),
+                "world": "spin",
                 "published": {"c1_per_s": c1, "c2_per_rad": c2},
             },
         )
