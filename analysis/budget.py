@@ -116,7 +116,7 @@ class Budget:
         return self.included[0] if self.included and self.u > 0 else None
 
     def share(self, row: Component) -> float | None:
-        """Part of u² that a row is; of one that is not in u, what it would be of u² with it alone."""
+        """Return the part of a row in u²; for a row outside u, its part of the sum of both squares."""
         part = row.contribution
         if part is None or (not part and not self.u):
             return None
@@ -170,7 +170,7 @@ def u_of_limit(limit: float) -> float:
 
 
 def gate_bias(before: Array, middle: Array, after: Array) -> Array:
-    """By how much means over a gate exceed the values in its middle, by Simpson's rule: to second order ν″T²/24.
+    """Return the bias of means over a gate against the values in its middle, to second order ν″T²/24 (Simpson's rule).
 
     The next term is ν⁗T⁴/1920: of a spin that decays by 0.3 %/s and a gate of 10 s, 10⁻⁵ of this one.
 

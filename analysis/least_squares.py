@@ -52,7 +52,7 @@ def solve(
     most: int = MOST_EVALUATIONS,
     tolerance: float = TOLERANCE,
 ) -> tuple[Array, bool]:
-    """The parameters of the smallest sum of squares, and whether the search ended there.
+    """Find the parameters of the smallest sum of squares, and whether the search converged.
 
     A search that does not end in so many evaluations at `most` returns the best point found.  One that begins where a
     residual is no number has not ended, though MINPACK says so.
@@ -77,7 +77,7 @@ def solve(
 def profile(
     residual: Residual, gradient: Gradient, best: Array, u: Array, variance: float | None
 ) -> list[tuple[float, float] | None]:
-    """Profile-likelihood intervals of 68.27 %: where χ², minimised over the other parameters, has grown too much.
+    """Return profile-likelihood intervals of 68.27 %, over which χ² minimised by the other parameters is small enough.
 
     Args:
         residual: of parameters that are wanted themselves, not of a transform of them.

@@ -148,7 +148,7 @@ class Statistics:
 
 
 def summarize(sample: Sample) -> Statistics:
-    """Mean, scatter, standard error, trend and outliers of repeated limits.
+    """Return mean, scatter, standard error, trend and outliers of repeated limits.
 
     The mean is not weighted: tops differ by more than their limits are uncertain.  Its standard error is s/√n, no less
     than the limits' own uncertainties leave to it; where the drive made steps, with what these leave: tops that scatter
@@ -265,7 +265,7 @@ def _with_own_u(scatter: float, freedom: int) -> Estimate:
 
 
 def _freedom(variance: float, by_scatter: float, freedom: int) -> float | None:
-    """Of a variance of which only a part is from a scatter (Welch and Satterthwaite, GUM G.4)."""
+    """Return the degrees of freedom of a variance that only partly comes from a scatter (GUM G.4)."""
     return None if by_scatter == 0 else freedom * (variance / by_scatter) ** 2
 
 
@@ -291,7 +291,7 @@ def _between(means: Array, own: Array) -> float:
 
 
 def _weights(variances: Array) -> Array:
-    """Inverse variances, of the sum 1; all alike where there is no variance at all."""
+    """Return inverse variances, of the sum 1; all equal where there is no variance at all."""
     if not (variances > 0).all():
         return np.full(variances.size, 1 / variances.size)
     inverse = variances.min() / variances
@@ -326,7 +326,7 @@ def _common_error(scatter: float, step: float) -> float:
 
 
 def _trend(limits: Array) -> tuple[Estimate, float]:
-    """Slope of a straight line through the limits by their number, and its p-value (Student's t)."""
+    """Return the slope of a straight line through the limits by their number, and its p-value (Student's t)."""
     number = np.arange(limits.size) - (limits.size - 1) / 2
     square = float(number @ number)
     slope = float(number @ limits) / square
@@ -343,7 +343,7 @@ def _by_chance(t: float, freedom: float | None) -> float:
 
 
 def outliers_of(limits: Array) -> tuple[int, ...]:
-    """Numbers of limits that do not belong to the others: Grubbs's test, two-sided, again without the one found.
+    """Return the numbers of outliers: Grubbs's test, two-sided, repeated without each one found.
 
     At most a third are looked for; of fewer than five none.
     """
@@ -409,7 +409,7 @@ class NoWindow(AnalysisError):
 
 
 def nearest_edge(mean: float, window: tuple[float, float]) -> str:
-    """Whether a mean limit is a "lower" or an "upper" one: by the nearer edge of the window, in parts of it [Hz]."""
+    """Return which limit a mean is, "lower" or "upper": by ratio, the edge of the window that is nearer [Hz]."""
     low, high = window
     return "lower" if mean < math.sqrt(low * high) else "upper"
 

@@ -47,7 +47,7 @@ class Curvature:
 
 
 def curvature(gradient: Array) -> Curvature:
-    """Covariance for residuals of unit variance, and leverages, from slopes of shape (p, n).
+    """Return the covariance for residuals of unit variance, and leverages, from slopes of shape (p, n).
 
     By QR of the scaled slopes, never by their squares: a normal matrix loses half the digits.
     """
@@ -67,7 +67,7 @@ def curvature(gradient: Array) -> Curvature:
 
 
 def propagate(covariance: Array, slopes: Array) -> tuple[Array | None, Array]:
-    """Covariance of functions of parameters, and their standard uncertainties, to first order.
+    """Return the covariance of functions of parameters, and their standard uncertainties, to first order.
 
     Args:
         covariance: of the parameters, shape (p, p).
@@ -90,7 +90,7 @@ def propagate(covariance: Array, slopes: Array) -> tuple[Array | None, Array]:
 def bootstrap(
     refit: Callable[[Array], Array], residuals: Array, leverage: Array, *, samples: int, seed: int
 ) -> list[tuple[float, float] | None]:
-    """Percentile intervals of 68.27 % from a fit repeated with its own residuals, drawn anew.
+    """Return percentile intervals of 68.27 % from a fit repeated with its own residuals, drawn again.
 
     A residual is smaller than the error it stems from, by √(1 − leverage): that is put right first, and the mean
     taken off.

@@ -142,7 +142,7 @@ class Form:
     suffix: str = ""
 
     def matches(self, answer: str) -> bool:
-        """Whether the whole answer has this form."""
+        """Return whether the whole answer has this form."""
         return _compile(self.pattern).fullmatch(answer) is not None
 
     def number(self, answer: str) -> float:
@@ -172,7 +172,7 @@ IDENTITY_FIELDS = ("maker", "model", "serial number", "firmware")
 
 
 def identity_fields(answer: str) -> tuple[str, ...]:
-    """Maker, model, serial number and firmware of an answer to ``*IDN?``.
+    """Return maker, model, serial number and firmware of an answer to ``*IDN?``.
 
     Raises ValueError where there are not four fields, where maker or model is empty, or where it is no plain text.
 

@@ -225,7 +225,7 @@ def _remove_parts_of_the_dead(path: Path) -> None:
 
 
 def _is_alive(process: int) -> bool:
-    """Whether a process may be alive; False on Windows, where asking by a signal would end it."""
+    """Return whether a process may be alive; False on Windows, where asking by a signal would end it."""
     if os.name != "posix":
         return False
     try:

@@ -166,7 +166,7 @@ class FieldScan:
         return _ring(self.values)
 
     def model(self, height: Array) -> Array:
-        """Flux density as fitted, background included, at heights of shape (n,) [T]."""
+        """Return the fitted flux density, background included, at heights of shape (n,) [T]."""
         return np.asarray(on_axis(self.ring, height)[0] + self.values[3])
 
     @property
@@ -502,7 +502,7 @@ class UPart:
 
 
 def parts_of(scan: FieldScan, height_u: ArrayLike | float) -> dict[str, tuple[UPart, ...]]:
-    """What u of each parameter is made of.
+    """Return the parts of each parameter's u.
 
     The covariance of the fit is H = (Σ s sᵀ/σ² + Σ p pᵀ)⁻¹ = H (Σ s sᵀ u_b²/σ⁴ + Σ s sᵀ (B′u_z)²/σ⁴ + Σ p pᵀ) H: a sum
     of what readings, heights and each of the priors leave.

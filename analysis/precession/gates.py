@@ -182,7 +182,7 @@ def _columns(gates: Gates, frequency: float | None) -> Array:
 
 
 def _residual_sums(gates: Gates, frequencies: Array) -> Array:
-    """Σ residual² with a swing of each of these frequencies, shape (f,) [turns²].
+    """Return Σ residual² with a swing of each of these frequencies, shape (f,) [turns²].
 
     By least squares as `numpy.linalg.lstsq` does it, with its limit for columns that depend on each other, but for all
     frequencies at once.

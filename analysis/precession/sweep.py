@@ -221,7 +221,7 @@ def _fit(sweep: Sweep, *, orthogonal: bool) -> Line:
 
 
 def _weight(sweep: Sweep, line: Line) -> Array:
-    """1/u² of each point in the fit, shape (n,)."""
+    """Return 1/u² of each point in the fit, shape (n,)."""
     u = np.ones_like(sweep.drive) if sweep.u is None else sweep.u
     if not line.orthogonal:
         return np.asarray(u**-2.0)

@@ -91,7 +91,7 @@ def _apart(y: Array, rate: float, lowest: float, highest: float) -> tuple[float,
 
 
 def _together(y: Array, rate: float, time: Array, frequency: float, slope: float) -> tuple[float, float]:
-    """Both made exact with the phases of the pieces."""
+    """Return frequency and slope, both made exact with the phases of the pieces."""
     duration = y.size / rate
     size = max(int(SHORT * rate), 1)
     starts = np.arange(0, y.size - size // 2, size)

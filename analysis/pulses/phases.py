@@ -67,7 +67,7 @@ def _kinds(track: Track, still: float) -> list[Kind]:
 
 
 def _slope(track: Track, i: int) -> float:
-    """Slope of the frequency at a window from its neighbours [Hz/s]."""
+    """Return the slope of the frequency at a window from its neighbours [Hz/s]."""
     reach = NEIGHBOURS // 2
     near = np.arange(max(i - reach, 0), min(i + reach + 1, track.time.size))
     if near.size < 2:
@@ -92,7 +92,7 @@ def _edge(track: Track, i: int, side: int) -> float:
 
 
 def _touching(found: list[Phase]) -> list[Phase]:
-    """Phases that end where an empty time begins."""
+    """Make phases end where an empty time begins."""
     result = []
     for i, phase in enumerate(found):
         start, end = phase.start, phase.end

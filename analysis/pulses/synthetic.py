@@ -116,7 +116,7 @@ def bound(snr: float) -> float:
 
 
 def make(case: Case, random: Random) -> Trace:
-    """One trace of a kind, its frequency, phase and all that disturbs it drawn at random."""
+    """Return one trace of a kind; its frequency, phase and disturbances are drawn at random."""
     frequency = case.frequency + random.uniform(-0.5, 0.5)
     duration = case.duration if case.turns is None else case.turns / frequency
     first = random.uniform(0, 1) if case.turns is None else 0.0

@@ -388,7 +388,7 @@ def _result(pulses: Found, start: float, rate: float, degree: int | None) -> Spi
 
 
 def _wider(found: Estimate, own: Estimate) -> Estimate:
-    """Return the estimate of a method with the scatter of the pulses' own places, and the distance to them, in u."""
+    """Return the estimate with u enlarged by the scatter of the pulses' places and the distance to their estimate."""
     assert found.value is not None
     assert found.u is not None
     assert own.value is not None

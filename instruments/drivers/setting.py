@@ -155,7 +155,7 @@ class Setting(Generic[T]):
         instrument.last_set[self.name_with_unit] = self._canonical(value)
 
     def differs(self, asked: T, answered: T, *, rounding: float = 0.0) -> bool:
-        """Whether an answer is another value than the one set, apart from rounding.
+        """Return whether an answer is another value than the one set, apart from rounding.
 
         Args:
             asked: the value set.
@@ -168,7 +168,7 @@ class Setting(Generic[T]):
         return self._canonical(asked) != self._canonical(answered)
 
     def _last_digit(self, value: float) -> float:
-        """One unit in the last digit of a number that the instrument keeps [unit]."""
+        """Return one unit in the last digit of a number that the instrument keeps [unit]."""
         if self.digits and 0 < value < math.inf:
             return 10.0 ** (math.floor(math.log10(value)) + 1 - self.digits)
         return (_PRINTED if self.resolution else _ROUNDING) * value
@@ -191,7 +191,7 @@ class Setting(Generic[T]):
         return answer
 
     def _may_be(self, number: float) -> bool:
-        """Whether the instrument may have this number, apart from the rounding of its limits."""
+        """Return whether the instrument may have this number, apart from the rounding of its limits."""
         if self.values:
             return number in self.values
         low, high = self.span or (self.low, self.high)

@@ -206,12 +206,12 @@ class FreeTop(Generic[S]):
         return row | ({"spin_frequency_u_hz": u} if u else {})
 
     def _is_plausible(self, reading: Row) -> bool:
-        """Whether a reading is the first, or plausible after the last one."""
+        """Return whether a reading is the first, or plausible after the last one."""
         return self.last is None or is_plausible(self.last, reading)
 
 
 def gate_began(end: float, gate_s: float, count: float) -> float:
-    """When a gate that has just ended began [s].
+    """Return the time at which a gate that has just ended began [s].
 
     It lasts whole periods, up to the first pulse behind its length; before it the counter waits for a pulse, and reads
     its errors, so the exchange begins some 40 ms earlier.
@@ -228,7 +228,7 @@ def gate_began(end: float, gate_s: float, count: float) -> float:
 
 
 def is_plausible(last: Row, reading: Row) -> bool:
-    """Whether a free top can have the spin of a reading after the last one."""
+    """Return whether a free top can have the spin of a reading after the last one."""
     share = reading["spin_frequency_hz"] / last["spin_frequency_hz"]
     gap = reading["time_s"] - last["time_s"]
     lowest: float = 0.5 ** (1 + gap / _HALVING_S)
@@ -236,20 +236,20 @@ def is_plausible(last: Row, reading: Row) -> bool:
 
 
 def _is_drop(before: Row, last: Row) -> bool:
-    """Whether the spin fell from one reading to a later one by more than a coasting top's does."""
+    """Return whether the spin fell from one reading to a later one by more than a coasting top's does."""
     gap = last["time_s"] - before["time_s"]
     lowest: float = 0.5 ** (gap / _HALVING_S) / _HIGHEST_SHARE
     return last["spin_frequency_hz"] / before["spin_frequency_hz"] < lowest
 
 
 def _coasts(last: Row, reading: Row, times: int) -> bool:
-    """Whether a reading is so many times the spin of a top that coasts since the last one."""
+    """Return whether a reading is so many times the spin of a top that coasts since the last one."""
     one = reading | {"spin_frequency_hz": reading["spin_frequency_hz"] / times}
     return is_plausible(last, one) and not _is_drop(last, one)
 
 
 def _is_same_spin(first: Row, second: Row) -> bool:
-    """Whether two counts in succession are of one spin."""
+    """Return whether two counts in succession are of one spin."""
     return abs(second["spin_frequency_hz"] / first["spin_frequency_hz"] - 1) < _SAME_SHARE
 
 

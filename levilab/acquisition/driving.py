@@ -278,7 +278,7 @@ def _ramp(session: Session[D], start: float, target: float) -> float:
 
 
 def _until(session: Session[D], target: float, left_s: float) -> str:
-    """When a ramp reaches its end, in words; empty at the end, and on a clock that does not keep to the wall's."""
+    """Return the end of a ramp as text; empty at the end, and on a clock that does not keep to the wall's."""
     if left_s <= 0 or not math.isfinite(session.bench.clock.speed):
         return ""
     return f", {target:.2f} Hz in {clock(left_s)}"
@@ -308,7 +308,7 @@ def _hold(session: Session[D], drive: float) -> None:
 
 
 def has_drifted(counts: Sequence[float]) -> bool:
-    """Whether the second half of the counts lies off the first half, as those of a top that was lost meanwhile do.
+    """Return whether the second half of the counts lies off the first half, as when the top was lost meanwhile.
 
     A tape that slips is as far behind at first as it is at last.
 
@@ -358,7 +358,7 @@ def have_a_top(session: Session[D], text: str, number: int, *, within_s: float) 
 
 
 def is_over(session: Session[D]) -> bool:
-    """Whether the time that the run may take is over; says so."""
+    """Return whether the time that the run may take is over; says so."""
     longest = session.settings.longest_s
     if session.spent() <= longest:
         return False

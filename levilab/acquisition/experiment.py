@@ -68,7 +68,7 @@ class CounterSettings(ExperimentSettings):
         return self
 
     def with_jitter(self, jitter_s: float) -> Self:
-        """With the uncertainty that pulses which scatter by this much [s] give a reading, √2 jitter/gate turns."""
+        """Add the uncertainty of a reading from pulses that scatter by this much [s]: √2 jitter/gate turns."""
         u = self.reading_u_hz or round(2**0.5 * jitter_s / self.gate_s, 6)
         return self.model_copy(update={"reading_u_hz": u})
 

@@ -172,7 +172,7 @@ def _earlier(request: AcquisitionRequest) -> Earlier | None:
 
 
 def _note_instruments(session: Session[Any], moment: str) -> None:
-    """Identity and settings of each instrument go into run.json; a virtual one makes the run synthetic."""
+    """Write identity and settings of each instrument into run.json; a virtual one makes the run synthetic."""
     noted = {kind: dict(about) for kind, about in session.writer.record.instruments.items()}
     for kind, instrument in session.bench.instruments.items():
         about = noted.setdefault(kind, {})

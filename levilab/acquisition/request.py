@@ -204,7 +204,7 @@ def _check_given(config: BenchConfig, without: BenchConfig, experiment: str) -> 
 
 
 def _refused(config: BenchConfig, experiment: str) -> ConfigError | None:
-    """Why the bench does not allow the experiment's settings; None if it does."""
+    """Return why the bench does not allow the experiment's settings; None if it does."""
     try:
         settings_of(config, experiment).check(experiment, config.limits)
     except ConfigError as error:

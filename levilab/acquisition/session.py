@@ -132,11 +132,11 @@ class Session(Generic[S]):
     # --- time ---
 
     def now(self) -> float:
-        """Seconds since time zero."""
+        """Return the seconds since time zero."""
         return self.bench.clock.now() - (self.zero or 0.0)
 
     def spent(self) -> float:
-        """Seconds since this session began to measure."""
+        """Return the seconds since this session began to measure."""
         return self.now() - self.began
 
     def wait(self, duration: float) -> None:
@@ -362,7 +362,7 @@ def _head(channel: Channel) -> str:
 
 
 def _width(channel: Channel) -> int:
-    """Of a channel's values with their unit, and of its head."""
+    """Return the width of a channel's values with their unit, and of its heading."""
     width = 10 if channel.unit == "s" else 12 if channel.unit == "Hz" else 12 + len(channel.unit)
     return max(width, len(_head(channel)))
 

@@ -151,7 +151,7 @@ def _hash(text: str) -> str:
 
 
 def _json(document: Any) -> str:
-    """JSON that no text in it can end as a script of the page."""
+    """Return JSON in which no text can end a script of the page."""
     return json.dumps(document, sort_keys=True, separators=(",", ":")).replace("<", "\\u003c")
 
 
@@ -184,7 +184,7 @@ def _data(page: Page, alt: str, readings: list[tuple[str, str, int]]) -> dict[st
 
 
 def _readings(poses: Poses) -> list[tuple[str, str, int]]:
-    """Name, unit and digits after the point of what is read."""
+    """Return name, unit and digits after the point of each number on display."""
     found = [("time", "\u00a0s", 3), ("height", "\u00a0cm", 2), ("tilt", "°", 1), ("spin", "\u00a0Hz", 2)]
     columns = columns_of(poses)
     if "slip" in columns:
@@ -204,7 +204,7 @@ def _alt(page: Page) -> str:
 
 
 def _legend(poses: Poses) -> list[tuple[str, str]]:
-    """Colours, by their names in `parts.COLOURS`, and what they are."""
+    """Return colours, by their names in `parts.COLOURS`, and their meanings."""
     found = [
         ("magnet", "the top's magnet"),
         ("disc", "its disc, with a mark"),

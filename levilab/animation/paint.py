@@ -90,7 +90,7 @@ class _Camera:
         return flat
 
     def size_at(self, point: Array) -> float:
-        """Pixels in a metre at a point."""
+        """Return the pixels in a metre at a point."""
         return float(self.scale / -((point - self.place) @ self.frame[2]))
 
 
@@ -158,7 +158,7 @@ class Painter:
         return image.reduce(_FINER)
 
     def where(self, point: Sequence[float]) -> tuple[float, float]:
-        """Where a point [m] lies in the picture [pixels]."""
+        """Return the place of a point [m] in the picture [pixels]."""
         x, y = self._camera.project(np.array(point, dtype=np.float64)) / _FINER
         return float(x), float(y)
 
@@ -219,7 +219,7 @@ class Painter:
     # --- what moves ---
 
     def _draw_shadow(self, image: Image, pose: Pose) -> None:
-        """Of light from straight above: softer, the higher the top."""
+        """Draw the shadow of light from straight above: softer, the higher the top."""
         x, y, z = pose.position
         bottom = self.parts["base"]["bottom"]
         radius = self._widest * (1.2 + _SOFTER / self._reach * max(z - bottom, 0.0))
@@ -283,7 +283,7 @@ class Painter:
                 self._draw_solid(pen, pose, solid, lean)
 
     def _draw_trail(self, pen: ImageDraw, trail: Array) -> None:
-        """Fading towards its beginning."""
+        """Draw the trail, fading towards its beginning."""
         flat = self._camera.project(trail)
         old, new = np.array(self.colours["background"]), np.array(self.colours["path"])
         pieces = 12
@@ -318,7 +318,7 @@ class Painter:
             self._draw_spin(pen, pose, lean, front=True)
 
     def _draw_spin(self, pen: ImageDraw, pose: Pose, lean: Array, *, front: bool) -> None:
-        """Three quarters of a circle around the stem; the piece before the stem comes after it."""
+        """Draw three quarters of a circle around the stem; the piece before the stem comes after it."""
         radius, height = self.parts["spin"]["radius"], self.parts["spin"]["height"]
         angles = pose.sense * np.linspace(0.0, 0.72 * 2 * np.pi, 49)
         circle = np.stack([radius * np.cos(angles), radius * np.sin(angles), np.full(49, height)], axis=1)
@@ -422,13 +422,13 @@ def _about_z(angle: float) -> Array:
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First places of the runs of True, and the places after their last."""
+    """Return the first places of the runs of True, and the places after their last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
 
 
 def _camera(parts: dict[str, Any], size: tuple[int, int]) -> _Camera:
-    """As `placeCamera` of top.js has it."""
+    """Place the camera as `placeCamera` of top.js does."""
     reach, top, bottom = parts["view"]["reach"], parts["view"]["top"], parts["base"]["bottom"]
     aspect, half = size[0] / size[1], math.tan(_VIEW_RAD / 2)
     target = np.array([0.0, 0.0, 0.48 * top + 0.52 * bottom])
@@ -459,7 +459,7 @@ def _flat(points: Array) -> list[float]:
 
 
 def font(size: float) -> FreeTypeFont | ImageFont:
-    """DejaVu Sans, which comes with matplotlib and has the letters of names in any European language and of physics."""
+    """Return DejaVu Sans, which comes with matplotlib and has the letters of all European languages and of physics."""
     from PIL import ImageFont
 
     found = find_spec("matplotlib")

@@ -87,7 +87,7 @@ def parts_of(scene: Scene, height: float | None = None) -> dict[str, Any]:
 
 
 def _parts(radius: float, half: float) -> list[dict[str, Any]]:
-    """From the tip below to the stem above; lengths as parts of the magnet's radius, heights from its upper face."""
+    """Return the parts from tip to stem; lengths in radii of the magnet, heights from its upper face."""
     washers = [
         _part(f"washer {k + 1}", "washers" if k == 2 else "", "washers", _edged(0.52, low, low + 0.075, 0.012))
         for k, low in enumerate((0.300, 0.376, 0.452))
@@ -121,7 +121,7 @@ def _edged(radius: float, low: float, high: float, edge: float) -> Outline:
 
 
 def _marks(radius: float, half: float, *, loose: bool) -> list[dict[str, Any]]:
-    """White tape on the rim, or on washers that slip, as on the virtual bench; and a mark on the disc.
+    """Return white tape on the rim, or on washers that slip, as on the virtual bench; and a mark on the disc.
 
     The tape is where the transverse part of the moment points.  The mark is opposite, and with loose washers below the
     tape: both part as the washers slip.
@@ -161,5 +161,5 @@ def _direction(scene: Scene) -> list[float] | None:
 
 
 def _usual_height(scene: Scene) -> float:
-    """Near to where the top starts [m]; where it floats is not computed for a picture, and is a matter of the base."""
+    """Return a height near the top's start [m]; where it floats depends on the base and need not be computed."""
     return scene.start.position_m[2] if scene.start.place == "given" else _FLOATS * scene.base.outer_radius_m

@@ -198,7 +198,7 @@ def animate(
 
 
 def _span(request: AnimationRequest, end: float, *, fell: bool = False) -> tuple[float, float]:
-    """From where to where [s]: what is asked for, of a motion up to this end; the last seconds of one that fell."""
+    """Return the first and last time to show [s]: as requested, up to this end; the last seconds of a top that fell."""
     usual = request.format.span_s
     stop = end if request.stop is None else min(request.stop, end)
     if request.start is not None:
@@ -209,7 +209,7 @@ def _span(request: AnimationRequest, end: float, *, fell: bool = False) -> tuple
 
 
 def _count_for_page(scene: Scene, span: float, turns: float) -> int:
-    """Intervals between the poses of a page: enough for each turn, and as many as fit.
+    """Return the number of intervals between the poses of a page: enough for each turn, within what fits.
 
     Args:
         scene: whose poses they are.

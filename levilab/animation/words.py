@@ -46,7 +46,7 @@ def span_in_words(poses: Poses) -> str:
 
 
 def readout(poses: Poses, k: int) -> list[tuple[str, str]]:
-    """Names and values of what is read at the k-th pose."""
+    """Return names and values of the numbers on display at the k-th pose."""
     rows = [
         ("time", f"{poses.times[k]:.3f} s"),
         ("height", f"{with_decimals(100 * poses.positions[k, 2], 2)} cm"),

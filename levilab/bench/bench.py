@@ -67,7 +67,7 @@ class Bench:
         return self.instruments[kind].changed_settings(since=self._prepared.get(kind, {}))
 
     def address(self, kind: str) -> str:
-        """Where an instrument is."""
+        """Return the address of an instrument."""
         return self.instruments[kind].transport.address
 
     def reopen(self, kind: str) -> None:

@@ -98,7 +98,7 @@ READINGS: dict[str, Callable[[Bench, Light], Reading]] = {
 
 
 def check(wiring: Wiring, light: Light) -> Iterator[Checked]:
-    """Each instrument of a bench, one after the other.
+    """Check each instrument of a bench, one after the other.
 
     The generator's output is off afterwards.  Raises ConfigError where nothing is described.
     """

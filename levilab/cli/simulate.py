@@ -225,7 +225,7 @@ def benchmark_simulator(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    r"""Speed against error of the simulator, with scipy's and heyoka's integrators on the same motion.
+    r"""Measure speed and error of the simulator, with scipy's and heyoka's integrators on the same motion.
 
     heyoka takes part if it is installed: pip install ".\[peers]" in the
     clone.  Leave the machine alone meanwhile.
@@ -249,7 +249,7 @@ def benchmark_estimators(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Error and speed of the frequency of light pulses, with an FFT, an autocorrelation and find_peaks beside.
+    """Measure error and speed of the estimators of a pulse frequency, beside an FFT, an autocorrelation and find_peaks.
 
     RMSE over the Cramér–Rao bound from 0 to 40 dB, samples a second, and failures and coverage on hard traces.
     """

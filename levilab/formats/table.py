@@ -201,7 +201,7 @@ def parse_columns(text: str) -> dict[str, str]:
 
 
 def _in_one_word(columns: Iterable[str]) -> str:
-    """Columns as any shell takes them: PowerShell would split them at a comma."""
+    """Return columns as any shell takes them: PowerShell would split them at a comma."""
     text = ",".join(columns)
     return f'"{text}"' if "," in text else text
 

@@ -130,7 +130,7 @@ class Analyses:
         } | (_result(folder) if self._is_new(folder / RESULT) else {})
 
     def _is_new(self, path: Path) -> bool:
-        """Whether a file is there, and was not before the analysis that was asked for last."""
+        """Return whether a file is there, and was not before the analysis that was asked for last."""
         now = stamp(path)
         return now is not None and now != self._before.get(path)
 
@@ -168,5 +168,5 @@ def _values(values: Any) -> list[str]:
 
 
 def _is_number(value: Any) -> bool:
-    """Whether it is a number as an analysis writes it; a person may have changed the file."""
+    """Return whether it is a number as an analysis writes it; a person may have changed the file."""
     return isinstance(value, float) and math.isfinite(value)

@@ -37,7 +37,7 @@ class Choice:
 
 
 def run_names(root: Path) -> list[str]:
-    """Names of the newest runs in a folder, newest first: names begin with the time.  None where there is no folder."""
+    """Return the names of the newest runs in a folder, newest first; None without a folder."""
     return heapq.nlargest(MOST_RUNS, _names(root))
 
 

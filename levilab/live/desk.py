@@ -83,11 +83,11 @@ class Desk:
         return self._records
 
     def address(self) -> Address | None:
-        """Where it publishes; None until it is ready."""
+        """Return the address at which the bench publishes; None until it is ready."""
         return self.bench.address
 
     def step(self) -> None:
-        """Hear what is new."""
+        """Read the new events of the bench."""
         for event in self.bench.events():
             self.count += 1
             if event.kind == "ready":

@@ -71,7 +71,7 @@ class Followed:
         )
 
     def _read_all(self, tail: Tail, take: Callable[[list[bytes]], None], end: float) -> bool:
-        """Whether more is left when the time is over."""
+        """Return whether more is left when the time is over."""
         while lines := tail.lines():
             take(lines)
             if self.clock() > end:
@@ -160,7 +160,7 @@ def numbers(lines: list[bytes], columns: int) -> NDArray[np.float64]:
 
 
 def _known(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Numbers with which instruments say that they have no value are none; a row without a first value is left out."""
+    """Replace by NaN the numbers with which instruments say "no value"; drop rows without a first value."""
     rows[~(np.abs(rows) < NO_READING)] = np.nan
     return rows[~np.isnan(rows[:, 0])] if rows.shape[1] else rows
 

@@ -146,7 +146,7 @@ def spin_down(columns: Mapping[str, Array], size: int, _: Mapping[str, Any] = Ma
 
 
 def _times_of_fall(best: LawFit, last: float, duration: float) -> tuple[float, float] | None:
-    """When a law reaches the spins between which a top falls; None where the later one is far off [s]."""
+    """Return the times at which a law reaches the spins of a fall; None where the later one is far off [s]."""
     between = times_of_fall(lambda times: best.forecast(times, last), last, last + _BEYOND * duration)
     return between if math.isfinite(between[1]) else None
 

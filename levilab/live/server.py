@@ -73,7 +73,7 @@ class Hall:
     analyses: Analyses = field(default_factory=Analyses)
 
     def is_run(self, name: str) -> bool:
-        """Whether a run of this name lies in the folder; a name with a way to elsewhere does not."""
+        """Return whether a run of this name lies in the folder; a name with a way to elsewhere does not."""
         plain = bool(name) and name == Path(name).name and name not in {".", ".."}
         try:
             return plain and (self.root / name / RECORD).exists()
@@ -246,7 +246,7 @@ class Pages:
         return self._file(path, REPORT_POLICY) if is_here else _nothing()
 
     async def analysis(self, request: Request) -> Response:
-        """How far a run's analysis is, and what it says."""
+        """Return the progress of a run's analysis, and its answer."""
         name = request.path_params["run"]
         return self._json(self.hall.analyses.about(self.hall.root / name) if self.hall.is_run(name) else {})
 

@@ -337,7 +337,7 @@ def _readings(followed: Followed, ask: dict[str, Any]) -> dict[str, Any]:
 
 
 def _trend(groups: Any, place: dict[str, int]) -> float | None:
-    """How fast the spin changes by the last readings [Hz/s]; None where it cannot be said."""
+    """Return the rate of change of the spin by the last readings [Hz/s]; None where it is unknown."""
     if "time_s" not in place or "spin_frequency_hz" not in place:
         return None
     t, f = (groups.mean[place[name]][-4:] for name in ("time_s", "spin_frequency_hz"))

@@ -69,7 +69,7 @@ def motion_section(run: Run) -> Section:
 
 
 def motions_overview(runs: Sequence[Run]) -> Section:
-    """One section of many simulated motions: a row for each, no figures."""
+    """Return one section of many simulated motions: a row for each, no figures."""
     heads = ("run", "scene", "how it ended", "up for [s]", "spin at the end [Hz]")
     rows, unusable = [], []
     for run in runs:
@@ -89,7 +89,7 @@ def motions_overview(runs: Sequence[Run]) -> Section:
 
 
 def motion_values(runs: Sequence[Run]) -> tuple[tuple[str, ...], tuple[tuple[str | float | bool | None, ...], ...]]:
-    """Heads and rows of a table for programs: what run.json says of each motion in single numbers and words."""
+    """Return heads and rows of a table for programs: the single numbers and words of each motion in run.json."""
     found = [(run, document) for run in runs if (document := _document_or_none(run))]
     plain_keys = {
         key: None
@@ -165,7 +165,7 @@ _LIFETIME, _WHOLE_TIME = "lifetime", "up for the whole time"
 
 
 def _time_up(found: Mapping[str, Any]) -> tuple[str, str, float, str]:
-    """How long the top was up: of one that did not fall that is as long as it was simulated, and no lifetime."""
+    """Return how long the top was up; for one that did not fall, the simulated time, which is no lifetime."""
     return _LIFETIME if isinstance(found.get("fell"), dict) else _WHOLE_TIME, "s", 1.0, "end_s"
 
 

@@ -200,7 +200,7 @@ def kept_rows(motion: Trajectory, factor: int) -> np.ndarray[Any, np.dtype[np.in
 
 
 def state_rows(motion: Trajectory, rows: np.ndarray[Any, np.dtype[np.intp]]) -> Iterator[str]:
-    """Lines of states.csv, some at a time, in full precision."""
+    """Yield lines of states.csv, some at a time, in full precision."""
     table = np.column_stack([values(motion) for _, _, _, values in COLUMNS])
     for first in range(0, len(rows), _ROWS):
         block = table[rows[first : first + _ROWS]].tolist()

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def print_motion(summary: Summary, console: Console | None = None) -> None:
-    """How it ended, the motion in numbers, the lines of the axis, how good it is, and what to mind.
+    """Print the end of the motion, its numbers, the lines of the axis, the errors, and the warnings.
 
     Args:
         summary: of the motion.
@@ -45,7 +45,7 @@ def print_motion(summary: Summary, console: Console | None = None) -> None:
 
 
 def headline(summary: Summary) -> str:
-    """How it ended, in a line."""
+    """Return one line about the end of a motion."""
     name = summary.motion.scene.name or "the scene"
     if summary.motion.scene.observed == "spin":
         return f"{name}: the spin alone, for {summary.duration:g} s"
@@ -70,7 +70,7 @@ def _motion_facts(summary: Summary) -> list[tuple[str, str]]:
 
 
 def _angle(angle: float) -> str:
-    """In mrad only as long as it is small."""
+    """Return an angle, in mrad only if it is small."""
     degrees = f"{math.degrees(angle):.3g}°"
     return degrees if angle > 1 else f"{1000 * angle:.3g} mrad, {degrees}"
 
@@ -97,7 +97,7 @@ def _quality_facts(summary: Summary) -> list[tuple[str, str]]:
 
 
 def _rounded(speed: float) -> str:
-    """Two digits: more of a computer's speed is chance."""
+    """Return a speed with two digits: more of a computer's speed is chance."""
     return f"{float(f'{speed:.2g}'):,.0f}".replace(",", " ") if speed >= 10 else f"{speed:.2g}"
 
 
@@ -119,7 +119,7 @@ def _lines_table(summary: Summary) -> Table:
 
 
 def print_effects(effects: Sequence[Effect]) -> None:
-    """One row an effect: in or out, and what it changes."""
+    """Print one row an effect: in or out, and its influence."""
     changes = ("height \\[mm]", "precession \\[Hz]", "spin at the end \\[Hz]")
     table = new_table(
         "What is in this scene, and what is left out", "effect", "", *changes, "what it is, what else it does",
@@ -144,7 +144,7 @@ def print_effects(effects: Sequence[Effect]) -> None:
 
 
 def _shown(change: float, least: float, factor: float) -> str:
-    """Two digits: the next effect changes the third."""
+    """Return a change with two digits: the next effect changes the third."""
     if math.isnan(change):
         return "–"
     return with_minus(f"{factor * change:+.2g}") if change else f"< {factor * least:g}"

@@ -74,7 +74,10 @@ def _analyzed(
     in_words: Callable[[str], str],
     folder: Path | None = None,
 ) -> AnalysisResult:
-    """in_words: a message as the caller reads it; folder: in which DataFrames were written."""
+    """Analyze paths by a kind of analysis, or by the one that suits them all.
+
+    in_words: a message as the caller reads it; folder: of the files written from DataFrames.
+    """
     with _errors(in_words):
         if kind:
             analysis = ANALYSES[kind]

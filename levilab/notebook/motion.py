@@ -77,7 +77,7 @@ class SimulatedMotion(Trajectory):
         return pd.DataFrame({name: values(self) for name, _, _, values in COLUMNS})
 
     def plot(self) -> Figure:
-        """Path, height, spin, tilt and energy in time, and the spectrum of the axis; it needs no display."""
+        """Draw path, height, spin, tilt and energy in time, and the spectrum of the axis; it needs no display."""
         from levilab.motion.figure import motion_figure  # with matplotlib
         from levilab.present.style import for_notebooks
 

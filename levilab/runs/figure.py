@@ -24,7 +24,7 @@ _AGAINST = ("height_m", "time_s")
 
 
 def readings_figure(frame: pd.DataFrame, title: str) -> Figure:
-    """Each channel in a panel of its own, with its standard uncertainties where they are known.
+    """Draw each channel in a panel of its own, with its standard uncertainties where they are known.
 
     Args:
         frame: columns as in readings.csv.

@@ -66,7 +66,7 @@ class Listed:
 
 
 def list_runs(root: Path) -> list[Listed]:
-    """Every run at or below a folder, oldest first; a broken one is listed with what is wrong.  Raises DataError."""
+    """List every run at or below a folder, oldest first, the broken ones with their fault.  Raises DataError."""
     if root.is_file():
         raise DataError(f"{root}: is a file; name the folder that holds the runs")
     if not root.is_dir():
@@ -133,7 +133,7 @@ class _Rows(NamedTuple):
 
 
 def _read(run: Run) -> _Rows:
-    """By reading them as an analysis does.  Raises DataError."""
+    """Read the readings as an analysis does.  Raises DataError."""
     if not (run.folder / READINGS).exists():
         return _Rows(0, None, of_records=False)
     table = run.readings()
@@ -178,7 +178,7 @@ def _glance(run: Run) -> _Rows | None:
 
 
 def _length(run: Run, first: float, last: float) -> float:
-    """From time zero to the last reading [s]; limits and sweeps have their first one long after it."""
+    """Return the time from time zero to the last reading [s]; the first of a limit or a sweep may be long after it."""
     return last - (0.0 if run.record.time_zero_utc else first)
 
 

@@ -118,7 +118,7 @@ class Run:
         return f"<Run: {self.record.experiment}{when}, {self.status}{made_up}, in {self.folder}>"
 
     def _repr_html_(self) -> str:
-        """As a notebook shows it."""
+        """Return the HTML that a notebook shows."""
         frame, problem = self._frame_or_problem()
         count = "" if frame is None else f"{len(frame)}, the first {min(len(frame), SHOWN_ROWS)} below"
         facts = [
@@ -172,11 +172,11 @@ class Run:
         return load_traces(self.folder)
 
     def count(self) -> int:
-        """How many readings there are; a run of another kind, without readings.csv, has none."""
+        """Return the number of readings; a run of another kind, without readings.csv, has none."""
         return len(self.readings()) if (self.folder / READINGS).exists() else 0
 
     def elapsed(self) -> float:
-        """Seconds on the wall since time zero.  Raises DataError if the run ended before it, or the clock was set."""
+        """Return the wall clock's time since time zero [s].  Raises DataError without one, or if the clock was set back."""
         if self.record.time_zero_utc is None:
             raise DataError(
                 f"{self.folder}: ended before its first reading, there is nothing to go on with: start anew"
@@ -207,7 +207,7 @@ class Run:
 
 
 def _warnings_of(events: list[dict[str, Any]]) -> tuple[str, ...]:
-    """Each warning once; of those that differ in their numbers alone the first, and how many there are."""
+    """Return each warning once; of those that differ only in their numbers the first, with a count."""
     texts = [str(event["text"]) for event in events if event["kind"] == RunEvent.WARNING]
     alike = Counter(_NUMBERS.sub("#", text) for text in texts)
     firsts = {_NUMBERS.sub("#", text): text for text in reversed(texts)}
@@ -228,7 +228,7 @@ def _event(line: str) -> dict[str, Any] | None:
 
 
 def _is_alive(folder: Path) -> bool:
-    """Whether a process holds the folder's lock.  Looking never creates a file."""
+    """Return whether a process holds the folder's lock.  Looking never creates a file."""
     from filelock import Timeout
 
     if not (folder / LOCK).exists():

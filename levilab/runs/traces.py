@@ -137,7 +137,7 @@ def append_arriving(folder: Path, codes: Codes) -> None:
 
 
 def is_arriving(folder: Path) -> bool:
-    """Whether a run folder says how to read a record that is on its way."""
+    """Return whether a run folder says how to read a record that is on its way."""
     return (folder / ARRIVING).is_file()
 
 
@@ -189,7 +189,7 @@ def save_codes(folder: Path, head: Head, codes: Codes) -> str:
 
 
 def _path(number: int) -> str:
-    """Of the codes of a record, in the run folder."""
+    """Return the path of the codes of a record, in the run folder."""
     return f"{FOLDER}/{number:06d}.npy"
 
 
@@ -200,7 +200,7 @@ def _make_folder(folder: Path) -> None:
 
 
 def has_codes(folder: Path, line: str) -> bool:
-    """Whether the codes that a line of the index describes are in a run folder."""
+    """Return whether the codes that a line of the index describes are in a run folder."""
     return (folder / _line(folder / INDEX, line).path).is_file()
 
 
@@ -215,12 +215,12 @@ def last_number(folder: Path) -> int:
 
 
 def described_times(folder: Path) -> list[float]:
-    """When the records that the index of a run folder describes were kept [s].  Raises DataError."""
+    """Return the times at which the records in a run folder's index were kept [s].  Raises DataError."""
     return [_line(folder / INDEX, line).time_s for line in _lines(folder)]
 
 
 def undescribed_codes(folder: Path) -> list[str]:
-    """Codes in a run folder that nothing describes, as their paths in it.  Raises DataError."""
+    """Return the paths of the codes in a run folder that its index does not describe.  Raises DataError."""
     described = {_line(folder / INDEX, line).path for line in _lines(folder)}
     if found := arrived(folder):
         described.add(_path(found.number))

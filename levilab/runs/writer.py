@@ -167,7 +167,7 @@ class RunWriter:
         return gone
 
     def _holds_readings(self) -> bool:
-        """Whether there is more than a header, in memory or on the disk; what cannot be read may be readings."""
+        """Return whether there is more than a header, in memory or on the disk; what cannot be read may be readings."""
         if self._lines_kept(READINGS) > 1:
             return True
         try:
@@ -352,7 +352,7 @@ class RunWriter:
             replace_atomically(self.folder / RECORD, self.record.as_json())
 
     def _record_is_whole(self) -> bool:
-        """Whether run.json is there and can be read; a person may have changed it."""
+        """Return whether run.json is there and can be read; a person may have changed it."""
         try:
             if (self.folder / RECORD).stat().st_size == len(self.record.as_json().encode(errors="replace")):
                 return True
@@ -437,7 +437,7 @@ class _GrowingFile:
         self._file.close()
 
     def is_lost(self) -> bool:
-        """Whether the path no longer names this file, or not all of it."""
+        """Return whether the path no longer names this file, or not all of it."""
         if os.name == "nt":  # Windows removes no file that is open, and tells its size late
             return False
         try:
@@ -478,7 +478,7 @@ def _folder_beside(old: Path) -> Path:
 
 
 def _is_of(folder: Path, record: RunRecord) -> bool:
-    """Whether a folder's run.json is of this run, or so damaged that it says nothing."""
+    """Return whether a folder's run.json is of this run, or so damaged that it says nothing."""
     try:
         return read_record(folder).started_utc == record.started_utc
     except DataError:
@@ -511,7 +511,7 @@ def _copy_others(old: Path, new: Path, ours: set[str]) -> None:
 
 
 def _new_folder(out: Path, experiment: str) -> Path:
-    """``<UTC>-<experiment>-<four hex digits>``, one that is not there yet."""
+    """Create a new folder ``<UTC>-<experiment>-<four hex digits>``."""
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     while True:
         folder = out / f"{stamp}-{experiment}-{secrets.token_hex(2)}"

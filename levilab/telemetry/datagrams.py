@@ -46,7 +46,7 @@ def wish(token: bytes) -> bytes:
 
 
 def is_wish(data: bytes, token: bytes) -> bool:
-    """Whether a datagram is a view's wish, with this token."""
+    """Return whether a datagram is a view's wish, with this token."""
     return hmac.compare_digest(data, wish(token))
 
 

@@ -33,7 +33,7 @@ GOODBYE_S = 0.5
 
 
 def cluster(scheduler: str, *, patience_s: float = PATIENCE_S) -> Workers:
-    """Tasks on the workers of a Dask cluster.
+    """Return workers on a Dask cluster.
 
     Args:
         scheduler: its address, such as ``tcp://10.0.0.1:8786``, or the file that `dask scheduler --scheduler-file`

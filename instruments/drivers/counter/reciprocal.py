@@ -62,7 +62,7 @@ class ReciprocalCounter(ScpiInstrument):
         self.command(f"CONF:FREQ (@{channel})")
 
     def frequency(self) -> float | None:
-        """One reading [Hz], or None; see :class:`Counter`.  Raises CommandRefused if an error was waiting."""
+        """Return one reading [Hz], or None; see :class:`Counter`.  Raises CommandRefused if an error was waiting."""
         self._end_old_series()
         answer = self._ask("READ?", self._patience)
         with self.clearing_on_bad_answer():

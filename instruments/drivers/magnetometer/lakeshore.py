@@ -89,10 +89,10 @@ class LakeShoreGaussmeter(ScpiInstrument):
     mode: Setting[str]
 
     def forget_errors(self) -> None:
-        """There is no error queue."""
+        """Do nothing: there is no error queue."""
 
     def raise_errors(self, after: str) -> None:
-        """There is no error queue."""
+        """Do nothing: there is no error queue."""
 
     def command(self, message: str) -> None:
         """Set something and ask it back.  Raises CommandRefused when it is not so afterwards."""
@@ -108,7 +108,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
         return super().settings() | {"probe": probe, "range_t": self._range_t(probe)}
 
     def probe(self) -> str:
-        """HSE, HST or UHS: high sensitivity, high stability, ultra-high sensitivity.  Raises BadAnswer."""
+        """Return HSE, HST or UHS: high sensitivity, high stability, ultra-high sensitivity.  Raises BadAnswer."""
         answer = self.transport.query("TYPE?")
         if not re.fullmatch(r"[45][012]", answer, re.ASCII):
             self.reject("TYPE?", answer, "40 to 42, or 50 to 52: is a probe plugged in?")
@@ -123,7 +123,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
         return ranges[int(answer) - 1]
 
     def prepare(self, *, range_t: float | None) -> None:
-        """Steady fields in tesla; the smallest range that holds range_t; see :class:`Magnetometer`."""
+        """Measure steady fields in tesla, in the smallest range that holds range_t; see :class:`Magnetometer`."""
         self.unit = "TESLA"
         self.mode = self._STEADY
         if range_t is None:
@@ -137,7 +137,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
         self.command(f"RANGE {fitting[0]}")
 
     def flux_density(self) -> float | None:
-        """One reading [T]; see :class:`Magnetometer`.
+        """Return one reading [T]; see :class:`Magnetometer`.
 
         One message asks for the unit, the field, the unit again and the status: so the answer cannot be the one to
         another question.  The unit may be changed at the front panel between the two: then it is not known which one

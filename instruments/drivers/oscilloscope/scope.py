@@ -98,7 +98,7 @@ class Scope(ScpiInstrument):
         return {n: self.CHANNEL(self, n) for n in range(1, (self._inputs or 4) + 1)}
 
     def command(self, message: str) -> None:
-        """As every instrument; a reset takes the inputs' settings, too."""
+        """Send a command; a reset takes the inputs' settings, too."""
         super().command(message)
         if message.upper().startswith("*RST") and self._inputs:
             for channel in self.channel.values():
@@ -111,7 +111,7 @@ class Scope(ScpiInstrument):
         return int(digits[3]) if len(digits) > 3 and digits[3] in "1248" else 4
 
     def settings(self) -> dict[str, bool | float | str]:
-        """Every declared setting, those of the prepared channels as ``channel1_…``."""
+        """Return every declared setting, those of the prepared channels as ``channel1_…``."""
         channels = {
             f"channel{n}_{name}": value for n in self._channels for name, value in self.channel[n].settings().items()
         }
@@ -333,7 +333,7 @@ class Scope(ScpiInstrument):
         self._check("channel", channel, self._channels)
 
     def preamble(self, channel: int) -> Preamble:
-        """How the record of one channel is read; it is the one that is read next.  Raises NothingAcquired."""
+        """Read the preamble of one channel's record, the next to be fetched.  Raises NothingAcquired."""
         self._check_readable(channel)
         self._select(channel)
         answer = self.transport.query(":WAV:PRE?")

@@ -67,7 +67,7 @@ class HallProbe:
 
 
 def _frequency(field: NDArray[np.float64], step: float) -> float:
-    """Of an alternating field, by its rising crossings of the mean [Hz]; 0 if there are fewer than two."""
+    """Return the frequency of an alternating field, by its rising crossings of the mean [Hz]; 0 of fewer than two."""
     level = field - field.mean()
     rising = np.flatnonzero((level[:-1] < 0) & (level[1:] >= 0))
     if len(rising) < 2:

@@ -112,7 +112,7 @@ class Acquisition:
             self._forced = max(now, self.filled)
 
     def block(self) -> None:
-        """No trigger comes: the instrument is busy until a device clear."""
+        """Stay busy until a device clear: no trigger comes."""
         self.blocked = True
 
     def unblock(self) -> None:
@@ -173,7 +173,7 @@ class Acquisition:
         return True
 
     def running(self, now: float) -> bool:
-        """Whether the scope acquires or waits for a trigger."""
+        """Return whether the scope acquires or waits for a trigger."""
         self.follow(now)
         return self.armed is not None
 

@@ -189,7 +189,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
     ROWS: ClassVar = (*_CONTROL, *_TIME, *_TRIGGER, *_WAVEFORM, *_REST)
 
     def spell(self, value: float) -> str:
-        """As in the preamble that public drivers quote: 2.000000e-05."""
+        """Return a number as in the preamble that public drivers quote: 2.000000e-05."""
         return f"{value:.6e}"
 
     # --- acquiring ---
@@ -279,7 +279,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
         return tuple(depth // share for depth in _DEPTHS)
 
     def _share(self) -> int:
-        """By how many the converter and the memory are shared: 1, 2 or 4."""
+        """Return the number of channels that share converter and memory: 1, 2 or 4."""
         return {0: 1, 1: 1, 2: 2}.get(len(self.shown()), 4)
 
     # --- scaling ---
@@ -296,7 +296,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
         return min(fastest, points / length), points
 
     def screen(self) -> tuple[float, float]:
-        """Twelve divisions around the offset."""
+        """Return twelve divisions around the offset."""
         scale = self.value("time_scale")
         return self.value("time_offset") - 6 * scale, 12 * scale
 
@@ -373,7 +373,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
         return self.spell(self.measured(name, channel))
 
     def statistic(self, parameters: list[str]) -> str:
-        """Statistics of one: every value but the deviation is the present one."""
+        """Return a statistic of a measurement: every value but the deviation is the present one."""
         if not parameters:
             raise ScpiError(-109)
         kind = choice(parameters[0], _STATISTICS)
@@ -393,7 +393,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
 
 
 def _refuse_mathematics(on: bool) -> None:  # noqa: FBT001
-    """There is no mathematics in this model.  Raises ScpiError when it is switched on."""
+    """Refuse mathematics, which this model has not.  Raises ScpiError when it is switched on."""
     if on:
         raise ScpiError(-221)
 

@@ -247,7 +247,7 @@ def _measure(session: Session[FieldSettings], height: float) -> Row:
 
 
 def _read(session: Session[FieldSettings], height: float) -> float:
-    """One reading [T], after the interval.  Raises ExperimentFailed beyond the range."""
+    """Return one reading [T], after the interval.  Raises ExperimentFailed beyond the range."""
     session.wait(session.settings.interval_s)
     flux_density = session.bench.magnetometer.flux_density()
     if flux_density is None:
@@ -262,7 +262,7 @@ def _read(session: Session[FieldSettings], height: float) -> float:
 
 
 def _mean(settings: FieldSettings, values: list[float]) -> Row:
-    """Mean and standard uncertainties [T]; readings that all show the same digits are known to half of the last one."""
+    """Return mean and standard uncertainties [T]; readings that are all equal are known to half of the last digit."""
     n = len(values)
     mean = math.fsum(values) / n
     scatter = math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (n - 1) / n)
@@ -277,7 +277,7 @@ def _mean(settings: FieldSettings, values: list[float]) -> Row:
 
 
 def _digit(values: list[float]) -> float:
-    """Return the last digit of the instrument [T]: the smallest step between readings, else that of six digits."""
+    """Return the last digit of the instrument [T]: the least step between readings, or that of six digits."""
     different = sorted(set(values))
     steps = [b - a for a, b in pairwise(different)]
     largest = max(abs(value) for value in values)

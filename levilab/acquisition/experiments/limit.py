@@ -147,7 +147,7 @@ def _have_the_next_top(session: Session[LimitSettings]) -> bool:
 
 
 def _spins_freely(session: Session[LimitSettings]) -> bool:
-    """Whether the last top still spins, faster than the drive is to begin: one that only lost its lock."""
+    """Return whether the last top still spins, faster than the drive is to begin: one that only lost its lock."""
     spin = spin_now(session)
     return spin is not None and spin > session.settings.drive_frequency_hz
 
@@ -284,7 +284,7 @@ def _limit_of_loss(settings: LimitSettings, between: tuple[float, float], seen: 
 def _say_how_it_was_lost(
     session: Session[LimitSettings], lost: NotHeld, limit: Row, seen: list[tuple[float, float]]
 ) -> None:
-    """Whether the top is still up, and whether its tape slipped on the way; once the limit is kept."""
+    """Return whether the top is still up, and whether its tape slipped on the way; once the limit is kept."""
     top = FreeTop(session)
     is_up = lost.spin is not None or top.read() is not None or top.missed[-1] is Missed.UNSTEADY
     kind, what = (RunEvent.LOCK_LOST, "the drive lost the top") if is_up else (RunEvent.TOP_LOST, "the top fell")

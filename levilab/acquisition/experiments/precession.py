@@ -110,12 +110,12 @@ class PrecessionSettings(DriveSettings):
 
 
 def also_needs(settings: PrecessionSettings) -> tuple[str, ...]:
-    """Return the oscilloscope is needed for records only."""
+    """Return the oscilloscope, if there are to be records."""
     return ("oscilloscope",) if settings.record_s else ()
 
 
 def channels(settings: PrecessionSettings) -> tuple[Channel, ...]:
-    """One reading a point of the sweep."""
+    """Return the channels of a reading; each point of the sweep gives one."""
     over = f"{settings.counts} gates of {settings.gate_s:g} s"
     one = "that of one count in the configuration" if settings.reading_u_hz else f"scatter of {over}"
     u = f"{one} over √{settings.counts}"
@@ -160,7 +160,7 @@ def _points_done(rows: list[Row], sweep: tuple[float, ...]) -> int:
 
 
 def _time_left(settings: PrecessionSettings, done: int) -> float:
-    """Until the end, if the lock holds [s]."""
+    """Return the time that the rest of the sweep takes, if the lock holds [s]."""
     left = settings.sweep[max(done - 1, 0) :]
     way = sum(abs(b - a) for a, b in pairwise(left))
     looks = _LOOKS * max(settings.interval_s, settings.gate_s)
@@ -201,7 +201,7 @@ def _wait_for_lock(session: Session[PrecessionSettings], drive: float) -> None:
 
 
 def _measure(session: Session[PrecessionSettings], drive: float) -> tuple[Row, dict[str, Any]]:
-    """Spin and precession of a locked top, and the gates that they are from.  Raises as `_point`."""
+    """Measure spin and precession of a locked top, with the gates behind them.  Raises as `_point`."""
     settings = session.settings
     spins = _counted(session, drive, "spin_frequency_hz", settings.trigger_level_v, 1)
     _still_held(session, drive, spins.frequency)
@@ -250,7 +250,7 @@ def _calm(session: Session[PrecessionSettings], drive: float, swing: Swing | Non
 
 
 def calming_step(swing: Swing, drive: float, now: float, limits: DriveLimits) -> tuple[float, float] | None:
-    """When the drive's frequency is to differ for _STEP_S [s], and what it is then [Hz].
+    """Return when to begin a step of the drive's frequency [s], and the frequency during it [Hz].
 
     Forward where the top is farthest ahead, else back where it is farthest behind, whichever comes first and is within
     the limits of the drive; None where neither is.

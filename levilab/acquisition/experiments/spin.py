@@ -36,7 +36,7 @@ class SpinSettings(DriveSettings):
 
 
 def channels(settings: SpinSettings) -> tuple[Channel, ...]:
-    """Without reading_u_hz the column of uncertainties is left out."""
+    """Return the channels; without reading_u_hz there is no column of uncertainties."""
     columns = (
         Channel("time_s", "s", "bench clock, from the moment the drive is off"),
         Channel("spin_frequency_hz", "Hz", "frequency counter on the phototransistor, one pulse a turn"),
@@ -66,7 +66,7 @@ def run(session: Session[SpinSettings]) -> None:
 
 
 def keeps_its_spin(first: Row, last: Row) -> bool:
-    """Whether a top has lost much less of its spin than air takes from a free one, after a while."""
+    """Return whether a top has lost much less of its spin than air takes from a free one, after a while."""
     lapse = last["time_s"] - first["time_s"]
     return lapse >= _SEEN_TO_FALL_S and last["spin_frequency_hz"] > first["spin_frequency_hz"] * math.exp(
         -_LEAST_LOSS_PER_S / 2 * lapse
@@ -86,7 +86,7 @@ def _why_it_keeps_its_spin(session: Session[SpinSettings], first: Row, last: Row
 
 
 def time_left(first: Row, middle: Row, last: Row, longest_s: float) -> tuple[float, float]:
-    """Until the spins between which a top falls, and no longer than the run goes on, at least and at most [s].
+    """Return the least and the greatest time until the fall, at most the time left of the run [s].
 
     Drag slows the spin by dν/dt ∝ −νᵖ, with p from 1 (Stokes) to 2 (Newton).  The first and the last reading show the
     rate, the one in the middle shows p.  Until readings differ by much more than their noise, the rate is the usual one
@@ -116,7 +116,7 @@ def time_left(first: Row, middle: Row, last: Row, longest_s: float) -> tuple[flo
 
 
 def _powers(first: Row, middle: Row, last: Row, u: float) -> tuple[float, float]:
-    """Between which powers of the spin the drag is, from three readings of standard uncertainty u [Hz].
+    """Return the range of powers of the spin in the drag, from three readings of standard uncertainty u [Hz].
 
     The part of ∫ dν/νᵖ that is passed in the middle is that of the time, and goes nearly evenly with p from 1 to 2.
     """

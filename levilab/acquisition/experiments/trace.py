@@ -234,7 +234,7 @@ class _Watch:
 
 
 def spin_of_record(trace: Trace, level_v: float) -> float | None:
-    """How often a second the signal passes a level upwards: the median of the intervals [Hz]; None of fewer than three.
+    """Return the rate of rises through a level: the median of the intervals [Hz]; None of fewer than three.
 
     It passes once more only after it was below by a quarter of its range: noise on a flank is no pulse.
     """

@@ -162,7 +162,7 @@ def printed(text: str, dialect: Dialect) -> Printed | None:
 
 
 def dialect_of(head: Head) -> Dialect:
-    """As of any table; one number a line makes a table, too, here."""
+    """Find the dialect as for any table; here one number a line is a table, too."""
     sample = head.lines[-SAMPLE:]
     found = find_dialect(sample)
     texts = [line.strip() for line in sample if line.strip()]
@@ -202,7 +202,7 @@ def _is_number(text: str, dialect: Dialect) -> bool:
 
 
 def _first_row(rows: Sequence[Sequence[str]], after: int, index: int, dialect: Dialect) -> int | None:
-    """Index of the first row below `after` with a number at `index`."""
+    """Return the index of the first row below `after` with a number at `index`."""
     return next(
         (k for k in range(after + 1, len(rows)) if index < len(rows[k]) and _is_number(rows[k][index], dialect)), None
     )
@@ -464,7 +464,7 @@ def _bare(title: str) -> str:
 
 
 def _time_column(head: Head, layout: Layout, wanted: Mapping[str, str]) -> int:
-    """Index of the column of times: as named, by its title, else the first where there are no titles."""
+    """Return the index of the column of times: by name, by its title, else the first where there are no titles."""
     name = wanted.get("t") or wanted.get("time_s")
     folded = [title.casefold() for title in layout.header]
     if name is not None:

@@ -71,7 +71,7 @@ def read_blocks(path: Path, encoding: str, dialect: Dialect, first_line: int, us
 
 
 def _at_once(text: str, dialect: Dialect, used: Sequence[int]) -> Array | None:
-    """All rows by pandas; None where a line is not plain."""
+    """Read all rows by pandas; None where a line is not plain."""
     import pandas as pd
 
     if not text.strip():

@@ -227,7 +227,7 @@ _FINE = 1e-6
 
 
 def _fitted(path: Path, clock: _Clock, unit: float, *, first: float, mean: float, allowed: float) -> _Times:
-    """Where times alone give the step: from the ends, or by a straight line where they lost digits."""
+    """Return the step from the times alone: from the ends, or by a straight line where they lost digits."""
     if allowed / (clock.count - 1) < 1e-3 * _FINE * mean:
         return _Times(first, mean)
     step, resolution = clock.slope * unit, clock.resolution * unit
@@ -252,7 +252,7 @@ def _check_even(path: Path, clock: _Clock, unit: float, mean: float, allowed: fl
 
 
 def _contradiction(path: Path, header: Header, first: float, mean: float) -> _Times:
-    """Header and printed times disagree: a unit of the times that only the step shows, else a reason to refuse."""
+    """Return the times in the unit that makes header and printed times agree.  Raises TableError without one."""
     step = header.step.value if header.step else mean
     factor = next((unit for unit in _UNITS if abs(mean / step / unit - 1) < 1e-3), None)
     if factor is None:

@@ -84,7 +84,7 @@ def _signals(channels: int) -> tuple[Signal, ...]:
 
 
 def _bits(path: Path) -> int:
-    """Bits of a sample, 0 where they are not found; the format is the first chunk of nearly all files."""
+    """Return the bits of a sample, 0 where they are not found; the format is the first chunk of nearly all files."""
     with path.open("rb") as stream:
         head = stream.read(4096)
     place = head.find(b"fmt ")

@@ -82,7 +82,7 @@ class Waveform:
         return (self.count - 1) * self.step
 
     def signal(self, wanted: str | None = None) -> int:
-        """Index of a channel by its name, in any case, or its 1-based number; of the first without a name.
+        """Return the index of a channel by its name, in any case, or its 1-based number; the first without a name.
 
         Raises:
             NoSuchSignal: there is none of that name.
@@ -104,7 +104,7 @@ class Waveform:
         return self.read(self.signal(wanted))
 
     def samples(self, wanted: str | None = None) -> Array:
-        """All samples of a channel, shape (count,)."""
+        """Return all samples of a channel, shape (count,)."""
         found = list(self.blocks(wanted))
         return np.concatenate(found) if found else np.zeros(0)
 

@@ -177,7 +177,7 @@ def _in_words(spin: float | None) -> str:
 
 
 def work(options: PracticeOptions, pipe: Connection) -> None:
-    """Be the bench until the far end of the pipe is closed, or a signal asks for the end."""
+    """Run the bench until the far end of the pipe is closed, or a signal asks for the end."""
     with watching_for_end() as end:
         report = Reporter(pipe)
         try:
@@ -268,7 +268,7 @@ class PracticeProcess:
     # --- the bench ---
 
     def run(self) -> None:
-        """Be the bench until the end."""
+        """Run the bench until the end."""
         address = self._publisher.address
         said: dict[str, Any] = {"port": address.port, "token": address.token.hex()} if address else {}
         ready = PracticeEvent("ready", f"the top of the scene {self.scene.name}", scene=self.scene.as_table(), **said)
@@ -286,7 +286,7 @@ class PracticeProcess:
             self._wanted = None
 
     def _is_called_away(self) -> bool:
-        """Whether a run is to be recorded, or the bench is to end; a command may say so during a count."""
+        """Return whether a run is to be recorded, or the bench is to end; a command may say so during a count."""
         return self._over or self._wanted is not None
 
     def _next_run(self) -> RecordRun | None:
@@ -472,7 +472,7 @@ class PracticeProcess:
         return "the top floats again"
 
     def _floats(self) -> bool:
-        """Whether the top is up now, as a person at the bench sees; the counter knows it a second later."""
+        """Return whether the top is up now, as a person at the bench sees; the counter knows it a second later."""
         poses = self._wiring.poses
         return poses is not None and bool(poses(self.clock.now(), RAMP_STEP_S, 1).up[0])
 
