@@ -187,8 +187,8 @@ def _described(field: AxialField, top: SymmetricTop, height: float) -> Equilibri
 def quartic(field: AxialField, top: SymmetricTop, height: float, spin: float) -> Array:
     """Return the coefficients of (I₁α² − I₃ω₃α + P)(α² + Ω²/2) = (μB′)²/4m over I₁, highest power first.
 
-    ω₃ is `spin` [rad/s], u = x + iy and N = n_x + i n_y ∝ e^{iαt}; P = −μB = −E_θθ, Ω²/2 = −μB″/2m = −E_xx/m, μB′/2 = E_xθ, which is
-    mg/2 at the equilibrium of a point.
+    ω₃ is `spin` [rad/s], u = x + iy and N = n_x + i n_y ∝ e^{iαt}; P = −μB = −E_θθ, Ω²/2 = −μB″/2m = −E_xx/m,
+    μB′/2 = E_xθ, which is mg/2 at the equilibrium of a point.
     """
     tilt, sideways, both = (float(value) for value in top.stiffness(field, np.array([height]))[:, 0])
     p, half, turn = -tilt, -sideways / top.mass, top.axial * spin

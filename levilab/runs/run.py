@@ -176,7 +176,7 @@ class Run:
         return len(self.readings()) if (self.folder / READINGS).exists() else 0
 
     def elapsed(self) -> float:
-        """Return the wall clock's time since time zero [s].  Raises DataError without one, or if the clock was set back."""
+        """Return the time on the wall clock since time zero [s].  Raises DataError if the clock was set back."""
         if self.record.time_zero_utc is None:
             raise DataError(
                 f"{self.folder}: ended before its first reading, there is nothing to go on with: start anew"
