@@ -28,7 +28,7 @@ class Component:
 
     Attributes:
         name: the same in all versions, a word or two with underscores.
-        source: what is uncertain, in words.
+        source: description of the uncertain input.
         kind: "A", from a scatter that was seen, or "B", from anything else (GUM §2.3).
         u: standard uncertainty of the input quantity, in `unit`; None where it is not known.
         unit: of the input quantity.
@@ -50,7 +50,7 @@ class Component:
 
     @property
     def contribution(self) -> float | None:
-        """What it contributes to u of the result, in the result's unit."""
+        """The contribution to u of the result, in the result's unit."""
         return None if self.u is None else abs(self.sensitivity) * self.u
 
 

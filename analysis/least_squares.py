@@ -54,7 +54,7 @@ def solve(
 ) -> tuple[Array, bool]:
     """Find the parameters of the smallest sum of squares, and whether the search converged.
 
-    A search that does not end in so many evaluations at `most` returns the best point found.  One that begins where a
+    A search that does not end within `most` evaluations returns the best point found.  One that begins where a
     residual is no number has not ended, though MINPACK says so.
     """
     from scipy.optimize import leastsq
@@ -84,7 +84,7 @@ def profile(
         gradient: its slopes.
         best: its solution, shape (p,).
         u: standard uncertainties to take the first step by, shape (p,).
-        variance: that of the residuals: χ² may grow by as much. None: unknown, then an F-test decides.
+        variance: of the residuals, by which χ² may grow. None: unknown, then an F-test decides.
 
     Returns:
         For each parameter the two ends, None where an end does not exist or was not found.

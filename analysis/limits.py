@@ -299,7 +299,7 @@ def _weights(variances: Array) -> Array:
 
 
 def _common_error(scatter: float, step: float) -> float:
-    """Return the standard uncertainty that steps of the drive leave to a mean of ever so many limits [Hz].
+    """Return the standard uncertainty of a mean from the drive's steps, which no number of limits lowers [Hz].
 
     A limit within a step is given as the middle of the step, wrong by step/√12.  Two tops share that error if they fall
     into the same step, and do not if they scatter over several: of tops with a true scatter σ its correlation is

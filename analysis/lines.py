@@ -1,7 +1,7 @@
 """Spectral lines of complex signals: frequencies of either sign, amplitudes and phases.
 
 The strongest line is found in a Hann-windowed transform, placed between the bins by the ratio of the two highest
-(Grandke, IEEE Trans. Instrum. Meas. 32, 350 (1983)), taken away, and so on; then each is placed anew with all
+(Grandke, IEEE Trans. Instrum. Meas. 32, 350 (1983)), taken away, and so on; then each is placed again with all
 others taken away (Li & Stoica's RELAX, IEEE Trans. Signal Process. 44, 281 (1996)), since every line leaks a
 little into the others' bins.
 
@@ -34,7 +34,7 @@ FEWEST = 32
 LOBE = 2
 #: The greatest of 10⁵ bins of white noise stands at 4.1 times their median: what is higher than this is no noise.
 ABOVE_NOISE = 5.0
-#: How often all lines are placed anew; a round takes what leaks in down by a factor of about a hundred.
+#: Rounds in which all lines are placed again; each lowers the leakage by a factor of about a hundred.
 ROUNDS = 3
 #: While lines are looked for, each is taken away this far to either side [bins]; beyond, 1/(π FAR³) of it is left,
 #: 2e-8, where weaker lines are not looked for.

@@ -167,7 +167,7 @@ NR2 = Form(r"[+-]?\d+\.\d+", "+12.5")
 NR3 = Form(r"[+-]?\d+\.\d+[Ee][+-]\d{1,3}", "+1.25E+01")
 NUMERIC = Form(f"{NR1.pattern}|{NR2.pattern}|{NR3.pattern}", NR3.example)
 
-#: How many fields an identity has, and what they are (IEEE 488.2-1992, 10.14.3).
+#: Fields of an identity (IEEE 488.2-1992, 10.14.3).
 IDENTITY_FIELDS = ("maker", "model", "serial number", "firmware")
 
 

@@ -260,7 +260,7 @@ def locked(path: Path, busy: str) -> Iterator[None]:
         yield
     finally:
         with contextlib.suppress(OSError):  # while it is held, so that no file is removed that another one holds
-            os.unlink(lock.lock_file)  # noqa: PTH108 - what it gives is text
+            os.unlink(lock.lock_file)  # noqa: PTH108 - the path is text
         lock.release()
 
 

@@ -38,7 +38,7 @@ def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> st
     return f"{where}{seen}: {expected(first['msg'])}{hint}{more}"
 
 
-#: How pydantic begins and ends what it says of a wrong value, and its words for what it expects.
+#: Beginning and end of pydantic's message about a wrong value, and its names of the expected kinds.
 _SHOULD_BE = re.compile(r"Input should be (a valid )?(.*?)(, unable to .*|, got .*)?")
 _WHOLE = {
     "Field required": "is missing",
@@ -50,7 +50,7 @@ _IN_PLAIN_WORDS = {
 
 
 def expected(text: str) -> str:
-    """Return pydantic's message about a wrong value in plain words.
+    """Translate pydantic's message about a wrong value.
 
     >>> expected("Input should be a valid number, unable to parse string as a number")
     'a number is expected'

@@ -48,9 +48,9 @@ PARAMETERS = tuple(UNITS)
 FEWEST_HEIGHTS = 4
 #: Heights closer than this count as one [m]: no stand is set more exactly.
 SAME_HEIGHT_M = 1e-5
-#: The effective variance depends on the fitted slope; after so many iterations it has settled to 1e-6.
+#: The effective variance depends on the fitted slope; after these iterations it has settled to 1e-6.
 _MOST_TURNS = 8
-#: A field below so many u of the background counts as none.
+#: A field below this multiple of the background's u counts as none.
 _NO_FIELD = 5.0
 #: A χ² less probable than this: the model, or the stated uncertainty, is wrong.
 NO_FIT = 1e-3
@@ -492,7 +492,7 @@ class UPart:
     """A part of the u of a parameter; the squares of all parts add up to u².
 
     Attributes:
-        name: "readings" and "heights", what each reading has of its own; "excess", by as much they scatter beyond that;
+        name: "readings" and "heights", what each reading has of its own; "excess", their scatter beyond that;
             "gain", the scale of the instrument; else the parameter that calliper or data sheet give.
         size: of the part, in the unit of the parameter, with the sign in which the parameter follows the input.
     """

@@ -292,7 +292,7 @@ def whole_counts(gates: Gates, expected: float) -> int:
 
 
 def pulses_too_many(pulses: int) -> str:
-    """Return a miscount in words.
+    """Return a miscount as text.
 
     >>> pulses_too_many(1), pulses_too_many(-2)
     ('1 pulse too many', '2 pulses too few')

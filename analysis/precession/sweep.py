@@ -47,7 +47,7 @@ class Point:
         spin, u_spin: [Hz], where they were measured.
         leverage, residual, studentised, slope_change, intercept_change: see `analysis.precession.line.Influence`; None
             for a point that is left out, and if undefined.  A point that is left out has a residual, too.
-        miscount: what the counter counted instead of the precession, in words; None: the point is sound.
+        miscount: text of a count of something else than the precession; None: the point is sound.
         used: whether the line goes through it.
     """
 

@@ -2,7 +2,7 @@
 
 A phase that is nearly right is improved: at each turn a piece of the trace is fitted by pulse, slope of the pulse and
 a constant. The slope's share is the turn's shift, which is regressed with the weight that it deserves; the pulse is
-learned anew; and so on until nothing moves. To first order that is the maximum of the likelihood.
+learned again; and so on until nothing moves. To first order that is the maximum of the likelihood.
 """
 
 from __future__ import annotations

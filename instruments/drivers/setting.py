@@ -1,4 +1,4 @@
-"""A quantity of an instrument, declared in one line: its header, its kind, what it may be set to and may answer."""
+"""A quantity of an instrument, declared in one line: its header, its kind, its allowed values and answers."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Setting(Generic[T]):
         values: the only numbers that the instrument has.
         span: the lowest and the highest number that it may answer, where these are not low and high: with a probe, an
             attenuator or a load other than the driver's.
-        about: what it is, for `help`.
+        about: its meaning, for `help`.
         name: of the attribute; Python sets it.
     """
 
@@ -236,7 +236,7 @@ class Setting(Generic[T]):
 
 
 def _short_form(word: str, choices: tuple[str, ...]) -> str:
-    """Return the short form of the choice that this word is, in any case.  Raises ValueError where it is none.
+    """Return the short form of a choice, in any case.  Raises ValueError for an unknown word.
 
     >>> _short_form("sinusoid", ("SINusoid", "SQUare")), _short_form("SQU", ("SINusoid", "SQUare"))
     ('SIN', 'SQU')

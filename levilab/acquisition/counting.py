@@ -24,10 +24,10 @@ _HIGHEST_SHARE, _LEAST_LOSS_PER_S, _HALVING_S = 1.05, 1e-3, 100.0
 _SAME_SHARE = 0.03
 #: Number of readings that a new one is compared with: the last one, and two in case that it was a miscount.
 _KEPT = 3
-#: A fallen top rattles: after so many times without a credible count it is taken for fallen; after so many counts in a
+#: A fallen top rattles: after this many times without a credible count it is taken for fallen; after as many in a
 #: row that are too high, for another one.
 _MOST_MISSED = 3
-#: No top's pulses are so many in a gate: what is counted then is something else.
+#: No top gives more pulses in a gate: then something else is counted.
 _MOST_PERIODS = 1e9
 
 
@@ -116,7 +116,7 @@ class FreeTop(Generic[S]):
 
         Two counts that agree are a reading, even if they do not follow, as long as a coasting top can have them: less
         than before, or as much as before a miscount.  More than it can have is no reading.  A counter that fails, or
-        whose settings another program changed, costs this reading and is set up anew.
+        whose settings another program changed, costs this reading and is set up again.
 
         Raises:
             AnotherTop: one that is faster, three times in a row.
@@ -243,7 +243,7 @@ def _is_drop(before: Row, last: Row) -> bool:
 
 
 def _coasts(last: Row, reading: Row, times: int) -> bool:
-    """Return whether a reading is so many times the spin of a top that coasts since the last one."""
+    """Return whether a reading is this multiple of the spin of a top that coasts since the last one."""
     one = reading | {"spin_frequency_hz": reading["spin_frequency_hz"] / times}
     return is_plausible(last, one) and not _is_drop(last, one)
 

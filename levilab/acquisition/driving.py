@@ -42,15 +42,15 @@ _USUAL_WINDOW_HZ = (21.65, 80.60)
 #: A held top swings about the drive's frequency by what the drive can hold at most, 0.5 Hz at 0.4 mT [Hz].
 HELD_WITHIN_HZ = 1.0
 #: The halves of a hold differ by no more than this where the top is held [Hz], the beginning and the end of a swing of
-#: a third of a turn in 10 s each, nor by so many standard uncertainties; a lost top loses 1 Hz meanwhile.  Of so many
-#: counts in a half.
+#: a third of a turn in 10 s each, nor by this multiple of u; a lost top loses 1 Hz meanwhile.
+#: Fewest counts in a half.
 _DRIFTS_HZ, _DRIFTS_BY_U, _FEWEST_IN_HALF = 0.1, 3.0, 3
-#: A top that the drive did not take hold of, or lost, loses 0.1 Hz/s to the air: it is looked at so often on the way
-#: [s], and the drive tries so many times.
+#: A top that the drive did not take hold of, or lost, loses 0.1 Hz/s to the air: the interval between looks on the way
+#: [s], and the number of tries.
 _LOOK_EVERY_S, _TRIES_TO_HOLD = 10.0, 4
-#: A top that a person was asked for is looked for so often [s].
+#: Interval between looks for a top that a person was asked for [s].
 _LOOK_FOR_TOP_S = 2.0
-#: A point of a sweep is tried so often, and so many that fail one after the other end the sweep.
+#: Tries of a point of a sweep, and failed points in succession that end the sweep.
 TRIES, MOST_FAILED = 2, 3
 
 
@@ -403,7 +403,7 @@ def sweep_drive(
         measure: measures at a frequency at which the drive now is, and keeps the reading itself.  Raises NotHeld where
             the top is lost, or not locked; PointFailed where another try at this point would not help.
         within_s: how long a person has to float a top [s].
-        most_failed: so many points that fail one after the other end the sweep.
+        most_failed: number of points that fail in succession and end the sweep.
 
     Returns:
         The points that failed.

@@ -44,12 +44,12 @@ class CounterSettings(ExperimentSettings):
 
     Attributes:
         one_top: whether all readings are of one top, which falls meanwhile: then longest_s counts from time zero, else
-            a resumed run has it anew.
+            a resumed run starts with the full time.
     """
 
     one_top: ClassVar[bool] = True
 
-    interval_s: PositiveFloat = Field(default=10.0, description="then read every so often,")
+    interval_s: PositiveFloat = Field(default=10.0, description="time from one reading to the next")
     gate_s: PositiveFloat = Field(default=1.0, description="length of a count")
     trigger_level_v: float = Field(default=0.6, description="half way between dark and the pulse of the tape")
     reading_u_hz: PositiveFloat | None = Field(

@@ -1,4 +1,4 @@
-"""The keys of an experiment's settings: what may stand there, in words, for lists and for messages."""
+"""The keys of an experiment's settings: the allowed values as text, for lists and for messages."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Key:
 
     Attributes:
         name: without its table's.
-        value: what it is now.
+        value: the present one.
         expected: what may stand there.
         meaning: of it.
     """

@@ -45,7 +45,7 @@ class AcquisitionRequest:
         config: the bench and the settings of the experiments, as they stand in run.json.
         wiring: makes the wiring of the bench, real or virtual.
         out: the folder in which the run folder is made.
-        synthetic_how: if anything is simulated, how, in words.
+        synthetic_how: description of the simulated part, if there is any.
         scene: of the full motion, as a table.
         seed: of what is drawn by chance on a virtual bench.
         note: kept with the run.
@@ -84,7 +84,7 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
         except Interrupted as interruption:
             text = f"interrupted by {interruption.by}, outputs are off"
             writer.event(None, RunEvent.INTERRUPTED, text)
-            show.close()  # what it shows of the bench is from before the outputs went off
+            show.close()  # its picture of the bench is from before the outputs went off
             show.message(text)
             status = "interrupted"
         except Exception as error:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from levilab.bench.wiring import Wiring
     from levilab.telemetry.messages import Poses
 
-#: A record is sent anew so often [s].
+#: Interval at which a record is sent again [s].
 _AGAIN_EVERY_S = 1.0
 #: Of a bench that jumps ahead only the last part of its motion is shown [s].
 _SHOWN_S = 1.0
@@ -156,7 +156,7 @@ def record_of(number: int, channel: str, time_s: float, trace: Trace) -> Record:
 
     Args:
         number: of the record.
-        channel: what it shows.
+        channel: the quantity that it shows.
         time_s: bench time when it was taken [s].
         trace: its samples.
     """

@@ -36,7 +36,7 @@ HOW = (
     "acquired on the virtual bench: the drivers are the real ones, the instruments wire-level models, {what}, "
     "and no real top was measured"
 )
-_ANEW = "correct it or start anew"
+_ADVICE = "correct it or start again"
 _SPIN_ONLY = "the top a spin that decays by the {law}; drag and fall were drawn by the seed"
 _BASE = (
     "the base a ring of strength {strength_t_m:.6e} T m, radii {inner_radius_m:.6f} and {outer_radius_m:.6f} m, "
@@ -244,7 +244,7 @@ def _resumable(folder: Path, experiment: str) -> Run:
     if run.status in {"running", "finished"}:
         raise CannotResume(f"{folder}: is {run.status}, only an interrupted or failed run can be resumed")
     if not run.count():
-        raise CannotResume(f"{folder}: ended before its first reading, there is nothing to go on with: start anew")
+        raise CannotResume(f"{folder}: ended before its first reading, there is nothing to go on with: start again")
     if run.record.time_zero_utc is None:
         raise CannotResume(
             f"{folder}/run.json: has no time_zero_utc, so it is not known at which time its readings go on; they are "
@@ -260,18 +260,18 @@ def _check_readings(run: Run, request: AcquisitionRequest) -> None:
     channels = experiment.channels(settings)
     names = [channel.name for channel in channels]
     if [channel.get("name") for channel in run.record.channels] != names:
-        raise CannotResume(f"{run.folder}/run.json: channels: {', '.join(names)} are expected here; {_ANEW}")
+        raise CannotResume(f"{run.folder}/run.json: channels: {', '.join(names)} are expected here; {_ADVICE}")
     readings = run.readings()
     if list(readings.header) != names:
-        raise CannotResume(f"{readings.path}: the columns {', '.join(names)} are expected; {_ANEW}")
+        raise CannotResume(f"{readings.path}: the columns {', '.join(names)} are expected; {_ADVICE}")
     for channel in channels:
         if channel.unit == "Hz" and channel.name in readings.columns and not (readings.column(channel.name) > 0).all():
-            raise CannotResume(f"{readings.path}: {channel.name}: only numbers above 0 are expected; {_ANEW}")
+            raise CannotResume(f"{readings.path}: {channel.name}: only numbers above 0 are expected; {_ADVICE}")
     last = float(readings.column("time_s")[-1])
     if isinstance(settings, CounterSettings) and settings.one_top and last > settings.longest_s:
         raise CannotResume(
             f"{run.folder}: its last reading is of {last:g} s, and it was to end after {settings.longest_s:g} s "
-            f"({experiment.name}.longest_s): there is nothing to go on with; start anew"
+            f"({experiment.name}.longest_s): there is nothing to go on with; start again"
         )
 
 
@@ -383,7 +383,7 @@ def _scene(name: str | None, run: Run | None) -> Scene | None:
     if name is None and begun is None:
         return None
     if begun is not None and not isinstance(begun, dict):
-        raise CannotResume(f"{run.folder if run else ''}/run.json: configuration.scene: a table is expected; {_ANEW}")
+        raise CannotResume(f"{run.folder if run else ''}/run.json: configuration.scene: a table is expected; {_ADVICE}")
     scene = scene_of(begun) if begun is not None else read_scene(str(name))
     if scene.top.aligned:
         raise SceneError(

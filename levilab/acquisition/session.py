@@ -33,7 +33,7 @@ S = TypeVar("S", bound=Settings)
 _NAP_S = 0.2
 #: Pauses [s] before the tries to reach an instrument again, half a minute in all.
 REOPENING_S = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0)
-#: An instrument that is lost so many times in a row, with no reading in between, is broken.
+#: An instrument that is lost this many times in a row, with no reading in between, is broken.
 MOST_LOSSES = 5
 
 #: A reading: channel → value.  A value that is not known has no key.
@@ -71,7 +71,7 @@ class Doing:
     """What an acquisition does at present, for the person at the bench and for views.
 
     Attributes:
-        text: what it does; empty while readings come.
+        text: its present work; empty while readings come.
         share: of the way to the first reading; None once readings come.
         end: bench times between which it is expected to end [s]; None where that is not known.
         seen: channel → what an instrument answered last, in a reading or outside of one.
@@ -105,7 +105,7 @@ class Session(Generic[S]):
         last_request_time: when the last reading was asked for [s].
         called: what one reading of this experiment is called.
         began: when this session began to measure: at time zero, or when it resumed the run, maybe days later [s].
-        doing: what it does at present.
+        doing: its present work.
         look: called whenever that changes; while bench time passes the clock calls it.
     """
 
@@ -222,7 +222,7 @@ class Session(Generic[S]):
         """Show how far the bench is on the way to the first reading.
 
         Args:
-            text: what it is doing.
+            text: its present work.
             share: of the way, from 0 to 1.
         """
         if not self._replaying:
@@ -288,7 +288,7 @@ class Session(Generic[S]):
 
         Args:
             input_: of the oscilloscope.
-            channel: what it shows.
+            channel: the quantity that it shows.
             time_s: when the record was taken.
 
         Raises:
@@ -368,5 +368,5 @@ def _width(channel: Channel) -> int:
 
 
 def _with_unit(value: float, channel: Channel) -> str:
-    decimals = unit(channel.unit).decimals  # so many that points stand below each other
+    decimals = unit(channel.unit).decimals  # with these, points stand below each other
     return f"{value:{'.6g' if decimals is None else f'.{decimals}f'}} {channel.unit}".rstrip()

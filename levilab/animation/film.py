@@ -275,7 +275,7 @@ def nice_length(length: float) -> float:
 
 
 def in_mm(length: float) -> str:
-    """Return a length [m] in words.
+    """Return a length [m] as text, in mm.
 
     >>> in_mm(0.002), in_mm(5e-5)
     ('2 mm', '0.05 mm')

@@ -46,7 +46,7 @@ _REST = 470_000
 _BYTES_PER_NUMBER = 4 * 4 / 3
 #: Speeds to choose from.
 _SPEEDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
-#: Poses a turn: so many make a slerp between two of them as good as the motion, and no fewer than FEWEST.
+#: Poses a turn with which a slerp between two is as good as the motion, and the fewest.
 POSES_A_TURN, FEWEST_A_TURN = 16, 12
 #: Length of the axis' path that is drawn [s of the motion].
 _TRAIL_S = 0.5
@@ -68,7 +68,7 @@ class Page:
 
 
 def most_poses(columns: int) -> int:
-    """Return how many poses of so many numbers a page holds."""
+    """Return the number of poses, each of `columns` numbers, that a page holds."""
     return int((LARGEST - _REST) / (columns * _BYTES_PER_NUMBER))
 
 

@@ -33,7 +33,7 @@ Colour = tuple[int, int, int]
 
 #: Facets around a part of the top, and around the base.
 _AROUND, _AROUND_BASE = 48, 120
-#: Pictures are drawn so many times as large and made smaller, which smooths their edges.
+#: Pictures are drawn larger by this factor and made smaller, which smooths their edges.
 _FINER = 2
 #: Field of view [rad], and where the camera stands: above the horizon, and around [rad].
 _VIEW_RAD, _ELEVATION, _AZIMUTH = math.radians(26), 0.33, -1.25

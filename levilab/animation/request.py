@@ -37,7 +37,7 @@ _SLOWEST, _FASTEST = 1e-4, 10.0
 _MOST_PICTURES = 3000
 #: Poses for each picture of a film, for its path.
 _POSES_A_PICTURE = 3
-#: A page has at least so many poses a second: the wobble is faster than the spin of a slow top.
+#: Least poses per second of a page: the wobble is faster than the spin of a slow top.
 _LEAST_RATE_HZ = 240.0
 #: With fewer pictures in a turn the eye loses which way the top turns.
 _PICTURES_A_TURN = 4
@@ -166,7 +166,7 @@ def animate(
         progress: called with the share that is done.
 
     Returns:
-        What the file shows, in words.
+        A description of the file's content.
 
     Raises:
         UsageError: the top was lost before the span, or the file would become too large.

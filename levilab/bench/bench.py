@@ -111,7 +111,7 @@ def open_bench(
     with contextlib.ExitStack() as links:
 
         def connect(kind: Kind[I], *, alone: bool = True) -> I:
-            """Open an instrument, and take it into the bench once it has shown that it is what it should be."""
+            """Open an instrument, and take it into the bench once its identity is right."""
             check()
             instrument = connected(kind, wiring, log=log)
             links.callback(instrument.close)

@@ -45,7 +45,7 @@ class Light:
     trigger_level_v: float = 0.6
 
 
-#: In words, the value, its unit.
+#: Name of the quantity, its value, its unit.
 Reading = tuple[str, float | None, str]
 
 

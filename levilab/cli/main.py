@@ -17,7 +17,7 @@ from levilab.cli.quantities import in_options
 
 
 class Commands(typer.core.TyperGroup):
-    """All commands.  The wrong value of an option is refused in plain words; Ctrl-C ends them in one line."""
+    """All commands.  A wrong value of an option is refused with its fault; Ctrl-C ends them in one line."""
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
         """Read the options before the command, which imports pydantic."""

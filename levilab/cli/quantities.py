@@ -14,7 +14,7 @@ from levilab.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-#: A quantity in a message, and what it is set to, as in "take `rate` = 500 or less".
+#: A quantity in a message, and its value, as in "take `rate` = 500 or less".
 _QUANTITY = re.compile(r"`([a-z]\w*)`( = False\b| = True\b| = )?")
 
 

@@ -66,7 +66,7 @@ class Dialect:
         """Return the number in a field; infinite where it says so or overflows.
 
         Raises:
-            ValueError: it is none, or it has the other decimal mark.
+            ValueError: the field is no number, or has the other decimal mark.
         """
         if self.decimal == "," and THOUSANDS.fullmatch(text):
             text = text.replace(".", "")
@@ -92,7 +92,7 @@ def clock_time(text: str) -> float:
     (10.0, 50712.5)
 
     Raises:
-        ValueError: it is none of these.
+        ValueError: it is none of the three.
     """
     if found := CLOCK.fullmatch(text):
         hours, minutes, seconds = int(found[1] or 0), int(found[2]), float(found[3].replace(",", "."))
@@ -173,8 +173,8 @@ def find_dialect(lines: Sequence[str], first: Sequence[str] = ()) -> Dialect | N
     return best if titles(best) else None
 
 
-#: Digest of some lines → the dialect of their rows.  Each analysis reads all files of a folder anew, in the same order,
-#: to see which of them suit it.  Where there are too many, the newest entry goes: the next pass finds the older ones.
+#: Digest of some lines → the dialect of their rows.  Each analysis reads all files of a folder, in the same order, to
+#: see which of them suit it.  Where there are too many, the newest entry goes: the next pass finds the older ones.
 _DIALECTS_OF_ROWS: dict[bytes, Dialect | None] = {}
 _MOST_DIALECTS = 1 << 14  # in 1.4 MB
 

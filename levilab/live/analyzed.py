@@ -25,7 +25,7 @@ REPORT = "report.html"
 RESULT = "result.json"
 #: An analysis that takes longer than this is given up [s].
 _LONGEST_S = 600.0
-#: An analysis that is given up ends at once; it is waited for so long at most [s].
+#: An analysis that is given up ends at once; the longest wait for that [s].
 _PATIENCE_S = 5.0
 #: Signals to the view's process group, as Ctrl-C in a terminal, leave an analysis alone: the view ends it and says so.
 _APART: dict[str, Any] = {
@@ -84,7 +84,7 @@ class Analyses:
             self.running.discard(folder.name)
 
     def _run(self, words: Sequence[str]) -> tuple[int, str]:
-        """Run a command of this program.  Returns its exit status, and what it wrote about failures."""
+        """Run a command of this program.  Returns its exit status and its messages about failures."""
         with self._lock:
             if self._is_over:
                 return 1, "the live view was ended"
@@ -141,7 +141,7 @@ def _figures(folder: Path) -> list[Path]:
 
 
 def _result(folder: Path) -> dict[str, Any]:
-    """Return what result.json beside a run says, in words."""
+    """Return the summary, as text, of the result.json beside a run."""
     found: Any = {}
     with contextlib.suppress(OSError, ValueError):
         found = json.loads((folder / RESULT).read_text(encoding="utf-8"))

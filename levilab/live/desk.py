@@ -1,4 +1,4 @@
-"""The bench for practice as the server holds it: commands go to it, and what it says is kept for the pages."""
+"""The bench for practice as the server holds it: commands go to it, and its events are kept for the pages."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ EXPERIMENTS = {
 
 @dataclass
 class Desk:
-    """A bench for practice, and what it has said.
+    """A bench for practice, and its events.
 
     Attributes:
         bench: which the command starts and ends.
-        count: of what it has said.
-        said: the latest of that.
+        count: number of its events.
+        said: the latest events.
         scene: of its top, None until it is ready.
         folders: of the runs that it has recorded, or records, in order.
         answers: number of a command → whether it was carried out or refused, of the latest commands.

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 MOST_EVENTS = 400
 #: Longest text of an event that is shown.
 _MOST_CHARACTERS = 600
-#: Whether the process that writes is alive is looked up so often, since that takes its lock for a moment [s].
+#: Interval between checks that the writing process is alive, each of which takes its lock for a moment [s].
 _ALIVE_EVERY_S = 2.0
-#: One look reads for so long at most, so that frames do not wait; a long file takes several [s].
+#: Longest time of one look [s], so that frames do not wait; a long file takes several [s].
 LOOK_S = 0.025
 
 

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from levilab.live.running import Running
     from levilab.live.watch import FitTask
 
-#: Frames a second at most, so that 20 come to the page; and so long a page waits for one in which nothing is new [s].
+#: Frames a second at most, so that 20 come to the page; and the longest wait of a page without news [s].
 FRAMES_PER_S, PATIENCE_S = 22, 1.0
 #: Time between two looks for runs of other programs [s].
 _OTHERS_EVERY_S = 2.0

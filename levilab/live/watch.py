@@ -202,7 +202,7 @@ class Watch:
         """Take in what was computed of a run, and the processor time that it took [s].
 
         It is dropped if another run is followed by now.  The time of the first fit that draws a line says nothing of
-        the next ones: it imports what it needs.
+        the next ones, as it has to import libraries.
         """
         took_s = took_s if self._has_fitted else 0.0
         self._has_fitted |= found is not None and found.curve is not None
@@ -219,8 +219,8 @@ class Watch:
         """Return what a page does not have yet.
 
         Args:
-            ask: what it has: "run" (name), "readings", "events", "fit", "poses" (numbers), "records" (channel →
-                number); and what it wants: "columns" of its picture, and whether the "latest" readings alone.
+            ask: the page's state: "run" (name), "readings", "events", "fit", "poses" (numbers), "records" (channel →
+                number); and its wishes: "columns" of its picture, and whether the "latest" readings alone.
             said: what the bench for practice has said.
         """
         followed = self.followed

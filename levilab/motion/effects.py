@@ -34,7 +34,7 @@ LEAST_M, LEAST_HZ = 1e-7, 1e-5
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect, and what it changes.
+    """One effect, and the changes by it.
 
     Attributes:
         name: of the effect.
@@ -145,7 +145,7 @@ KINDS = (
 
 
 def explain(scene: Scene, duration: float = 30.0) -> tuple[Effect, ...]:
-    """Return every effect of a scene with what it changes, the field's first.  Raises as `simulate` does."""
+    """Return every effect of a scene with its changes, the field's first.  Raises as `simulate` does."""
     if scene.observed == "spin":
         scene = scene.changed({"observed": "motion"})
     time = min(abs(duration), LONGEST)
@@ -206,7 +206,7 @@ def _precession(motion: Trajectory) -> float:
 
 
 def _remark(included: bool, as_it_is: Trajectory, other: Trajectory) -> str:  # noqa: FBT001
-    """Return how the change decides whether the top stays up, in words; empty if it stays up either way."""
+    """Return a remark on a change that decides whether the top stays up; empty if it stays up either way."""
     if as_it_is.survived == other.survived:
         return "" if as_it_is.survived else "lost either way"
     assert other.fell or as_it_is.fell

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: A curve of more points is drawn as the envelope of so many pieces.
+#: A curve of more points is drawn as the envelope of this number of pieces.
 PIECES = 700
 #: A path of more points than these is no clearer.
 MOST_POINTS = 30_000

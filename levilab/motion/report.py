@@ -113,7 +113,7 @@ def _document_or_none(run: Run) -> Mapping[str, Any] | None:
 def _document(run: Run) -> Mapping[str, Any]:
     found = (run.record.model_extra or {}).get("simulation")
     if not isinstance(found, dict) or not isinstance(found.get("end_s"), int | float):
-        raise DataError(f"{run.folder}: is {run.status} and says nothing of its motion; simulate it anew")
+        raise DataError(f"{run.folder}: is {run.status} and says nothing of its motion; simulate it again")
     return found
 
 
@@ -121,10 +121,10 @@ def _scene(run: Run) -> Scene:
     try:
         return scene_of(run.record.configuration["scene"])
     except (KeyError, TypeError, AttributeError, SceneError) as error:
-        raise DataError(f"{run.folder}: its scene cannot be read ({error}); simulate it anew") from error
+        raise DataError(f"{run.folder}: its scene cannot be read ({error}); simulate it again") from error
 
 
-# --- what it is like -----------------------------------------------------------------------------------
+# --- the motion in numbers -----------------------------------------------------------------------------------
 
 
 _LOCKED = {"True": " It is locked to its drive.", "False": " It is not locked to its drive."}

@@ -39,7 +39,7 @@ _FIRST_S = 1e-3
 #: Rows in one block of states.csv.
 _ROWS = 1000
 
-#: Columns of states.csv: name, unit, what it is, and its values for a motion.
+#: Columns of states.csv: name, unit, meaning, and its values for a motion.
 COLUMNS: tuple[tuple[str, str, str, Callable[[Trajectory], Any]], ...] = (
     ("time_s", "s", "since the start; the last row is the end", lambda motion: motion.time),
     ("x_m", "m", "centre of mass, from the base's centre", lambda motion: motion.position[:, 0]),

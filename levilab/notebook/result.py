@@ -59,7 +59,7 @@ class AnalysisResult:
 
     Attributes:
         analysis: the row of the catalogue.
-        found: what it found, with the readings.
+        found: its result, with the readings.
         copies: data files that DataFrames were written to, which `save` writes beside the result.
     """
 
@@ -79,7 +79,7 @@ class AnalysisResult:
 
     @property
     def synthetic(self) -> bool:
-        """Whether any of the inputs is known to be simulated or made up."""
+        """Whether any of the inputs is known to be synthetic."""
         return any(source.synthetic for source in self.found.sources)
 
     @property

@@ -52,7 +52,7 @@ def readings_figure(frame: pd.DataFrame, title: str) -> Figure:
 
 
 def _axis(column: str) -> str:
-    r"""Return a column's name for an axis: its quantity in words, its unit in brackets.
+    r"""Return a column's name for an axis: the quantity's name, its unit in brackets.
 
     >>> _axis("height_m"), _axis("precession_frequency_hz"), _axis("remark")
     ('height  [cm]', 'precession frequency\n[Hz]', 'remark')

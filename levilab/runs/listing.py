@@ -36,7 +36,7 @@ class Listed:
         readings: how many there are.
         length_s: from time zero, or the first reading where that is not known, to the last reading or state; None
             where they have no times.
-        synthetic: whether any of it was simulated or made up.
+        synthetic: whether any of it is synthetic.
         note: as in run.json.
         problem: why it cannot be read.
         states: of a simulation, 0 for what was measured.
@@ -59,7 +59,7 @@ class Listed:
 
     @property
     def size(self) -> str:
-        """How much there is, in words where it is not readings."""
+        """The number of readings, or a description of other content."""
         if self.states:
             return f"{self.states} states"
         return f"{self.records} record{'s' * (self.records > 1)}" if self.records else str(self.readings)

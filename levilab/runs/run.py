@@ -157,7 +157,7 @@ class Run:
 
     @property
     def continued_in(self) -> Path | None:
-        """The folder that all of it was written to anew, where this one was damaged under way."""
+        """The folder to which the whole run was written again, where this one was damaged under way."""
         name = (self.record.model_extra or {}).get("continued_in")
         folder = self.folder.with_name(Path(str(name)).name) if name else None
         return folder if folder and (folder / RECORD).exists() else None
@@ -179,19 +179,19 @@ class Run:
         """Return the time on the wall clock since time zero [s].  Raises DataError if the clock was set back."""
         if self.record.time_zero_utc is None:
             raise DataError(
-                f"{self.folder}: ended before its first reading, there is nothing to go on with: start anew"
+                f"{self.folder}: ended before its first reading, there is nothing to go on with: start again"
             )
         try:
             zero = datetime.fromisoformat(self.record.time_zero_utc)
         except ValueError as error:
-            raise DataError(f"{self.folder / RECORD}: time_zero_utc: {error}; correct it or start anew") from error
+            raise DataError(f"{self.folder / RECORD}: time_zero_utc: {error}; correct it or start again") from error
         zero = zero if zero.tzinfo else zero.replace(tzinfo=UTC)
         elapsed = (datetime.now(UTC) - zero).total_seconds()
         last = float(self.readings().column("time_s")[-1]) if self.count() else 0.0
         if elapsed <= last:
             raise DataError(
                 f"{self.folder}: by the computer's clock {elapsed:.0f} s have passed since its time zero, but its last "
-                f"reading is of {last:.0f} s: the clock was set back, correct it or start anew"
+                f"reading is of {last:.0f} s: the clock was set back, correct it or start again"
             )
         return elapsed
 

@@ -75,7 +75,7 @@ class StoredTrace:
     Attributes:
         number: from 1 on.
         time_s: when it was complete, on the clock of the readings.
-        channel: what it shows.
+        channel: the quantity that it shows.
         trace: the record itself.
         announced: points that it was to have, None where it has them all.
     """
@@ -88,7 +88,7 @@ class StoredTrace:
 
     @property
     def how_short(self) -> str:
-        """How much there is of it, in words; empty where it is whole."""
+        """The part of an incomplete record that there is, as text; empty where it is whole."""
         if self.announced is None:
             return ""
         return f"was cut short: {self.trace.codes.size} of its {self.announced} points are kept"
@@ -101,7 +101,7 @@ def head_of(trace: Trace, number: int, time_s: float, channel: str, announced: i
         trace: the record.
         number: in the run, from 1 on.
         time_s: when it was taken, on the clock of the readings.
-        channel: what it shows.
+        channel: the quantity that it shows.
         announced: points that it is to have, where it has fewer.
     """
     return Head(

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: The drivers ask an oscilloscope so often whether its record is complete [s].
+#: Interval at which the drivers ask an oscilloscope whether its record is complete [s].
 SEEN_LATE_S = 0.02
 
 

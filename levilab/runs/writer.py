@@ -2,7 +2,7 @@
 
 ``run.json`` is replaced atomically, ``readings.csv`` and ``events.jsonl`` are flushed to the disk row by row:
 a process that is killed between two rows loses nothing that it has shown. A folder that is removed under way is
-written anew, beside, from what this process holds in memory.
+written again, beside, from what this process holds in memory.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from instruments.drivers.oscilloscope import Trace
     from levilab.runs.run import Run, Status
 
-#: What grows line by line, and is kept in memory to be written anew.
+#: Files that grow line by line, kept in memory to be written again.
 _KEPT = (READINGS, EVENTS, traces.INDEX)
 #: Errors that free space would mend.
 _FULL = frozenset(getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG") if hasattr(errno, name))
@@ -70,7 +70,7 @@ class RunWriter:
     def __init__(self, folder: Path, record: RunRecord, tell: Callable[[str], None] = lambda _: None) -> None:
         self.folder, self.record, self.tell = folder, record, tell
         self._files: dict[str, _GrowingFile] = {}
-        self._kept: dict[str, list[bytes]] = {}  # what was appended line by line, to be written anew
+        self._kept: dict[str, list[bytes]] = {}  # all lines appended, to be written again
         self._created = False
         self.events = 0
         self._records = 0  # of the oscilloscope
@@ -252,7 +252,7 @@ class RunWriter:
         Args:
             time_s: when the record was taken, on the clock of the readings.
             trace: its first samples, at each call some more of one record.
-            channel: what it shows.
+            channel: the quantity that it shows.
             points: it is to have.
 
         Raises:
@@ -344,7 +344,7 @@ class RunWriter:
     # --- a folder that is removed under way ---
 
     def _rescue_if_lost(self) -> None:
-        """Write the run anew if what was written is no longer where it was written.  Raises OSError."""
+        """Write the run again if its files are no longer in their place.  Raises OSError."""
         kept = [file for name, file in self._files.items() if name in self._kept and name != STATES]
         if any(file.is_lost() for file in kept):
             self._rescue()
@@ -422,7 +422,7 @@ class _GrowingFile:
         self._file = path.open("ab")
         self._opened = os.fstat(self._file.fileno())
         self._size = self._opened.st_size
-        # some file systems number their files anew at each look
+        # some file systems give their files new numbers at each look
         self._comparable = os.path.samestat(self._opened, path.lstat())
 
     def append(self, data: bytes) -> None:

@@ -10,7 +10,7 @@ A bench's go on, little-endian:
 ====================  ===================================================================
 4 bytes               number of the message, which grows by one and begins again after 2³²
 2 bytes               which part of it this is, from 0
-2 bytes               of so many
+2 bytes               number of parts
 up to 8000 bytes      the part
 ====================  ===================================================================
 """

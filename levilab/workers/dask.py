@@ -140,7 +140,7 @@ class Cluster(Executor):
 
     def _lost_scheduler(self) -> WorkersLost:
         return WorkersLost(
-            f"the Dask scheduler at {self._scheduler} is lost, with what was under way: start it and its workers anew"
+            f"the Dask scheduler at {self._scheduler} is lost, with the tasks under way: start it and its workers again"
         )
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002

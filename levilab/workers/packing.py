@@ -28,7 +28,7 @@ class Outcome:
 
     Attributes:
         result: what the function returned.
-        error: what it raised.
+        error: the error that it raised.
         unusable: why this worker cannot do any task of this kind; empty if it can.
     """
 

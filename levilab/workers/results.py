@@ -40,7 +40,7 @@ class Done(Generic[T, R]):
     Attributes:
         task: as it was given.
         result: what the function returned; None if it failed.
-        error: what it raised, or WorkersLost if the task kills the process that does it; None if it succeeded.
+        error: the error of the task, or WorkersLost if the task kills the process that does it; None if it succeeded.
     """
 
     task: T
@@ -54,9 +54,9 @@ def results_of(
     """Yield the results of tasks as they come, in any order.
 
     An exception of the function is returned with its task; the other tasks continue.  If a worker process dies, all are
-    started anew, and only the tasks that were under way are computed again.  A task that was under way whenever workers
-    died, the last time alone, is returned as an error.  Ctrl-C ends the tasks under way; so does a caller that closes
-    the iterator (`contextlib.closing`), which Python by itself may do late.
+    started again, and only the tasks that were under way are computed again.  A task that was under way whenever
+    workers died, the last time alone, is returned as an error.  Ctrl-C ends the tasks under way; so does a caller
+    that closes the iterator (`contextlib.closing`), which Python by itself may do late.
 
     Args:
         function: pure, so that it may be done again; at the head of a module if it is done elsewhere.
@@ -214,7 +214,7 @@ def _outcome_of(future: _Future, pool: Executor, executor: Workers) -> Outcome |
     """
     if future.cancelled():
         executor.check(pool)
-        raise WorkersLost(f"the {executor.name} gave up what they were to do: start them anew")
+        raise WorkersLost(f"the {executor.name} gave up their tasks: start them again")
     error = future.exception()
     if error is None:
         outcome = unpack(future.result())

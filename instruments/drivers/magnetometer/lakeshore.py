@@ -73,8 +73,8 @@ _UNIT = Coded("UNIT", str, choices=tuple(_UNITS_T))
 class LakeShoreGaussmeter(ScpiInstrument):
     """What the Lake Shore gaussmeters 425, 455 and 475 have in common.
 
-    They have no error queue, and ignore what they do not understand.  So each setting is asked back in the same
-    message, ``UNIT 2;UNIT?``: one exchange, for they want to be left alone between two.
+    They have no error queue, and ignore commands that they do not understand.  So each setting is asked back in
+    the same message, ``UNIT 2;UNIT?``: one exchange, as they need a pause between two.
     """
 
     #: Greatest flux density of each range [T], by probe, lowest first.
@@ -149,7 +149,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
                 before, field, after, status = self._parts(answer)
                 if before == after:
                     return self._field_t(answer, field, _UNITS_T[before], status)
-        raise BadAnswer(self.transport.address, _READING, answer, "a unit that stays what it is")
+        raise BadAnswer(self.transport.address, _READING, answer, "a unit that does not change")
 
     def _parts(self, answer: str) -> tuple[str, str, str, int]:
         """Return unit, field, unit and status of an answer.  Raises BadAnswer."""
@@ -189,7 +189,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
 
 
 def _whole_numbers(text: str) -> list[int] | None:
-    """Return the numbers of a list with commas; None if it is none."""
+    """Return the numbers of a list with commas; None for any other text."""
     return [int(part) for part in text.split(",")] if _LIST.matches(text) else None
 
 

@@ -1,7 +1,7 @@
 """What the drivers of oscilloscopes do in the same way: preparing, waiting for the trigger, reading, and comparing.
 
 A scope that was reset, or whose keys were turned, gives good records of something else: its probe factor makes every
-voltage ten times too large, its level lets no pulse trigger.  So the driver keeps what it prepared, and compares before
+voltage ten times too large, its level lets no pulse trigger.  So the driver keeps its settings, and compares before
 it hands a record out and before it says that the signal never triggered.
 """
 

@@ -211,7 +211,7 @@ class Session:
             raise LinkLost
 
     def _drop_abandoned_answers(self) -> None:
-        """Drop the answers of a measurement that was given up; the program may read to its end what it has begun."""
+        """Drop the answers of a measurement that was given up; an answer that the program has begun may be read."""
         if self._state is State.ANSWERED:
             self._drop_while(lambda answer: answer.epoch != self.device.epoch)
 

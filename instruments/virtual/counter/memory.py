@@ -1,4 +1,4 @@
-"""The memory of the virtual counters for their readings, and statistics of what it holds."""
+"""The memory of the virtual counters for their readings, and their statistics."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One output of a virtual function generator: its settings, their limits, its triggers, and what it puts out.
+"""One output of a virtual function generator: its settings, their limits, its triggers, and its signal.
 
 Sources: Agilent/Keysight 33500 Series Operating and Service Guide (limits, couplings); Agilent 33220A User's Guide;
 the state after ``*RST`` as a public driver of the family lists it.  The real instrument does not refuse a number

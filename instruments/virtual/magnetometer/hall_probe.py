@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-#: An alternating field is looked at so long [s], so often.
+#: An alternating field: duration [s] and number of samples of one reading.
 _WINDOW, _LOOKS = 0.2, 512
-#: A steady one so often, within the time constant of the filter.
+#: A steady field: samples within the time constant of the filter.
 _STEADY_LOOKS = 16
 
 
@@ -40,7 +40,7 @@ class Reading:
 class HallProbe:
     """A probe at its place.
 
-    flux_density: along its axis, at a time [s] → [T]; zero_error: what it shows without a field [T].
+    flux_density: along its axis, at a time [s] → [T]; zero_error: its reading without a field [T].
     """
 
     flux_density: Callable[[float], float]

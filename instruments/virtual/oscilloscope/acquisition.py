@@ -99,7 +99,7 @@ class Acquisition:
         self.latest = old
 
     def stop(self, now: float) -> None:
-        """Acquire no more; a scope that ran on its own keeps what it has just seen."""
+        """Acquire no more; a scope that ran on its own keeps its last record."""
         self.follow(now)
         if self.armed is not None and self.latest is None and self._plan.automatic:
             trigger = max(now - self._plan.length, 0.0) - self._plan.record.origin

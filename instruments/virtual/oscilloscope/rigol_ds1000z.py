@@ -28,7 +28,7 @@ _ON_SCREEN = 1200
 #: Points that one block may have, by format.
 _LONGEST = {"BYTE": 250_000, "WORD": 125_000, "ASC": 15_625}
 
-#: The items of :MEASure:ITEM as this maker spells them, and what they are called here.
+#: The items of :MEASure:ITEM as this maker spells them, and their names here.
 _ITEMS = {
     "VMAX": "VMAX",
     "VMIN": "VMIN",

@@ -36,7 +36,7 @@ _DESCRIPTOR = 346
 #: Bits of INR?: a new record; the trigger is ready.
 _NEW_RECORD, _READY = 1, 8192
 
-#: What PAVA? measures, and what it is called here; units.
+#: Measurements of PAVA?: their names here, and units.
 _MEASUREMENTS = {
     "PKPK": ("VPP", "V"),
     "MAX": ("VMAX", "V"),

@@ -50,10 +50,10 @@ class FieldSettings(ExperimentSettings):
     lowest_m: float = Field(default=0.03, description="put the probe at this height,")
     highest_m: float = Field(default=0.11, description="go on up to this one")
     step_m: PositiveFloat = Field(default=0.005, description="in such steps;")
-    readings: PositiveInt = Field(default=10, ge=2, description="at each, so many readings,")
-    interval_s: PositiveFloat = Field(default=0.2, description="one every so often,")
-    settle_s: NonNegativeFloat = Field(default=1.0, description="after a pause for the filter")
-    range_t: NonNegativeFloat = Field(default=0.035, description="in this range; 0: as the instrument chooses")
+    readings: PositiveInt = Field(default=10, ge=2, description="number of readings at each height")
+    interval_s: PositiveFloat = Field(default=0.2, description="time from one reading to the next")
+    settle_s: NonNegativeFloat = Field(default=1.0, description="pause before the first one, for the filter")
+    range_t: NonNegativeFloat = Field(default=0.035, description="range of the magnetometer; 0: as it chooses")
     height_u_m: NonNegativeFloat = Field(default=2e-4, description="standard uncertainty of setting a height")
     gain_u: NonNegativeFloat = Field(
         default=0.0012, description="of the magnetometer's scale, relative (0.2 % of reading: 0.2 %/√3)"

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 #: Points of a sweep, at most.
 _MOST_POINTS = 1000
-#: A locked top swings about the drive, by some tenths of a hertz: so many looks in a row have a mean this near to it
-#: [Hz]; after so many looks it is not locked.
+#: A locked top swings about the drive, by some tenths of a hertz: the mean of these looks in a row is this near to it
+#: [Hz]; after the last number of looks it is not locked.
 _LOOKS, _LOCKED_WITHIN_HZ, _MOST_LOOKS = 3, 0.25, 12
 #: Shortest and longest gate, in parts of `gate_s`, and longest pause before one, in periods of the drive.
 _GATES, _PAUSES = (0.75, 1.25), 4.0
@@ -57,14 +57,14 @@ class PrecessionSettings(DriveSettings):
 
     drive_frequency_hz: PositiveFloat = Field(default=44.0, description="the top is driven up to this first,")
     first_hz: PositiveFloat = Field(default=44.0, description="sweep the drive from this")
-    last_hz: PositiveFloat = Field(default=28.0, description="to this; the top is lost rather at the lower end,")
-    step_hz: PositiveFloat = Field(default=2.0, description="in steps of this;")
+    last_hz: PositiveFloat = Field(default=28.0, description="to this: a top is lost rather at the lower end")
+    step_hz: PositiveFloat = Field(default=2.0, description="in steps of this")
     frequencies_hz: tuple[PositiveFloat, ...] | None = Field(
         default=None, description="or these, in this order", examples=[[44.0, 38.0, 33.0, 28.0]]
     )
-    hold_s: NonNegativeFloat = Field(default=20.0, description="and held so long at each point of the sweep")
-    interval_s: PositiveFloat = Field(default=2.0, description="look every so often whether it is locked,")
-    counts: PositiveInt = Field(default=10, ge=3, description="and count spin and laser so many times")
+    hold_s: NonNegativeFloat = Field(default=20.0, description="time for which it is held at each point of the sweep")
+    interval_s: PositiveFloat = Field(default=2.0, description="time from one look at the lock to the next")
+    counts: PositiveInt = Field(default=10, ge=3, description="number of counts of spin and of laser at each point")
     laser_input: Literal[1, 2] = Field(
         default=2, description="of the counter; 1: you are asked to change the cable each time"
     )
@@ -136,14 +136,14 @@ def channels(settings: PrecessionSettings) -> tuple[Channel, ...]:
 
 
 def run(session: Session[PrecessionSettings]) -> None:
-    """Drive the top up and through the sweep; where it is lost, drive it up anew."""
+    """Drive the top up and through the sweep; where it is lost, drive it up again."""
     settings = session.settings
     if settings.laser_input == 1 and session.writer.record.seed is not None:
         raise ExperimentFailed(
             "the virtual bench has no person who could change the counter's cable (precession.laser_input = 1): take 2"
         )
     prepare_counter(session)
-    session.begin(lambda: None, resumed="the top is driven up anew")
+    session.begin(lambda: None, resumed="the top is driven up again")
     left = settings.sweep[_points_done(session.rows, settings.sweep) :]
     sweep_drive(session, left, lambda drive: _point(session, drive))
     session.event(RunEvent.DRIVE_OFF, f"drive off, {len(session.rows)} of {len(settings.sweep)} points were measured")

@@ -22,9 +22,9 @@ _USUAL_HZ_PER_S, _USUAL_HZ = 0.0964, 30.0
 _USUAL_U_HZ = 0.03
 #: Of the spin: a larger uncertainty counts as this.
 _MOST_U = 0.1
-#: Readings that differ by so many of their standard uncertainties show the rate of the fall.
+#: Readings that differ by this multiple of their u show the rate of the fall.
 _CLEAR = 8.0
-#: Air takes a thousandth of a free top's spin a second at least (0.3 %/s is usual) [1/s]; half of it, after so long a
+#: Air takes a thousandth of a free top's spin a second at least (0.3 %/s is usual) [1/s]; half of it, after this
 #: time [s], is much more than the noise of a reading.
 _LEAST_LOSS_PER_S, _SEEN_TO_FALL_S = 1e-3, 60.0
 #: The drag of every law is between these powers of the spin.

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 #: What is read.
 WANTED = "samples beside their times, a scope's CSV, WAV, .npy, or a column of pulse times is expected"
-#: A header ends within so many lines.
+#: Longest header [lines].
 MOST_LINES = 200
 #: What stands for a unit beside its symbol.
 _UNIT_WORDS = dict.fromkeys(("volt", "volts", "voltage", "value", "spannung", "y"), "V") | dict.fromkeys(
@@ -91,7 +91,7 @@ class Header:
     """What stands above or beside the samples.
 
     Attributes:
-        format: what wrote it, in words.
+        format: name of the program or instrument that wrote it.
         dialect: of the lines.
         first_line: 1-based line of the first row.
         columns: the channels.
@@ -143,7 +143,7 @@ def read_header(head: Head, dialect: Dialect, columns: Mapping[str, str]) -> Hea
 
 
 def printed(text: str, dialect: Dialect) -> Printed | None:
-    """Return a number and how finely it is printed; None if it is none.
+    """Return a number and its last printed digit; None for any other text.
 
     >>> printed("-250.0000E-03", Dialect(",", "."))
     Printed(value=-0.25, resolution=1e-07)
@@ -242,12 +242,12 @@ def _rigol(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Heade
         for key in ("start", "increment")
     )
     if start is None or step is None:
-        raise TableError(head.path, "has no numbers below Start and Increment: export it anew", line=2)
+        raise TableError(head.path, "has no numbers below Start and Increment: export it again", line=2)
     numbered = title[0] in {"x", "sequence"}
     channels = range(int(numbered), min(title.index("start"), title.index("increment")))
     first = _first_row(rows, 1, 0, dialect)
     if first is None or not channels:
-        raise TableError(head.path, "holds a header of Rigol's and no samples: export it anew", line=len(rows))
+        raise TableError(head.path, "holds a header of Rigol's and no samples: export it again", line=len(rows))
     columns = [SampleColumn(_signal(rows[0][k]), *_from_unit(rows[1], k)) for k in channels]
     kept, begin = _with_samples(columns, rows, first, dialect)
     return Header(
@@ -288,7 +288,7 @@ def _is_time(text: str) -> bool:
 
 
 def _are_units(row: Sequence[str]) -> bool:
-    """Return whether a row holds units alone, that of the times in words first."""
+    """Return whether a row holds units alone, the name of the times first."""
     return row[0].casefold() in {"second", "seconds"} and all(_is_unit_word(text) for text in row[1:] if text)
 
 
@@ -327,7 +327,7 @@ def _keyed(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Heade
         return None
     first = _first_row(rows, titles, 0, dialect)
     if first is None:
-        raise TableError(head.path, "holds the header of a scope and no samples: export it anew", line=len(rows))
+        raise TableError(head.path, "holds the header of a scope and no samples: export it again", line=len(rows))
     names = [cell for cell in keys.get("source", ()) if cell]
     units = [cell.partition(":") for cell in keys.get("vertical units", ()) if cell]
     columns = []
@@ -396,7 +396,7 @@ def _interval(head: Head, keys: Mapping[str, Sequence[str]], dialect: Dialect) -
     if interval is None and rate is not None and rate.value > 0:
         interval = Printed(1 / rate.value, rate.resolution / rate.value**2)
     if interval is not None and not interval.value > 0:
-        raise TableError(head.path, f"its header says a sample interval of {interval.value:g} s: export it anew")
+        raise TableError(head.path, f"its header says a sample interval of {interval.value:g} s: export it again")
     return interval
 
 

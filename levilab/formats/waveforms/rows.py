@@ -132,8 +132,8 @@ def _number(path: Path, text: str, line: int, dialect: Dialect) -> float:
     if not abs(value) < HIGHEST:
         raise TableError(
             path,
-            f"'{shorten(text)}' is a missing sample, but samples are evenly spaced: export the record anew, or cut the "
-            "file there",
+            f"'{shorten(text)}' is a missing sample, but samples are evenly spaced: export the record again, or cut "
+            "the file there",
             line=line,
         )
     return value

@@ -192,7 +192,7 @@ def _check_numbers(path: Path, clock: _Clock) -> None:
             raise TableError(
                 path,
                 f"its samples are numbered, and {difference:g} lies from one to the next, 1 is expected: "
-                "export the record anew",
+                "export the record again",
                 line=line,
             )
 

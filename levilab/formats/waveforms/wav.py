@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 #: Samples of integers → (value of silence, full scale).
 _SCALES = {"u1": (128.0, 128.0), "i2": (0.0, 32768.0), "i4": (0.0, 2147483648.0)}
 UNIT = "full scale"
-_ADVICE = "export it anew as PCM or float WAV"
+_ADVICE = "export it again as PCM or float WAV"
 
 
 def read_wav(path: Path) -> Waveform:

@@ -50,7 +50,7 @@ class Waveform:
 
     Attributes:
         path: the file.
-        format: what wrote it, in words.
+        format: name of the program or instrument that wrote it.
         start: time of the first sample [s].
         step: from one sample to the next [s]; step_u: its standard uncertainty [s], where it comes from rounded times.
         count: samples of each channel.

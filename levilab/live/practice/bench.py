@@ -76,7 +76,7 @@ class PracticeBench:
             BenchGone: the process has ended.
         """
         self._number += 1
-        gone = BenchGone("the bench for practice has ended, or was not started: start it anew")
+        gone = BenchGone("the bench for practice has ended, or was not started: start it again")
         if self._pipe is None:
             raise gone
         try:

@@ -71,9 +71,9 @@ RAMP_STEP_S = 0.5
 #: The drive can take hold of a top that spins as fast as it is set, within this [Hz].
 CATCHES_WITHIN_HZ = 1.0
 #: A top that the drive took hold of swings about it by less than this [Hz], on the ramp, too.  One that is not held
-#: loses 0.1 Hz/s to the air: so long after the drive has yielded it is compared [s].  So far off [Hz] it is lost.
+#: loses 0.1 Hz/s to the air: it is compared this long after the drive has yielded [s], and lost beyond this [Hz].
 SWINGS_HZ, COMPARED_S, LOST_HZ = 0.4, 6.0, 1.0
-#: A top that follows the drive so much higher than where it took hold was tuned up [Hz].
+#: A top that follows the drive this far above where it took hold was tuned up [Hz].
 TUNED_UP_HZ = 0.5
 #: Experiments for which a top has to be up when they begin; for `limit` the virtual person puts one back.
 NEED_A_TOP = frozenset({"spin", "precession", "trace"})
@@ -208,7 +208,7 @@ class Reporter:
 
 
 class LinesToReport(Display):
-    """The display of a run that is recorded: what it says goes to the person at the bench."""
+    """The display of a run that is recorded: its messages go to the person at the bench."""
 
     def __init__(self, report: Reporter) -> None:
         self._report = report
@@ -254,7 +254,7 @@ class PracticeProcess:
         self._number: int | None = None  # of the command that wanted it
         self._stopped = ""  # why the run that is recorded is to end
         self._over = False
-        self._looking = False  # whether `look` is under way: what it does may wait, too
+        self._looking = False  # whether `look` is under way: its work may wait, too
         self._hold: Hold | None = None  # of the drive, while it is on near the top's spin
         self._took_hold = self._tuned_up = False  # whether a person has come so far
         self._paused = False  # by a person
