@@ -177,7 +177,7 @@ def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levila
     done = levilab("analyze", "spindown", sample_data, "--no-save")
     assert "skipped" not in done.stdout
     assert "skipped 3 limit runs\n" in done.stderr
-    assert "time [s]" in done.stdout
+    assert "lasts [s]" in done.stdout
 
 
 def test_a_result_that_is_damaged_ends_the_report_with_one_line(levilab: Command, tmp_path: Path) -> None:

@@ -349,8 +349,8 @@ def test_a_person_who_cannot_be_asked_ends_the_experiment(monkeypatch: pytest.Mo
 
 def test_readings_of_a_run_are_drawn_channel_by_channel() -> None:
     figure = levilab.load(SAMPLE_DATA / "field-scan").plot()
-    assert [panel.get_ylabel() for panel in figure.axes] == ["flux density  [T]"]
-    assert figure.axes[-1].get_xlabel() == "height  [m]"
+    assert [panel.get_ylabel() for panel in figure.axes] == ["flux density  [mT]"]
+    assert figure.axes[-1].get_xlabel() == "height  [cm]"
     assert len(levilab.load(SAMPLE_DATA / "upper-limits").plot().axes) == 4
 
 
