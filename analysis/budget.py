@@ -83,12 +83,12 @@ class Budget:
     @property
     def included(self) -> tuple[Component, ...]:
         """The rows that u is made of, the largest first."""
-        return self._sorted(one for one in self.components if one.included)
+        return self._sort(one for one in self.components if one.included)
 
     @property
     def left_out(self) -> tuple[Component, ...]:
         """The rows that u does not contain, those of unknown size last."""
-        return self._sorted(one for one in self.components if not one.included)
+        return self._sort(one for one in self.components if not one.included)
 
     @property
     def combined(self) -> float:
@@ -123,7 +123,7 @@ class Budget:
         whole = self.u if row.included else hypot(self.u, part)
         return (part / whole) ** 2 if whole else None
 
-    def _sorted(self, rows: Iterable[Component]) -> tuple[Component, ...]:
+    def _sort(self, rows: Iterable[Component]) -> tuple[Component, ...]:
         def size(one: Component) -> float:
             return -1.0 if one.contribution is None else one.contribution
 

@@ -95,14 +95,14 @@ def profile(
     # In units of u, and away from zero, lmfit's first step and its relative tolerance suit every parameter.
     offset = 10.0
 
-    def unscaled(z: Array) -> Array:
+    def unscale(z: Array) -> Array:
         return best + (z - offset) * u
 
     def grown(old: Any, new: Any) -> float:
         return float(erf(np.sqrt(max(new.chisqr - old.chisqr, 0.0) / (variance or 1.0) / 2)))
 
     minimizer = _minimizer(
-        lambda z: residual(unscaled(z)), lambda z: gradient(unscaled(z)) * u[:, None], np.full(len(best), offset)
+        lambda z: residual(unscale(z)), lambda z: gradient(unscale(z)) * u[:, None], np.full(len(best), offset)
     )
     probability = None if variance is None else grown
 

@@ -166,7 +166,7 @@ def summarize(sample: Sample) -> Statistics:
     >>> round(found.mean.u, 4), round(found.scatter.value, 4)
     (0.0577, 0.0)
     """
-    limits, n = _checked(sample.limits), sample.limits.size
+    limits, n = _check_limits(sample.limits), sample.limits.size
     mean = float(limits.mean())
     if n < FEWEST:
         own = None if sample.u is None else float(sample.u[0])
@@ -203,7 +203,7 @@ def combine(runs: Sequence[Sample]) -> Statistics:
     >>> round(found.mean.value, 2), round(found.mean.u, 2), round(found.scatter.value, 2), round(found.between.value, 2)
     (60.5, 0.5, 0.1, 0.7)
     """
-    limits = [_checked(run.limits) for run in runs]
+    limits = [_check_limits(run.limits) for run in runs]
     numbers = np.array([one.size for one in limits])
     within = int(numbers.sum()) - len(runs)
     if len(runs) == 1:
@@ -238,7 +238,7 @@ def combine(runs: Sequence[Sample]) -> Statistics:
     )
 
 
-def _checked(limits: Array) -> Array:
+def _check_limits(limits: Array) -> Array:
     if limits.size == 0:
         raise TooFewReadings(seen=0, needed=1)
     for i, value in enumerate(limits.tolist()):

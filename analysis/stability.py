@@ -169,10 +169,10 @@ def equilibria(field: AxialField, top: SymmetricTop, low: float, high: float) ->
 
     values = top.moment * field(z)[1] - weight
     places = [_zero(missing, z[i], z[i + 1], xtol=1e-15) for i in np.flatnonzero(values[1:] * values[:-1] < 0)]
-    return tuple(_described(field, top, place) for place in places)
+    return tuple(_describe_equilibrium(field, top, place) for place in places)
 
 
-def _described(field: AxialField, top: SymmetricTop, height: float) -> Equilibrium:
+def _describe_equilibrium(field: AxialField, top: SymmetricTop, height: float) -> Equilibrium:
     bend = float(field(np.array([height]))[2, 0])
     tilt, sideways, both = top.stiffness(field, np.array([height]))[:, 0]
     # U = −μB for the upright top; sideways |B| changes by B′²/4B − B″/2 (Berry), and −μ = |μ| against the field

@@ -47,12 +47,12 @@ def parse_json(text: str) -> Any:
             nesting beyond DEEPEST, a whole number beyond LARGEST, NaN, infinity, half a surrogate pair.
     """
     try:
-        return _parsed_json(text)
+        return _parse_strict_json(text)
     except json.JSONDecodeError as error:
         raise ValueError(f"from line {error.lineno}, column {error.colno} on") from error
 
 
-def _parsed_json(text: str) -> Any:
+def _parse_strict_json(text: str) -> Any:
     _refuse_surrogates(text)
     if "\\u" not in text and text.count("{") + text.count("[") <= DEEPEST:  # nothing to look for afterwards
         return json.loads(text, parse_int=_whole_number, parse_float=_finite_number, parse_constant=_finite_number)

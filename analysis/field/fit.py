@@ -223,17 +223,17 @@ def fit_scan(
     inner, outer = known.inner_radius.value, known.outer_radius.value
     if not 0 < inner < outer < math.inf:
         raise ImpossibleRing(inner=inner, outer=outer)
-    z, b, u_b, u_z = _checked(height, flux_density, u, height_u)
+    z, b, u_b, u_z = _check_columns(height, flux_density, u, height_u)
     _refuse_bad_scans(z, b, known)
-    problem = _Problem(z, b, u_b, u_z, known, _free(known, free_radii=free_radii))
+    problem = _Problem(z, b, u_b, u_z, known, _free_parameters(known, free_radii=free_radii))
     values, sigma = problem.solve()
-    return _described(problem, values, sigma)
+    return _describe_scan(problem, values, sigma)
 
 
 # --- the input ---
 
 
-def _checked(
+def _check_columns(
     height: ArrayLike, flux_density: ArrayLike, u: ArrayLike | None, height_u: ArrayLike | float
 ) -> tuple[Array, Array, Array | None, Array]:
     """Check all columns, and return them in the order of the heights."""
@@ -292,7 +292,7 @@ def _refuse_plateau(z: Array, b: Array) -> None:
 # --- the fit ---
 
 
-def _free(known: Known, *, free_radii: bool) -> tuple[str, ...]:
+def _free_parameters(known: Known, *, free_radii: bool) -> tuple[str, ...]:
     """Return the parameters to fit: all that are not exact, and the radii only on request."""
     wanted = PARAMETERS if free_radii else PARAMETERS[:-2]
     priors = {name: known.prior(name) for name in wanted}
@@ -396,14 +396,14 @@ class _Problem:
             return np.concatenate([(self.model(every) - self.b) / sigma, known])
 
         def gradient(q: Array) -> Array:
-            return self.weighted(whole(q), sigma)[moved] * steps[:, None]
+            return self.weighted_slopes(whole(q), sigma)[moved] * steps[:, None]
 
         found, ended = solve(residual, gradient, values[moved] / steps)
         if not ended or not np.isfinite(found).all():
             raise NotFitted(what="flux density against height", advice="are heights and radii of one base, in metres?")
         return whole(found)
 
-    def weighted(self, values: Array, sigma: Array) -> Array:
+    def weighted_slopes(self, values: Array, sigma: Array) -> Array:
         """Return the slopes of all residuals by all parameters, shape (6, n + priors)."""
         known = np.zeros((6, len(self.priors())))
         for column, (index, prior) in enumerate(self.priors()):
@@ -414,9 +414,9 @@ class _Problem:
 # --- the result ---
 
 
-def _described(problem: _Problem, values: Array, sigma: Array) -> FieldScan:
+def _describe_scan(problem: _Problem, values: Array, sigma: Array) -> FieldScan:
     known, free, moved = problem.known, problem.free, problem.indices
-    jacobian = problem.weighted(values, sigma)
+    jacobian = problem.weighted_slopes(values, sigma)
     found = curvature(jacobian[moved])
     if found.covariance is None:
         raise NotFitted(what="flux density against height", advice="the readings do not tell the parameters apart")
@@ -513,7 +513,7 @@ def parts_of(scan: FieldScan, height_u: ArrayLike | float) -> dict[str, tuple[UP
     """
     problem = _Problem(scan.height, scan.flux_density, None, np.zeros_like(scan.height), scan.known, scan.fitted)
     moved, values = problem.indices, scan.values
-    jacobian = problem.weighted(values, scan.u)
+    jacobian = problem.weighted_slopes(values, scan.u)
     h = curvature(jacobian[moved]).covariance
     if h is None:
         return {}

@@ -256,7 +256,7 @@ def learn(x: Array, cell: NDArray[np.intp], valid: NDArray[np.bool_] | None, wid
     return Pulse(shape, np.fft.irfft(full * turn, TABLE), float(np.angle(around) / (2 * np.pi)) % 1.0)
 
 
-def _flat(x: Array) -> bool:
+def _is_clipped(x: Array) -> bool:
     """Return whether more than half of the turns reach one and the same greatest value three times or more."""
     return bool(np.count_nonzero(np.count_nonzero(x == x.max(), axis=1) > 2) > 0.5 * len(x))
 
@@ -375,7 +375,7 @@ def _regress(
         shifts=phase - fit.phase(pieces.times),
         used=use,
         evidence=float(found.height[found.usable] ** 2 @ found.power[found.usable]) / noise2,
-        flat=_flat(pieces.x),
+        flat=_is_clipped(pieces.x),
         noise=float(np.sqrt(noise2)),
         height=mean * height_of_pulse,
         bound=float(np.sqrt(fit.unit_covariance[1, 1])) / fit.half,

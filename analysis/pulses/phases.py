@@ -49,7 +49,7 @@ def phases(track: Track, *, still: float = STILL) -> tuple[Phase, ...]:
     for start, end in track.empty:
         at = int(np.searchsorted(track.time, start))
         found.append(Phase("nothing", start, end, (at, at)))
-    return tuple(_touching(sorted(found, key=lambda phase: phase.start)))
+    return tuple(_extend_to_gaps(sorted(found, key=lambda phase: phase.start)))
 
 
 def _kinds(track: Track, still: float) -> list[Kind]:
@@ -91,7 +91,7 @@ def _edge(track: Track, i: int, side: int) -> float:
     return float(track.time[i] + 0.5 * back)
 
 
-def _touching(found: list[Phase]) -> list[Phase]:
+def _extend_to_gaps(found: list[Phase]) -> list[Phase]:
     """Make phases end where an empty time begins."""
     result = []
     for i, phase in enumerate(found):

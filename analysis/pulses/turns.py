@@ -77,7 +77,7 @@ def _from_intervals(times: Array) -> Numbering | None:
     if off.max() < TOLERANCE and whole.min() >= 1:
         return Numbering(np.concatenate([[0], np.cumsum(whole)]).astype(np.int64), np.ones(times.size, dtype=bool))
     phase = frequency * since + 0.5 * slope * since**2
-    phase -= _densest(phase[None, :])[0]
+    phase -= _densest_phase(phase[None, :])[0]
     turns = np.rint(phase)
     belongs = np.abs(phase - turns) < TOLERANCE
     return Numbering(turns.astype(np.int64), belongs) if np.count_nonzero(belongs) > NEARLY * times.size else None
@@ -191,11 +191,11 @@ def _refine(since: Array, frequency: Array) -> tuple[Array, Array, Array]:
         frequency = np.take_along_axis(trial, np.argmax(power, axis=1)[:, None], axis=1)[:, 0]
     phases = since * frequency[:, None]
     mean = np.exp(2j * np.pi * phases).mean(axis=1)
-    phase = -_densest(phases)
+    phase = -_densest_phase(phases)
     return frequency, phase, np.abs(mean)
 
 
-def _densest(phases: Array) -> Array:
+def _densest_phase(phases: Array) -> Array:
     """Return where most phases [turns] lie, for each row."""
     bins = 32
     fraction = phases - np.floor(phases)
@@ -215,12 +215,12 @@ def _densest(phases: Array) -> Array:
 def _from_windows(times: Array) -> Numbering:
     """Return the better of two: windows joined one by one, or one frequency and slope for all of them."""
     found = windows_of(times)
-    joined, common = _joined(times, found), _common(times, found)
+    joined, common = _join_windows(times, found), _common_line(times, found)
     # a joined phase can bend to whatever lies near: it has to be much better
     return joined if np.count_nonzero(joined.belongs) > 1.2 * np.count_nonzero(common.belongs) else common
 
 
-def _common(times: Array, found: Windows) -> Numbering:
+def _common_line(times: Array, found: Windows) -> Numbering:
     """Return numbers by the frequency and the slope about the windows' at which the pulses' phases agree best."""
     if found.centre.size >= 4:
         frequency, slope, origin = _line(found.centre, found.frequency)
@@ -240,12 +240,12 @@ def _common(times: Array, found: Windows) -> Numbering:
         i, j = np.unravel_index(np.argmax(power), power.shape)
         frequency, slope = frequency + float(f[i]), slope + float(c[j])
     phase = frequency * since + 0.5 * slope * since**2
-    phase = phase - _densest(phase[None, :])[0]
+    phase = phase - _densest_phase(phase[None, :])[0]
     turns = np.rint(phase)
     return Numbering(turns.astype(np.int64), np.abs(phase - turns) < CORE, 2 * CORE)
 
 
-def _joined(times: Array, found: Windows) -> Numbering:
+def _join_windows(times: Array, found: Windows) -> Numbering:
     middle = (
         np.median(np.lib.stride_tricks.sliding_window_view(np.pad(found.frequency, 2, mode="reflect"), 5), axis=1)
         if found.centre.size > 4

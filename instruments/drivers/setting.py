@@ -104,9 +104,9 @@ class Setting(Generic[T]):
     def description(self) -> str:
         """Return the text of `help`: the meaning, the header on the wire, range and unit."""
         about = f"{self.about}: " if self.about else ""
-        return f"{about}{self.header}{f' {self.key}' if self.key else ''}, {self._allowed()}."
+        return f"{about}{self.header}{f' {self.key}' if self.key else ''}, {self._describe_allowed()}."
 
-    def _allowed(self, span: tuple[float, float] | None = None) -> str:
+    def _describe_allowed(self, span: tuple[float, float] | None = None) -> str:
         """Return the text that describes the allowed values."""
         unit = f" {self.unit}" if self.unit else ""
         if self.kind is bool:
@@ -144,7 +144,7 @@ class Setting(Generic[T]):
         try:
             return cast("T", self._parse(instrument.field_of(answer, self.header, self.key), form))
         except ValueError:
-            instrument.reject(question, answer, self._expected(form))
+            instrument.reject(question, answer, self._describe_expected(form))
 
     def __set__(self, instrument: Owner, value: T) -> None:
         """Check, send, and read the error queue."""
@@ -198,12 +198,12 @@ class Setting(Generic[T]):
         below, above = (self.resolution + self._last_digit(abs(limit)) for limit in (low, high))
         return low - below <= number <= high + above and abs(number) < NOT_A_NUMBER  # a load may be 9.9E37 ohm
 
-    def _expected(self, form: Form) -> str:
+    def _describe_expected(self, form: Form) -> str:
         """Return the text that describes the expected answer."""
         if self.kind is bool:
             return "0 or 1"
         if self.kind is float:
-            return f"a number ({self._allowed(self.span)}), as {form.example}"
+            return f"a number ({self._describe_allowed(self.span)}), as {form.example}"
         if self.choices:
             return "one of " + ", ".join((*self.choices, *self.answers))
         return f"a text, as {form.example}"
@@ -221,13 +221,13 @@ class Setting(Generic[T]):
             try:
                 _short_form(str(value), self.choices)
             except ValueError:
-                raise OutOfRange(address, self.name, value, self._allowed()) from None
+                raise OutOfRange(address, self.name, value, self._describe_allowed()) from None
         if self.values and value not in self.values:
-            raise OutOfRange(address, self.name, value, self._allowed())
+            raise OutOfRange(address, self.name, value, self._describe_allowed())
         if self.kind is float and not self.low <= float(value) <= self.high:
-            raise OutOfRange(address, self.name, value, self._allowed())
+            raise OutOfRange(address, self.name, value, self._describe_allowed())
         if self.kind is str and not self.choices and self.form and not self.form.matches(str(value)):
-            raise OutOfRange(address, self.name, value, self._allowed())
+            raise OutOfRange(address, self.name, value, self._describe_allowed())
 
     def _spell(self, value: T) -> str:
         if self.kind is bool:

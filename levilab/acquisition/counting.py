@@ -162,13 +162,13 @@ class FreeTop(Generic[S]):
         if second and self._is_plausible(second):
             return second
         if first and second and _is_same_spin(first, second):
-            return self._agreed(second)
+            return self._judge_pair(second)
         if second:
             text = f"{second['spin_frequency_hz']:.4g} Hz is not credible either"
             self.session.event(RunEvent.NOT_TAKEN, text, **_spin_of(second))
         return Missed.UNSTEADY if first or second else Missed.DARK
 
-    def _agreed(self, reading: Row) -> Row | Missed:
+    def _judge_pair(self, reading: Row) -> Row | Missed:
         """Return the meaning of two counts that agree, but do not follow from the last reading."""
         last = self.before[-1]  # else they would follow
         if reading["spin_frequency_hz"] < last["spin_frequency_hz"]:

@@ -270,14 +270,14 @@ def _ramp(session: Session[D], start: float, target: float) -> float:
         session.stop.check()
         drive = start + (target - start) * k / steps
         session.bench.generator.frequency = drive
-        session.progress(f"drive at {drive:.2f} Hz{_until(session, target, (steps - k) * RAMP_STEP_S)}", k / steps)
+        session.progress(f"drive at {drive:.2f} Hz{_ramp_end(session, target, (steps - k) * RAMP_STEP_S)}", k / steps)
         session.wait(RAMP_STEP_S)
         if k % round(_LOOK_EVERY_S / RAMP_STEP_S) == 0 and k < steps:
             held_spin(session, drive)
     return held_spin(session, target)
 
 
-def _until(session: Session[D], target: float, left_s: float) -> str:
+def _ramp_end(session: Session[D], target: float, left_s: float) -> str:
     """Return the end of a ramp as text; empty at the end, and on a clock that does not keep to the wall's."""
     if left_s <= 0 or not math.isfinite(session.bench.clock.speed):
         return ""

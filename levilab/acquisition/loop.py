@@ -90,7 +90,7 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
         except Exception as error:
             # the disk may be full: the first thing that went wrong is what counts
             with contextlib.suppress(CannotWrite):
-                writer.event(None, RunEvent.FAILED, _in_words(error))
+                writer.event(None, RunEvent.FAILED, _reason_of(error))
                 writer.finish("failed")
             if not writer.record.instruments and not request.wire_log:
                 writer.discard()
@@ -99,7 +99,7 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
     return Run.load(writer.folder)
 
 
-def _in_words(error: Exception) -> str:
+def _reason_of(error: Exception) -> str:
     """Return the reason that ended a run: the text of a known failure, with the class of an unexpected one."""
     known = isinstance(error, LevilabError | InstrumentError)
     return unquoted(str(error) if known else f"{type(error).__name__}: {error}")
@@ -140,7 +140,7 @@ def _at_the_bench(
         )
         try:
             _note_instruments(session, "start")
-            with watch(session, wiring) as look, _called_meanwhile(look, session):
+            with watch(session, wiring) as look, _look_meanwhile(look, session):
                 experiment.run(session)
         finally:
             stop.shield()
@@ -150,7 +150,7 @@ def _at_the_bench(
 
 
 @contextlib.contextmanager
-def _called_meanwhile(look: Callable[[], None], session: Session[Any]) -> Iterator[None]:
+def _look_meanwhile(look: Callable[[], None], session: Session[Any]) -> Iterator[None]:
     """Let an onlooker see whatever happens, and how time passes."""
     clock = session.bench.clock
     before = clock.meanwhile

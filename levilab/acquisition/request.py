@@ -133,7 +133,7 @@ def _configuration(options: AcquisitionOptions, run: Run | None, *, virtual: boo
 
     The settings of `options` are not in it.
     """
-    config = _as_it_was(run) if run else Configuration()
+    config = _original_configuration(run) if run else Configuration()
     if options.bench or not virtual:
         instead = "" if virtual else ", or try `mock`"
         described = read_bench(options.bench or Path("bench.toml"), Configuration, instead=instead)
@@ -196,14 +196,14 @@ def _check_given(config: BenchConfig, without: BenchConfig, experiment: str) -> 
         UsageError: the bench allows the configuration without the given settings, and not with them.
         ConfigError: it allows neither.
     """
-    refused = _refused(config, experiment)
-    if refused and not _refused(without, experiment):
+    refused = _refusal(config, experiment)
+    if refused and not _refusal(without, experiment):
         raise UsageError("settings", str(refused)) from refused
     if refused:
         raise refused
 
 
-def _refused(config: BenchConfig, experiment: str) -> ConfigError | None:
+def _refusal(config: BenchConfig, experiment: str) -> ConfigError | None:
     """Return why the bench does not allow the experiment's settings; None if it does."""
     try:
         settings_of(config, experiment).check(experiment, config.limits)
@@ -212,7 +212,7 @@ def _refused(config: BenchConfig, experiment: str) -> ConfigError | None:
     return None
 
 
-def _as_it_was(run: Run) -> BenchConfig:
+def _original_configuration(run: Run) -> BenchConfig:
     """Return the configuration that a run was begun with."""
     bench = {key: value for key, value in run.record.configuration.items() if key != "scene"}
     try:
@@ -360,19 +360,19 @@ def _with_a_spinning_top(
         request,
         config=config,
         wiring=lambda: virtual_wiring(SpinWorld(scene, clock()), config.limits),
-        synthetic_how=HOW.format(what=_world_in_words(scene, request.experiment)),
+        synthetic_how=HOW.format(what=_describe_world(scene, request.experiment)),
     )
 
 
-def _world_in_words(scene: SpinScene, experiment: str) -> str:
+def _describe_world(scene: SpinScene, experiment: str) -> str:
     """Return a description of the part of the world that an experiment measures."""
     if "magnetometer" in EXPERIMENTS[experiment].instruments:
         base = scene.base
         return _BASE.format(**vars(base))
-    return _SPIN_ONLY.format(law=_law_in_words(scene))
+    return _SPIN_ONLY.format(law=_describe_law(scene))
 
 
-def _law_in_words(scene: SpinScene) -> str:
+def _describe_law(scene: SpinScene) -> str:
     constants = ", ".join(f"{c:.4e}" for c in scene.constants)
     return f"{scene.drag} law with {constants} (SI), falling at {scene.fall_hz:.2f} Hz"
 

@@ -278,7 +278,7 @@ class Session(Generic[S]):
         if not self._headed:
             self._headed = True
             self.show.message("  ".join(f"{_head(one):>{_width(one)}}" for one in self._shown))
-        self.show.reading(self._in_words(row), row["time_s"], (least, most))
+        self.show.reading(self._format_values(row), row["time_s"], (least, most))
         self.look()
 
     def keep_trace(self, input_: int, channel: str, time_s: float) -> Trace:
@@ -311,7 +311,7 @@ class Session(Generic[S]):
         self.doing.records[channel] = number, time_s + (self.zero or 0.0), trace
         return trace
 
-    def _in_words(self, row: Row) -> str:
+    def _format_values(self, row: Row) -> str:
         """Return the values of a reading as they stand in a line, below their heads."""
         texts = (_with_unit(row[one.name], one) if one.name in row else "" for one in self._shown)
         return "  ".join(f"{text:>{_width(one)}}" for text, one in zip(texts, self._shown, strict=True))

@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.numbers import digits
-from levilab.animation.film import Film, in_mm, nice_length, still, table_of_colours
+from levilab.animation.film import Film, millimetres, nice_length, still, table_of_colours
 from levilab.animation.parts import COLOURS, parts_of
 from levilab.animation.poses import height_for_camera
 from levilab.animation.three import MissingThree, three_js
-from levilab.animation.words import bind_units, short_speed, span_in_words, speed_in_words
+from levilab.animation.words import bind_units, short_speed, span_text, speed_text
 from levilab.errors import UsageError
 from levilab.present.numbers import plain, with_decimals
 from levilab.software import software_versions
@@ -112,7 +112,7 @@ def as_page(page: Page) -> bytes:
     readings = _readings(poses)
     text = environment.get_template("page.html.j2").render(
         title=title,
-        lead=f"A Levitron as computed by levilab, {span_in_words(poses)}, at first at {speed_in_words(page.speed)}.",
+        lead=f"A Levitron as computed by levilab, {span_text(poses)}, at first at {speed_text(page.speed)}.",
         alt=alt,
         still_light=_data_address(stills["light"], "light"),
         still_dark=_data_address(stills["dark"], "dark"),
@@ -171,7 +171,7 @@ def _data(page: Page, alt: str, readings: list[tuple[str, str, int]]) -> dict[st
     bar = nice_length(0.45 * span)
     return {
         "alt": alt,
-        "bar": {"length": bar, "text": bind_units(in_mm(bar))},
+        "bar": {"length": bar, "text": bind_units(millimetres(bar))},
         "columns": columns_of(poses),
         "count": len(poses.times),
         "drive_mt": 1000 * poses.scene.drive.amplitude_t,
@@ -199,7 +199,7 @@ def _alt(page: Page) -> str:
     height, tilt = 100 * poses.positions[:, 2].mean(), math.degrees(poses.tilts.max())
     return (
         f"A spinning top with a magnet, a disc and a stem, on average {height:.1f} cm above a ring magnet, "
-        f"{span_in_words(poses)}; its axis leans by up to {tilt:.1f} degrees"
+        f"{span_text(poses)}; its axis leans by up to {tilt:.1f} degrees"
     )
 
 
@@ -239,7 +239,7 @@ def _numbers(page: Page) -> list[tuple[str, str]]:
     tilts, heights = np.degrees(poses.tilts), 100 * poses.positions[:, 2]
     found = [
         ("scene", scene.description or "no description"),
-        ("shown", f"{span_in_words(poses)}, of {float(motion.time[-1]):.4g} s that were simulated"),
+        ("shown", f"{span_text(poses)}, of {float(motion.time[-1]):.4g} s that were simulated"),
         ("end", page.summary.ending),
         ("height", f"{heights.min():.2f} to {heights.max():.2f} cm above the base's centre"),
         ("tilt", f"{tilts.min():.1f} to {tilts.max():.1f}° of the axis against the base's"),

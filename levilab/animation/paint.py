@@ -185,7 +185,7 @@ class Painter:
         image = Image.new("RGB", (_FINER * self.size[0], _FINER * self.size[1]), self.colours["background"])
         base = self.parts["base"]
         circle = _circle(2.1 * base["outer"], base["bottom"], _AROUND_BASE)
-        ImageDraw.Draw(image).polygon(_flat(self._camera.project(circle)), fill=self.colours["ground"])
+        ImageDraw.Draw(image).polygon(_flatten(self._camera.project(circle)), fill=self.colours["ground"])
         return image
 
     @cached_property
@@ -241,7 +241,7 @@ class Painter:
     def _draw_plumb(self, pen: ImageDraw, pose: Pose) -> None:
         x, y, z = pose.position
         ends = self._camera.project(np.array([[x, y, self.parts["base"]["bottom"]], [x, y, z + self._lowest]]))
-        pen.line(_flat(ends), fill=self.colours["faint"], width=_FINER)
+        pen.line(_flatten(ends), fill=self.colours["faint"], width=_FINER)
 
     def _draw_drive(self, pen: ImageDraw, pose: Pose) -> None:
         direction = self.parts["drive"]
@@ -256,13 +256,13 @@ class Painter:
         """Draw a line along points [m] with a head at its end."""
         flat = self._camera.project(points)
         width = max(round(thick * self._camera.size_at(points[-1])), _FINER)
-        pen.line(_flat(flat), fill=colour, width=width, joint="curve")
+        pen.line(_flatten(flat), fill=colour, width=width, joint="curve")
         along = flat[-1] - flat[-2]
         length = float(np.hypot(*along)) or 1.0
         along = along / length
         across = np.array([-along[1], along[0]])
         head = [flat[-1] + 3.6 * width * along, flat[-1] + 1.8 * width * across, flat[-1] - 1.8 * width * across]
-        pen.polygon(_flat(np.array(head)), fill=colour)
+        pen.polygon(_flatten(np.array(head)), fill=colour)
 
     def _draw_top(self, pen: ImageDraw, pose: Pose) -> None:
         axis = pose.matrix[:, 2]
@@ -292,12 +292,12 @@ class Painter:
             share = 0.15 + 0.85 * (k + 1) / pieces
             if ends[k + 1] > ends[k]:
                 colour = _colour(old + share * (new - old))
-                pen.line(_flat(flat[ends[k] : ends[k + 1] + 1]), fill=colour, width=2 * _FINER - 1, joint="curve")
+                pen.line(_flatten(flat[ends[k] : ends[k + 1] + 1]), fill=colour, width=2 * _FINER - 1, joint="curve")
 
     def _draw_axis(self, pen: ImageDraw, pose: Pose, low: float, high: float) -> None:
         axis = pose.matrix[:, 2]
         ends = self._camera.project(np.array([pose.position + low * axis, pose.position + high * axis]))
-        pen.line(_flat(ends), fill=self.colours["axis"], width=2 * _FINER - 1)
+        pen.line(_flatten(ends), fill=self.colours["axis"], width=2 * _FINER - 1)
         if high == self.parts["axis"]["up"]:
             radius = 2.3 * _FINER
             (x, y), colour = ends[1], self.colours["path"]
@@ -332,7 +332,7 @@ class Painter:
                 self._draw_arrow(pen, piece, colour, thick)
             elif len(piece) > 1:
                 width = max(round(thick * self._camera.size_at(middle)), _FINER)
-                pen.line(_flat(self._camera.project(piece)), fill=colour, width=width, joint="curve")
+                pen.line(_flatten(self._camera.project(piece)), fill=colour, width=width, joint="curve")
 
     # --- facets ---
 
@@ -453,7 +453,7 @@ def _colour(values: Array) -> Colour:
     return red, green, blue
 
 
-def _flat(points: Array) -> list[float]:
+def _flatten(points: Array) -> list[float]:
     flat: list[float] = points.ravel().tolist()
     return flat
 

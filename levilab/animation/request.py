@@ -17,7 +17,7 @@ from levilab.animation.page import (
     three_for_page,
 )
 from levilab.animation.poses import poses_of, turn_rate
-from levilab.animation.words import span_in_words, speed_in_words
+from levilab.animation.words import span_text, speed_text
 from levilab.errors import UsageError
 from levilab.files import replace_atomically, writing
 from levilab.simulator.compilation import announce_compilation
@@ -99,7 +99,7 @@ class AnimationRequest:
             ) from None
 
     @property
-    def played(self) -> float:
+    def playing_speed(self) -> float:
         """The speed that was chosen, or the format's usual one."""
         return self.format.speed if self.speed is None else self.speed
 
@@ -134,11 +134,11 @@ def check_request(request: AnimationRequest, scene: Scene, duration: float) -> N
             f"a time above {first:g} s and up to the duration of {duration:g} s is expected",
             value=request.stop,
         )
-    if not _SLOWEST <= request.played <= _FASTEST:
+    if not _SLOWEST <= request.playing_speed <= _FASTEST:
         raise UsageError(
             "animate_speed",
             f"a number from {_SLOWEST:g} to {_FASTEST:g} is expected, as 0.05 for a twentieth of the real speed",
-            value=request.played,
+            value=request.playing_speed,
         )
     chosen.check()
 
@@ -176,7 +176,7 @@ def animate(
     if request.start is not None and request.start >= summary.end:
         raise UsageError("animate_from", f"the top was lost after {summary.end:.4g} s already", value=request.start)
     start, stop = _span(request, summary.end, fell=summary.motion.fell is not None)
-    speed = request.played
+    speed = request.playing_speed
     progress = progress or (lambda _: None)
     if chosen.encode is None:
         count = _count_for_page(summary.motion.scene, stop - start, turn_rate(summary.motion))
@@ -194,7 +194,7 @@ def animate(
     with writing(f"{request.path}: could not be written", "choose another place with `animate`"):
         request.path.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(request.path, content)
-    return f"the motion {span_in_words(poses)}, at {speed_in_words(speed)}"
+    return f"the motion {span_text(poses)}, at {speed_text(speed)}"
 
 
 def _span(request: AnimationRequest, end: float, *, fell: bool = False) -> tuple[float, float]:

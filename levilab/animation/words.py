@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 _BEFORE_A_UNIT = re.compile(r"(?<=\d) (?=(?:A m²|[mckµ]?m|s|Hz|m?T|k?g|rad|turns|MB)(?:\W|$))|(?<=\d[ \u00a0]A) (?=m²)")
 
 
-def speed_in_words(speed: float) -> str:
+def speed_text(speed: float) -> str:
     """Return a film's speed, as a part of the real one.
 
-    >>> [speed_in_words(x) for x in (0.05, 1.0, 0.3, 2.0)]
+    >>> [speed_text(x) for x in (0.05, 1.0, 0.3, 2.0)]
     ['1/20 of real speed', 'real speed', '0.3 of real speed', '2 times real speed']
     """
     if speed == 1:
@@ -36,10 +36,10 @@ def short_speed(speed: float) -> str:
     >>> [short_speed(x) for x in (0.05, 1.0, 0.3)]
     ['1/20', '1', '0.3']
     """
-    return speed_in_words(speed).removesuffix(" of real speed") if speed < 1 else f"{speed:g}"
+    return speed_text(speed).removesuffix(" of real speed") if speed < 1 else f"{speed:g}"
 
 
-def span_in_words(poses: Poses) -> str:
+def span_text(poses: Poses) -> str:
     """Return the seconds of the motion that are shown."""
     last = ", where it is lost" if poses.fell else ""
     return f"from {poses.times[0]:.4g} s to {poses.times[-1]:.4g} s{last}"

@@ -29,30 +29,30 @@ class Commands(typer.core.TyperGroup):
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:
-            error.message = in_plain_words(error.message, _refused(error))
+            error.message = explain_bad_value(error.message, _refused_value(error))
             raise
         except KeyboardInterrupt:  # what can be lost is said by the command itself
             message("levilab: interrupted")
             raise typer.Exit(exit_codes.INTERRUPTED) from None
 
 
-def _refused(error: typer.BadParameter) -> object:
+def _refused_value(error: typer.BadParameter) -> object:
     """Return the value that pydantic refused, None where something else did."""
     errors = getattr(error.__context__, "errors", None)
     return errors()[0]["input"] if errors else None
 
 
-def in_plain_words(text: str, seen: object = None) -> str:
+def explain_bad_value(text: str, seen: object = None) -> str:
     """Return typer's message about a wrong value, with the value and its fault.
 
-    >>> in_plain_words("Input should be a valid number, unable to parse string as a number", "0,03")
+    >>> explain_bad_value("Input should be a valid number, unable to parse string as a number", "0,03")
     "'0,03': a number is expected; write a decimal point, not a comma"
-    >>> in_plain_words("Input should be greater than or equal to 10")
+    >>> explain_bad_value("Input should be greater than or equal to 10")
     'a number greater than or equal to 10 is expected'
     """
-    from levilab.settings import expected, hint_about  # with pydantic
+    from levilab.settings import explain_message, hint_about  # with pydantic
 
-    said = expected(text)
+    said = explain_message(text)
     if not said.endswith(" is expected"):
         return said
     return (f"{seen!r}: " if seen is not None else "") + said + hint_about(seen, "which --help names")

@@ -73,7 +73,7 @@ def shorten(text: str, most: int = 40) -> str:
     return plain if len(plain) <= most else plain[: most - 1] + "…"
 
 
-def quoted(names: Iterable[str]) -> str:
+def quote_names(names: Iterable[str]) -> str:
     """Return names in quotation marks, with commas, the first dozen of them."""
     names = list(names)
     return ", ".join(f"'{shorten(n)}'" for n in names[:12]) + (", …" if len(names) > 12 else "")
@@ -217,7 +217,8 @@ def _wanted_columns(
         if index is None:
             raise TableError(
                 path,
-                f"has no column '{shorten(title)}'; it has {quoted(header)}: correct `columns` = {key}=NAME or NUMBER",
+                f"has no column '{shorten(title)}'; it has {quote_names(header)}: "
+                f"correct `columns` = {key}=NAME or NUMBER",
             )
         if index in chosen.values():
             raise TableError(path, f"`columns` names column '{shorten(title)}' twice; each column holds one quantity")
@@ -253,7 +254,8 @@ def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) 
     period = "; if T is the time of a turn say its unit, as T [ms]" if any(header[i] == "T" for i in indices) else ""
     raise TableError(
         path,
-        f"columns {quoted(header[i] for i in indices)} could each be {name}; say which: `columns` = {numbers}{period}",
+        f"columns {quote_names(header[i] for i in indices)} could each be {name}; "
+        f"say which: `columns` = {numbers}{period}",
     )
 
 

@@ -224,16 +224,16 @@ def read_title(text: str) -> Title:
     forms = (form.fullmatch(text) for form in _UNIT_FORMS)
     found = [(m["name"], m["unit"]) for m in forms if m]
     for label, unit in found:
-        if title := _named(label, unit):
+        if title := _title_of_name(label, unit):
             return title
     for place in (m.start() for m in re.finditer("_", text)):
-        title = _named(text[:place], text[place + 1 :])
+        title = _title_of_name(text[:place], text[place + 1 :])
         if title and (title.inverse or unit_factor(text[place + 1 :], dimension(title.column or "")) is not None):
             return title
     return Title(None, found[0][1] if found else None)
 
 
-def _named(label: str, unit: str) -> Title | None:
+def _title_of_name(label: str, unit: str) -> Title | None:
     """Return the title that a name gives together with a possible unit; None for an unknown name."""
     name = _plain_name(label)
     if (name in TURNS or label == "U") and unit_factor(f"/{unit}", "frequency"):

@@ -65,7 +65,7 @@ def _choice(folder: Path) -> Choice:
     return Choice(folder.name, run.status, record.experiment, record.started_utc or "", record.note[:200])
 
 
-def recorded_now(root: Path, but: Collection[Path] = ()) -> Path | None:
+def running_run(root: Path, but: Collection[Path] = ()) -> Path | None:
     """Return the folder of the newest run that is running, among the newest few; None where there is none.
 
     Args:

@@ -102,7 +102,7 @@ class Desk:
             about = {"n": self.count, "kind": event.kind, "text": text, "status": event.status, "utc": utc_now()}
             self.said.append(about | {"of_run": self._records and event.kind == "message"})
 
-    def said_after(self, number: object) -> list[dict[str, Any]]:
+    def events_after(self, number: object) -> list[dict[str, Any]]:
         """Return what was said after that of a number."""
         after = number if type(number) is int and number <= self.count else 0
         return [one for one in self.said if one["n"] > after]

@@ -144,7 +144,7 @@ def numbers(lines: list[bytes], columns: int) -> NDArray[np.float64]:
     try:
         if all(line.count(b",") == columns - 1 for line in lines):
             flat = [*map(float, b",".join(lines).split(b","))]
-            return _known(np.array(flat, dtype=np.float64).reshape(-1, columns))
+            return _mask_missing(np.array(flat, dtype=np.float64).reshape(-1, columns))
     except ValueError:  # an empty field, or a damaged line
         pass
     rows = []
@@ -156,10 +156,10 @@ def numbers(lines: list[bytes], columns: int) -> NDArray[np.float64]:
             continue
         if len(row) == columns and fields != [b""]:
             rows.append(row)
-    return _known(np.array(rows, dtype=np.float64).reshape(-1, columns))
+    return _mask_missing(np.array(rows, dtype=np.float64).reshape(-1, columns))
 
 
-def _known(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _mask_missing(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Replace by NaN the numbers with which instruments say "no value"; drop rows without a first value."""
     rows[~(np.abs(rows) < NO_READING)] = np.nan
     return rows[~np.isnan(rows[:, 0])] if rows.shape[1] else rows

@@ -22,7 +22,7 @@ from starlette.websockets import WebSocketDisconnect
 from levilab.animation.three import three_js
 from levilab.errors import LevilabError
 from levilab.live.analyzed import FIGURES, REPORT, Analyses
-from levilab.live.choice import choices, newest, recorded_now
+from levilab.live.choice import choices, newest, running_run
 from levilab.live.desk import parts_for, scene_of_run
 from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
 from levilab.live.watch import Watch
@@ -150,7 +150,7 @@ class Hall:
         if not desk.is_recording:
             if watch.followed and watch.followed.status == "running":
                 return
-            folder = await asyncio.to_thread(recorded_now, self.root, [*desk.folders])
+            folder = await asyncio.to_thread(running_run, self.root, [*desk.folders])
         if desk.is_recording:  # it may have begun meanwhile
             folder = desk.folder
         if folder:
@@ -161,7 +161,7 @@ class Hall:
 
     async def _fit(self, watch: Watch, task: FitTask) -> None:
         with watch.failing_alone():
-            watch.take_fit(task.folder, *await asyncio.to_thread(_timed, task.compute))
+            watch.take_fit(task.folder, *await asyncio.to_thread(_time_task, task.compute))
 
     def _announce(self) -> None:
         self.new.set()
@@ -186,7 +186,7 @@ class Hall:
         return desk.answers.get(number)
 
 
-def _timed(task: Callable[[], Running | None]) -> tuple[Running | None, float]:
+def _time_task(task: Callable[[], Running | None]) -> tuple[Running | None, float]:
     """Return the result of a task and the processor time of this thread [s]: waiting for others costs none."""
     begin = time.thread_time()
     return task(), time.thread_time() - begin
@@ -278,7 +278,7 @@ class Pages:
                 await asyncio.sleep(max(0.0, again - time.monotonic()))
                 again = time.monotonic() + 1 / FRAMES_PER_S
                 await hall.wait_for_news(watch, ask.get("tick"))
-                said = hall.desk.said_after(ask.get("said")) if hall.desk else []
+                said = hall.desk.events_after(ask.get("said")) if hall.desk else []
                 await socket.send_bytes(watch.frame(ask, said))
             await socket.close(1003 if text is None else 1009)
 

@@ -232,12 +232,12 @@ class Watch:
             head["about"] = _about(followed, self._failure)
             if ask.get("readings") != followed.version or ask.get("changed"):
                 head["readings"] = _readings(followed, ask)
-            seen = _whole(ask.get("events"))
+            seen = _count_or_zero(ask.get("events"))
             head["events"] = followed.texts_after(seen if seen <= followed.event_count else 0)
         if ask.get("fit") != self.fit_version:
             head["fit"] = self._about_fit()
         head["records"] = self._new_records(ask.get("records"))
-        head["poses"] = self._new_poses(_whole(ask.get("poses")))
+        head["poses"] = self._new_poses(_count_or_zero(ask.get("poses")))
         return pack(head)
 
     def _about_bench(self) -> dict[str, Any] | None:
@@ -270,7 +270,7 @@ class Watch:
             self._subscriber = None
 
 
-def _whole(value: Any) -> int:
+def _count_or_zero(value: Any) -> int:
     return value if type(value) is int and value >= 0 else 0
 
 
@@ -319,7 +319,7 @@ def _readings(followed: Followed, ask: dict[str, Any]) -> dict[str, Any]:
     x, low, high = groups.mean[place[view.x]], groups.low[place[view.y]], groups.high[place[view.y]]
     kept = np.isfinite(x) & np.isfinite(low)
     x, low, high = x[kept], low[kept], high[kept]
-    width = min(max(_whole(ask.get("columns")), _FEWEST_COLUMNS), _MOST_COLUMNS)
+    width = min(max(_count_or_zero(ask.get("columns")), _FEWEST_COLUMNS), _MOST_COLUMNS)
     single = groups.size == 1 and len(x) <= 2 * width
     if not single:
         order = np.argsort(x, kind="stable")

@@ -73,7 +73,7 @@ class _Kind:
     off: dict[str, Any]
 
 
-def _leaning(scene: Scene) -> dict[str, Any]:
+def _lean_moment(scene: Scene) -> dict[str, Any]:
     """Return the change to a moment that leans by 1.77°, as the thesis's does, with the same part along the axis."""
     return {"top.moment_tilt": [0.03 / 0.97 * scene.top.moment_tilt[1], scene.top.moment_tilt[1]]}
 
@@ -117,7 +117,7 @@ KINDS = (
         "tilt of the moment",
         "by 1.77° in the top, as in the thesis, with the same part along the axis",
         lambda s: not s.top.aligned,
-        _leaning,
+        _lean_moment,
         {},
     ),
     _Kind(
@@ -162,7 +162,7 @@ def _effect(kind: _Kind, scene: Scene, as_it_is: Trajectory, time: float) -> Eff
     except (SceneError, SimulationError) as error:
         return Effect(kind.name, included, kind.what, math.nan, math.nan, math.nan, str(error))
     with_it, without = (as_it_is, other) if included else (other, as_it_is)
-    height, precession, spin = (a - b for a, b in zip(_observed(with_it), _observed(without), strict=True))
+    height, precession, spin = (a - b for a, b in zip(_observe(with_it), _observe(without), strict=True))
     return Effect(
         kind.name,
         included,
@@ -182,7 +182,7 @@ def _zero_if_below(change: float, least: float) -> float:
     return 0.0 if abs(change) < least else change
 
 
-def _observed(motion: Trajectory) -> tuple[float, float, float]:
+def _observe(motion: Trajectory) -> tuple[float, float, float]:
     """Return mean height [m], precession frequency [Hz] and spin at the end [Hz]; NaN of a top that fell."""
     if not motion.survived:
         return math.nan, math.nan, math.nan

@@ -60,9 +60,9 @@ def turns_behind(scene: Scene, states: Array) -> Array:
     Positive where the body is ahead.  From sample to sample the angle changes by what the spin says, give or take half
     a turn.  A drive that swings to and fro turns in either sense; the top goes with the one of its own spin.
     """
-    time, sense = states[..., TIME], copysign(1.0, _beside(scene.start.spin_hz))
-    turning = sense * _beside(scene.drive.frequency_hz)
-    spin = core_spin(states, _beside(scene.top.inertia_axial_kg_m2), _beside(scene.washers.inertia_kg_m2))
+    time, sense = states[..., TIME], copysign(1.0, _align(scene.start.spin_hz))
+    turning = sense * _align(scene.drive.frequency_hz)
+    spin = core_spin(states, _align(scene.top.inertia_axial_kg_m2), _align(scene.washers.inertia_kg_m2))
     rate = spin / (2 * math.pi) - turning
     followed = np.zeros(time.shape)
     np.cumsum((rate[..., 1:] + rate[..., :-1]) / 2 * np.diff(time), axis=-1, out=followed[..., 1:])
@@ -72,7 +72,7 @@ def turns_behind(scene: Scene, states: Array) -> Array:
     return np.asarray(sense * (followed + off))
 
 
-def _beside(number: Any) -> Any:
+def _align(number: Any) -> Any:
     """Return a number, or one of each top in a shape that goes with their samples."""
     return number[..., None] if isinstance(number, np.ndarray) else number
 

@@ -270,17 +270,17 @@ def _how_long(run: Run) -> tuple[Fact, ...]:
 
 
 def _pictures(run: Run, scene: Scene, name: str, found: Mapping[str, Any]) -> Iterator[Picture]:
-    summary = _again(run, scene, found)
+    summary = _simulate_again(run, scene, found)
     stored = run.folder / FIGURE
     if summary is None and not stored.is_file():
         return
     caption = "Path from the side and from above; height, spin, tilt and energy in time; the spectrum of the axis."
-    draw = partial(_drawn, summary) if summary else partial(_stored, stored)
+    draw = partial(_draw, summary) if summary else partial(_load_figure, stored)
     alt = f"Simulated motion of the scene {name}: path, height, spin, tilt, energy and spectrum"
     yield Picture("motion", f"Simulated motion of {name}, SYNTHETIC.", caption, alt, draw, raster=summary is None)
 
 
-def _again(run: Run, scene: Scene, found: Mapping[str, Any]) -> Summary | None:
+def _simulate_again(run: Run, scene: Scene, found: Mapping[str, Any]) -> Summary | None:
     """Return the motion computed once more; None where that takes long, or does not end in the same state."""
     settings, took = run.record.configuration, found.get("computing_time_s")
     if not isinstance(took, int | float) or took > LONGEST_S:
@@ -306,13 +306,13 @@ def _last_state(path: Path) -> str:
         return ""
 
 
-def _drawn(summary: Summary) -> Figure:
+def _draw(summary: Summary) -> Figure:
     from levilab.motion.figure import motion_figure  # with matplotlib
 
     return motion_figure(summary)
 
 
-def _stored(path: Path) -> Figure:
+def _load_figure(path: Path) -> Figure:
     from levilab.present.style import figure_of_png  # with matplotlib
 
     return figure_of_png(path.read_bytes())
@@ -324,7 +324,7 @@ def _stored(path: Path) -> Figure:
 def _reproduction(run: Run) -> Iterator[Block]:
     record = run.record
     if record.command_line:
-        yield Code(command_in_words(record.command_line))
+        yield Code(command_text(record.command_line))
     facts = [
         Fact("When", tuple(f"{utc[:19].replace('T', ' ')} UTC" for utc in (record.started_utc,) if utc)),
         Fact("Software", (", ".join(f"{name} {version}" for name, version in record.software.items()),)),
@@ -333,10 +333,10 @@ def _reproduction(run: Run) -> Iterator[Block]:
     yield Facts(tuple(fact for fact in facts if any(fact.texts)))
 
 
-def command_in_words(words: Sequence[str]) -> str:
+def command_text(words: Sequence[str]) -> str:
     """Return a recorded command line as one types it: ours without the place of its program.
 
-    >>> command_in_words(["/opt/bin/levilab", "simulate", "my scene.toml"])
+    >>> command_text(["/opt/bin/levilab", "simulate", "my scene.toml"])
     "levilab simulate 'my scene.toml'"
     """
     first, *others = words

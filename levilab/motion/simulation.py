@@ -107,14 +107,14 @@ def run_simulation(
     """
     factor = _samples_per_state(request)
     if request.out is None:
-        return Simulation(_simulated(request, factor, message, progress, uses_states=uses_states), None, factor)
+        return Simulation(_simulate(request, factor, message, progress, uses_states=uses_states), None, factor)
     with (
         interruption_postponed() as admit_interruption,
         RunWriter.create(request.out, _record(request), STATES) as writer,
     ):
         try:
             admit_interruption()  # from here on the folder is taken away again
-            summary = _simulated(request, factor, message, progress, uses_states=True)
+            summary = _simulate(request, factor, message, progress, uses_states=True)
             _write(summary, factor, writer)
         except BaseException:
             writer.discard()
@@ -139,7 +139,7 @@ def _samples_per_state(request: SimulationRequest) -> int:
     return max(min(wanted, int(MOST_STATES / states)), 1)
 
 
-def _simulated(
+def _simulate(
     request: SimulationRequest,
     factor: int,
     message: Callable[[str], None],

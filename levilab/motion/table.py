@@ -91,12 +91,12 @@ def _quality_facts(summary: Summary) -> list[tuple[str, str]]:
         change = summary.energy_change
         facts.append(("energy", f"constant to {change:.1g} of itself" if change else "exactly constant"))
     steps = f"{accuracy.steps} steps of at most {1000 * accuracy.step:.3g} ms by {accuracy.scheme}"
-    speed = f", {_rounded(summary.speed)} times faster than the real top" if summary.end >= 1 else ""
+    speed = f", {_format_speed(summary.speed)} times faster than the real top" if summary.end >= 1 else ""
     facts.append(("computed", steps + speed))  # of less than a second nothing but the overhead would be seen
     return facts
 
 
-def _rounded(speed: float) -> str:
+def _format_speed(speed: float) -> str:
     """Return a speed with two digits: more of a computer's speed is chance."""
     return f"{float(f'{speed:.2g}'):,.0f}".replace(",", " ") if speed >= 10 else f"{speed:.2g}"
 
@@ -130,9 +130,9 @@ def print_effects(effects: Sequence[Effect]) -> None:
         table.add_row(
             effect.name,
             "in" if effect.included else "out",
-            _shown(effect.height_m, LEAST_M, 1e3),
-            _shown(effect.precession_hz, LEAST_HZ, 1),
-            _shown(effect.spin_hz, LEAST_HZ, 1),
+            _format_change(effect.height_m, LEAST_M, 1e3),
+            _format_change(effect.precession_hz, LEAST_HZ, 1),
+            _format_change(effect.spin_hz, LEAST_HZ, 1),
             escape(words),
         )
     table.caption = (
@@ -143,7 +143,7 @@ def print_effects(effects: Sequence[Effect]) -> None:
     terminal().print(table)
 
 
-def _shown(change: float, least: float, factor: float) -> str:
+def _format_change(change: float, least: float, factor: float) -> str:
     """Return a change with two digits: the next effect changes the third."""
     if math.isnan(change):
         return "–"

@@ -162,7 +162,7 @@ def arrived(folder: Path) -> StoredTrace | None:
             return None
         whole = folder / _path(head.number)
         if whole.is_file():  # killed between codes and line
-            return _stored(head.model_copy(update={"announced": None}), np.load(whole, allow_pickle=False))
+            return _make_trace(head.model_copy(update={"announced": None}), np.load(whole, allow_pickle=False))
         content = codes.read_bytes() if codes.is_file() else b""
     except FileNotFoundError:  # the process that writes it has kept it meanwhile
         return None
@@ -172,7 +172,7 @@ def arrived(folder: Path) -> StoredTrace | None:
         raise DataError(f"{about}: does not say how to read {codes.name}, remove both ({error})") from error
     dtype = np.dtype(head.dtype)
     count = len(content) // dtype.itemsize
-    return _stored(head, np.frombuffer(content, dtype=dtype, count=count)) if count else None
+    return _make_trace(head, np.frombuffer(content, dtype=dtype, count=count)) if count else None
 
 
 def save_codes(folder: Path, head: Head, codes: Codes) -> str:
@@ -271,10 +271,10 @@ def _load(folder: Path, record: Record) -> StoredTrace:
         raise DataError(f"{path}: cannot be read ({error.strerror}): {advice}") from error
     if hashlib.sha256(content).hexdigest() != record.sha256:
         raise DataError(f"{path}: is not what was recorded: its sha256 differs from the one in {INDEX}")
-    return _stored(record, np.load(io.BytesIO(content), allow_pickle=False))
+    return _make_trace(record, np.load(io.BytesIO(content), allow_pickle=False))
 
 
-def _stored(head: Head, codes: Codes) -> StoredTrace:
+def _make_trace(head: Head, codes: Codes) -> StoredTrace:
     trace = Trace(
         codes,
         head.dt_s,

@@ -50,7 +50,7 @@ class Coded(Setting[str]):
     def _parse(self, answer: str, form: Form) -> str:
         return self.word(answer)
 
-    def _expected(self, form: Form) -> str:
+    def _describe_expected(self, form: Form) -> str:
         return f"a number from {self.first} to {self.first + len(self.choices) - 1}"
 
     def _spell(self, value: str) -> str:

@@ -236,7 +236,7 @@ class VirtualCNT91(VirtualCounter):
         """MEASure?: CONFigure, INITiate and FETCh?."""
         self.configure(name, parameters, array=array)
         self.initiate()
-        return (yield from self.fetch(int(self._wanted()) if array else 1))
+        return (yield from self.fetch(int(self._result_count()) if array else 1))
 
     def initiate(self, *, endless: bool = False) -> None:
         """INITiate."""
@@ -248,7 +248,7 @@ class VirtualCNT91(VirtualCounter):
         def measure(inputs: Inputs, begin: float, number: int) -> Measurement:
             deadline = begin + timeout
             if number == 0 and arming in {"EXT1", "EXT2"}:
-                begin = yield from self._armed(inputs, int(arming[-1]), begin)
+                begin = yield from self._arming_time(inputs, int(arming[-1]), begin)
                 deadline = begin + timeout
             gate = aperture
             if gapless:
@@ -262,7 +262,7 @@ class VirtualCNT91(VirtualCounter):
                 begin=self._ready,
                 inputs=self.inputs(),
                 measure=measure,
-                samples=math.inf if endless else self._wanted(),
+                samples=math.inf if endless else self._result_count(),
                 dead_time=dead,
                 delay=self.value("arming_delay"),
                 shortest=aperture if self.kind in {"FREQ", "PER"} else 0.0,
@@ -272,7 +272,7 @@ class VirtualCNT91(VirtualCounter):
         )
 
     @staticmethod
-    def _armed(inputs: Inputs, channel: int, begin: float) -> Generator[Wanted, None, float]:
+    def _arming_time(inputs: Inputs, channel: int, begin: float) -> Generator[Wanted, None, float]:
         """Return the time of the arming input's edge [s]."""
         edge = yield from first_edge(inputs.finder(channel, begin), begin, math.inf)
         return edge.time if edge else begin
@@ -317,7 +317,7 @@ class VirtualCNT91(VirtualCounter):
 
     # --- series ---
 
-    def _wanted(self) -> float:
+    def _result_count(self) -> float:
         """Return the number of results of one INITiate."""
         if self.settings["averaging"]:
             return self.value("averaged")
@@ -331,10 +331,10 @@ class VirtualCNT91(VirtualCounter):
     def read_array(self, parameters: list[str]) -> Steps[str]:
         """Execute READ:ARRay? n, which is READ? with n results.  Raises ScpiError."""
         count = self._size(parameters)
-        if count > self._wanted():
+        if count > self._result_count():
             raise ScpiError(-221)
         self._restart()
-        most = count if math.isfinite(count) else min(self._wanted(), self.value("most"))
+        most = count if math.isfinite(count) else min(self._result_count(), self.value("most"))
         return (yield from self.fetch(int(most)))
 
     def _restart(self) -> None:

@@ -362,14 +362,14 @@ class VirtualDS1000Z(VirtualOscilloscope):
         """MEASure:ITEM: a measurement for the screen; it must exist.  Raises ScpiError."""
         if not parameters:
             raise ScpiError(-109)
-        _named(parameters[0])
+        _name_of_item(parameters[0])
         self._where(parameters[1:])
 
     def item(self, parameters: list[str]) -> str:
         """MEASure:ITEM?: what is measured.  Raises ScpiError."""
         if not parameters:
             raise ScpiError(-109)
-        name, channel = _named(parameters[0]), self._where(parameters[1:])
+        name, channel = _name_of_item(parameters[0]), self._where(parameters[1:])
         return self.spell(self.measured(name, channel))
 
     def statistic(self, parameters: list[str]) -> str:
@@ -398,6 +398,6 @@ def _refuse_mathematics(on: bool) -> None:  # noqa: FBT001
         raise ScpiError(-221)
 
 
-def _named(item: str) -> str:
+def _name_of_item(item: str) -> str:
     spelled = choice(item, _WORDS)
     return next(name for word, name in _ITEMS.items() if choice(word, (word,)) == spelled)

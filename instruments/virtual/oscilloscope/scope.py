@@ -178,13 +178,13 @@ class VirtualOscilloscope(VirtualInstrument):
     def setup(self) -> bytes:
         """Return all settings, as messages that restore them."""
         headers = self._headers().items()
-        return "\n".join(f"{header} {self._spelled(name)}" for name, header in headers).encode("latin-1")
+        return "\n".join(f"{header} {self._spell_setting(name)}" for name, header in headers).encode("latin-1")
 
     def _headers(self) -> dict[str, str]:
         """Return each setting that is part of the setup, and the shortest header of its row."""
         return {name: ":" + short_header(row.header) for row in self.commands.rows for name in row.defaults()}
 
-    def _spelled(self, name: str) -> str:
+    def _spell_setting(self, name: str) -> str:
         value: Value = self.settings[name]
         if isinstance(value, bool):
             return str(int(value))

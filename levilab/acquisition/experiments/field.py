@@ -209,17 +209,17 @@ def _place(session: Session[FieldSettings], height: float, which: str) -> float:
         answer = session.ask(PlaceProbe(text, height))
         if not answer:
             return height
-        typed = typed_height(answer)
+        typed = parse_height(answer)
         if typed is not None:
             session.event(RunEvent.ANOTHER_HEIGHT, f"the probe stands at {1e3 * typed:.2f} mm", height_m=typed)
             return typed
         session.event(RunEvent.NOT_UNDERSTOOD, f"{answer[:40]!r} is no height: a number in mm is expected, as 61.5")
 
 
-def typed_height(answer: str) -> float | None:
+def parse_height(answer: str) -> float | None:
     """Return a height as a person types it, in mm where no unit is said [m]; None for what is none.
 
-    >>> typed_height("61,5"), typed_height("6.15 cm"), typed_height("high")
+    >>> parse_height("61,5"), parse_height("6.15 cm"), parse_height("high")
     (0.0615, 0.0615, None)
     """
     match = _TYPED.fullmatch(answer.strip())

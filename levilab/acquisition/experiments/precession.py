@@ -203,13 +203,13 @@ def _wait_for_lock(session: Session[PrecessionSettings], drive: float) -> None:
 def _measure(session: Session[PrecessionSettings], drive: float) -> tuple[Row, dict[str, Any]]:
     """Measure spin and precession of a locked top, with the gates behind them.  Raises as `_point`."""
     settings = session.settings
-    spins = _counted(session, drive, "spin_frequency_hz", settings.trigger_level_v, 1)
+    spins = _count_gates(session, drive, "spin_frequency_hz", settings.trigger_level_v, 1)
     _still_held(session, drive, spins.frequency)
     _calm(session, drive, swing_of(spins))
     if settings.laser_input == 1:
         session.ask(Task("Connect the laser's phototransistor to the counter's input 1, in place of the tape's."))
     level_v, channel = settings.laser_trigger_level_v, settings.laser_input
-    laser = _counted(session, drive, "precession_frequency_hz", level_v, channel)
+    laser = _count_gates(session, drive, "precession_frequency_hz", level_v, channel)
     if settings.laser_input == 1:
         session.ask(Task("Connect the tape's phototransistor to the counter's input 1 again."))
     prepare_counter_again(session)
@@ -265,7 +265,7 @@ def calming_step(swing: Swing, drive: float, now: float, limits: DriveLimits) ->
     return None
 
 
-def _counted(session: Session[PrecessionSettings], drive: float, what: str, level_v: float, channel: int) -> Gates:
+def _count_gates(session: Session[PrecessionSettings], drive: float, what: str, level_v: float, channel: int) -> Gates:
     """Return the gates of an input of the counter.
 
     A gate begins and ends with a pulse.  Pulses come early and late where a nutation goes on beside the wobble in step,

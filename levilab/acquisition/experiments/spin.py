@@ -109,8 +109,8 @@ def time_left(first: Row, middle: Row, last: Row, longest_s: float) -> tuple[flo
     for power, falls_hz, sign in zip(powers, FALLS_BETWEEN_HZ, (1, -1), strict=True):
         off = sign * math.sqrt(2) * u
         usual = _USUAL_HZ_PER_S * _USUAL_HZ**-power
-        per_second = _passed(start + off, now - off, power) / lapse if seen else usual
-        ends.append(time + _passed(now - off, falls_hz, power) / per_second)
+        per_second = _power_integral(start + off, now - off, power) / lapse if seen else usual
+        ends.append(time + _power_integral(now - off, falls_hz, power) / per_second)
     least, most = (max(0.0, min(end, longest_s) - time) for end in ends)
     return least, most
 
@@ -124,15 +124,15 @@ def _powers(first: Row, middle: Row, last: Row, u: float) -> tuple[float, float]
     if not (start - half > _CLEAR * u and half - now > _CLEAR * u):
         return _POWERS
     of_time = (middle["time_s"] - first["time_s"]) / (last["time_s"] - first["time_s"])
-    least, most = (_passed(start, half, power) / _passed(start, now, power) for power in _POWERS)
+    least, most = (_power_integral(start, half, power) / _power_integral(start, now, power) for power in _POWERS)
     power = 1 + (of_time - least) / (most - least)
     # the middle reading counts once, the two others by parts whose sum is 1: √1.5 u in all, at half time
-    u_power = math.sqrt(1.5) * u * half**-1.5 / _passed(start, now, 1.5) / abs(most - least)
+    u_power = math.sqrt(1.5) * u * half**-1.5 / _power_integral(start, now, 1.5) / abs(most - least)
     low, high = (min(max(end, _POWERS[0]), _POWERS[1]) for end in (power - 2 * u_power, power + 2 * u_power))
     return low, high
 
 
-def _passed(start: float, end: float, power: float) -> float:
+def _power_integral(start: float, end: float, power: float) -> float:
     """∫ dν/νᵖ from one spin down to another, which time increases evenly."""
     return math.log(start / end) if power == 1 else (end ** (1 - power) - start ** (1 - power)) / (power - 1)
 

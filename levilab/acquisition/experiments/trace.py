@@ -292,7 +292,7 @@ def _why_no_trigger(session: Session[TraceSettings]) -> str:
     try:
         _prepare_scope(session, sweep="auto")
         session.bench.oscilloscope.acquire(timeout_s=settings.trigger_patience_s)
-        low, high = _range(session.bench.oscilloscope.trace(_shown(settings)))
+        low, high = _range(session.bench.oscilloscope.trace(_channel_in_message(settings)))
     except InstrumentError:
         low = high = math.nan
     if math.isnan(low):
@@ -304,7 +304,7 @@ def _why_no_trigger(session: Session[TraceSettings]) -> str:
     return f"{said}: the signal there lies between {low:.2f} and {high:.2f} V; {advice}"
 
 
-def _shown(settings: TraceSettings) -> int:
+def _channel_in_message(settings: TraceSettings) -> int:
     """Return the channel whose range the message names: the one that triggers, if it is recorded."""
     return settings.trigger_source if settings.trigger_source in settings.channels else settings.channels[0]
 
@@ -318,7 +318,7 @@ def _range(trace: Trace) -> tuple[float, float]:
 def _keep(session: Session[TraceSettings], traces: list[Trace], time_s: float) -> None:
     """Keep the row that says that the traces of a record are there.  time_s: when it was taken."""
     settings, number = session.settings, len(session.rows) + 1
-    shown = next(trace for trace in traces if trace.channel == _shown(settings))
+    shown = next(trace for trace in traces if trace.channel == _channel_in_message(settings))
     low, high = _range(shown)
     row: Row = {"time_s": time_s, "record": number}
     if not math.isnan(low):

@@ -214,7 +214,7 @@ def _printed_times(path: Path, header: Header, survey: _Survey, rate: float | No
     allowed = max(1.01 * clock.resolution * unit, min(SINGLE * largest, mean / 4)) + 1e-9 * mean
     _check_even(path, clock, unit, mean, allowed)
     if header.step is None:
-        return _fitted(path, clock, unit, first=first, mean=mean, allowed=allowed)
+        return _fit_step(path, clock, unit, first=first, mean=mean, allowed=allowed)
     step, u = header.step.value, 0.505 * header.step.resolution
     off = abs(mean - step)
     if off <= u + allowed / (n - 1):
@@ -226,7 +226,7 @@ def _printed_times(path: Path, header: Header, survey: _Survey, rate: float | No
 _FINE = 1e-6
 
 
-def _fitted(path: Path, clock: _Clock, unit: float, *, first: float, mean: float, allowed: float) -> _Times:
+def _fit_step(path: Path, clock: _Clock, unit: float, *, first: float, mean: float, allowed: float) -> _Times:
     """Return the step from the times alone: from the ends, or by a straight line where they lost digits."""
     if allowed / (clock.count - 1) < 1e-3 * _FINE * mean:
         return _Times(first, mean)

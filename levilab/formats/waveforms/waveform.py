@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.errors import UsageError
-from levilab.formats.columns import TableError, quoted, shorten
+from levilab.formats.columns import TableError, quote_names, shorten
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -94,7 +94,7 @@ class Waveform:
             return names.index(wanted.strip().casefold())
         if wanted.strip().isdecimal() and 1 <= int(wanted) <= len(names):
             return int(wanted) - 1
-        has = quoted(signal.name for signal in self.signals)
+        has = quote_names(signal.name for signal in self.signals)
         raise NoSuchSignal(
             "channel", f"{shorten(str(self.path), 200)} has {has}: name one of them", value=f"'{shorten(wanted)}'"
         )
