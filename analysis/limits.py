@@ -270,7 +270,7 @@ def _freedom(variance: float, by_scatter: float, freedom: int) -> float | None:
 
 
 def _between(means: Array, own: Array) -> float:
-    """Return the variance between runs [Hz²], from the runs' means and the variances that their tops leave to them."""
+    """Return the variance between runs [Hz²], from the runs' means and the variances of these within a run."""
     wanted = means.size - 1
     if not _scatter(means):
         return 0.0
@@ -409,7 +409,7 @@ class NoWindow(AnalysisError):
 
 
 def nearest_edge(mean: float, window: tuple[float, float]) -> str:
-    """Return which limit a mean is, "lower" or "upper": by ratio, the edge of the window that is nearer [Hz]."""
+    """Return "lower" or "upper": the edge of the window that is nearer to a mean limit, by their ratio [Hz]."""
     low, high = window
     return "lower" if mean < math.sqrt(low * high) else "upper"
 

@@ -107,7 +107,7 @@ _TOO_LARGE = "a whole number in it has more than 300 digits"
 
 
 def finite(value: Any) -> Any:
-    """Return a value for JSON: what no number can say becomes null, in tables and lists too.
+    """Return a value for JSON: numbers that are not finite become null, in tables and lists too.
 
     >>> finite({"mean": 1.0, "spread": [math.inf, math.nan]})
     {'mean': 1.0, 'spread': [None, None]}
@@ -216,7 +216,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 def _remove_parts_of_the_dead(path: Path) -> None:
-    """Remove the parts of a file that processes left which were killed while they wrote it."""
+    """Remove the parts of a file that killed processes have left."""
     for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         number = part.name.removesuffix(".part").rpartition(".")[2]
         if number.isdecimal() and not _is_alive(int(number)):
@@ -265,7 +265,7 @@ def locked(path: Path, busy: str) -> Iterator[None]:
 
 
 def sync_folder(folder: Path) -> None:
-    """Put a new name onto the disk, which happens only with its folder; Windows keeps names without being asked."""
+    """Write a folder's new names to the disk; Windows does so by itself."""
     if os.name != "posix":
         return
     descriptor = os.open(folder, os.O_RDONLY)

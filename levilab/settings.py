@@ -20,7 +20,7 @@ class Settings(BaseModel):
 
 
 def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> str:
-    """Return the first thing that is wrong, with its path and what is allowed, and how many more there are.
+    """Return the first fault, with its path and the allowed values, and the number of others.
 
     Args:
         error: of the table.
@@ -71,7 +71,7 @@ def explain_message(text: str) -> str:
 
 
 def _suggest_key(where: tuple[int | str, ...], of: type[BaseModel] | None) -> str:
-    """Return the key that an unknown one is most like, or those that there are."""
+    """Return a hint for an unknown key: the most similar one, or the known ones."""
     *tables, key = where
     for name in tables:
         field = of.model_fields.get(str(name)) if of else None

@@ -96,7 +96,7 @@ class Known:
     gain_u: float = 0.0
 
     def prior(self, name: str) -> Prior | None:
-        """Return what is known of a parameter; None if nothing is."""
+        """Return the prior of a parameter; None without one."""
         found: Prior | None = getattr(self, name, None)
         return found
 
@@ -181,7 +181,7 @@ class FieldScan:
         return float(self.covariance[i, j]) / size if size else 0.0
 
     def learned(self, name: str) -> float | None:
-        """Return u after the scan over u before it, 0 to 1; None if there was none before."""
+        """Return the ratio of u after and before the scan, 0 to 1; None without a u before."""
         prior, u = self.known.prior(name), self.parameters[name].u
         return None if prior is None or not prior.u or u is None else u / prior.u
 
@@ -324,7 +324,7 @@ class _Problem:
         return [PARAMETERS.index(name) for name in self.free]
 
     def priors(self) -> list[tuple[int, Prior]]:
-        """Return index among all parameters, and prior, of those that are fitted."""
+        """Return index and prior of each fitted parameter."""
         found = ((PARAMETERS.index(name), self.known.prior(name)) for name in self.free)
         return [(index, prior) for index, prior in found if prior]
 
@@ -450,7 +450,7 @@ def _statistics(problem: _Problem, values: Array, sigma: Array) -> Statistics:
 
 
 def _misfit(statistics: Statistics) -> tuple[float, list[str]]:
-    """Return the factor on the variances if the residuals exceed the uncertainties, and a warning."""
+    """Return the factor by which residuals beyond the uncertainties widen variances, and a warning."""
     from scipy.special import chdtr, chdtrc
 
     reduced = statistics.reduced_chi_square

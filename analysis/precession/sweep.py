@@ -339,7 +339,7 @@ def _about_drive(drive: Array, u_drive: Array, u: Array, line: Line) -> list[str
     share = float(np.median(u_drive / drive))
     if np.ptp(u_drive / drive) > _ONE_CLOCK * share:
         worst = float(np.max(u_drive / u))
-        text = f"u of the drive's frequency is up to {digits(worst)} of that of the precession"
+        text = f"u of the drive's frequency is up to {digits(worst)} u of the precession"
         return [f"{text}: let it count with `orthogonal` = True"] if worst > _MATTERS else []
     of_slope = share * abs(line.slope)
     if line.u_slope is None or of_slope <= _MATTERS * line.u_slope:

@@ -212,7 +212,7 @@ def _improve(
 
 
 def turn_times(fit: Fit, middle: float, duration: float) -> tuple[Array, Array, Array]:
-    """Return times at which a phase passes (a part of a turn), those phases, and the frequencies there."""
+    """Return the times at which the middle of a pulse [turns] passes, and the phases and frequencies there."""
     jump, fit = fit.jump, replace(fit, jump=None)
     end = duration + (0.0 if jump is None else jump.lost)
     first, last = fit.phase(np.array([0.0, end]))

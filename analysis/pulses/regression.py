@@ -216,7 +216,7 @@ def median(values: Array) -> float:
 
 
 def student(freedom: float, deviations: float = 1.0) -> float:
-    """Return the factor of a standard deviation from few degrees of freedom that covers as much as a known one's."""
+    """Return the factor that widens a standard deviation from few degrees of freedom to the same coverage."""
     if freedom > 200:
         return deviations
     from scipy.special import ndtr, stdtrit

@@ -100,7 +100,7 @@ def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None) -> SpinF
 
 
 def check_times(pulse_times: ArrayLike) -> Array:
-    """Return the times as an array of floats.  Raises what is wrong with them."""
+    """Return the times as an array of floats.  Raises an error for faulty ones."""
     times = np.asarray(pulse_times, dtype=np.float64)
     if times.ndim != 1:
         raise ShapesDiffer(quantity="pulse times", seen=times.shape, expected=(times.size,))
@@ -252,7 +252,7 @@ def findings_of(train: Train) -> tuple[Finding, ...]:
 
 
 def findings_of_fit(fit: Fit, what: str, start: float = 0.0) -> tuple[Finding, ...]:
-    """Return what is to be said of a fit to turns or pulses."""
+    """Return the findings about a fit to turns or pulses."""
     notes = []
     if (jump := fit.jump) is not None:
         size = f"{digits(abs(1e3 * jump.lost), 3)} ms, or that and whole turns,"

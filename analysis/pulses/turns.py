@@ -84,7 +84,7 @@ def _from_intervals(times: Array) -> Numbering | None:
 
 
 def _line(x: Array, y: Array) -> tuple[float, float, float]:
-    """Return value at, slope about, and place of the mean of x, without what lies off the line."""
+    """Return the line's value at the mean of x, its slope, and this mean, without outliers."""
     value, slope, origin = median(y), 0.0, float(x.mean())
     keep = np.abs(y / value - 1) < 0.25
     for _ in range(3):

@@ -242,7 +242,7 @@ def _no_light(session: Session[D]) -> NoLight:
 
 
 def _take_hold(session: Session[D], spin: float) -> float:
-    """Let a drive that has come on at the top's spin yield to it until it holds; its frequency then [Hz].
+    """Let a drive switched on at the top's spin follow it until it holds; return its frequency then [Hz].
 
     Raises NotHeld.
     """
@@ -264,7 +264,7 @@ def _take_hold(session: Session[D], spin: float) -> float:
 
 
 def _ramp(session: Session[D], start: float, target: float) -> float:
-    """Move the drive in steps that the top can follow; its spin then [Hz].  Raises NotHeld."""
+    """Move the drive in steps that the top can follow; return its spin then [Hz].  Raises NotHeld."""
     steps = max(1, round(abs(target - start) / (session.settings.ramp_hz_per_s * RAMP_STEP_S)))
     for k in range(1, steps + 1):
         session.stop.check()
@@ -324,7 +324,7 @@ def has_drifted(counts: Sequence[float]) -> bool:
 
 
 def compare_with_drive(session: Session[D], slip: Slip) -> None:
-    """Write down how the counted spin of a held top compares with its drive; a tape that slips is warned of."""
+    """Record the difference of a held top's counted spin from its drive; warn of a tape that slips."""
     text = f"held at {slip.drive:.2f} Hz: counted {slip.spin:.3f} Hz, {signed(slip.difference, 3)} Hz beside the drive"
     session.event(RunEvent.HELD, text, spin_frequency_hz=slip.spin, drive_frequency_hz=slip.drive, u_hz=slip.u)
     if slip.warning:
@@ -358,7 +358,7 @@ def have_a_top(session: Session[D], text: str, number: int, *, within_s: float) 
 
 
 def is_over(session: Session[D]) -> bool:
-    """Return whether the time that the run may take is over; says so."""
+    """Return whether the time of the run is over, and record it."""
     longest = session.settings.longest_s
     if session.spent() <= longest:
         return False

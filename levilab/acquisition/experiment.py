@@ -35,7 +35,7 @@ class ExperimentSettings(Settings):
         """
 
     def for_scene(self, scene: Scene) -> Self:
-        """Return these settings for a virtual bench whose top is a scene's: what was not set may suit it better."""
+        """Return these settings for a virtual bench whose top is a scene's; defaults may change to suit it."""
         return self
 
 

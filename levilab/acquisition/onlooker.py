@@ -73,7 +73,7 @@ Watch = Callable[["Session[Any]", "Wiring"], AbstractContextManager[Callable[[],
 
 @contextlib.contextmanager
 def publishing(session: Session[Any], wiring: Wiring) -> Iterator[Onlooker]:
-    """Yield an onlooker that publishes for views; where to is said in the run folder until the context ends."""
+    """Yield an onlooker that publishes for views; its address stands in the run folder until the context ends."""
     with Publisher() as publisher:
         yield Onlooker(session, publisher, wiring.poses)
 
@@ -109,7 +109,7 @@ class Onlooker:
 
 
 def state_of(session: Session[Any], *, virtual: bool) -> State:
-    """Return what the bench and the acquisition do now; no instrument is asked."""
+    """Return the present state of bench and acquisition; no instrument is asked."""
     bench, doing = session.bench, session.doing
     now = bench.clock.now()
     return State(

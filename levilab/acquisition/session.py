@@ -204,7 +204,7 @@ class Session(Generic[S]):
     # --- what the person sees, and what is written down ---
 
     def event(self, kind: RunEvent, text: str, **data: Any) -> None:
-        """Write down and show what happened."""
+        """Record and show an event."""
         if not self._replaying:
             self._write_event(kind, text, **data)
             self.doing.text = text
@@ -215,7 +215,7 @@ class Session(Generic[S]):
         self.writer.event(None if self.zero is None else self.now(), kind, text, **data)
 
     def warn(self, text: str) -> None:
-        """Write down and show what to know before the readings are used; every result of the run repeats it."""
+        """Record and show a warning about the readings; every result of the run repeats it."""
         self.event(RunEvent.WARNING, text)
 
     def progress(self, text: str, share: float) -> None:
@@ -231,7 +231,7 @@ class Session(Generic[S]):
             self.look()
 
     def saw(self, channel: str, value: float | None) -> None:
-        """Note what an instrument answered, whether or not it becomes part of a reading; None: nothing to count.
+        """Note an instrument's answer, whether or not it becomes part of a reading; None: nothing to count.
 
         Args:
             channel: as in readings.csv.
@@ -256,7 +256,7 @@ class Session(Generic[S]):
         return answer
 
     def keep(self, row: Row, time_left_s: float | tuple[float, float]) -> None:
-        """Write a reading down, then show it: what was shown is on the disk.
+        """Write a reading to the disk, then show it.
 
         Args:
             row: the reading.

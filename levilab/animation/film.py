@@ -218,7 +218,7 @@ class _Words:
         self._inset.draw(pen, k, self._colours, self._small)
 
     def _veil_behind(self, size: tuple[int, int], rows: list[tuple[float, float]]) -> Image:
-        """Return what hides a path behind lines of text, of these heights and widths, and behind the inset's frame."""
+        """Return the veil over a path behind lines of text, of these heights and widths, and the inset's frame."""
         from PIL import Image, ImageDraw
 
         veil, edge, line = Image.new("L", size), self._line, self._line

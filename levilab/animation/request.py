@@ -105,7 +105,7 @@ class AnimationRequest:
 
 
 def check_request(request: AnimationRequest, scene: Scene, duration: float) -> None:
-    """Raise what is wrong with a request before anything is simulated.
+    """Check a request before anything is simulated.  Raises UsageError.
 
     Args:
         request: what is to be animated.
@@ -157,7 +157,7 @@ def _check_pictures(chosen: _Format, span: float, speed: float) -> None:
 def animate(
     request: AnimationRequest, summary: Summary, message: Callable[[str], None], progress: Progress | None = None
 ) -> str:
-    """Animate a span of a simulated motion; what does not come to its end leaves nothing behind.
+    """Animate a span of a simulated motion; an interrupted animation leaves no file.
 
     Args:
         request: checked by `check_request`.
@@ -233,7 +233,7 @@ def _count_for_page(scene: Scene, span: float, turns: float) -> int:
 
 
 def _stroboscopic(turns: float, speed: float, pictures_per_s: float) -> str:
-    """Return what to know of a film that shows too few pictures of a turn; empty for others."""
+    """Return a warning about a film that shows too few pictures of a turn; empty for others."""
     if turns * speed * _PICTURES_A_TURN <= pictures_per_s:
         return ""
     seen, slower = pictures_per_s / turns / speed, pictures_per_s / turns / _PICTURES_A_TURN

@@ -31,7 +31,7 @@ def speed_text(speed: float) -> str:
 
 
 def short_speed(speed: float) -> str:
-    """Return a film's speed in a list of them.
+    """Return a film's speed for a list of speeds.
 
     >>> [short_speed(x) for x in (0.05, 1.0, 0.3)]
     ['1/20', '1', '0.3']

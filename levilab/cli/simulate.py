@@ -74,7 +74,7 @@ def simulate(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate a scene, and print what the motion is like."""
+    """Simulate a scene, and print a summary of the motion."""
     chosen = chosen_scene(scene, settings)
     film = _animation_request(animate, animate_from, animate_to, animate_speed)
     if film:

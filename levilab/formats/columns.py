@@ -86,7 +86,7 @@ def choose_columns(
     wanted: Mapping[str, str],
     quantities: Collection[str] = CANONICAL,
 ) -> tuple[tuple[Column, ...], tuple[str, ...]]:
-    """Return the columns of a file that hold something we know, and warnings about those that nearly do.
+    """Return the columns of a file with known quantities, and warnings about similar ones.
 
     Args:
         path: the file, for messages.

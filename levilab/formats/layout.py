@@ -90,7 +90,7 @@ def sniff(path: Path) -> Layout:
 
 
 def _of_words(lines: list[str], encoding: str, head: bytes) -> Layout | None:
-    """Return the layout of a table without two numbers in a row, below unknown titles."""
+    """Return the layout of a table below unknown titles, without two numbers in any row."""
     for separator in filter(None, SEPARATORS):
         dialect = Dialect(separator, ".")
         content = list(content_lines(lines[:SAMPLE], dialect))

@@ -108,7 +108,7 @@ class Analyses:
                     self._processes.discard(process)
 
     def end(self) -> None:
-        """Give up what is under way, and wait for its end: files are replaced whole, so none is left torn."""
+        """Stop the analyses under way, and wait for their end: files are replaced whole, so none is left torn."""
         with self._lock:
             self._is_over = True
             for process in self._processes:
@@ -117,7 +117,7 @@ class Analyses:
             thread.join(_PATIENCE_S)
 
     def about(self, folder: Path) -> dict[str, Any]:
-        """Return the state of a run's analysis: its state, names of figures, the verdict, whether there is a report.
+        """Return the state of a run's analysis, names of figures, the verdict, and whether there is a report.
 
         Results of an earlier analysis are not shown for one that is under way or has failed.
         """

@@ -69,7 +69,7 @@ class Desk:
 
     @property
     def about(self) -> dict[str, Any]:
-        """What the page has to know at first."""
+        """The first data of the page."""
         return {"experiments": [*EXPERIMENTS], "runs": [folder.name for folder in self.folders]}
 
     @property
@@ -103,7 +103,7 @@ class Desk:
             self.said.append(about | {"of_run": self._records and event.kind == "message"})
 
     def events_after(self, number: object) -> list[dict[str, Any]]:
-        """Return what was said after that of a number."""
+        """Return the events after the one of this number."""
         after = number if type(number) is int and number <= self.count else 0
         return [one for one in self.said if one["n"] > after]
 
@@ -125,7 +125,7 @@ def scene_of_run(folder: Path) -> dict[str, Any] | None:
 
 
 def parts_for(scene: dict[str, Any] | None) -> dict[str, Any]:
-    """Return what is drawn of a scene; where none is known, of the one for practice."""
+    """Return the parts to draw of a scene; without one, of the scene for practice."""
     try:
         known = scene_of(scene) if scene else read_scene("practice")
     except LevilabError:

@@ -63,7 +63,7 @@ class Followed:
         self._alive_again = -1.0
 
     def look(self) -> None:
-        """Read what is new."""
+        """Read the new lines of the run's files."""
         end = self.clock() + LOOK_S
         self._read_record()
         self.behind = self._read_all(self._rows, self._take_rows, end) | self._read_all(

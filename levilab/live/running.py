@@ -109,7 +109,7 @@ def fit_so_far(
 
 
 def _without_forecast(found: Running) -> Running:
-    """Return the fit of a run that has ended: its line goes as far as the readings."""
+    """Return the fit of a run that has ended, with a line up to the last reading."""
     curve = found.curve
     if curve is not None and np.isfinite(curve.solid_to):
         x = np.append(curve.x[curve.x < curve.solid_to], curve.solid_to)

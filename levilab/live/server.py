@@ -117,7 +117,7 @@ class Hall:
         return scene_of_run(self.root / name) if self.is_run(name) else None
 
     async def read_on(self) -> None:
-        """Read what is new for all pages, for ever."""
+        """Read the news of all runs that pages show, for ever."""
         fitting: set[asyncio.Task[None]] = set()
         before = self._ticks()
         while True:
@@ -168,7 +168,7 @@ class Hall:
         self.new = asyncio.Event()
 
     async def wait_for_news(self, watch: Watch, tick: object) -> None:
-        """Return when there is something newer than a page has, or it has waited long enough."""
+        """Return once there is news for a page, or it has waited long enough."""
         end = time.monotonic() + PATIENCE_S
         before = self.desk.count if self.desk else 0
         while (
@@ -178,7 +178,7 @@ class Hall:
                 await asyncio.wait_for(self.new.wait(), left)
 
     async def wait_for_answer(self, desk: Desk, number: int) -> PracticeEvent | None:
-        """Return what the bench for practice answers to a command; None where it takes longer than PATIENCE_S."""
+        """Return the answer of the bench for practice to a command; None if it takes longer than PATIENCE_S."""
         end = time.monotonic() + PATIENCE_S
         while number not in desk.answers and (left := end - time.monotonic()) > 0:
             with contextlib.suppress(TimeoutError):
@@ -225,7 +225,7 @@ class Pages:
         return self._file(found) if found else _nothing()
 
     async def runs(self, _: Request) -> Response:
-        """Return the runs to choose from, and what the page has to know at first."""
+        """Return the runs to choose from, and the first data of the page."""
         hall = self.hall
         found = await asyncio.to_thread(choices, hall.root)
         first = hall.shown or newest(found) or ""
@@ -233,7 +233,7 @@ class Pages:
         return self._json({"runs": [asdict(one) for one in found], "first": first, "practice": practice})
 
     async def parts(self, request: Request) -> Response:
-        """Return what is drawn of the top."""
+        """Return the parts of the top to draw."""
         scene = self.hall.scene(request.query_params.get("run", ""))
         return self._json(await asyncio.to_thread(parts_for, scene))
 

@@ -110,7 +110,7 @@ class Watch:
                 self.tick += 1
 
     def step(self) -> None:
-        """Read what is new; `tick` says whether there was anything."""
+        """Read the news of the run; `tick` counts them."""
         self._subscribe()
         for message in self._subscriber.receive() if self._subscriber else ():
             self._take(message)
@@ -177,7 +177,7 @@ class Watch:
     # --- the running fit, which the server computes beside the frames ---
 
     def fit_task(self) -> FitTask | None:
-        """Return what to compute in a thread, if it is time; `take_fit` takes the result."""
+        """Return the fit to compute in a thread, if it is time; `take_fit` takes the result."""
         followed = self.followed
         ended = followed is not None and followed.status != "running"
         if (
@@ -199,7 +199,7 @@ class Watch:
         return FitTask(followed.folder, compute)
 
     def take_fit(self, folder: Path, found: Running | None, took_s: float) -> None:
-        """Take in what was computed of a run, and the processor time that it took [s].
+        """Take in the fit of a run, and its processor time [s].
 
         It is dropped if another run is followed by now.  The time of the first fit that draws a line says nothing of
         the next ones, as it has to import libraries.
@@ -216,7 +216,7 @@ class Watch:
     # --- what the page asks for ---
 
     def frame(self, ask: dict[str, Any], said: Sequence[Mapping[str, Any]] = ()) -> bytes:
-        """Return what a page does not have yet.
+        """Return the news for a page.
 
         Args:
             ask: the page's state: "run" (name), "readings", "events", "fit", "poses" (numbers), "records" (channel →
@@ -296,7 +296,7 @@ def _about(followed: Followed, failure: str) -> dict[str, Any]:
 
 
 def _settings(instrument: dict[str, Any]) -> dict[str, Any]:
-    """Return what an instrument was set to at the start of a run, as far as the page shows it without the bench."""
+    """Return an instrument's settings at the start of a run that the page shows without the bench."""
     found = instrument.get("settings_start")
     found = found if isinstance(found, dict) else {}
     return {key: value for key, value in found.items() if key in _SETTINGS and isinstance(value, str | float | int)}

@@ -248,7 +248,7 @@ def scene_blocks(scene: Scene, more: Sequence[Fact] = ()) -> tuple[Block, ...]:
         Fact("Left out", (", ".join(left_out) or "no effect that the simulator knows",)),
         *more,
     )
-    note = Note("What each effect changes, levilab simulate computes where it is asked to explain.")
+    note = Note("`levilab simulate --explain` computes the change by each effect.")
     # a preset and its changes say all of it in few lines
     keys = Details(
         "All keys of the scene", (Code(scene.as_toml().strip()),), on_paper="whole" if changed is None else "out"

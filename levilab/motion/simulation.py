@@ -93,7 +93,7 @@ def run_simulation(
     *,
     uses_states: bool = False,
 ) -> Simulation:
-    """Simulate, look at the motion, and write it down; what does not come to its end leaves nothing behind.
+    """Simulate a motion, analyze and write it; an interrupted simulation leaves nothing behind.
 
     Args:
         request: what is simulated, and how.

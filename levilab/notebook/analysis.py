@@ -97,7 +97,7 @@ def _is_one(data: object) -> bool:
 
 
 def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
-    """Return where the data lie; a DataFrame is written into the folder."""
+    """Return the path of the data; a DataFrame is written into the folder."""
     if isinstance(item, Run):
         return item.folder
     if isinstance(item, str | PathLike):

@@ -84,12 +84,12 @@ class AnalysisResult:
 
     @property
     def verdict(self) -> str:
-        """What the data say, in a few sentences."""
+        """The answer of the data, in a few sentences."""
         return str(self.found.text)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to know before using the numbers."""
+        """Warnings about the numbers."""
         return tuple(unquoted(text) for text in self.found.all_warnings)
 
     @cached_property

@@ -113,7 +113,7 @@ def _load(folder: Path) -> Run | None:
 
 
 def _content(path: str) -> bytes | None:
-    """Return what is in a file; None where it is no file, as a pipe, which would be waited for, or a long one."""
+    """Return the content of a file; None where it is no file, as a pipe, or a long one."""
     try:
         about = os.stat(path)  # noqa: PTH116 - of ten thousand folders
         if not stat.S_ISREG(about.st_mode) or about.st_size >= _GLANCED_BYTES:
@@ -206,7 +206,7 @@ MOST_PROBLEMS = 5
 
 
 def print_runs(runs: Sequence[Listed], root: Path) -> None:
-    """Print the list of runs, and below it what is wrong with the broken ones."""
+    """Print the list of runs, and below it the faults of the broken ones."""
     console = terminal()
     if not runs:
         console.print(f"no runs in {escape(str(root))}")

@@ -202,7 +202,7 @@ class Run:
         return [event for line in lines if (event := _event(line))]
 
     def warnings(self) -> tuple[str, ...]:
-        """Return what the experiment warned of while it ran, each once."""
+        """Return the experiment's warnings, each once."""
         return _warnings_of(self.events())
 
 
@@ -268,7 +268,7 @@ def read_record(folder: Path) -> RunRecord:
 
 
 def find_run(name: Path, root: Path = Path("runs")) -> Path:
-    """Return the run folder that is meant: a path, or the name of a run in a folder, its time left out or not."""
+    """Return the run folder of a path, or of the name of a run in a folder, with or without its time."""
     if name.name != str(name) or name.exists() or not root.is_dir():
         return name
     named = runs_named(name.name, root)
@@ -276,7 +276,7 @@ def find_run(name: Path, root: Path = Path("runs")) -> Path:
 
 
 def runs_named(name: str, root: Path) -> list[Path]:
-    """Return the runs in a folder that have this name, their time left out or not."""
+    """Return the runs in a folder that have this name, with or without their time."""
     return [folder for folder in root.iterdir() if name in {folder.name, folder.name.split("Z-", 1)[-1]}]
 
 
@@ -301,7 +301,7 @@ def run_folders(root: Path) -> list[str]:
 
 
 def _identity(folder: str) -> object:
-    """Return what no two folders have in common; some file systems of networks number none."""
+    """Return an identity that no two folders share: a path, where the file system numbers no files."""
     try:
         there = os.stat(folder)  # noqa: PTH116 - of ten thousand folders
     except OSError:

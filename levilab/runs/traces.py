@@ -142,13 +142,13 @@ def is_arriving(folder: Path) -> bool:
 
 
 def forget_arriving(folder: Path) -> None:
-    """Take away what is there of a record on its way, which is kept elsewhere, or of no use.  Raises OSError."""
+    """Remove the part of a record on its way, which is kept elsewhere, or of no use.  Raises OSError."""
     for name in (ARRIVING, ARRIVING_CODES):
         (folder / name).unlink(missing_ok=True)
 
 
 def arrived(folder: Path) -> StoredTrace | None:
-    """Return what had come of the record that was on its way when a process was killed; None where there is nothing.
+    """Return the part of the record that was on its way when a process was killed; None where there is none.
 
     Raises:
         DataError: what is there of it cannot be read.

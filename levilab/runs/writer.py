@@ -167,7 +167,7 @@ class RunWriter:
         return gone
 
     def _holds_readings(self) -> bool:
-        """Return whether there is more than a header, in memory or on the disk; what cannot be read may be readings."""
+        """Return whether there are readings, in memory or on the disk; an unreadable file may have some."""
         if self._lines_kept(READINGS) > 1:
             return True
         try:
@@ -231,7 +231,7 @@ class RunWriter:
         return self._keep_record(traces.head_of(trace, self._records + 1, time_s, channel), trace)
 
     def _keep_record(self, head: traces.Head, trace: Trace) -> int:
-        """Write the head of a record, its codes and their line: of a process that is killed all that had come stays."""
+        """Write the head of a record, its codes and their line; all of them survive a killed process."""
         self._records = max(self._records, head.number)
         with _explain_errors(f"write the record {head.number}", self.folder):
             self._rescue_if_lost()
@@ -247,7 +247,7 @@ class RunWriter:
         return head.number
 
     def arriving(self, time_s: float, trace: Trace, channel: str, points: int) -> None:
-        """Put down what has come so far of a record; the whole one is kept by `trace`.
+        """Write the part of a record that has come so far; the whole one is kept by `trace`.
 
         Args:
             time_s: when the record was taken, on the clock of the readings.
@@ -271,7 +271,7 @@ class RunWriter:
         self._arriving = self.folder, trace.codes.size
 
     def keep_what_arrived(self) -> str | None:
-        """Keep what has come of a record that was broken off; says what that is.  Raises CannotWrite."""
+        """Keep the part of a record that was broken off, and return its description.  Raises CannotWrite."""
         try:
             found = traces.arrived(self.folder)
         except DataError:  # the analysis says so
@@ -286,7 +286,7 @@ class RunWriter:
         return f"{traces.INDEX}: record {found.number} ({found.channel}) {found.how_short or 'was kept whole'}"
 
     def forget_what_arrived(self) -> None:
-        """Take away what has come of a record that is of no use.  Raises CannotWrite."""
+        """Remove the part of a record that is of no use.  Raises CannotWrite."""
         self._arriving = None
         with _explain_errors("clear up", self.folder):
             traces.forget_arriving(self.folder)
@@ -402,7 +402,7 @@ class RunWriter:
             replace_atomically(old / RECORD, self.record.model_copy(update=gone_on).as_json())
 
     def _forget_lost_records(self) -> int:
-        """Take records whose codes are gone out of the index; returns how many.
+        """Remove records whose codes are gone from the index; return their number.
 
         Codes are not kept in memory: a record may have as many as an oscilloscope holds.
         """
@@ -498,7 +498,7 @@ def _cut_foreign_tail(path: Path, ours: bytes) -> None:
 
 
 def _copy_others(old: Path, new: Path, ours: set[str]) -> None:
-    """Copy what else lies in the old folder, where there is any of it."""
+    """Copy the other files and folders of the old folder, if there is one."""
     with contextlib.suppress(OSError):
         for path in old.iterdir():
             if path.name in ours or path.is_symlink() or path.name.endswith(".part"):

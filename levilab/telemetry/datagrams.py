@@ -68,7 +68,7 @@ class Joiner:
         self._open: OrderedDict[int, dict[int, bytes]] = OrderedDict()
 
     def join(self, data: bytes) -> bytes | None:
-        """Take in a datagram.  Returns the message that it completes, None where it completes none."""
+        """Take in a datagram.  Returns the message if it is complete now, else None."""
         if len(data) < _HEAD.size or len(data) > _HEAD.size + PART_BYTES:
             return None
         magic, token, number, part, parts = _HEAD.unpack_from(data)

@@ -122,7 +122,7 @@ class _Attempt(Generic[T]):
 
     @property
     def as_deadly(self) -> Done[T, Any]:
-        """The task with the error that it kills its worker."""
+        """The task, done with an error: it kills its worker."""
         return Done(self.task, None, WorkersLost("each process that does it dies: memory may be short"))
 
 
@@ -149,7 +149,7 @@ class _Queue(Generic[T]):
         return self.alone.popleft() if self.alone and nothing_under_way else None
 
     def put_back(self, attempts: Iterable[_Attempt[T]], suspects: int) -> None:
-        """Take back what was under way, in the order of submission; the pool broke by one of the first few."""
+        """Take back the tasks under way, in the order of submission; one of the first few broke the pool."""
         for place, attempt in enumerate(attempts):
             attempt.breaks += place < suspects
             (self.alone if attempt.is_to_be_alone else self.again).append(attempt)
@@ -236,7 +236,7 @@ def _first_line(error: Exception) -> str:
 def _after_a_break(
     queued: _Queue[T], under_way: dict[_Future, _Attempt[T]], pool: Executor, executor: Workers
 ) -> Iterator[Done[T, Any]]:
-    """Yield what ended before the pool broke and queue the rest again."""
+    """Yield the results from before the pool broke, and queue the other tasks again."""
     lost = []
     for future, attempt in under_way.items():
         try:

@@ -386,7 +386,7 @@ class VirtualCNT91(VirtualCounter):
         return self._spell(*self._memory.slice(start, start + count), size_known=size_known)
 
     def _wait_until(self, held: int) -> Steps[bool]:
-        """Wait until the memory holds this many.  Raises ScpiError if it never will."""
+        """Wait until the memory holds this number of readings.  Raises ScpiError if it never will."""
         gone = self._run.n_taken - self._memory.size if self._run else 0
         if held > self._memory.size and (self._run is None or gone + held > self._run.wanted):
             raise ScpiError(-230)

@@ -87,7 +87,7 @@ def _triangle(turns: Array, _: Array, _output: Output) -> Array:
 
 
 def _hold_samples(turns: Array, _: Array, output: Output) -> Array:
-    """Each sample holds until the next; 1e-9: a time that is meant to be that of a sample may be a little before it."""
+    """Hold each sample until the next; 1e-9 allows for the rounding of times just before a sample."""
     samples = _samples(output)
     return samples[(((turns % 1.0) * samples.size + 1e-9).astype(np.int64)) % samples.size]
 

@@ -116,7 +116,7 @@ class VirtualOscilloscope(VirtualInstrument):
         return "trigger_level"
 
     def source_word(self, channel: int) -> str:
-        """Return a channel as a source of the trigger."""
+        """Return the word for a channel as the trigger's source."""
         return f"CHAN{channel}"
 
     def slope_name(self, channel: int) -> str:
@@ -345,7 +345,7 @@ class VirtualOscilloscope(VirtualInstrument):
         return Measured((codes.astype(np.float64) - scale.zero) * scale.volts_per_code, step, start)
 
     def measured(self, name: str, channel: int) -> float:
-        """Return a measurement on the screen, or what stands for none."""
+        """Return a measurement on the screen, or the number for none."""
         value = measure(name, self.on_screen(channel))
         return self.no_measurement if value is None else value
 

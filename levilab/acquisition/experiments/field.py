@@ -114,7 +114,7 @@ class FieldSettings(ExperimentSettings):
 
 
 def channels(settings: FieldSettings) -> tuple[Channel, ...]:
-    """Return the uncertainties of all that is known, and that of the mean alone: only the latter is a reading's own."""
+    """Return the channels, with all uncertainties known and that of the mean, the only one of a reading's own."""
     return (
         Channel("time_s", "s", "bench clock, from the zero of the probe"),
         Channel("height_m", "m", "of the probe on the axis, as the person set or typed it"),

@@ -150,7 +150,7 @@ def run(session: Session[PrecessionSettings]) -> None:
 
 
 def _points_done(rows: list[Row], sweep: tuple[float, ...]) -> int:
-    """Return the first point after those that the readings are of, in order."""
+    """Return the index of the first point after those with readings, in order."""
     done = 0
     for row in rows:
         drive = row["drive_frequency_hz"]

@@ -77,7 +77,7 @@ class _Clock:
         self._sum_up(values)
 
     def _sum_up(self, values: Array) -> None:
-        """Add a block to the straight line."""
+        """Add a block of values to the sums of the straight line."""
         n, m = self.count, len(values)
         numbers = n + np.arange(m, dtype=np.float64)
         means = float(numbers.mean()), float(values.mean())

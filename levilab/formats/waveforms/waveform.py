@@ -109,7 +109,7 @@ class Waveform:
         return np.concatenate(found) if found else np.zeros(0)
 
     def at_rate(self, rate: float | None) -> Waveform:
-        """Return the same at a rate that is given [Hz], with a warning where it is another than the file's."""
+        """Return the record at a given rate [Hz], with a warning where it differs from the file's."""
         if rate is None:
             return self
         warnings = (*self.warnings, *about_rate(self.path, self.step, rate))

@@ -111,7 +111,7 @@ _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discrimin
 
 
 def command_of(table: Any) -> Command:
-    """Return the command that a table of plain values is, such as {"do": "pause", "on": True}.
+    """Return the command in a table of plain values, such as {"do": "pause", "on": True}.
 
     Raises:
         CommandRefused: the table is not a command.

@@ -407,7 +407,7 @@ class PracticeProcess:
         self._sent.send_poses(self._publisher, self._wiring.poses, self.clock.now())
 
     def state(self) -> State:
-        """Return what views are shown."""
+        """Return the state for the views."""
         speed = self.clock.speed if math.isfinite(self.clock.speed) else None
         here: dict[str, Any] = {"virtual": True, "speed": speed, "paused": self._paused, "probe_m": self._probe_m}
         here |= {"took_hold": self._took_hold, "tuned_up": self._tuned_up}
@@ -430,7 +430,7 @@ class PracticeProcess:
 
     @singledispatchmethod
     def _carry_out(self, command: Command) -> str:
-        """Carry out a command.  Returns what was done; raises CommandRefused and what instruments raise."""
+        """Carry out a command.  Returns a text of what was done; raises CommandRefused and InstrumentError."""
         raise CommandRefused(f"{command!r}: this bench cannot do that")
 
     @_carry_out.register
@@ -687,7 +687,7 @@ class PracticeProcess:
 
     @contextlib.contextmanager
     def _watching(self, session: Session[Any], wiring: Wiring) -> Iterator[Callable[[], None]]:
-        """Yield what the session and the clock call while a run is recorded."""
+        """Yield the function that session and clock call while a run is recorded."""
         self._session, self._folder = session, str(session.writer.folder)
         if self._stopped:
             session.stop.by = self._stopped
