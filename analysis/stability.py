@@ -136,6 +136,7 @@ def _edge(field: AxialField, top: SymmetricTop, inside: float, outside: float) -
 
 
 def _sizes(field: AxialField, z: float) -> Array:
+    """Return the scale of each of the conditions at a height, by which they can be compared."""
     b, slope, bend = np.abs(field(np.array([z]))[:3, 0])
     return np.array([b * slope, b * bend + slope**2, slope**2])
 

@@ -259,7 +259,7 @@ def _join_windows(times: Array, found: Windows) -> Numbering:
         if i:
             mean = 0.5 * (found.frequency[i] + found.frequency[i - 1])
             ahead = phase + mean * (found.centre[i] - found.centre[i - 1])
-            base = ahead + _to_half(found.phase[i] - ahead)
+            base = float(found.phase[i] - np.rint(found.phase[i] - ahead))
         else:
             base = float(found.phase[0])
         phase = base
@@ -285,7 +285,3 @@ def phase_between(times: Array, knots: Array, counts: Array, frequency: Array) -
     before = counts[0] + frequency[0] * (times - knots[0])
     after = counts[-1] + frequency[-1] * (times - knots[-1])
     return np.asarray(np.where(s < 0, before, np.where(s > 1, after, inside)))
-
-
-def _to_half(x: float) -> float:
-    return float(x - np.rint(x))

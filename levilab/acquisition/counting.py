@@ -161,7 +161,7 @@ class FreeTop(Generic[S]):
         second = self._count()
         if second and self._is_plausible(second):
             return second
-        if first and second and _is_same_spin(first, second):
+        if first and second and abs(second["spin_frequency_hz"] / first["spin_frequency_hz"] - 1) < _SAME_SHARE:
             return self._judge_pair(second)
         if second:
             text = f"{second['spin_frequency_hz']:.4g} Hz is not credible either"
@@ -246,11 +246,6 @@ def _coasts(last: Row, reading: Row, times: int) -> bool:
     """Return whether a reading is this multiple of the spin of a top that coasts since the last one."""
     one = reading | {"spin_frequency_hz": reading["spin_frequency_hz"] / times}
     return is_plausible(last, one) and not _is_drop(last, one)
-
-
-def _is_same_spin(first: Row, second: Row) -> bool:
-    """Return whether two counts in succession are of one spin."""
-    return abs(second["spin_frequency_hz"] / first["spin_frequency_hz"] - 1) < _SAME_SHARE
 
 
 def _spin_of(row: Row | None) -> Row:

@@ -38,7 +38,7 @@ class Key:
 
     name: str
     value: Any
-    describe_values: str
+    expected: str
     meaning: str
 
 
@@ -55,7 +55,7 @@ def keys_of(config: BenchConfig, experiment: str) -> tuple[Key, ...]:
 
 def keys_table(keys: tuple[Key, ...], experiment: str) -> Table:
     """Return a table for the terminal."""
-    rows = [(one.name, _as_typed(one.value), one.describe_values, one.meaning) for one in keys]
+    rows = [(one.name, _as_typed(one.value), one.expected, one.meaning) for one in keys]
     return table(f"levilab acquire {experiment} --set {experiment}.KEY=VALUE", ("KEY", "is", "may be", ""), rows)
 
 

@@ -253,12 +253,8 @@ def _exit_with(error: Exception) -> NoReturn:
         status, text = exit_codes.FAILED, str(error)
     if status is None:
         raise error
-    message("levilab: " + _in_one_line(text))
+    message("levilab: " + " ".join(text.split()))
     sys.exit(status)
-
-
-def _in_one_line(text: str) -> str:
-    return " ".join(text.split())
 
 
 def _prepare_output() -> None:

@@ -155,7 +155,8 @@ def explain(scene: Scene, duration: float = 30.0) -> tuple[Effect, ...]:
 
 def _effect(kind: _Kind, scene: Scene, as_it_is: Trajectory, time: float) -> Effect:
     included = kind.included(scene)
-    changes = _without(kind, scene) if included else kind.on(scene)
+    off = kind.off or {"top.moment_tilt": [0.0, scene.top.moment_tilt[1]]}
+    changes = off if included else kind.on(scene)
     try:
         changed = scene.changed(changes)
         other = simulate(changed, time, tolerance=1e-6, rate=rate_for(changed))
@@ -172,10 +173,6 @@ def _effect(kind: _Kind, scene: Scene, as_it_is: Trajectory, time: float) -> Eff
         _zero_if_below(spin, LEAST_HZ),
         _remark(included, as_it_is, other),
     )
-
-
-def _without(kind: _Kind, scene: Scene) -> dict[str, Any]:
-    return kind.off or {"top.moment_tilt": [0.0, scene.top.moment_tilt[1]]}
 
 
 def _zero_if_below(change: float, least: float) -> float:

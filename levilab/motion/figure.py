@@ -220,15 +220,12 @@ def _spin(summary: Summary) -> _Quantity:
 def _energy_title(summary: Summary) -> str:
     there = changing_energy(summary.motion.scene)
     if not there:
-        return f"Error of the energy: it should stay as it is, and does {_exactly(summary.energy_change)}"
+        kept = f"to {digits(summary.energy_change, 1)}" if summary.energy_change else "exactly"
+        return f"Error of the energy: it should stay as it is, and does {kept}"
     own = " (without the drive's own part)" if "drive" in there else ""
     *others, last = there
     named = f"{', '.join(others)} and {last} change" if others else f"{last} changes"
     return f"Energy, change since the start: {named} it{own}"
-
-
-def _exactly(change: float) -> str:
-    return f"to {digits(change, 1)}" if change else "exactly"
 
 
 def _draw_quantity(axes: Axes, quantity: _Quantity, time: Array) -> None:

@@ -165,7 +165,7 @@ _LIFETIME, _WHOLE_TIME = "lifetime", "up for the whole time"
 
 
 def _time_up(found: Mapping[str, Any]) -> tuple[str, str, float, str]:
-    """Return how long the top was up; for one that did not fall, the simulated time, which is no lifetime."""
+    """Return the column of the time up: a lifetime, or the simulated time of a top that did not fall."""
     return _LIFETIME if isinstance(found.get("fell"), dict) else _WHOLE_TIME, "s", 1.0, "end_s"
 
 
@@ -248,7 +248,7 @@ def scene_blocks(scene: Scene, more: Sequence[Fact] = ()) -> tuple[Block, ...]:
         Fact("Left out", (", ".join(left_out) or "no effect that the simulator knows",)),
         *more,
     )
-    note = Note("`levilab simulate --explain` computes the change by each effect.")
+    note = Note("levilab simulate computes the change by each effect where it is asked to explain.")
     # a preset and its changes say all of it in few lines
     keys = Details(
         "All keys of the scene", (Code(scene.as_toml().strip()),), on_paper="whole" if changed is None else "out"

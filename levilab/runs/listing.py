@@ -173,17 +173,13 @@ def _glance(run: Run) -> _Rows | None:
     return _Rows(
         len(lines),
         _length(run, numbers[0], numbers[-len(titles)]),
-        "record" in titles and "record" in _channel_names(run),
+        "record" in titles and any(channel.get("name") == "record" for channel in run.record.channels),
     )
 
 
 def _length(run: Run, first: float, last: float) -> float:
     """Return the time from time zero to the last reading [s]; the first of a limit or a sweep may be long after it."""
     return last - (0.0 if run.record.time_zero_utc else first)
-
-
-def _channel_names(run: Run) -> set[str]:
-    return {channel.get("name", "") for channel in run.record.channels}
 
 
 def _table(of: dict[str, Any] | None, key: str) -> dict[str, Any]:

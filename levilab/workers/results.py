@@ -225,12 +225,8 @@ def _outcome_of(future: _Future, pool: Executor, executor: Workers) -> Outcome |
         return None
     if isinstance(error, BrokenExecutor) or not isinstance(error, Exception):
         raise error
-    why = f"{type(error).__name__}: {_first_line(error)}"
+    why = f"{type(error).__name__}: {str(error).strip().partition(chr(10))[0]}"
     raise WorkersLost(f"the {executor.name} cannot do the work ({why}): install the same on all machines")
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().partition("\n")[0]
 
 
 def _after_a_break(

@@ -62,7 +62,8 @@ class _SiglentChannel(Channel):
 
     def field_of(self, answer: str, header: str, key: str) -> str:
         """Return the text behind the header; a switch as 0 or 1."""
-        return _as_digit(_after_header(answer, self.header_in_use(header)))
+        text = _after_header(answer, self.header_in_use(header))
+        return {"ON": "1", "OFF": "0"}.get(text, text)
 
     def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
         """Ask for it: there is no error queue."""
@@ -72,10 +73,6 @@ class _SiglentChannel(Channel):
 def _single(value: float) -> float:
     """Return a number that came in single precision, which has seven digits: 0.2 instead of 0.20000000298."""
     return float(f"{value:.7g}")
-
-
-def _as_digit(text: str) -> str:
-    return {"ON": "1", "OFF": "0"}.get(text, text)
 
 
 class SiglentSDS1000XE(Scope):

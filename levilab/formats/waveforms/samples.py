@@ -219,7 +219,7 @@ def _printed_times(path: Path, header: Header, survey: _Survey, rate: float | No
     off = abs(mean - step)
     if off <= u + allowed / (n - 1):
         return _Times(first, step if off <= SAME * step or u <= allowed / (n - 1) else mean)
-    return _contradiction(path, header, first, mean)
+    return _times_by_header(path, header, first, mean)
 
 
 #: Relative uncertainty of the step below which nothing is said of it: of a frequency it is 0.03 mHz at 30 Hz.
@@ -251,7 +251,7 @@ def _check_even(path: Path, clock: _Clock, unit: float, mean: float, allowed: fl
             )
 
 
-def _contradiction(path: Path, header: Header, first: float, mean: float) -> _Times:
+def _times_by_header(path: Path, header: Header, first: float, mean: float) -> _Times:
     """Return the times in the unit that makes header and printed times agree.  Raises TableError without one."""
     step = header.step.value if header.step else mean
     factor = next((unit for unit in _UNITS if abs(mean / step / unit - 1) < 1e-3), None)
