@@ -50,7 +50,7 @@ class Slip:
         """What it means, empty where the tape turns with the drive."""
         if abs(self.difference) <= max(_SIGNIFICANT * self.u, self.least):
             return ""
-        seen = f"the drive holds the top at {self.drive:.2f} Hz, but the counter sees {self.spin:.2f}({_digits(self.u)}) Hz"
+        seen = f"the drive holds the top at {self.drive:.2f} Hz, but the counter sees {self.spin:.2f}({_u(self.u)}) Hz"
         if self.difference > 0:
             return (
                 f"{seen}: no tape overtakes the drive; is there a second bright mark, or is the trigger level too low?"
@@ -61,7 +61,7 @@ class Slip:
         )
 
 
-def _digits(u: float) -> str:
+def _u(u: float) -> str:
     """Return a standard uncertainty in the second digit behind the point."""
     return f"{max(round(100 * u), 1)}"
 
