@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Residual = Callable[[Array], Array]  # q of shape (p,) → (model − data)/u of shape (n,)
-Gradient = Callable[[Array], Array]  # q of shape (p,) → slopes of that, shape (p, n)
+Gradient = Callable[[Array], Array]  # q of shape (p,) → slopes of the residuals, shape (p, n)
 
 # A step that changes χ² or q by less than this ends the search: then q is within 1e-5 standard uncertainties of the
 # minimum, and exact to about 1e-12 where the data are free of noise.

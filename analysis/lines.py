@@ -32,7 +32,7 @@ Bins = NDArray[np.int64]
 FEWEST = 32
 #: Half the width of a line's main lobe behind a Hann window, in bins: lines nearer to each other are one.
 LOBE = 2
-#: The greatest of 10⁵ bins of white noise stands at 4.1 times their median: what is higher than this is no noise.
+#: The greatest of 10⁵ bins of white noise stands at 4.1 times their median: higher peaks are no noise.
 ABOVE_NOISE = 5.0
 #: Rounds in which all lines are placed again; each lowers the leakage by a factor of about a hundred.
 ROUNDS = 3
@@ -205,7 +205,7 @@ def _find(rest: _Spectra, most: int, weakest: float) -> tuple[_Waves, Bins]:
         rest.re[rows, bins] -= line.re[:, None] * shape_of_line
         rest.im[rows, bins] -= line.im[:, None] * shape_of_line
         height[rows, bins] = _length(rest.re[rows, bins], rest.im[rows, bins])
-        # what is left so near to a line is that line's own imperfection, and flanks are no lines
+        # residuals so near to a line come from its own fit, and flanks are no lines
         allowed[rows, (line.bins[:, None] + np.arange(-LOBE, LOBE + 1)) % n] = False
         bins = (line.bins[:, None] + shown) % n
         flank = np.concatenate([bins[:, :1] - 1, bins, (bins[:, -1:] + 1) % n], axis=-1)

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 EXCLUDED_P = 0.01
 #: A point deserves a warning above this studentised residual, or this leverage in units of the mean one.
 _FAR, _HEAVY = 3.5, 3.0
-#: An uncertainty of the drive matters above this share of that of the precession.
+#: Least ratio of the drive's u to the precession's u that matters.
 _MATTERS = 0.3
 #: Relative uncertainties of the drive's frequency that differ by less than this are those of one clock.
 _ONE_CLOCK = 1e-3

@@ -201,7 +201,7 @@ def mains_lines(bins: Array, rate: float) -> Lines:
     for mains in MAINS:
         hum: set[int] = set()
         highest = int(min(HIGHEST, top) / (mains + STRAYS))
-        for multiple in range(highest, 0, -1):  # from above: hum is no measure of what is below it
+        for multiple in range(highest, 0, -1):  # from above: hum is no measure of the lines below it
             nominal = mains * multiple
             reach = max(STRAYS * multiple, 2 * width)
             band = near(nominal, reach)
@@ -334,7 +334,7 @@ def _baseline(bins: Array, rate: float, counted: Mask) -> tuple[Array, Array] | 
     reach = float(ordered[:, -1].mean() - ordered[:, 0].mean())
     if scatter > max(
         WIDE * noise_of(bins), 0.05 * reach
-    ):  # pulses that last about as long as the pauses: no level is that of the pauses
+    ):  # pulses about as long as the pauses: no level belongs to the pauses
         values = 0.5 * (ordered[:, n // 20] + ordered[:, -1 - n // 20])
     error = 1.2533 * scatter / np.sqrt(n)
     times = ((np.arange(count) + 0.5) * size / rate)[there]

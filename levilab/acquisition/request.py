@@ -175,7 +175,7 @@ def _with_texts(config: BenchConfig, experiment: str, texts: Mapping[str, str]) 
     """Return the configuration with texts as values at some of the experiment's keys.  Raises UsageError."""
     if not texts:
         return config
-    table = config.model_dump(mode="json", exclude_unset=True)  # what was not set may still be suited to a scene
+    table = config.model_dump(mode="json", exclude_unset=True)  # defaults may still be suited to a scene
     values = {name: parse_setting(f"{name}={text}")[1] for name, text in texts.items()}
     table[experiment] = table.get(experiment, {}) | values
     try:

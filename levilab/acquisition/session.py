@@ -201,7 +201,7 @@ class Session(Generic[S]):
                 self.event(RunEvent.LONGEST, f"{longest_s:g} s are over ({name}.longest_s)")
                 return
 
-    # --- what the person sees, and what is written down ---
+    # --- display and record ---
 
     def event(self, kind: RunEvent, text: str, **data: Any) -> None:
         """Record and show an event."""

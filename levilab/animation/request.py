@@ -105,11 +105,11 @@ class AnimationRequest:
 
 
 def check_request(request: AnimationRequest, scene: Scene, duration: float) -> None:
-    """Check a request before anything is simulated.  Raises UsageError.
+    """Check a request before anything is simulated.
 
     Args:
-        request: what is to be animated.
-        scene: what will be simulated.
+        request: the animation.
+        scene: the simulated scene.
         duration: for how long [s].
 
     Raises:

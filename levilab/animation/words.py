@@ -61,7 +61,7 @@ def readout(poses: Poses, k: int) -> list[tuple[str, str]]:
 
 
 def bind_units(text: str) -> str:
-    r"""Bind numbers to their units, and what units consist of, with spaces at which no line ends.
+    r"""Put no-break spaces between numbers and their units, and within compound units.
 
     >>> bind_units("from 0.5 s to 2 cm radius, 0.71 A m², 1/20 of real speed, 3 parts")
     'from 0.5\xa0s to 2\xa0cm radius, 0.71\xa0A\xa0m², 1/20 of real speed, 3 parts'

@@ -96,7 +96,7 @@ class Watch:
         self._silent = True
         self._failure = ""  # what went wrong while this run was read
 
-    # --- what is new ---
+    # --- news ---
 
     @contextlib.contextmanager
     def failing_alone(self) -> Iterator[None]:
@@ -140,7 +140,7 @@ class Watch:
         if self._subscriber and address == self._subscriber.address:
             return
         if self._subscriber and address is None:
-            return  # the run is over; what was said last remains
+            return  # the run is over; its last state remains
         if self._subscriber:
             self._subscriber.close()
             self._subscriber = None
@@ -221,7 +221,7 @@ class Watch:
         Args:
             ask: the page's state: "run" (name), "readings", "events", "fit", "poses" (numbers), "records" (channel →
                 number); and its wishes: "columns" of its picture, and whether the "latest" readings alone.
-            said: what the bench for practice has said.
+            said: the events of the bench for practice.
         """
         followed = self.followed
         name = followed.folder.name if followed else ""

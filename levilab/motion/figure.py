@@ -40,7 +40,7 @@ _NAMES_SHARE = 0.385
 #: A name in this row or higher leaves room for others below it.
 _FREE_ROWS = 2
 _FONT = 7.0
-#: A path is not magnified more than to this width [cm]: what is left then is rounding.
+#: A path is not magnified more than to this width [cm]: the rest is rounding.
 _SMALLEST_CM = 1e-4
 #: Height of the legend of the spin [inch].
 _LEGEND = 0.12

@@ -229,7 +229,7 @@ def _digits(found: Mapping[str, Any], key: str, count: int = 3) -> str:
     return plain(value, count) if isinstance(value, int | float) else "—"
 
 
-# --- what was simulated --------------------------------------------------------------------------------
+# --- the simulated scene --------------------------------------------------------------------------------
 
 
 def scene_blocks(scene: Scene, more: Sequence[Fact] = ()) -> tuple[Block, ...]:

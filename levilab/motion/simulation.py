@@ -96,8 +96,8 @@ def run_simulation(
     """Simulate a motion, analyze and write it; an interrupted simulation leaves nothing behind.
 
     Args:
-        request: what is simulated, and how.
-        message: called with what takes a moment.
+        request: scene, duration and accuracy.
+        message: called with the name of a step that takes a moment.
         progress: called with the share that is done.
         uses_states: whether the states at this rate are used without a folder, too: too low a rate is then noted.
 

@@ -57,7 +57,7 @@ class ReciprocalCounter(ScpiInstrument):
         if channel not in self.channels:
             raise OutOfRange(self.transport.address, "channel", channel, " or ".join(map(str, self.channels)))
         if channel != self.channel:
-            self.last_set.clear()  # what was set is the other input's
+            self.last_set.clear()  # these settings are the other input's
         self.channel = channel
         self.command(f"CONF:FREQ (@{channel})")
 

@@ -51,7 +51,7 @@ class LoadSetting(Setting[float]):
 class OutputSwitch(Setting[bool]):
     """The output.  Where the coil has limits, nothing goes on that was not set under them."""
 
-    def __set__(self, instrument: Owner, value: bool) -> None:  # noqa: FBT001 - it is what is assigned
+    def __set__(self, instrument: Owner, value: bool) -> None:  # noqa: FBT001 - the assigned value
         drive = cast("DriveGenerator", instrument)
         if value and drive.limits != NO_LIMITS and not drive.prepared_here:
             allowed = "prepare() first: what stands there may be beyond limits.drive_amplitude_vpp in the bench file"

@@ -345,7 +345,7 @@ class Scope(ScpiInstrument):
             preamble = None
         # a scope prints all exponents with as many digits: where one has fewer, a byte is missing
         exponents = {len(field) for field in re.findall(r"[Ee][+-]\d+", answer)}
-        # 0: bytes, which is what was asked for; of some nothing follows, of others no record that any of these has
+        # 0: bytes, as requested; of other formats nothing follows, or no record that these scopes can have
         if preamble is None or len(exponents) > 1 or int(numbers[0]) != 0 or not preamble.plausible:
             self.reject(":WAV:PRE?", answer, "ten numbers, with format 0, points and their distance")
         return preamble

@@ -66,7 +66,7 @@ _MEASUREMENTS = {
 }
 #: Measurements whose answers are percentages.
 _PERCENT = {"PDUTY", "NDUTY", "OVERSHOOT", "PRESHOOT"}
-#: Words before the source that say over what is measured.
+#: Words before the source: the interval of the measurement.
 _INTERVALS = ("CYCLe", "DISPlay", "AC", "DC")
 #: Sources that a waveform may have beside the channels; this model has nothing in them.
 _EMPTY_SOURCES = ("FUNCtion", "MATH", "FFT", "WMEMory1", "WMEMory2", "EXTernal", "ABUS")

@@ -270,7 +270,7 @@ def _limit_of_loss(settings: LimitSettings, between: tuple[float, float], seen: 
     seen: each count until then, with the drive's frequency [Hz].
     """
     held, drive = between
-    # a top that slips is taken for held until it is far behind; but it only slows, so its limit is above what was seen
+    # a top that slips is taken for held until it is far behind; but it only slows, so its limit is above the counts
     low = min(held, seen[-1][0]) if seen else held
     return {
         "spin_frequency_hz": (low + drive) / 2,

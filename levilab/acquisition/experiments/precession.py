@@ -180,7 +180,7 @@ def _point(session: Session[PrecessionSettings], drive: float) -> None:
     session.writer.event(session.now(), RunEvent.COUNTED, text, drive_frequency_hz=drive, **counts)
     left = _time_left(settings, _points_done([*session.rows, row], settings.sweep))
     session.keep(row | {"time_s": session.now()}, left)
-    if settings.record_s:  # last: what was counted is kept where the record is broken off
+    if settings.record_s:  # last: the counts are kept where the record is broken off
         _record(session, drive)
 
 

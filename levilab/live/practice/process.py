@@ -641,7 +641,7 @@ class PracticeProcess:
         return float(bench.generator.last_set.get("frequency_hz", 0.0))
 
     def _move_drive(self) -> None:
-        """Move the drive's frequency on towards where it is going, as far as the ramp comes in the time since."""
+        """Move the drive's frequency towards its goal, as far as the ramp has gone since the last move."""
         since = self.clock.now() - self._moved
         yields = self._hold is not None and self._hold.is_under_way
         if self._bench is None or not self._knobs.on or yields or since < RAMP_STEP_S:
