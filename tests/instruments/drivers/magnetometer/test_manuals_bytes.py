@@ -136,7 +136,7 @@ def test_a_reading_during_which_the_unit_changed_is_taken_again():
 
 def test_a_unit_that_changes_all_the_time_raises():
     lines = [reading("+100.000E-05", unit=unit, after=after) for unit, after in ("21", "12", "24")]
-    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer, match="a unit that stays"):
+    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer, match="a unit that does not"):
         magnetometer.flux_density()
 
 
