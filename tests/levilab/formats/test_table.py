@@ -626,7 +626,7 @@ def test_what_is_another_kind_of_text_is_named(table_file, text, says):
     ],
     ids=["blanks", "blanks about a stroke", "no-break blanks", "brackets"],
 )
-def test_a_title_of_many_blanks_or_brackets_is_read_at_once(tmp_path: Path, title: str) -> None:
+def test_a_title_of_many_blanks_or_brackets_is_read_at_once(tmp_path, title):
     """Forms that look at each pair of places of a title took minutes; the hang guard ends a test that does so again."""
     file = tmp_path / "odd.csv"
     file.write_text(f"time_s,{title}\n" + "".join(f"{k},{30 - k}\n" for k in range(5)), encoding="utf-8")
