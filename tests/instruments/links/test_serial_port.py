@@ -20,7 +20,6 @@ from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnected, Occupied, OutOfRange
 from instruments.links.serial_port import SerialTransport, port_name
 from instruments.virtual.bench.bench import VirtualBench
-from instruments.virtual.bench.faults import FAULTS, Fault
 from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.line import LineSettings, received_as
@@ -161,13 +160,6 @@ def test_an_interrupted_wait_leaves_no_answer_for_the_next_question(slow, clock,
     assert slow.query("LIST?") == "1,2,1,1,1"
 
 
-def test_an_answer_that_is_no_text_raises_and_is_forgotten(slow):
-    with pytest.raises(BadAnswer, match="plain text") as bad:
-        slow.query("BIN?")
-    assert bad.value.question == "BIN?"
-    assert slow.query("LIST?") == "1,2,1,1,1"
-
-
 def test_a_block_of_any_bytes_comes_whole(slow):
     assert slow.query_block("DATA?") == ANY_BYTES
     assert slow.query("LIST?") == "1,2,1,1,1"
@@ -216,28 +208,6 @@ def test_the_instrument_is_left_alone_between_two_exchanges(bench, monkeypatch):
 
 
 # --- faults ---
-
-
-@pytest.mark.parametrize("what", FAULTS)
-def test_after_each_fault_there_is_an_error_or_the_right_reading_and_soon_right_ones_again(bench, clock, what):
-    magnetometer = LakeShore425(SerialTransport(METER, **LINE))
-    magnetometer.prepare(range_t=0.02)
-    bench.faults.append(Fault(what, question=r"RDGFIELD\?", after=1))
-    readings = []
-    for _ in range(20):
-        clock.sleep(1.0)
-        try:
-            readings.append(magnetometer.flux_density())
-        except (NoAnswer, BadAnswer):
-            pass
-        except NotConnected:
-            for client_lock in bench._client_locks.values():  # the other program has ended
-                client_lock.holders.clear()
-            with contextlib.suppress(NotConnected):
-                magnetometer.transport.reopen()
-    assert readings == pytest.approx([0.0123] * len(readings), rel=3e-4)
-    assert len(readings) >= 12
-    magnetometer.close()
 
 
 def test_a_port_that_another_program_has_taken_is_occupied(bench):
@@ -437,11 +407,6 @@ def test_the_error_of_a_forbidden_port_names_its_group(monkeypatch, tmp_path):
         SerialTransport(str(port))
 
 
-def test_a_port_that_is_not_there():
-    with pytest.raises(NotConnected, match="cannot be opened"):
-        SerialTransport("/dev/no-such-port")
-
-
 def test_a_locked_port_is_occupied_until_it_is_given_back(bench):
     first, second = SerialTransport(SLOW), SerialTransport(SLOW)
     first.lock()
@@ -455,15 +420,6 @@ def test_a_locked_port_is_occupied_until_it_is_given_back(bench):
     with contextlib.closing(SerialTransport(SLOW)) as third:
         third.lock()
         assert third.query("*IDN?") == IDENTITY
-
-
-@pytest.mark.parametrize("act", ["query", "write", "query_block", "clear", "reopen", "lock"])
-def test_a_closed_link_says_that_it_was_closed_whatever_it_is_used_for(bench, act):
-    transport = SerialTransport(SLOW)
-    transport.close()
-    transport.close()
-    with pytest.raises(NotConnected, match="this session was closed: open another one"):
-        getattr(transport, act)(*(["*IDN?"] if act in {"query", "write", "query_block"} else []))
 
 
 # --- the URL handler ---
