@@ -130,16 +130,6 @@ def test_too_low_a_rate_for_the_lines_is_reported_where_states_are_written(levil
     assert not any("take --rate" in note for note in json.loads(levilab(*words).stdout)["notes"])
 
 
-def test_a_fall_and_a_drift_are_told_as_what_they_are():
-    fell = summary(preset("undriven").changed({"start.spin_hz": 15.0}), 1.0)
-    drifted = summary(preset("undriven").changed({"escape.radius_m": 0.002}), 5.0)
-    assert fell.ending.startswith("fell after 0.18")
-    assert fell.ending.endswith(" s: it came down to 0 cm")
-    assert drifted.ending.startswith("was lost after ")
-    assert drifted.ending.endswith(" s: it drifted out to 0.2 cm from the axis")
-    assert "was lost after" in texts(drifted)
-
-
 def test_the_spin_is_reported_with_its_range_where_it_swings_and_as_constant_where_it_is():
     driven, friction, free = (summary(preset(name), 5.0) for name in ("driven", "friction", "undriven"))
     low, high, mean = (f(driven.motion.spin_hz) for f in (np.min, np.max, np.mean))
@@ -336,35 +326,6 @@ def test_a_fall_is_drawn_to_its_end():
 
 
 # --- what is refused, and what ends it ---
-
-REFUSED = {
-    "an unknown scene": (["nowhere"], "driven"),
-    "a key that is not there": (["undriven", "--set", "top.mass=1"], "top.mass_kg"),
-    "a setting without a value": (["undriven", "--set", "top.mass_kg"], "KEY=VALUE"),
-    "a value that is not allowed": (["undriven", "--set", "top.mass_kg=-1"], "top.mass_kg"),
-    "no duration": (["undriven", "--duration", "0"], "--duration"),
-    "time that runs back": (["undriven", "--duration", "-3"], "--duration"),
-    "no end": (["undriven", "--duration", "inf"], "--duration"),
-    "no number": (["undriven", "--tolerance", "nan"], "--tolerance"),
-    "more states than memory": (["undriven", "--rate", "1e9"], "--rate 6.7e+04"),
-    "a file where a folder should be": (["undriven", "--out", "file"], "--out"),
-}
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_makes_no_sense_is_refused_in_one_line(levilab, tmp_path, name):
-    words, says = REFUSED[name]
-    (tmp_path / "file").write_text("", encoding="utf-8")
-    refused = levilab("simulate", *words, check=1 if "--out" in words else 2)
-    assert refused.stdout == ""
-    (line,) = refused.stderr.splitlines()
-    assert says in line
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
-
-
-def test_a_number_that_is_none_is_wrong_usage(levilab):
-    levilab("simulate", "undriven", "--duration", "long", check=2)
-    levilab("simulate", check=2)
 
 
 def test_interrupted_it_says_so_in_one_line_and_leaves_nothing(levilab, tmp_path, monkeypatch):

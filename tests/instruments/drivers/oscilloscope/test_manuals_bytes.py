@@ -213,13 +213,6 @@ def test_the_memory_of_the_rigol_is_shared_between_its_channels(points, channels
     assert scope._depth(points, channels) == depth
 
 
-def test_a_refused_step_of_the_preparation_ends_it_with_the_scopes_words():
-    lines = [("*IDN?", RIGOL), ("*CLS", None), (":RUN", None), ("SYST:ERR?", '-221,"Settings conflict"'), NO_ERROR]
-    _, scope = talk(RigolDS1000Z, *lines)
-    with pytest.raises(CommandRefused, match="Settings conflict"):
-        scope.prepare(**PULSES)
-
-
 @pytest.mark.parametrize(
     ("driver", "model"),
     [

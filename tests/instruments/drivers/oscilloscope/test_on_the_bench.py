@@ -1,12 +1,10 @@
 """The drivers of the oscilloscopes at the virtual ones."""
 
 import contextlib
-import json
 import tracemalloc
 
 import numpy as np
 import pytest
-import pyvisa
 
 from instruments.clock import VirtualClock
 from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired
@@ -81,19 +79,6 @@ def test_with_sweep_auto_the_driver_shows_what_there_is(driver, make):
     transport.close()
 
 
-@BOTH
-def test_the_settings_have_their_units(driver, make):
-    _, transport, clock = bench(make, pulses)
-    scope = driver(transport, clock=clock)
-    scope.prepare(**PULSES, trigger_level_v=0.65)
-    settings = scope.settings()
-    assert settings["trigger_level_v"] == pytest.approx(0.65)
-    assert settings["channel1_scale_v"] == pytest.approx(0.2)
-    assert settings["channel1_probe_factor"] == 1.0
-    json.dumps(settings)
-    transport.close()
-
-
 def test_24_million_points_stream_through_the_memory_of_a_few_pieces():
     _, transport, clock = bench(VirtualDS1000Z, cheap)
     scope = RigolDS1000Z(transport, clock=clock)
@@ -109,17 +94,6 @@ def test_24_million_points_stream_through_the_memory_of_a_few_pieces():
     # of a piece: volts, scaled volts, their codes in floating point, and the bytes on their way
     assert peak < 60 * PIECE
     transport.close()
-
-
-def test_pyvisa_reads_the_block_as_of_any_scope():
-    device, transport, _ = bench(VirtualDSOX1000, constant(0.2))
-    transport.close()
-    manager = pyvisa.ResourceManager(library_for(VirtualBench({"GPIB0::7::INSTR": device})))
-    scope = manager.open_resource("GPIB0::7::INSTR")
-    scope.write(":WAV:FORM WORD;UNS 1;POIN 1000")
-    codes = scope.query_binary_values(":WAV:DATA?", datatype="H", is_big_endian=True, container=np.array)
-    assert codes.size == 1000
-    scope.close()
 
 
 # --- a scope that is changed under way ---
@@ -214,13 +188,6 @@ def test_a_key_of_the_front_panel_raises_instead_of_giving_a_trace(driver, make,
             read(scope, "trace")
         assert len(lost.value.changed) == 1
         assert name is None or name in lost.value.changed
-
-
-@BOTH
-def test_what_is_rounded_is_not_changed(driver, make):
-    with prepared(driver, make) as (device, scope, _):
-        device.settings |= {"chan1_offset": 1.005 * device.settings["chan1_offset"], "trigger_level": 0.66}
-        assert read(scope, "trace").size >= 10_000
 
 
 @BOTH
