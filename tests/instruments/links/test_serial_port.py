@@ -6,7 +6,6 @@ import os
 import socketserver
 import sys
 import threading
-import time
 
 import pytest
 import pyvisa
@@ -180,33 +179,6 @@ def test_clearing_drops_what_is_under_way(slow, clock):
     assert slow.query("LIST?") == "1,2,1,1,1"
 
 
-def test_the_log_gets_the_bytes_of_both_directions(bench):
-    traffic = []
-    with contextlib.closing(SerialTransport(SLOW, log=lambda *line: traffic.append(line))) as transport:
-        transport.write("*CLS")
-        transport.query("*IDN?")
-        transport.query_block("DATA?")
-    assert traffic == [
-        (SLOW, ">", b"*CLS\n"),
-        (SLOW, ">", b"*IDN?\n"),
-        (SLOW, "<", IDENTITY.encode() + b"\n"),
-        (SLOW, ">", b"DATA?\n"),
-        (SLOW, "<", ANY_BYTES[:64] + b"... (1024 bytes)\n"),
-    ]
-
-
-def test_the_instrument_is_left_alone_between_two_exchanges(bench, monkeypatch):
-    now, slept = [100.0], []
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(time, "sleep", slept.append)
-    with contextlib.closing(SerialTransport(SLOW, pause=0.03)) as transport:
-        transport.query("*IDN?")
-        transport.query("*IDN?")
-        now[0] += 0.02
-        transport.query("*IDN?")
-    assert slept == [pytest.approx(0.03), pytest.approx(0.01)]  # and before the first one not at all
-
-
 # --- faults ---
 
 
@@ -237,8 +209,9 @@ def test_wrong_settings_raise_each_time_with_a_hint(bench, wrong, error):
 
 
 def test_a_parity_that_does_not_exist_is_refused():
-    with pytest.raises(OutOfRange, match="parity = Odd is refused, allowed is one of none, odd"):
+    with pytest.raises(OutOfRange) as refused:
         SerialTransport(METER, parity="Odd")
+    assert (refused.value.name, refused.value.value) == ("parity", "Odd")
 
 
 @pytest.mark.parametrize("wrong", [{"data_bits": 9}, {"stop_bits": 3}, {"baud_rate": -1}])
@@ -524,7 +497,7 @@ def test_a_line_behind_a_socket_that_is_lost_and_found_again():
     with serving() as address, contextlib.closing(SerialTransport(address, timeout=AT_MOST)) as transport:
         transport.lock()  # sockets have none
         assert transport.query("TEXT?") == "+1.0"
-        with pytest.raises(NotConnected, match="no link at 'BYE'"):
+        with pytest.raises(NotConnected):
             transport.query("BYE")
         transport.reopen()
         assert transport.query("TEXT?") == "+1.0"

@@ -171,16 +171,13 @@ def test_signs_that_no_file_can_hold_are_no_part_of_a_name(tmp_path):
     assert read_bench(path, Configuration).counter is None
 
 
-def test_a_wrong_key_is_reported_before_the_one_that_it_was_to_be(tmp_path):
-    path = tmp_path / "bench.toml"
-    path.write_text('[counter]\nmodell = "53230A"\naddress = "A::1"\n', encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"counter\.modell is no key known here: did you mean model\?"):
-        read_bench(path, Configuration)
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [
+        (
+            "[counter]\nmodell = '53230A'\naddress = 'A::1'\n",
+            "counter.modell is no key known here: did you mean model?",
+        ),
         ("[countr]\nmodel = 'x'\n", "countr is no key known here: did you mean counter?"),
         ("[spin]\nintervall_s = 3\n", "spin.intervall_s is no key known here: did you mean interval_s?"),
         ("[limits]\nxyz = 3\n", "limits.xyz is no key known here: known are drive_amplitude_vpp, "),

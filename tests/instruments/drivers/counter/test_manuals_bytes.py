@@ -54,8 +54,9 @@ def test_the_other_input_is_set_up_with_its_own_suffix():
 
 @pytest.mark.parametrize("driver", [Keysight53230A, PendulumCNT91])
 def test_an_input_that_counts_no_slow_pulses_is_refused(driver):
-    with conversation(driver) as counter, pytest.raises(OutOfRange, match="channel = 3 is refused"):
+    with conversation(driver) as counter, pytest.raises(OutOfRange) as refused:
         counter.prepare(gate_s=1.0, trigger_level_v=0.6, channel=3)
+    assert (refused.value.name, refused.value.value) == ("channel", 3)
 
 
 @pytest.mark.parametrize(("gate", "patience"), [(0.1, 1.2), (1.0, 3.0), (10.0, 21.0)])
@@ -76,9 +77,10 @@ def test_the_longest_gate_meets_the_longest_time_out():
 def test_a_gate_that_the_counter_does_not_have_is_refused_by_name():
     with (
         conversation(Keysight53230A, *accepted("CONF:FREQ (@1)", "SENS:FREQ:GATE:SOUR TIME")) as counter,
-        pytest.raises(OutOfRange, match=r"gate = 0\.0 is refused"),
+        pytest.raises(OutOfRange) as refused,
     ):
         counter.prepare(gate_s=0.0, trigger_level_v=0.6)
+    assert (refused.value.name, refused.value.value) == ("gate", 0.0)
 
 
 def test_a_reading_is_a_number_in_hertz():
@@ -158,8 +160,9 @@ def test_a_series_of_the_wrong_length_is_none():
         ("*CLS", None),
         *accepted("ABOR", "SAMP:COUN 1"),
     ]
-    with conversation(Keysight53230A, *lines) as counter, pytest.raises(BadAnswer, match="3 numbers, not 2"):
+    with conversation(Keysight53230A, *lines) as counter, pytest.raises(BadAnswer) as bad:
         counter.readings(3)
+    assert bad.value.answer == "+2.5E+01,+2.5E+01"
 
 
 @pytest.mark.parametrize("driver", [Keysight53230A, PendulumCNT91])
@@ -386,8 +389,9 @@ def test_a_series_whose_end_could_not_be_sent_is_ended_before_the_next_reading()
     reading = [NO_ERROR, ("READ?", "+2.50000000000000E+001")]
     lines = [*accepted("SAMP:COUN 3", "INIT"), *dead, *back, *reading, *reading]
     with conversation(Keysight53230A, *lines) as counter:
-        with pytest.raises(NoAnswer, match="DATA:REM"):
+        with pytest.raises(NoAnswer) as silence:
             counter.readings(3)
+        assert silence.value.question == "DATA:REM? 3,WAIT"
         assert [counter.frequency(), counter.frequency()] == [25.0, 25.0]
 
 

@@ -77,14 +77,16 @@ def test_a_silent_generator_is_not_taken_for_one_that_is_off():
 def test_a_signal_beyond_the_terminals_is_refused_before_anything_is_sent():
     with conversation(Keysight33500B) as generator:
         for amplitude, offset in ((20.5, 0.0), (20.0, -0.1), (12.0, 4.1), (float("nan"), 0.0), (1.0, float("nan"))):
-            with pytest.raises(OutOfRange, match="up to 10 V"):
+            with pytest.raises(OutOfRange) as refused:
                 generator.prepare(waveform="SIN", frequency_hz=30.5, amplitude_vpp=amplitude, offset_v=offset)
+            assert "10 V" in refused.value.allowed
 
 
 def test_an_amplitude_that_is_too_small_stops_the_preparation_before_it_is_sent():
     lines = accepted("*RST", "OUTP1:LOAD INF", "VOLT:UNIT VPP", "FUNC SIN", "FREQ 30.5", "VOLT:OFFS 0.0")
-    with conversation(Keysight33500B, *lines) as generator, pytest.raises(OutOfRange, match=r"0\.002 to 20 Vpp"):
+    with conversation(Keysight33500B, *lines) as generator, pytest.raises(OutOfRange) as refused:
         generator.prepare(waveform="SIN", frequency_hz=30.5, amplitude_vpp=0.001)
+    assert (refused.value.name, refused.value.value) == ("amplitude", 0.001)
 
 
 LIMITS = Limits(drive_amplitude_vpp=4.0, drive_offset_v=1.0, drive_frequency_hz=50.0, drive_lowest_hz=5.0)
@@ -109,8 +111,9 @@ FORBIDDEN = [
 def test_no_setting_gets_around_the_limits_of_the_bench(driver, name, value, limit):
     with conversation(driver) as generator:  # nothing is sent
         generator.limits = LIMITS
-        with pytest.raises(OutOfRange, match=rf"limits\.{limit} in the bench file"):
+        with pytest.raises(OutOfRange) as refused:
             setattr(generator, name, value)
+        assert f"limits.{limit}" in refused.value.allowed
 
 
 @pytest.mark.parametrize("driver", [Keysight33500B, Agilent33220A])
@@ -216,7 +219,7 @@ def test_both_families_put_the_same_signal_on_the_coil(driver, device, waveform)
     assert (signal.frequency, signal.amplitude, signal.offset) == (30.5, 6.0, 0.0)
     generator.frequency, generator.offset = 31.0, 1.5
     assert (generator.frequency, generator.offset) == (31.0, 1.5)
-    with pytest.raises(OutOfRange, match="up to 10 V"):
+    with pytest.raises(OutOfRange):
         generator.offset = 8.0  # 6 V are there already
     assert virtual.signal().offset == 1.5  # refused, not clipped
     generator.off()

@@ -60,8 +60,9 @@ def test_the_driver_says_when_the_scope_never_triggers(driver, make):
     scope = driver(transport, clock=clock)
     scope.prepare(**PULSES, trigger_level_v=1.25)
     before = clock.now()
-    with pytest.raises(NeverTriggered, match=r"1\.25 V on CHAN1"):
+    with pytest.raises(NeverTriggered) as never:
         scope.acquire(timeout_s=5.0)
+    assert (never.value.level_v, never.value.source) == (pytest.approx(1.25, abs=0.01), "CHAN1")
     assert clock.now() - before == pytest.approx(5.1, abs=0.3)
     assert not device.running()
     scope.prepare(**PULSES, trigger_level_v=0.65)  # and goes on
@@ -124,7 +125,7 @@ READING = pytest.mark.parametrize("how", ["trace", "blocks"])
 def test_a_reset_after_the_preparation_gives_no_trace(driver, make, how):
     with prepared(driver, make) as (device, scope, _):
         device.reset()
-        with pytest.raises(SettingsLost, match=r"probe_factor = 10\.0 instead of 1\.0") as lost:
+        with pytest.raises(SettingsLost, match="probe_factor") as lost:
             read(scope, how)
         assert {"channel1_scale_v", "channel1_offset_v", "trigger_level_v"} <= set(lost.value.changed)
         with pytest.raises(NothingAcquired):
