@@ -72,7 +72,7 @@ def test_what_was_found_becomes_a_bench_that_can_be_read_and_checked(tmp_path):
     ]
 
 
-def test_kinds_that_were_not_found_stand_there_as_comments_and_others_are_told(tmp_path):
+def test_kinds_that_were_not_found_stand_there_as_comments_and_others_are_named(tmp_path):
     path = tmp_path / "bench.toml"
     odd = 'maker,"quoted" <tag> \\ ,1,2'
     found = [
@@ -191,7 +191,7 @@ def test_a_key_that_is_nearly_right_is_reported_with_the_right_one(tmp_path, tex
     assert says in str(error.value)
 
 
-def test_no_library_and_no_bench_are_told(levilab, tmp_path):
+def test_a_missing_library_and_bench_are_reported(levilab, tmp_path):
     assert 'take visa_library = "@py"' in levilab("bench", "init", "--library", "@nolibrary", check=3).stderr
     assert "no such file" in levilab("bench", "check", check=1).stderr
     (tmp_path / "empty.toml").write_text("", encoding="utf-8")

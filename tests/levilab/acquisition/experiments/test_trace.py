@@ -132,7 +132,7 @@ def test_a_resumed_run_keeps_its_records_and_counts_on(tmp_path):
     ],
     ids=["level", "dark", "elsewhere"],
 )
-def test_without_a_trigger_the_level_and_the_signal_are_told(tmp_path, settings, said):
+def test_without_a_trigger_the_error_has_the_level_and_the_signal(tmp_path, settings, said):
     with pytest.raises(ExperimentFailed, match=said):
         acquire(mock_trace(tmp_path, settings + "\ndrive_frequency_hz = 30.0", seed=1), Silent())
     [folder] = (tmp_path / "runs").iterdir()
@@ -155,7 +155,7 @@ def test_a_channel_that_shows_nothing_or_too_much_is_reported(tmp_path):
     assert "channel 4 (channel 4) shows nothing" in texts[1]
 
 
-def test_a_record_without_a_single_sample_is_kept_and_told(tmp_path, monkeypatch):
+def test_a_record_without_a_single_sample_is_kept_and_reported(tmp_path, monkeypatch):
     whole = RigolDS1000Z.trace
 
     def hollow(scope, channel, arrived=None):

@@ -144,7 +144,7 @@ def test_the_step_comes_from_the_header_where_times_lost_digits(write):
     assert record.warnings == ()
 
 
-def test_times_in_microseconds_below_a_header_in_seconds_are_told(write):
+def test_times_in_microseconds_below_a_header_in_seconds_are_warned_of(write):
     record = waveform(write(siglent("2e-6", 2.0, unit="us")))
     assert record.step == 2e-6
     assert "are taken to be in units of 1e-06 s" in record.warnings[0]
@@ -187,7 +187,7 @@ def test_the_way_a_file_is_written_does_not_matter(content, write):
     assert (record.step, record.signals[0].unit) == (pytest.approx(1e-3), "V")
 
 
-def test_a_torn_last_line_is_left_out_and_told(write):
+def test_a_torn_last_line_is_left_out_with_a_warning(write):
     record = waveform(write(PLAIN + "0,02"))
     assert record.count == 20
     assert "line 22: '0,02' was cut off" in record.warnings[0]
