@@ -72,7 +72,7 @@ def _in_world(request: AcquisitionRequest, scene: Scene, seed: int) -> Acquisiti
 
     settings: Any = settings_of(request.config, request.experiment)
     config = with_settings(request.config, request.experiment, settings.model_copy(update={"reading_u_hz": None}))
-    return replace(request, config=config, wiring=wiring, scene=scene.as_table())
+    return replace(request, config=config, wiring=wiring, scene=scene.as_table(), world=None)
 
 
 def _fall(found: Fitted, run: Run, scene: Scene) -> Pull:
