@@ -202,7 +202,7 @@ def analyze() -> typer.Typer:
 
 @app.command(cls=Later)
 def bench() -> typer.Typer:
-    """Return the instruments: what answers, and a virtual bench to practise."""
+    """Look at the instruments: which of them answer, and a virtual bench to practise on."""
     from levilab.cli.bench import bench_app
 
     return bench_app
@@ -210,7 +210,7 @@ def bench() -> typer.Typer:
 
 @app.command(cls=Later, epilog="Example: levilab live --mock")
 def live() -> Callable[..., None]:
-    r"""Return the bench in a web browser: a run as it grows, a finished one, or with --mock a bench to play with.
+    r"""Show the bench in a web browser: a run as it grows, a finished one, or with --mock a bench to play with.
 
     A view only, in a process of its own: a run goes on when it is closed, and it can be opened again at any time.  No
     program of another machine reaches it.  Needs the extra live: pip install ".\[live]" in the clone.
