@@ -66,6 +66,8 @@ PERIODS = (
     "umlaufdauer", "drehperiode",
 )  # fmt: skip
 TURNS = ("turns", "rotations", "revolutions", "revs", "rev", "umdrehungen", "umdr.", "umdr", "tours")
+#: A symbol after its name says nothing more, as in Zeit t, Drehzahl n.
+SYMBOLS = ("t", "f", "n", "nu", "ν", "omega", "ω", "z", "h", "b")
 # Titles that begin so hold something from which a frequency is yet to be worked out.
 _INVERSE, _OVER_TIME = (
     "say its unit in the title, as in period [ms]",
@@ -178,7 +180,16 @@ def is_unit(text: str) -> bool:
 
 
 def _plain_name(text: str) -> str:
-    return re.sub(r"[\s\-]+", "_", unicodedata.normalize("NFKC", text).strip().casefold())
+    """Return a name as the tables spell it; of a name and its symbol, "Zeit t", the one that says more."""
+    name = re.sub(r"[\s\-]+", "_", unicodedata.normalize("NFKC", text).strip().casefold())
+    word, _, symbol = name.rpartition("_")
+    if name in NAMES or symbol not in SYMBOLS:
+        return name
+    if word in PERIODS and symbol == "t":
+        return word
+    if NAMES.get(word) != NAMES[symbol]:
+        return name
+    return symbol if symbol in ANGULAR else word
 
 
 _TURNS_IN = re.compile(

@@ -97,7 +97,7 @@ TABLES = {
 
 ANGULAR = (
     "ω in 1/s", "omega [1/s]", "ω in s^-1", "ω [s⁻¹]", "ω / s⁻¹", "Winkelgeschwindigkeit in 1/s",
-    "angular velocity (1/s)", "Kreisfrequenz / (1/s)", "ω\ns;1/s",
+    "angular velocity (1/s)", "Kreisfrequenz / (1/s)", "Winkelgeschwindigkeit ω in 1/s", "Frequenz ω / s⁻¹", "ω\ns;1/s",
 )  # fmt: skip
 
 
@@ -113,9 +113,10 @@ def test_an_angular_frequency_in_1_per_s_is_in_rad_per_s(title, table_file):
     assert any("rad/s" in warning for warning in table.warnings)
 
 
-@pytest.mark.parametrize("title", ["f in 1/s", "Drehzahl [1/s]", "ω in Hz", "n / s⁻¹"])
+@pytest.mark.parametrize("title", ["f in 1/s", "Drehzahl [1/s]", "Drehzahl n / s^-1", "Frequenz f", "ω in Hz"])
 def test_turns_in_1_per_s_stay_turns(title, table_file):
-    table = read_table(table_file(f"t;{title}\n0;61.5\n0.5;61.25\n1;61\n"))
+    table = read_table(table_file(f"Zeit t in s;{title}\n0;61.5\n0.5;61.25\n1;61\n"))
+    np.testing.assert_array_equal(table.column(T), PLAIN[T])
     np.testing.assert_array_equal(table.column(F), PLAIN[F])
     assert not table.warnings
 
@@ -362,6 +363,7 @@ def test_what_is_nearly_a_reading_is_reported_with_what_to_do(text, columns, say
     [
         ("T [ms]", (25.0, 20.0, 0.0, 40.0)),
         ("Periodendauer in ms", (25.0, 20.0, 0.0, 40.0)),
+        ("Periodendauer T in ms", (25.0, 20.0, 0.0, 40.0)),
         ("period_ms", (25.0, 20.0, math.nan, 40.0)),
         ("Periode / s", (0.025, 0.02, math.nan, 0.04)),
         ("turns in 10 s", (400, 500, math.nan, 250)),
