@@ -15,7 +15,7 @@ from levilab.acquisition.driving import (
     FailedPoint,
     NotHeld,
     _hold,
-    _until,
+    _ramp_end,
     has_drifted,
     held_spin,
     sweep_drive,
@@ -69,8 +69,8 @@ def events(run, kind):
 @pytest.mark.parametrize(("speed", "says"), [(1.0, ", 40.00 Hz in 3:20 min"), (math.inf, "")])
 def test_a_ramp_that_a_person_waits_for_says_when_it_ends(speed, says):
     session = SimpleNamespace(bench=SimpleNamespace(clock=SimpleNamespace(speed=speed)))
-    assert _until(session, 40.0, 200.0) == says
-    assert _until(session, 40.0, 0.0) == ""
+    assert _ramp_end(session, 40.0, 200.0) == says
+    assert _ramp_end(session, 40.0, 0.0) == ""
 
 
 def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(tmp_path, monkeypatch):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from levilab.errors import DataError, UsageError
 from levilab.formats import dialect
-from levilab.formats.columns import Column, NoSuchColumn, NoTable, TableError, quoted, shorten
+from levilab.formats.columns import Column, NoSuchColumn, NoTable, TableError, quote_names, shorten
 from levilab.formats.dialect import DIALECTS, Dialect
 from levilab.formats.layout import Layout, sniff
 from levilab.formats.rows import FEW, _read_at_once, _read_lines
@@ -185,7 +185,9 @@ def test_a_column_of_true_and_false_is_refused_by_its_line(table_file):
 ])  # fmt: skip
 def test_the_error_of_a_table_of_words_names_the_known_titles(separator, header, row, table_file):
     path = table_file("\n".join(map(separator.join, [header, *[row] * 19])) + "\n")
-    with pytest.raises(NoSuchColumn, match=f'no title is known .* among {quoted(header)}: say `columns` = "t=NAME'):
+    with pytest.raises(
+        NoSuchColumn, match=f'no title is known .* among {quote_names(header)}: say `columns` = "t=NAME'
+    ):
         read_table(path)
     with pytest.raises(TableError, match="line 2: 'kalt' stands in column 'Kommentar'"):
         read_table(path, columns={"t": "Temperatur", "f": "Kommentar"})

@@ -60,7 +60,7 @@ def test_an_executor_that_gives_up_its_tasks_ends_the_work():
             future.cancel()
             return future
 
-    with pytest.raises(WorkersLost, match="the batch jobs gave up what they were to do"):
+    with pytest.raises(WorkersLost, match="the batch jobs gave up their tasks"):
         list(results_of(tasks.square, [1], Workers(GivesUp, name="batch jobs")))
 
 

@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from instruments.clock import VirtualClock
-from levilab.acquisition.experiments.field import FieldSettings, _mean, typed_height
+from levilab.acquisition.experiments.field import FieldSettings, _mean, parse_height
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
@@ -114,7 +114,7 @@ def test_a_height_that_is_typed_is_the_one_that_is_kept(tmp_path):
      ("9999", None), ("mm", None)],
 )  # fmt: skip
 def test_heights_as_people_type_them(typed, height):
-    assert typed_height(typed) == height
+    assert parse_height(typed) == height
 
 
 def test_a_field_beyond_the_range_ends_the_scan_in_a_sentence(tmp_path):

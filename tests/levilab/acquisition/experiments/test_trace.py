@@ -234,7 +234,7 @@ def test_what_was_cut_short_is_said_and_taken_anew(tmp_path):
     run = acquire(request_for("trace", AcquisitionOptions(resume=whole.folder, out=tmp_path)), Silent())
     cut = [event["text"] for event in run.events() if event["kind"] == "cut short"]
     assert cut[0].startswith("traces/000004.npy: the run was cut short before traces.jsonl said how to read it")
-    assert cut[1] == "record 2 was cut short after 1 of 2 channels; it is taken anew"
+    assert cut[1] == "record 2 was cut short after 1 of 2 channels; it is taken again"
     assert [one.number for one in run.traces()] == [1, 2, 3, 5, 6]
     assert run.count() == 2
 

@@ -263,7 +263,7 @@ def test_arrays_need_a_rate_unless_they_hold_pulse_times(tmp_path):
     np.save(path, np.arange(5.0))
     assert isinstance(read_record(path), PulseTimes)
     np.save(path, np.array([{}]), allow_pickle=True)
-    with pytest.raises(TableError, match="save it anew"):
+    with pytest.raises(TableError, match="save it again"):
         read_record(path)
     with pytest.raises(UsageError, match="rate"):
         read_record(path, rate=-1.0)
