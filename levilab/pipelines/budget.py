@@ -86,11 +86,9 @@ def direct_row(  # noqa: PLR0917 - the fields of a row
     note: str,
     remedy: str,
     kind: Literal["A", "B"] = "B",
-    *,
-    included: bool = True,
 ) -> Component:
     """Return a row whose size is known in the result's own unit alone [`unit`]; see `Component`."""
-    return Component(name, what, kind, part, unit, 1.0, included, note, remedy)
+    return Component(name, what, kind, part, unit, 1.0, note=note, remedy=remedy)
 
 
 def gate_of(source: Source[Any], experiment: str) -> float | None:

@@ -69,10 +69,10 @@ def _pulse_times(spin: SpinFrequency) -> Array:
     return np.asarray(times)
 
 
-def _compared(found: SpinFrequency, spin: SpinFrequency, shift: float = 0.0) -> Trial:
+def _compared(found: SpinFrequency, spin: SpinFrequency) -> Trial:
     """The pulls of what was found: the truth at its own reference time."""
     frequency, chirp, bend = _motion(spin)
-    at = found.reference_time - shift
+    at = found.reference_time
     return Trial(
         [
             pull("frequency", found.frequency, frequency + chirp * at + bend * at**2 / 2),
