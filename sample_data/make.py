@@ -37,7 +37,7 @@ from analysis.locked import slip_of
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.present.numbers import signed
-from levilab.present.progress import Mute
+from levilab.present.progress import Display
 from levilab.reproduce.synthetic import NOISE_HZ, READINGS, solve
 from levilab.simulator import preset
 from levilab.stability.published.printed import several
@@ -322,7 +322,7 @@ def precession_sweep() -> None:
         bench = Path(out) / "bench.toml"
         bench.write_text("[precession]\nrecord_s = 6.0\n", encoding="utf-8")
         options = AcquisitionOptions(mock=True, bench=bench, out=Path(out), seed=seed)
-        run = acquire(request_for("precession", options), Mute())
+        run = acquire(request_for("precession", options), Display())
         readings = run.readings().frame.round(6)
         write(
             folder,
@@ -366,7 +366,7 @@ def write_traces(name: str, scene: str | None, settings: str, note: str) -> None
         options = AcquisitionOptions(
             mock=True, bench=bench, out=Path(place), seed=1, scene=scene, note=f"SYNTHETIC, {note}"
         )
-        run = acquire(request_for("trace", options), Mute())
+        run = acquire(request_for("trace", options), Display())
         count = run.count()
         shutil.rmtree(HERE / name, ignore_errors=True)
         shutil.copytree(run.folder, HERE / name, ignore=shutil.ignore_patterns("datapackage.json", "run.lock"))
@@ -390,7 +390,7 @@ def write_traces(name: str, scene: str | None, settings: str, note: str) -> None
 def from_the_virtual_bench(experiment: str, folder: str, seed: int, note: str) -> None:
     """A run of the virtual bench, without what would differ from one making to the next."""
     with tempfile.TemporaryDirectory() as out:
-        run = acquire(request_for(experiment, AcquisitionOptions(mock=True, out=Path(out), seed=seed)), Mute())
+        run = acquire(request_for(experiment, AcquisitionOptions(mock=True, out=Path(out), seed=seed)), Display())
         header, *rows = (run.folder / "readings.csv").read_text(encoding="utf-8").splitlines()
     record = run.record
     write(
@@ -428,6 +428,7 @@ def main() -> None:
                 "note": f"run {number} of four; a stand-in for the thesis's run {number}",
                 "synthetic": True,
                 "synthetic_how": HOW.format(c1=c1, c2=c2, **how),
+                "world": "spin",
                 "published": {"c1_per_s": c1, "c2_per_rad": c2},
             },
         )

@@ -9,7 +9,7 @@ import contextlib
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from instruments.errors import InstrumentError
 from levilab.acquisition.onlooker import publishing
@@ -46,6 +46,7 @@ class AcquisitionRequest:
         wiring: makes the wiring of the bench, real or virtual.
         out: the folder in which the run folder is made.
         synthetic_how: if anything is simulated, how, in words.
+        world: of a virtual bench, if its top only spins.
         scene: of the full motion, as a table.
         seed: of what is drawn by chance on a virtual bench.
         note: kept with the run.
@@ -58,6 +59,7 @@ class AcquisitionRequest:
     wiring: Callable[[], Wiring]
     out: Path = Path("runs")
     synthetic_how: str | None = None
+    world: Literal["spin"] | None = None
     scene: dict[str, Any] | None = None
     seed: int | None = None
     note: str = ""
@@ -205,4 +207,5 @@ def _record(request: AcquisitionRequest) -> RunRecord:
         note=request.note,
         synthetic=request.synthetic_how is not None,
         synthetic_how=request.synthetic_how,
+        world=request.world,
     )

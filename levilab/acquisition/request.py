@@ -361,6 +361,7 @@ def _with_a_spinning_top(
         config=config,
         wiring=lambda: virtual_wiring(SpinWorld(scene, clock()), config.limits),
         synthetic_how=HOW.format(what=_world_in_words(scene, request.experiment)),
+        world="spin",
     )
 
 

@@ -133,7 +133,7 @@ def spin_down(columns: Mapping[str, Array], size: int, _: Mapping[str, Any] = Ma
     lines = [
         ", ".join(constants),
         f"as good: {', '.join(others)}" if others else "",
-        f"excluded: {', '.join(name for name, _ in found.verdict.excluded)}" if found.verdict.excluded else "",
+        f"excluded: {', '.join(found.verdict.excluded)}" if found.verdict.excluded else "",
     ]
     return Running(
         f"{found.best} law, the best so far   {LAWS[found.best].equation}",

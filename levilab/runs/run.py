@@ -69,6 +69,8 @@ class RunRecord(BaseModel):
     note: str = ""
     synthetic: bool = False
     synthetic_how: str | None = None
+    #: Of a virtual bench, if its top only spins.
+    world: Literal["spin"] | None = None
 
     def as_json(self) -> str:
         """Return the file's text."""

@@ -27,10 +27,10 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration
 from levilab.bench.config import InstrumentSettings
 from levilab.bench.wiring import Wiring
-from levilab.crosscheck.subjects.spindown import LAWS
 from levilab.files import CannotWrite
 from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
+from levilab.simulator.laws import LAWS
 from levilab.simulator.spin import DECAYS
 from levilab.world.bench import VIRTUAL, virtual_bus
 from levilab.world.spin_world import Phase, SpinScene, SpinWorld, random_scene
@@ -448,7 +448,7 @@ def test_a_top_falls_within_the_time_left_under_every_law_of_drag(law: str) -> N
     held = []
     for seed in range(20):
         random = np.random.default_rng(seed)
-        constants = tuple(c * random.uniform(0.8, 1.2) for c in LAWS[law][0])
+        constants = tuple(c * random.uniform(0.8, 1.2) for c in LAWS[law].usual)
         fell = float(DECAYS[law].elapsed(80 * np.pi, 2 * np.pi * random.uniform(21.4, 24.9), *constants))
         times = np.arange(0.5, fell, 10.0)
         rows = readings_of(law, constants, times, 0.03 * random.standard_normal(times.size))
@@ -463,7 +463,7 @@ def test_a_top_falls_within_the_time_left_under_every_law_of_drag(law: str) -> N
 @pytest.mark.parametrize(("law", "off"), [("stokes", 0.003), ("disc", 0.003), ("newton", 0.003), ("mixed", 0.02)])
 def test_the_time_left_of_exact_readings_is_that_of_their_law(law: str, off: float) -> None:
     """From 40 to about 32 Hz: the power is interpolated, and that of the mixed law falls with the spin."""
-    constants = LAWS[law][0]
+    constants = LAWS[law].usual
     first, middle, last = (
         {**row, "spin_frequency_u_hz": 1e-6} for row in readings_of(law, constants, np.array([0.0, 30.0, 60.0]))
     )

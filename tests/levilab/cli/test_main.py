@@ -117,7 +117,7 @@ def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> N
 @pytest.mark.usefixtures("undrawn_figures")
 def test_options_may_stand_before_the_name_of_an_analysis(levilab: Command, sample_data: Path) -> None:
     named = levilab("analyze", "spindown", sample_data, "--no-save").stdout
-    for first in (["--out", "spindown"], ["--out=there"], ["--no-save"], ["--uncertainty", "covariance"]):
+    for first in (["--out", "spindown"], ["--out=there"], ["--no-save"], ["--tilt", "auto"]):
         assert levilab("analyze", *first, "spindown", sample_data, "--no-save").stdout == named
     assert "Did you mean 'spindown'" in levilab("analyze", "--out", "there", "spindwon", check=2).stderr
     assert "spindown: there is no such file" in levilab("analyze", "--no-save", "--", "spindown", check=1).stderr
@@ -159,13 +159,13 @@ def test_notes_name_options_on_the_terminal_and_quantities_where_stored(
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab: Command, tmp_path: Path) -> None:
-    for k, (name, *options) in enumerate((("a.csv",), ("b.csv", "--uncertainty", "profile"))):
+    for k, (name, *options) in enumerate((("a.csv",), ("b.csv", "--tilt", "none"))):
         levilab("analyze", "spindown", spin_down_csv(tmp_path / name, seed=k), *options)
     names = {path.name for path in tmp_path.iterdir()}
     assert {f"{file}.csv.{kind}" for file in "ab" for kind in ("result.json", "spindown.png")} <= names
     levilab("report", "b.csv", "--no-crosscheck")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "68 % interval (profile)" in page
+    assert "is taken to turn upright" in page
     assert "as levilab analyze found it: b.csv.result.json" in page
     levilab("report", "b.csv", "--keep-outliers", "--no-crosscheck")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -177,7 +177,7 @@ def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levila
     done = levilab("analyze", "spindown", sample_data, "--no-save")
     assert "skipped" not in done.stdout
     assert "skipped 3 limit runs\n" in done.stderr
-    assert "time [s]" in done.stdout
+    assert "lasts [s]" in done.stdout
 
 
 def test_a_result_that_is_damaged_ends_the_report_with_one_line(levilab: Command, tmp_path: Path) -> None:
@@ -194,7 +194,7 @@ def test_columns_of_another_name_are_mapped(levilab: Command, tmp_path: Path) ->
     refused = levilab("analyze", "spindown", path, check=1)
     assert "Kanal 2" in refused.stderr
     assert "--columns" in refused.stderr
-    mapped = levilab("analyze", "spindown", path, "--json", "--columns", "t=Uhr,f=Kanal 2")
+    mapped = levilab("analyze", "spindown", path, "--json", "--columns", "t=Uhr,f=Kanal 2", "--tilt", "none")
     assert json.loads(mapped.stdout)["best_model"] == "disc"
 
 
@@ -318,11 +318,6 @@ def test_a_drive_beyond_the_limits_is_refused_before_anything_is_touched(levilab
     refused = levilab("acquire", "spin", "--mock", "--bench", "mine.toml", check=1)
     assert "spin.drive_amplitude_vpp = 10 is more than this bench allows" in refused.stderr
     assert not (tmp_path / "runs").exists()
-
-
-def test_intervals_are_shown_when_asked_for(levilab: Command, tmp_path: Path) -> None:
-    path = spin_down_csv(tmp_path / "my.csv")
-    assert "68 %: " in levilab("analyze", "spindown", path, "--uncertainty", "profile", "--no-save").stdout
 
 
 @pytest.mark.usefixtures("undrawn_figures")
