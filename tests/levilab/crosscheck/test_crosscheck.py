@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from analysis.uncertainty import Estimate
 from levilab.crosscheck.catalogue import SUBJECTS
 from levilab.crosscheck.figure import crosscheck_figure
 from levilab.crosscheck.study import Verdict, study_world
@@ -96,7 +97,7 @@ def test_the_table_and_the_notes_show_what_failed():
 
 def test_a_value_without_an_uncertainty_is_no_pull():
     with pytest.raises(TrialFailed, match="c32: the analysis gives no value with an uncertainty"):
-        pull_of("c32", {"value": 1.0, "u": None}, 1.0)
+        pull_of("c32", Estimate(1.0, None, "1/s"), 1.0)
 
 
 def test_ctrl_c_in_a_trial_ends_the_cross_check():
