@@ -93,9 +93,8 @@ def direct_row(  # noqa: PLR0917 - the fields of a row
 
 def gate_of(source: Source[Any], experiment: str) -> float | None:
     """Return the counter's gate [s], where a run says it."""
-    settings = source.run.record.configuration.get(experiment) if source.run else None
-    gate = settings.get("gate_s") if isinstance(settings, dict) else None
-    return float(gate) if isinstance(gate, int | float) and 0 < gate < _LONGEST_GATE_S else None
+    gate = setting_of(source, experiment, "gate_s")
+    return gate if gate is not None and 0 < gate < _LONGEST_GATE_S else None
 
 
 def setting_of(source: Source[Any], experiment: str, name: str) -> float | None:
