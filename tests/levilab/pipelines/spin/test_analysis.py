@@ -30,6 +30,7 @@ from support.detector import C32, RELEASE_HZ, coasting_turns, coasting_wav, puls
 from support.figures import faults
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from pathlib import Path
 
 
@@ -112,19 +113,24 @@ def test_a_record_that_is_too_short_is_no_spin_down(sample_data: Path) -> None:
         analyze_spindowns([sample_data / "scope-files" / "recording.wav"], SpinDownOptions())
 
 
-@pytest.fixture
-def traced(tmp_path: Path) -> Path:
-    """A run with three records of the light at 30, 29 and 28 Hz."""
+def run_of(runs: Path, records: Iterable[Trace]) -> Path:
+    """A run with records of the light, 10 s apart."""
     channels = [{"name": "time_s", "unit": "s", "source": "a test"}]
     record = RunRecord(experiment="trace", status="running", started_utc=utc_now(), channels=channels)
-    with RunWriter.create(tmp_path / "runs", record, tell=lambda _: None) as writer:
-        for k in range(3):
-            t = -0.2 + np.arange(1600) / 4000
-            codes = np.round(pulses((30 - k) * t, seed=k) / 0.01).astype(np.uint8)
-            trace = Trace(codes, dt_s=2.5e-4, t0_s=-0.2, volts_per_code=0.01, offset_v=0.0, channel=1)
+    with RunWriter.create(runs, record, tell=lambda _: None) as writer:
+        for k, trace in enumerate(records):
             writer.trace(10.0 * k, trace, "light")
         writer.finish("finished")
     return writer.folder
+
+
+@pytest.fixture
+def traced(tmp_path: Path) -> Path:
+    """A run with three records of the light at 30, 29 and 28 Hz."""
+    t = -0.2 + np.arange(1600) / 4000
+    codes = (np.round(pulses((30 - k) * t, seed=k) / 0.01).astype(np.uint8) for k in range(3))
+    of_one: dict[str, Any] = {"dt_s": 2.5e-4, "t0_s": -0.2, "volts_per_code": 0.01, "offset_v": 0.0, "channel": 1}
+    return run_of(tmp_path / "runs", (Trace(one, **of_one) for one in codes))
 
 
 def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> None:
@@ -157,14 +163,9 @@ def test_a_run_that_was_killed_before_its_first_record_has_nothing_to_analyze(tr
 
 
 def test_records_of_a_run_that_are_left_out_are_counted_in_a_note(traced: Path) -> None:
-    channels = [{"name": "time_s", "unit": "s", "source": "a test"}]
-    record = RunRecord(experiment="trace", status="running", started_utc=utc_now(), channels=channels)
-    with RunWriter.create(traced.parent, record, tell=lambda _: None) as writer:
-        for k, stored in enumerate(Run.load(traced).traces()):
-            dark = np.full_like(stored.trace.codes, 10)
-            writer.trace(10.0 * k, stored.trace if k else replace(stored.trace, codes=dark), "light")
-        writer.finish("finished")
-    analysis = METHOD.analyze([writer.folder], SpinOptions())
+    first, *others = (stored.trace for stored in Run.load(traced).traces())
+    dark = replace(first, codes=np.full_like(first.codes, 10))
+    analysis = METHOD.analyze([run_of(traced.parent, [dark, *others])], SpinOptions())
     assert len(analysis.runs[0].series) == 2
     (note,) = [text for text in analysis.all_warnings if text.endswith("(no-pulses)")]
     assert "1 of 3 records are left out, the last of them for this: 0 pulses" in note
@@ -172,16 +173,10 @@ def test_records_of_a_run_that_are_left_out_are_counted_in_a_note(traced: Path) 
 
 def test_a_finding_in_some_records_of_a_run_names_them(traced: Path) -> None:
     """The table shows the record in the middle alone."""
-    channels = [{"name": "time_s", "unit": "s", "source": "a test"}]
-    record = RunRecord(experiment="trace", status="running", started_utc=utc_now(), channels=channels)
-    with RunWriter.create(traced.parent, record, tell=lambda _: None) as writer:
-        for k, stored in enumerate(Run.load(traced).traces()):
-            codes = stored.trace.codes.copy()
-            if k == 2:  # at 28 Hz, from -0.2 s on: its sixth turn
-                codes[int((0 - 0.5 / 28 + 0.2) * 4000) : int((0.5 / 28 + 0.2) * 4000)] = 10
-            writer.trace(10.0 * k, replace(stored.trace, codes=codes), "light")
-        writer.finish("finished")
-    analysis = METHOD.analyze([writer.folder], SpinOptions())
+    *others, last = (stored.trace for stored in Run.load(traced).traces())
+    codes = last.codes.copy()  # at 28 Hz, from -0.2 s on: its sixth turn
+    codes[int((0 - 0.5 / 28 + 0.2) * 4000) : int((0.5 / 28 + 0.2) * 4000)] = 10
+    analysis = METHOD.analyze([run_of(traced.parent, [*others, replace(last, codes=codes)])], SpinOptions())
     assert analysis.runs[0].spin.missing == 0
     assert [text for text in analysis.all_warnings if text.endswith("record 3: 1 turn has no pulse (missing)")]
 
