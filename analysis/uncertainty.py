@@ -1,10 +1,8 @@
-"""Standard uncertainties: from curvature, from resampled residuals, and what an estimate is.
+"""Standard uncertainties: from curvature, and what an estimate is.
 
-Source: JCGM 100:2008 (GUM) for the words; Bates & Watts, Nonlinear Regression Analysis (1988), §2; Davison & Hinkley,
-Bootstrap Methods and their Application (1997), §6.2.3 and §7.2.
+Source: JCGM 100:2008 (GUM) for the words; Bates & Watts, Nonlinear Regression Analysis (1988), §2.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,7 +45,7 @@ class Curvature:
 
 
 def curvature(gradient: Array) -> Curvature:
-    """Covariance for residuals of unit variance, and leverages, from slopes of shape (p, n).
+    """Return the covariance for residuals of unit variance, and leverages, from slopes of shape (p, n).
 
     By QR of the scaled slopes, never by their squares: a normal matrix loses half the digits.
     """
@@ -67,7 +65,7 @@ def curvature(gradient: Array) -> Curvature:
 
 
 def propagate(covariance: Array, slopes: Array) -> tuple[Array | None, Array]:
-    """Covariance of functions of parameters, and their standard uncertainties, to first order.
+    """Return the covariance of functions of parameters, and their standard uncertainties, to first order.
 
     Args:
         covariance: of the parameters, shape (p, p).
@@ -85,27 +83,3 @@ def propagate(covariance: Array, slopes: Array) -> tuple[Array | None, Array]:
         full = unit * np.outer(scale, scale)
         u = scale * np.sqrt(np.maximum(np.diagonal(unit), 0.0))
     return (full if np.isfinite(full).all() else None), np.where(finite, u, np.nan)
-
-
-def bootstrap(
-    refit: Callable[[Array], Array], residuals: Array, leverage: Array, *, samples: int, seed: int
-) -> list[tuple[float, float] | None]:
-    """Percentile intervals of 68.27 % from a fit repeated with its own residuals, drawn anew.
-
-    A residual is smaller than the error it stems from, by √(1 − leverage): that is put right first, and the mean
-    taken off.
-
-    Args:
-        refit: added errors, shape (n,), → parameters, shape (p,).
-        residuals: of equal variance, shape (n,).
-        leverage: shape (n,).
-        samples: how often.
-        seed: of the random numbers.
-    """
-    errors = residuals / np.sqrt(np.maximum(1 - leverage, 1e-12))
-    errors -= errors.mean()
-    random = np.random.default_rng(seed)
-    fits = np.array([refit(random.choice(errors, len(errors))) for _ in range(samples)])
-    with np.errstate(invalid="ignore"):  # a constant that overflows in some samples has no interval
-        low, high = np.percentile(fits, [15.865525, 84.134475], axis=0)
-    return [(float(a), float(b)) if np.isfinite([a, b]).all() else None for a, b in zip(low, high, strict=True)]

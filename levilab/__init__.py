@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from levilab.bench.person import Task
     from levilab.notebook.motion import SimulatedMotion
     from levilab.notebook.result import AnalysisResult
-    from levilab.pipelines.options import Method, Tilt, Uncertainty
+    from levilab.pipelines.options import Method, Tilt
     from levilab.runs.run import Run
     from levilab.simulator.scene import Scene
 
@@ -121,9 +121,6 @@ def analyze(
     channel: str | None = None,
     rate: float | None = None,
     reading_u: float | None = None,
-    uncertainty: Uncertainty = "covariance",
-    bootstrap_samples: int = 1000,
-    seed: int = 0,
     keep_outliers: bool = False,
     tilt: Tilt = "auto",
     method: Method = "auto",
@@ -146,15 +143,12 @@ def analyze(
         rate: samples per second [Hz], of files that do not say it (spindown, spin).
         reading_u: standard uncertainty of every reading [Hz], in the place of what the data say (spindown, limit,
             precession).
-        uncertainty: profile and bootstrap add 68 % intervals, and take longer (spindown).
-        bootstrap_samples: how often the bootstrap draws (spindown).
-        seed: of the bootstrap (spindown).
         keep_outliers: fit readings that look like miscounts, too (spindown, precession).
-        tilt: whether counts hold the tilt of the top's moment: "auto" where they demand it, and u has what noise may
-            hide of it; "none" for a top that only spins (spindown).
+        tilt: whether counts hold the tilt of the top's moment: "auto" as "fitted", but for a mock run whose top only
+            spins; "none" for a top that only spins (spindown).
         method: how pulses are found: edges is the fastest, likelihood for weak ones (spin).
         orthogonal: let the uncertainty of the drive's frequency count, too (precession).
-        device: file that describes base and top, as sample_data/device.toml (field).
+        device: file that describes base and top, as sample_data/device.toml (spindown, field).
         height_m: where the top was seen to float [m]; its moment follows, if its mass is known (field).
         height_u_m: standard uncertainty of it [m]; by default that of the scan's heights (field).
         free_radii: let the scan move the radii, within what the calliper says (field).

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 #: The libraries that compute or speak to instruments.
-LIBRARIES = ("levilab", "numpy", "numba", "scipy", "pandas", "lmfit", "pyvisa", "pyvisa-py")
+LIBRARIES = ("levilab", "numpy", "numba", "scipy", "pandas", "pyvisa", "pyvisa-py")
 
 
 #: What uv writes into the environment of an installed tool, and the extras that README installs: uv installs the tool

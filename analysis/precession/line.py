@@ -145,7 +145,7 @@ def fit_line(x: Array, y: Array, u: Array | None = None) -> Line:
 
     >>> line = fit_line(np.array([26.0, 30.0, 34.0]), np.array([26.01, 30.0, 33.99]), np.full(3, 0.01))
     >>> round(line.slope, 4), round(line.intercept, 4), round(line.u_slope, 5)
-    (0.9975, 0.075, 0.00177)
+    (0.9975, 0.075, 0.00167)
     """
     _check(x)
     weight = np.ones_like(x) if u is None else u**-2.0

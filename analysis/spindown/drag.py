@@ -175,7 +175,9 @@ class DragLaw:
         >>> LAWS["mixed"].contains(LAWS["disc"]), LAWS["power"].contains(LAWS["mixed"])
         (False, False)
         """
-        return set(other.orders) < set(self.orders) if self.orders else other.exponent is not None
+        if not self.orders:
+            return other.exponent is not None
+        return bool(other.orders) and set(other.orders) < set(self.orders)
 
     def natural(self, q: Array, reference_hz: float, duration: float) -> tuple[Array, Array]:
         """Start frequency [Hz] and constants for dimensionless parameters q, and their slopes with q.

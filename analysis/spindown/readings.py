@@ -1,6 +1,6 @@
 """Readings of a spin-down, checked, and in the dimensionless numbers that fits work with."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,6 +45,31 @@ class Readings:
     def sigma_known(self) -> bool:
         """Whether the uncertainties were given."""
         return self.u is not None
+
+    def means(self, most: int) -> "Readings":
+        """Return at most so many means over neighbours, each with its u; the readings themselves where they are fewer.
+
+        Neighbours count as independent here: what they are not shows in the scatter of the means.
+        """
+        size = -(-len(self) // most)
+        if size == 1:
+            return self
+        starts = np.arange(0, len(self), size)
+        counts = np.diff(np.append(starts, len(self)))
+
+        def mean(values: Array) -> Array:
+            return np.asarray(np.add.reduceat(values, starts) / counts)
+
+        weight = np.broadcast_to(self.weight, self.x.shape)
+        return replace(
+            self,
+            time=mean(self.time),
+            frequency=mean(self.frequency),
+            u=None if self.u is None else np.sqrt(mean(self.u**2) / counts),
+            tau=mean(self.tau),
+            x=mean(self.x),
+            weight=np.sqrt(counts / mean(weight**-2.0)),
+        )
 
     def without(self, left_out: NDArray[np.intp]) -> "Readings":
         """The same readings, some left out; start and units stay."""

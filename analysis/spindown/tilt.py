@@ -31,87 +31,90 @@ from analysis.spindown.drag import DragLaw
 
 Array = NDArray[np.float64]
 
-# Of the thesis's top, and of Simon's three to 0.1: a tenth of κ changes C by 0.05 %.
-KAPPA = 0.4
-# At a height in the middle of the stable range (computed for the thesis's base at 7.4 cm); it is 2.5 at its upper end.
-BETA = 3.3
-# What of the change that the tilt makes in a constant is not known, as κ and β are of another top, and since the top's
-# other motions count, too.  With a tenth, pulls of C of simulated tops scatter by 0.7, with this by 0.8 to 0.9.
-UNKNOWN_PART = 0.05
-# The same of δ itself, which stands and falls with the height that β is for: of 40 other tops 85 % had it within 2 u
-# without this part, 95 % have it with it.
-UNKNOWN_TILT = 0.15
-# The resonance lies below the last reading, x there being 1 + exp(a).  Where a tilt is seen at all, a is so much: 32
-# simulated tops fell at −1.1 ± 0.4.
-LAST_GAP, LAST_GAP_U = -1.1, 0.5
+PARAMETERS = ("moment_tilt", "resonance", "wobble")
+UNITS = ("rad", "Hz", "Hz")
+MORE = len(PARAMETERS)
+#: The same, and κ and β: what the model has beside the law's own parameters.
+UNCERTAIN = MORE + 2
+
+#: ln(x − 1) and tan²θ at the last reading of a top that is read until it falls, by the equations above.  It falls
+#: where x(η) or Ω(1 − κ sin²θ) has its minimum; makers of magnets give 3° as the largest error of direction (95 % of a
+#: Rayleigh distribution), and the last reading lies up to 1.25 Hz above the fall, which is what a top loses in 10 s.
+LAST_GAP, LAST_GAP_U = -1.25, 0.4
+LAST_TILT2, LAST_TILT2_U = 0.0072, 0.0034
 
 
 @dataclass(frozen=True)
-class Wobble:
+class Nutation:
     """K/ν_ref as it is expected, and its standard uncertainty; 0.001 of it change C by 0.12 %."""
 
     value: float
     u: float
 
 
-# How a top came to its spin is not known: set by a calm hand it has hardly any.
-UNKNOWN_ORIGIN = Wobble(0.0008, 0.0013)
-# A drive makes the top nutate while it raises it: 58 virtual tops had 0.0013 in the median, nine in ten of them 0.0003
-# to 0.004, measured in their motion (the counts know it to 0.001).
-AFTER_DRIVE = Wobble(0.0015, 0.0010)
+#: A nutation of 1.1° (0.02 rad) at 40 Hz has K/ν_ref = 0.0006 and moves the rim by 0.3 mm, which one sees.  A top that
+#: seems calm has anything below.
+CALM = Nutation(0.0003, 0.0003)
+#: A drive shakes the top while it raises it: up to twice that angle.
+DRIVEN = Nutation(0.0012, 0.0007)
 
-PARAMETERS = ("moment_tilt", "resonance", "wobble")
-UNITS = ("rad", "Hz", "Hz")
-MORE = len(PARAMETERS)
-_SLEEPING = 2 * float(np.sqrt(KAPPA * (1 - KAPPA)))
 _NODES = 120
 _GRID = np.linspace(0.0, 1.0, _NODES)
 # Counts at so many times are worked out at once: for few readings numpy's calls cost more than their numbers.
 _AT_ONCE = 20_000
 _LARGEST_TILT2 = 0.3  # tan²θ: far beyond what a top survives
+# Times at which the wobble is worked out; between them it is a straight line, good to 1e-5 Hz.
+_MOST_POINTS = 1000
 _GAUSS = np.array([0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)]), np.array([5.0, 8.0, 5.0]) / 18
+
+
+@dataclass(frozen=True)
+class Top:
+    """What is known beforehand of a top whose count is analyzed.
+
+    Attributes:
+        kappa, kappa_u: κ = 1 − I₁/I₃, and its standard uncertainty.
+        beta, beta_u: β = B′²/(B B″) where the top floats.
+        resonance_hz: ν_r [Hz]; a run that ends far above it ended before the fall.
+    """
+
+    kappa: float = 0.4
+    kappa_u: float = 0.02
+    beta: float = 3.3
+    beta_u: float = 0.8
+    resonance_hz: float = 22.0
+
+
+#: κ of PHYSICS.md §1, with moments of inertia good to 2 % each; Simon's three tops have it to 0.1.  β is 3.3 in the
+#: middle of the stable heights, 2.5 at their upper end (computed for the thesis's base at 7.4 cm).
+THESIS_TOP = Top()
 
 
 @dataclass(frozen=True, eq=False)
 class CountedLaw:
-    """A drag law as a counter sees it: three parameters more, and what is known of two of them beforehand.
+    """A drag law as a counter sees it: with the tilt and the nutation of the top, and what is known of them beforehand.
 
     The additional parameters are A, tan²θ at the last reading by linear theory, and a, by which the last reading
     stands above the resonance, x = 1 + exp(a): these two hardly depend on each other, δ and ν_r do.
-    The third is K/ν_ref.
+    The third is K/ν_ref.  κ and β follow; they keep the values of the top, and only add to uncertainties.
 
     Attributes:
         law: of the drag.
         last: the last reading, in units of ν_ref.
-        gap: a as expected.
-        gap_u: standard uncertainty of that.
-        wobble: K/ν_ref as expected.
+        reference_hz: ν_ref [Hz].
+        top: whose count it is.
+        nutation: K/ν_ref as expected.
     """
 
     law: DragLaw
     last: float
-    gap: float = LAST_GAP
-    gap_u: float = LAST_GAP_U
-    wobble: Wobble = UNKNOWN_ORIGIN
-
-    @property
-    def name(self) -> str:
-        """Of the law."""
-        return self.law.name
-
-    @property
-    def constants(self) -> tuple[str, ...]:
-        """Names of the law's constants."""
-        return self.law.constants
-
-    @property
-    def orders(self) -> tuple[float, ...]:
-        """Of the law."""
-        return self.law.orders
+    reference_hz: float
+    top: Top = THESIS_TOP
+    nutation: Nutation = CALM
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of all parameters."""
+        """Names of the parameters that are reported."""
         return (*self.law.parameters, *PARAMETERS)
 
     @property
@@ -120,70 +123,80 @@ class CountedLaw:
         return (*self.law.parameter_units, *UNITS)
 
     @property
-    def expected(self) -> tuple[tuple[int, float, float], ...]:
-        """Which parameter is known beforehand, its value and u."""
-        return (-2, self.gap, self.gap_u), (-1, self.wobble.value, self.wobble.u)
+    def expected(self) -> tuple[Array, Array]:
+        """A, a, K/ν_ref, κ and β before the readings, and their standard uncertainties, shape (5,) each."""
+        x = (self.last * self.reference_hz / self.top.resonance_hz) ** 2
+        gap = max(LAST_GAP, float(np.log(x - 1)) if x > 1 else LAST_GAP)
+        nearer = float(np.exp(-2 * (gap - LAST_GAP)))
+        top = self.top
+        value = np.array([LAST_TILT2 * nearer, gap, self.nutation.value, top.kappa, top.beta])
+        return value, np.array([LAST_TILT2_U * nearer, LAST_GAP_U, self.nutation.u, top.kappa_u, top.beta_u])
 
     def shape(self, q: Array) -> tuple[float, float, float]:
-        """δ², ν_r/ν_ref, and K/ν_ref."""
-        a = min(max(float(q[-2]), -5.0), 4.0)
-        s = min(max(float(q[-3]) * float(np.exp(2 * a)), -0.01), 0.1)
-        return s, self.last / float(np.sqrt(1 + np.exp(a))), float(q[-1])
-
-    def solution(self, q: Array) -> Array:
-        """The law's parameters, then δ², ν_r/ν_ref and K/ν_ref, shape (p,)."""
-        return np.array([*q[:-MORE], *self.shape(q)])
+        """δ², ν_r/ν_ref, and K/ν_ref, from A, a and K/ν_ref."""
+        a = min(max(float(q[1]), -5.0), 40.0)
+        s = min(max(float(q[0]) * float(np.exp(min(2 * a, 8.0))), -0.01), 0.1)
+        return s, self.last / float(np.sqrt(1 + np.exp(a))), float(q[2])
 
     def spin(self, tau: Array, q: Array) -> Array:
         """What the counter counts, shape (n,)."""
         return np.asarray(self.spins(tau, q[None])[0])
 
     def gradient(self, tau: Array, q: Array) -> Array:
-        """Its slopes with q, shape (p, n), by differences: good to 1e-7 of themselves."""
+        """Its slopes with q, shape (p, n), by differences: good to 1e-6 of themselves."""
         sizes = 1e-5 * np.maximum(np.abs(q), 0.1)
-        sizes[-MORE:] = 1e-4
+        sizes[-UNCERTAIN:] = [1e-4, 1e-3, 1e-4, 1e-3, 1e-2]
         steps, p = np.diag(sizes), len(q)
         spins = self.spins(tau, np.vstack([q + steps, q - steps]))
         return np.asarray((spins[:p] - spins[p:]) / (2 * sizes[:, None]))
 
     def spins(self, tau: Array, rows: Array) -> Array:
         """The same for several q, shape (r, p) → (r, n)."""
-        shapes = np.array([self.shape(q) for q in rows])
+        p = len(self.law.parameters)
+        shapes = np.array([[*self.shape(q[p:]), *q[p + MORE :]] for q in rows])
         with np.errstate(all="ignore"):
-            return counts(self.law, tau, rows[:, :-MORE], shapes)
+            if len(tau) <= _MOST_POINTS:
+                return counts(self.law, tau, rows[:, :p], shapes)
+            few = np.linspace(tau[0], tau[-1], _MOST_POINTS)
+            added = counts(self.law, few, rows[:, :p], shapes) - [self.law.spin(few, q[:p]) for q in rows]
+            return np.array(
+                [self.law.spin(tau, q[:p]) + np.interp(tau, few, more) for q, more in zip(rows, added, strict=True)]
+            )
 
     def natural(self, q: Array, reference_hz: float, duration: float) -> tuple[Array, Array]:
-        """As `DragLaw.natural`, then δ [rad], ν_r [Hz] and K [Hz]."""
-        values, slopes = self.law.natural(q[:-MORE], reference_hz, duration)
-        n, (s, resonance, wobble) = len(values), self.shape(q)
+        """As `DragLaw.natural`, then δ [rad], ν_r [Hz] and K [Hz]; slopes of shape (p + 3, p + 5).
+
+        δ is the root of δ², which noise may make negative: then it is 0, with the slope of the uncertainty's own root.
+        """
+        n = len(self.law.parameters)
+        values, slopes = self.law.natural(q[:n], reference_hz, duration)
+        s, resonance, wobble = self.shape(q[n:])
         delta = float(np.sqrt(max(s, 0.0)))
-        share = float(np.exp(q[-2]) / (1 + np.exp(q[-2]))) / 2
-        full = np.zeros((n + MORE, n + MORE))
+        growth = float(np.exp(min(2 * float(q[n + 1]), 8.0)))
+        share = float(1 / (1 + np.exp(-min(float(q[n + 1]), 40.0)))) / 2
+        full = np.zeros((n + MORE, n + UNCERTAIN))
         full[:n, :n] = slopes
-        full[n, n : n + 2] = [delta / (2 * float(q[-3])) if delta else np.nan, delta]
+        # beside δ its u may be as large as δ itself, where the slope of a root has no end
+        full[n, n] = growth / (2 * max(delta, 0.5 * float(np.sqrt(self.expected[1][0] * growth))))
+        full[n, n + 1] = delta
         full[n + 1, n + 1] = -share * resonance * reference_hz
         full[n + 2, n + 2] = reference_hz
         return np.array([*values, delta, resonance * reference_hz, wobble * reference_hz]), full
 
-    def dimensionless(self, values: Array, reference_hz: float, duration: float) -> Array:
-        """The inverse of `natural`."""
-        q = self.law.dimensionless(values[:-MORE], reference_hz, duration)
-        delta, resonance, wobble = (float(value) for value in values[-MORE:])
-        ratio = max((self.last * reference_hz / resonance) ** 2 - 1, 1e-2)
-        a = float(np.log(ratio))
-        return np.array([*q, delta**2 * float(np.exp(-2 * a)), a, wobble / reference_hz])
+    def solution(self, q: Array) -> Array:
+        """The law's parameters, then δ², ν_r/ν_ref and K/ν_ref, shape (p + 3,)."""
+        n = len(self.law.parameters)
+        return np.array([*q[:n], *self.shape(q[n:])])
 
 
-Law = DragLaw | CountedLaw
-
-
-def counted(law: DragLaw, tau: Array, solution: Array) -> Array:
-    """The curve of a solution, with the tilt where it has one; shape (n,)."""
+def counted(law: DragLaw, tau: Array, solution: Array, top: Top = THESIS_TOP) -> Array:
+    """The curve of a solution, with the tilt where it has one (δ², ν_r/ν_ref, K/ν_ref at its end); shape (n,)."""
     p = len(law.parameters)
     if len(solution) == p:
         return law.spin(tau, solution)
-    s, resonance, wobble = (float(value) for value in solution[p:])
-    return count(law, tau, solution[:p], s, resonance, wobble=wobble)
+    shape = np.array([[*solution[p:], top.kappa, top.beta]])
+    with np.errstate(all="ignore"):
+        return np.asarray(counts(law, tau, np.array([solution[:p]]), shape)[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +209,7 @@ class _Path:
     momentum_slope: Array  # of Ω(1 − κ sin²θ), with ln η
 
 
-def _path(log_eta: Array, s: Array) -> _Path:
+def _path(log_eta: Array, s: Array, kappa: Array, beta: Array) -> _Path:
     """The way at these points, for each s.
 
     With w = 1 + sη², l = 1 + βs(η + η²/2) and sin²θ = sη²/w: Ω² = (1 + 1/η) l √w, and
@@ -212,7 +225,7 @@ def _path(log_eta: Array, s: Array) -> _Path:
     axial = np.sqrt(w)
     lift = eta2 * 0.5
     lift += eta
-    lift *= BETA * s
+    lift *= beta * s
     lift += 1
     np.maximum(lift, 0.1, out=lift)
     spin = 1 / eta
@@ -222,56 +235,49 @@ def _path(log_eta: Array, s: Array) -> _Path:
     np.sqrt(spin, out=spin)
     slope = eta2
     slope += eta
-    slope *= BETA * s
+    slope *= beta * s
     slope /= lift
     slope += sin2
     eta += 1
     slope -= np.divide(1, eta, out=eta)
     slope *= spin
     slope *= 0.5
-    momentum_slope = sin2 * -KAPPA
+    momentum_slope = sin2 * -kappa
     momentum_slope += 1
     momentum_slope *= slope
     sin2 *= spin
     sin2 /= w
-    sin2 *= 2 * KAPPA
+    sin2 *= 2 * kappa
     momentum_slope -= sin2
     return _Path(spin, slope, np.divide(1, axial, out=axial), momentum_slope)
 
 
-def count(law: DragLaw, tau: Array, q: Array, s: float, resonance: float, *, wobble: float = 0.0) -> Array:
-    """What the counter counts, in the dimensionless numbers of `analysis.spindown.drag`.
+def counts(law: DragLaw, tau: Array, q: Array, shapes: Array) -> Array:
+    """Return what a counter counts of several tops, in the dimensionless numbers of `analysis.spindown.drag`.
 
     Args:
         law: of the drag.
         tau: shape (n,), rising from 0 on.
-        q: of the law, the start being that of the count.
-        s: δ², of either sign.
-        resonance: ν_r/ν_ref.
-        wobble: K/ν_ref of the free wobble.
+        q: of the law, the start being that of the count, shape (r, p).
+        shapes: δ² of either sign, ν_r/ν_ref, K/ν_ref, κ and β of each, shape (r, 5).
 
     Returns:
-        Shape (n,); beyond the fall, which a search may meet, a straight line.
+        Shape (r, n); beyond the fall, which a search may meet, a straight line.
     """
-    return np.asarray(counts(law, tau, np.array([q]), np.array([[s, resonance, wobble]]))[0])
-
-
-def counts(law: DragLaw, tau: Array, q: Array, shapes: Array) -> Array:
-    """The same of several tops; q of shape (r, p), shapes: s, resonance and wobble of each, shape (r, 3) → (r, n)."""
     many = max(_AT_ONCE // max(len(tau), 1), 1)
     parts = [_counts(law, tau, q[k : k + many], shapes[k : k + many]) for k in range(0, len(q), many)]
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _counts(law: DragLaw, tau: Array, q: Array, shapes: Array) -> Array:
-    s, resonance, wobble = shapes.T[:, :, None]
+    s, resonance, wobble, kappa, beta = shapes.T[:, :, None]
     of_law = q.T[:, :, None]
     x0 = np.minimum(np.maximum(of_law[0], resonance * 1.001), 1e3)
-    log_eta, path = _nodes(1 / ((1.01 * x0 / resonance) ** 2 - 1), s)
+    log_eta, path = _nodes(1 / ((1.01 * x0 / resonance) ** 2 - 1), s, kappa, beta)
     # time between the nodes by three points of Gauss and Legendre: 1e-10 of it
     width = np.diff(log_eta)
     inner = (log_eta[:, :-1, None] + width[:, :, None] * _GAUSS[0]).reshape(len(q), -1)
-    within = _path(inner, s)
+    within = _path(inner, s, kappa, beta)
     lapse = (_time_slope(law, within, of_law, resonance).reshape(*width.shape, 3) @ _GAUSS[1]) * width
     time = np.concatenate([np.zeros((len(q), 1)), np.cumsum(lapse, axis=1)], axis=1)
     spin = resonance * path.spin
@@ -279,10 +285,11 @@ def _counts(law: DragLaw, tau: Array, q: Array, shapes: Array) -> Array:
     start = _hermite(-x0, -spin, time, -1 / slope)
     even = _hermite(tau + start, time, spin, slope)
     even = np.nan_to_num(np.minimum(np.maximum(even, -1e3), 1e3))  # a search may go anywhere
-    return np.asarray(even + wobble / np.sqrt(np.maximum((even / (_SLEEPING * resonance)) ** 2 - 1, 0.05)))
+    sleeping = 2 * np.sqrt(kappa * (1 - kappa)) * resonance
+    return np.asarray(even + wobble / np.sqrt(np.maximum((even / sleeping) ** 2 - 1, 0.05)))
 
 
-def _nodes(first: Array, s: Array) -> tuple[Array, _Path]:
+def _nodes(first: Array, s: Array, kappa: Array, beta: Array) -> tuple[Array, _Path]:
     """From a little above the start down to the fall, where the spin would rise again, or to the resonance.
 
     first, s: shape (r, 1).
@@ -291,7 +298,7 @@ def _nodes(first: Array, s: Array) -> tuple[Array, _Path]:
     last = np.minimum(2e3, np.sqrt(_LARGEST_TILT2 / np.maximum(np.abs(s), 1e-12)))
     end = np.log(np.maximum(last, 1.5 * first))
     log_eta = begin + (end - begin) * _GRID
-    path = _path(log_eta, s)
+    path = _path(log_eta, s, kappa, beta)
     turned = np.minimum(-path.slope, -path.momentum_slope) <= 1e-4
     falls = turned.any(axis=1)
     if not falls.any():
@@ -299,7 +306,7 @@ def _nodes(first: Array, s: Array) -> tuple[Array, _Path]:
     at = np.maximum(np.argmax(turned, axis=1) - 1, 2)
     end[falls, 0] = log_eta[falls, at[falls]]
     log_eta = begin + (end - begin) * _GRID
-    return log_eta, _path(log_eta, s)
+    return log_eta, _path(log_eta, s, kappa, beta)
 
 
 def _time_slope(law: DragLaw, path: _Path, q: Array, resonance: Array) -> Array:

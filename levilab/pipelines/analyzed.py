@@ -13,7 +13,7 @@ from levilab.pipelines.sources import Needs, Readings, Remark, Skipped, Source, 
 from levilab.runs.run import find_run
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
 
     from analysis.budget import Budget
@@ -149,8 +149,6 @@ class Method(Generic[S, R, Opt, A]):
         mixed: what is wrong with numbers over real and synthetic inputs; empty where there are none.
         of_files: names of options that say nothing about runs, whose columns are known.
         skips: whether of several inputs one that cannot be used is skipped with a warning.
-        refit: number of each input to analyze once more, for what only all together show → what is found then.
-        refit_text: why, in words.
         budget_of_run: what the uncertainties of one input's numbers are made of.
         budget_of_all: those of all inputs together, from what was found of each; of one input they are its own.
     """
@@ -163,8 +161,6 @@ class Method(Generic[S, R, Opt, A]):
     mixed: str = ""
     of_files: frozenset[str] = frozenset({"columns", "channel", "rate"})
     skips: bool = False
-    refit: Callable[[Sequence[Source[S]], Sequence[R], Sequence[Opt]], Mapping[int, R]] = lambda *_: {}
-    refit_text: str = ""
     budget_of_run: Callable[[Source[S], R, Opt], tuple[Budget, ...]] = lambda *_: ()
     budget_of_all: Callable[[A], tuple[Budget, ...]] = lambda _: ()
 
@@ -201,11 +197,6 @@ class Method(Generic[S, R, Opt, A]):
         """
         done, warnings = self._each(found.sources, one)
         sources, runs, origins = (list(column) for column in zip(*done, strict=True))
-        if recall is None:
-            for k, run in self.refit(sources, runs, [origin.options for origin in origins]).items():
-                runs[k], origins[k] = run, replace(origins[k], budget=None)
-                if origins[k].text != NOW:
-                    origins[k] = replace(origins[k], text=f"{FOR_THIS_PAGE}: {self.refit_text}")
         used = origins[0].options if all(origin.options == origins[0].options for origin in origins) else options
         for k, (source, run, origin) in enumerate(zip(sources, runs, origins, strict=True)):
             if origin.budget is None:

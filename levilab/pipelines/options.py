@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from levilab.formats.device import Device
 
-Uncertainty = Literal["covariance", "profile", "bootstrap"]
 Tilt = Literal["auto", "none", "fitted"]
 Method = Literal["auto", "edges", "matched", "likelihood"]
 
@@ -99,6 +98,10 @@ _READING_U = _about(
     kind=float, metavar="HZ", unit="Hz", above=0.0,
 )  # fmt: skip
 _KEEP_OUTLIERS = _about("Fit readings that look like miscounts, too.", kind=bool)
+_DEVICE = _about(
+    "Describes base and top, as sample_data/device.toml does; see levilab top.",
+    kind=Path, metavar="FILE", read=_read_device,
+)  # fmt: skip
 _CLOCK_U = _about(
     "Relative standard uncertainty of the clock that counts or samples, as 2e-6, from its manual; the budgets show "
     "what it does, it is in no u.",
@@ -141,17 +144,13 @@ class SpinDownOptions(RecordOptions):
     """Options of spin-downs."""
 
     reading_u: float | None = field(default=None, metadata=_READING_U)
-    uncertainty: Uncertainty = field(default="covariance", metadata=_about(
-        "profile and bootstrap add 68 % intervals, and take longer.", choices=get_args(Uncertainty),
-    ))  # fmt: skip
     keep_outliers: bool = field(default=False, metadata=_KEEP_OUTLIERS)
     tilt: Tilt = field(default="auto", metadata=_about(
-        "Whether counts hold the tilt of the top's moment.  auto: fitted if the counts demand it; u covers a tilt that "
-        "noise may hide.  none: a top that only spins.",
+        "Whether counts hold the tilt of the top's moment.  auto: as fitted, but for a mock run whose top only spins.  "
+        "none: a top that only spins.",
         choices=get_args(Tilt),
     ))  # fmt: skip
-    bootstrap_samples: int = field(default=1000, metadata=_about("How often the bootstrap draws.", typed=None))
-    seed: int = field(default=0, metadata=_about("Seed of the bootstrap.", typed=None))
+    device: Device | None = field(default=None, metadata=_DEVICE)
     clock_u: float | None = field(default=None, metadata=_CLOCK_U)
 
 
@@ -169,10 +168,7 @@ class SpinOptions(RecordOptions):
 class FieldOptions(InputOptions):
     """Options of scans of the field."""
 
-    device: Device | None = field(default=None, metadata=_about(
-        "Describes base and top, as sample_data/device.toml does; see levilab top.",
-        kind=Path, metavar="FILE", read=_read_device,
-    ))  # fmt: skip
+    device: Device | None = field(default=None, metadata=_DEVICE)
     height_m: float | None = field(default=None, metadata=_about(
         "Height at which the top floats; its moment follows, if its mass is known.",
         kind=float, metavar="MM", typed="height", unit="mm", factor=1e-3, low=-1.0, high=2.0,

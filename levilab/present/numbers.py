@@ -76,19 +76,6 @@ def column(estimates: Iterable[Estimate | None]) -> list[str]:
     return ["—" if one is None or one.value is None else _number(one.value, one.u, ordinary=ordinary) for one in cells]
 
 
-def ends(estimate: Estimate) -> tuple[str, str] | None:
-    """Return the ends of the 68 % interval, where there is one, with the digits that u gives the value.
-
-    >>> from analysis.uncertainty import Estimate
-    >>> ends(Estimate(2.3687e-4, 3.0e-7, "1/s", (2.365e-4, 2.371e-4)))
-    ('2.3650×10⁻⁴', '2.3710×10⁻⁴')
-    """
-    if not estimate.interval or not estimate.u:
-        return None
-    low, high = (re.sub(r"\(.*?\)", "", _number(end, estimate.u)) for end in estimate.interval)
-    return low, high
-
-
 def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> str:
     """Round by the rule of the Particle Data Group, with a power of ten instead of leading zeros.
 

@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.budget import gate_bias, printed_step
-from analysis.residuals import DENSE
 from analysis.spindown.combine import combine
 from analysis.spindown.drag import LAWS
-from analysis.spindown.fit import fit_spin_down, is_correlated
+from analysis.spindown.fit import fit_spin_down
 from analysis.spindown.tilt import counted
 from levilab.crosscheck.own.model import OF_ONE_RUN, Own, pull
 from levilab.crosscheck.subject import Trial
 from levilab.pipelines.budget import gate_of
-from levilab.pipelines.spindown.analysis import EXPERIMENT, TILTED
+from levilab.pipelines.spindown.analysis import EXPERIMENT
 from levilab.simulator import laws
 
 if TYPE_CHECKING:
@@ -28,10 +27,10 @@ if TYPE_CHECKING:
 
     Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
-#: Processor time of the fits of one run [s]: of any, for a reading, and for the square of their number up to `DENSE`.
-_COST_S, _COST_OF_READING_S, _COST_OF_PAIR_S = 0.03, 1.6e-5, 5e-6
+#: Processor time of the fits of one run [s]: of any, and for a reading.
+_COST_S, _COST_OF_READING_S = 0.006, 2e-5
 #: What fitting the tilt adds to that, for any run and for a reading.
-_COST_OF_TILT_S, _TILTED_READING_S = 0.25, 3e-4
+_COST_OF_TILT_S, _TILTED_READING_S = 0.015, 1e-4
 #: Runs that scatter by so many times what their readings leave give u from their scatter alone.
 _SCATTERS = 1.5
 
@@ -57,7 +56,7 @@ class _Run:
     rho: float
     step: float
     gate: float
-    tilt: bool | None
+    tilt: bool
     driven: bool
 
     def readings(self, random: np.random.Generator, factors: Sequence[float]) -> Array:
@@ -68,7 +67,7 @@ class _Run:
     def cost_s(self) -> float:
         """Processor time of its fits, as measured [s]."""
         n = len(self.time)
-        cost = _COST_S + n * _COST_OF_READING_S + (n**2 * _COST_OF_PAIR_S if n <= DENSE else 0.0)
+        cost = _COST_S + n * _COST_OF_READING_S
         return cost + (_COST_OF_TILT_S + n * _TILTED_READING_S if self.tilt else 0.0)
 
     def curve(self, factors: Sequence[float]) -> Array:
@@ -81,7 +80,7 @@ class _Run:
         middle = np.clip(tau, half, 1 - half)
 
         def at(times: Array) -> Array:
-            return np.asarray(counted(LAWS[self.fit.name], times, solution))
+            return np.asarray(counted(LAWS[self.fit.name], times, solution, self.fit.top))
 
         bias = gate_bias(at(middle - half), at(middle), at(middle + half)) if half else 0.0
         return np.asarray(frequency * (at(tau) + bias))
@@ -94,12 +93,6 @@ def own(found: SpinDownAnalysis) -> Own:
     constants = [name for name in LAWS[law].constants if name != "exponent"]
     spread = _between(found, law, constants)
     several = len(runs) > 1
-    hidden = not any(run.has_tilt for run in found.runs) and any(run.tilt is None for run in runs)
-    more = (
-        ("here u holds what a tilt that noise hides would do; what was made up has none, so the pulls scatter less",)
-        if hidden
-        else ()
-    )
     return Own(
         about=f"{len(runs)} spin-down{'s' * several} by the {law} law, "
         + ("constants that differ from run to run as these do, " if several else "")
@@ -108,12 +101,11 @@ def own(found: SpinDownAnalysis) -> Own:
         cost_s=sum(run.cost_s for run in runs),
         law=law,
         freedom=_freedom(found, law, constants),
-        more=more,
     )
 
 
 def _run(found: SpinDownAnalysis, k: int, fit: LawFit, run: SpinDown) -> _Run:
-    source, options = found.sources[k], found.origins[k].options
+    source = found.sources[k]
     step = printed_step(source.readings.frequency.tolist())
     noise = _scatter(fit, run)
     return _Run(
@@ -121,10 +113,10 @@ def _run(found: SpinDownAnalysis, k: int, fit: LawFit, run: SpinDown) -> _Run:
         u=run.u,
         fit=fit,
         noise=np.sqrt(np.maximum(noise**2 - (step or 0.0) ** 2 / 12, 0.0)),
-        rho=max(run.correlation.value, 0.0) if run.correlation and is_correlated(run.correlation) else 0.0,
+        rho=(run.correlation.value or 0.0) if run.correlation and run.is_correlated else 0.0,
         step=step or 0.0,
         gate=gate_of(source, EXPERIMENT) or 0.0,
-        tilt=True if fit.has_tilt else TILTED[options.tilt],
+        tilt=fit.has_tilt,
         driven=source.readings.driven,
     )
 
@@ -133,7 +125,7 @@ def _scatter(fit: LawFit, run: SpinDown) -> Array:
     """Standard deviation of each reading, shape (n,) [Hz]: as stated, or more where they scatter more."""
     stats = fit.statistics
     if run.u is not None:
-        return np.asarray(run.u * np.sqrt(stats.inflation))
+        return np.asarray(run.u * np.sqrt(stats.variance_factor))
     return np.full(len(run.time), np.sqrt(stats.rss / max(stats.degrees_of_freedom, 1)))
 
 
@@ -175,7 +167,11 @@ def _trial(
             for name, truth in zip(constants, truths, strict=True)
         ]
         readings = run.readings(random, factors)
-        fits.append(fit_spin_down(run.time, readings, run.u, tilt=run.tilt, driven=run.driven, gate=run.gate or None))
+        fits.append(
+            fit_spin_down(
+                run.time, readings, run.u, tilt=run.tilt, driven=run.driven, gate=run.gate or None, top=run.fit.top
+            )
+        )
         if several:
             of_run = fits[-1].fit(law).parameters
             pulls += [
@@ -195,7 +191,7 @@ def _trial(
     if exponent is not None:
         of_power = together.fit("power").constants if several else fits[0].fit("power").parameters
         pulls.append(pull("exponent", of_power["exponent"], exponent))
-    return Trial(pulls, law=together.best, excluded=law in {name for name, _ in together.verdict.excluded})
+    return Trial(pulls, law=together.best, excluded=law in together.verdict.excluded)
 
 
 def _noise(random: np.random.Generator, n: int, rho: float) -> Array:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.spindown.tilt import AFTER_DRIVE
+from analysis.spindown.tilt import DRIVEN
 from instruments.clock import VirtualClock
 from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
@@ -72,7 +72,7 @@ def _in_world(request: AcquisitionRequest, scene: Scene, seed: int) -> Acquisiti
 
     settings: Any = settings_of(request.config, request.experiment)
     config = with_settings(request.config, request.experiment, settings.model_copy(update={"reading_u_hz": None}))
-    return replace(request, config=config, wiring=wiring, scene=scene.as_table())
+    return replace(request, config=config, wiring=wiring, scene=scene.as_table(), world=None)
 
 
 def _fall(found: Fitted, run: Run, scene: Scene) -> Pull:
@@ -103,10 +103,10 @@ def _wobble(parameters: dict[str, Any], typical_hz: float) -> tuple[float, float
     One top in ten has two to five times what is expected, and the fit draws that back to it: so far from normal is what
     a drive leaves that its spread is added to u.
     """
-    fitted, spread = parameters.get("wobble"), AFTER_DRIVE.u * typical_hz
+    fitted, spread = parameters.get("wobble"), DRIVEN.u * typical_hz
     if fitted and fitted["value"] is not None and fitted["u"]:
         return fitted["value"], math.hypot(fitted["u"], spread)
-    return AFTER_DRIVE.value * typical_hz, 2 * spread
+    return DRIVEN.value * typical_hz, 2 * spread
 
 
 def nutation(scene: Scene, wobble_hz: float) -> float:

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from analysis.field.fit import Known, Prior
 from analysis.field.floating import KnownTop
 from analysis.field.magnet import Disc
-from analysis.top import Cylinder, Top, top_of
+from analysis.top import Cylinder, top_of
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.formats.device import BaseTable, Device
@@ -118,7 +118,7 @@ def known_top(options: FieldOptions, height_u: float | None) -> tuple[KnownTop, 
                 "`height_m` tells the moment of a top only if its mass is known: write [top] with mass_kg or its parts "
                 "into a file, as sample_data/device.toml, and give it with `device`"
             )
-    transverse, axial, missing = _inertias(table, made)
+    transverse, axial, missing = inertias(table)
     if moment is None and height is None:
         moment = Estimate(THESIS["moment"][0], 0.0, "A m^2")
         missing = [*missing, "moment"]
@@ -137,7 +137,9 @@ def known_top(options: FieldOptions, height_u: float | None) -> tuple[KnownTop, 
     return KnownTop(transverse, axial, moment, mass, height, device.gravity_m_s2, covariance, magnet), warnings
 
 
-def _inertias(table: TopTable, made: Top | None) -> tuple[Estimate, Estimate, list[str]]:
+def inertias(table: TopTable) -> tuple[Estimate, Estimate, list[str]]:
+    """Return the moments of inertia across and along the axis, and what is missing in the file; then the thesis's."""
+    made = top_of(parts_of(table)) if table.parts else None
     if made:
         return made.transverse, made.axial, []
     transverse = _estimate(table.inertia_transverse_kg_m2, table.inertia_transverse_u_kg_m2, "kg m^2")

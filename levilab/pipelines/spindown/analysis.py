@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-import re
+import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.errors import AnalysisError
-from analysis.spindown.combine import Combined, combine, tilt_demanded
+from analysis.spindown.combine import Combined, combine
 from analysis.spindown.fit import SpinDown, fit_spin_down
+from analysis.spindown.tilt import THESIS_TOP, Top
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.budget import gate_of
+from levilab.pipelines.field.device import THESIS, inertias
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.sources import Needs
-from levilab.pipelines.spindown.laws import SYMBOLS
 from levilab.pipelines.spindown.readings import Readings, read_run_readings, read_spin_file
+from levilab.pipelines.spindown.words import remark, verdict_of_all
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -22,7 +25,7 @@ if TYPE_CHECKING:
 
     from analysis.spindown.combine import CombinedLaw
     from analysis.spindown.lawfit import LawFit
-    from levilab.pipelines.options import Tilt
+    from levilab.formats.device import Device
     from levilab.pipelines.sources import Source
 
 SPINDOWN = "spindown"
@@ -37,21 +40,17 @@ NEEDS = Needs(
 )
 
 
-#: Whether the count holds the tilt of the top's moment; None: where readings demand it.
-TILTED: dict[Tilt, bool | None] = {"auto": None, "none": False, "fitted": True}
-
-
 class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
     """Spin-downs, each by itself and together."""
 
     @property
     def text(self) -> str:
         """What the data say, in a few sentences."""
-        return self.combined.verdict.text
+        return verdict_of_all(self.combined, self.runs)
 
     def about_all(self) -> Iterable[str]:
         """What to know of the means, and of the laws that are not excluded."""
-        return map(_with_symbols, (*self.combined.warnings, *self._left_out(), *self._of_laws(self.combined.fits)))
+        return (*map(remark, self.combined.remarks), *self._left_out(), *self._of_laws(self.combined.fits))
 
     def _left_out(self) -> Iterable[str]:
         """Yield which runs the means leave out, since their unit is in doubt."""
@@ -61,62 +60,52 @@ class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
 
     def about_run(self, run: SpinDown) -> Iterable[str]:
         """What to know of one run."""
-        return (*run.warnings, *self._of_laws(run.fits))
+        return (*map(remark, run.remarks), *self._of_laws(run.fits))
 
     def _of_laws(self, fits: Iterable[LawFit | CombinedLaw]) -> Iterable[str]:
-        excluded = {name for name, _ in self.combined.verdict.excluded}  # what they lack is of no interest any more
-        return (warning for fit in fits if fit.name not in excluded for warning in fit.warnings)
+        excluded = self.combined.verdict.excluded  # what they lack is of no interest any more
+        return (remark(each) for fit in fits if fit.name not in excluded for each in fit.remarks)
 
 
-def _with_symbols(text: str) -> str:
-    """A warning with the constants' symbols, as tables and figures have them, for their names in result.json.
-
-    >>> _with_symbols("disc: c32 scatters between the runs 25 times as much")
-    'disc: C₃/₂ scatters between the runs 25 times as much'
-    """
-    return re.sub(r"(?<=: )(\w+)(?= scatters)", lambda found: SYMBOLS.get(found[0], found[0]), text)
-
-
-def fit_source(source: Source[Readings], options: SpinDownOptions, *, tilt: bool | None = None) -> SpinDown:
-    """All laws fitted to one input.
-
-    Args:
-        source: the input.
-        options: of the fit.
-        tilt: whether the count has the top's tilt; None: as the options say.
-
-    Raises:
-        DataError: with the name of the file.
-    """
+def fit_source(source: Source[Readings], options: SpinDownOptions) -> SpinDown:
+    """Fit all laws to one input.  Raises DataError, with the name of the file."""
     readings = source.readings
     try:
         return fit_spin_down(
             readings.time,
             readings.frequency,
             readings.u if options.reading_u is None else options.reading_u,
-            uncertainty=options.uncertainty,
-            bootstrap_samples=options.bootstrap_samples,
-            seed=options.seed,
             keep_outliers=options.keep_outliers,
-            tilt=TILTED[options.tilt] if tilt is None else tilt,
+            tilt=options.tilt == "fitted" or (options.tilt == "auto" and not readings.upright),
             driven=readings.driven,
             gate=gate_of(source, EXPERIMENT),
+            top=top_of_device(options.device),
         )
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error
 
 
-def fit_with_tilt(
-    sources: Sequence[Source[Readings]], runs: Sequence[SpinDown], options: Sequence[SpinDownOptions]
-) -> dict[int, SpinDown]:
-    """Number → fit with the tilt, of those that lack it where the runs together demand it."""
-    if not tilt_demanded(runs):
-        return {}
-    return {
-        k: fit_source(sources[k], options[k], tilt=True)
-        for k, run in enumerate(runs)
-        if not run.has_tilt and options[k].tilt == "auto"
-    }
+def top_of_device(device: Device | None) -> Top:
+    """Return what a device's file says of the top for the count; the thesis's where it says nothing.
+
+    ν_r goes with √(|μ|/(I₃ − I₁)): the field where a top floats is taken for that of the thesis's base.
+    """
+    if device is None:
+        return THESIS_TOP
+    transverse, axial, _ = inertias(device.top)
+    one, three = transverse.value or 0.0, axial.value or 0.0
+    if not 0 < one < three:
+        raise DataError(f"the top of the device has I₁ = {one:g} and I₃ = {three:g} kg m²: I₁ < I₃ is expected")
+    share = one / three
+    u = share * math.hypot((transverse.u or 0.0) / one, (axial.u or 0.0) / three)
+    moment = (device.top.moment_a_m2 or THESIS["moment"][0]) / THESIS["moment"][0]
+    slow = (three - one) / (THESIS["axial"][0] - THESIS["transverse"][0])
+    return replace(
+        THESIS_TOP,
+        kappa=1 - share,
+        kappa_u=u or THESIS_TOP.kappa_u,
+        resonance_hz=THESIS_TOP.resonance_hz * math.sqrt(moment / slow),
+    )
 
 
 def _undoubted(sources: Sequence[Source[Readings]], runs: Sequence[SpinDown]) -> Sequence[SpinDown]:
@@ -131,8 +120,6 @@ METHOD = Method(
     fit=fit_source,
     combine=lambda sources, runs, _: combine(_undoubted(sources, runs)),
     mixed="a mean over both says nothing about a real top",
-    refit=fit_with_tilt,
-    refit_text="the runs show a tilt of the top together, not each by itself",
 )
 
 

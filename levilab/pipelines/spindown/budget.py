@@ -74,7 +74,7 @@ def _rows(
 ) -> Iterator[Component]:
     estimate, parts = fit.parameters[name], fit.parts[name]
     yield from _of_readings(source, run, fit, name, options)
-    yield from _of_model(fit, parts, estimate)
+    yield from _of_model(parts, estimate)
     gate = gate_of(source, EXPERIMENT)
     if gate is not None and parts.gate is not None:
         note = f"the mean over {gate:g} s is higher than the spin in the middle; not corrected"
@@ -134,17 +134,12 @@ def _of_readings(
         )  # fmt: skip
 
 
-def _of_model(fit: LawFit, parts: Parts, estimate: Estimate) -> Iterator[Component]:
-    """What the tilt of the top's moment leaves open, fitted or hidden."""
-    if parts.beforehand > 0:
-        note = "resonance and nutation are known beforehand only so well"
-        yield direct_row("beforehand", "what is known of the wobble", parts.beforehand, estimate.unit, note, "")
+def _of_model(parts: Parts, estimate: Estimate) -> Iterator[Component]:
+    """What is not known of the tilt of the top's moment and of its nutation."""
     if parts.tilt > 0:
-        what, note = "tilt that noise hides", "what a tilt of the moment would change, by its probability"
-        if fit.has_tilt:
-            what, note = "model of the tilt", "a twentieth of what the tilt changes, 0.15 of the tilt itself"
-        remedy = "less noise in the readings, and readings until the top falls"
-        yield direct_row("tilt", what, parts.tilt, estimate.unit, note, remedy)
+        note = "what was known of them beforehand, and the readings do not tell"
+        remedy = "less noise in the readings, readings until the top falls, and the top's file for --device"
+        yield direct_row("tilt", "tilt and nutation of the top", parts.tilt, estimate.unit, note, remedy)
 
 
 def _by_clocks(fit: LawFit, name: str) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -11,21 +11,22 @@ from pydantic import Field
 from analysis.spindown.combine import Combined  # noqa: TC001 - pydantic reads the type when it runs
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown  # noqa: TC001 - as above
+from levilab.formats.device import Device  # noqa: TC001 - as above
 from levilab.pipelines.document import Document, Settings, number, statistics_of, value_of, values_of
 from levilab.pipelines.dump import Dump
-from levilab.pipelines.options import SpinDownOptions, Tilt, Uncertainty
-from levilab.pipelines.result import Part, Result, RunPart
+from levilab.pipelines.options import Tilt  # noqa: TC001 - as above
+from levilab.pipelines.result import Result, RunPart
 from levilab.pipelines.row import find_all
 from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
 from levilab.pipelines.spindown.budget import budget_of_all, budget_of_run
 from levilab.pipelines.spindown.quantities import CORRELATION, QUANTITIES
+from levilab.pipelines.spindown.words import remark, verdict_of_run
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from analysis.spindown.combine import CombinedLaw, Mean
     from analysis.spindown.verdict import Verdict
-    from levilab.pipelines.options import InputOptions
 
 
 class SpinDownPart(RunPart):
@@ -34,37 +35,16 @@ class SpinDownPart(RunPart):
     result: Annotated[SpinDown, Dump()]
 
 
-class BootstrapPart(Part):
-    """How the bootstrap drew."""
-
-    samples: int = Field(ge=1)
-    seed: int = Field(ge=0)
-
-
 class SettingsPart(Settings):
     """How the readings were analyzed."""
 
     channel: str | None = None
     rate: float | None = Field(default=None, gt=0, alias="rate_hz")
     reading_u: float | None = Field(gt=0, alias="reading_u_hz")
-    uncertainty: Uncertainty
     keep_outliers: bool
     tilt: Tilt = "auto"
-    bootstrap: BootstrapPart | None
+    device: Device | None = None
     clock_u: float | None = Field(default=None, gt=0)
-
-    @classmethod
-    def of(cls, options: InputOptions, **more: Any) -> Self:
-        """Make the settings from options."""
-        assert isinstance(options, SpinDownOptions)
-        drawn = BootstrapPart(samples=options.bootstrap_samples, seed=options.seed)
-        return super().of(options, bootstrap=drawn if options.uncertainty == "bootstrap" else None, **more)
-
-    def arguments(self) -> dict[str, Any]:
-        """Return the settings as options."""
-        given = super().arguments()
-        drawn: BootstrapPart | None = given.pop("bootstrap")
-        return given | ({"bootstrap_samples": drawn.samples, "seed": drawn.seed} if drawn else {})
 
 
 class SpinDownResult(Result):
@@ -82,17 +62,17 @@ def _entries(analysis: SpinDownAnalysis) -> dict[str, Any]:
     return {
         "values": _combined_values(combined),
         "models": [_combined_model(fit) for fit in combined.fits] if several else _models(analysis.runs[0]),
-    } | _verdict(combined.best, combined.verdict)
+    } | _verdict(combined.best, combined.verdict, analysis.text)
 
 
 def _run_entries(run: SpinDown) -> dict[str, Any]:
     values = values_of(run.fit(run.best).parameters | find_all(QUANTITIES, run))
-    return {"values": values, "models": _models(run)} | _verdict(run.best, run.verdict)
+    return {"values": values, "models": _models(run)} | _verdict(run.best, run.verdict, verdict_of_run(run))
 
 
-def _verdict(best: str, verdict: Verdict) -> dict[str, Any]:
+def _verdict(best: str, verdict: Verdict, text: str) -> dict[str, Any]:
     return {
-        "best_model": best, "verdict": verdict.text, "decided": verdict.decided, "describes": verdict.describes,
+        "best_model": best, "verdict": text, "decided": verdict.decided, "describes": verdict.describes,
     }  # fmt: skip
 
 
@@ -116,7 +96,7 @@ def _combined_model(fit: CombinedLaw) -> dict[str, Any]:
         "covariance": None,
         "scatter": {name: mean.scatter for name, mean in fit.constants.items()},
         "statistics": statistics_of(fit.statistics),
-        "warnings": fit.warnings,
+        "warnings": [remark(each) for each in fit.remarks],
     } | ({"linearised": _means(fit.linearised)} if fit.linearised else {})
 
 
@@ -128,7 +108,7 @@ def _models(run: SpinDown) -> list[dict[str, Any]]:
             "parameters": values_of(fit.parameters),
             "covariance": None if fit.covariance is None else fit.covariance.tolist(),
             "statistics": statistics_of(fit.statistics),
-            "warnings": fit.warnings,
+            "warnings": [remark(each) for each in fit.remarks],
         }
         | ({"linearised": values_of(fit.linearised)} if fit.linearised else {})
         for fit in run.fits

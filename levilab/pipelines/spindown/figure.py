@@ -99,7 +99,7 @@ def _finding(analysis: SpinDownAnalysis) -> str:
         others = [name for name in (*verdict.indistinguishable, *verdict.needless, *verdict.weak) if name != best]
         also = f"; {enumeration(others)} cannot be excluded" if others else ""
         return f"Spin-down{together}: the readings do not single out a drag law, {best} comes first{also}"
-    excluded = [name for name in laws_of(analysis) if name in dict(verdict.excluded)]
+    excluded = [name for name in laws_of(analysis) if name in verdict.excluded]
     also = f"; {enumeration(excluded)} {'is' if len(excluded) == 1 else 'are'} excluded" if excluded else ""
     return f"Spin-down{together}: the {best} law, {equation}, describes the readings{also}"
 
@@ -212,7 +212,7 @@ def _draw_weights(axes: Axes, analysis: SpinDownAnalysis) -> None:
 def _note(analysis: SpinDownAnalysis, name: str, *, short: bool = False) -> str:
     """The verdict on a law in a word or two, or if `short` in the least that says it."""
     verdict, best = analysis.combined.verdict, name == analysis.combined.best
-    if name in dict(verdict.excluded):
+    if name in verdict.excluded:
         return "excluded"
     if best:
         return "best" if verdict.decided else "first" if verdict.describes else "nearest"
@@ -261,7 +261,7 @@ def _power_of_ten(values: Array) -> int:
 def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> None:
     """Readings and every law less the best one, which is the line at zero, with the band of its u."""
     best, several = analysis.combined.best, len(analysis.runs)
-    excluded = dict(analysis.combined.verdict.excluded)
+    excluded = analysis.combined.verdict.excluded
     found: list[float] = []
     for k, run in enumerate(analysis.runs):
         found += [*(run.fit(best).residuals + 1.5 * unit.usual), *(run.fit(best).residuals - 1.5 * unit.usual)]
@@ -323,7 +323,7 @@ def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit
         name: [run.fit(name).residuals / of for run, of in zip(analysis.runs, unit.of, strict=True)] for name in laws
     }
     reach = {name: max(float(np.abs(one).max()) for one in of) for name, of in values.items()}
-    excluded = dict(analysis.combined.verdict.excluded)
+    excluded = analysis.combined.verdict.excluded
     good = [reach[name] for name in laws if name not in excluded] or [reach[analysis.combined.best]]
     common = max(_LEAST_SCALE, _ROOM * max(good))
     far = {name for name in laws if reach[name] > _BEYOND * common}

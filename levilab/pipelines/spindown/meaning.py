@@ -11,6 +11,7 @@ import numpy as np
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
 from levilab.pipelines.spindown.laws import SYMBOLS
+from levilab.pipelines.spindown.words import is_seen
 from levilab.present.numbers import enumeration, plain, with_uncertainty
 
 if TYPE_CHECKING:
@@ -39,25 +40,14 @@ def meaning(analysis: SpinDownAnalysis) -> tuple[str, ...]:
 
 
 def _law(analysis: SpinDownAnalysis) -> Iterator[str]:
-    combined = analysis.combined
-    best, verdict = combined.best, combined.verdict
-    stats = combined.fit(best).statistics
+    verdict = analysis.combined.verdict
     if not verdict.describes:
         yield (
-            "No law of drag describes these readings, so no constant below is one of the top: something other than "
-            "drag moved its spin, or the counter counted something else."
+            "No constant below is one of the top: something other than drag moved its spin, or the counter counted "
+            "something else."
         )
-        return
-    left = f"it leaves {digits(1e3 * stats.rms_residual)} mHz a reading"
-    if verdict.decided:
-        yield f"The {best} law describes the readings; {left}. {_torque(best)}"
-        return
-    others = [name for name in verdict.indistinguishable if name != best]
-    beside = f" as well as {enumeration(others)}" if others else ""
-    yield (
-        f"The {best} law describes the readings{beside}; {left}. Which law of drag is right these readings do not "
-        "decide; it takes a longer fall of the spin, or less scatter."
-    )
+    elif verdict.decided:
+        yield _torque(verdict.best)
 
 
 def _torque(law: str) -> str:
@@ -129,7 +119,7 @@ def _exponent(analysis: SpinDownAnalysis) -> Iterator[str]:
 
 def _tilt(analysis: SpinDownAnalysis) -> Iterator[str]:
     tilt = analysis.combined.tilt
-    if tilt and tilt.value:
+    if tilt and tilt.value and is_seen(tilt):
         yield (
             f"The magnet's moment points {digits(math.degrees(tilt.value))}° off the axis of the top: it wobbles with "
             "its spin, more and more towards the fall, and the counter counts a little more than the spin."

@@ -40,6 +40,7 @@ class Readings:
     """Spin readings, each array of shape (n,): increasing `time` [s], positive `frequency` and its `u` [Hz].
 
     driven: whether a drive is known to have brought the top to its spin.
+    upright: whether the top is known to have no tilt: it stands on a virtual bench, and only spins there.
     doubtful: whether the unit is in doubt; means over several runs leave such a run out.
     """
 
@@ -48,6 +49,7 @@ class Readings:
     u: "NDArray[np.float64] | None"
     warnings: tuple[str, ...]
     driven: bool = False
+    upright: bool = False
     doubtful: bool = False
 
     def __len__(self) -> int:
@@ -72,7 +74,7 @@ SAME = 1e-9
 
 def read_run_readings(run: "Run", _: "InputOptions") -> Readings:
     """The readings of a run of the experiment `spin`, which drives the top up."""
-    return replace(spin_readings(run.readings()), driven=True)
+    return replace(spin_readings(run.readings()), driven=True, upright=run.record.world == "spin")
 
 
 def read_spin_file(path: "Path", options: "InputOptions") -> Readings:

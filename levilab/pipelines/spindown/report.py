@@ -28,9 +28,10 @@ from levilab.pipelines.spindown.table import (
     law_constants,
     quality_table,
 )
+from levilab.pipelines.spindown.words import verdict_of_run
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Details, Listing, Note, Paragraph, Points, Tabular
-from levilab.present.numbers import column, ends, off, reading, short_name, with_decimals, with_uncertainty
+from levilab.present.numbers import column, off, reading, short_name, with_decimals, with_uncertainty
 from levilab.present.tables import Row, Table, table
 from levilab.present.units import unit as unit_row
 from levilab.runs.events import RunEvent
@@ -64,7 +65,7 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
         subject="spin-down",
         heading="Spin-down of a levitated top",
         lead=f"{n} readings used",
-        verdict=combined.verdict.text,
+        verdict=analysis.text,
         result=(*_meaning(analysis), *_falls(analysis), *_laws(analysis), *_count(analysis)),
         figure=FigureText(
             title="Spin-down.",
@@ -81,7 +82,7 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
             analysis,
             _in_words,
             lambda source, run, options: (_readings(source, run, options, combined.best),),
-            lambda run: run.verdict.text,
+            verdict_of_run,
         ),
     )
 
@@ -116,10 +117,10 @@ def _laws(analysis: SpinDownAnalysis) -> tuple[Tabular, Tabular]:
     n = analysis.combined.fit(analysis.combined.best).statistics.n
     low, high = max(2 - 4 / math.sqrt(n), 0), min(2 + 4 / math.sqrt(n), 4)
     u = "Of a mean it comes from the scatter s of the runs, u = s/√N." if several else "ν₀: the spin at first."
-    constants = f"{VALUE_U} {u}{'' if several else _intervals(analysis)}"
+    constants = f"{VALUE_U} {u}"
     quality = (
-        "constants: how many were fitted, beside the start of each run; the exponent is common to all runs, and the "
-        "tilt δ counts where the readings show it. χ²/dof is near 1 where a law leaves nothing but the readings' own "
+        "constants: how many were fitted, beside the start of each run; the exponent is common to all runs."
+        " χ²/dof is near 1 where a law leaves nothing but the readings' own "
         "uncertainty. ΔAICc counts against a law, more than 10 "
         "excludes it; weight: the law's share of the evidence (Akaike). Order test p (Wald–Wolfowitz): how probable it "
         "is that residuals in random order change their sign so seldom, or so often; below 0.01 they have a shape. "
@@ -136,8 +137,7 @@ def _count(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
     """What the count holds beside the spin."""
     found = count_table(analysis)
     if found is None:
-        text = "These readings show no tilt of the top's moment. What one that noise hides could change is part of the "
-        return (Note(f"{text}uncertainties."),)
+        return (Note("The top is taken to turn upright: what a tilt of its moment would change is in no uncertainty."),)
     explained = (
         "A counter counts turns about the vertical. A moment that points off the axis by δ makes the top wobble with "
         "its spin, the more the nearer the spin is to the resonance ν_r, and the count is higher than the spin by what "
@@ -159,15 +159,9 @@ def _run_by_run(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
         f"of the {best}."
     )
     several = " s: standard deviation of one run's constant from another's; the uncertainty of the mean is s/√N."
-    note = f"ν₀: the spin at the first reading.{several if len(analysis.runs) > 1 else ''}{_intervals(analysis)}"
+    note = f"ν₀: the spin at the first reading.{several if len(analysis.runs) > 1 else ''}"
     shown = Tabular("spindown-runs", _by_run_table(analysis), note, first_column_wraps=True)
     return Paragraph(paper), shown
-
-
-def _intervals(analysis: SpinDownAnalysis) -> str:
-    """What the brackets hold where there are some."""
-    asked = {origin.options.uncertainty for origin in analysis.origins} - {"covariance"}
-    return f" In brackets: the 68 % interval ({' and '.join(sorted(asked))})." if asked else ""
 
 
 def _laws_table(analysis: SpinDownAnalysis) -> Table:
@@ -182,19 +176,12 @@ def _laws_table(analysis: SpinDownAnalysis) -> Table:
 def _law_cells(analysis: SpinDownAnalysis, law: CombinedLaw) -> tuple[str, ...]:
     name = law.name + (" (best)" if is_best(analysis, law.name) else "")
     constants = [
-        f"{SYMBOLS[of]} = {with_uncertainty(value)} {interval(value)}".rstrip()
-        for of, value in law_constants(analysis, law.name).items()
+        f"{SYMBOLS[of]} = {with_uncertainty(value)}" for of, value in law_constants(analysis, law.name).items()
     ]
     if len(analysis.runs) == 1:
         return name, "\n".join(constants)
     scatters = [with_uncertainty(s) if (s := scatter(mean)) else "—" for mean in law.constants.values()]
     return name, "\n".join(constants), "\n".join(scatters)
-
-
-def interval(estimate: Estimate) -> str:
-    """The 68 % interval where one was asked for."""
-    found = ends(estimate)
-    return f"[{found[0]} … {found[1]}]" if found else ""
 
 
 @dataclass(frozen=True)
@@ -207,14 +194,9 @@ class _Column:
 
     @property
     def cells(self) -> list[str]:
-        """The runs, with their intervals; of several runs mean and scatter, empty where there is none."""
+        """The runs; of several runs mean and scatter, empty where there is none."""
         together = [self.mean, scatter(self.mean) if self.mean else None] if len(self.estimates) > 1 else []
-        shown = column([*self.estimates, *together])
-        intervals = [interval(one) if one else "" for one in self.estimates] + [""] * len(together)
-        return [
-            f"{cell}\n{more}".rstrip() if cell != "—" or more else ""
-            for cell, more in zip(shown, intervals, strict=True)
-        ]
+        return ["" if cell == "—" else cell for cell in column([*self.estimates, *together])]
 
 
 def _by_run_table(analysis: SpinDownAnalysis) -> Table:

@@ -16,7 +16,6 @@ from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
 from levilab.pipelines.spindown.quantities import OF_RUN
 from levilab.present.numbers import (
     column,
-    ends,
     plain,
     share,
     short_name,
@@ -97,7 +96,7 @@ def law_constants(analysis: SpinDownAnalysis, name: str) -> Mapping[str, Estimat
     if len(analysis.runs) > 1:
         return analysis.combined.fit(name).constants
     found = analysis.runs[0].fit(name).parameters
-    excluded = name in dict(analysis.combined.verdict.excluded)
+    excluded = name in analysis.combined.verdict.excluded
     return {one: value for one, value in found.items() if not (excluded and one in WOBBLE)}
 
 
@@ -138,16 +137,17 @@ def count_table(analysis: SpinDownAnalysis, *, symbols: bool = False) -> Table |
         fit = run.fit(run.best)
         tilt, resonance = (fit.parameters.get(name) for name in ("moment_tilt", "resonance"))
         added = tilt_part(fit, run.time)
-        effective, seen = fit.statistics.n_effective, run.correlation
+        seen = run.correlation if run.is_correlated else None
+        rho, n = (seen.value or 0.0) if seen else 0.0, len(run.time)
         rows.append(
             Row(
                 (
                     short_name(source.name),
-                    without_unit(tilt) if tilt else "not seen",
+                    without_unit(tilt) if tilt else "none",
                     without_unit(resonance) if resonance else "—",
                     plain(float(added[-1]), 2) if tilt else "—",
-                    f"{seen.value:.2f} ± {seen.u:.2f}" if seen and run.is_correlated else "none",
-                    f"{len(run.time)}" if effective is None else f"{digits(effective)} of {len(run.time)}",
+                    f"{rho:.2f} ± {seen.u:.2f}" if seen else "none",
+                    f"{digits(n * (1 - rho) / (1 + rho))} of {n}" if seen else f"{n}",
                 )
             )
         )
@@ -162,7 +162,7 @@ def tilt_part(fit: LawFit, time: Array) -> Array:
     """What tilt and wobble add to the count at some times [Hz], shape (n,); zeros for a fit without them."""
     p = len(fit.law.parameters)
     tau = (time - fit.start_time) / fit.reference[1]
-    spin: Array = fit.reference[0] * counted(fit.law, tau, fit.solution[:p])
+    spin: Array = fit.reference[0] * counted(fit.law, tau, fit.solution[:p], fit.top)
     return fit.spin_frequency(time) - spin
 
 
@@ -189,15 +189,7 @@ def _lines_table(analysis: SpinDownAnalysis) -> Table:
 
 
 def _equations(estimates: Mapping[str, Estimate]) -> list[str]:
-    return [
-        f"{SYMBOLS[name]} = {with_uncertainty(estimate)}{_interval(estimate)}" for name, estimate in estimates.items()
-    ]
-
-
-def _interval(estimate: Estimate) -> str:
-    """The 68 % interval where one was asked for."""
-    found = ends(estimate)
-    return f", 68 %: {found[0]} … {found[1]}" if found else ""
+    return [f"{SYMBOLS[name]} = {with_uncertainty(estimate)}" for name, estimate in estimates.items()]
 
 
 def _head(estimates: Mapping[str, Estimate]) -> str:

@@ -4,13 +4,11 @@ import dataclasses
 import functools
 import itertools
 
-import lmfit
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2, linregress
-from scipy.stats import t as student
 
 from analysis.errors import (
     AnalysisError,
@@ -22,8 +20,12 @@ from analysis.errors import (
     TooFewReadings,
     UnknownName,
 )
+from analysis.spindown import fit as spin_down_fit
 from analysis.spindown.drag import LAWS, spin
-from analysis.spindown.fit import fit_spin_down
+
+fit_spin_down = functools.partial(
+    spin_down_fit.fit_spin_down, tilt=False
+)  # a top that only spins; test_tilt.py has others
 
 T = np.arange(0, 200, 10.0)
 SIGMA = 0.03  # [Hz], the noise of PHYSICS.md §5
@@ -74,13 +76,14 @@ def test_readings_without_noise_give_their_constants_back(law, u):
 
 
 def test_the_uncertainty_of_the_curve_is_its_scatter_over_repetitions():
-    fits = [
-        fit_spin_down(T, readings(seed=seed), SIGMA, laws=["power"], tilt=False).fit("power") for seed in range(100)
-    ]
+    fits = [fit_spin_down(T, readings(seed=seed), SIGMA, laws=["power"]).fit("power") for seed in range(100)]
     at = T[[0, 10, -1]]
     scatter = np.std([fit.spin_frequency(at) for fit in fits], axis=0)
     stated = np.mean([fit.u_spin_frequency(at) for fit in fits], axis=0)
-    assert scatter == pytest.approx(stated, rel=0.21)  # 3 standard errors of a standard deviation from 100
+    # a correlation that 20 readings cannot rule out is in u, the more the more readings a value is a mean of;
+    # 0.21: three standard errors of a standard deviation from 100
+    assert (scatter < 1.21 * stated).all()
+    assert (scatter > 0.75 * 0.79 * stated).all()
 
 
 def test_the_curve_has_no_uncertainty_where_its_parameters_have_none():
@@ -108,7 +111,7 @@ def fitted():
     @functools.cache
     def runs(law, u):
         truth = readings(law, sigma=0)
-        return [fit_spin_down(T, truth + noise, u, laws=[law], tilt=False) for noise in noises()]
+        return [fit_spin_down(T, truth + noise, u, laws=[law]) for noise in noises()]
 
     return runs
 
@@ -119,9 +122,10 @@ def test_constants_are_unbiased_and_their_uncertainties_true(law, fitted):
     found, u = np.array([values(fit) for fit in fits]), np.array([uncertainties(fit) for fit in fits])
     # c of the power law is skew, by half of u(ln c) = 0.08; of the others nothing but rounding
     assert np.abs((found.mean(axis=0) - truth) / found.std(axis=0)).max() < 0.1
-    # one run in 14 is taken for correlated and has a larger u: 0.6827 + 0.02; 0.1 is two standard errors of 80 pairs
-    assert (np.abs(found - truth) < u).mean(axis=0) == pytest.approx(0.70, abs=0.1)
-    assert found.std(axis=0) / np.median(u, axis=0) == pytest.approx(1, abs=0.05)
+    # u allows for a correlation that 20 readings cannot rule out: 1.15 to 1.25 times as large as without.  0.1 is two
+    # standard errors of 80 pairs
+    assert (np.abs(found - truth) < u).mean(axis=0) == pytest.approx(0.77, abs=0.1)
+    assert found.std(axis=0) / np.median(u, axis=0) == pytest.approx(0.87, abs=0.1)
 
 
 @pytest.mark.parametrize("law", ["disc", "power"])  # of two and of three parameters
@@ -129,22 +133,56 @@ def test_without_stated_uncertainties_the_intervals_cover_as_students_t(law, fit
     truth = np.array([40.0, *CONSTANTS[law]])
     fits = [run.fits[0] for run in fitted(law, None)]
     covered = np.array([np.abs(values(fit) - truth) < uncertainties(fit) for fit in fits]).mean(axis=0)
-    expected = 1 - 2 * student.sf(1, len(T) - len(truth)) + 0.02  # one run in 14 is taken for correlated
-    assert covered == pytest.approx(expected, abs=0.1)  # two standard errors of 80 pairs
+    # more than Student's 0.67, since independent noise is not known to be that; 0.1: two standard errors of 80 pairs
+    assert covered == pytest.approx(0.82, abs=0.1)
 
 
-def test_the_covariance_in_textbook_constants_is_that_of_the_textbook_fit():
-    fit = fit_spin_down(T, readings("power"), SIGMA, laws=["power"], tilt=False).fit("power")
+def likelihood(fit, u):
+    """Return −2 ln of the greatest likelihood of a law: dense matrices, s at its mode, a mean over τ."""
+    p, (frequency, _) = len(fit.law.parameters), fit.reference
+    scale = np.ones(T.size) if u is None else np.full(T.size, u)
+    slopes = np.array([
+        (spin(fit.name, T, *(values(fit) + step)) - spin(fit.name, T, *(values(fit) - step))) / 2e-4
+        for step in np.diag(values(fit)) * 1e-4
+    ]) / scale  # fmt: skip
+    own, freedom = fit.residuals / scale, 0 if u is None else 8
+    chances = []
+    for tau in 10 ** np.linspace(-1, 1, 9):
+        r = np.exp(-np.abs(np.subtract.outer(T, T)) / (10 * tau))
+        w = np.linalg.inv(r)
+        e = own - slopes.T @ np.linalg.solve(slopes @ w @ slopes.T, slopes @ w @ own)
+        s2 = (freedom + e @ w @ e) / (T.size + freedom)
+        total = T.size + freedom
+        chances.append(np.exp(-(total * np.log(s2) + total + np.linalg.slogdet(r)[1]) / 2))
+    assert frequency > 0
+    assert p == len(slopes)
+    return -2 * np.log(np.mean(chances))
 
-    def misfit(p):
-        return (spin("power", T, *(v.value for v in p.values())) - readings("power")) / SIGMA
 
-    start = lmfit.create_params(nu=40.0, c=2.34e-4, n=1.5)
-    peer = lmfit.minimize(misfit, start, scale_covar=False, epsfcn=1e-10)
-    # 1e-3 and 1e-2: lmfit's numerical slopes in strongly correlated parameters are the worse ones
-    assert values(fit) == pytest.approx([v.value for v in peer.params.values()], rel=1e-3)
-    assert np.sqrt(np.diagonal(fit.covariance)) == pytest.approx(np.sqrt(np.diagonal(peer.covar)), rel=1e-2)
-    assert np.sqrt(np.diagonal(fit.covariance)) == pytest.approx(uncertainties(fit), rel=1e-12)
+@pytest.mark.parametrize("u", [SIGMA, None])
+def test_criteria_are_the_textbooks_with_the_noise_averaged_over(u):
+    known = fit_spin_down(T, readings(), u).fit("power").statistics
+    n, k = 20, 4
+    misfit = likelihood(fit_spin_down(T, readings(), u).fit("power"), u)
+    assert known.misfit == pytest.approx(misfit, abs=2e-2)  # its slopes are differences
+    assert known.aicc == pytest.approx(known.misfit + 2 * k + 2 * k * (k + 1) / (n - k - 1))
+    assert known.bic == pytest.approx(known.misfit + k * np.log(n))
+    assert (known.reduced_chi_square is None) == (u is None)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.6])
+def test_u_grows_with_the_noise_without_a_step(rho):
+    """Walked through all sizes of noise, from half the stated u to four times of it."""
+    rng = np.random.default_rng(3)
+    noise = np.linalg.cholesky(rho ** np.abs(np.subtract.outer(range(20), range(20)))) @ rng.normal(size=20)
+    sizes = np.geomspace(0.5, 4.0, 120)
+    u = np.array([
+        fit_spin_down(T, readings(sigma=0) + SIGMA * size * noise, SIGMA, laws=["disc"]).fits[0].parameters["c32"].u
+        for size in sizes
+    ])  # fmt: skip
+    # the scatter grows by 1.75 % from one size to the next, u by no more and never by a step
+    assert np.abs(np.diff(np.log(u))).max() < 0.02
+    assert u[-1] > 2 * u[0]
 
 
 def test_one_uncertainty_each_weighs_the_readings():
@@ -153,7 +191,8 @@ def test_one_uncertainty_each_weighs_the_readings():
     y[3] += 0.5
     u[3] = 1e6  # such a reading says nothing: the fit is that of the others
     others = fit_spin_down(np.delete(T, 3), np.delete(y, 3), SIGMA).fit("disc")
-    assert values(fit_spin_down(T, y, u).fit("disc")) == pytest.approx(values(others), rel=1e-8)
+    # but for what it says of its neighbours' noise, whose correlation is not known: a sixth of their u
+    assert (np.abs(values(fit_spin_down(T, y, u).fit("disc")) - values(others)) < uncertainties(others) / 6).all()
 
 
 @pytest.mark.parametrize(
@@ -183,20 +222,6 @@ def test_the_fitted_curve_goes_through_the_readings_on_their_own_clock():
 # -------------------------------------------------------------------------------------------------- statistics, verdict
 
 
-def test_criteria_are_the_textbooks():
-    y = readings()
-    known, unknown = fit_spin_down(T, y, SIGMA).fit("power"), fit_spin_down(T, y).fit("power")
-    n, p, rss = 20, 3, (known.residuals**2).sum()
-    chi2 = rss / SIGMA**2
-    assert known.statistics.reduced_chi_square == pytest.approx(chi2 / (n - p))
-    assert known.statistics.aicc == pytest.approx(chi2 + 2 * p + 2 * p * (p + 1) / (n - p - 1))
-    assert known.statistics.bic == pytest.approx(chi2 + p * np.log(n))
-    k = p + 1
-    assert unknown.statistics.aicc == pytest.approx(n * np.log(rss / n) + 2 * k + 2 * k * (k + 1) / (n - k - 1))
-    assert unknown.statistics.bic == pytest.approx(n * np.log(rss / n) + k * np.log(n))
-    assert unknown.statistics.reduced_chi_square is None
-
-
 def test_weights_are_akaikes():
     fits = fit_spin_down(T, readings(sigma=0.3), 0.3).fits
     aicc = np.array([fit.statistics.aicc for fit in fits])
@@ -204,98 +229,67 @@ def test_weights_are_akaikes():
     assert [fit.statistics.weight for fit in fits] == pytest.approx(expected / expected.sum())
 
 
-@pytest.mark.parametrize(("u", "exponent_u"), [(SIGMA, 0.015), (None, 0.009)])
-def test_precise_readings_of_a_disc_exclude_stokes_and_newton(u, exponent_u):
+@pytest.mark.parametrize("u", [SIGMA, None])
+def test_precise_readings_of_a_disc_exclude_stokes_and_newton(u):
     verdict = fit_spin_down(T, readings(), u).verdict
-    assert {name for name, _ in verdict.excluded} == {"stokes", "newton"}
+    assert set(verdict.excluded) == {"stokes", "newton"}
     assert "disc" in verdict.indistinguishable
-    assert all("ΔAICc" in reason and "Hz rms" in reason for _, reason in verdict.excluded)
     assert verdict.decided
-    assert f"power, n = 1.495 ± {exponent_u}" in verdict.text
 
 
 def test_readings_on_a_law_to_rounding_are_called_too_good_to_be_measured():
     time = np.arange(0, 80, 10.0)
     run = fit_spin_down(time, 40 - 0.1 * time)  # a power law with n = 0
-    assert "n = 0, fits best" in run.verdict.text
-    assert "too good to be measured" in " ".join(run.warnings)
+    assert run.best == "power"
+    assert "calculated" in kinds(run)
     rounded = np.round(spin("disc", T, 40.0, 2.34e-4), 6)
-    assert "too good" not in " ".join(fit_spin_down(T, rounded).warnings)
+    assert "calculated" not in kinds(fit_spin_down(T, rounded))
 
 
-def test_rough_readings_cannot_tell_and_say_why():
+def kinds(thing):
+    return [remark.kind for remark in thing.remarks]
+
+
+def test_rough_readings_cannot_tell():
     verdict = fit_spin_down(T, readings(sigma=3.0), 3.0).verdict
     assert verdict.excluded == ()
     assert {"stokes", "newton", "disc"} <= {*verdict.indistinguishable, *verdict.weak}
     assert not verdict.decided
-    assert "differ too little" in verdict.text
 
 
 def test_a_fall_by_one_per_cent_cannot_tell_the_laws_apart():
     time = np.linspace(0, 3, 20)
     run = fit_spin_down(time, readings(time=time), SIGMA)
     assert run.verdict.excluded == ()
-    assert "a fall of the spin by 1" in run.verdict.text
     assert not run.verdict.decided
     assert run.fit("power").parameters["exponent"].u > 10
     assert_finite(run)
 
 
-def test_understated_uncertainties_are_enlarged_by_the_birge_ratio_and_exclude_nothing_falsely():
+def test_understated_uncertainties_are_enlarged_and_exclude_nothing_falsely():
     y = readings(sigma=0.3)
     run, honest = fit_spin_down(T, y, 0.003), fit_spin_down(T, y)
-    assert uncertainties(run.fit("disc")) == pytest.approx(uncertainties(honest.fit("disc")), rel=1e-6)
-    assert "misses the readings by" in run.warnings[-1]
+    # a stated u counts as 8 readings beside 18, so u is smaller by √(18/26), and the correlation seems better known
+    ratio = uncertainties(run.fit("disc")) / uncertainties(honest.fit("disc"))
+    assert (0.8 * np.sqrt(18 / 26) < ratio).all()
+    assert (ratio < 1).all()
+    assert "understated" in kinds(run)
     assert run.fit("newton").statistics.difference < 100  # it would be 1e4 if 0.003 Hz were believed
 
 
 def test_readings_without_uncertainty_are_warned_of():
-    (warning,) = fit_spin_down(T, readings()).warnings
-    assert "no uncertainties of the readings were given" in warning
-    assert fit_spin_down(T, readings(), SIGMA).warnings == ()
+    assert kinds(fit_spin_down(T, readings())) == ["no u"]
+    assert kinds(fit_spin_down(T, readings(), SIGMA)) == []
 
 
 def test_a_constant_well_below_zero_is_called_unphysical():
     falls_evenly = 40 - T / 10  # exponent 0: c2 must undo c1's curvature
-    assert "c2 is negative by" in fit_spin_down(T, falls_evenly, SIGMA).fit("mixed").warnings[0]
+    (remark,) = fit_spin_down(T, falls_evenly, SIGMA).fit("mixed").remarks
+    assert (remark.kind, remark.name) == ("negative", "c2")
     for seed in range(20):  # and not on account of noise
         fit = fit_spin_down(T, readings("newton", seed=seed), SIGMA, laws=["mixed"]).fit("mixed")
         c1 = fit.parameters["c1"]
-        assert (fit.warnings != ()) == (c1.value < -2 * c1.u)
-
-
-# ---------------------------------------------------------------------------------------------------------- intervals
-
-
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("u", [SIGMA, None])
-def test_profile_intervals_agree_with_the_covariance_on_good_readings(law, u):
-    fit = fit_spin_down(T, readings(law), u, laws=[law], uncertainty="profile").fits[0]
-    # with u unknown the interval is Student's: 1.03 u for 17 or 18 degrees of freedom; c of the power law is skew
-    widening = 1.0 if u else student.ppf(0.841345, fit.statistics.degrees_of_freedom)
-    for estimate in fit.parameters.values():
-        low, high = estimate.interval
-        assert (high - low) / 2 / estimate.u == pytest.approx(widening, abs=0.02)
-        assert low < estimate.value < high
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_bootstrap_intervals_agree_with_the_covariance_on_good_readings(law):
-    time = np.linspace(0, 190, 200)  # many readings, so that their own scatter is known to 5 %
-    fit = fit_spin_down(
-        time, readings(law, time=time), laws=[law], uncertainty="bootstrap", bootstrap_samples=600
-    ).fits[0]
-    for estimate in fit.parameters.values():
-        low, high = estimate.interval
-        assert (high - low) / 2 / estimate.u == pytest.approx(1, abs=0.2)  # 3 errors of percentiles of 600: 0.06
-
-
-def test_the_bootstrap_repeats_with_its_seed():
-    def interval(seed):
-        run = fit_spin_down(T, readings(), laws=["disc"], uncertainty="bootstrap", bootstrap_samples=20, seed=seed)
-        return run.fits[0].parameters["c32"].interval
-
-    assert interval(1) == interval(1) != interval(2)
+        assert (fit.remarks != ()) == (c1.value < -2 * c1.u)
 
 
 # ----------------------------------------------------------------------------------------------------------- outliers
@@ -310,7 +304,7 @@ def test_a_miscounted_reading_is_found_named_and_left_out(index, factor, u):
     run = fit_spin_down(T, y, u, laws=["disc"])
     clean = fit_spin_down(np.delete(T, index), np.delete(y, index), u, laws=["disc"])
     assert run.outliers == (index,)
-    assert f"{y[index]:.6g} Hz at {T[index]:.6g} s" in run.warnings[0]
+    assert run.remarks[0].values[:2] == (T[index], y[index])
     assert run.time.size == run.fit("disc").residuals.size == 19
     constant = [fitted.fit("disc").parameters["c32"].value for fitted in (run, clean)]
     assert constant[0] == pytest.approx(constant[1], rel=1e-9)
@@ -321,7 +315,8 @@ def test_outliers_are_kept_on_request_and_still_named():
     y[7] *= 2
     run = fit_spin_down(T, y, SIGMA, keep_outliers=True)
     assert (run.outliers, run.time.size) == ((7,), 20)
-    assert "kept" in run.warnings[0]
+    *_, kept, _ = run.remarks[0].values
+    assert kept
 
 
 def test_an_outlier_is_so_far_away_as_the_warning_says():
@@ -329,13 +324,15 @@ def test_an_outlier_is_so_far_away_as_the_warning_says():
     y[19] += 1.5
     run = fit_spin_down(T, y, SIGMA, laws=["disc"])
     off = y[19] - run.fit("disc").spin_frequency(T[19])
-    assert f"{off:.2g} Hz from the disc law, {off / SIGMA:.2g} times its uncertainty" in run.warnings[0]
-    assert "the top may already have been falling" in run.warnings[0]
+    _, _, distance, times, stated, _, falling = run.remarks[0].values
+    assert (distance, times) == pytest.approx((off, off / SIGMA))
+    assert stated
+    assert falling
     unknown = fit_spin_down(T, y, laws=["disc"])
     rms = unknown.fit("disc").statistics.rms_residual
-    assert f"{off / rms:.2g} times the rms residual of the others" in unknown.warnings[0]
+    assert unknown.remarks[0].values[3] == pytest.approx(unknown.remarks[0].values[2] / rms)
     y[19], y[7] = readings()[19], 2 * y[7]
-    assert "falling" not in fit_spin_down(T, y, SIGMA, laws=["disc"]).warnings[0]
+    assert not fit_spin_down(T, y, SIGMA, laws=["disc"]).remarks[0].values[-1]
 
 
 @pytest.mark.parametrize("u", [SIGMA, None])
@@ -364,11 +361,11 @@ def test_three_readings_of_unknown_uncertainty_leave_three_parameters_without_on
     run = fit_spin_down([0, 100, 190], [40.0, 29.4, 21.9])
     power = run.fit("power")
     assert all(estimate.u is None for estimate in power.parameters.values())
-    assert "pass through 3 readings" in power.warnings[0]
+    assert power.remarks[0].kind == "no freedom"
     assert run.fit("disc").parameters["c32"].u > 0
     assert run.best in {"stokes", "newton", "disc"}
     assert run.verdict.excluded == ()
-    assert "too few to compare" in run.warnings[-1]
+    assert run.remarks[-1].kind == "few readings"
     assert_finite(run)
 
 
@@ -377,7 +374,7 @@ def test_one_decade_of_time_and_spin():
     run = fit_spin_down(time, readings(time=time), SIGMA)
     exponent = run.fit("power").parameters["exponent"]
     assert abs(exponent.value - 1.5) < 3 * exponent.u < 0.01
-    assert {"stokes", "newton", "mixed"} <= {name for name, _ in run.verdict.excluded}
+    assert {"stokes", "newton", "mixed"} <= set(run.verdict.excluded)
 
 
 @pytest.mark.parametrize("scale", [1e-12, 1e12])
@@ -397,13 +394,13 @@ def test_a_c_that_is_known_only_to_a_factor_is_called_so():
     fit = fit_spin_down(time, readings(time=time), SIGMA, laws=["power"]).fits[0]
     c = fit.parameters["c"]
     assert c.u > 0.5 * c.value
-    assert "known only to a factor" in fit.warnings[0]
+    assert fit.remarks[0].kind == "factor"
 
 
 def test_a_c_beyond_all_floats_is_none_with_a_warning():
     fit = fit_spin_down([0, 100, 190], [40.0, 21.91, 21.9], SIGMA, laws=["power"]).fits[0]
     assert fit.parameters["c"].value is None
-    assert any("too large or too small for a number" in warning for warning in fit.warnings)
+    assert "out of range" in kinds(fit)
     assert_finite(fit)
 
 
@@ -473,8 +470,6 @@ def test_readings_that_cannot_be_used_are_refused_in_one_sentence(error, text, a
 def test_unknown_names_are_refused_with_the_known_ones():
     with pytest.raises(UnknownName, match="stokes, newton, disc, mixed, power"):
         fit_spin_down(T, Y, laws=["storks"])
-    with pytest.raises(UnknownName, match="covariance, profile, bootstrap"):
-        fit_spin_down(T, Y, uncertainty="guess")
 
 
 def test_results_do_not_change_with_the_callers_arrays():
@@ -491,14 +486,14 @@ def test_a_law_is_never_excluded_for_the_number_of_its_constants():
     for seed in range(20):
         time = np.linspace(0, 190, 6)
         verdict = fit_spin_down(time, readings(time=time, seed=seed)).verdict
-        assert "power" not in [name for name, _ in verdict.excluded]
+        assert "power" not in verdict.excluded
 
 
 def test_every_law_stands_in_exactly_one_list():
     for n, u in itertools.product((3, 4, 5, 6, 8, 20), (None, SIGMA)):
         time = np.linspace(0, 190, n)
         verdict = fit_spin_down(time, readings(time=time), u).verdict
-        listed = [*verdict.indistinguishable, *verdict.needless, *verdict.weak, *(name for name, _ in verdict.excluded)]
+        listed = [*verdict.indistinguishable, *verdict.needless, *verdict.weak, *verdict.excluded]
         assert sorted(listed) == sorted(LAWS)
 
 
@@ -507,6 +502,6 @@ def test_an_uncertainty_stated_far_too_small_or_too_large_is_reported_and_change
     y = readings()
     true, small, large = (fit_spin_down(T, y, u) for u in (SIGMA, 1e-11, 1.0))
     assert small.best == true.best
-    assert {name for name, _ in small.verdict.excluded} == {"stokes", "newton"}
-    assert "enlarged by that ratio" in small.warnings[0]
-    assert "are these too large?" in large.warnings[0]
+    assert set(small.verdict.excluded) == {"stokes", "newton"}
+    assert "understated" in kinds(small)
+    assert "overstated" in kinds(large)

@@ -41,7 +41,7 @@ RECORD = SAMPLE_DATA / "scope-files" / "rigol-ds1000z.csv"
 
 #: Analysis → a run, options for its bare readings, a value, and the truth: what made the readings, or was published.
 CASES = {
-    "spindown": ("spin-down-1", {}, "c32", 2.3711e-4),
+    "spindown": ("spin-down-1", {"tilt": "none"}, "c32", 2.3711e-4),
     "field": ("field-scan", {"device": DEVICE}, "strength", 1.409299e-3),
     "limit": ("lower-limits", {}, "mean", 21.86),
     "precession": ("precession-sweep", {}, "slope", 1.0),
@@ -281,7 +281,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str | type[levilab.LevilabError]]] = {
     "two kinds": (lambda: levilab.analyze([SAMPLE_DATA / "spin-down-1", SAMPLE_DATA / "field-scan"]), DoesNotSuit),
     "no file": (lambda: levilab.analyze("nowhere.csv"), DataError),
     "foreign option": (lambda: levilab.analyze(spin_down(), method="edges"), "method"),
-    "no such word": (lambda: levilab.analyze(spin_down(), uncertainty="x"), "uncertainty"),
+    "no such word": (lambda: levilab.analyze(spin_down(), tilt="x"), "tilt"),
     "no positive u": (lambda: levilab.analyze(spin_down(), reading_u=-1.0), "reading_u"),
     "u alone": (lambda: levilab.analyze(spin_down(), height_u_m=1e-3), "height_u_m"),
     "height alone": (lambda: levilab.analyze(SAMPLE_DATA / "field-scan", height_m=0.07), DataError),
@@ -349,8 +349,8 @@ def test_a_person_who_cannot_be_asked_ends_the_experiment(monkeypatch: pytest.Mo
 
 def test_readings_of_a_run_are_drawn_channel_by_channel() -> None:
     figure = levilab.load(SAMPLE_DATA / "field-scan").plot()
-    assert [panel.get_ylabel() for panel in figure.axes] == ["flux density  [T]"]
-    assert figure.axes[-1].get_xlabel() == "height  [m]"
+    assert [panel.get_ylabel() for panel in figure.axes] == ["flux density  [mT]"]
+    assert figure.axes[-1].get_xlabel() == "height  [cm]"
     assert len(levilab.load(SAMPLE_DATA / "upper-limits").plot().axes) == 4
 
 

@@ -79,7 +79,7 @@ def test_a_budget_is_of_the_value_that_the_result_has(found: dict[str, Any], cas
 def test_a_law_as_good_with_fewer_constants_has_its_budget_too(tmp_path: Path):
     analysis = analyzed("spindown", [spin_down_csv(tmp_path / "run.csv", seed=7)])
     assert analysis.combined.best == "mixed"
-    assert analysis.text.startswith("The laws disc, mixed and power, n = 1.481 ± 0.015, cannot be told apart")
+    assert not analysis.combined.verdict.decided
     assert {(one.model, one.quantity) for one in analysis.budget} >= {("disc", "c32"), ("mixed", "c1"), ("mixed", "c2")}
     assert of(analysis.budget, "c32").closes
 

@@ -123,9 +123,8 @@ RUN = ["runs", 0, "result"]
         ([*RUN, "fits", 2, "reference"], [1.0], "result.fits.2.reference"),
         ([*RUN, "fits", 2, "parameters"], [["c32"]], "result.fits.2.parameters"),
         ([*RUN, "fits", 2, "parameters", 0, 1], {"value": "1.0 Hz"}, "result.fits.2.parameters.start_frequency"),
-        (["settings", "uncertainty"], "guessed", "settings.uncertainty"),
+        (["settings", "tilt"], "guessed", "settings.tilt"),
         (["settings", "reading_u_hz"], -1.0, "reading_u_hz"),
-        (["settings", "bootstrap"], {"samples": 0, "seed": 0}, "bootstrap.samples"),
     ],
 )
 def test_a_damaged_result_is_refused_with_what_is_wrong(tmp_path: Path, keys: Any, value: object, says: str) -> None:

@@ -62,7 +62,7 @@ def test_a_mean_of_several_runs_has_trials_that_differ_as_the_runs_do(runs: Any)
     ("cost_s", "trials"), [(1e-4, TRIALS), (0.02, 100), (0.13, ENOUGH), (0.3, 13), (0.8, FEWEST), (0.9, 0)]
 )
 def test_a_report_makes_as_many_trials_as_it_has_time_for(cost_s: float, trials: int):
-    """Four runs of 20 readings cost 0.13 s, one with a tilt 0.3 s: a fit with it takes ten times as long."""
+    """Four runs of 20 readings cost 0.04 s, with the tilt 0.13 s."""
     assert trials_of_report(Own("", lambda _: Trial([]), cost_s)) == trials
 
 
@@ -70,8 +70,7 @@ def test_the_cost_of_a_spin_down_grows_with_its_runs_and_its_tilt(runs: Any, mon
     two = OWN["spindown"](runs)
     monkeypatch.setattr("analysis.spindown.lawfit.LawFit.has_tilt", True)
     tilted = OWN["spindown"](runs)
-    assert trials_of_report(two) == 30
-    assert FEWEST < trials_of_report(tilted) < 10
+    assert FEWEST < trials_of_report(tilted) < trials_of_report(two) / 2
 
 
 def test_one_spin_down_and_one_scan_come_to_their_own_values(sample_data: Path):

@@ -80,12 +80,12 @@ def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data
     cells = {row.cells[0]: row.cells[2] for row in laws.rows}
     assert re.fullmatch(r"5\.\d\(2\.\d\)×10⁻⁶ .*", cells["disc (best)"]), cells  # as below; u of it: s/√(2·3)
     assert combined.best == "disc"
-    assert {name for name, _ in combined.verdict.excluded} == {"stokes", "newton"}
+    assert set(combined.verdict.excluded) == {"stokes", "newton"}
     disc = combined.fit("disc").constants["c32"]
     # refit of the published pairs (PHYSICS.md §5): 2.365, 2.309, 2.289, 2.397e-4
     assert disc.value == pytest.approx(np.mean([2.365e-4, 2.309e-4, 2.289e-4, 2.397e-4]), rel=3e-3)
     assert disc.scatter == pytest.approx(np.std([2.365, 2.309, 2.289, 2.397], ddof=1) * 1e-4, rel=0.15)
-    assert disc.u == pytest.approx(disc.scatter / 2, rel=5e-3)  # a hidden tilt, which the runs share, adds 0.1 %
+    assert disc.u == pytest.approx(disc.scatter / 2, rel=1e-9)
 
 
 def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path: Path) -> None:
@@ -103,7 +103,7 @@ def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path
         assert set(model["parameters"]) >= {"start_frequency"}
         assert set(model["statistics"]) == {
             "n", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson", "runs_test_p",
-            "difference", "n_effective",
+            "difference",
         }  # fmt: skip
     assert run["models"][0]["linearised"]["c1"]["unit"] == "1/s"
     assert set(result["models"][2]["parameters"]) == {"c32"}
@@ -121,7 +121,7 @@ def test_one_run_has_its_start_and_covariance_at_the_top(sample_data: Path) -> N
 
 
 def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path: Path) -> None:
-    analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())
+    analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))
     result = ANALYSES["spindown"].document(analysis, analysis.output_folder)
     assert analysis.output_folder == tmp_path
     assert (result["synthetic"], result["best_model"]) == (False, "disc")
@@ -212,25 +212,14 @@ def test_a_speed_without_unit_may_be_in_hertz_or_turns_per_minute(tmp_path: Path
 
 def test_a_stated_reading_uncertainty_takes_the_place_of_the_scatter(tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv", u=False)
-    without = analyze_spindowns([path], SpinDownOptions()).runs[0].fit("disc")
-    with_u = analyze_spindowns([path], SpinDownOptions(reading_u=0.03)).runs[0].fit("disc")
+    without = analyze_spindowns([path], SpinDownOptions(tilt="none")).runs[0].fit("disc")
+    with_u = analyze_spindowns([path], SpinDownOptions(reading_u=0.03, tilt="none")).runs[0].fit("disc")
     assert without.statistics.reduced_chi_square is None
     assert with_u.statistics.reduced_chi_square == pytest.approx(1, abs=1)
     ratio = without.parameters["c32"].u / with_u.parameters["c32"].u  # type: ignore[operator]
-    # 0.1: what a hidden tilt adds to u is not proportional to the readings' own
-    assert ratio**2 == pytest.approx(with_u.statistics.reduced_chi_square, rel=0.1)
-
-
-@pytest.mark.parametrize("how", ["profile", "bootstrap"])
-def test_intervals_are_there_when_asked_for(tmp_path: Path, how: str) -> None:
-    path = spin_down_csv(tmp_path / "my.csv", u=False)
-    options = SpinDownOptions(uncertainty=how, bootstrap_samples=300)  # type: ignore[arg-type]
-    analysis = analyze_spindowns([path], options)
-    c = ANALYSES["spindown"].document(analysis, tmp_path)["runs"][0]["values"]["c32"]
-    low, high = c["interval_68"]
-    assert low < c["value"] < high
-    # no u was stated: both stand on the residuals' own scatter; 300 samples tell half a width to some 6 %
-    assert (high - low) / 2 == pytest.approx(c["u"], rel=0.15)
+    # what is stated counts as 8 readings beside the 18 that scatter; 0.15: u tells more of the correlation
+    expected = with_u.statistics.reduced_chi_square / with_u.statistics.variance_factor  # type: ignore[operator]
+    assert ratio**2 == pytest.approx(expected, rel=0.15)
 
 
 def test_in_a_searched_folder_what_is_broken_is_passed_over_and_told(sample_data: Path, tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ ANALYZE = "from levilab.cli.start import main; sys.exit(main())"
 LIVE = """
 import numpy as np
 from levilab.live.running import spin_down
-time = np.linspace(0.0, 200.0, 101)
+time = np.linspace(0.0, 60.0, 101)  # ends before the top leans
 print(spin_down({"time_s": time, "spin_frequency_hz": drag.spin("turbulent", time, 40.0, 4e-5)}, 1).head)
 """
 

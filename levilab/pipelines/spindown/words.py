@@ -1,0 +1,239 @@
+"""The verdict of spin-downs, and what to know before using their numbers, as sentences."""
+
+from __future__ import annotations
+
+from math import floor, log10
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from analysis.numbers import digits
+from analysis.spindown.verdict import is_simple
+from levilab.pipelines.spindown.laws import SYMBOLS
+from levilab.present.numbers import enumeration
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from analysis.spindown.combine import Combined, CombinedLaw
+    from analysis.spindown.fit import SpinDown
+    from analysis.spindown.lawfit import LawFit
+    from analysis.spindown.remarks import Remark
+    from analysis.spindown.verdict import Verdict
+    from analysis.uncertainty import Estimate
+
+#: u of an exponent, or of an angle [rad], that no measurement has.
+TOO_SMALL = 5e-10
+#: A tilt of the moment is mentioned where it is so many times its u.
+SEEN = 2.0
+
+
+def verdict_of_run(run: SpinDown) -> str:
+    """Return what one run says about the laws."""
+    power = {fit.name: fit.parameters for fit in run.fits}.get("power", {})
+    tilt = run.fit(run.best).parameters.get("moment_tilt")
+    return _verdict(run, run.fits, power.get("exponent"), tilt, [run])
+
+
+def verdict_of_all(found: Combined, runs: Sequence[SpinDown]) -> str:
+    """Return what all runs together say about the laws."""
+    if len(runs) == 1:
+        return verdict_of_run(runs[0])
+    power = {fit.name: fit.constants for fit in found.fits}.get("power", {})
+    return _verdict(found, found.fits, power.get("exponent"), found.tilt, runs)
+
+
+def is_seen(tilt: Estimate | None) -> bool:
+    """Return whether readings show a tilt of the moment, and not only what was known of it beforehand."""
+    return tilt is not None and tilt.value is not None and bool(tilt.u) and tilt.value > SEEN * (tilt.u or 0.0)
+
+
+def _verdict(
+    found: SpinDown | Combined,
+    fits: Sequence[LawFit | CombinedLaw],
+    exponent: Estimate | None,
+    tilt: Estimate | None,
+    runs: Sequence[SpinDown],
+) -> str:
+    said, stats = found.verdict, {fit.name: fit.statistics for fit in fits}
+    best = stats[said.best]
+
+    def names(laws: Sequence[str]) -> str:
+        return enumeration([f"power ({_exponent(exponent)})" if name == "power" else name for name in laws])
+
+    simple = [name for name in (*said.indistinguishable, *said.weak) if is_simple(name)]
+    if not said.describes:
+        first = _no_law(found, runs, digits(best.rms_residual))
+    elif said.decided and said.best == "power":
+        first = f"The power law, {_exponent(exponent)}, fits best" + _also(said.indistinguishable[1:], names)
+    elif said.decided:
+        first = f"The {said.best} law fits best" + _also(said.indistinguishable[1:], names)
+    elif len(simple) == 1:
+        alike = sorted(said.indistinguishable, key=lambda name: stats[name].n_parameters)
+        first = (
+            f"The laws {names(alike)} cannot be distinguished: {alike[0]} has the fewest constants. More runs, or a "
+            "longer fall of the spin, can decide"
+        )
+    else:
+        fall = max(float(1 - run.frequency[-1] / run.frequency[0]) for run in runs)
+        first = (
+            f"These {best.n} readings cannot distinguish {enumeration(simple) if len(simple) > 1 else 'the laws'}: "
+            f"over a fall of the spin by {digits(100 * fall)} % they differ too little for readings of this number "
+            "and precision. Let the top fall further, or read it more often"
+        )
+    reasons = [f"{n} (ΔAICc {stats[n].difference:.0f}: {digits(stats[n].rms_residual)} Hz rms)" for n in said.excluded]
+    weak = [f"{n} (ΔAICc {stats[n].difference:.1f})" for n in said.weak]
+    sentences = [
+        first,
+        f"The readings exclude {enumeration(reasons)}; {said.best} leaves {digits(best.rms_residual)} Hz"
+        if reasons
+        else "",
+        f"They speak against {enumeration(weak)}, without excluding {'them' if len(weak) > 1 else 'it'}"
+        if weak
+        else "",
+        _needless(said, names(said.needless)) if said.needless and said.decided else "",
+        f"The counter sees the wobble of the top: its moment is tilted against its axis by {_value(tilt)} rad"
+        if tilt is not None and is_seen(tilt)
+        else "",
+    ]
+    return " ".join(f"{text}." for text in sentences if text)
+
+
+def _needless(said: Verdict, names: str) -> str:
+    fit, need = ("fit", "need") if len(said.needless) > 1 else ("fits", "needs")
+    return f"{names} {fit} as well as {said.best}, but {need} more constants"
+
+
+def _also(others: Sequence[str], names: Callable[[Sequence[str]], str]) -> str:
+    """Return the laws that fit as well as the best one, as the end of a sentence."""
+    return f"; {names(others)} cannot be distinguished from it" if others else ""
+
+
+def _no_law(found: SpinDown | Combined, runs: Sequence[SpinDown], rms: str) -> str:
+    change = found.verdict.change
+    if change is None:
+        numbers = [str(k + 1) for k in found.verdict.changed]
+        what = f"none describes the runs {enumeration(numbers)} of {len(runs)}"
+    else:
+        time, way = runs[0].time, "rise" if change.size > 0 else "fall"
+        where = f"between {time[change.first]:.4g} s and {time[change.last]:.4g} s"
+        what = f"they {way} by {digits(abs(change.size))} Hz beyond any drag {where}, or bend there"
+    return (
+        f"No law describes these readings: {what}; the best one, {found.best}, leaves {rms} Hz rms. Its constants and "
+        "their uncertainties are those of a curve through the readings, not of a drag"
+    )
+
+
+def _exponent(exponent: Estimate | None) -> str:
+    """Return an exponent as n = 1.507 ± 0.006."""
+    if exponent is None or exponent.value is None or not exponent.u:
+        return "of whatever exponent"
+    return f"n = {_value(exponent)}"
+
+
+def _value(estimate: Estimate) -> str:
+    """Return 1.507 ± 0.006; without u where that is smaller than any measurement makes it."""
+    value, u = estimate.value or 0.0, estimate.u or 0.0
+    if u < TOO_SMALL:
+        return f"{round(value, 9) + 0.0:.9g}"
+    places = min(max(0, -floor(log10(u)) + (u < 3 * 10 ** floor(log10(u)))), 9)
+    return f"{value:.{places}f} ± {u:.{places}f}"
+
+
+# --- remarks ------------------------------------------------------------------------------------------
+
+
+def remark(of: Remark) -> str:
+    """Return a remark as a sentence, without its full stop."""
+    text = _REMARKS[of.kind]
+    said = text(of) if callable(text) else text
+    return f"{of.law}: {said}" if of.law and of.kind in _OF_A_LAW else said
+
+
+_OF_A_LAW = frozenset({
+    "not converged", "no freedom", "not separated", "out of range", "negative", "undetermined", "factor", "missing",
+    "scatters",
+})  # fmt: skip
+#: A reading more times its unit away than this is only said to be: all others lie on the law then.
+_MOST_TIMES = 1000
+
+
+def _outlier(of: Remark) -> str:
+    time, frequency, off, times, stated, kept, falling = of.values
+    many = f"more than {_MOST_TIMES}" if times >= _MOST_TIMES else digits(times)
+    return (
+        f"the reading of {frequency:.6g} Hz at {round(time, 3):.12g} s lies {digits(off)} Hz from the {of.law} law, "
+        f"{many} times {'its uncertainty' if stated else 'the rms residual of the others'}, and was "
+        f"{'kept as asked' if kept else 'left out'}"
+        f"{'; it stands at the end: the top may already have been falling' if falling else ''}"
+    )
+
+
+def _few_runs(of: Remark) -> str:
+    n, width = of.values
+    return (
+        f"{n:.0f} runs give their scatter, and so u of the means, to {100 / (2 * (n - 1)) ** 0.5:.0f} % only: a 68 % "
+        f"interval is {digits(width)} u to each side (Student's t)"
+    )
+
+
+_REMARKS: Mapping[str, str | Callable[[Remark], str]] = MappingProxyType({
+    "not converged": "the fit did not converge, the numbers are those of the best point found",
+    "no freedom": lambda of: (
+        f"{of.values[0]:.0f} parameters pass through {of.values[0]:.0f} readings, so nothing shows their uncertainty: "
+        "record more readings, or state the uncertainty of each"
+    ),
+    "not separated": "the readings do not separate the parameters, so these have no uncertainty",
+    "out of range": lambda of: (
+        f"{of.name} is too large or too small for a number, as it depends exponentially on the exponent"
+    ),
+    "negative": lambda of: (
+        f"{of.name} is negative by {of.values[0]:.1f} standard uncertainties, which no drag can be"
+    ),
+    "undetermined": lambda of: f"{of.name} is not determined, as it depends exponentially on the exponent",
+    "factor": lambda of: (
+        f"{of.name} is known only to a factor of about {digits(of.values[0])}, as it depends exponentially on the "
+        "exponent"
+    ),
+    "outlier": _outlier,
+    "calculated": lambda of: (
+        f"the readings lie on the {of.law} law to {digits(of.values[0], 1)} Hz, too good to be measured: were they "
+        "calculated? Then no uncertainty here says anything about a top"
+    ),
+    "no u": (
+        "no uncertainties of the readings were given: they are taken from the scatter about each law, so a law that "
+        "does not fit shows only beside one that fits better"
+    ),
+    "understated": lambda of: (
+        f"even the best law, {of.law}, misses the readings by {digits(of.values[0])} times their stated uncertainties, "
+        "more than chance explains: all uncertainties are enlarged; check the readings' uncertainties"
+    ),
+    "overstated": lambda of: (
+        f"the readings scatter only {digits(of.values[0])} times as much about the best law as their stated "
+        "uncertainties say: are these too large?"
+    ),
+    "few readings": lambda of: (
+        f"{of.values[0]:.0f} readings are too few to compare {of.name} by AICc: record more readings"
+    ),
+    "correlated": lambda of: (
+        f"neighbouring residuals resemble each other: their correlation is {of.values[0]:.2f} ± {of.values[1]:.2f}, so "
+        f"{of.values[2]:.0f} readings are worth as much as "
+        f"{digits(of.values[2] * (1 - of.values[0]) / (1 + of.values[0]))} independent ones; it is in all uncertainties"
+    ),
+    "changed": lambda of: (
+        f"no law describes run {of.values[0]:.0f} of {of.values[1]:.0f}: that noise makes a change as large in any of "
+        f"the runs has p = {digits(min(of.values[1] * of.values[2], 1.0))}; look at it"
+    ),
+    "mixed u": lambda of: (
+        f"{of.values[0]:.0f} of {of.values[1]:.0f} runs give no uncertainties of their readings: theirs come from the "
+        "scatter about each law"
+    ),
+    "one run": "this is one run: its uncertainties contain nothing of the scatter between runs, so record several",
+    "few runs": _few_runs,
+    "missing": lambda of: (
+        f"{of.values[0]:.0f} of {of.values[1]:.0f} runs have no {of.name} and are not in its mean"
+    ),
+    "scatters": lambda of: (
+        f"{SYMBOLS.get(of.name, of.name)} scatters between the runs {digits(of.values[0])} times as much as each fit's "
+        "own uncertainty explains: the runs differ, so trust the scatter, not the fit of one run"
+    ),
+})  # fmt: skip
