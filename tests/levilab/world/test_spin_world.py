@@ -627,6 +627,10 @@ def test_a_top_that_falls_is_put_back_if_the_scene_says_so():
     assert top.motion(np.array([fallen + 500.0]))[0] == pytest.approx(2 * np.pi * 30)
 
 
+def test_else_it_lies_there():
+    assert world(SpinScene()).motion(np.array([1e5]))[0] == 0
+
+
 # --- the laser ---
 
 
