@@ -9,8 +9,6 @@
 from __future__ import annotations
 
 import argparse
-import platform
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +16,7 @@ from as_called.comparison import Case, measure_calls
 from as_called.overhead import OVERHEADS, Overhead, overhead
 from as_called.tasks import TASKS
 from levilab.benchmark.found import give, tell
-from levilab.benchmark.machine import processor, version_of
+from levilab.benchmark.machine import describe_measurement
 from levilab.benchmark.simulator.command import number
 from levilab.benchmark.simulator.work_precision import as_point, as_ratio
 from levilab.present.terminal import Terminal, new_table, terminal
@@ -56,9 +54,7 @@ def as_document(cases: Iterable[Case], overheads: Iterable[Overhead]) -> dict[st
     """Return everything, with units in the names."""
     return {
         "schema": "levilab-benchmark-simulator-as-called/1",
-        "measured_utc": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": {"processor": processor(), "system": platform.system(), "python": platform.python_version()},
-        "software": {name: version_of(name) for name in ("levilab", "numba", "numpy", "scipy", "heyoka")},
+        **describe_measurement("levilab", "numba", "numpy", "scipy", "heyoka"),
         "called": [
             {
                 "motion": case.task.name,

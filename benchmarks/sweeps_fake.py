@@ -11,6 +11,7 @@ from levilab.sweeps.observables import columns_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from levilab.sweeps.plan import Chunk
     from levilab.sweeps.run import Task
 
 
@@ -18,10 +19,10 @@ def nothing(number: int) -> int:
     return number
 
 
-def fake_chunk(task: Task) -> dict[str, NDArray[Any]]:
+def fake_chunk(task: Task[Chunk]) -> dict[str, NDArray[Any]]:
     """Numbers of the right shape and type, without a simulation."""
-    rng = np.random.default_rng(task.chunk.number)
+    rng = np.random.default_rng(task.part.number)
     return {
-        column.name: (rng.normal(size=task.chunk.shape) * 10).astype(column.dtype)
+        column.name: (rng.normal(size=task.part.shape) * 10).astype(column.dtype)
         for column in columns_of(task.plan.observables)
     }

@@ -3,7 +3,18 @@
 from __future__ import annotations
 
 import platform
+from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+
+def describe_measurement(*packages: str) -> dict[str, Any]:
+    """Return when and on what a benchmark runs, and the versions of these packages, for its document."""
+    return {
+        "measured_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "machine": {"processor": processor(), "system": platform.system(), "python": platform.python_version()},
+        "software": {name: version_of(name) for name in packages},
+    }
 
 
 def processor() -> str:

@@ -57,16 +57,14 @@ _LEFT, _FULL, _ZOOM, _BESIDE = 0.76, 6.1, 1.28, 0.55
 _PATH, _CURVE, _PITCH, _SPECTRUM, _BOTTOM = 2.1, 0.86, 1.16, 2.3, 0.55
 
 
+@mpl.rc_context(STYLE)
 def motion_figure(summary: Summary) -> Figure:
-    """Draw the path from the side and from above, height, spin, tilt, energy in time, the spectrum of n_x + i n_y."""
-    with mpl.rc_context(STYLE):
-        if summary.motion.scene.observed == "spin":
-            return _spin_figure(summary)
-        return _whole_figure(summary)
+    """Draw the path from the side and from above, height, spin, tilt, energy in time, the spectrum of n_x + i n_y.
 
-
-def _whole_figure(summary: Summary) -> Figure:
-    """Arrange the panels, without the spectrum where there is none, and without the zoom where all is short."""
+    The spectrum is left out where there is none, and the zoom where all is short.
+    """
+    if summary.motion.scene.observed == "spin":
+        return _spin_figure(summary)
     quantities = _quantities(summary)
     tops = 0.62 + _PATH + 0.74 + _PITCH * np.arange(len(quantities))
     tops[1:] += _LEGEND if quantities[1].has_legend else 0.0  # of the spin, between its title and its panel
@@ -220,8 +218,8 @@ def _spin(summary: Summary) -> _Quantity:
 def _energy_title(summary: Summary) -> str:
     there = changing_energy(summary.motion.scene)
     if not there:
-        kept = f"to {digits(summary.energy_change, 1)}" if summary.energy_change else "exactly"
-        return f"Error of the energy: it should stay as it is, and does {kept}"
+        exactly = f"to {digits(summary.energy_change, 1)}" if summary.energy_change else "exactly"
+        return f"Error of the energy: it should stay as it is, and does {exactly}"
     own = " (without the drive's own part)" if "drive" in there else ""
     *others, last = there
     named = f"{', '.join(others)} and {last} change" if others else f"{last} changes"

@@ -161,16 +161,12 @@ _QUANTITIES = (
     ("greatest spin", "Hz", 1.0, "spin_max_hz"),
     ("spin of the washers at the end", "Hz", 1.0, "washer_spin_end_hz"),
 )
-_LIFETIME, _WHOLE_TIME = "lifetime", "up for the whole time"
-
-
-def _time_up(found: Mapping[str, Any]) -> tuple[str, str, float, str]:
-    """Return the column of the time up: a lifetime, or the simulated time of a top that did not fall."""
-    return _LIFETIME if isinstance(found.get("fell"), dict) else _WHOLE_TIME, "s", 1.0, "end_s"
 
 
 def _numbers(found: Mapping[str, Any], scene: Scene) -> Iterator[tuple[str, str, str]]:
-    for name, unit, factor, key in (*_QUANTITIES, _time_up(found)):
+    # of a top that did not fall this is the time that was simulated, and no lifetime
+    time_up = "lifetime" if isinstance(found.get("fell"), dict) else "up for the whole time"
+    for name, unit, factor, key in (*_QUANTITIES, (time_up, "s", 1.0, "end_s")):
         value = found.get(key)
         if scene.observed == "spin" and "spin" not in name and key != "end_s":
             continue

@@ -163,7 +163,8 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
     if not accuracy.reached:
         notes.append(_not_reached(accuracy))
     if motion.fell is not None:
-        notes.extend(_cannot_float(motion.scene))
+        found = stability_of(motion.scene)
+        notes += [] if found.floating else [advice(found)]
     highest = max((abs(line.frequency) for line in lines.lines), default=0.0)
     if highest > rate / 2:
         notes.append(
@@ -179,12 +180,6 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
             "than their resolution"
         )
     return notes
-
-
-def _cannot_float(scene: Scene) -> list[str]:
-    """Say what to change if the top cannot float at all."""
-    found = stability_of(scene)
-    return [] if found.floating else [advice(found)]
 
 
 def _not_reached(accuracy: Accuracy) -> str:
@@ -208,6 +203,7 @@ def as_document(summary: Summary) -> dict[str, Any]:
     motion = summary.motion
     height, accuracy, fell = motion.position[:, 2], motion.accuracy, motion.fell
     lowest, highest = height_range(motion)
+    has_washers = motion.scene.washers.inertia_kg_m2 > 0
     document = {
         "scene": motion.scene.name,
         "survived": motion.survived,
@@ -225,7 +221,7 @@ def as_document(summary: Summary) -> dict[str, Any]:
         "spin_min_hz": float(motion.spin_hz.min()),
         "spin_max_hz": float(motion.spin_hz.max()),
         "locked": is_locked(motion.scene, motion.states, survived=motion.survived),
-        **_washers(motion),
+        **({"washer_spin_end_hz": float(motion.washer_spin_hz[-1])} if has_washers else {}),
         "energy_conserved": not changing_energy(motion.scene),
         "energy_change_relative": summary.energy_change,
         "lines": [
@@ -247,8 +243,3 @@ def as_document(summary: Summary) -> dict[str, Any]:
         "notes": [unquoted(note) for note in summary.notes],
     }
     return {key: finite(value) for key, value in document.items()}
-
-
-def _washers(motion: Trajectory) -> dict[str, float]:
-    loose = motion.scene.washers.inertia_kg_m2 > 0
-    return {"washer_spin_end_hz": float(motion.washer_spin_hz[-1])} if loose else {}

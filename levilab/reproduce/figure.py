@@ -20,19 +20,16 @@ from levilab.reproduce.tops import MASS_KG
 from levilab.stability.thesis import SIMULATED_HZ, WITH_DRAG_HZ
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
 
     from analysis.limits import Statistics
     from analysis.spindown.fit import SpinDown
     from levilab.motion.lines import AxisLines
+    from levilab.reproduce.tops import Array, Flags
     from levilab.simulator.equilibrium import MassWindows
     from levilab.simulator.trajectory import Trajectory
-
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 #: A curve of more points is drawn as the band between its least and greatest values in so many pieces.
 PIECES = 900
@@ -55,16 +52,6 @@ def _figure(height: float, *boxes: Box) -> tuple[Figure, list[Axes]]:
     """A wide figure and its panels; placed by hand, since automatic layouts differ in the last bit."""
     figure = Figure(figsize=(WIDE, height))
     return figure, [figure.add_axes(box) for box in boxes]
-
-
-def _styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
-    """The function with the house's style about it."""
-
-    def styled(*given: Any) -> Figure:
-        with mpl.rc_context(STYLE):
-            return draw(*given)
-
-    return styled
 
 
 def _band(axes: Axes, time: Array, values: Array, colour: str) -> None:
@@ -111,7 +98,7 @@ def rim(shown: Contours) -> float:
     return low
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def contour_figure(shown: Sequence[Contours], names: Sequence[str]) -> Figure:
     """The potential of tops of several masses."""
     width = 0.27
@@ -128,7 +115,7 @@ def contour_figure(shown: Sequence[Contours], names: Sequence[str]) -> Figure:
     return figure
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def window_figure(over: MassWindows, estimate: float) -> Figure:
     """The window of spin over mass."""
     figure, (axes,) = _figure(3.2, (0.085, 0.15, 0.57, 0.79))
@@ -173,7 +160,7 @@ class Scans:
     lower_aside: Array
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def limits_figure(shown: Scans) -> Figure:
     """Scans of the upper limit, and what the lower ones depend on."""
     figure, panels = _figure(
@@ -188,7 +175,6 @@ def limits_figure(shown: Scans) -> Figure:
 
 
 def _draw_scans(axes: Axes, shown: Scans) -> None:
-
     half = (shown.spins[1] - shown.spins[0]) / 2
     extent = (shown.spins[0] - half, shown.spins[-1] + half)
     for k, (name, up) in enumerate(shown.up.items()):
@@ -205,7 +191,6 @@ def _draw_scans(axes: Axes, shown: Scans) -> None:
 
 
 def _draw_lower(axes: Axes, shown: Scans) -> None:
-
     for (name, values), colour in zip(shown.lower.items(), SERIES, strict=False):
         axes.plot(shown.masses, values, color=colour)
         axes.axhline(SIMULATED_HZ[name][0], color=colour, linestyle=(0, (4, 2)), linewidth=0.8)
@@ -220,7 +205,6 @@ def _draw_lower(axes: Axes, shown: Scans) -> None:
 
 
 def _draw_falls(axes: Axes, shown: Scans) -> None:
-
     for k, ((name, values), colour) in enumerate(zip(shown.falling.items(), SERIES, strict=False)):
         spread = 0.5 * (np.arange(values.size) / (values.size - 1) - 0.5)
         axes.plot(k + spread, values, ".", color=colour, markersize=3)
@@ -231,7 +215,6 @@ def _draw_falls(axes: Axes, shown: Scans) -> None:
 
 
 def _draw_aside(axes: Axes, shown: Scans) -> None:
-
     axes.plot(shown.aside, shown.lower_aside, "o-", color=SERIES[2], markersize=3)
     axes.axhline(SIMULATED_HZ["IC3"][0], color=SERIES[2], linestyle=(0, (4, 2)))
     for x in (0.3, 0.5):
@@ -243,7 +226,7 @@ def _draw_aside(axes: Axes, shown: Scans) -> None:
 # --- motions ---
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def paths_figure(shown: Mapping[str, Trajectory]) -> Figure:
     """Paths over x and z."""
     figure, panels = _figure(
@@ -258,7 +241,7 @@ def paths_figure(shown: Mapping[str, Trajectory]) -> Figure:
     return figure
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def fall_figure(motion: Trajectory) -> Figure:
     """Tilt, height and spin up to the fall."""
     boxes = [(0.085, 0.68 - 0.285 * k, 0.43, 0.25) for k in range(3)]
@@ -286,7 +269,7 @@ def fall_figure(motion: Trajectory) -> Figure:
     return figure
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def tilted_figure(motions: tuple[Trajectory, Trajectory]) -> Figure:
     """The axis from above, with a tilted and an aligned moment."""
     figure, panels = _figure(3.3, (0.1, 0.14, 0.37, 0.78), (0.6, 0.14, 0.37, 0.78))
@@ -299,7 +282,7 @@ def tilted_figure(motions: tuple[Trajectory, Trajectory]) -> Figure:
     return figure
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def driven_figure(motion: Trajectory) -> Figure:
     """The spin of the driven top."""
     figure, panels = _figure(3.6, (0.085, 0.63, 0.89, 0.29), (0.085, 0.13, 0.89, 0.29))
@@ -345,7 +328,7 @@ _CUT_HZ = 120.0
 _SLOW_HZ = 2.0
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def azimuth_figure(motion: Trajectory, found: Azimuth, lines: AxisLines) -> Figure:
     """The azimuth's rate, and the spectrum of the axis."""
     figure, panels = _figure(4.6, (0.085, 0.63, 0.5, 0.3), (0.68, 0.63, 0.305, 0.3), (0.085, 0.11, 0.9, 0.35))
@@ -391,7 +374,7 @@ def azimuth_figure(motion: Trajectory, found: Azimuth, lines: AxisLines) -> Figu
 # --- spin-downs and limits ---
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def spindown_figure(runs: Sequence[tuple[Array, SpinDown]]) -> Figure:
     """What three laws leave over of the runs."""
     laws = (("stokes", "n = 1"), ("disc", "n = 3/2"), ("newton", "n = 2"))
@@ -412,7 +395,7 @@ def spindown_figure(runs: Sequence[tuple[Array, SpinDown]]) -> Figure:
     return figure
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def statistics_figure(values: Array, found: Statistics, edge: float) -> Figure:
     """The ten limits, and their normal quantiles."""
     from scipy.special import ndtri
@@ -438,7 +421,7 @@ def statistics_figure(values: Array, found: Statistics, edge: float) -> Figure:
     return figure
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def counter_figure(spin: Array, count: Array, cosine: Array) -> Figure:
     """The count less the spin."""
     figure, (axes,) = _figure(2.9, (0.1, 0.16, 0.885, 0.78))
@@ -453,7 +436,7 @@ def counter_figure(spin: Array, count: Array, cosine: Array) -> Figure:
 # --- the magnet, and the papers ---
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def dipole_figure(z: Array, fields: tuple[Array, Array], height: float) -> Figure:
     """What a disc feels over what a point feels, and the curvature of the field of both."""
     figure, panels = _figure(2.9, (0.085, 0.17, 0.4, 0.74), (0.575, 0.17, 0.41, 0.74))
@@ -475,7 +458,7 @@ def dipole_figure(z: Array, fields: tuple[Array, Array], height: float) -> Figur
     return figure
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def simon_figure(
     scans: Sequence[tuple[str, Array, Flags, tuple[float, float], tuple[float, float]]],
 ) -> Figure:
@@ -502,7 +485,7 @@ def simon_figure(
     return figure
 
 
-@_styled
+@mpl.rc_context(STYLE)
 def gans_figure(spins: Array, tilts: Array, up: Flags, window: tuple[float, float]) -> Figure:
     """Survival over spin and tilt."""
     figure, (axes,) = _figure(3.0, (0.085, 0.15, 0.66, 0.8))

@@ -18,9 +18,10 @@ from levilab.errors import SimulationError, UsageError, WorkersLost
 from levilab.files import writing
 from levilab.interruption import interruption_postponed
 from levilab.sweeps.axes import first_error
-from levilab.sweeps.observables import OBSERVABLES, columns_of, observe
+from levilab.sweeps.observables import OBSERVABLES, columns_of
 from levilab.sweeps.quantities import step_in_words
-from levilab.sweeps.refinement import AUDIT, CONFIDENCE, STRIDE, Points, Refined, refine
+from levilab.sweeps.refinement import AUDIT, CONFIDENCE, STRIDE, Points, Refined, refine, run_refinement
+from levilab.sweeps.run import Task, compute
 from levilab.sweeps.store import COMPUTED, DONE, FILLED, STATUS
 from levilab.workers import results_of
 
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from levilab.sweeps.plan import Plan
+    from levilab.sweeps.refinement import Flags, Question
     from levilab.sweeps.store import Store
     from levilab.workers import Done, Workers
 
@@ -39,26 +41,6 @@ ASKED, FOUND = "adaptive", "refined"
 FEWEST, MANY, MOST = 64, 64, 4096
 #: The store is written after this number of new points, and at the end of a round.
 KEPT = 20_000
-
-
-@dataclass(frozen=True)
-class PointsTask:
-    """Some points of a map.
-
-    Attributes:
-        plan: without the values of its axes.
-        points: flat indices into the map.
-        values: key → values at these points, shape (n,).
-    """
-
-    plan: Plan
-    points: Points
-    values: dict[str, NDArray[Any]]
-
-
-def compute_points(task: PointsTask) -> dict[str, NDArray[Any]]:
-    """Observe the points of a task: a function of the task alone, for any process on any machine."""
-    return observe(task.plan, task.values)
 
 
 def begin_adaptive(store: Store, observable: str = "survived", *, stride: int = STRIDE, audit: int = AUDIT) -> None:
@@ -119,15 +101,14 @@ def run_adaptive(store: Store, executor: Workers, progress: Callable[[float], No
     asked, plan = store.group.attrs[ASKED], store.plan
     refinement = refine(plan.shape, stride=asked["stride"], audit=asked["audit"], seed=plan.seed)
     run, feed = _Run.of(store, progress), _Feed()
-    with contextlib.closing(results_of(compute_points, feed, executor)) as results:
+    with contextlib.closing(results_of(compute, feed, executor)) as results:
+
+        def answer(question: Question) -> Flags:
+            run.compute(run.missing(question.points), question.until, feed, results)
+            return np.asarray(run.columns[asked["observable"]].flat[question.points], dtype=np.bool_)
+
         try:
-            question = next(refinement)
-            while True:
-                run.compute(run.missing(question.points), question.until, feed, results)
-                values = run.columns[asked["observable"]].flat[question.points]
-                question = refinement.send(np.asarray(values, dtype=np.bool_))
-        except StopIteration as end:
-            return run.finish(end.value)
+            return run.finish(run_refinement(refinement, answer))
         finally:
             run.write()
 
@@ -140,12 +121,12 @@ class _Feed:
     """
 
     def __init__(self) -> None:
-        self.tasks: deque[PointsTask] = deque()
+        self.tasks: deque[Task[Points]] = deque()
 
     def __iter__(self) -> _Feed:
         return self
 
-    def __next__(self) -> PointsTask:
+    def __next__(self) -> Task[Points]:
         if not self.tasks:
             raise StopIteration
         return self.tasks.popleft()
@@ -182,7 +163,7 @@ class _Run:
         return np.asarray(points[self.status.flat[points] != COMPUTED])
 
     def compute(
-        self, points: Points, until: float, feed: _Feed, results: Generator[Done[PointsTask, dict[str, NDArray[Any]]]]
+        self, points: Points, until: float, feed: _Feed, results: Generator[Done[Task[Points], dict[str, NDArray[Any]]]]
     ) -> None:
         """Compute points, all in one round."""
         feed.tasks.extend(self.tasks_of(points))
@@ -192,27 +173,27 @@ class _Run:
             if one is None:
                 raise WorkersLost("the workers gave fewer results than they had tasks: start them anew, and resume")
             self.keep(one)
-            done += one.task.points.size
+            done += one.task.part.size
             self.share = max(begun + (until - begun) * done / points.size, begun)
             if self.progress is not None:
                 self.progress(self.share)
         self.write()
 
-    def tasks_of(self, points: Points) -> list[PointsTask]:
+    def tasks_of(self, points: Points) -> list[Task[Points]]:
         """Cut points into tasks."""
         plan = self.store.plan
         size = min(max(-(-points.size // MANY), FEWEST), MOST)
         return [_task(plan, points[i : i + size]) for i in range(0, points.size, size)]
 
-    def keep(self, done: Done[PointsTask, dict[str, NDArray[Any]]]) -> None:
+    def keep(self, done: Done[Task[Points], dict[str, NDArray[Any]]]) -> None:
         """Keep the result of a task in memory, and now and then in the store."""
         if done.error is not None or done.result is None:
             invalid = first_error(self.store.plan.scene, done.task.values)
             raise SimulationError(invalid) if invalid else done.error or AssertionError
         for name, values in done.result.items():
-            self.columns[name].flat[done.task.points] = values
-        self.status.flat[done.task.points] = COMPUTED
-        self.unwritten.append(done.task.points)
+            self.columns[name].flat[done.task.part] = values
+        self.status.flat[done.task.part] = COMPUTED
+        self.unwritten.append(done.task.part)
         if sum(map(len, self.unwritten)) >= KEPT:
             self.write()
 
@@ -249,10 +230,10 @@ def _writing(store: Store) -> contextlib.AbstractContextManager[None]:
     return writing(f"{store.path}: cannot be written", "free space, then go on with `resume`")
 
 
-def _task(plan: Plan, points: Points) -> PointsTask:
+def _task(plan: Plan, points: Points) -> Task[Points]:
     places = np.unravel_index(points, plan.shape)
     values = {axis.key: axis.values[place] for axis, place in zip(plan.axes, places, strict=True)}
-    return PointsTask(plan.without_values(), points, values)
+    return Task(plan.without_values(), points, values)
 
 
 def report_of(found: Refined) -> dict[str, Any]:

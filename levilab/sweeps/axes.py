@@ -281,7 +281,8 @@ def error_at(scene: Scene, values: Mapping[str, Any]) -> str:
     try:
         start_of(scene.changed(dict(values)))
     except (SceneError, SimulationError) as error:
-        return f"at {_point_in_words(values)} the scene is invalid: {error}"
+        place = ", ".join(f"{key} = {short_text(value)}" for key, value in values.items())
+        return f"at {place} the scene is invalid: {error}"
     return ""
 
 
@@ -290,10 +291,6 @@ def first_error(scene: Scene, values: Mapping[str, NDArray[Any]]) -> str:
     arrays = broadcast(values)
     points = zip(*(array.ravel().tolist() for array in arrays.values()), strict=True)
     return next(filter(None, (error_at(scene, dict(zip(arrays, point, strict=True))) for point in points)), "")
-
-
-def _point_in_words(values: Mapping[str, Any]) -> str:
-    return ", ".join(f"{key} = {short_text(value)}" for key, value in values.items())
 
 
 def _plain(value: Any) -> Any:

@@ -11,10 +11,22 @@ from levilab.sweeps.observables import GROUPS, columns_of
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from levilab.sweeps.store import Store
+    from levilab.sweeps.observables import Observable
+    from levilab.sweeps.store import Map, Store
 
 #: A map with more points is not drawn: it would have to be in memory, and a picture cannot show so many.
 MOST_POINTS = 20_000_000
+
+
+def load_drawn(store: Store) -> tuple[Map, tuple[Observable, ...]] | None:
+    """Return a map and its columns that are drawn; None of one with more than `MOST_POINTS`, or that has no figure."""
+    from levilab.sweeps.figure import has_figure
+
+    if not has_figure(store.plan) or store.plan.size > MOST_POINTS:
+        return None
+    found = store.load()
+    columns = columns_of(name for name in store.plan.observables if name not in GROUPS)
+    return (found, columns) if found.computed.any() else None
 
 
 def draw_figures(store: Store) -> list[Path]:
@@ -27,17 +39,16 @@ def draw_figures(store: Store) -> list[Path]:
         CannotWrite: a picture cannot be written.
     """
     from levilab.present.style import save_png
-    from levilab.sweeps.figure import has_figure, map_figure
+    from levilab.sweeps.figure import map_figure
 
-    if store.path is None or not has_figure(store.plan) or store.plan.size > MOST_POINTS:
+    drawn = None if store.path is None else load_drawn(store)
+    if store.path is None or drawn is None:
         return []
-    found = store.load()
-    if not found.computed.any():
-        return []
+    found, columns = drawn
     report = report_in(store)
     notes = in_words(report, store.plan) if report else []
     pictures = []
-    for column in columns_of(name for name in store.plan.observables if name not in GROUPS):
+    for column in columns:
         picture = store.path.with_name(f"{store.path.name}.{column.name}.png")
         with writing(f"{picture} cannot be written", "free space, or change the folder's permissions"):
             save_png(map_figure(found, column.name, notes), picture)

@@ -172,12 +172,12 @@ class _State(NamedTuple):
     linked: tuple[int, ...]
 
 
-def run_refinement(refinement: Refinement, values_of: Callable[[Points], Flags]) -> Refined:
-    """Answer all questions of a refinement with a function of flat indices, and return its result."""
+def run_refinement(refinement: Refinement, answer: Callable[[Question], Flags]) -> Refined:
+    """Answer all questions of a refinement with a function, and return its result."""
     try:
         question = next(refinement)
         while True:
-            question = refinement.send(values_of(question.points))
+            question = refinement.send(answer(question))
     except StopIteration as end:
         result: Refined = end.value
         return result
@@ -190,17 +190,13 @@ Grid = list[Points]
 
 def _grids(shape: Sequence[int], stride: int) -> list[Grid]:
     """Return the grids from the coarse to the full one; a coarse one never has less than three points along an axis."""
-    finest = [min(stride, _power_below(n // 2)) for n in shape]
+    finest = [min(stride, 1 << max((n // 2).bit_length() - 1, 0)) for n in shape]
     grids = []
     while True:
         grids.append([_every(step, n) for step, n in zip(finest, shape, strict=True)])
         if max(finest, default=1) == 1:
             return grids
         finest = [max(step // 2, 1) for step in finest]
-
-
-def _power_below(n: int) -> int:
-    return 1 << max(n.bit_length() - 1, 0) if n > 0 else 1
 
 
 def _every(step: int, n: int) -> Points:

@@ -23,8 +23,7 @@ from levilab.present.document.blocks import (
 )
 from levilab.sweeps.adaptive import in_words, report_in
 from levilab.sweeps.axes import in_words as axis_in_words
-from levilab.sweeps.drawing import MOST_POINTS
-from levilab.sweeps.observables import GROUPS, columns_of
+from levilab.sweeps.drawing import load_drawn
 from levilab.sweeps.store import Store
 from levilab.sweeps.summary import columns_table, headline, points_table, summarise
 
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
 
     from levilab.present.document.blocks import Block
     from levilab.present.style import Figure
-    from levilab.sweeps.plan import Plan
     from levilab.sweeps.store import Map
     from levilab.sweeps.summary import Summary
 
@@ -96,26 +94,17 @@ def _warnings(store: Store, summary: Summary) -> Iterator[Warnings]:
 
 
 def _figures(store: Store, notes: Sequence[str]) -> Iterator[Block]:
-    from levilab.sweeps.figure import has_figure  # with matplotlib
-
-    plan = store.plan
-    if not has_figure(plan) or plan.size > MOST_POINTS:
+    if (drawn := load_drawn(store)) is None:
         return
-    found = store.load()
-    if not found.computed.any():
-        return
-    columns = list(columns_of(name for name in plan.observables if name not in GROUPS))
+    found, columns = drawn
+    axes = " and ".join(axis.key for axis in store.plan.axes)
     for column in columns[:MOST_FIGURES]:
-        title = f"{column.name} over {_axes(plan)}, SYNTHETIC."
-        alt = f"Map of {column.name} over {_axes(plan)}"
+        title = f"{column.name} over {axes}, SYNTHETIC."
+        alt = f"Map of {column.name} over {axes}"
         draw = partial(_drawn, found, column.name, tuple(notes))
         yield Picture(f"sweep-{column.name.replace('_', '-')}", title, column.meaning, alt, draw)
     if len(columns) > MOST_FIGURES:
         yield Note(f"{len(columns) - MOST_FIGURES} more columns are not drawn here; levilab sweep draws all of them.")
-
-
-def _axes(plan: Plan) -> str:
-    return " and ".join(axis.key for axis in plan.axes)
 
 
 def _drawn(found: Map, column: str, notes: Sequence[str]) -> Figure:

@@ -70,12 +70,8 @@ def plan_of(request: SweepRequest) -> Plan:
     return cut(plan)
 
 
-def _say_nothing(text: str) -> None:
-    """Ignore a message."""
-
-
 def store_for(
-    request: SweepRequest, path: Path | None, message: Callable[[str], None] = _say_nothing, *, resume: bool = False
+    request: SweepRequest, path: Path | None, message: Callable[[str], None] = lambda _: None, *, resume: bool = False
 ) -> Store:
     """Return the store of a request, ready to be computed.
 

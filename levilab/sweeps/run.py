@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from levilab.errors import LevilabError
 from levilab.interruption import interruption_postponed
@@ -32,26 +32,29 @@ MOST_FAILURES = 20
 _FIRST_S = 1e-3
 
 
+Part = TypeVar("Part")
+
+
 class ChunksFailed(LevilabError):
     """Some chunks could not be computed."""
 
 
 @dataclass(frozen=True)
-class Task:
-    """One chunk with all that a worker needs for it.
+class Task(Generic[Part]):
+    """Part of a map with all that a worker needs for it.
 
     Attributes:
         plan: without the values of its axes.
-        chunk: which part of the map it is.
+        part: a chunk, or flat indices of points.
         values: key → values at its points.
     """
 
     plan: Plan
-    chunk: Chunk
+    part: Part
     values: dict[str, NDArray[Any]]
 
 
-def compute(task: Task) -> dict[str, NDArray[Any]]:
+def compute(task: Task[Any]) -> dict[str, NDArray[Any]]:
     """Observe the points of a task: a function of the task alone, for any process on any machine."""
     return observe(task.plan, task.values)
 
@@ -70,13 +73,10 @@ def with_step(plan: Plan, message: Callable[[str], None]) -> Plan:
         with interruption_postponed():  # a compilation would lose it
             first = {axis.key: axis.values[:1] for axis in plan.axes}
             step_share_of(plan.scene, first, min(_FIRST_S, plan.duration_s), tolerance=plan.tolerance)
-        over = {axis.key: axis.values for axis in plan.axes} if plan.is_table else _grid(plan)
+        values = {axis.key: axis.values for axis in plan.axes}
+        over = values if plan.is_table else grid(values)
         share = step_share_of(plan.scene, over, plan.duration_s, tolerance=plan.tolerance, survivors_only=True)
         return replace(plan, step_share=share)
-
-
-def _grid(plan: Plan) -> dict[str, NDArray[Any]]:
-    return grid({axis.key: axis.values for axis in plan.axes})
 
 
 def compile_for(plan: Plan) -> None:
@@ -86,7 +86,7 @@ def compile_for(plan: Plan) -> None:
         simulate_many(plan.scene, values, min(_FIRST_S, plan.duration_s), step=_FIRST_S, errors=False, cores=1)
 
 
-def tasks_of(store: Store) -> Iterator[Task]:
+def tasks_of(store: Store) -> Iterator[Task[Chunk]]:
     """Yield the tasks that are left; each is made when it is requested."""
     light = store.plan.without_values()
     return (Task(light, chunk, store.plan.values_of(chunk)) for chunk in store.missing())
@@ -119,12 +119,12 @@ def run(store: Store, workers: Workers | None = None, progress: Callable[[float]
         ChunksFailed: some could not be computed; the others are done.
         CannotWrite, WorkersLost: what is done so far is in the store.
     """
-    failed: list[tuple[Task, Exception]] = []
+    failed: list[tuple[Task[Chunk], Exception]] = []
     with contextlib.closing(results_of(compute, tasks_of(store), workers or this_process())) as results:
         for done in results:
             if done.result is not None:
                 with interruption_postponed():
-                    store.write(done.task.chunk, done.result)
+                    store.write(done.task.part, done.result)
                 if progress is not None:
                     progress(store.done / store.plan.chunk_count)
             elif isinstance(done.error, LevilabError):
@@ -137,9 +137,9 @@ def run(store: Store, workers: Workers | None = None, progress: Callable[[float]
         raise ChunksFailed(_why(failed, store.plan))
 
 
-def _why(failed: list[tuple[Task, Exception]], plan: Plan) -> str:
+def _why(failed: list[tuple[Task[Chunk], Exception]], plan: Plan) -> str:
     task, error = failed[0]
-    first, last = task.chunk.start, tuple(k - 1 for k in task.chunk.stop)
+    first, last = task.part.start, tuple(k - 1 for k in task.part.stop)
     ends = [plan.point(index) for index in (first, last)]
     where = ", ".join(f"{key} from {ends[0][key]} to {ends[1][key]}" for key in ends[0])
     count = f"{len(failed)} of {plan.chunk_count} chunks" if len(failed) > 1 else "a chunk"

@@ -17,7 +17,7 @@ from levilab.simulator.start import start_of
 from levilab.world.timeline import Timeline
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Trajectory
@@ -187,12 +187,10 @@ class Flight:
         Args:
             times: shape (n,) [s].
         """
-        self.simulate_until(float(times.max(initial=0.0)))
         turns, up = np.zeros_like(times), np.zeros(times.shape, dtype=np.bool_)
-        for piece, part in self._pieces.pieces(times):
-            if isinstance(piece, _Flying):
-                samples = self._samples_of(piece)
-                turns[part], up[part] = np.interp(times[part], samples.times, samples.turns), True
+        for piece, part in self._flying_pieces(times):
+            samples = self._samples_of(piece)
+            turns[part], up[part] = np.interp(times[part], samples.times, samples.turns), True
         return turns, up
 
     def tape(self, times: Array) -> tuple[Array, Array, Array]:
@@ -205,14 +203,12 @@ class Flight:
             Turns, counted upwards whatever the sense; their rate [Hz], 0 without a top; height of the rim above the
             base at that spot [m].
         """
-        self.simulate_until(float(times.max(initial=0.0)))
         turns, rate, lift = np.zeros_like(times), np.zeros_like(times), np.zeros_like(times)
-        for piece, part in self._pieces.pieces(times):
-            if isinstance(piece, _Flying):
-                samples = self._samples_of(piece)
-                counted, rate[part] = samples.counted
-                turns[part] = np.interp(times[part], samples.times, counted)
-                lift[part] = np.interp(times[part], samples.times, samples.lift)
+        for piece, part in self._flying_pieces(times):
+            samples = self._samples_of(piece)
+            counted, rate[part] = samples.counted
+            turns[part] = np.interp(times[part], samples.times, counted)
+            lift[part] = np.interp(times[part], samples.times, samples.lift)
         return turns, rate, lift
 
     def first_lift(self) -> float:
@@ -252,12 +248,10 @@ class Flight:
         Args:
             times: shape (n,) [s].
         """
-        self.simulate_until(float(times.max(initial=0.0)))
         place, up = np.zeros_like(times), np.zeros(times.shape, dtype=np.bool_)
-        for piece, part in self._pieces.pieces(times):
-            if isinstance(piece, _Flying):
-                samples = self._samples_of(piece)
-                place[part], up[part] = _cubic(times[part], samples.times, *samples.stem), True
+        for piece, part in self._flying_pieces(times):
+            samples = self._samples_of(piece)
+            place[part], up[part] = _cubic(times[part], samples.times, *samples.stem), True
         return place, up
 
     def attitude(self, times: Array) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
@@ -270,16 +264,21 @@ class Flight:
         Args:
             times: shape (n,) [s].
         """
-        self.simulate_until(float(times.max(initial=0.0)))
         place, axis, arm = (np.zeros((times.size, 3)) for _ in range(3))
         up = np.zeros(times.shape, dtype=np.bool_)
+        for piece, part in self._flying_pieces(times):
+            up[part] = True
+            time, states = self._states_of(piece)
+            for found, columns in ((place, R), (axis, N), (arm, ARM)):
+                found[part] = np.stack([np.interp(times[part], time, one) for one in states[:, columns].T], axis=1)
+        return place, axis, arm, up
+
+    def _flying_pieces(self, times: Array) -> Iterator[tuple[_Flying, slice]]:
+        """Simulate up to these times, and yield the pieces in which a top is up, with their places in the times."""
+        self.simulate_until(float(times.max(initial=0.0)))
         for piece, part in self._pieces.pieces(times):
             if isinstance(piece, _Flying):
-                up[part] = True
-                time, states = self._states_of(piece)
-                for found, columns in ((place, R), (axis, N), (arm, ARM)):
-                    found[part] = np.stack([np.interp(times[part], time, one) for one in states[:, columns].T], axis=1)
-        return place, axis, arm, up
+                yield piece, part
 
     def _states_of(self, piece: _Flying) -> tuple[Array, Array]:
         """Return times and states of a piece; those of the last pieces are kept."""

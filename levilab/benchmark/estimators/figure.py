@@ -29,15 +29,15 @@ LINES = {
 }
 
 
+@mpl.rc_context(STYLE)
 def estimators_figure(found: Study) -> Figure:
     """Three panels: RMSE over the bound, speed, and coverage of the hard cases."""
-    with mpl.rc_context(STYLE):
-        rows = len(found.hard)
-        figure = Figure(figsize=(WIDE, 4.6 + 0.17 * rows))
-        headline(figure, _title(found))
-        _errors(panel(figure, 0.65, 0.55, 3.3, 2.2), found)
-        _speeds(panel(figure, 5.45, 0.55, 1.45, 2.2), found)
-        _hard(panel(figure, 2.35, 4.05, 4.5, 0.1 + 0.17 * rows), found.hard)
+    rows = len(found.hard)
+    figure = Figure(figsize=(WIDE, 4.6 + 0.17 * rows))
+    headline(figure, _title(found))
+    _errors(panel(figure, 0.65, 0.55, 3.3, 2.2), found)
+    _speeds(panel(figure, 5.45, 0.55, 1.45, 2.2), found)
+    _hard(panel(figure, 2.35, 4.05, 4.5, 0.1 + 0.17 * rows), found.hard)
     return figure
 
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-import platform
 import time
 from collections import Counter
 from dataclasses import asdict, dataclass, field
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +15,7 @@ from analysis.errors import AnalysisError
 from analysis.pulses import spin_of_times, spin_of_trace
 from analysis.pulses.synthetic import DURATION, HARD, RATE, Case, Trace, bound, make
 from levilab.benchmark.estimators.peers import PEERS
-from levilab.benchmark.machine import processor, version_of
+from levilab.benchmark.machine import describe_measurement
 from levilab.errors import UsageError
 
 if TYPE_CHECKING:
@@ -231,9 +229,7 @@ def as_document(found: Study) -> dict[str, Any]:
     return {
         "schema": "levilab-benchmark-estimators/1",
         "traces": "Gaussian pulse of 3 % duty, 29.5 to 30.5 Hz, -0.1 Hz/s, 20 kS/s, 10 s; hard cases at 20 dB",
-        "measured_utc": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": {"processor": processor(), "system": platform.system(), "python": platform.python_version()},
-        "software": {name: version_of(name) for name in ("levilab", "numpy", "scipy")},
+        **describe_measurement("levilab", "numpy", "scipy"),
         "trials": found.trials,
         "methods": [_row(score) for score in found.scores],
         "hard_cases": [_row(score) for score in found.hard],

@@ -35,35 +35,35 @@ TITLE = "Speed against error of one top, scene undriven: levilab's kernels at fi
 RANGE = (1e-1, 3e-12)
 
 
+@mpl.rc_context(STYLE)
 def work_precision_figure(found: Comparison) -> Figure:
     """Error at the end falling to the right, speed upwards; the names beside, fastest first."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDE, 4.1))
-        headline(figure, TITLE)
-        axes = panel(figure, 0.75, 0.55, 4.2, 3.0)
-        fastest = {}
-        for method, (colour, marker, line, name) in LINES.items():
-            points = sorted(
-                (100 * p.error, p.speed)
-                for p in found.points
-                if p.method == method and RANGE[1] < 100 * p.error < RANGE[0]
-                and (method != "heyoka batch" or p.setting.endswith(_lanes(found)))
-            )  # fmt: skip
-            if points:
-                errors, speeds = zip(*points, strict=True)
-                fastest[name] = max(speeds)
-                axes.loglog(errors, speeds, color=colour, marker=marker, linestyle=line, label=name)
-        axes.set_xlim(*RANGE)
-        axes.set(xlabel="error of the place after 5 s  [cm]; smaller to the right",
-                 ylabel="simulated seconds per second of one core")  # fmt: skip
-        axes.grid(visible=True, which="major")
-        handles, names = axes.get_legend_handles_labels()
-        order = sorted(range(len(names)), key=lambda k: -fastest[names[k]])
-        axes.legend(
-            [handles[k] for k in order], [names[k] for k in order], loc="upper left", bbox_to_anchor=(1.02, 1.0),
-            fontsize=SMALL, borderaxespad=0, labelspacing=0.6,
+    figure = Figure(figsize=(WIDE, 4.1))
+    headline(figure, TITLE)
+    axes = panel(figure, 0.75, 0.55, 4.2, 3.0)
+    fastest = {}
+    for method, (colour, marker, line, name) in LINES.items():
+        points = sorted(
+            (100 * p.error, p.speed)
+            for p in found.points
+            if p.method == method and RANGE[1] < 100 * p.error < RANGE[0]
+            and (method != "heyoka batch" or p.setting.endswith(_lanes(found)))
         )  # fmt: skip
-        axes.text(1.04, 0.0, "higher is faster", transform=axes.transAxes, fontsize=SMALL)
+        if points:
+            errors, speeds = zip(*points, strict=True)
+            fastest[name] = max(speeds)
+            axes.loglog(errors, speeds, color=colour, marker=marker, linestyle=line, label=name)
+    axes.set_xlim(*RANGE)
+    axes.set(xlabel="error of the place after 5 s  [cm]; smaller to the right",
+             ylabel="simulated seconds per second of one core")  # fmt: skip
+    axes.grid(visible=True, which="major")
+    handles, names = axes.get_legend_handles_labels()
+    order = sorted(range(len(names)), key=lambda k: -fastest[names[k]])
+    axes.legend(
+        [handles[k] for k in order], [names[k] for k in order], loc="upper left", bbox_to_anchor=(1.02, 1.0),
+        fontsize=SMALL, borderaxespad=0, labelspacing=0.6,
+    )  # fmt: skip
+    axes.text(1.04, 0.0, "higher is faster", transform=axes.transAxes, fontsize=SMALL)
     return figure
 
 

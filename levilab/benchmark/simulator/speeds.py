@@ -40,11 +40,8 @@ def best_speed(points: Iterable[Point], error: float) -> float:
         if point.error > 0 and math.isfinite(point.error):
             key = f"{point.method}{point.setting.partition(',')[2]}"
             methods.setdefault(key, []).append(point)
-    return max((_between(rows, error) for rows in methods.values()), default=math.nan, key=_or_nothing)
-
-
-def _or_nothing(speed: float) -> float:
-    return 0.0 if math.isnan(speed) else speed
+    speeds = (_between(rows, error) for rows in methods.values())
+    return max((speed for speed in speeds if not math.isnan(speed)), default=math.nan)
 
 
 def _between(rows: list[Point], error: float) -> float:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import platform
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from levilab.benchmark.machine import processor, version_of
+from levilab.benchmark.machine import describe_measurement
 from levilab.benchmark.simulator import ours
 from levilab.benchmark.simulator.peers import PEERS, Peer
 from levilab.benchmark.simulator.speeds import Ratio, best_speed
@@ -44,21 +42,13 @@ class Comparison:
 
 
 def compare(*, quick: bool = False, tell: Callable[[str], None] = lambda _: None) -> Comparison:
-    """Measure everything in one process.
+    """Measure the kernels at fixed steps and the peers on the undriven motion, in one process.
+
+    In ROUNDS, of which each point keeps its best: a machine that slows down for a while slows every contender.
 
     Args:
         quick: fewer settings, one round.
         tell: called with what is under way.
-    """
-    points = kernel_points(quick=quick, tell=tell)
-    missing = {peer.package for peer in PEERS if not peer.installed}
-    return Comparison(points, ratios(points), tuple(sorted(missing)))
-
-
-def kernel_points(*, quick: bool, tell: Callable[[str], None]) -> tuple[Point, ...]:
-    """Measure the kernels at fixed steps and the peers on the undriven motion.
-
-    In ROUNDS, of which each point keeps its best: a machine that slows down for a while slows every contender.
     """
     sides = (Peer("one top", "levilab", ours.scalar), Peer("many at once", "levilab", ours.many), *PEERS)
     best: dict[tuple[str, str], Point] = {}
@@ -71,7 +61,9 @@ def kernel_points(*, quick: bool, tell: Callable[[str], None]) -> tuple[Point, .
             for point in side.points(quick):
                 key = point.method, point.setting
                 best[key] = max(point, best.get(key, point), key=lambda p: p.speed)
-    return tuple(best.values())
+    points = tuple(best.values())
+    missing = {peer.package for peer in PEERS if not peer.installed}
+    return Comparison(points, ratios(points), tuple(sorted(missing)))
 
 
 def ratios(points: Sequence[Point]) -> tuple[Ratio, ...]:
@@ -91,9 +83,7 @@ def as_document(found: Comparison) -> dict[str, Any]:
     return {
         "schema": "levilab-benchmark-simulator/1",
         "motion": "undriven, IC1, 30 Hz, 25.26 g, 5 s; error: largest component of the place at the end",
-        "measured_utc": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": {"processor": processor(), "system": platform.system(), "python": platform.python_version()},
-        "software": {name: version_of(name) for name in ("levilab", "numba", "numpy", "scipy", "heyoka")},
+        **describe_measurement("levilab", "numba", "numpy", "scipy", "heyoka"),
         "points": [as_point(p) for p in found.points],
         "ratios": [as_ratio(r) for r in found.ratios],
         "missing": list(found.missing),

@@ -65,7 +65,7 @@ def test_a_map_with_islands_agrees_with_the_full_one_within_its_limit() -> None:
 
 
 def test_the_result_does_not_depend_on_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(adaptive, "compute_points", made_up)
+    monkeypatch.setattr(adaptive, "compute", made_up)
     asked, found = plan(41, 41, 0.01), []
     for workers in (this_process(), threads(3)):
         store = Store.create(None, asked)
@@ -84,14 +84,14 @@ def test_a_map_that_was_interrupted_goes_on_without_computing_anew(
         pass
 
     def counted(task: Any) -> dict[str, np.ndarray]:
-        computed.extend(task.points.tolist())
+        computed.extend(task.part.tolist())
         return made_up(task)
 
     def cut(share: float) -> None:
         if share > 0.5:
             raise Cut
 
-    monkeypatch.setattr(adaptive, "compute_points", counted)
+    monkeypatch.setattr(adaptive, "compute", counted)
     monkeypatch.setattr(adaptive, "KEPT", 150)
     stores = [Store.create(tmp_path / name, asked) for name in ("whole.zarr", "cut.zarr")]
     for store in stores:
@@ -125,11 +125,11 @@ def test_ctrl_c_costs_only_the_points_under_way(monkeypatch: pytest.MonkeyPatch)
         tasks.append(task)
         return made_up(task)
 
-    monkeypatch.setattr(adaptive, "compute_points", interrupted)
+    monkeypatch.setattr(adaptive, "compute", interrupted)
     store = Store.create(None, plan(161, 161, 0.01), begin_adaptive)
     with pytest.raises(KeyboardInterrupt):
         run_adaptive(store, this_process())
-    assert np.count_nonzero(store.group["status"][...]) == sum(task.points.size for task in tasks) > 0
+    assert np.count_nonzero(store.group["status"][...]) == sum(task.part.size for task in tasks) > 0
 
 
 def test_what_has_no_boundary_cannot_be_refined() -> None:

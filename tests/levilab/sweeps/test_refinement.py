@@ -23,7 +23,7 @@ def islands(seed: int, shape: tuple[int, int] = (120, 160), count: int = 15, lar
 
 
 def refined(values: np.ndarray, **how: int) -> Refined:
-    return run_refinement(refine(values.shape, **how), lambda points: values.flat[points])
+    return run_refinement(refine(values.shape, **how), lambda question: values.flat[question.points])
 
 
 def test_what_was_computed_is_right_and_every_edge_has_it_on_both_sides() -> None:

@@ -73,10 +73,10 @@ def test_the_order_of_the_chunks_and_what_is_beside_a_point_change_no_bit(plan: 
     tasks = list(tasks_of(store))
     random.Random(1).shuffle(tasks)
     for task in tasks:
-        store.write(task.chunk, compute(task))
+        store.write(task.part, compute(task))
     assert bits(store.load()) == bits(whole)
-    one = compute(next(task for task in tasks if task.chunk.number == 2))
-    assert whole.values["lifetime_s"][tasks[0].chunk.box].shape == one["lifetime_s"].shape
+    one = compute(next(task for task in tasks if task.part.number == 2))
+    assert whole.values["lifetime_s"][tasks[0].part.box].shape == one["lifetime_s"].shape
 
 
 def test_chunks_follow_from_the_plan_and_cover_it_once() -> None:
@@ -117,7 +117,7 @@ def test_a_table_is_swept_row_by_row_with_words_in_it(tmp_path: Path) -> None:
 
 def test_a_chunk_that_fails_is_named_and_the_others_are_kept(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     def fails_once(task):
-        if task.chunk.number == 1:
+        if task.part.number == 1:
             raise SimulationError("a top was lost in numbers")
         return compute(task)
 

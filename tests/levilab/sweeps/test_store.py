@@ -36,16 +36,16 @@ def test_a_store_that_is_opened_again_has_the_plan_and_the_values(tmp_path: Path
     assert made.plan.chunk_count > 2
     *tasks, last = tasks_of(made)
     for task in tasks:
-        made.write(task.chunk, made_up(task))
+        made.write(task.part, made_up(task))
     again = Store.open(tmp_path / "map.zarr")
     assert again.plan.as_table() == made.plan.as_table()
-    assert [chunk.number for chunk in again.missing()] == [last.chunk.number]
+    assert [chunk.number for chunk in again.missing()] == [last.part.number]
     found = again.load()
     spin, mass = (axis.values for axis in plan().axes)
     expected = spin[:, None] + mass
     assert np.array_equal(found.values["lifetime_s"][found.computed], expected[found.computed])
     assert np.all(np.isnan(found.values["lifetime_s"][~found.computed]))
-    assert np.count_nonzero(~found.computed) == np.prod(last.chunk.shape)
+    assert np.count_nonzero(~found.computed) == np.prod(last.part.shape)
 
 
 def test_a_store_in_memory_and_one_on_the_disk_hold_the_same(tmp_path: Path) -> None:
@@ -76,7 +76,7 @@ def test_values_are_on_the_disk_before_their_mark(tmp_path: Path, monkeypatch: p
     marks: list[int] = []
     monkeypatch.setattr(os, "fsync", lambda _: marks.append(int(made.group["done"][:].sum())))
     for task in tasks_of(made):
-        made.write(task.chunk, made_up(task))
+        made.write(task.part, made_up(task))
     files = [
         file for column in ("survived", "lifetime_s") for file in (tmp_path / "map.zarr" / column / "c").glob("*/*")
     ]
@@ -97,7 +97,7 @@ def test_two_processes_cannot_write_into_one_store(tmp_path: Path) -> None:
 def test_a_store_that_is_damaged_is_an_error_that_names_it(tmp_path: Path) -> None:
     made = Store.create(tmp_path / "map.zarr", plan())
     task = next(tasks_of(made))
-    made.write(task.chunk, made_up(task))
+    made.write(task.part, made_up(task))
     (file,) = (tmp_path / "map.zarr" / "lifetime_s" / "c").glob("*/*")
     file.write_bytes(b"torn")
     with pytest.raises(DataError, match=r"map\.zarr: a file of lifetime_s is damaged"):
@@ -114,7 +114,7 @@ def test_a_store_that_is_moved_while_it_is_written_is_an_error_that_names_it(tmp
     (tmp_path / "map.zarr").rename(tmp_path / "elsewhere.zarr")
     task = next(tasks_of(made))
     with pytest.raises(CannotWrite, match=r"map\.zarr: it was moved or removed meanwhile"):
-        made.write(task.chunk, made_up(task))
+        made.write(task.part, made_up(task))
 
 
 def test_a_store_whose_marks_are_torn_is_an_error(tmp_path: Path) -> None:
