@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -59,7 +59,7 @@ class AnalysisResult:
 
     Attributes:
         analysis: the row of the catalogue.
-        found: what it found, with the readings.
+        found: its result, with the readings.
         copies: data files that DataFrames were written to, which `save` writes beside the result.
     """
 
@@ -79,17 +79,17 @@ class AnalysisResult:
 
     @property
     def synthetic(self) -> bool:
-        """Whether any of the inputs is known to be simulated or made up."""
+        """Whether any of the inputs is known to be synthetic."""
         return any(source.synthetic for source in self.found.sources)
 
     @property
     def verdict(self) -> str:
-        """What the data say, in a few sentences."""
+        """The answer of the data, in a few sentences."""
         return str(self.found.text)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to know before using the numbers."""
+        """Warnings about the numbers."""
         return tuple(unquoted(text) for text in self.found.all_warnings)
 
     @cached_property
@@ -143,7 +143,7 @@ class AnalysisResult:
         """Return the tables and sentences that `levilab analyze` prints."""
         from levilab.present.terminal import as_text  # with rich
 
-        return as_text(partial(_print, self))
+        return as_text(lambda console: print_analysis(self.analysis, self.found, console=console))
 
     def to_dataframe(self, table: TableName = "values") -> pd.DataFrame:
         """Return the result as a table.
@@ -212,10 +212,6 @@ class AnalysisResult:
             return [*written, *save_result(self.analysis, found, place)]
         except CannotWrite as error:
             raise CannotWrite(error.problem, _ELSEWHERE) from error
-
-
-def _print(result: AnalysisResult, console: Any) -> None:
-    print_analysis(result.analysis, result.found, console=console)
 
 
 def _copy(path: Path, folder: Path) -> Path:

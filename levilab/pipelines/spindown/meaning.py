@@ -134,8 +134,10 @@ def _runs(analysis: SpinDownAnalysis) -> Iterator[str]:
             "how the top was set spinning are not in it."
         )
         return
-    law = analysis.combined.best
-    for name, mean in _constants(analysis).items():
+    # the constants of a general law trade against each other: their large u would hide that the runs differ
+    verdict = analysis.combined.verdict
+    law = next((name for name in (*verdict.indistinguishable, *verdict.weak) if name in _POWERS), verdict.best)
+    for name, mean in analysis.combined.fit(law).constants.items():
         if name == "exponent" or mean.value is None or mean.scatter is None:  # type: ignore[attr-defined]
             continue
         scatter: float = mean.scatter  # type: ignore[attr-defined]
