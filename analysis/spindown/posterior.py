@@ -104,7 +104,7 @@ def posterior(
     s2 = np.maximum(triangles[:, p, p] ** 2 / max(n - p, 1), least**2)
     if n - p < _FEW:
         expected_left = triangles[:, :, p] - triangles[:, :, :k] @ (scale[p - k :] * expected)
-        of_law = np.linalg.qr(np.concatenate([triangles[:, :, k:p], expected_left[:, :, None]], axis=2), mode="r")
+        _, of_law = np.linalg.qr(np.concatenate([triangles[:, :, k:p], expected_left[:, :, None]], axis=2))
         s2 = np.maximum(of_law[:, -1, -1] ** 2 / max(n - (p - k), 1), least**2)
     if stated:
         s2 = (stated_freedom + triangles[:, p, p] ** 2) / (stated_freedom + max(n - p, 0))
