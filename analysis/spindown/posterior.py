@@ -32,6 +32,9 @@ INDEPENDENT = np.zeros(1)
 _ALIKE = 1e-12
 #: Rounds in which s settles: to 1e-3 of itself.
 _ROUNDS = 3
+#: With fewer readings beyond the parameters s starts from the scatter about the law with all others as expected: from
+#: below it would fall to zero, for as many parameters as readings fit any noise.
+_FEW = 4
 #: Numbers that are worked on at once.
 _AT_ONCE = 2_000_000
 
@@ -99,6 +102,10 @@ def posterior(
     ridge[:, :, p] = expected / u
 
     s2 = np.maximum(triangles[:, p, p] ** 2 / max(n - p, 1), least**2)
+    if n - p < _FEW:
+        expected_left = triangles[:, :, p] - triangles[:, :, :k] @ (scale[p - k :] * expected)
+        _, of_law = np.linalg.qr(np.concatenate([triangles[:, :, k:p], expected_left[:, :, None]], axis=2))
+        s2 = np.maximum(of_law[:, -1, -1] ** 2 / max(n - (p - k), 1), least**2)
     if stated:
         s2 = (stated_freedom + triangles[:, p, p] ** 2) / (stated_freedom + max(n - p, 0))
     for _ in range(_ROUNDS):

@@ -64,7 +64,7 @@ def unpack(data: bytes) -> Any:
     try:
         head = parse_json(data[4 : 4 + length].decode())
         return _with_arrays(head, data[4 + length :])
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise MalformedMessage(f"no message: {error}") from error
 
 

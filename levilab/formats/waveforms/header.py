@@ -134,7 +134,8 @@ def read_header(head: Head, dialect: Dialect, columns: Mapping[str, str]) -> Hea
         TableError: it is one, and its header is damaged.
     """
     lines = [line.lstrip("#") for line in head.lines[:MOST_LINES]]
-    rows = [[field.strip().strip('"').strip() for field in dialect.split(line)] for line in lines]
+    # a blank line is a row with one empty field
+    rows = [[field.strip().strip('"').strip() for field in dialect.split(line)] or [""] for line in lines]
     for recognise in (_recognise_rigol, _recognise_beside, _recognise_keyed, _recognise_titled, _recognise_stepped):
         header = recognise(head, dialect, rows)
         if header:

@@ -505,3 +505,15 @@ def test_an_uncertainty_stated_far_too_small_or_too_large_is_reported_and_change
     assert set(small.verdict.excluded) == {"stokes", "newton"}
     assert "understated" in kinds(small)
     assert "overstated" in kinds(large)
+
+
+@pytest.mark.parametrize(("n", "largest"), [(4, 55), (5, 19), (6, 11.5), (7, 8.7)])
+def test_u_of_few_readings_with_a_tilt_is_no_smaller_than_their_noise(n: int, largest: float) -> None:
+    # largest: of 30 pulls by Student's t with n − 2 degrees of freedom, exceeded with a probability of 1 %
+    rng, time = np.random.default_rng(1), 10.0 * np.arange(n)
+    for _ in range(30):
+        noisy = spin("disc", time, 40.0, 2.34e-4) + rng.normal(0, SIGMA, n)
+        start = spin_down_fit.fit_spin_down(time, noisy, laws=["disc"]).fit("disc").parameters["start_frequency"]
+        assert start.value is not None
+        assert start.u is not None
+        assert abs(start.value - 40.0) < largest * start.u

@@ -101,7 +101,8 @@ def test_any_bytes_are_no_message(data):
         "[]", "null", '{"kind":"state"}', '{"kind":"other"}', '{"kind":"state","time_s":NaN}',
         '{"kind":"state","time_s":"<b>"}', '{"kind":["state"]}', "[" * 5000, POSES % ("[9,3]", "[9,4]", "[9]"),
         POSES % ("[1,3]", "[1,4]", "[2]"), POSES % ("[1]", "[1,4]", "[1]"), POSES % ("[-1,3]", "[1,4]", "[1]"),
-        POSES % ("[1e3,3]", "[1,4]", "[1]"), POSES % ("7", "[1,4]", "[1]"), POSES % ("[0,3]", "[0,4]", "[0]") + "x",
+        POSES % ("[1e3,3]", "[1,4]", "[1]"), POSES % (f"[{10**24},3]", "[1,4]", "[1]"),
+        POSES % ("7", "[1,4]", "[1]"), POSES % ("[0,3]", "[0,4]", "[0]") + "x",
     ],
 )  # fmt: skip
 def test_a_head_that_says_something_else_is_refused(head):

@@ -95,6 +95,8 @@ def rows(n=20, first=0):
         ("x-axis,1,2\nsecond,Volt,Ampere\n" + "".join(f"{k}.0E-03,1,2\n" for k in range(20)),
          0.0, 1e-3, "CH1 V, CH2 A"),
         ("t,CH1\n" + "".join(f"{k / 1000},1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
+        ("t CH1\n\n" + "".join(f"{k / 1000} 1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
+        ("\nt CH1\n" + "".join(f"{k / 1000} 1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
         ("X(CH1),CH1\nSecond,Volt\n" + "".join(f"{k / 1000},1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
         ("X(CH1),Y(CH1),X(CH2),Y(CH2)\nSecond,Volt,Second,Ampere\n"
          + "".join(f"{k / 1000},1,{k / 1000},2\n" for k in range(20)), 0.0, 1e-3, "CH1 V, CH2 A"),
