@@ -138,9 +138,9 @@ def _runs(analysis: SpinDownAnalysis) -> Iterator[str]:
     verdict = analysis.combined.verdict
     law = next((name for name in (*verdict.indistinguishable, *verdict.weak) if name in _POWERS), verdict.best)
     for name, mean in analysis.combined.fit(law).constants.items():
-        if name == "exponent" or mean.value is None or mean.scatter is None:  # type: ignore[attr-defined]
+        if name == "exponent" or mean.value is None or mean.scatter is None:
             continue
-        scatter: float = mean.scatter  # type: ignore[attr-defined]
+        scatter: float = mean.scatter
         own = [run.fit(law).parameters[name].u for run in analysis.runs]
         known = [u for u in own if u]
         if len(known) != len(own):
