@@ -34,7 +34,7 @@ def tests(session: nox.Session) -> None:
 
 @nox.session
 def wheel(session: nox.Session) -> None:
-    """The wheel in a clean environment runs from a folder that holds a decoy analysis.py."""
+    """Test that the wheel in a clean environment runs from a folder that holds a decoy analysis.py."""
     install_wheel(session)
     folder = Path(session.create_tmp()).resolve() / "elsewhere"
     folder.mkdir(exist_ok=True)
@@ -72,7 +72,7 @@ def peers(session: nox.Session) -> None:
 
 
 def unpacked_source(session: nox.Session, package: str) -> Path:
-    """The folder of a package's source distribution; fetched once.  package: as in name==version."""
+    """Return the folder of a package's source distribution; fetched once.  package: as in name==version."""
     folder = Path(session.create_tmp()).resolve()
     source = folder / package.replace("==", "-")
     if not source.exists():
@@ -86,7 +86,7 @@ def unpacked_source(session: nox.Session, package: str) -> Path:
 
 @nox.session
 def site(session: nox.Session) -> None:
-    """The pages as a site in build/site; a warning is an error, and no page asks another host for anything."""
+    """Build the pages as a site in build/site; a warning is an error, and no page asks another host for anything."""
     session.install("--editable", ".[docs]", "--constraint", str(CONSTRAINTS))
     session.run(
         "sphinx-build", "--fail-on-warning", "--keep-going", "--jobs", "2", "docs", "build/site", *session.posargs

@@ -28,7 +28,7 @@ class Component:
 
     Attributes:
         name: the same in all versions, a word or two with underscores.
-        source: what is uncertain, in words.
+        source: description of the uncertain input.
         kind: "A", from a scatter that was seen, or "B", from anything else (GUM §2.3).
         u: standard uncertainty of the input quantity, in `unit`; None where it is not known.
         unit: of the input quantity.
@@ -50,7 +50,7 @@ class Component:
 
     @property
     def contribution(self) -> float | None:
-        """What it contributes to u of the result, in the result's unit."""
+        """The contribution to u of the result, in the result's unit."""
         return None if self.u is None else abs(self.sensitivity) * self.u
 
 
@@ -83,12 +83,12 @@ class Budget:
     @property
     def included(self) -> tuple[Component, ...]:
         """The rows that u is made of, the largest first."""
-        return self._sorted(one for one in self.components if one.included)
+        return self._sort(one for one in self.components if one.included)
 
     @property
     def left_out(self) -> tuple[Component, ...]:
         """The rows that u does not contain, those of unknown size last."""
-        return self._sorted(one for one in self.components if not one.included)
+        return self._sort(one for one in self.components if not one.included)
 
     @property
     def combined(self) -> float:
@@ -116,14 +116,14 @@ class Budget:
         return self.included[0] if self.included and self.u > 0 else None
 
     def share(self, row: Component) -> float | None:
-        """Part of u² that a row is; of one that is not in u, what it would be of u² with it alone."""
+        """Return the part of a row in u²; for a row outside u, its part of the sum of both squares."""
         part = row.contribution
         if part is None or (not part and not self.u):
             return None
         whole = self.u if row.included else hypot(self.u, part)
         return (part / whole) ** 2 if whole else None
 
-    def _sorted(self, rows: Iterable[Component]) -> tuple[Component, ...]:
+    def _sort(self, rows: Iterable[Component]) -> tuple[Component, ...]:
         def size(one: Component) -> float:
             return -1.0 if one.contribution is None else one.contribution
 
@@ -170,7 +170,7 @@ def u_of_limit(limit: float) -> float:
 
 
 def gate_bias(before: Array, middle: Array, after: Array) -> Array:
-    """By how much means over a gate exceed the values in its middle, by Simpson's rule: to second order ν″T²/24.
+    """Return the bias of means over a gate against the values in its middle, to second order ν″T²/24 (Simpson's rule).
 
     The next term is ν⁗T⁴/1920: of a spin that decays by 0.3 %/s and a gate of 10 s, 10⁻⁵ of this one.
 

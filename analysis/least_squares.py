@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Residual = Callable[[Array], Array]  # q of shape (p,) → (model − data)/u of shape (n,)
-Gradient = Callable[[Array], Array]  # q of shape (p,) → slopes of that, shape (p, n)
+Gradient = Callable[[Array], Array]  # q of shape (p,) → slopes of the residuals, shape (p, n)
 
 # A step that changes χ² or q by less than this ends the search: then q is within 1e-5 standard uncertainties of the
 # minimum, and exact to about 1e-12 where the data are free of noise.
@@ -24,9 +24,9 @@ def solve(
     most: int = MOST_EVALUATIONS,
     tolerance: float = TOLERANCE,
 ) -> tuple[Array, bool]:
-    """The parameters of the smallest sum of squares, and whether the search ended there.
+    """Find the parameters of the smallest sum of squares, and whether the search converged.
 
-    A search that does not end in so many evaluations at `most` returns the best point found.  One that begins where a
+    A search that does not end within `most` evaluations returns the best point found.  One that begins where a
     residual is no number has not ended, though MINPACK says so.
     """
     from scipy.optimize import leastsq

@@ -148,7 +148,7 @@ class Statistics:
 
 
 def summarize(sample: Sample) -> Statistics:
-    """Mean, scatter, standard error, trend and outliers of repeated limits.
+    """Return mean, scatter, standard error, trend and outliers of repeated limits.
 
     The mean is not weighted: tops differ by more than their limits are uncertain.  Its standard error is s/√n, no less
     than the limits' own uncertainties leave to it; where the drive made steps, with what these leave: tops that scatter
@@ -166,7 +166,7 @@ def summarize(sample: Sample) -> Statistics:
     >>> round(found.mean.u, 4), round(found.scatter.value, 4)
     (0.0577, 0.0)
     """
-    limits, n = _checked(sample.limits), sample.limits.size
+    limits, n = _check_limits(sample.limits), sample.limits.size
     mean = float(limits.mean())
     if n < FEWEST:
         own = None if sample.u is None else float(sample.u[0])
@@ -203,7 +203,7 @@ def combine(runs: Sequence[Sample]) -> Statistics:
     >>> round(found.mean.value, 2), round(found.mean.u, 2), round(found.scatter.value, 2), round(found.between.value, 2)
     (60.5, 0.5, 0.1, 0.7)
     """
-    limits = [_checked(run.limits) for run in runs]
+    limits = [_check_limits(run.limits) for run in runs]
     numbers = np.array([one.size for one in limits])
     within = int(numbers.sum()) - len(runs)
     if len(runs) == 1:
@@ -238,7 +238,7 @@ def combine(runs: Sequence[Sample]) -> Statistics:
     )
 
 
-def _checked(limits: Array) -> Array:
+def _check_limits(limits: Array) -> Array:
     if limits.size == 0:
         raise TooFewReadings(seen=0, needed=1)
     for i, value in enumerate(limits.tolist()):
@@ -265,12 +265,12 @@ def _with_own_u(scatter: float, freedom: int) -> Estimate:
 
 
 def _freedom(variance: float, by_scatter: float, freedom: int) -> float | None:
-    """Of a variance of which only a part is from a scatter (Welch and Satterthwaite, GUM G.4)."""
+    """Return the degrees of freedom of a variance that only partly comes from a scatter (GUM G.4)."""
     return None if by_scatter == 0 else freedom * (variance / by_scatter) ** 2
 
 
 def _between(means: Array, own: Array) -> float:
-    """Return the variance between runs [Hz²], from the runs' means and the variances that their tops leave to them."""
+    """Return the variance between runs [Hz²], from the runs' means and the variances of these within a run."""
     wanted = means.size - 1
     if not _scatter(means):
         return 0.0
@@ -291,7 +291,7 @@ def _between(means: Array, own: Array) -> float:
 
 
 def _weights(variances: Array) -> Array:
-    """Inverse variances, of the sum 1; all alike where there is no variance at all."""
+    """Return inverse variances, of the sum 1; all equal where there is no variance at all."""
     if not (variances > 0).all():
         return np.full(variances.size, 1 / variances.size)
     inverse = variances.min() / variances
@@ -299,7 +299,7 @@ def _weights(variances: Array) -> Array:
 
 
 def _common_error(scatter: float, step: float) -> float:
-    """Return the standard uncertainty that steps of the drive leave to a mean of ever so many limits [Hz].
+    """Return the standard uncertainty of a mean from the drive's steps, which no number of limits lowers [Hz].
 
     A limit within a step is given as the middle of the step, wrong by step/√12.  Two tops share that error if they fall
     into the same step, and do not if they scatter over several: of tops with a true scatter σ its correlation is
@@ -326,7 +326,7 @@ def _common_error(scatter: float, step: float) -> float:
 
 
 def _trend(limits: Array) -> tuple[Estimate, float]:
-    """Slope of a straight line through the limits by their number, and its p-value (Student's t)."""
+    """Return the slope of a straight line through the limits by their number, and its p-value (Student's t)."""
     number = np.arange(limits.size) - (limits.size - 1) / 2
     square = float(number @ number)
     slope = float(number @ limits) / square
@@ -343,7 +343,7 @@ def _by_chance(t: float, freedom: float | None) -> float:
 
 
 def outliers_of(limits: Array) -> tuple[int, ...]:
-    """Numbers of limits that do not belong to the others: Grubbs's test, two-sided, again without the one found.
+    """Return the numbers of outliers: Grubbs's test, two-sided, repeated without each one found.
 
     At most a third are looked for; of fewer than five none.
     """
@@ -409,7 +409,7 @@ class NoWindow(AnalysisError):
 
 
 def nearest_edge(mean: float, window: tuple[float, float]) -> str:
-    """Whether a mean limit is a "lower" or an "upper" one: by the nearer edge of the window, in parts of it [Hz]."""
+    """Return "lower" or "upper": the edge of the window that is nearer to a mean limit, by their ratio [Hz]."""
     low, high = window
     return "lower" if mean < math.sqrt(low * high) else "upper"
 

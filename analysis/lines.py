@@ -1,7 +1,7 @@
 """Spectral lines of complex signals: frequencies of either sign, amplitudes and phases.
 
 The strongest line is found in a Hann-windowed transform, placed between the bins by the ratio of the two highest
-(Grandke, IEEE Trans. Instrum. Meas. 32, 350 (1983)), taken away, and so on; then each is placed anew with all
+(Grandke, IEEE Trans. Instrum. Meas. 32, 350 (1983)), taken away, and so on; then each is placed again with all
 others taken away (Li & Stoica's RELAX, IEEE Trans. Signal Process. 44, 281 (1996)), since every line leaks a
 little into the others' bins.
 
@@ -32,9 +32,9 @@ Bins = NDArray[np.int64]
 FEWEST = 32
 #: Half the width of a line's main lobe behind a Hann window, in bins: lines nearer to each other are one.
 LOBE = 2
-#: The greatest of 10⁵ bins of white noise stands at 4.1 times their median: what is higher than this is no noise.
+#: The greatest of 10⁵ bins of white noise stands at 4.1 times their median: higher peaks are no noise.
 ABOVE_NOISE = 5.0
-#: How often all lines are placed anew; a round takes what leaks in down by a factor of about a hundred.
+#: Rounds in which all lines are placed again; each lowers the leakage by a factor of about a hundred.
 ROUNDS = 3
 #: While lines are looked for, each is taken away this far to either side [bins]; beyond, 1/(π FAR³) of it is left,
 #: 2e-8, where weaker lines are not looked for.
@@ -79,12 +79,12 @@ def spectral_lines(signal: Signal, rate: float, *, most: int = 12, weakest: floa
     >>> [(round(line.frequency, 4), round(line.amplitude, 3)) for line in found.lines], found.resolution
     ([(7.3456, 3.0), (-0.6, 1.0)], 0.2)
     """
-    return lines_of_signals(_checked(signal)[None], rate, most=most, weakest=weakest)[0]
+    return lines_of_signals(_check_signal(signal)[None], rate, most=most, weakest=weakest)[0]
 
 
 def lines_of_signals(signals: Signal, rate: float, *, most: int = 12, weakest: float = 1e-3) -> list[Lines]:
     """Return the lines of many signals, shape (signals, n), each as `spectral_lines` would, to the last bit."""
-    signals = _checked(signals)
+    signals = _check_signal(signals)
     n = signals.shape[-1]
     together = max(TOGETHER // n, 1)
     return [
@@ -107,13 +107,13 @@ def amplitude_spectrum(signal: Signal, rate: float) -> tuple[Array, Array]:
     Raises:
         TooFewReadings, NotFinite: for what is no signal.
     """
-    signal = _checked(signal)
+    signal = _check_signal(signal)
     transform = np.fft.fft(signal * _hann(signal.size), 4 * signal.size)
     frequencies = np.fft.fftshift(np.fft.fftfreq(4 * signal.size, 1 / rate))
     return np.asarray(frequencies), np.asarray(np.abs(np.fft.fftshift(transform)))
 
 
-def _checked(signal: Signal) -> Signal:
+def _check_signal(signal: Signal) -> Signal:
     """Return a signal, or many of one length."""
     signal = np.asarray(signal, dtype=np.complex128)
     if signal.shape[-1] < FEWEST:
@@ -156,7 +156,7 @@ def _lines_of(signals: Signal, rate: float, most: int, weakest: float) -> Iterat
     found, counts = _find(_Spectra(spectra.re.copy(), spectra.im.copy()), most, weakest)
     for _ in range(ROUNDS):
         for i in range(int(counts.max(initial=0))):
-            _place_anew(spectra, found, i, i < counts)
+            _place_again(spectra, found, i, i < counts)
     places = found.bins + found.offset
     frequencies = np.where(places >= n / 2, places - n, places) * rate / n
     amplitudes = _length(found.re, found.im)
@@ -190,7 +190,7 @@ def _find(rest: _Spectra, most: int, weakest: float) -> tuple[_Waves, Bins]:
         top = peaks[rows[:, 0], peak]
         # as many bins as make the median below it are below this
         goes_on &= 2 * np.count_nonzero(height < (top / ABOVE_NOISE)[:, None], axis=-1) > n
-        line = _placed(_taken(rest, peak), peak, n)
+        line = _fit_peak(_bins_around(rest, peak), peak, n)
         size = _length(line.re, line.im)
         strongest = np.where(goes_on, np.maximum(strongest, size), strongest)
         goes_on &= size >= weakest * strongest
@@ -205,7 +205,7 @@ def _find(rest: _Spectra, most: int, weakest: float) -> tuple[_Waves, Bins]:
         rest.re[rows, bins] -= line.re[:, None] * shape_of_line
         rest.im[rows, bins] -= line.im[:, None] * shape_of_line
         height[rows, bins] = _length(rest.re[rows, bins], rest.im[rows, bins])
-        # what is left so near to a line is that line's own imperfection, and flanks are no lines
+        # residuals so near to a line come from its own fit, and flanks are no lines
         allowed[rows, (line.bins[:, None] + np.arange(-LOBE, LOBE + 1)) % n] = False
         bins = (line.bins[:, None] + shown) % n
         flank = np.concatenate([bins[:, :1] - 1, bins, (bins[:, -1:] + 1) % n], axis=-1)
@@ -219,13 +219,13 @@ def _find(rest: _Spectra, most: int, weakest: float) -> tuple[_Waves, Bins]:
 _AROUND = np.arange(-LOBE, LOBE + 1)
 
 
-def _taken(spectra: _Spectra, middle: Bins) -> _Spectra:
+def _bins_around(spectra: _Spectra, middle: Bins) -> _Spectra:
     """Return the bins around those in the middle, shape (signals, 5)."""
     rows, bins = np.arange(len(middle))[:, None], (middle[:, None] + _AROUND) % spectra.re.shape[-1]
     return _Spectra(spectra.re[rows, bins], spectra.im[rows, bins])
 
 
-def _placed(near: _Spectra, peak: Bins, n: int) -> _Waves:
+def _fit_peak(near: _Spectra, peak: Bins, n: int) -> _Waves:
     """Return the line at a peak: its place from the higher neighbour's share, its amplitude by least squares.
 
     Args:
@@ -244,16 +244,16 @@ def _placed(near: _Spectra, peak: Bins, n: int) -> _Waves:
     return _Waves((peak + bins) % n, offset, re, im)
 
 
-def _place_anew(spectra: _Spectra, found: _Waves, i: int, there: NDArray[np.bool_]) -> None:
+def _place_again(spectra: _Spectra, found: _Waves, i: int, there: NDArray[np.bool_]) -> None:
     """Place line i of each signal once more, with all the others taken away; changes `found`."""
     n, peak = spectra.re.shape[-1], found.bins[i]
     away = (peak - found.bins + n // 2) % n - n // 2
     shape = _shape(found.offset, away[..., None] + _AROUND, n)
     shape[i] = 0.0
-    near = _taken(spectra, peak)
+    near = _bins_around(spectra, peak)
     re = near.re - np.add.reduce(shape * found.re[..., None], axis=0)
     im = near.im - np.add.reduce(shape * found.im[..., None], axis=0)
-    for all_lines, one in zip(found, _placed(_Spectra(re, im), peak, n), strict=True):
+    for all_lines, one in zip(found, _fit_peak(_Spectra(re, im), peak, n), strict=True):
         all_lines[i] = np.where(there, one, all_lines[i])
 
 

@@ -13,7 +13,7 @@ def with_minus(text: str) -> str:
 
 
 def digits(value: float, count: int = 2) -> str:
-    """Return a number rounded to so many digits; with a power of ten only where zeros would hide them.
+    """Return a number rounded to `count` digits; with a power of ten only where zeros would hide them.
 
     >>> digits(538.2), digits(0.0312), digits(2.34e-14), digits(1.0), digits(12345, 3), digits(-0.5)
     ('540', '0.031', '2.3×10⁻¹⁴', '1', '12300', '−0.5')

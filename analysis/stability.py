@@ -26,7 +26,7 @@ SPINS = 2000
 
 
 def _zero(function: Callable[[float], float], low: float, high: float, *, xtol: float, rtol: float = 1e-14) -> float:
-    """Where a function changes sign, by Brent's method."""
+    """Find where a function changes sign, by Brent's method."""
     from scipy.optimize import brentq  # takes a moment to load
 
     return float(brentq(function, low, high, xtol=xtol, rtol=rtol))
@@ -53,7 +53,7 @@ class SymmetricTop:
     stiffnesses: Callable[[Array], Array] | None = None
 
     def stiffness(self, field: AxialField, z: Array) -> Array:
-        """Against tilting, moving sideways, and both: shape (3, n)."""
+        """Return the stiffness against tilting, against moving sideways, and between both: shape (3, n)."""
         if self.stiffnesses is not None:
             return self.stiffnesses(z)
         b, slope, bend = field(z)[:3]
@@ -100,7 +100,7 @@ class Equilibrium:
 
 
 def _conditions(field: AxialField, top: SymmetricTop, z: Array) -> Array:
-    """Three functions, positive where stable: lift away from the base, axial and radial stiffness; shape (3, n).
+    """Return three functions, positive where stable: lift away from the base, axial and radial stiffness; shape (3, n).
 
     In φ₁ = −B: φ₁φ₂ < 0, φ₁φ₃ > 0, φ₂² − 2φ₃φ₁ > 0 for U = mgz + |μ||B|.  The last is the sideways stiffness of a
     moment that follows the field, E_xx − E_xθ²/E_θθ, for a top that stands against it.
@@ -136,6 +136,7 @@ def _edge(field: AxialField, top: SymmetricTop, inside: float, outside: float) -
 
 
 def _sizes(field: AxialField, z: float) -> Array:
+    """Return the scale of each of the conditions at a height, by which they can be compared."""
     b, slope, bend = np.abs(field(np.array([z]))[:3, 0])
     return np.array([b * slope, b * bend + slope**2, slope**2])
 
@@ -152,7 +153,7 @@ def _masses(field: AxialField, top: SymmetricTop, heights: Array) -> Array:
 
 
 def reduced_mass(mass: float, top: SymmetricTop, radius: float, strength: float) -> float:
-    """M = m g a²/(2π|μ|ρ), without dimension."""
+    """Return M = m g a²/(2π|μ|ρ), without dimension."""
     return mass * top.gravity * radius**2 / (2 * math.pi * abs(top.moment) * strength)
 
 
@@ -160,7 +161,7 @@ def reduced_mass(mass: float, top: SymmetricTop, radius: float, strength: float)
 
 
 def equilibria(field: AxialField, top: SymmetricTop, low: float, high: float) -> tuple[Equilibrium, ...]:
-    """All heights between low and high [m] at which the force μB′ carries the weight."""
+    """Return all heights between low and high [m] at which the force μB′ carries the weight."""
     z = np.linspace(low, high, HEIGHTS)
     weight = top.mass * top.gravity
 
@@ -169,10 +170,10 @@ def equilibria(field: AxialField, top: SymmetricTop, low: float, high: float) ->
 
     values = top.moment * field(z)[1] - weight
     places = [_zero(missing, z[i], z[i + 1], xtol=1e-15) for i in np.flatnonzero(values[1:] * values[:-1] < 0)]
-    return tuple(_described(field, top, place) for place in places)
+    return tuple(_describe_equilibrium(field, top, place) for place in places)
 
 
-def _described(field: AxialField, top: SymmetricTop, height: float) -> Equilibrium:
+def _describe_equilibrium(field: AxialField, top: SymmetricTop, height: float) -> Equilibrium:
     bend = float(field(np.array([height]))[2, 0])
     tilt, sideways, both = top.stiffness(field, np.array([height]))[:, 0]
     # U = −μB for the upright top; sideways |B| changes by B′²/4B − B″/2 (Berry), and −μ = |μ| against the field
@@ -185,10 +186,10 @@ def _described(field: AxialField, top: SymmetricTop, height: float) -> Equilibri
 
 
 def quartic(field: AxialField, top: SymmetricTop, height: float, spin: float) -> Array:
-    """Coefficients of (I₁α² − I₃ω₃α + P)(α² + Ω²/2) = (μB′)²/4m, highest power first, over I₁; spin ω₃ [rad/s].
+    """Return the coefficients of (I₁α² − I₃ω₃α + P)(α² + Ω²/2) = (μB′)²/4m over I₁, highest power first.
 
-    For u = x + iy and N = n_x + i n_y ∝ e^{iαt}; P = −μB = −E_θθ, Ω²/2 = −μB″/2m = −E_xx/m, μB′/2 = E_xθ, which is
-    mg/2 at the equilibrium of a point.
+    ω₃ is `spin` [rad/s], u = x + iy and N = n_x + i n_y ∝ e^{iαt}; P = −μB = −E_θθ, Ω²/2 = −μB″/2m = −E_xx/m,
+    μB′/2 = E_xθ, which is mg/2 at the equilibrium of a point.
     """
     tilt, sideways, both = (float(value) for value in top.stiffness(field, np.array([height]))[:, 0])
     p, half, turn = -tilt, -sideways / top.mass, top.axial * spin
@@ -230,7 +231,7 @@ def spin_windows(field: AxialField, top: SymmetricTop, height: float) -> tuple[t
 
 
 def _all_real(at_zero_and_one: Array, spins: Array) -> NDArray[np.bool_]:
-    """Whether the quartic has four real roots at each of the spins; its coefficients are linear in the spin.
+    """Return whether the quartic has four real roots at each of the spins; its coefficients are linear in the spin.
 
     The roots are the eigenvalues of the companion matrices, all in one call.
     """
@@ -243,7 +244,10 @@ def _all_real(at_zero_and_one: Array, spins: Array) -> NDArray[np.bool_]:
 
 
 def _discriminant(coefficients: Array) -> float:
-    """Of a x⁴ + b x³ + c x² + d x + e: 4(c² − 3bd + 12ae)³ − (2c³ − 9bcd + 27ad² + 27b²e − 72ace)², over 27."""
+    """Return the discriminant of a x⁴ + b x³ + c x² + d x + e.
+
+    It is (4(c² − 3bd + 12ae)³ − (2c³ − 9bcd + 27ad² + 27b²e − 72ace)²)/27.
+    """
     a, b, c, d, e = (float(x) for x in coefficients)
     first = c * c - 3 * b * d + 12 * a * e
     second = 2 * c**3 - 9 * b * c * d + 27 * a * d * d + 27 * b * b * e - 72 * a * c * e
@@ -251,7 +255,7 @@ def _discriminant(coefficients: Array) -> float:
 
 
 def sleeping_limit(field: AxialField, top: SymmetricTop, height: float) -> float:
-    """2√(I₁P)/I₃ in turns per second: below, a top on a fixed point would not sleep.  NaN where the field rights it."""
+    """Return 2√(I₁P)/I₃ [Hz]: below it a top on a fixed point would not sleep.  NaN where the field rights it."""
     p = -float(top.stiffness(field, np.array([height]))[0, 0])
     return 2 * math.sqrt(top.transverse * p) / top.axial / (2 * math.pi) if p > 0 else math.nan
 
@@ -263,7 +267,7 @@ def thesis_limit(field: AxialField, top: SymmetricTop, height: float) -> float:
 
 
 def wobble_resonance(field: AxialField, top: SymmetricTop, height: float) -> float:
-    """√(P/(I₃ − I₁)) in turns per second: at this spin a moment that is not along the axis tilts the top without end.
+    """Return √(P/(I₃ − I₁)) [Hz]: at this spin a moment across the axis tilts the top without end.
 
     A transverse part δ of the moment makes it lean by δ P/((I₃ − I₁)ω² − P), once per turn.  NaN where there is none:
     of a long top, or where the field rights it.

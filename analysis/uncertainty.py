@@ -45,7 +45,7 @@ class Curvature:
 
 
 def curvature(gradient: Array) -> Curvature:
-    """Covariance for residuals of unit variance, and leverages, from slopes of shape (p, n).
+    """Return the covariance for residuals of unit variance, and leverages, from slopes of shape (p, n).
 
     By QR of the scaled slopes, never by their squares: a normal matrix loses half the digits.
     """
@@ -65,7 +65,7 @@ def curvature(gradient: Array) -> Curvature:
 
 
 def propagate(covariance: Array, slopes: Array) -> tuple[Array | None, Array]:
-    """Covariance of functions of parameters, and their standard uncertainties, to first order.
+    """Return the covariance of functions of parameters, and their standard uncertainties, to first order.
 
     Args:
         covariance: of the parameters, shape (p, p).

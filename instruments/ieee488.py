@@ -142,7 +142,7 @@ class Form:
     suffix: str = ""
 
     def matches(self, answer: str) -> bool:
-        """Whether the whole answer has this form."""
+        """Return whether the whole answer has this form."""
         return _compile(self.pattern).fullmatch(answer) is not None
 
     def number(self, answer: str) -> float:
@@ -167,12 +167,12 @@ NR2 = Form(r"[+-]?\d+\.\d+", "+12.5")
 NR3 = Form(r"[+-]?\d+\.\d+[Ee][+-]\d{1,3}", "+1.25E+01")
 NUMERIC = Form(f"{NR1.pattern}|{NR2.pattern}|{NR3.pattern}", NR3.example)
 
-#: How many fields an identity has, and what they are (IEEE 488.2-1992, 10.14.3).
+#: Fields of an identity (IEEE 488.2-1992, 10.14.3).
 IDENTITY_FIELDS = ("maker", "model", "serial number", "firmware")
 
 
 def identity_fields(answer: str) -> tuple[str, ...]:
-    """Maker, model, serial number and firmware of an answer to ``*IDN?``.
+    """Return maker, model, serial number and firmware of an answer to ``*IDN?``.
 
     Raises ValueError where there are not four fields, where maker or model is empty, or where it is no plain text.
 

@@ -47,12 +47,12 @@ def parse_json(text: str) -> Any:
             nesting beyond DEEPEST, a whole number beyond LARGEST, NaN, infinity, half a surrogate pair.
     """
     try:
-        return _parsed_json(text)
+        return _parse_strict_json(text)
     except json.JSONDecodeError as error:
         raise ValueError(f"from line {error.lineno}, column {error.colno} on") from error
 
 
-def _parsed_json(text: str) -> Any:
+def _parse_strict_json(text: str) -> Any:
     _refuse_surrogates(text)
     if "\\u" not in text and text.count("{") + text.count("[") <= DEEPEST:  # nothing to look for afterwards
         return json.loads(text, parse_int=_whole_number, parse_float=_finite_number, parse_constant=_finite_number)
@@ -107,7 +107,7 @@ _TOO_LARGE = "a whole number in it has more than 300 digits"
 
 
 def finite(value: Any) -> Any:
-    """Return a value for JSON: what no number can say becomes null, in tables and lists too.
+    """Return a value for JSON: numbers that are not finite become null, in tables and lists too.
 
     >>> finite({"mean": 1.0, "spread": [math.inf, math.nan]})
     {'mean': 1.0, 'spread': [None, None]}
@@ -216,7 +216,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 def _remove_parts_of_the_dead(path: Path) -> None:
-    """Remove the parts of a file that processes left which were killed while they wrote it."""
+    """Remove the parts of a file that killed processes have left."""
     for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         number = part.name.removesuffix(".part").rpartition(".")[2]
         if number.isdecimal() and not _is_alive(int(number)):
@@ -225,7 +225,7 @@ def _remove_parts_of_the_dead(path: Path) -> None:
 
 
 def _is_alive(process: int) -> bool:
-    """Whether a process may be alive; False on Windows, where asking by a signal would end it."""
+    """Return whether a process may be alive; False on Windows, where asking by a signal would end it."""
     if os.name != "posix":
         return False
     try:
@@ -260,12 +260,12 @@ def locked(path: Path, busy: str) -> Iterator[None]:
         yield
     finally:
         with contextlib.suppress(OSError):  # while it is held, so that no file is removed that another one holds
-            os.unlink(lock.lock_file)  # noqa: PTH108 - what it gives is text
+            os.unlink(lock.lock_file)  # noqa: PTH108 - the path is text
         lock.release()
 
 
 def sync_folder(folder: Path) -> None:
-    """Put a new name onto the disk, which happens only with its folder; Windows keeps names without being asked."""
+    """Write a folder's new names to the disk; Windows does so by itself."""
     if os.name != "posix":
         return
     descriptor = os.open(folder, os.O_RDONLY)

@@ -20,7 +20,7 @@ class Settings(BaseModel):
 
 
 def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> str:
-    """Return the first thing that is wrong, with its path and what is allowed, and how many more there are.
+    """Return the first fault, with its path and the allowed values, and the number of others.
 
     Args:
         error: of the table.
@@ -31,14 +31,14 @@ def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> st
     where = ".".join(str(part) for part in first["loc"]) or "the whole"
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
     if first["type"] == "extra_forbidden":
-        return f"{where} is no key known here{_meant(first['loc'], of)}{more}"
+        return f"{where} is no key known here{_suggest_key(first['loc'], of)}{more}"
     hint = "" if first["type"] == "literal_error" else hint_about(first["input"])  # where words are expected
     whole_table = first["type"] == "missing" or isinstance(first["input"], dict)
     seen = "" if whole_table else f" = {str(first['input'])[:60]!r}"
-    return f"{where}{seen}: {expected(first['msg'])}{hint}{more}"
+    return f"{where}{seen}: {explain_message(first['msg'])}{hint}{more}"
 
 
-#: How pydantic begins and ends what it says of a wrong value, and its words for what it expects.
+#: Beginning and end of pydantic's message about a wrong value, and its names of the expected kinds.
 _SHOULD_BE = re.compile(r"Input should be (a valid )?(.*?)(, unable to .*|, got .*)?")
 _WHOLE = {
     "Field required": "is missing",
@@ -49,14 +49,14 @@ _IN_PLAIN_WORDS = {
 }  # fmt: skip
 
 
-def expected(text: str) -> str:
-    """Return pydantic's message about a wrong value in plain words.
+def explain_message(text: str) -> str:
+    """Translate pydantic's message about a wrong value.
 
-    >>> expected("Input should be a valid number, unable to parse string as a number")
+    >>> explain_message("Input should be a valid number, unable to parse string as a number")
     'a number is expected'
-    >>> expected("Input should be greater than 0"), expected("Input should be 'motion' or 'spin'")
+    >>> explain_message("Input should be greater than 0"), explain_message("Input should be 'motion' or 'spin'")
     ('a number greater than 0 is expected', "'motion' or 'spin' is expected")
-    >>> expected("Input should be a valid boolean, unable to interpret input"), expected("Field required")
+    >>> explain_message("Input should be a valid boolean, unable to interpret input"), explain_message("Field required")
     ('true or false is expected', 'is missing')
     """
     found = None if text in _WHOLE else _SHOULD_BE.fullmatch(text)
@@ -70,8 +70,8 @@ def expected(text: str) -> str:
     return f"{'' if what.startswith((chr(39), 'a ', 'an ')) else 'a number '}{what} is expected"
 
 
-def _meant(where: tuple[int | str, ...], of: type[BaseModel] | None) -> str:
-    """Return the key that an unknown one is most like, or those that there are."""
+def _suggest_key(where: tuple[int | str, ...], of: type[BaseModel] | None) -> str:
+    """Return a hint for an unknown key: the most similar one, or the known ones."""
     *tables, key = where
     for name in tables:
         field = of.model_fields.get(str(name)) if of else None

@@ -35,7 +35,7 @@ class PracticeBench(LevilabVisaLibrary):
 
 
 def kind_and_name(model: str) -> tuple[str, str]:
-    """Return the kind of a model, and its name, given in any case.  Raises ConfigError where it is none.
+    """Return the kind of a model, and its name, given in any case.  Raises ConfigError for an unknown model.
 
     >>> kind_and_name("cnt-91")
     ('counter', 'CNT-91')

@@ -96,7 +96,7 @@ UPPER_SETTINGS = {
 
 
 def upper_limits(name: str, scene: str, seed: int, *, loose: bool) -> None:
-    """A run of upper limits.  scene: that of the top; loose: the washers slip, and the tape on them turns slower."""
+    """Make a run of upper limits.  scene: of the top; loose: the washers slip, and the tape on them turns slower."""
     random = np.random.default_rng(seed)
     rows, events, time = [], [], 0.0
     for _ in range(TOPS):
@@ -133,7 +133,7 @@ def upper_limits(name: str, scene: str, seed: int, *, loose: bool) -> None:
 
 
 def when_missed(limit: float, slip: float) -> tuple[float, float, float]:
-    """The drive at the first look at which a top is missed, and the drive and the counted spin at the look before [Hz].
+    """Return the drive at the first look without a top, and drive and counted spin at the look before [Hz].
 
     limit: the drive at which the top was lost; slip: by how much its tape turns slower [Hz].
     """
@@ -153,7 +153,7 @@ def slip_hz(spin_hz: float) -> float:
 
 
 def write(folder: Path, header: str, rows: list[str], record: dict[str, Any]) -> None:
-    """A run folder."""
+    """Make a run folder."""
     folder.mkdir(exist_ok=True)
     common = {
         "schema": "levilab-run/1",
@@ -182,7 +182,7 @@ DARK_V, PULSE_V, NOISE_V, DIGIT_V = 0.1, 1.0, 0.02, 0.01
 
 
 def turns(t: Array) -> Array:
-    """Turns of the top since time 0, beginning at PHASE."""
+    """Return the turns of the top since time 0, beginning at PHASE."""
     return PHASE + SPIN_HZ * t + CHIRP_HZ_S * t**2 / 2
 
 
@@ -196,14 +196,14 @@ def tape() -> tuple[Array, Array]:
 
 
 def pulse_times(n: int = 60) -> Array:
-    """Times at which the tape passes, with a jitter of 20 µs [s]."""
+    """Return the times at which the tape passes, with a jitter of 20 µs [s]."""
     k = np.arange(n)
     t = (-SPIN_HZ + np.sqrt(SPIN_HZ**2 + 2 * CHIRP_HZ_S * (k + 1 - PHASE))) / CHIRP_HZ_S
     return t + np.random.default_rng(31).normal(0, 20e-6, n)
 
 
 def engineering(x: float, digits: int = 4) -> str:
-    """A number as Keysight writes it: +158.6506E-03."""
+    """Return a number as Keysight writes it: +158.6506E-03."""
     power = 0 if x == 0 else 3 * math.floor(math.log10(abs(x)) / 3)
     return f"{x / 10.0**power:+.{digits}f}E{power:+03d}"
 
@@ -271,7 +271,7 @@ def tektronix(t: Array, u: Array) -> list[str]:
 
 
 def two_columns(t: Array, u: Array) -> list[str]:
-    """A spreadsheet of a German Windows: semicolons, decimal commas, milliseconds and millivolts."""
+    """Write a spreadsheet of a German Windows: semicolons, decimal commas, milliseconds and millivolts."""
     rows = (f"{1e3 * x:.2f};{1e3 * y:.0f}".replace(".", ",") for x, y in zip(t, u, strict=True))
     return ["Zeit [ms];Spannung [mV]", *rows]
 
@@ -291,7 +291,7 @@ TEXTS: dict[str, tuple[Callable[[Array, Array], list[str]], str]] = {
 
 
 def write_scope_files(folder: Path) -> None:
-    """The files of scope-files/."""
+    """Write the files of scope-files/."""
     folder.mkdir(exist_ok=True)
     t, u = tape()
     for name, (lines, end) in TEXTS.items():
@@ -316,7 +316,7 @@ noise N(0, {NOISE_V:g} V); rounded to {DIGIT_V:g} V.  recording.wav has 2 V at f
 
 
 def precession_sweep() -> None:
-    """A sweep of the drive on the virtual bench, without the times of the day at which it was made."""
+    """Make a sweep of the drive on the virtual bench, without the times of the day at which it was made."""
     folder, seed = HERE / "precession-sweep", 1
     with tempfile.TemporaryDirectory() as out:
         bench = Path(out) / "bench.toml"
@@ -359,7 +359,7 @@ TRACES: dict[str, tuple[str | None, str, str]] = {
 
 
 def write_traces(name: str, scene: str | None, settings: str, note: str) -> None:
-    """A run folder with records of the oscilloscope, acquired on the virtual bench."""
+    """Make a run folder with records of the oscilloscope, acquired on the virtual bench."""
     with tempfile.TemporaryDirectory() as place:
         bench = Path(place) / "bench.toml"
         bench.write_text(f"[trace]\n{settings}\n", encoding="utf-8")
@@ -388,7 +388,7 @@ def write_traces(name: str, scene: str | None, settings: str, note: str) -> None
 
 
 def from_the_virtual_bench(experiment: str, folder: str, seed: int, note: str) -> None:
-    """A run of the virtual bench, without what would differ from one making to the next."""
+    """Make a run of the virtual bench that is the same each time."""
     with tempfile.TemporaryDirectory() as out:
         run = acquire(request_for(experiment, AcquisitionOptions(mock=True, out=Path(out), seed=seed)), Display())
         header, *rows = (run.folder / "readings.csv").read_text(encoding="utf-8").splitlines()

@@ -48,9 +48,9 @@ PARAMETERS = tuple(UNITS)
 FEWEST_HEIGHTS = 4
 #: Heights closer than this count as one [m]: no stand is set more exactly.
 SAME_HEIGHT_M = 1e-5
-#: The effective variance depends on the fitted slope; after so many iterations it has settled to 1e-6.
+#: The effective variance depends on the fitted slope; after these iterations it has settled to 1e-6.
 _MOST_TURNS = 8
-#: A field below so many u of the background counts as none.
+#: A field below this multiple of the background's u counts as none.
 _NO_FIELD = 5.0
 #: A χ² less probable than this: the model, or the stated uncertainty, is wrong.
 NO_FIT = 1e-3
@@ -96,7 +96,7 @@ class Known:
     gain_u: float = 0.0
 
     def prior(self, name: str) -> Prior | None:
-        """Return what is known of a parameter; None if nothing is."""
+        """Return the prior of a parameter; None without one."""
         found: Prior | None = getattr(self, name, None)
         return found
 
@@ -166,7 +166,7 @@ class FieldScan:
         return _ring(self.values)
 
     def model(self, height: Array) -> Array:
-        """Flux density as fitted, background included, at heights of shape (n,) [T]."""
+        """Return the fitted flux density, background included, at heights of shape (n,) [T]."""
         return np.asarray(on_axis(self.ring, height)[0] + self.values[3])
 
     @property
@@ -181,7 +181,7 @@ class FieldScan:
         return float(self.covariance[i, j]) / size if size else 0.0
 
     def learned(self, name: str) -> float | None:
-        """Return u after the scan over u before it, 0 to 1; None if there was none before."""
+        """Return the ratio of u after and before the scan, 0 to 1; None without a u before."""
         prior, u = self.known.prior(name), self.parameters[name].u
         return None if prior is None or not prior.u or u is None else u / prior.u
 
@@ -223,17 +223,17 @@ def fit_scan(
     inner, outer = known.inner_radius.value, known.outer_radius.value
     if not 0 < inner < outer < math.inf:
         raise ImpossibleRing(inner=inner, outer=outer)
-    z, b, u_b, u_z = _checked(height, flux_density, u, height_u)
+    z, b, u_b, u_z = _check_columns(height, flux_density, u, height_u)
     _refuse_bad_scans(z, b, known)
-    problem = _Problem(z, b, u_b, u_z, known, _free(known, free_radii=free_radii))
+    problem = _Problem(z, b, u_b, u_z, known, _free_parameters(known, free_radii=free_radii))
     values, sigma = problem.solve()
-    return _described(problem, values, sigma)
+    return _describe_scan(problem, values, sigma)
 
 
 # --- the input ---
 
 
-def _checked(
+def _check_columns(
     height: ArrayLike, flux_density: ArrayLike, u: ArrayLike | None, height_u: ArrayLike | float
 ) -> tuple[Array, Array, Array | None, Array]:
     """Check all columns, and return them in the order of the heights."""
@@ -292,7 +292,7 @@ def _refuse_plateau(z: Array, b: Array) -> None:
 # --- the fit ---
 
 
-def _free(known: Known, *, free_radii: bool) -> tuple[str, ...]:
+def _free_parameters(known: Known, *, free_radii: bool) -> tuple[str, ...]:
     """Return the parameters to fit: all that are not exact, and the radii only on request."""
     wanted = PARAMETERS if free_radii else PARAMETERS[:-2]
     priors = {name: known.prior(name) for name in wanted}
@@ -324,7 +324,7 @@ class _Problem:
         return [PARAMETERS.index(name) for name in self.free]
 
     def priors(self) -> list[tuple[int, Prior]]:
-        """Return index among all parameters, and prior, of those that are fitted."""
+        """Return index and prior of each fitted parameter."""
         found = ((PARAMETERS.index(name), self.known.prior(name)) for name in self.free)
         return [(index, prior) for index, prior in found if prior]
 
@@ -396,14 +396,14 @@ class _Problem:
             return np.concatenate([(self.model(every) - self.b) / sigma, known])
 
         def gradient(q: Array) -> Array:
-            return self.weighted(whole(q), sigma)[moved] * steps[:, None]
+            return self.weighted_slopes(whole(q), sigma)[moved] * steps[:, None]
 
         found, ended = solve(residual, gradient, values[moved] / steps)
         if not ended or not np.isfinite(found).all():
             raise NotFitted(what="flux density against height", advice="are heights and radii of one base, in metres?")
         return whole(found)
 
-    def weighted(self, values: Array, sigma: Array) -> Array:
+    def weighted_slopes(self, values: Array, sigma: Array) -> Array:
         """Return the slopes of all residuals by all parameters, shape (6, n + priors)."""
         known = np.zeros((6, len(self.priors())))
         for column, (index, prior) in enumerate(self.priors()):
@@ -414,9 +414,9 @@ class _Problem:
 # --- the result ---
 
 
-def _described(problem: _Problem, values: Array, sigma: Array) -> FieldScan:
+def _describe_scan(problem: _Problem, values: Array, sigma: Array) -> FieldScan:
     known, free, moved = problem.known, problem.free, problem.indices
-    jacobian = problem.weighted(values, sigma)
+    jacobian = problem.weighted_slopes(values, sigma)
     found = curvature(jacobian[moved])
     if found.covariance is None:
         raise NotFitted(what="flux density against height", advice="the readings do not tell the parameters apart")
@@ -450,7 +450,7 @@ def _statistics(problem: _Problem, values: Array, sigma: Array) -> Statistics:
 
 
 def _misfit(statistics: Statistics) -> tuple[float, list[str]]:
-    """Return the factor on the variances if the residuals exceed the uncertainties, and a warning."""
+    """Return the factor by which residuals beyond the uncertainties widen variances, and a warning."""
     from scipy.special import chdtr, chdtrc
 
     reduced = statistics.reduced_chi_square
@@ -492,7 +492,7 @@ class UPart:
     """A part of the u of a parameter; the squares of all parts add up to u².
 
     Attributes:
-        name: "readings" and "heights", what each reading has of its own; "excess", by as much they scatter beyond that;
+        name: "readings" and "heights", what each reading has of its own; "excess", their scatter beyond that;
             "gain", the scale of the instrument; else the parameter that calliper or data sheet give.
         size: of the part, in the unit of the parameter, with the sign in which the parameter follows the input.
     """
@@ -502,7 +502,7 @@ class UPart:
 
 
 def parts_of(scan: FieldScan, height_u: ArrayLike | float) -> dict[str, tuple[UPart, ...]]:
-    """What u of each parameter is made of.
+    """Return the parts of each parameter's u.
 
     The covariance of the fit is H = (Σ s sᵀ/σ² + Σ p pᵀ)⁻¹ = H (Σ s sᵀ u_b²/σ⁴ + Σ s sᵀ (B′u_z)²/σ⁴ + Σ p pᵀ) H: a sum
     of what readings, heights and each of the priors leave.
@@ -513,7 +513,7 @@ def parts_of(scan: FieldScan, height_u: ArrayLike | float) -> dict[str, tuple[UP
     """
     problem = _Problem(scan.height, scan.flux_density, None, np.zeros_like(scan.height), scan.known, scan.fitted)
     moved, values = problem.indices, scan.values
-    jacobian = problem.weighted(values, scan.u)
+    jacobian = problem.weighted_slopes(values, scan.u)
     h = curvature(jacobian[moved]).covariance
     if h is None:
         return {}

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 FERRITE_PER_K = -0.002
 #: Tops are searched from a tenth of the inner radius to four outer radii above the upper face, as in the simulator.
 _LOW, _HIGH = 0.1, 4.0
-#: A window is searched around the previous one, by so many times its width on either side.
+#: A window is searched around the previous one, by this many of its widths on either side.
 _AROUND = 2.0
 
 #: The results in the order of their covariance, and their units.

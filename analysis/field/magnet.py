@@ -33,7 +33,7 @@ class Disc:
 
 
 def _weights(disc: Disc | None) -> dict[int, float]:
-    """Q_l/l! of a cylinder, l even.
+    """Return Q_l/l! of a cylinder, l even.
 
     In cylinder coordinates sˡP_l(cos γ) = Σ_k (−1)ᵏ l!/(4ᵏ k!² (l − 2k)!) · z^(l−2k) r^2k, whose means over the height
     and over the radius are those of powers.
@@ -52,7 +52,7 @@ def _weights(disc: Disc | None) -> dict[int, float]:
 
 
 def axial_field(ring: Ring, disc: Disc | None) -> AxialField:
-    """B, B′ and B″ as an upright magnet feels them at heights of shape (n,) [m]: shape (3, n)."""
+    """Return B, B′ and B″ as an upright magnet feels them at heights of shape (n,) [m]: shape (3, n)."""
     weights = _weights(disc)
 
     def field(z: Array) -> Array:
@@ -63,7 +63,7 @@ def axial_field(ring: Ring, disc: Disc | None) -> AxialField:
 
 
 def stiffnesses(ring: Ring, disc: Disc, moment: float) -> AxialField:
-    """∂²E/∂θ², ∂²E/∂x², ∂²E/∂x∂θ of an upright magnet on the axis, for `stability.SymmetricTop`: shape (3, n)."""
+    """Return ∂²E/∂θ², ∂²E/∂x², ∂²E/∂x∂θ of an upright magnet on the axis, for `stability.SymmetricTop`: (3, n)."""
     weights = _weights(disc)
 
     def of(z: Array) -> Array:

@@ -119,7 +119,7 @@ def slopes(ring: Ring, z: Array) -> Array:
 
 
 def _with_radius(at: Array, radius: float, ring: Ring) -> Array:
-    """d/dR of dF/dz, averaged over the thickness."""
+    """Return d/dR of dF/dz, averaged over the thickness."""
     if _is_thin(ring):  # of a sheet: what the thickness adds to this slope is below 1e-6 of it
         return np.asarray(-radius * (radius**2 - 2 * at * at) * (radius**2 + at * at) ** -2.5)
     h = ring.thickness

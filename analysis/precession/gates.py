@@ -182,7 +182,7 @@ def _columns(gates: Gates, frequency: float | None) -> Array:
 
 
 def _residual_sums(gates: Gates, frequencies: Array) -> Array:
-    """Σ residual² with a swing of each of these frequencies, shape (f,) [turns²].
+    """Return Σ residual² with a swing of each of these frequencies, shape (f,) [turns²].
 
     By least squares as `numpy.linalg.lstsq` does it, with its limit for columns that depend on each other, but for all
     frequencies at once.
@@ -292,7 +292,7 @@ def whole_counts(gates: Gates, expected: float) -> int:
 
 
 def pulses_too_many(pulses: int) -> str:
-    """Return a miscount in words.
+    """Return a miscount as text.
 
     >>> pulses_too_many(1), pulses_too_many(-2)
     ('1 pulse too many', '2 pulses too few')

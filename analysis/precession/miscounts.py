@@ -67,7 +67,7 @@ class Miscount:
 
     @property
     def text(self) -> str:
-        """What the counter counted, in words."""
+        """The miscount as text."""
         if self.times is not None:
             above, below = self.times
             part = {(1, 2): "half", (2, 1): "twice"}.get(self.times, f"{above}/{below} of")

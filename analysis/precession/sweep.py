@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 EXCLUDED_P = 0.01
 #: A point deserves a warning above this studentised residual, or this leverage in units of the mean one.
 _FAR, _HEAVY = 3.5, 3.0
-#: An uncertainty of the drive matters above this share of that of the precession.
+#: Least ratio of the drive's u to the precession's u that matters.
 _MATTERS = 0.3
 #: Relative uncertainties of the drive's frequency that differ by less than this are those of one clock.
 _ONE_CLOCK = 1e-3
@@ -47,7 +47,7 @@ class Point:
         spin, u_spin: [Hz], where they were measured.
         leverage, residual, studentised, slope_change, intercept_change: see `analysis.precession.line.Influence`; None
             for a point that is left out, and if undefined.  A point that is left out has a residual, too.
-        miscount: what the counter counted instead of the precession, in words; None: the point is sound.
+        miscount: text of a count of something else than the precession; None: the point is sound.
         used: whether the line goes through it.
     """
 
@@ -221,7 +221,7 @@ def _fit(sweep: Sweep, *, orthogonal: bool) -> Line:
 
 
 def _weight(sweep: Sweep, line: Line) -> Array:
-    """1/u² of each point in the fit, shape (n,)."""
+    """Return 1/u² of each point in the fit, shape (n,)."""
     u = np.ones_like(sweep.drive) if sweep.u is None else sweep.u
     if not line.orthogonal:
         return np.asarray(u**-2.0)
@@ -339,7 +339,7 @@ def _about_drive(drive: Array, u_drive: Array, u: Array, line: Line) -> list[str
     share = float(np.median(u_drive / drive))
     if np.ptp(u_drive / drive) > _ONE_CLOCK * share:
         worst = float(np.max(u_drive / u))
-        text = f"u of the drive's frequency is up to {digits(worst)} of that of the precession"
+        text = f"u of the drive's frequency is up to {digits(worst)} u of the precession"
         return [f"{text}: let it count with `orthogonal` = True"] if worst > _MATTERS else []
     of_slope = share * abs(line.slope)
     if line.u_slope is None or of_slope <= _MATTERS * line.u_slope:

@@ -12,7 +12,7 @@ from analysis.numbers import digits
 from analysis.pulses.regression import Fit, median
 from analysis.pulses.result import Finding
 from analysis.pulses.search import WIDE, find_events, noise_of, shorten
-from analysis.pulses.times import checked_times, fit_train
+from analysis.pulses.times import check_times, fit_train
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -70,7 +70,7 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
         whole = share == 0
         counted = whole  # the others hold a value that was put in
         notes.append(Finding("not-finite", f"{np.count_nonzero(bad)} samples are no finite numbers and do not count"))
-    dead = _dead(bins, bin_rate, whole)
+    dead = _dead_bins(bins, bin_rate, whole)
     if dead.any():
         notes.append(
             Finding("gap", f"the signal is constant for {digits(np.count_nonzero(dead) / bin_rate, 3)} s in all")
@@ -83,7 +83,7 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
         return Clean(samples, bins, bad, tuple(notes), ())
     if not counted.all():
         bins = np.interp(np.arange(bins.size), np.flatnonzero(counted), bins[counted])
-    lines = _without_own(mains_lines(bins, bin_rate), bins, bin_rate)
+    lines = _without_pulse_lines(mains_lines(bins, bin_rate), bins, bin_rate)
     if lines:
         names = " and ".join(f"{digits(amplitude)} at {frequency:.5g} Hz" for frequency, amplitude in lines)
         notes.append(Finding("hum", f"hum of amplitude {names} was taken off"))
@@ -99,7 +99,7 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
     return Clean(samples, bins, bad, tuple(notes), lines)
 
 
-def _without_own(lines: Lines, bins: Array, rate: float) -> Lines:
+def _without_pulse_lines(lines: Lines, bins: Array, rate: float) -> Lines:
     """Return the lines that are no harmonics of the pulses which stand out of the bins; rate: of the bins.
 
     Where more turns lack a pulse than have one, hum itself may be numbered, and is no measure of hum.
@@ -107,14 +107,14 @@ def _without_own(lines: Lines, bins: Array, rate: float) -> Lines:
     if not lines:
         return ()
     try:
-        train = fit_train(checked_times(find_events(bins, rate).times))
+        train = fit_train(check_times(find_events(bins, rate).times))
     except TooFewPulses:
         return lines
-    own = _own_lines(lines, bins, rate, train.fit) if train.missing <= train.used.size else ()
+    own = _pulse_lines(lines, bins, rate, train.fit) if train.missing <= train.used.size else ()
     return tuple(line for line in lines if line not in own)
 
 
-def _own_lines(lines: Lines, bins: Array, rate: float, fit: Fit) -> Lines:
+def _pulse_lines(lines: Lines, bins: Array, rate: float, fit: Fit) -> Lines:
     """Return the lines that are harmonics of the pulses; rate: of the bins; fit: the phase of the pulses.
 
     A harmonic may lie at a multiple of the mains, too. It then is about as high as the harmonics beside it, and hum
@@ -158,7 +158,7 @@ def _own_lines(lines: Lines, bins: Array, rate: float, fit: Fit) -> Lines:
             return tuple(own)
 
 
-def _dead(bins: Array, rate: float, whole: Mask | None) -> Mask:
+def _dead_bins(bins: Array, rate: float, whole: Mask | None) -> Mask:
     """Return bins in runs of one and the same value that last too long; whole: those with all their samples."""
     dead = np.zeros(bins.size, dtype=bool)
     place = np.arange(bins.size) if whole is None else np.flatnonzero(whole)
@@ -201,7 +201,7 @@ def mains_lines(bins: Array, rate: float) -> Lines:
     for mains in MAINS:
         hum: set[int] = set()
         highest = int(min(HIGHEST, top) / (mains + STRAYS))
-        for multiple in range(highest, 0, -1):  # from above: hum is no measure of what is below it
+        for multiple in range(highest, 0, -1):  # from above: hum is no measure of the lines below it
             nominal = mains * multiple
             reach = max(STRAYS * multiple, 2 * width)
             band = near(nominal, reach)
@@ -334,7 +334,7 @@ def _baseline(bins: Array, rate: float, counted: Mask) -> tuple[Array, Array] | 
     reach = float(ordered[:, -1].mean() - ordered[:, 0].mean())
     if scatter > max(
         WIDE * noise_of(bins), 0.05 * reach
-    ):  # pulses that last about as long as the pauses: no level is that of the pauses
+    ):  # pulses about as long as the pauses: no level belongs to the pauses
         values = 0.5 * (ordered[:, n // 20] + ordered[:, -1 - n // 20])
     error = 1.2533 * scatter / np.sqrt(n)
     times = ((np.arange(count) + 0.5) * size / rate)[there]

@@ -90,7 +90,7 @@ def _steepness(x: Array, side: int, height: float) -> float:
 
 
 def _sums(side: int) -> Array:
-    """Return what a piece of 4 side + 1 samples is multiplied by for left, right and height, shape (4 side + 1, 3)."""
+    """Return the weights of 4 side + 1 samples for left, right and height, shape (4 side + 1, 3)."""
     sums = np.zeros((4 * side + 1, 3))
     sums[side : 2 * side, 0] = 1.0
     sums[2 * side + 1 : 3 * side + 1, 1] = 1.0

@@ -25,9 +25,9 @@ class Jump:
     u: float = 0.0
 
     def mend(self, times: Array) -> Array:
-        """Return what a clock would have shown at times of the record."""
+        """Return the times of an unbroken clock at times of the record."""
         return times + self.lost * (times > self.at)
 
     def spoil(self, times: Array) -> Array:
-        """Return the record's times of what passed at times of the clock."""
+        """Return the times of the record at times of the unbroken clock."""
         return times - self.lost * (times > self.at + max(self.lost, 0.0))

@@ -39,9 +39,9 @@ def search(bins: Array, rate: float) -> Fit | None:
     middle = float(ordered[ordered.size // 2])
     low, high = (middle + 2 * (float(ordered[round(p * (ordered.size - 1))]) - middle) for p in (0.005, 0.995))
     y = np.clip(bins, low, high) - middle
-    frequency, slope = _apart(y, rate, lowest, highest)
+    frequency, slope = _search_pieces(y, rate, lowest, highest)
     time = (np.arange(y.size, dtype=np.float64) + 0.5) / rate - 0.5 * duration
-    frequency, slope = _together(y, rate, time, frequency, slope)
+    frequency, slope = _refine_with_phases(y, rate, time, frequency, slope)
     half = 0.5 * duration
     return Fit(
         coefficients=np.array([0.0, frequency * half, 0.5 * slope * half**2, 0.0]),
@@ -54,7 +54,7 @@ def search(bins: Array, rate: float) -> Fit | None:
     )
 
 
-def _apart(y: Array, rate: float, lowest: float, highest: float) -> tuple[float, float]:
+def _search_pieces(y: Array, rate: float, lowest: float, highest: float) -> tuple[float, float]:
     """Return frequency at the middle and slope from the powers of pieces."""
     count = max(int(y.size / rate / PIECE), 1)
     size = y.size // count
@@ -90,8 +90,8 @@ def _apart(y: Array, rate: float, lowest: float, highest: float) -> tuple[float,
     return best[1], best[2]
 
 
-def _together(y: Array, rate: float, time: Array, frequency: float, slope: float) -> tuple[float, float]:
-    """Both made exact with the phases of the pieces."""
+def _refine_with_phases(y: Array, rate: float, time: Array, frequency: float, slope: float) -> tuple[float, float]:
+    """Return frequency and slope, both made exact with the phases of the pieces."""
     duration = y.size / rate
     size = max(int(SHORT * rate), 1)
     starts = np.arange(0, y.size - size // 2, size)

@@ -2,7 +2,7 @@
 
 A phase that is nearly right is improved: at each turn a piece of the trace is fitted by pulse, slope of the pulse and
 a constant. The slope's share is the turn's shift, which is regressed with the weight that it deserves; the pulse is
-learned anew; and so on until nothing moves. To first order that is the maximum of the likelihood.
+learned again; and so on until nothing moves. To first order that is the maximum of the likelihood.
 """
 
 from __future__ import annotations
@@ -212,7 +212,7 @@ def _improve(
 
 
 def turn_times(fit: Fit, middle: float, duration: float) -> tuple[Array, Array, Array]:
-    """Return times at which a phase passes (a part of a turn), those phases, and the frequencies there."""
+    """Return the times at which the middle of a pulse [turns] passes, and the phases and frequencies there."""
     jump, fit = fit.jump, replace(fit, jump=None)
     end = duration + (0.0 if jump is None else jump.lost)
     first, last = fit.phase(np.array([0.0, end]))
@@ -256,7 +256,7 @@ def learn(x: Array, cell: NDArray[np.intp], valid: NDArray[np.bool_] | None, wid
     return Pulse(shape, np.fft.irfft(full * turn, TABLE), float(np.angle(around) / (2 * np.pi)) % 1.0)
 
 
-def _flat(x: Array) -> bool:
+def _is_clipped(x: Array) -> bool:
     """Return whether more than half of the turns reach one and the same greatest value three times or more."""
     return bool(np.count_nonzero(np.count_nonzero(x == x.max(), axis=1) > 2) > 0.5 * len(x))
 
@@ -375,7 +375,7 @@ def _regress(
         shifts=phase - fit.phase(pieces.times),
         used=use,
         evidence=float(found.height[found.usable] ** 2 @ found.power[found.usable]) / noise2,
-        flat=_flat(pieces.x),
+        flat=_is_clipped(pieces.x),
         noise=float(np.sqrt(noise2)),
         height=mean * height_of_pulse,
         bound=float(np.sqrt(fit.unit_covariance[1, 1])) / fit.half,

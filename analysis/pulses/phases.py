@@ -49,7 +49,7 @@ def phases(track: Track, *, still: float = STILL) -> tuple[Phase, ...]:
     for start, end in track.empty:
         at = int(np.searchsorted(track.time, start))
         found.append(Phase("nothing", start, end, (at, at)))
-    return tuple(_touching(sorted(found, key=lambda phase: phase.start)))
+    return tuple(_extend_to_gaps(sorted(found, key=lambda phase: phase.start)))
 
 
 def _kinds(track: Track, still: float) -> list[Kind]:
@@ -67,7 +67,7 @@ def _kinds(track: Track, still: float) -> list[Kind]:
 
 
 def _slope(track: Track, i: int) -> float:
-    """Slope of the frequency at a window from its neighbours [Hz/s]."""
+    """Return the slope of the frequency at a window from its neighbours [Hz/s]."""
     reach = NEIGHBOURS // 2
     near = np.arange(max(i - reach, 0), min(i + reach + 1, track.time.size))
     if near.size < 2:
@@ -91,8 +91,8 @@ def _edge(track: Track, i: int, side: int) -> float:
     return float(track.time[i] + 0.5 * back)
 
 
-def _touching(found: list[Phase]) -> list[Phase]:
-    """Phases that end where an empty time begins."""
+def _extend_to_gaps(found: list[Phase]) -> list[Phase]:
+    """Make phases end where an empty time begins."""
     result = []
     for i, phase in enumerate(found):
         start, end = phase.start, phase.end

@@ -216,7 +216,7 @@ def median(values: Array) -> float:
 
 
 def student(freedom: float, deviations: float = 1.0) -> float:
-    """Return the factor of a standard deviation from few degrees of freedom that covers as much as a known one's."""
+    """Return the factor that widens a standard deviation from few degrees of freedom to the same coverage."""
     if freedom > 200:
         return deviations
     from scipy.special import ndtr, stdtrit
@@ -248,7 +248,7 @@ def fit_turns(
     if jump is not None and not FEWEST_BESIDE <= np.count_nonzero(times > jump.at) <= times.size - FEWEST_BESIDE:
         jump = None
     model = _Model(degree, jump, grid, absolute)
-    for _ in range(1 if jump is None else 3):  # the second is right to the change of the frequency in what was lost
+    for _ in range(1 if jump is None else 3):  # the second is exact up to the change of frequency in the lost piece
         fit, step = _fit(times, turns, weight, model)
         if model.jump is None or step is None:
             break
@@ -426,6 +426,6 @@ def scatter_of(residuals: Array, turns: Array, parameters: int, *, absolute: boo
     from scipy.special import fdtr
 
     p = float(fdtr(blocks, freedom, ratio))
-    # Welch and Satterthwaite; the blocks' variance is a part of that of all residuals
+    # Welch and Satterthwaite; the blocks' variance is a part of the residuals' variance
     whole = (PRIOR_FREEDOM + blocks) ** 2 / ((PRIOR_FREEDOM**2 + 2 * PRIOR_FREEDOM * blocks) / freedom + blocks)
     return Scatter(variance, inflation, whole, 2 * min(p, 1 - p))

@@ -53,7 +53,7 @@ def noise_of(bins: Array) -> float:
 
 
 def find_events(bins: Array, rate: float) -> Events:
-    """Return centres of what stands out of the bins; rate: bins per second."""
+    """Return the centres of the peaks in the bins; rate: bins per second."""
     total = np.zeros(bins.size + 1)
     np.cumsum(bins - bins[0], out=total[1:])
     noise = noise_of(bins)

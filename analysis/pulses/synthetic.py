@@ -21,11 +21,11 @@ class Case:
 
     Attributes:
         frequency: at the middle [Hz]; each trial's lies up to 0.5 Hz beside it.
-        duration: [s]; turns: if given, so many turns instead.
+        duration: [s]; turns: the length in turns, instead of `duration`.
         snr: pulse height over noise [dB].
         missing: share of turns without a pulse.
         reflection: height of a second pulse 0.1 turn later.
-        spikes: so many samples or short bursts of 1 to 5 pulse heights.
+        spikes: number of samples or short bursts of 1 to 5 pulse heights.
         bobbing: amplitude of the pulse height's modulation at 0.8 Hz.
         hum: (frequency [Hz], amplitude in pulse heights), each.
         wander: amplitude of a wandering baseline, a sine of 0.3 Hz and a random walk.
@@ -89,7 +89,7 @@ HARD = {
 
 @dataclass(frozen=True)
 class Trace:
-    """A record that is made up, with its truth.
+    """A synthetic record with its truth.
 
     Attributes:
         samples: shape (n,), or, of a switch, times [s].
@@ -116,7 +116,7 @@ def bound(snr: float) -> float:
 
 
 def make(case: Case, random: Random) -> Trace:
-    """One trace of a kind, its frequency, phase and all that disturbs it drawn at random."""
+    """Return one trace of a kind; its frequency, phase and disturbances are drawn at random."""
     frequency = case.frequency + random.uniform(-0.5, 0.5)
     duration = case.duration if case.turns is None else case.turns / frequency
     first = random.uniform(0, 1) if case.turns is None else 0.0

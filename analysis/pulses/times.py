@@ -74,7 +74,7 @@ def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None) -> SpinF
     >>> round(found.frequency.value, 9), found.pulses, found.missing
     (25.0, 30, 0)
     """
-    train = fit_train(checked_times(pulse_times), degree=degree)
+    train = fit_train(check_times(pulse_times), degree=degree)
     fit = train.fit
     frequency, chirp, bend = fit.motion_at(fit.reference)
     assert frequency.value is not None
@@ -99,8 +99,8 @@ def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None) -> SpinF
     )
 
 
-def checked_times(pulse_times: ArrayLike) -> Array:
-    """Return the times as an array of floats.  Raises what is wrong with them."""
+def check_times(pulse_times: ArrayLike) -> Array:
+    """Return the times as an array of floats.  Raises an error for faulty ones."""
     times = np.asarray(pulse_times, dtype=np.float64)
     if times.ndim != 1:
         raise ShapesDiffer(quantity="pulse times", seen=times.shape, expected=(times.size,))
@@ -200,7 +200,7 @@ def _find_jump(times: Array, fit: Fit) -> tuple[Jump, Numbering]:
 
 
 def _fit_numbered(times: Array, numbering: Numbering, degree: int | None, jump: Jump | None = None) -> Train:
-    used = _one_a_turn(numbering)
+    used = _nearest_pulses(numbering)
     if used.size < FEWEST:
         raise TooFewPulses(seen=used.size, needed=FEWEST, duration=float(np.ptp(times)))
     turns = numbering.turns
@@ -212,7 +212,7 @@ def _fit_numbered(times: Array, numbering: Numbering, degree: int | None, jump: 
         spread = 1.4826 * median(np.abs(fit.residuals)) + 1e-12
         far = student(fit.scatter.freedom, GROSS) * spread
         near = np.abs(away) < np.clip(far, 1e-9, numbering.tolerance)
-        new = _one_a_turn(Numbering(whole, near), np.abs(away))
+        new = _nearest_pulses(Numbering(whole, near), np.abs(away))
         if new.size < FEWEST:
             break
         if np.array_equal(new, used) and np.ptp(whole[new] - turns[used]) == 0:
@@ -225,7 +225,7 @@ def _fit_numbered(times: Array, numbering: Numbering, degree: int | None, jump: 
     return Train(fit, used, turns[used], span - used.size, times.size - used.size)
 
 
-def _one_a_turn(numbering: Numbering, away: Array | None = None) -> NDArray[np.intp]:
+def _nearest_pulses(numbering: Numbering, away: Array | None = None) -> NDArray[np.intp]:
     """Return indices of the pulses that belong, the nearest of each turn."""
     index = np.flatnonzero(numbering.belongs)
     turns = numbering.turns[index]
@@ -252,7 +252,7 @@ def findings_of(train: Train) -> tuple[Finding, ...]:
 
 
 def findings_of_fit(fit: Fit, what: str, start: float = 0.0) -> tuple[Finding, ...]:
-    """Return what is to be said of a fit to turns or pulses."""
+    """Return the findings about a fit to turns or pulses."""
     notes = []
     if (jump := fit.jump) is not None:
         size = f"{digits(abs(1e3 * jump.lost), 3)} ms, or that and whole turns,"

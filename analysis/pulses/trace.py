@@ -87,13 +87,13 @@ def spin_of_trace(
     >>> f"{found.at(1.0).value:.4f} Hz at 1 s", f"{found.chirp.value:.3f} Hz/s"
     ('24.9000 Hz at 1 s', '-0.100 Hz/s')
     """
-    x, bins, bad = _checked(samples, rate)
+    x, bins, bad = _check_samples(samples, rate)
     # the bins are a pass over an eighth of the samples; where they move, so do the samples
     if _constant(bins) and _constant(x):
         raise TooFewPulses(seen=0, needed=FEWEST, duration=x.size / rate)
     cleaned = clean(x, rate, bins, bad)
     try:
-        found = _found(Trace(cleaned, rate, degree), method)
+        found = _find_pulses(Trace(cleaned, rate, degree), method)
     except TooFewPulses as error:
         if cleaned.lines:
             raise OnlyHum(seen=error.seen, needed=error.needed, duration=error.duration) from None
@@ -160,37 +160,40 @@ class Found:
     one_by_one: Fit | None = None
 
 
-def _found(trace: Trace, method: Choice) -> Found:
+def _find_pulses(trace: Trace, method: Choice) -> Found:
     """Return the pulses by a method.  Raises TooFewPulses."""
     if method == "edges":
-        if train := _scattered(trace, math.inf):
-            return _one_by_one(trace, train)
+        if train := _scattered_train(trace, math.inf):
+            return _from_train(trace, train)
         edges, doubled = _by_edges(trace)
         return Found(edges, doubled, "edges", 0.0, trace.notes)
     found, doubled, used, why = _by_pulse(trace, method)
-    train = _scattered(trace, 1.4826 * median(np.abs(found.shifts[found.used])))
+    train = _scattered_train(trace, 1.4826 * median(np.abs(found.shifts[found.used])))
     if train and method == "auto":
-        return _one_by_one(trace, train)
+        return _from_train(trace, train)
     found, trap = _without_trap(trace, found)
     notes = (*why, *trap, *trace.notes)
-    if train is None or not _same(found.fit, train.fit):
+    if train is None or not _same_turns(found.fit, train.fit):
         return Found(found, doubled, used, found.origin, notes)
-    notes = (_scatters(train, "a mean pulse does not show it, so their own places are in the uncertainty"), *notes)
+    notes = (
+        _scatter_finding(train, "a mean pulse does not show it, so their own places are in the uncertainty"),
+        *notes,
+    )
     return Found(found, doubled, used, found.origin, notes, train.fit)
 
 
-def _one_by_one(trace: Trace, train: Train) -> Found:
+def _from_train(trace: Trace, train: Train) -> Found:
     """Return the result by pulses that were placed one by one."""
     edges = Edges(train.fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0)
-    notes = (_scatters(train, "each was timed by itself, without a mean pulse"), *trace.notes)
+    notes = (_scatter_finding(train, "each was timed by itself, without a mean pulse"), *trace.notes)
     return Found(edges, train.doubled, "edges", 0.0, notes)
 
 
-def _scatters(train: Train, text: str) -> Finding:
+def _scatter_finding(train: Train, text: str) -> Finding:
     return Finding("scattered", f"the pulses come early or late by {digits(_scatter(train), 2)} turns (rms): {text}")
 
 
-def _scattered(trace: Trace, left: float) -> Train | None:
+def _scattered_train(trace: Trace, left: float) -> Train | None:
     """Return the train if pulses stand out but are not at their places: a mean pulse does not show how far they are.
 
     left: how far a match leaves them from their places, as a standard deviation [turns].
@@ -221,7 +224,7 @@ def _scatter(train: Train) -> float:
     return float(np.sqrt(train.fit.scatter.variance))
 
 
-def _same(one: Fit, other: Fit) -> bool:
+def _same_turns(one: Fit, other: Fit) -> bool:
     """Return whether two fits count the same turns."""
     return abs(one.middle_frequency - other.middle_frequency) < SAME * other.middle_frequency
 
@@ -261,7 +264,7 @@ def _by_pulse(trace: Trace, method: Choice) -> tuple[Match, int, Method, tuple[F
         why = "more pulses lie beside the turns than at them" if astray else _doubt(found)
         if not why:
             return found, doubled, "matched", ()
-    other = _of_greatest_likelihood(trace, found)
+    other = _match_by_likelihood(trace, found)
     if other is None or _sweep(other) > MOST_SWEPT:
         raise trace.too_few(seen)
     notes = (
@@ -270,7 +273,7 @@ def _by_pulse(trace: Trace, method: Choice) -> tuple[Match, int, Method, tuple[F
     return other, doubled, "likelihood", notes
 
 
-def _of_greatest_likelihood(trace: Trace, found: Match | None) -> Match | None:
+def _match_by_likelihood(trace: Trace, found: Match | None) -> Match | None:
     """Return the match at the frequency of greatest likelihood, or the one that was found, if that is likelier."""
     fit = search(trace.bins, trace.bin_rate)
     other = None if fit is None else trace.match(fit)
@@ -308,7 +311,7 @@ def _without_trap(trace: Trace, found: Match) -> tuple[Match, tuple[Finding, ...
         notes = (Finding("half", "two equal pulses a turn: half the frequency fitted too, and was not taken"),)
     if notes:
         return found, notes
-    if why := traps.alternates(found) or traps.elsewhere(trace.bins, found.fit.phase(trace.middles)):
+    if why := traps.alternates(found) or traps.displaces(trace.bins, found.fit.phase(trace.middles)):
         half = trace.match(found.fit.times(0.5))
         if half is not None:
             return half, (
@@ -322,7 +325,7 @@ def _constant(values: Array) -> bool:
     return high - low <= ROUNDING * max(abs(low), abs(high))
 
 
-def _checked(samples: ArrayLike, rate: float) -> tuple[Array, Array, NDArray[np.bool_] | None]:
+def _check_samples(samples: ArrayLike, rate: float) -> tuple[Array, Array, NDArray[np.bool_] | None]:
     """Return the samples, their shortened trace, and which of them are no finite numbers (None: all are)."""
     x = np.ascontiguousarray(samples, dtype=np.float64)
     if x.ndim != 1:
@@ -351,8 +354,8 @@ def _result(pulses: Found, start: float, rate: float, degree: int | None) -> Spi
     phase, scatter = fit.phase_at(reference, pulses.origin), 1.4826 * median(np.abs(fit.residuals))
     u_of_pulses = fit.u_of_pulses(reference)
     if own is not None:
-        frequency, chirp, bend = map(_wider, (frequency, chirp, bend), own.motion_at(reference))
-        phase, scatter = _wider(phase, own.phase_at(reference)), float(np.sqrt(own.scatter.variance))
+        frequency, chirp, bend = map(_widen, (frequency, chirp, bend), own.motion_at(reference))
+        phase, scatter = _widen(phase, own.phase_at(reference)), float(np.sqrt(own.scatter.variance))
         u_of_pulses = own.u_of_pulses(reference)
     assert frequency.value is not None
     more = [*pulses.notes, *traps.mains(frequency, chirp)]
@@ -387,8 +390,8 @@ def _result(pulses: Found, start: float, rate: float, degree: int | None) -> Spi
     )
 
 
-def _wider(found: Estimate, own: Estimate) -> Estimate:
-    """Return the estimate of a method with the scatter of the pulses' own places, and the distance to them, in u."""
+def _widen(found: Estimate, own: Estimate) -> Estimate:
+    """Return the estimate with u enlarged by the scatter of the pulses' places and the distance to their estimate."""
     assert found.value is not None
     assert found.u is not None
     assert own.value is not None

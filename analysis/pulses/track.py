@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import NotPositive, TooFewPulses
 from analysis.pulses.result import Finding, SpinFrequency
-from analysis.pulses.times import FEWEST, checked_times, spin_of_times
+from analysis.pulses.times import FEWEST, check_times, spin_of_times
 from analysis.pulses.trace import Choice, spin_of_trace
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def track_of_times(pulse_times: ArrayLike, *, window: float = WINDOW) -> Track:
         TooFewPulses: no window has enough of them.
         NotFinite, TimesNotIncreasing, ShapesDiffer, NotPositive.
     """
-    times = checked_times(pulse_times)
+    times = check_times(pulse_times)
     _check_window(window)
     count = max(round((times[-1] - times[0]) / window), 1)
     ends = np.linspace(times[0], times[-1], count + 1)

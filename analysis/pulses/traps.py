@@ -63,7 +63,7 @@ def alternates(found: Match) -> str:
     return ""
 
 
-def elsewhere(bins: Array, phase: Array) -> str:
+def displaces(bins: Array, phase: Array) -> str:
     """Return how every second pulse lies at another place, too far for `alternates`; empty if it does not.
 
     bins: of the trace, and their phases [turns], shape (n,).

@@ -77,14 +77,14 @@ def _from_intervals(times: Array) -> Numbering | None:
     if off.max() < TOLERANCE and whole.min() >= 1:
         return Numbering(np.concatenate([[0], np.cumsum(whole)]).astype(np.int64), np.ones(times.size, dtype=bool))
     phase = frequency * since + 0.5 * slope * since**2
-    phase -= _densest(phase[None, :])[0]
+    phase -= _densest_phase(phase[None, :])[0]
     turns = np.rint(phase)
     belongs = np.abs(phase - turns) < TOLERANCE
     return Numbering(turns.astype(np.int64), belongs) if np.count_nonzero(belongs) > NEARLY * times.size else None
 
 
 def _line(x: Array, y: Array) -> tuple[float, float, float]:
-    """Return value at, slope about, and place of the mean of x, without what lies off the line."""
+    """Return the line's value at the mean of x, its slope, and this mean, without outliers."""
     value, slope, origin = median(y), 0.0, float(x.mean())
     keep = np.abs(y / value - 1) < 0.25
     for _ in range(3):
@@ -191,11 +191,11 @@ def _refine(since: Array, frequency: Array) -> tuple[Array, Array, Array]:
         frequency = np.take_along_axis(trial, np.argmax(power, axis=1)[:, None], axis=1)[:, 0]
     phases = since * frequency[:, None]
     mean = np.exp(2j * np.pi * phases).mean(axis=1)
-    phase = -_densest(phases)
+    phase = -_densest_phase(phases)
     return frequency, phase, np.abs(mean)
 
 
-def _densest(phases: Array) -> Array:
+def _densest_phase(phases: Array) -> Array:
     """Return where most phases [turns] lie, for each row."""
     bins = 32
     fraction = phases - np.floor(phases)
@@ -215,12 +215,12 @@ def _densest(phases: Array) -> Array:
 def _from_windows(times: Array) -> Numbering:
     """Return the better of two: windows joined one by one, or one frequency and slope for all of them."""
     found = windows_of(times)
-    joined, common = _joined(times, found), _common(times, found)
+    joined, common = _join_windows(times, found), _common_line(times, found)
     # a joined phase can bend to whatever lies near: it has to be much better
     return joined if np.count_nonzero(joined.belongs) > 1.2 * np.count_nonzero(common.belongs) else common
 
 
-def _common(times: Array, found: Windows) -> Numbering:
+def _common_line(times: Array, found: Windows) -> Numbering:
     """Return numbers by the frequency and the slope about the windows' at which the pulses' phases agree best."""
     if found.centre.size >= 4:
         frequency, slope, origin = _line(found.centre, found.frequency)
@@ -240,12 +240,12 @@ def _common(times: Array, found: Windows) -> Numbering:
         i, j = np.unravel_index(np.argmax(power), power.shape)
         frequency, slope = frequency + float(f[i]), slope + float(c[j])
     phase = frequency * since + 0.5 * slope * since**2
-    phase = phase - _densest(phase[None, :])[0]
+    phase = phase - _densest_phase(phase[None, :])[0]
     turns = np.rint(phase)
     return Numbering(turns.astype(np.int64), np.abs(phase - turns) < CORE, 2 * CORE)
 
 
-def _joined(times: Array, found: Windows) -> Numbering:
+def _join_windows(times: Array, found: Windows) -> Numbering:
     middle = (
         np.median(np.lib.stride_tricks.sliding_window_view(np.pad(found.frequency, 2, mode="reflect"), 5), axis=1)
         if found.centre.size > 4
@@ -259,7 +259,7 @@ def _joined(times: Array, found: Windows) -> Numbering:
         if i:
             mean = 0.5 * (found.frequency[i] + found.frequency[i - 1])
             ahead = phase + mean * (found.centre[i] - found.centre[i - 1])
-            base = ahead + _to_half(found.phase[i] - ahead)
+            base = float(found.phase[i] - np.rint(found.phase[i] - ahead))
         else:
             base = float(found.phase[0])
         phase = base
@@ -285,7 +285,3 @@ def phase_between(times: Array, knots: Array, counts: Array, frequency: Array) -
     before = counts[0] + frequency[0] * (times - knots[0])
     after = counts[-1] + frequency[-1] * (times - knots[-1])
     return np.asarray(np.where(s < 0, before, np.where(s > 1, after, inside)))
-
-
-def _to_half(x: float) -> float:
-    return float(x - np.rint(x))

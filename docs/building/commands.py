@@ -47,7 +47,7 @@ def _row(parameter: Any, context: Any) -> str:
 
 
 def _example(epilog: str) -> str:
-    """``Example: levilab …`` as a block."""
+    """Return ``Example: levilab …`` as a block."""
     head, _, command = epilog.partition(": ")
     return f"{head}:\n\n```text\n{command}\n```" if command else _in_plain_text(epilog)
 

@@ -47,7 +47,7 @@ def _read(_: Sphinx, page: str, source: list[str]) -> None:
 
 
 def _include(_app: Sphinx, path: Path, _page: str, source: list[str]) -> None:
-    """A page of the clone that is included: its links are those of its own folder."""
+    """Include a page of the clone: its links are those of its own folder."""
     folder = Path(path).as_posix().rpartition("/")[0]
     if not folder:
         return

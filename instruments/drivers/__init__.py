@@ -30,10 +30,10 @@ class Instrument(Protocol):
         """Drive the instrument at this link.  clock: of the bench, for what is waited for; by default the wall's."""
 
     def identity(self) -> str:
-        """Maker, model, serial number, firmware.  Raises WrongInstrument when another model answers."""
+        """Return maker, model, serial number and firmware.  Raises WrongInstrument when another model answers."""
 
     def settings(self) -> dict[str, Value]:
-        """Its settings as they stand, unit at the end of the name."""
+        """Return the instrument's present settings, with the unit at the end of each name."""
 
     def changed_settings(
         self, now: Mapping[str, Value] | None = None, *, since: Mapping[str, Value] | None = None

@@ -114,7 +114,7 @@ class ScpiInstrument:
         self.close()
 
     def __repr__(self) -> str:
-        """Model, serial number and address; the first two after identity() only."""
+        """Return model, serial number and address; the first two after identity() only."""
         known = " ".join(field for field in self._fields[1:3] if field)
         return f"<{type(self).__name__}{' ' * bool(known)}{known} at {self.transport.address}>"
 
@@ -284,12 +284,12 @@ class ScpiInstrument:
         return found
 
     def rounding(self, row: Setting[Any]) -> float:
-        """How much more than other instruments this one rounds a setting [its unit]."""
+        """Return the rounding of a setting beyond that of other instruments [its unit]."""
         return 0.0
 
     @classmethod
     def declared(cls) -> list[Setting[Any]]:
-        """Its declared settings, those of a base first."""
+        """Return the declared settings, those of a base first."""
         rows = (row for owner in reversed(cls.__mro__) for row in vars(owner).values())
         return [row for row in rows if isinstance(row, Setting)]
 

@@ -1,4 +1,4 @@
-"""A quantity of an instrument, declared in one line: its header, its kind, what it may be set to and may answer."""
+"""A quantity of an instrument, declared in one line: its header, its kind, its allowed values and answers."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Setting(Generic[T]):
         values: the only numbers that the instrument has.
         span: the lowest and the highest number that it may answer, where these are not low and high: with a probe, an
             attenuator or a load other than the driver's.
-        about: what it is, for `help`.
+        about: its meaning, for `help`.
         name: of the attribute; Python sets it.
     """
 
@@ -104,9 +104,9 @@ class Setting(Generic[T]):
     def description(self) -> str:
         """Return the text of `help`: the meaning, the header on the wire, range and unit."""
         about = f"{self.about}: " if self.about else ""
-        return f"{about}{self.header}{f' {self.key}' if self.key else ''}, {self._allowed()}."
+        return f"{about}{self.header}{f' {self.key}' if self.key else ''}, {self._describe_allowed()}."
 
-    def _allowed(self, span: tuple[float, float] | None = None) -> str:
+    def _describe_allowed(self, span: tuple[float, float] | None = None) -> str:
         """Return the text that describes the allowed values."""
         unit = f" {self.unit}" if self.unit else ""
         if self.kind is bool:
@@ -144,7 +144,7 @@ class Setting(Generic[T]):
         try:
             return cast("T", self._parse(instrument.field_of(answer, self.header, self.key), form))
         except ValueError:
-            instrument.reject(question, answer, self._expected(form))
+            instrument.reject(question, answer, self._describe_expected(form))
 
     def __set__(self, instrument: Owner, value: T) -> None:
         """Check, send, and read the error queue."""
@@ -155,7 +155,7 @@ class Setting(Generic[T]):
         instrument.last_set[self.name_with_unit] = self._canonical(value)
 
     def differs(self, asked: T, answered: T, *, rounding: float = 0.0) -> bool:
-        """Whether an answer is another value than the one set, apart from rounding.
+        """Return whether an answer is another value than the one set, apart from rounding.
 
         Args:
             asked: the value set.
@@ -168,7 +168,7 @@ class Setting(Generic[T]):
         return self._canonical(asked) != self._canonical(answered)
 
     def _last_digit(self, value: float) -> float:
-        """One unit in the last digit of a number that the instrument keeps [unit]."""
+        """Return one unit in the last digit of a number that the instrument keeps [unit]."""
         if self.digits and 0 < value < math.inf:
             return 10.0 ** (math.floor(math.log10(value)) + 1 - self.digits)
         return (_PRINTED if self.resolution else _ROUNDING) * value
@@ -191,19 +191,19 @@ class Setting(Generic[T]):
         return answer
 
     def _may_be(self, number: float) -> bool:
-        """Whether the instrument may have this number, apart from the rounding of its limits."""
+        """Return whether the instrument may have this number, apart from the rounding of its limits."""
         if self.values:
             return number in self.values
         low, high = self.span or (self.low, self.high)
         below, above = (self.resolution + self._last_digit(abs(limit)) for limit in (low, high))
         return low - below <= number <= high + above and abs(number) < NOT_A_NUMBER  # a load may be 9.9E37 ohm
 
-    def _expected(self, form: Form) -> str:
+    def _describe_expected(self, form: Form) -> str:
         """Return the text that describes the expected answer."""
         if self.kind is bool:
             return "0 or 1"
         if self.kind is float:
-            return f"a number ({self._allowed(self.span)}), as {form.example}"
+            return f"a number ({self._describe_allowed(self.span)}), as {form.example}"
         if self.choices:
             return "one of " + ", ".join((*self.choices, *self.answers))
         return f"a text, as {form.example}"
@@ -221,13 +221,13 @@ class Setting(Generic[T]):
             try:
                 _short_form(str(value), self.choices)
             except ValueError:
-                raise OutOfRange(address, self.name, value, self._allowed()) from None
+                raise OutOfRange(address, self.name, value, self._describe_allowed()) from None
         if self.values and value not in self.values:
-            raise OutOfRange(address, self.name, value, self._allowed())
+            raise OutOfRange(address, self.name, value, self._describe_allowed())
         if self.kind is float and not self.low <= float(value) <= self.high:
-            raise OutOfRange(address, self.name, value, self._allowed())
+            raise OutOfRange(address, self.name, value, self._describe_allowed())
         if self.kind is str and not self.choices and self.form and not self.form.matches(str(value)):
-            raise OutOfRange(address, self.name, value, self._allowed())
+            raise OutOfRange(address, self.name, value, self._describe_allowed())
 
     def _spell(self, value: T) -> str:
         if self.kind is bool:
@@ -236,7 +236,7 @@ class Setting(Generic[T]):
 
 
 def _short_form(word: str, choices: tuple[str, ...]) -> str:
-    """Return the short form of the choice that this word is, in any case.  Raises ValueError where it is none.
+    """Return the short form of a choice, in any case.  Raises ValueError for an unknown word.
 
     >>> _short_form("sinusoid", ("SINusoid", "SQUare")), _short_form("SQU", ("SINusoid", "SQUare"))
     ('SIN', 'SQU')

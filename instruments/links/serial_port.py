@@ -191,7 +191,7 @@ class SerialPort:
             raise Occupied(self._address) from error
 
     def failure(self, error: Exception) -> Failure:
-        """SerialException and OSError have the system's number; a time-out on reading raises nothing."""
+        """Return the meaning of an error: SerialException and OSError have the system's number, a time-out none."""
         return Failure.OCCUPIED if getattr(error, "errno", None) in _IN_USE else Failure.LOST
 
     def _wait_at_most(self, within: float) -> None:
@@ -215,7 +215,7 @@ def port_name(address: str) -> str:
 
 
 def _permission_hint(port: str) -> str:
-    """How to get the right to use this port: its group, on systems with groups."""
+    """Return how to get the right to use this port: its group, on systems with groups."""
     try:
         import grp
 
@@ -226,7 +226,7 @@ def _permission_hint(port: str) -> str:
 
 
 def _ports_hint(port: str) -> str:
-    """Advice for a name that is no port of this computer: the ports that it has."""
+    """Return advice for a name that is no port of this computer: the ports that it has."""
     if "://" in port:
         return "check the address, and that it is on"
     if re.fullmatch(r"[\d.]+|[\w-]+(\.[\w-]+)+", port):

@@ -109,7 +109,7 @@ class VisaPort:
         resource.stop_bits = {1: StopBits.one, 1.5: StopBits.one_and_a_half, 2: StopBits.two}[given.get("stop_bits", 1)]
 
     def _send_at_once(self) -> None:
-        """VISA's default (VPP-4.3, VI_ATTR_TCPIP_NODELAY), which pyvisa-py leaves out and has no switch for.
+        """Disable Nagle's algorithm, as VISA does by default (VPP-4.3, VI_ATTR_TCPIP_NODELAY) and pyvisa-py does not.
 
         Without it a message that follows one without an answer waits until that one is acknowledged: 0.04 s.
         """
@@ -208,7 +208,7 @@ class VisaPort:
             self._by_line = yes
 
     def _session(self) -> Any:
-        """pyvisa-py's session with the resource; None in any other library."""
+        """Return pyvisa-py's session with the resource; None in any other library."""
         return getattr(self.resource.visalib, "sessions", {}).get(self.resource.session)
 
     def _bare_socket(self) -> socket.socket | None:

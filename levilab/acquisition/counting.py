@@ -24,10 +24,10 @@ _HIGHEST_SHARE, _LEAST_LOSS_PER_S, _HALVING_S = 1.05, 1e-3, 100.0
 _SAME_SHARE = 0.03
 #: Number of readings that a new one is compared with: the last one, and two in case that it was a miscount.
 _KEPT = 3
-#: A fallen top rattles: after so many times without a credible count it is taken for fallen; after so many counts in a
+#: A fallen top rattles: after this many times without a credible count it is taken for fallen; after as many in a
 #: row that are too high, for another one.
 _MOST_MISSED = 3
-#: No top's pulses are so many in a gate: what is counted then is something else.
+#: No top gives more pulses in a gate: then something else is counted.
 _MOST_PERIODS = 1e9
 
 
@@ -116,7 +116,7 @@ class FreeTop(Generic[S]):
 
         Two counts that agree are a reading, even if they do not follow, as long as a coasting top can have them: less
         than before, or as much as before a miscount.  More than it can have is no reading.  A counter that fails, or
-        whose settings another program changed, costs this reading and is set up anew.
+        whose settings another program changed, costs this reading and is set up again.
 
         Raises:
             AnotherTop: one that is faster, three times in a row.
@@ -161,14 +161,14 @@ class FreeTop(Generic[S]):
         second = self._count()
         if second and self._is_plausible(second):
             return second
-        if first and second and _is_same_spin(first, second):
-            return self._agreed(second)
+        if first and second and abs(second["spin_frequency_hz"] / first["spin_frequency_hz"] - 1) < _SAME_SHARE:
+            return self._judge_pair(second)
         if second:
             text = f"{second['spin_frequency_hz']:.4g} Hz is not credible either"
             self.session.event(RunEvent.NOT_TAKEN, text, **_spin_of(second))
         return Missed.UNSTEADY if first or second else Missed.DARK
 
-    def _agreed(self, reading: Row) -> Row | Missed:
+    def _judge_pair(self, reading: Row) -> Row | Missed:
         """Return the meaning of two counts that agree, but do not follow from the last reading."""
         last = self.before[-1]  # else they would follow
         if reading["spin_frequency_hz"] < last["spin_frequency_hz"]:
@@ -206,12 +206,12 @@ class FreeTop(Generic[S]):
         return row | ({"spin_frequency_u_hz": u} if u else {})
 
     def _is_plausible(self, reading: Row) -> bool:
-        """Whether a reading is the first, or plausible after the last one."""
+        """Return whether a reading is the first, or plausible after the last one."""
         return self.last is None or is_plausible(self.last, reading)
 
 
 def gate_began(end: float, gate_s: float, count: float) -> float:
-    """When a gate that has just ended began [s].
+    """Return the time at which a gate that has just ended began [s].
 
     It lasts whole periods, up to the first pulse behind its length; before it the counter waits for a pulse, and reads
     its errors, so the exchange begins some 40 ms earlier.
@@ -228,7 +228,7 @@ def gate_began(end: float, gate_s: float, count: float) -> float:
 
 
 def is_plausible(last: Row, reading: Row) -> bool:
-    """Whether a free top can have the spin of a reading after the last one."""
+    """Return whether a free top can have the spin of a reading after the last one."""
     share = reading["spin_frequency_hz"] / last["spin_frequency_hz"]
     gap = reading["time_s"] - last["time_s"]
     lowest: float = 0.5 ** (1 + gap / _HALVING_S)
@@ -236,21 +236,16 @@ def is_plausible(last: Row, reading: Row) -> bool:
 
 
 def _is_drop(before: Row, last: Row) -> bool:
-    """Whether the spin fell from one reading to a later one by more than a coasting top's does."""
+    """Return whether the spin fell from one reading to a later one by more than a coasting top's does."""
     gap = last["time_s"] - before["time_s"]
     lowest: float = 0.5 ** (gap / _HALVING_S) / _HIGHEST_SHARE
     return last["spin_frequency_hz"] / before["spin_frequency_hz"] < lowest
 
 
 def _coasts(last: Row, reading: Row, times: int) -> bool:
-    """Whether a reading is so many times the spin of a top that coasts since the last one."""
+    """Return whether a reading is this multiple of the spin of a top that coasts since the last one."""
     one = reading | {"spin_frequency_hz": reading["spin_frequency_hz"] / times}
     return is_plausible(last, one) and not _is_drop(last, one)
-
-
-def _is_same_spin(first: Row, second: Row) -> bool:
-    """Whether two counts in succession are of one spin."""
-    return abs(second["spin_frequency_hz"] / first["spin_frequency_hz"] - 1) < _SAME_SHARE
 
 
 def _spin_of(row: Row | None) -> Row:

@@ -42,15 +42,15 @@ _USUAL_WINDOW_HZ = (21.65, 80.60)
 #: A held top swings about the drive's frequency by what the drive can hold at most, 0.5 Hz at 0.4 mT [Hz].
 HELD_WITHIN_HZ = 1.0
 #: The halves of a hold differ by no more than this where the top is held [Hz], the beginning and the end of a swing of
-#: a third of a turn in 10 s each, nor by so many standard uncertainties; a lost top loses 1 Hz meanwhile.  Of so many
-#: counts in a half.
+#: a third of a turn in 10 s each, nor by this multiple of u; a lost top loses 1 Hz meanwhile.
+#: Fewest counts in a half.
 _DRIFTS_HZ, _DRIFTS_BY_U, _FEWEST_IN_HALF = 0.1, 3.0, 3
-#: A top that the drive did not take hold of, or lost, loses 0.1 Hz/s to the air: it is looked at so often on the way
-#: [s], and the drive tries so many times.
+#: A top that the drive did not take hold of, or lost, loses 0.1 Hz/s to the air: the interval between looks on the way
+#: [s], and the number of tries.
 _LOOK_EVERY_S, _TRIES_TO_HOLD = 10.0, 4
-#: A top that a person was asked for is looked for so often [s].
+#: Interval between looks for a top that a person was asked for [s].
 _LOOK_FOR_TOP_S = 2.0
-#: A point of a sweep is tried so often, and so many that fail one after the other end the sweep.
+#: Tries of a point of a sweep, and failed points in succession that end the sweep.
 TRIES, MOST_FAILED = 2, 3
 
 
@@ -242,7 +242,7 @@ def _no_light(session: Session[D]) -> NoLight:
 
 
 def _take_hold(session: Session[D], spin: float) -> float:
-    """Let a drive that has come on at the top's spin yield to it until it holds; its frequency then [Hz].
+    """Let a drive switched on at the top's spin follow it until it holds; return its frequency then [Hz].
 
     Raises NotHeld.
     """
@@ -264,21 +264,21 @@ def _take_hold(session: Session[D], spin: float) -> float:
 
 
 def _ramp(session: Session[D], start: float, target: float) -> float:
-    """Move the drive in steps that the top can follow; its spin then [Hz].  Raises NotHeld."""
+    """Move the drive in steps that the top can follow; return its spin then [Hz].  Raises NotHeld."""
     steps = max(1, round(abs(target - start) / (session.settings.ramp_hz_per_s * RAMP_STEP_S)))
     for k in range(1, steps + 1):
         session.stop.check()
         drive = start + (target - start) * k / steps
         session.bench.generator.frequency = drive
-        session.progress(f"drive at {drive:.2f} Hz{_until(session, target, (steps - k) * RAMP_STEP_S)}", k / steps)
+        session.progress(f"drive at {drive:.2f} Hz{_ramp_end(session, target, (steps - k) * RAMP_STEP_S)}", k / steps)
         session.wait(RAMP_STEP_S)
         if k % round(_LOOK_EVERY_S / RAMP_STEP_S) == 0 and k < steps:
             held_spin(session, drive)
     return held_spin(session, target)
 
 
-def _until(session: Session[D], target: float, left_s: float) -> str:
-    """When a ramp reaches its end, in words; empty at the end, and on a clock that does not keep to the wall's."""
+def _ramp_end(session: Session[D], target: float, left_s: float) -> str:
+    """Return the end of a ramp as text; empty at the end, and on a clock that does not keep to the wall's."""
     if left_s <= 0 or not math.isfinite(session.bench.clock.speed):
         return ""
     return f", {target:.2f} Hz in {clock(left_s)}"
@@ -308,7 +308,7 @@ def _hold(session: Session[D], drive: float) -> None:
 
 
 def has_drifted(counts: Sequence[float]) -> bool:
-    """Whether the second half of the counts lies off the first half, as those of a top that was lost meanwhile do.
+    """Return whether the second half of the counts lies off the first half, as when the top was lost meanwhile.
 
     A tape that slips is as far behind at first as it is at last.
 
@@ -324,7 +324,7 @@ def has_drifted(counts: Sequence[float]) -> bool:
 
 
 def compare_with_drive(session: Session[D], slip: Slip) -> None:
-    """Write down how the counted spin of a held top compares with its drive; a tape that slips is warned of."""
+    """Record the difference of a held top's counted spin from its drive; warn of a tape that slips."""
     text = f"held at {slip.drive:.2f} Hz: counted {slip.spin:.3f} Hz, {signed(slip.difference, 3)} Hz beside the drive"
     session.event(RunEvent.HELD, text, spin_frequency_hz=slip.spin, drive_frequency_hz=slip.drive, u_hz=slip.u)
     if slip.warning:
@@ -358,7 +358,7 @@ def have_a_top(session: Session[D], text: str, number: int, *, within_s: float) 
 
 
 def is_over(session: Session[D]) -> bool:
-    """Whether the time that the run may take is over; says so."""
+    """Return whether the time of the run is over, and record it."""
     longest = session.settings.longest_s
     if session.spent() <= longest:
         return False
@@ -403,7 +403,7 @@ def sweep_drive(
         measure: measures at a frequency at which the drive now is, and keeps the reading itself.  Raises NotHeld where
             the top is lost, or not locked; PointFailed where another try at this point would not help.
         within_s: how long a person has to float a top [s].
-        most_failed: so many points that fail one after the other end the sweep.
+        most_failed: number of points that fail in succession and end the sweep.
 
     Returns:
         The points that failed.

@@ -35,7 +35,7 @@ class ExperimentSettings(Settings):
         """
 
     def for_scene(self, scene: Scene) -> Self:
-        """Return these settings for a virtual bench whose top is a scene's: what was not set may suit it better."""
+        """Return these settings for a virtual bench whose top is a scene's; defaults may change to suit it."""
         return self
 
 
@@ -44,12 +44,12 @@ class CounterSettings(ExperimentSettings):
 
     Attributes:
         one_top: whether all readings are of one top, which falls meanwhile: then longest_s counts from time zero, else
-            a resumed run has it anew.
+            a resumed run starts with the full time.
     """
 
     one_top: ClassVar[bool] = True
 
-    interval_s: PositiveFloat = Field(default=10.0, description="then read every so often,")
+    interval_s: PositiveFloat = Field(default=10.0, description="time from one reading to the next")
     gate_s: PositiveFloat = Field(default=1.0, description="length of a count")
     trigger_level_v: float = Field(default=0.6, description="half way between dark and the pulse of the tape")
     reading_u_hz: PositiveFloat | None = Field(
@@ -68,7 +68,7 @@ class CounterSettings(ExperimentSettings):
         return self
 
     def with_jitter(self, jitter_s: float) -> Self:
-        """With the uncertainty that pulses which scatter by this much [s] give a reading, √2 jitter/gate turns."""
+        """Add the uncertainty of a reading from pulses that scatter by this much [s]: √2 jitter/gate turns."""
         u = self.reading_u_hz or round(2**0.5 * jitter_s / self.gate_s, 6)
         return self.model_copy(update={"reading_u_hz": u})
 

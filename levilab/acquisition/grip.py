@@ -13,14 +13,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-#: A count is of so long a gate [s] and moves the drive by this share of its difference to the spin; after so many the
+#: Gate of a count [s]; the share of the difference to the spin by which it moves the drive; number of counts until the
 #: drive stands still.  As a pendulum with the pull of 0.4 mT at 2 to 6 % of the moment across the axis, drag at 26 and
 #: 33 Hz, and 0.03 Hz of noise, 400 angles each: all were held after 27 counts, and swung by less than 0.06 Hz.  With a
 #: share of 0.2 up to 6 % were not; gates of 1 s come too late for the swing, whose period is 2.5 to 4.5 s, and with
 #: gates of 0.1 s the counts are over before it holds, and their noise moves the drive.
 GRIP_GATE_S, SHARE, COUNTS = 0.5, 0.4, 27
-#: A spin that is farther from the drive is not that of a top that it could hold [Hz]; so many counts in a row without
-#: such a spin end the try.
+#: Largest distance from the drive of a spin that it can hold [Hz]; number of counts without such a
+#: spin, one after another, that ends the try.
 _WITHIN_HZ, _MOST_MISSED = 1.0, 3
 
 

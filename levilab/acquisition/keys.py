@@ -1,4 +1,4 @@
-"""The keys of an experiment's settings: what may stand there, in words, for lists and for messages."""
+"""The keys of an experiment's settings: the allowed values as text, for lists and for messages."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Key:
 
     Attributes:
         name: without its table's.
-        value: what it is now.
+        value: the present one.
         expected: what may stand there.
         meaning: of it.
     """
@@ -48,7 +48,8 @@ def keys_of(config: BenchConfig, experiment: str) -> tuple[Key, ...]:
     values = settings_of(config, experiment).model_dump(mode="json")
     schema = _schema(config, experiment)
     return tuple(
-        Key(one.name, values[one.name], expected(one.name, schema[one.name]), one.comment) for one in listed.settings
+        Key(one.name, values[one.name], describe_values(one.name, schema[one.name]), one.comment)
+        for one in listed.settings
     )
 
 
@@ -62,29 +63,29 @@ def _as_typed(value: Any) -> str:
     return "–" if value is None else json.dumps(value) if isinstance(value, list) else str(value)
 
 
-def expected(name: str, schema: Mapping[str, Any]) -> str:
+def describe_values(name: str, schema: Mapping[str, Any]) -> str:
     """Return the values that a key takes, with their unit.
 
     Args:
         name: of the key, which ends with its unit.
         schema: of the key, as JSON Schema describes it.
 
-    >>> expected("gate_s", {"exclusiveMinimum": 0, "type": "number"})
+    >>> describe_values("gate_s", {"exclusiveMinimum": 0, "type": "number"})
     'a number above 0 [s]'
-    >>> expected("which", {"enum": ["lower", "upper"], "type": "string"})
+    >>> describe_values("which", {"enum": ["lower", "upper"], "type": "string"})
     'lower or upper'
     """
     _, unit = split(name)
     kinds = [schema | one for one in schema.get("anyOf", [{}]) if one.get("type") != "null"]
-    return " or ".join(_in_words(one) for one in kinds) + (f" [{unit.text}]" if unit else "")
+    return " or ".join(_describe_schema(one) for one in kinds) + (f" [{unit.text}]" if unit else "")
 
 
-def _in_words(schema: Mapping[str, Any]) -> str:
+def _describe_schema(schema: Mapping[str, Any]) -> str:
     if "enum" in schema:
         *some, last = map(str, schema["enum"])
         return f"{', '.join(some)} or {last}" if some else last
     if schema.get("type") == "array":
-        each = _in_words(schema["items"])
+        each = _describe_schema(schema["items"])
         return f"a list as {_LISTS.get(schema['items'].get('type'), '[…]')}, each {each}"
     words = [_TYPES.get(schema.get("type", ""), "a value")]
     low, high = schema.get("minimum"), schema.get("maximum")
@@ -121,7 +122,7 @@ def refusal(error: ValidationError, given: Mapping[str, str], config: BenchConfi
 
 def allowed_values(config: BenchConfig, experiment: str, name: str) -> str:
     """Return the values that a key of an experiment takes on this bench, with their unit."""
-    return expected(name, _schema(config, experiment)[name])
+    return describe_values(name, _schema(config, experiment)[name])
 
 
 def _where(experiment: str) -> str:

@@ -45,7 +45,7 @@ class AcquisitionRequest:
         config: the bench and the settings of the experiments, as they stand in run.json.
         wiring: makes the wiring of the bench, real or virtual.
         out: the folder in which the run folder is made.
-        synthetic_how: if anything is simulated, how, in words.
+        synthetic_how: description of the simulated part, if there is any.
         world: of a virtual bench, if its top only spins.
         scene: of the full motion, as a table.
         seed: of what is drawn by chance on a virtual bench.
@@ -86,13 +86,13 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
         except Interrupted as interruption:
             text = f"interrupted by {interruption.by}, outputs are off"
             writer.event(None, RunEvent.INTERRUPTED, text)
-            show.close()  # what it shows of the bench is from before the outputs went off
+            show.close()  # its picture of the bench is from before the outputs went off
             show.message(text)
             status = "interrupted"
         except Exception as error:
             # the disk may be full: the first thing that went wrong is what counts
             with contextlib.suppress(CannotWrite):
-                writer.event(None, RunEvent.FAILED, _in_words(error))
+                writer.event(None, RunEvent.FAILED, _reason_of(error))
                 writer.finish("failed")
             if not writer.record.instruments and not request.wire_log:
                 writer.discard()
@@ -101,7 +101,7 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
     return Run.load(writer.folder)
 
 
-def _in_words(error: Exception) -> str:
+def _reason_of(error: Exception) -> str:
     """Return the reason that ended a run: the text of a known failure, with the class of an unexpected one."""
     known = isinstance(error, LevilabError | InstrumentError)
     return unquoted(str(error) if known else f"{type(error).__name__}: {error}")
@@ -142,7 +142,7 @@ def _at_the_bench(
         )
         try:
             _note_instruments(session, "start")
-            with watch(session, wiring) as look, _called_meanwhile(look, session):
+            with watch(session, wiring) as look, _look_meanwhile(look, session):
                 experiment.run(session)
         finally:
             stop.shield()
@@ -152,7 +152,7 @@ def _at_the_bench(
 
 
 @contextlib.contextmanager
-def _called_meanwhile(look: Callable[[], None], session: Session[Any]) -> Iterator[None]:
+def _look_meanwhile(look: Callable[[], None], session: Session[Any]) -> Iterator[None]:
     """Let an onlooker see whatever happens, and how time passes."""
     clock = session.bench.clock
     before = clock.meanwhile
@@ -174,7 +174,7 @@ def _earlier(request: AcquisitionRequest) -> Earlier | None:
 
 
 def _note_instruments(session: Session[Any], moment: str) -> None:
-    """Identity and settings of each instrument go into run.json; a virtual one makes the run synthetic."""
+    """Write identity and settings of each instrument into run.json; a virtual one makes the run synthetic."""
     noted = {kind: dict(about) for kind, about in session.writer.record.instruments.items()}
     for kind, instrument in session.bench.instruments.items():
         about = noted.setdefault(kind, {})

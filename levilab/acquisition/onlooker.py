@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from levilab.bench.wiring import Wiring
     from levilab.telemetry.messages import Poses
 
-#: A record is sent anew so often [s].
+#: Interval at which a record is sent again [s].
 _AGAIN_EVERY_S = 1.0
 #: Of a bench that jumps ahead only the last part of its motion is shown [s].
 _SHOWN_S = 1.0
@@ -73,7 +73,7 @@ Watch = Callable[["Session[Any]", "Wiring"], AbstractContextManager[Callable[[],
 
 @contextlib.contextmanager
 def publishing(session: Session[Any], wiring: Wiring) -> Iterator[Onlooker]:
-    """Yield an onlooker that publishes for views; where to is said in the run folder until the context ends."""
+    """Yield an onlooker that publishes for views; its address stands in the run folder until the context ends."""
     with Publisher() as publisher:
         yield Onlooker(session, publisher, wiring.poses)
 
@@ -109,7 +109,7 @@ class Onlooker:
 
 
 def state_of(session: Session[Any], *, virtual: bool) -> State:
-    """Return what the bench and the acquisition do now; no instrument is asked."""
+    """Return the present state of bench and acquisition; no instrument is asked."""
     bench, doing = session.bench, session.doing
     now = bench.clock.now()
     return State(
@@ -156,7 +156,7 @@ def record_of(number: int, channel: str, time_s: float, trace: Trace) -> Record:
 
     Args:
         number: of the record.
-        channel: what it shows.
+        channel: the quantity that it shows.
         time_s: bench time when it was taken [s].
         trace: its samples.
     """

@@ -36,7 +36,7 @@ HOW = (
     "acquired on the virtual bench: the drivers are the real ones, the instruments wire-level models, {what}, "
     "and no real top was measured"
 )
-_ANEW = "correct it or start anew"
+_ADVICE = "correct it or start again"
 _SPIN_ONLY = "the top a spin that decays by the {law}; drag and fall were drawn by the seed"
 _BASE = (
     "the base a ring of strength {strength_t_m:.6e} T m, radii {inner_radius_m:.6f} and {outer_radius_m:.6f} m, "
@@ -133,7 +133,7 @@ def _configuration(options: AcquisitionOptions, run: Run | None, *, virtual: boo
 
     The settings of `options` are not in it.
     """
-    config = _as_it_was(run) if run else Configuration()
+    config = _original_configuration(run) if run else Configuration()
     if options.bench or not virtual:
         instead = "" if virtual else ", or try `mock`"
         described = read_bench(options.bench or Path("bench.toml"), Configuration, instead=instead)
@@ -175,7 +175,7 @@ def _with_texts(config: BenchConfig, experiment: str, texts: Mapping[str, str]) 
     """Return the configuration with texts as values at some of the experiment's keys.  Raises UsageError."""
     if not texts:
         return config
-    table = config.model_dump(mode="json", exclude_unset=True)  # what was not set may still be suited to a scene
+    table = config.model_dump(mode="json", exclude_unset=True)  # defaults may still be suited to a scene
     values = {name: parse_setting(f"{name}={text}")[1] for name, text in texts.items()}
     table[experiment] = table.get(experiment, {}) | values
     try:
@@ -196,15 +196,15 @@ def _check_given(config: BenchConfig, without: BenchConfig, experiment: str) -> 
         UsageError: the bench allows the configuration without the given settings, and not with them.
         ConfigError: it allows neither.
     """
-    refused = _refused(config, experiment)
-    if refused and not _refused(without, experiment):
+    refused = _refusal(config, experiment)
+    if refused and not _refusal(without, experiment):
         raise UsageError("settings", str(refused)) from refused
     if refused:
         raise refused
 
 
-def _refused(config: BenchConfig, experiment: str) -> ConfigError | None:
-    """Why the bench does not allow the experiment's settings; None if it does."""
+def _refusal(config: BenchConfig, experiment: str) -> ConfigError | None:
+    """Return why the bench does not allow the experiment's settings; None if it does."""
     try:
         settings_of(config, experiment).check(experiment, config.limits)
     except ConfigError as error:
@@ -212,7 +212,7 @@ def _refused(config: BenchConfig, experiment: str) -> ConfigError | None:
     return None
 
 
-def _as_it_was(run: Run) -> BenchConfig:
+def _original_configuration(run: Run) -> BenchConfig:
     """Return the configuration that a run was begun with."""
     bench = {key: value for key, value in run.record.configuration.items() if key != "scene"}
     try:
@@ -244,7 +244,7 @@ def _resumable(folder: Path, experiment: str) -> Run:
     if run.status in {"running", "finished"}:
         raise CannotResume(f"{folder}: is {run.status}, only an interrupted or failed run can be resumed")
     if not run.count():
-        raise CannotResume(f"{folder}: ended before its first reading, there is nothing to go on with: start anew")
+        raise CannotResume(f"{folder}: ended before its first reading, there is nothing to go on with: start again")
     if run.record.time_zero_utc is None:
         raise CannotResume(
             f"{folder}/run.json: has no time_zero_utc, so it is not known at which time its readings go on; they are "
@@ -260,18 +260,18 @@ def _check_readings(run: Run, request: AcquisitionRequest) -> None:
     channels = experiment.channels(settings)
     names = [channel.name for channel in channels]
     if [channel.get("name") for channel in run.record.channels] != names:
-        raise CannotResume(f"{run.folder}/run.json: channels: {', '.join(names)} are expected here; {_ANEW}")
+        raise CannotResume(f"{run.folder}/run.json: channels: {', '.join(names)} are expected here; {_ADVICE}")
     readings = run.readings()
     if list(readings.header) != names:
-        raise CannotResume(f"{readings.path}: the columns {', '.join(names)} are expected; {_ANEW}")
+        raise CannotResume(f"{readings.path}: the columns {', '.join(names)} are expected; {_ADVICE}")
     for channel in channels:
         if channel.unit == "Hz" and channel.name in readings.columns and not (readings.column(channel.name) > 0).all():
-            raise CannotResume(f"{readings.path}: {channel.name}: only numbers above 0 are expected; {_ANEW}")
+            raise CannotResume(f"{readings.path}: {channel.name}: only numbers above 0 are expected; {_ADVICE}")
     last = float(readings.column("time_s")[-1])
     if isinstance(settings, CounterSettings) and settings.one_top and last > settings.longest_s:
         raise CannotResume(
             f"{run.folder}: its last reading is of {last:g} s, and it was to end after {settings.longest_s:g} s "
-            f"({experiment.name}.longest_s): there is nothing to go on with; start anew"
+            f"({experiment.name}.longest_s): there is nothing to go on with; start again"
         )
 
 
@@ -360,20 +360,20 @@ def _with_a_spinning_top(
         request,
         config=config,
         wiring=lambda: virtual_wiring(SpinWorld(scene, clock()), config.limits),
-        synthetic_how=HOW.format(what=_world_in_words(scene, request.experiment)),
+        synthetic_how=HOW.format(what=_describe_world(scene, request.experiment)),
         world="spin",
     )
 
 
-def _world_in_words(scene: SpinScene, experiment: str) -> str:
+def _describe_world(scene: SpinScene, experiment: str) -> str:
     """Return a description of the part of the world that an experiment measures."""
     if "magnetometer" in EXPERIMENTS[experiment].instruments:
         base = scene.base
         return _BASE.format(**vars(base))
-    return _SPIN_ONLY.format(law=_law_in_words(scene))
+    return _SPIN_ONLY.format(law=_describe_law(scene))
 
 
-def _law_in_words(scene: SpinScene) -> str:
+def _describe_law(scene: SpinScene) -> str:
     constants = ", ".join(f"{c:.4e}" for c in scene.constants)
     return f"{scene.drag} law with {constants} (SI), falling at {scene.fall_hz:.2f} Hz"
 
@@ -384,7 +384,7 @@ def _scene(name: str | None, run: Run | None) -> Scene | None:
     if name is None and begun is None:
         return None
     if begun is not None and not isinstance(begun, dict):
-        raise CannotResume(f"{run.folder if run else ''}/run.json: configuration.scene: a table is expected; {_ANEW}")
+        raise CannotResume(f"{run.folder if run else ''}/run.json: configuration.scene: a table is expected; {_ADVICE}")
     scene = scene_of(begun) if begun is not None else read_scene(str(name))
     if scene.top.aligned:
         raise SceneError(

@@ -33,7 +33,7 @@ S = TypeVar("S", bound=Settings)
 _NAP_S = 0.2
 #: Pauses [s] before the tries to reach an instrument again, half a minute in all.
 REOPENING_S = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0)
-#: An instrument that is lost so many times in a row, with no reading in between, is broken.
+#: An instrument that is lost this many times in a row, with no reading in between, is broken.
 MOST_LOSSES = 5
 
 #: A reading: channel → value.  A value that is not known has no key.
@@ -71,7 +71,7 @@ class Doing:
     """What an acquisition does at present, for the person at the bench and for views.
 
     Attributes:
-        text: what it does; empty while readings come.
+        text: its present work; empty while readings come.
         share: of the way to the first reading; None once readings come.
         end: bench times between which it is expected to end [s]; None where that is not known.
         seen: channel → what an instrument answered last, in a reading or outside of one.
@@ -105,7 +105,7 @@ class Session(Generic[S]):
         last_request_time: when the last reading was asked for [s].
         called: what one reading of this experiment is called.
         began: when this session began to measure: at time zero, or when it resumed the run, maybe days later [s].
-        doing: what it does at present.
+        doing: its present work.
         look: called whenever that changes; while bench time passes the clock calls it.
     """
 
@@ -132,11 +132,11 @@ class Session(Generic[S]):
     # --- time ---
 
     def now(self) -> float:
-        """Seconds since time zero."""
+        """Return the seconds since time zero."""
         return self.bench.clock.now() - (self.zero or 0.0)
 
     def spent(self) -> float:
-        """Seconds since this session began to measure."""
+        """Return the seconds since this session began to measure."""
         return self.now() - self.began
 
     def wait(self, duration: float) -> None:
@@ -201,10 +201,10 @@ class Session(Generic[S]):
                 self.event(RunEvent.LONGEST, f"{longest_s:g} s are over ({name}.longest_s)")
                 return
 
-    # --- what the person sees, and what is written down ---
+    # --- display and record ---
 
     def event(self, kind: RunEvent, text: str, **data: Any) -> None:
-        """Write down and show what happened."""
+        """Record and show an event."""
         if not self._replaying:
             self._write_event(kind, text, **data)
             self.doing.text = text
@@ -215,14 +215,14 @@ class Session(Generic[S]):
         self.writer.event(None if self.zero is None else self.now(), kind, text, **data)
 
     def warn(self, text: str) -> None:
-        """Write down and show what to know before the readings are used; every result of the run repeats it."""
+        """Record and show a warning about the readings; every result of the run repeats it."""
         self.event(RunEvent.WARNING, text)
 
     def progress(self, text: str, share: float) -> None:
         """Show how far the bench is on the way to the first reading.
 
         Args:
-            text: what it is doing.
+            text: its present work.
             share: of the way, from 0 to 1.
         """
         if not self._replaying:
@@ -231,7 +231,7 @@ class Session(Generic[S]):
             self.look()
 
     def saw(self, channel: str, value: float | None) -> None:
-        """Note what an instrument answered, whether or not it becomes part of a reading; None: nothing to count.
+        """Note an instrument's answer, whether or not it becomes part of a reading; None: nothing to count.
 
         Args:
             channel: as in readings.csv.
@@ -256,7 +256,7 @@ class Session(Generic[S]):
         return answer
 
     def keep(self, row: Row, time_left_s: float | tuple[float, float]) -> None:
-        """Write a reading down, then show it: what was shown is on the disk.
+        """Write a reading to the disk, then show it.
 
         Args:
             row: the reading.
@@ -278,7 +278,7 @@ class Session(Generic[S]):
         if not self._headed:
             self._headed = True
             self.show.message("  ".join(f"{_head(one):>{_width(one)}}" for one in self._shown))
-        self.show.reading(self._in_words(row), row["time_s"], (least, most))
+        self.show.reading(self._format_values(row), row["time_s"], (least, most))
         self.look()
 
     def keep_trace(self, input_: int, channel: str, time_s: float) -> Trace:
@@ -288,7 +288,7 @@ class Session(Generic[S]):
 
         Args:
             input_: of the oscilloscope.
-            channel: what it shows.
+            channel: the quantity that it shows.
             time_s: when the record was taken.
 
         Raises:
@@ -311,7 +311,7 @@ class Session(Generic[S]):
         self.doing.records[channel] = number, time_s + (self.zero or 0.0), trace
         return trace
 
-    def _in_words(self, row: Row) -> str:
+    def _format_values(self, row: Row) -> str:
         """Return the values of a reading as they stand in a line, below their heads."""
         texts = (_with_unit(row[one.name], one) if one.name in row else "" for one in self._shown)
         return "  ".join(f"{text:>{_width(one)}}" for text, one in zip(texts, self._shown, strict=True))
@@ -362,11 +362,11 @@ def _head(channel: Channel) -> str:
 
 
 def _width(channel: Channel) -> int:
-    """Of a channel's values with their unit, and of its head."""
+    """Return the width of a channel's values with their unit, and of its heading."""
     width = 10 if channel.unit == "s" else 12 if channel.unit == "Hz" else 12 + len(channel.unit)
     return max(width, len(_head(channel)))
 
 
 def _with_unit(value: float, channel: Channel) -> str:
-    decimals = unit(channel.unit).decimals  # so many that points stand below each other
+    decimals = unit(channel.unit).decimals  # with these, points stand below each other
     return f"{value:{'.6g' if decimals is None else f'.{decimals}f'}} {channel.unit}".rstrip()

@@ -40,7 +40,7 @@ def tables_to_write() -> tuple[SettingsTable, ...]:
 
 
 def _settings_to_write(settings: type[ExperimentSettings]) -> Iterator[Setting]:
-    """Its own settings, those that it changes included, before those that it inherits, the nearest first."""
+    """Yield an experiment's settings, its own before those of its bases, the nearest first."""
     names = dict.fromkeys(name for one in settings.__mro__ for name in inspect.get_annotations(one))
     for name in (name for name in names if name in settings.model_fields):
         field = settings.model_fields[name]
@@ -60,6 +60,6 @@ def with_settings(config: BenchConfig, experiment: str, settings: ExperimentSett
 
 
 def counter_settings(config: BenchConfig) -> CounterSettings:
-    """How the bench looks at the light: as the first experiment does that counts its pulses."""
+    """Return the counter settings of the first experiment that counts pulses of light."""
     tables = (settings_of(config, name) for name in EXPERIMENTS)
     return next((table for table in tables if isinstance(table, CounterSettings)), CounterSettings())

@@ -16,7 +16,7 @@ import numpy as np
 from levilab.animation.paint import Painter, Pose, font
 from levilab.animation.parts import COLOURS, parts_of
 from levilab.animation.poses import height_for_camera, matrices
-from levilab.animation.words import readout, span_in_words, speed_in_words
+from levilab.animation.words import readout, span_text, speed_text
 from levilab.errors import LevilabError
 from levilab.software import how_to_install
 
@@ -184,7 +184,7 @@ class _Words:
         self._line = self._unit / 25
         speed = film.speed
         self._about = ("simulated",) if speed is None else (
-            f"simulated, {speed_in_words(speed)}", span_in_words(film.poses)
+            f"simulated, {speed_text(speed)}", span_text(film.poses)
         )  # fmt: skip
         self._inset = _Inset(film)
         self._veil: Image | None = None
@@ -218,7 +218,7 @@ class _Words:
         self._inset.draw(pen, k, self._colours, self._small)
 
     def _veil_behind(self, size: tuple[int, int], rows: list[tuple[float, float]]) -> Image:
-        """Return what hides a path behind lines of text, of these heights and widths, and behind the inset's frame."""
+        """Return the veil over a path behind lines of text, of these heights and widths, and the inset's frame."""
         from PIL import Image, ImageDraw
 
         veil, edge, line = Image.new("L", size), self._line, self._line
@@ -259,7 +259,7 @@ class _Inset:
         length = self._bar * self._pixels_per_m
         y = top + size + size / 11
         pen.line((left + size - length, y, left + size, y), fill=colours["text"], width=2)
-        pen.text((left + size, y + 3), in_mm(self._bar), colours["faint"], small, anchor="ra")
+        pen.text((left + size, y + 3), millimetres(self._bar), colours["faint"], small, anchor="ra")
         pen.text((left, top - size / 20), "from above", colours["faint"], small, anchor="ls")
 
 
@@ -274,10 +274,10 @@ def nice_length(length: float) -> float:
     return float(f"{step}e{power}")
 
 
-def in_mm(length: float) -> str:
-    """Return a length [m] in words.
+def millimetres(length: float) -> str:
+    """Return a length [m] as text, in mm.
 
-    >>> in_mm(0.002), in_mm(5e-5)
+    >>> millimetres(0.002), millimetres(5e-5)
     ('2 mm', '0.05 mm')
     """
     return f"{1000 * length:g} mm"

@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.numbers import digits
-from levilab.animation.film import Film, in_mm, nice_length, still, table_of_colours
+from levilab.animation.film import Film, millimetres, nice_length, still, table_of_colours
 from levilab.animation.parts import COLOURS, parts_of
 from levilab.animation.poses import height_for_camera
 from levilab.animation.three import MissingThree, three_js
-from levilab.animation.words import bind_units, short_speed, span_in_words, speed_in_words
+from levilab.animation.words import bind_units, short_speed, span_text, speed_text
 from levilab.errors import UsageError
 from levilab.present.numbers import plain, with_decimals
 from levilab.software import software_versions
@@ -46,7 +46,7 @@ _REST = 470_000
 _BYTES_PER_NUMBER = 4 * 4 / 3
 #: Speeds to choose from.
 _SPEEDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
-#: Poses a turn: so many make a slerp between two of them as good as the motion, and no fewer than FEWEST.
+#: Poses a turn with which a slerp between two is as good as the motion, and the fewest.
 POSES_A_TURN, FEWEST_A_TURN = 16, 12
 #: Length of the axis' path that is drawn [s of the motion].
 _TRAIL_S = 0.5
@@ -68,7 +68,7 @@ class Page:
 
 
 def most_poses(columns: int) -> int:
-    """Return how many poses of so many numbers a page holds."""
+    """Return the number of poses, each of `columns` numbers, that a page holds."""
     return int((LARGEST - _REST) / (columns * _BYTES_PER_NUMBER))
 
 
@@ -112,7 +112,7 @@ def as_page(page: Page) -> bytes:
     readings = _readings(poses)
     text = environment.get_template("page.html.j2").render(
         title=title,
-        lead=f"A Levitron as computed by levilab, {span_in_words(poses)}, at first at {speed_in_words(page.speed)}.",
+        lead=f"A Levitron as computed by levilab, {span_text(poses)}, at first at {speed_text(page.speed)}.",
         alt=alt,
         still_light=_data_address(stills["light"], "light"),
         still_dark=_data_address(stills["dark"], "dark"),
@@ -151,7 +151,7 @@ def _hash(text: str) -> str:
 
 
 def _json(document: Any) -> str:
-    """JSON that no text in it can end as a script of the page."""
+    """Return JSON in which no text can end a script of the page."""
     return json.dumps(document, sort_keys=True, separators=(",", ":")).replace("<", "\\u003c")
 
 
@@ -171,7 +171,7 @@ def _data(page: Page, alt: str, readings: list[tuple[str, str, int]]) -> dict[st
     bar = nice_length(0.45 * span)
     return {
         "alt": alt,
-        "bar": {"length": bar, "text": bind_units(in_mm(bar))},
+        "bar": {"length": bar, "text": bind_units(millimetres(bar))},
         "columns": columns_of(poses),
         "count": len(poses.times),
         "drive_mt": 1000 * poses.scene.drive.amplitude_t,
@@ -184,7 +184,7 @@ def _data(page: Page, alt: str, readings: list[tuple[str, str, int]]) -> dict[st
 
 
 def _readings(poses: Poses) -> list[tuple[str, str, int]]:
-    """Name, unit and digits after the point of what is read."""
+    """Return name, unit and digits after the point of each number on display."""
     found = [("time", "\u00a0s", 3), ("height", "\u00a0cm", 2), ("tilt", "°", 1), ("spin", "\u00a0Hz", 2)]
     columns = columns_of(poses)
     if "slip" in columns:
@@ -199,12 +199,12 @@ def _alt(page: Page) -> str:
     height, tilt = 100 * poses.positions[:, 2].mean(), math.degrees(poses.tilts.max())
     return (
         f"A spinning top with a magnet, a disc and a stem, on average {height:.1f} cm above a ring magnet, "
-        f"{span_in_words(poses)}; its axis leans by up to {tilt:.1f} degrees"
+        f"{span_text(poses)}; its axis leans by up to {tilt:.1f} degrees"
     )
 
 
 def _legend(poses: Poses) -> list[tuple[str, str]]:
-    """Colours, by their names in `parts.COLOURS`, and what they are."""
+    """Return colours, by their names in `parts.COLOURS`, and their meanings."""
     found = [
         ("magnet", "the top's magnet"),
         ("disc", "its disc, with a mark"),
@@ -239,7 +239,7 @@ def _numbers(page: Page) -> list[tuple[str, str]]:
     tilts, heights = np.degrees(poses.tilts), 100 * poses.positions[:, 2]
     found = [
         ("scene", scene.description or "no description"),
-        ("shown", f"{span_in_words(poses)}, of {float(motion.time[-1]):.4g} s that were simulated"),
+        ("shown", f"{span_text(poses)}, of {float(motion.time[-1]):.4g} s that were simulated"),
         ("end", page.summary.ending),
         ("height", f"{heights.min():.2f} to {heights.max():.2f} cm above the base's centre"),
         ("tilt", f"{tilts.min():.1f} to {tilts.max():.1f}° of the axis against the base's"),

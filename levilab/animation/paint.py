@@ -33,7 +33,7 @@ Colour = tuple[int, int, int]
 
 #: Facets around a part of the top, and around the base.
 _AROUND, _AROUND_BASE = 48, 120
-#: Pictures are drawn so many times as large and made smaller, which smooths their edges.
+#: Pictures are drawn larger by this factor and made smaller, which smooths their edges.
 _FINER = 2
 #: Field of view [rad], and where the camera stands: above the horizon, and around [rad].
 _VIEW_RAD, _ELEVATION, _AZIMUTH = math.radians(26), 0.33, -1.25
@@ -90,7 +90,7 @@ class _Camera:
         return flat
 
     def size_at(self, point: Array) -> float:
-        """Pixels in a metre at a point."""
+        """Return the pixels in a metre at a point."""
         return float(self.scale / -((point - self.place) @ self.frame[2]))
 
 
@@ -158,7 +158,7 @@ class Painter:
         return image.reduce(_FINER)
 
     def where(self, point: Sequence[float]) -> tuple[float, float]:
-        """Where a point [m] lies in the picture [pixels]."""
+        """Return the place of a point [m] in the picture [pixels]."""
         x, y = self._camera.project(np.array(point, dtype=np.float64)) / _FINER
         return float(x), float(y)
 
@@ -185,7 +185,7 @@ class Painter:
         image = Image.new("RGB", (_FINER * self.size[0], _FINER * self.size[1]), self.colours["background"])
         base = self.parts["base"]
         circle = _circle(2.1 * base["outer"], base["bottom"], _AROUND_BASE)
-        ImageDraw.Draw(image).polygon(_flat(self._camera.project(circle)), fill=self.colours["ground"])
+        ImageDraw.Draw(image).polygon(_flatten(self._camera.project(circle)), fill=self.colours["ground"])
         return image
 
     @cached_property
@@ -219,7 +219,7 @@ class Painter:
     # --- what moves ---
 
     def _draw_shadow(self, image: Image, pose: Pose) -> None:
-        """Of light from straight above: softer, the higher the top."""
+        """Draw the shadow of light from straight above: softer, the higher the top."""
         x, y, z = pose.position
         bottom = self.parts["base"]["bottom"]
         radius = self._widest * (1.2 + _SOFTER / self._reach * max(z - bottom, 0.0))
@@ -241,7 +241,7 @@ class Painter:
     def _draw_plumb(self, pen: ImageDraw, pose: Pose) -> None:
         x, y, z = pose.position
         ends = self._camera.project(np.array([[x, y, self.parts["base"]["bottom"]], [x, y, z + self._lowest]]))
-        pen.line(_flat(ends), fill=self.colours["faint"], width=_FINER)
+        pen.line(_flatten(ends), fill=self.colours["faint"], width=_FINER)
 
     def _draw_drive(self, pen: ImageDraw, pose: Pose) -> None:
         direction = self.parts["drive"]
@@ -256,13 +256,13 @@ class Painter:
         """Draw a line along points [m] with a head at its end."""
         flat = self._camera.project(points)
         width = max(round(thick * self._camera.size_at(points[-1])), _FINER)
-        pen.line(_flat(flat), fill=colour, width=width, joint="curve")
+        pen.line(_flatten(flat), fill=colour, width=width, joint="curve")
         along = flat[-1] - flat[-2]
         length = float(np.hypot(*along)) or 1.0
         along = along / length
         across = np.array([-along[1], along[0]])
         head = [flat[-1] + 3.6 * width * along, flat[-1] + 1.8 * width * across, flat[-1] - 1.8 * width * across]
-        pen.polygon(_flat(np.array(head)), fill=colour)
+        pen.polygon(_flatten(np.array(head)), fill=colour)
 
     def _draw_top(self, pen: ImageDraw, pose: Pose) -> None:
         axis = pose.matrix[:, 2]
@@ -283,7 +283,7 @@ class Painter:
                 self._draw_solid(pen, pose, solid, lean)
 
     def _draw_trail(self, pen: ImageDraw, trail: Array) -> None:
-        """Fading towards its beginning."""
+        """Draw the trail, fading towards its beginning."""
         flat = self._camera.project(trail)
         old, new = np.array(self.colours["background"]), np.array(self.colours["path"])
         pieces = 12
@@ -292,12 +292,12 @@ class Painter:
             share = 0.15 + 0.85 * (k + 1) / pieces
             if ends[k + 1] > ends[k]:
                 colour = _colour(old + share * (new - old))
-                pen.line(_flat(flat[ends[k] : ends[k + 1] + 1]), fill=colour, width=2 * _FINER - 1, joint="curve")
+                pen.line(_flatten(flat[ends[k] : ends[k + 1] + 1]), fill=colour, width=2 * _FINER - 1, joint="curve")
 
     def _draw_axis(self, pen: ImageDraw, pose: Pose, low: float, high: float) -> None:
         axis = pose.matrix[:, 2]
         ends = self._camera.project(np.array([pose.position + low * axis, pose.position + high * axis]))
-        pen.line(_flat(ends), fill=self.colours["axis"], width=2 * _FINER - 1)
+        pen.line(_flatten(ends), fill=self.colours["axis"], width=2 * _FINER - 1)
         if high == self.parts["axis"]["up"]:
             radius = 2.3 * _FINER
             (x, y), colour = ends[1], self.colours["path"]
@@ -318,7 +318,7 @@ class Painter:
             self._draw_spin(pen, pose, lean, front=True)
 
     def _draw_spin(self, pen: ImageDraw, pose: Pose, lean: Array, *, front: bool) -> None:
-        """Three quarters of a circle around the stem; the piece before the stem comes after it."""
+        """Draw three quarters of a circle around the stem; the piece before the stem comes after it."""
         radius, height = self.parts["spin"]["radius"], self.parts["spin"]["height"]
         angles = pose.sense * np.linspace(0.0, 0.72 * 2 * np.pi, 49)
         circle = np.stack([radius * np.cos(angles), radius * np.sin(angles), np.full(49, height)], axis=1)
@@ -332,7 +332,7 @@ class Painter:
                 self._draw_arrow(pen, piece, colour, thick)
             elif len(piece) > 1:
                 width = max(round(thick * self._camera.size_at(middle)), _FINER)
-                pen.line(_flat(self._camera.project(piece)), fill=colour, width=width, joint="curve")
+                pen.line(_flatten(self._camera.project(piece)), fill=colour, width=width, joint="curve")
 
     # --- facets ---
 
@@ -422,13 +422,13 @@ def _about_z(angle: float) -> Array:
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First places of the runs of True, and the places after their last."""
+    """Return the first places of the runs of True, and the places after their last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
 
 
 def _camera(parts: dict[str, Any], size: tuple[int, int]) -> _Camera:
-    """As `placeCamera` of top.js has it."""
+    """Place the camera as `placeCamera` of top.js does."""
     reach, top, bottom = parts["view"]["reach"], parts["view"]["top"], parts["base"]["bottom"]
     aspect, half = size[0] / size[1], math.tan(_VIEW_RAD / 2)
     target = np.array([0.0, 0.0, 0.48 * top + 0.52 * bottom])
@@ -453,13 +453,13 @@ def _colour(values: Array) -> Colour:
     return red, green, blue
 
 
-def _flat(points: Array) -> list[float]:
+def _flatten(points: Array) -> list[float]:
     flat: list[float] = points.ravel().tolist()
     return flat
 
 
 def font(size: float) -> FreeTypeFont | ImageFont:
-    """DejaVu Sans, which comes with matplotlib and has the letters of names in any European language and of physics."""
+    """Return DejaVu Sans, which comes with matplotlib and has the letters of all European languages and of physics."""
     from PIL import ImageFont
 
     found = find_spec("matplotlib")

@@ -87,17 +87,19 @@ def parts_of(scene: Scene, height: float | None = None) -> dict[str, Any]:
 
 
 def _parts(radius: float, half: float) -> list[dict[str, Any]]:
-    """From the tip below to the stem above; lengths as parts of the magnet's radius, heights from its upper face."""
+    """Return the parts from tip to stem; lengths in radii of the magnet, heights from its upper face."""
     washers = [
-        _part(f"washer {k + 1}", "washers" if k == 2 else "", "washers", _edged(0.52, low, low + 0.075, 0.012))
+        _part(
+            f"washer {k + 1}", "washers" if k == 2 else "", "washers", _cylinder_outline(0.52, low, low + 0.075, 0.012)
+        )
         for k, low in enumerate((0.300, 0.376, 0.452))
     ]
     for washer in washers:
         washer["turns"] = "washers"
     upper = [
-        _part("disc", "disc", "disc", _edged(0.87, 0.0, 0.30, 0.05)),
+        _part("disc", "disc", "disc", _cylinder_outline(0.87, 0.0, 0.30, 0.05)),
         *washers,
-        _part("O-ring", "O-ring", "ring", _edged(0.25, 0.528, 0.628, 0.045)),
+        _part("O-ring", "O-ring", "ring", _cylinder_outline(0.25, 0.528, 0.628, 0.045)),
         _part("stem", "stem", "stem", [[0.0, 0.629], [0.17, 0.629], [0.15, 1.36], [0.11, 1.42], [0.0, 1.44]]),
     ]
     for part in upper:
@@ -105,7 +107,7 @@ def _parts(radius: float, half: float) -> list[dict[str, Any]]:
     tip = [[0.0, -0.34], [0.05, -0.31], [0.15, -0.10], [0.15, 0.0], [0.0, 0.0]]
     lower = [
         _part("tip", "", "tip", [[radius * r, radius * z - half] for r, z in tip]),
-        _part("magnet", "magnet", "magnet", _edged(radius, -half, half, min(0.03 * radius, half / 2))),
+        _part("magnet", "magnet", "magnet", _cylinder_outline(radius, -half, half, min(0.03 * radius, half / 2))),
     ]
     return lower + upper
 
@@ -114,14 +116,14 @@ def _part(name: str, label: str, colour: str, outline: Outline) -> dict[str, Any
     return {"name": name, "label": label, "colour": colour, "turns": "top", "outline": outline}
 
 
-def _edged(radius: float, low: float, high: float, edge: float) -> Outline:
+def _cylinder_outline(radius: float, low: float, high: float, edge: float) -> Outline:
     """Return the outline of a cylinder whose edges are broken."""
     rim = [[radius - edge, low], [radius, low + edge], [radius, high - edge], [radius - edge, high]]
     return [[0.0, low], *rim, [0.0, high]]
 
 
 def _marks(radius: float, half: float, *, loose: bool) -> list[dict[str, Any]]:
-    """White tape on the rim, or on washers that slip, as on the virtual bench; and a mark on the disc.
+    """Return white tape on the rim, or on washers that slip, as on the virtual bench; and a mark on the disc.
 
     The tape is where the transverse part of the moment points.  The mark is opposite, and with loose washers below the
     tape: both part as the washers slip.
@@ -161,5 +163,5 @@ def _direction(scene: Scene) -> list[float] | None:
 
 
 def _usual_height(scene: Scene) -> float:
-    """Near to where the top starts [m]; where it floats is not computed for a picture, and is a matter of the base."""
+    """Return a height near the top's start [m]; where it floats depends on the base and need not be computed."""
     return scene.start.position_m[2] if scene.start.place == "given" else _FLOATS * scene.base.outer_radius_m

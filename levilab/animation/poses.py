@@ -172,7 +172,7 @@ def quaternions_of(arms: Array, axes: Array) -> Array:
 
 
 def _slips(motion: Trajectory) -> Array:
-    """How far loose washers have turned on the top since the first state, shape (n,) [rad]; the slip changes slowly."""
+    """Return the turn of loose washers on the top since the first state, shape (n,) [rad]; the slip changes slowly."""
     rates = 2 * np.pi * (motion.washer_spin_hz - motion.spin_hz)
     return np.concatenate([[0.0], np.cumsum(np.diff(motion.time) * (rates[1:] + rates[:-1]) / 2)])
 

@@ -17,7 +17,7 @@ from levilab.animation.page import (
     three_for_page,
 )
 from levilab.animation.poses import poses_of, turn_rate
-from levilab.animation.words import span_in_words, speed_in_words
+from levilab.animation.words import span_text, speed_text
 from levilab.errors import UsageError
 from levilab.files import replace_atomically, writing
 from levilab.simulator.compilation import announce_compilation
@@ -37,7 +37,7 @@ _SLOWEST, _FASTEST = 1e-4, 10.0
 _MOST_PICTURES = 3000
 #: Poses for each picture of a film, for its path.
 _POSES_A_PICTURE = 3
-#: A page has at least so many poses a second: the wobble is faster than the spin of a slow top.
+#: Least poses per second of a page: the wobble is faster than the spin of a slow top.
 _LEAST_RATE_HZ = 240.0
 #: With fewer pictures in a turn the eye loses which way the top turns.
 _PICTURES_A_TURN = 4
@@ -99,17 +99,17 @@ class AnimationRequest:
             ) from None
 
     @property
-    def played(self) -> float:
+    def playing_speed(self) -> float:
         """The speed that was chosen, or the format's usual one."""
         return self.format.speed if self.speed is None else self.speed
 
 
 def check_request(request: AnimationRequest, scene: Scene, duration: float) -> None:
-    """Raise what is wrong with a request before anything is simulated.
+    """Check a request before anything is simulated.
 
     Args:
-        request: what is to be animated.
-        scene: what will be simulated.
+        request: the animation.
+        scene: the simulated scene.
         duration: for how long [s].
 
     Raises:
@@ -134,11 +134,11 @@ def check_request(request: AnimationRequest, scene: Scene, duration: float) -> N
             f"a time above {first:g} s and up to the duration of {duration:g} s is expected",
             value=request.stop,
         )
-    if not _SLOWEST <= request.played <= _FASTEST:
+    if not _SLOWEST <= request.playing_speed <= _FASTEST:
         raise UsageError(
             "animate_speed",
             f"a number from {_SLOWEST:g} to {_FASTEST:g} is expected, as 0.05 for a twentieth of the real speed",
-            value=request.played,
+            value=request.playing_speed,
         )
     chosen.check()
 
@@ -157,7 +157,7 @@ def _check_pictures(chosen: _Format, span: float, speed: float) -> None:
 def animate(
     request: AnimationRequest, summary: Summary, message: Callable[[str], None], progress: Progress | None = None
 ) -> str:
-    """Animate a span of a simulated motion; what does not come to its end leaves nothing behind.
+    """Animate a span of a simulated motion; an interrupted animation leaves no file.
 
     Args:
         request: checked by `check_request`.
@@ -166,7 +166,7 @@ def animate(
         progress: called with the share that is done.
 
     Returns:
-        What the file shows, in words.
+        A description of the file's content.
 
     Raises:
         UsageError: the top was lost before the span, or the file would become too large.
@@ -176,7 +176,7 @@ def animate(
     if request.start is not None and request.start >= summary.end:
         raise UsageError("animate_from", f"the top was lost after {summary.end:.4g} s already", value=request.start)
     start, stop = _span(request, summary.end, fell=summary.motion.fell is not None)
-    speed = request.played
+    speed = request.playing_speed
     progress = progress or (lambda _: None)
     if chosen.encode is None:
         count = _count_for_page(summary.motion.scene, stop - start, turn_rate(summary.motion))
@@ -194,11 +194,11 @@ def animate(
     with writing(f"{request.path}: could not be written", "choose another place with `animate`"):
         request.path.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(request.path, content)
-    return f"the motion {span_in_words(poses)}, at {speed_in_words(speed)}"
+    return f"the motion {span_text(poses)}, at {speed_text(speed)}"
 
 
 def _span(request: AnimationRequest, end: float, *, fell: bool = False) -> tuple[float, float]:
-    """From where to where [s]: what is asked for, of a motion up to this end; the last seconds of one that fell."""
+    """Return the first and last time to show [s]: as requested, up to this end; the last seconds of a top that fell."""
     usual = request.format.span_s
     stop = end if request.stop is None else min(request.stop, end)
     if request.start is not None:
@@ -209,7 +209,7 @@ def _span(request: AnimationRequest, end: float, *, fell: bool = False) -> tuple
 
 
 def _count_for_page(scene: Scene, span: float, turns: float) -> int:
-    """Intervals between the poses of a page: enough for each turn, and as many as fit.
+    """Return the number of intervals between the poses of a page: enough for each turn, within what fits.
 
     Args:
         scene: whose poses they are.
@@ -233,7 +233,7 @@ def _count_for_page(scene: Scene, span: float, turns: float) -> int:
 
 
 def _stroboscopic(turns: float, speed: float, pictures_per_s: float) -> str:
-    """Return what to know of a film that shows too few pictures of a turn; empty for others."""
+    """Return a warning about a film that shows too few pictures of a turn; empty for others."""
     if turns * speed * _PICTURES_A_TURN <= pictures_per_s:
         return ""
     seen, slower = pictures_per_s / turns / speed, pictures_per_s / turns / _PICTURES_A_TURN

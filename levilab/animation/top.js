@@ -244,7 +244,7 @@ export function placeCamera(THREE, camera, parts, aspect) {
   camera.updateProjectionMatrix();
 }
 
-/** How large a pixel is at what the camera looks at, in drawn units, of a picture with so many pixels in height. */
+/** How large a pixel is at what the camera looks at, in drawn units, of a picture of this height [pixels]. */
 export function pixelOf(camera, height) {
   return 2 * camera.position.distanceTo(camera.userData.target) * Math.tan(camera.fov / 2 * TURN / 360) / height;
 }
@@ -281,7 +281,7 @@ function revolve(THREE, scale, outline, from = 0, width = TURN, out = 0) {
   return geometry;
 }
 
-/** Room for a ribbon through so many points: two corners each, and two triangles from each to the next. */
+/** Make room for a ribbon through this number of points: two corners each, and two triangles from each to the next. */
 function makeRibbon(THREE, geometry, points) {
   const faces = [];
   for (let k = 0; k + 1 < points; k += 1) faces.push(2 * k, 2 * k + 1, 2 * k + 2, 2 * k + 1, 2 * k + 3, 2 * k + 2);

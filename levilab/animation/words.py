@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 _BEFORE_A_UNIT = re.compile(r"(?<=\d) (?=(?:A m²|[mckµ]?m|s|Hz|m?T|k?g|rad|turns|MB)(?:\W|$))|(?<=\d[ \u00a0]A) (?=m²)")
 
 
-def speed_in_words(speed: float) -> str:
+def speed_text(speed: float) -> str:
     """Return a film's speed, as a part of the real one.
 
-    >>> [speed_in_words(x) for x in (0.05, 1.0, 0.3, 2.0)]
+    >>> [speed_text(x) for x in (0.05, 1.0, 0.3, 2.0)]
     ['1/20 of real speed', 'real speed', '0.3 of real speed', '2 times real speed']
     """
     if speed == 1:
@@ -31,22 +31,22 @@ def speed_in_words(speed: float) -> str:
 
 
 def short_speed(speed: float) -> str:
-    """Return a film's speed in a list of them.
+    """Return a film's speed for a list of speeds.
 
     >>> [short_speed(x) for x in (0.05, 1.0, 0.3)]
     ['1/20', '1', '0.3']
     """
-    return speed_in_words(speed).removesuffix(" of real speed") if speed < 1 else f"{speed:g}"
+    return speed_text(speed).removesuffix(" of real speed") if speed < 1 else f"{speed:g}"
 
 
-def span_in_words(poses: Poses) -> str:
+def span_text(poses: Poses) -> str:
     """Return the seconds of the motion that are shown."""
     last = ", where it is lost" if poses.fell else ""
     return f"from {poses.times[0]:.4g} s to {poses.times[-1]:.4g} s{last}"
 
 
 def readout(poses: Poses, k: int) -> list[tuple[str, str]]:
-    """Names and values of what is read at the k-th pose."""
+    """Return names and values of the numbers on display at the k-th pose."""
     rows = [
         ("time", f"{poses.times[k]:.3f} s"),
         ("height", f"{with_decimals(100 * poses.positions[k, 2], 2)} cm"),
@@ -61,7 +61,7 @@ def readout(poses: Poses, k: int) -> list[tuple[str, str]]:
 
 
 def bind_units(text: str) -> str:
-    r"""Bind numbers to their units, and what units consist of, with spaces at which no line ends.
+    r"""Put no-break spaces between numbers and their units, and within compound units.
 
     >>> bind_units("from 0.5 s to 2 cm radius, 0.71 A m², 1/20 of real speed, 3 parts")
     'from 0.5\xa0s to 2\xa0cm radius, 0.71\xa0A\xa0m², 1/20 of real speed, 3 parts'

@@ -67,7 +67,7 @@ class Bench:
         return self.instruments[kind].changed_settings(since=self._prepared.get(kind, {}))
 
     def address(self, kind: str) -> str:
-        """Where an instrument is."""
+        """Return the address of an instrument."""
         return self.instruments[kind].transport.address
 
     def reopen(self, kind: str) -> None:
@@ -111,9 +111,9 @@ def open_bench(
     with contextlib.ExitStack() as links:
 
         def connect(kind: Kind[I], *, alone: bool = True) -> I:
-            """Open an instrument, and take it into the bench once it has shown that it is what it should be."""
+            """Open an instrument, and take it into the bench once its identity is right."""
             check()
-            instrument = connected(kind, wiring, log=log)
+            instrument = connect_driver(kind, wiring, log=log)
             links.callback(instrument.close)
             if alone:  # no other program changes its settings while it measures
                 instrument.transport.lock()
@@ -140,7 +140,7 @@ def open_bench(
             bench.outputs_off()
 
 
-def connected(kind: Kind[I], wiring: Wiring, *, log: TrafficLog | None = None) -> I:
+def connect_driver(kind: Kind[I], wiring: Wiring, *, log: TrafficLog | None = None) -> I:
     """Return a driver on an open link.  Raises ConfigError for an unknown model, InstrumentError."""
     settings = wiring.described(kind.name)
     driver = kind.model(settings.model).driver

@@ -45,7 +45,7 @@ class Light:
     trigger_level_v: float = 0.6
 
 
-#: In words, the value, its unit.
+#: Name of the quantity, its value, its unit.
 Reading = tuple[str, float | None, str]
 
 
@@ -98,7 +98,7 @@ READINGS: dict[str, Callable[[Bench, Light], Reading]] = {
 
 
 def check(wiring: Wiring, light: Light) -> Iterator[Checked]:
-    """Each instrument of a bench, one after the other.
+    """Check each instrument of a bench, one after the other.
 
     The generator's output is off afterwards.  Raises ConfigError where nothing is described.
     """

@@ -26,7 +26,7 @@ class ConfigError(LevilabError):
 
 
 class InstrumentSettings(Settings):
-    """Where an instrument is, and what it is.
+    """Address and model of an instrument.
 
     timeout_s: of one answer; baud_rate, data_bits, parity, stop_bits: of a serial line, where they are not those that
     the instrument leaves the factory with.

@@ -52,7 +52,7 @@ def search(library: str, named: Sequence[str], tell: Callable[[str], None]) -> l
 
 
 def identify(address: str, library: str) -> Found:
-    """Who is at an address, with each of the ways that a serial line may be set."""
+    """Identify the instrument at an address, with each of the ways that a serial line may be set."""
     trouble = ""
     for driver, line in _lines_to_try(address):
         settings = InstrumentSettings(model="", address=address, timeout_s=PATIENCE_S)
@@ -94,7 +94,7 @@ def _printable(identity: str) -> str:
 
 
 def driver_for_identity(identity: str) -> tuple[str, str] | None:
-    """Kind and model of our driver for an answer to ``*IDN?``; None if there is none.
+    """Return kind and model of our driver for an answer to ``*IDN?``; None if there is none.
 
     >>> driver_for_identity("Keysight Technologies,53220A,MY1,2.1")
     ('counter', '53220A')

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Setting:
-    """A line of a table.  comment: what it means, or empty; is_set: otherwise the line is a comment, an example."""
+    """A line of a table.  comment: its meaning, or empty; is_set: otherwise the line is a comment, an example."""
 
     name: str
     value: Any
@@ -35,7 +35,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class SettingsTable:
-    """A table of settings.  about: what it is of."""
+    """A table of settings.  about: its subject."""
 
     name: str
     about: str

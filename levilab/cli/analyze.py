@@ -251,7 +251,7 @@ def _tabulate(
 
 
 def _print_tally(context: typer.Context, tally: "Tally", table: Path, *, as_json: bool) -> None:
-    """Print where the table is and what did not get into it.  Raises NoneUsable where nothing was analyzed."""
+    """Print where the table is and which inputs are not in it.  Raises NoneUsable where nothing was analyzed."""
     app = context.find_root().command
     for path, problem in tally.failures:
         named = problem if PurePath(path).name in problem else f"{path}: {problem}"

@@ -1,4 +1,4 @@
-"""Ctrl-C while a command imports what it needs, before it does anything."""
+"""Ctrl-C while a command imports its modules, before it does anything."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ class Later(typer.core.TyperCommand):
             made, function = typer.Typer(add_completion=False), made
             made.command(self.name)(function)
         command = typer.main.get_command(made)
-        command.help, command.epilog = _rewrapped(self.help), self.epilog
+        command.help, command.epilog = _rewrap(self.help), self.epilog
         return command
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
@@ -42,7 +42,7 @@ class Later(typer.core.TyperCommand):
         return self.command.make_context(info_name, args, parent, **extra)
 
 
-def _rewrapped(text: str | None) -> str | None:
+def _rewrap(text: str | None) -> str | None:
     """Return a help text with one line a paragraph: typer keeps a docstring's line breaks and adds its own."""
     if text is None:
         return None

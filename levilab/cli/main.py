@@ -17,7 +17,7 @@ from levilab.cli.quantities import in_options
 
 
 class Commands(typer.core.TyperGroup):
-    """All commands.  The wrong value of an option is refused in plain words; Ctrl-C ends them in one line."""
+    """All commands.  A wrong value of an option is refused with its fault; Ctrl-C ends them in one line."""
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
         """Read the options before the command, which imports pydantic."""
@@ -29,30 +29,30 @@ class Commands(typer.core.TyperGroup):
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:
-            error.message = in_plain_words(error.message, _refused(error))
+            error.message = explain_bad_value(error.message, _refused_value(error))
             raise
         except KeyboardInterrupt:  # what can be lost is said by the command itself
             message("levilab: interrupted")
             raise typer.Exit(exit_codes.INTERRUPTED) from None
 
 
-def _refused(error: typer.BadParameter) -> object:
+def _refused_value(error: typer.BadParameter) -> object:
     """Return the value that pydantic refused, None where something else did."""
     errors = getattr(error.__context__, "errors", None)
     return errors()[0]["input"] if errors else None
 
 
-def in_plain_words(text: str, seen: object = None) -> str:
+def explain_bad_value(text: str, seen: object = None) -> str:
     """Return typer's message about a wrong value, with the value and its fault.
 
-    >>> in_plain_words("Input should be a valid number, unable to parse string as a number", "0,03")
+    >>> explain_bad_value("Input should be a valid number, unable to parse string as a number", "0,03")
     "'0,03': a number is expected; write a decimal point, not a comma"
-    >>> in_plain_words("Input should be greater than or equal to 10")
+    >>> explain_bad_value("Input should be greater than or equal to 10")
     'a number greater than or equal to 10 is expected'
     """
-    from levilab.settings import expected, hint_about  # with pydantic
+    from levilab.settings import explain_message, hint_about  # with pydantic
 
-    said = expected(text)
+    said = explain_message(text)
     if not said.endswith(" is expected"):
         return said
     return (f"{seen!r}: " if seen is not None else "") + said + hint_about(seen, "which --help names")
@@ -84,7 +84,7 @@ def levilab(
         typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True),
     ] = False,
 ) -> None:
-    """Return the lab application for experiments on the Levitron: acquire, analyze, report."""
+    """Acquire, analyze and report experiments on the Levitron."""
 
 
 @app.command(
@@ -130,7 +130,7 @@ def simulate() -> Callable[..., None]:
 
 @app.command(cls=Later, epilog="Example: levilab stability undriven --set top.mass_kg=0.0255")
 def stability() -> Callable[..., None]:
-    """Where the top floats: heights, masses and spins, from the field and the theory of small motions."""
+    """Find where the top floats: heights, masses and spins, from the field and the theory of small motions."""
     from levilab.cli.simulate import stability
 
     return stability
@@ -166,7 +166,7 @@ def crosscheck() -> Callable[..., None]:
 
 @app.command(cls=Later, epilog='Example: levilab reproduce --only "limits,errata" -o reproduce.html')
 def reproduce() -> Callable[..., None]:
-    """Make the tables and figures of the Levitron thesis and of two papers anew: published value beside ours.
+    """Compute the tables and figures of the Levitron thesis and of two papers again: published value beside ours.
 
     Prints published, ours and agreement, and writes all with figures as a report.  A minute on two cores.  Ends with 1
     where a value neither agrees nor differs for the reason that is shown.
@@ -178,7 +178,7 @@ def reproduce() -> Callable[..., None]:
 
 @app.command(cls=Later, epilog="Example: levilab top sample_data/device.toml")
 def top() -> Callable[..., None]:
-    """Mass and moments of inertia of a top from its parts, taken as cylinders, with uncertainties."""
+    """Calculate mass and moments of inertia of a top from its parts, taken as cylinders, with uncertainties."""
     from levilab.cli.top import top
 
     return top
@@ -202,7 +202,7 @@ def analyze() -> typer.Typer:
 
 @app.command(cls=Later)
 def bench() -> typer.Typer:
-    """Look at the instruments: which of them answer, and a virtual bench to practise on."""
+    """Check the instruments, or serve a virtual bench to practise."""
     from levilab.cli.bench import bench_app
 
     return bench_app
@@ -222,14 +222,14 @@ def live() -> Callable[..., None]:
 
 @app.command(cls=Later)
 def benchmark() -> typer.Typer:
-    """Speed against error, with other programs beside."""
+    """Compare speed and error with other programs."""
     from levilab.cli.simulate import benchmark_app
 
     return benchmark_app
 
 
 def main() -> None:
-    """Return the console script: known failures become one line and an exit status, everything else stays loud."""
+    """Run the console script: known failures become one line and an exit status, all others keep their traceback."""
     _prepare_output()
     # before numpy is loaded: matrices of a few hundred rows gain nothing by threads, which wait for each other busily
     # where another program has a core (docs/speed.md)
@@ -253,16 +253,12 @@ def _exit_with(error: Exception) -> NoReturn:
         status, text = exit_codes.FAILED, str(error)
     if status is None:
         raise error
-    message("levilab: " + _in_one_line(text))
+    message("levilab: " + " ".join(text.split()))
     sys.exit(status)
 
 
-def _in_one_line(text: str) -> str:
-    return " ".join(text.split())
-
-
 def _prepare_output() -> None:
-    """Consoles and pipes of Windows may use code pages without ν and ⁻³: those are spelled out there.
+    """Let Windows consoles and pipes with code pages without ν and ⁻³ spell these out.
 
     A stream that is closed from the start, as by ``>&-``, is None in Python: what goes there is thrown away.
     """

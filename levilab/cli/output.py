@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def print_json(document: Any, *, indent: int | None = 2, sort_keys: bool = False) -> None:
-    """One JSON document on standard output; NaN has no place in it."""
+    """Print one JSON document on standard output, without NaN."""
     import json
 
     typer.echo(json.dumps(document, indent=indent, sort_keys=sort_keys, allow_nan=False))

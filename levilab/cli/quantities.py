@@ -14,13 +14,13 @@ from levilab.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-#: A quantity in a message, and what it is set to, as in "take `rate` = 500 or less".
+#: A quantity in a message, and its value, as in "take `rate` = 500 or less".
 _QUANTITY = re.compile(r"`([a-z]\w*)`( = False\b| = True\b| = )?")
 
 
 @cache
 def option_names(app: Any) -> dict[str, tuple[str, str]]:
-    """Quantity → the option that sets it, and the one that switches it off (empty if there is none), of all commands.
+    """Return quantity → the options that set it and switch it off (empty if there is none), of all commands.
 
     Args:
         app: the application, or the command of its name.

@@ -1,4 +1,4 @@
-"""The thesis's tables and figures, made anew.  Heavy imports happen inside the command."""
+"""The thesis's tables and figures, computed again.  Heavy imports happen inside the command."""
 
 import contextlib
 from pathlib import Path

@@ -74,7 +74,7 @@ def simulate(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate a scene, and print what the motion is like."""
+    """Simulate a scene, and print a summary of the motion."""
     chosen = chosen_scene(scene, settings)
     film = _animation_request(animate, animate_from, animate_to, animate_speed)
     if film:
@@ -101,7 +101,7 @@ def simulate(
     if film:
         _animate(film, done.summary, partial(with_options, app=app))
     with interruptible("the effects are not known"):
-        effects = _explained(chosen, duration) if explain else ()
+        effects = _switch_effects(chosen, duration) if explain else ()
     if as_json:
         from dataclasses import asdict
 
@@ -137,7 +137,7 @@ def _animate(request: "AnimationRequest", summary: "Summary", in_words: "Callabl
     message(f"wrote {request.path}: {shown}")
 
 
-def _explained(scene: "Scene", duration: float) -> "tuple[Effect, ...]":
+def _switch_effects(scene: "Scene", duration: float) -> "tuple[Effect, ...]":
     from levilab.motion.effects import explain
 
     message("switching each effect on or off: some seconds, up to 15 where code must be compiled first")
@@ -186,7 +186,7 @@ def stability(
     if not as_json:
         print_stability(found)
     if survival:
-        document["map"] = _mapped(chosen, spans, stay, out or Path())
+        document["map"] = _simulate_map(chosen, spans, stay, out or Path())
     if as_json:
         print_json(document)
 
@@ -197,7 +197,9 @@ def _span(name: str, text: str | None) -> "Span | None":
     return None if text is None else span_of(name, text)
 
 
-def _mapped(scene: "Scene", spans: "tuple[Span | None, Span | None]", duration: float, out: Path) -> dict[str, object]:
+def _simulate_map(
+    scene: "Scene", spans: "tuple[Span | None, Span | None]", duration: float, out: Path
+) -> dict[str, object]:
     from levilab.present.progress import ShareBar
     from levilab.sweeps.run import compile_for, run, with_step, workers_for
     from levilab.sweeps.spin_mass import as_document, notes_of, place_for_map, plan_of, write_map
@@ -225,7 +227,7 @@ def benchmark_simulator(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    r"""Speed against error of the simulator, with scipy's and heyoka's integrators on the same motion.
+    r"""Measure speed and error of the simulator, with scipy's and heyoka's integrators on the same motion.
 
     heyoka takes part if it is installed: pip install ".\[peers]" in the
     clone.  Leave the machine alone meanwhile.
@@ -249,7 +251,7 @@ def benchmark_estimators(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Error and speed of the frequency of light pulses, with an FFT, an autocorrelation and find_peaks beside.
+    """Measure error and speed of the estimators of a pulse frequency, beside an FFT, an autocorrelation and find_peaks.
 
     RMSE over the Cramér–Rao bound from 0 to 40 dB, samples a second, and failures and coverage on hard traces.
     """

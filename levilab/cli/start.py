@@ -21,6 +21,6 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.stderr.write(LINE)
         sys.exit(INTERRUPTED)
-    finally:  # what was to be said is said; what is left are threads to wait for
+    finally:  # all messages are out; only threads are left to wait for
         end_process_at_interruption(INTERRUPTED)
         let_the_status_count()

@@ -68,13 +68,13 @@ class Column:
 
 
 def shorten(text: str, most: int = 40) -> str:
-    """`text` for a message of one line: no control characters, at most `most` characters."""
+    """Return `text` for a message of one line: no control characters, at most `most` characters."""
     plain = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
     return plain if len(plain) <= most else plain[: most - 1] + "…"
 
 
-def quoted(names: Iterable[str]) -> str:
-    """Names in quotation marks, with commas, the first dozen of them."""
+def quote_names(names: Iterable[str]) -> str:
+    """Return names in quotation marks, with commas, the first dozen of them."""
     names = list(names)
     return ", ".join(f"'{shorten(n)}'" for n in names[:12]) + (", …" if len(names) > 12 else "")
 
@@ -86,7 +86,7 @@ def choose_columns(
     wanted: Mapping[str, str],
     quantities: Collection[str] = CANONICAL,
 ) -> tuple[tuple[Column, ...], tuple[str, ...]]:
-    """Return the columns of a file that hold something we know, and warnings about those that nearly do.
+    """Return the columns of a file with known quantities, and warnings about similar ones.
 
     Args:
         path: the file, for messages.
@@ -180,7 +180,7 @@ def _of_the_period(text: str, title: Title) -> Title:
 
 
 def _is_of_a_period(title: Title, titles: Sequence[Title]) -> bool:
-    """Whether a title is that of the uncertainty of a period, in a unit of time."""
+    """Return whether a title is that of the uncertainty of a period, in a unit of time."""
     times = title.unit is not None and unit_factor(title.unit, "time") is not None
     return times and title.column == companion("spin_frequency_hz") and any(one.inverse for one in titles)
 
@@ -200,7 +200,7 @@ def how_else(title: str, name: str) -> str:
 def _wanted_columns(
     path: Path, header: Sequence[str], wanted: Mapping[str, str]
 ) -> tuple[dict[str, int], dict[str, str]]:
-    """Index and, where the user states it, unit of each wanted column."""
+    """Return the index and, where the user states it, the unit of each wanted column."""
     chosen: dict[str, int] = {}
     stated: dict[str, str] = {}
     for key, title in wanted.items():
@@ -217,7 +217,8 @@ def _wanted_columns(
         if index is None:
             raise TableError(
                 path,
-                f"has no column '{shorten(title)}'; it has {quoted(header)}: correct `columns` = {key}=NAME or NUMBER",
+                f"has no column '{shorten(title)}'; it has {quote_names(header)}: "
+                f"correct `columns` = {key}=NAME or NUMBER",
             )
         if index in chosen.values():
             raise TableError(path, f"`columns` names column '{shorten(title)}' twice; each column holds one quantity")
@@ -233,7 +234,7 @@ def _stated_unit(path: Path, name: str, unit: str) -> str:
 
 
 def _find(header: Sequence[str], title: str) -> int | None:
-    """Index of a title: as it stands, in any case, or without its unit; else a 1-based number."""
+    """Return the index of a title: as it stands, in any case, or without its unit; else a 1-based number."""
     folded = [text.casefold() for text in header]
     bare = [re.sub(r" ?/? ?[\[(][^\[\]()]*[\])]$", "", without_runs_of_blanks(text)) for text in folded]
     for titles, wanted in ((list(header), title), (folded, title.casefold()), (bare, title.casefold())):
@@ -253,7 +254,8 @@ def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) 
     period = "; if T is the time of a turn say its unit, as T [ms]" if any(header[i] == "T" for i in indices) else ""
     raise TableError(
         path,
-        f"columns {quoted(header[i] for i in indices)} could each be {name}; say which: `columns` = {numbers}{period}",
+        f"columns {quote_names(header[i] for i in indices)} could each be {name}; "
+        f"say which: `columns` = {numbers}{period}",
     )
 
 

@@ -46,7 +46,7 @@ class Dialect:
         return COMMENTS if self.separator == ";" else COMMENTS_UNLESS_SEMICOLON
 
     def skips(self, line: str) -> bool:
-        """Whether a line is blank or a comment; tabs that separate are empty fields, not blanks."""
+        """Return whether a line is blank or a comment; tabs that separate are empty fields, not blanks."""
         plain = line.strip(" \n") if self.separator == "\t" else line.strip()
         return not plain or plain.lstrip().startswith(self.comments)
 
@@ -66,7 +66,7 @@ class Dialect:
         """Return the number in a field; infinite where it says so or overflows.
 
         Raises:
-            ValueError: it is none, or it has the other decimal mark.
+            ValueError: the field is no number, or has the other decimal mark.
         """
         if self.decimal == "," and THOUSANDS.fullmatch(text):
             text = text.replace(".", "")
@@ -75,7 +75,7 @@ class Dialect:
         return float(text.replace(",", ".") if self.decimal == "," else text)
 
     def kind(self, text: str) -> Kind:
-        """Whether a field holds a number, a time of a clock, a missed reading, or text."""
+        """Return whether a field holds a number, a time of a clock, a missed reading, or text."""
         if text.casefold() in MISSING:
             return "missing"
         try:
@@ -86,13 +86,13 @@ class Dialect:
 
 
 def clock_time(text: str) -> float:
-    """Seconds that a clock, a stopwatch or a date stands for; a date's count from 1970.
+    """Return the seconds that a clock, a stopwatch or a date stands for; a date's count from 1970.
 
     >>> clock_time("0:10"), clock_time("14:05:12.5")
     (10.0, 50712.5)
 
     Raises:
-        ValueError: it is none of these.
+        ValueError: it is none of the three.
     """
     if found := CLOCK.fullmatch(text):
         hours, minutes, seconds = int(found[1] or 0), int(found[2]), float(found[3].replace(",", "."))
@@ -173,8 +173,8 @@ def find_dialect(lines: Sequence[str], first: Sequence[str] = ()) -> Dialect | N
     return best if titles(best) else None
 
 
-#: Digest of some lines → the dialect of their rows.  Each analysis reads all files of a folder anew, in the same order,
-#: to see which of them suit it.  Where there are too many, the newest entry goes: the next pass finds the older ones.
+#: Digest of some lines → the dialect of their rows.  Each analysis reads all files of a folder, in the same order, to
+#: see which of them suit it.  Where there are too many, the newest entry goes: the next pass finds the older ones.
 _DIALECTS_OF_ROWS: dict[bytes, Dialect | None] = {}
 _MOST_DIALECTS = 1 << 14  # in 1.4 MB
 
@@ -199,7 +199,7 @@ def _above_rows(lines: Sequence[str], dialect: Dialect) -> Iterator[Line]:
 
 
 def _score(lines: Iterable[Line], rank: int) -> tuple[int, int, int, int]:
-    """Rows of equal width without text, such rows at all, the separator's rank, numbers in those rows."""
+    """Return rows of equal width without text, such rows at all, the separator's rank, numbers in those rows."""
     rows = [line for line in lines if line.is_row]
     width = most_common(line.filled_count for line in rows)
     alike = [line for line in rows if line.filled_count == width]

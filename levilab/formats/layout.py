@@ -90,7 +90,7 @@ def sniff(path: Path) -> Layout:
 
 
 def _of_words(lines: list[str], encoding: str, head: bytes) -> Layout | None:
-    """Return the layout of a table without two numbers in a row, below unknown titles."""
+    """Return the layout of a table below unknown titles, without two numbers in any row."""
     for separator in filter(None, SEPARATORS):
         dialect = Dialect(separator, ".")
         content = list(content_lines(lines[:SAMPLE], dialect))
@@ -116,7 +116,7 @@ def _encoding(head: bytes) -> str:
 
 
 def lay_out(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> Layout:
-    """Where a table stands in lines that were read.
+    """Find the table in lines that were read.
 
     Args:
         lines: the first ones of the file.
@@ -155,7 +155,7 @@ def _above_rows(lines: Iterator[Line], width: int, numeric: Sequence[int]) -> tu
 
 
 def _header(above: list[Line], width: int) -> int | None:
-    """Index of the header among the lines above the rows: known titles count, then the width, then nearness.
+    """Find the header among the lines above the rows: known titles count, then the width, then nearness.
 
     A row of units is not it, unless there is nothing else.
     """
@@ -183,6 +183,6 @@ def _header_in_comment(above: list[str], dialect: Dialect, width: int) -> tuple[
 
 
 def _offset(head: bytes, line: int) -> int:
-    """Where a line begins [bytes]; right for encodings that write a line end as one byte."""
+    """Return where a line begins [bytes]; right for encodings that write a line end as one byte."""
     ends = [end.end() for end in re.finditer(rb"\r\n|\r|\n", head)]
     return ends[line - 2] if 1 < line <= len(ends) + 1 else 0 if line == 1 else len(head)

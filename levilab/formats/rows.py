@@ -48,7 +48,7 @@ class Rows:
 
 
 def read_rows(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool = False) -> Rows:
-    """All rows of the chosen columns.
+    """Read all rows of the chosen columns.
 
     A last line without line end is left out if it is no full row, or in any case if `drop_unended`.
 
@@ -62,7 +62,7 @@ def read_rows(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unen
 
 
 def _read_at_once(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows | None:
-    """All rows by pandas, or None if any line is not plain, or the file grows meanwhile."""
+    """Read all rows by pandas; None if any line is not plain, or the file grows meanwhile."""
     import pandas as pd
 
     dialect, fields, used = layout.dialect, layout.width, [column.index for column in chosen]
@@ -92,7 +92,7 @@ def _read_at_once(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_
 
 
 def _may_be_plain(layout: Layout, used: Sequence[int]) -> bool:
-    """Whether the fast way is safe; without the first field a comment with separators would pass for a row."""
+    """Return whether the fast way is safe; without the first field a comment with separators would pass for a row."""
     separator, decimal = layout.dialect.separator, layout.dialect.decimal
     return layout.encoding in ONE_BYTE_ENCODINGS and separator not in (None, decimal) and 0 in used
 
@@ -118,7 +118,7 @@ def _plain_lines(path: Path, layout: Layout) -> tuple[int, bytes]:
 
 
 def _every_line_is_full(path: Path, layout: Layout) -> bool:
-    """Whether each line, without all other characters, is the separators of one row."""
+    """Return whether each line, without all other characters, is the separators of one row."""
     line = (layout.dialect.separator or " ").encode() * (layout.width - 1) + b"\n"
     others = bytes(set(range(256)) - set(line))
     with path.open("rb") as stream:
@@ -131,7 +131,7 @@ def _every_line_is_full(path: Path, layout: Layout) -> bool:
 
 
 def _skips(layout: Layout, line: str) -> bool:
-    """Whether a line is no row: blank, a comment, or some separators that a spreadsheet left behind."""
+    """Return whether a line is no row: blank, a comment, or some separators that a spreadsheet left behind."""
     separator = layout.dialect.separator
     if layout.dialect.skips(line):
         return True
@@ -141,7 +141,7 @@ def _skips(layout: Layout, line: str) -> bool:
 def _with_last(
     path: Path, layout: Layout, chosen: Sequence[Column], rows: Rows, rest: str, *, drop_unended: bool
 ) -> Rows:
-    """Rows with what follows the last line end, if that is one."""
+    """Append the row behind the last line end, if there is one."""
     if _skips(layout, rest):
         return rows
     line = layout.first_line + rows.lines.size
@@ -153,7 +153,7 @@ def _with_last(
 
 
 def _read_lines(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows:
-    """All rows line by line; some 2 µs a number."""
+    """Read all rows line by line; some 2 µs a number."""
     lines, values, torn = array("q"), [array("d") for _ in chosen], None
     time = ""
     with path.open(encoding=layout.encoding, errors="replace", newline=None) as stream:
@@ -189,7 +189,7 @@ def _time_in(layout: Layout, chosen: Sequence[Column], line: str) -> str:
 
 
 def _from_first_date(times: "NDArray[np.float64]") -> "NDArray[np.float64]":
-    """Dates, which count from 1970, from the first one on.  times: shape (n,), NaN where one is missed [s]."""
+    """Count dates from the first one on, not from 1970.  times: shape (n,), NaN where one is missed [s]."""
     first: float = times[np.isfinite(times)][0]
     return np.asarray(times - first)
 

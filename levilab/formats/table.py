@@ -21,7 +21,7 @@ from levilab.formats.columns import (
     TableError,
     choose_columns,
     how_else,
-    quoted,
+    quote_names,
     shorten,
 )
 from levilab.formats.dialect import MISSING_WORDS, Dialect
@@ -120,7 +120,7 @@ def read_table(
             wanted_names = needed or [name for name in SHORTHANDS.values() if name in quantities][:2]
             raise NoSuchColumn(
                 path,
-                f"no title is known ({known} …) among {quoted(header)}: say `columns` = "
+                f"no title is known ({known} …) among {quote_names(header)}: say `columns` = "
                 + _in_one_word(f"{_key(name)}=NAME" for name in wanted_names),
                 line=layout.header_line or layout.first_line,
             )
@@ -201,7 +201,7 @@ def parse_columns(text: str) -> dict[str, str]:
 
 
 def _in_one_word(columns: Iterable[str]) -> str:
-    """Columns as any shell takes them: PowerShell would split them at a comma."""
+    """Return columns as any shell takes them: PowerShell would split them at a comma."""
     text = ",".join(columns)
     return f'"{text}"' if "," in text else text
 
@@ -212,7 +212,7 @@ def _key(name: str) -> str:
 
 
 def _no_column(path: Path, name: str, header: Sequence[str]) -> NoSuchColumn:
-    text = f"no column is known to be {name}; it has {quoted(header)}: say `columns` = {_key(name)}=NAME"
+    text = f"no column is known to be {name}; it has {quote_names(header)}: say `columns` = {_key(name)}=NAME"
     nearly = next((title for title in header if nearly_a_frequency(title)), None) if "frequency" in name else None
     foreign = next((title for title in header if read_title(title).column == name), None)
     if foreign:
@@ -298,7 +298,7 @@ def _table(
     good = np.logical_and.reduce(list(present.values())) if present else np.ones(rows.lines.size, bool)
     lines, kept = rows.lines, {column: numbers[column] for column in present}
     if not good.all():
-        notes.append(_missed(name, lines[~good], good.size, periods=any(column.inverse for column in present)))
+        notes.append(_missed_warning(name, lines[~good], good.size, periods=any(column.inverse for column in present)))
         lines, kept = lines[good], {column: values[good] for column, values in kept.items()}
     columns = {c.name: values if c.factor == 1 else values * c.factor for c, values in kept.items()}
     for name in [c.name for c in kept if c.inverse and c.name in QUANTITIES]:
@@ -308,7 +308,7 @@ def _table(
     return Table(path, columns, tuple(notes), header, lines, {c.name: c.factor for c in kept if not c.inverse})
 
 
-def _missed(name: str, lines: "NDArray[np.int64]", rows: int, *, periods: bool) -> str:
+def _missed_warning(name: str, lines: "NDArray[np.int64]", rows: int, *, periods: bool) -> str:
     """Return the warning about rows left out, with all that counts as missed, a period of 0 with `periods`."""
     kinds = ("empty", *MISSING_WORDS, "inf", *(["a period of 0"] if periods else []))
     places = ", ".join(str(line) for line in lines[:5]) + (", …" if lines.size > 5 else "")

@@ -149,7 +149,7 @@ _ANGULAR_NAMES = frozenset(form.format(name) for name in ANGULAR for form in ("{
 
 
 def dimension(column: str) -> str:
-    """Dimension of a canonical column, or of the quantity whose uncertainty it is."""
+    """Return the dimension of a canonical column, or of the quantity whose uncertainty it is."""
     return QUANTITIES[COMPANIONS.get(column, column)][0]
 
 
@@ -159,7 +159,7 @@ def plain_unit(text: str) -> str:
 
 
 def unit_factor(text: str, kind: str) -> float | None:
-    """Factor to SI of a unit of the dimension `kind`, or None if it is none.
+    """Return the factor to SI of a unit of the dimension `kind`, or None for any other text.
 
     Case counts only where it must: "khz" is kHz, but "mhz" could be two units and is none.
     """
@@ -175,7 +175,7 @@ def unit_factor(text: str, kind: str) -> float | None:
 
 
 def is_unit(text: str) -> bool:
-    """Whether a field is the unit of anything we know, as in a row of units beneath a header."""
+    """Return whether a field is the unit of anything we know, as in a row of units beneath a header."""
     return any(unit_factor(text, kind) is not None for kind in UNITS)
 
 
@@ -235,16 +235,16 @@ def read_title(text: str) -> Title:
     forms = (form.fullmatch(text) for form in _UNIT_FORMS)
     found = [(m["name"], m["unit"]) for m in forms if m]
     for label, unit in found:
-        if title := _named(label, unit):
+        if title := _title_of_name(label, unit):
             return title
     for place in (m.start() for m in re.finditer("_", text)):
-        title = _named(text[:place], text[place + 1 :])
+        title = _title_of_name(text[:place], text[place + 1 :])
         if title and (title.inverse or unit_factor(text[place + 1 :], dimension(title.column or "")) is not None):
             return title
     return Title(None, found[0][1] if found else None)
 
 
-def _named(label: str, unit: str) -> Title | None:
+def _title_of_name(label: str, unit: str) -> Title | None:
     """Return the title that a name gives together with a possible unit; None for an unknown name."""
     name = _plain_name(label)
     if (name in TURNS or label == "U") and unit_factor(f"/{unit}", "frequency"):
@@ -255,12 +255,12 @@ def _named(label: str, unit: str) -> Title | None:
 
 
 def known_titles(header: Sequence[str]) -> int:
-    """How many of the fields name a column that we know."""
+    """Return the number of fields that name a column that we know."""
     return sum(read_title(text).column is not None for text in header)
 
 
 def nearly_a_frequency(text: str) -> str | None:
-    """How a frequency follows from what a column holds, None if none does.
+    """Return how a frequency follows from a column's quantity, None if it does not.
 
     >>> nearly_a_frequency("Drehzahl")
     'say its unit in the title, or `columns` = "f=Drehzahl [Hz]" or "f=Drehzahl [rpm]", whichever it is in'

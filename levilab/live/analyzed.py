@@ -25,7 +25,7 @@ REPORT = "report.html"
 RESULT = "result.json"
 #: An analysis that takes longer than this is given up [s].
 _LONGEST_S = 600.0
-#: An analysis that is given up ends at once; it is waited for so long at most [s].
+#: An analysis that is given up ends at once; the longest wait for that [s].
 _PATIENCE_S = 5.0
 #: Signals to the view's process group, as Ctrl-C in a terminal, leave an analysis alone: the view ends it and says so.
 _APART: dict[str, Any] = {
@@ -84,7 +84,7 @@ class Analyses:
             self.running.discard(folder.name)
 
     def _run(self, words: Sequence[str]) -> tuple[int, str]:
-        """Run a command of this program.  Returns its exit status, and what it wrote about failures."""
+        """Run a command of this program.  Returns its exit status and its messages about failures."""
         with self._lock:
             if self._is_over:
                 return 1, "the live view was ended"
@@ -108,7 +108,7 @@ class Analyses:
                     self._processes.discard(process)
 
     def end(self) -> None:
-        """Give up what is under way, and wait for its end: files are replaced whole, so none is left torn."""
+        """Stop the analyses under way, and wait for their end: files are replaced whole, so none is left torn."""
         with self._lock:
             self._is_over = True
             for process in self._processes:
@@ -117,7 +117,7 @@ class Analyses:
             thread.join(_PATIENCE_S)
 
     def about(self, folder: Path) -> dict[str, Any]:
-        """Return the state of a run's analysis: its state, names of figures, the verdict, whether there is a report.
+        """Return the state of a run's analysis, names of figures, the verdict, and whether there is a report.
 
         Results of an earlier analysis are not shown for one that is under way or has failed.
         """
@@ -130,7 +130,7 @@ class Analyses:
         } | (_result(folder) if self._is_new(folder / RESULT) else {})
 
     def _is_new(self, path: Path) -> bool:
-        """Whether a file is there, and was not before the analysis that was asked for last."""
+        """Return whether a file is there, and was not before the analysis that was asked for last."""
         now = stamp(path)
         return now is not None and now != self._before.get(path)
 
@@ -141,7 +141,7 @@ def _figures(folder: Path) -> list[Path]:
 
 
 def _result(folder: Path) -> dict[str, Any]:
-    """Return what result.json beside a run says, in words."""
+    """Return the summary, as text, of the result.json beside a run."""
     found: Any = {}
     with contextlib.suppress(OSError, ValueError):
         found = json.loads((folder / RESULT).read_text(encoding="utf-8"))
@@ -168,5 +168,5 @@ def _values(values: Any) -> list[str]:
 
 
 def _is_number(value: Any) -> bool:
-    """Whether it is a number as an analysis writes it; a person may have changed the file."""
+    """Return whether it is a number as an analysis writes it; a person may have changed the file."""
     return isinstance(value, float) and math.isfinite(value)

@@ -37,7 +37,7 @@ class Choice:
 
 
 def run_names(root: Path) -> list[str]:
-    """Names of the newest runs in a folder, newest first: names begin with the time.  None where there is no folder."""
+    """Return the names of the newest runs in a folder, newest first; None without a folder."""
     return heapq.nlargest(MOST_RUNS, _names(root))
 
 
@@ -65,7 +65,7 @@ def _choice(folder: Path) -> Choice:
     return Choice(folder.name, run.status, record.experiment, record.started_utc or "", record.note[:200])
 
 
-def recorded_now(root: Path, but: Collection[Path] = ()) -> Path | None:
+def running_run(root: Path, but: Collection[Path] = ()) -> Path | None:
     """Return the folder of the newest run that is running, among the newest few; None where there is none.
 
     Args:

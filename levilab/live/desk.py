@@ -1,4 +1,4 @@
-"""The bench for practice as the server holds it: commands go to it, and what it says is kept for the pages."""
+"""The bench for practice as the server holds it: commands go to it, and its events are kept for the pages."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ EXPERIMENTS = {
 
 @dataclass
 class Desk:
-    """A bench for practice, and what it has said.
+    """A bench for practice, and its events.
 
     Attributes:
         bench: which the command starts and ends.
-        count: of what it has said.
-        said: the latest of that.
+        count: number of its events.
+        said: the latest events.
         scene: of its top, None until it is ready.
         folders: of the runs that it has recorded, or records, in order.
         answers: number of a command → whether it was carried out or refused, of the latest commands.
@@ -69,7 +69,7 @@ class Desk:
 
     @property
     def about(self) -> dict[str, Any]:
-        """What the page has to know at first."""
+        """The first data of the page."""
         return {"experiments": [*EXPERIMENTS], "runs": [folder.name for folder in self.folders]}
 
     @property
@@ -83,11 +83,11 @@ class Desk:
         return self._records
 
     def address(self) -> Address | None:
-        """Where it publishes; None until it is ready."""
+        """Return the address at which the bench publishes; None until it is ready."""
         return self.bench.address
 
     def step(self) -> None:
-        """Hear what is new."""
+        """Read the new events of the bench."""
         for event in self.bench.events():
             self.count += 1
             if event.kind == "ready":
@@ -102,8 +102,8 @@ class Desk:
             about = {"n": self.count, "kind": event.kind, "text": text, "status": event.status, "utc": utc_now()}
             self.said.append(about | {"of_run": self._records and event.kind == "message"})
 
-    def said_after(self, number: object) -> list[dict[str, Any]]:
-        """Return what was said after that of a number."""
+    def events_after(self, number: object) -> list[dict[str, Any]]:
+        """Return the events after the one of this number."""
         after = number if type(number) is int and number <= self.count else 0
         return [one for one in self.said if one["n"] > after]
 
@@ -125,7 +125,7 @@ def scene_of_run(folder: Path) -> dict[str, Any] | None:
 
 
 def parts_for(scene: dict[str, Any] | None) -> dict[str, Any]:
-    """Return what is drawn of a scene; where none is known, of the one for practice."""
+    """Return the parts to draw of a scene; without one, of the scene for practice."""
     try:
         known = scene_of(scene) if scene else read_scene("practice")
     except LevilabError:

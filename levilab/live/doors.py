@@ -56,7 +56,7 @@ class Doors:
         return frozenset(named | set(HERE) if self.port == 80 else named)
 
     def lets_in(self, headers: Iterable[tuple[bytes, bytes]], *, is_socket: bool) -> bool:
-        """Whether a request comes from where it should.  A program that is no browser sends no origin."""
+        """Return whether a request comes from where it should.  A program that is no browser sends no origin."""
         found = [(name.lower(), value.decode("latin-1").lower()) for name, value in headers]
         hosts, origins = ([value for name, value in found if name == wanted] for wanted in (b"host", b"origin"))
         if len(hosts) != 1 or hosts[0] not in self.hosts:  # of two hosts, another program may have believed the other
@@ -64,7 +64,7 @@ class Doors:
         return not is_socket or {*origins} <= {f"http://{host}" for host in self.hosts}
 
     def knows(self, token: object) -> bool:
-        """Whether a command carries the token."""
+        """Return whether a command carries the token."""
         return isinstance(token, str) and hmac.compare_digest(token.encode(), self.token.encode())
 
     def headers(self, policy: str = PAGE_POLICY) -> dict[str, str]:

@@ -97,7 +97,7 @@ class Envelope:
 
 
 def _of_groups(rows: Array) -> tuple[Array, Array, Array, Array]:
-    """Lowest, highest, sum and number of the known values, (channels, groups), of rows (groups, size, channels)."""
+    """Return lowest, highest, sum, number of known values, (channels, groups), of rows (groups, size, channels)."""
     known = ~np.isnan(rows)
     return (
         np.fmin.reduce(rows, axis=1).T,
@@ -108,7 +108,7 @@ def _of_groups(rows: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def by_columns(x: Array, low: Array, high: Array, columns: int) -> tuple[Array, Array, Array]:
-    """Lowest and highest value in each column of a picture.
+    """Return the lowest and the highest value in each column of a picture.
 
     Args:
         x: where the values stand, shape (n,), not decreasing.

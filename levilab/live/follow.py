@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 MOST_EVENTS = 400
 #: Longest text of an event that is shown.
 _MOST_CHARACTERS = 600
-#: Whether the process that writes is alive is looked up so often, since that takes its lock for a moment [s].
+#: Interval between checks that the writing process is alive, each of which takes its lock for a moment [s].
 _ALIVE_EVERY_S = 2.0
-#: One look reads for so long at most, so that frames do not wait; a long file takes several [s].
+#: Longest time of one look [s], so that frames do not wait; a long file takes several [s].
 LOOK_S = 0.025
 
 
@@ -63,7 +63,7 @@ class Followed:
         self._alive_again = -1.0
 
     def look(self) -> None:
-        """Read what is new."""
+        """Read the new lines of the run's files."""
         end = self.clock() + LOOK_S
         self._read_record()
         self.behind = self._read_all(self._rows, self._take_rows, end) | self._read_all(
@@ -71,7 +71,7 @@ class Followed:
         )
 
     def _read_all(self, tail: Tail, take: Callable[[list[bytes]], None], end: float) -> bool:
-        """Whether more is left when the time is over."""
+        """Return whether more is left when the time is over."""
         while lines := tail.lines():
             take(lines)
             if self.clock() > end:
@@ -144,7 +144,7 @@ def numbers(lines: list[bytes], columns: int) -> NDArray[np.float64]:
     try:
         if all(line.count(b",") == columns - 1 for line in lines):
             flat = [*map(float, b",".join(lines).split(b","))]
-            return _known(np.array(flat, dtype=np.float64).reshape(-1, columns))
+            return _mask_missing(np.array(flat, dtype=np.float64).reshape(-1, columns))
     except ValueError:  # an empty field, or a damaged line
         pass
     rows = []
@@ -156,11 +156,11 @@ def numbers(lines: list[bytes], columns: int) -> NDArray[np.float64]:
             continue
         if len(row) == columns and fields != [b""]:
             rows.append(row)
-    return _known(np.array(rows, dtype=np.float64).reshape(-1, columns))
+    return _mask_missing(np.array(rows, dtype=np.float64).reshape(-1, columns))
 
 
-def _known(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Numbers with which instruments say that they have no value are none; a row without a first value is left out."""
+def _mask_missing(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Replace by NaN the numbers with which instruments say "no value"; drop rows without a first value."""
     rows[~(np.abs(rows) < NO_READING)] = np.nan
     return rows[~np.isnan(rows[:, 0])] if rows.shape[1] else rows
 

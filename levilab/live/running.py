@@ -109,7 +109,7 @@ def fit_so_far(
 
 
 def _without_forecast(found: Running) -> Running:
-    """Return the fit of a run that has ended: its line goes as far as the readings."""
+    """Return the fit of a run that has ended, with a line up to the last reading."""
     curve = found.curve
     if curve is not None and np.isfinite(curve.solid_to):
         x = np.append(curve.x[curve.x < curve.solid_to], curve.solid_to)
@@ -146,7 +146,7 @@ def spin_down(columns: Mapping[str, Array], size: int, _: Mapping[str, Any] = Ma
 
 
 def _times_of_fall(best: LawFit, last: float, duration: float) -> tuple[float, float] | None:
-    """When a law reaches the spins between which a top falls; None where the later one is far off [s]."""
+    """Return the times at which a law reaches the spins of a fall; None where the later one is far off [s]."""
     between = times_of_fall(lambda times: best.forecast(times, last), last, last + _BEYOND * duration)
     return between if math.isfinite(between[1]) else None
 

@@ -72,11 +72,11 @@ class ViewServer(uvicorn.Server):
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Take no signals: uvicorn would give them back before the bench is closed, and hurry at the second Ctrl-C."""
+        """Leave signals alone: uvicorn would restore them before the bench is closed, and exit at the second Ctrl-C."""
         yield
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Say what the end waits for, and close what is open."""
+        """Say why the end waits, and close everything."""
         if text := self._farewell():
             self._say(text)
         await super().shutdown(sockets)
@@ -130,7 +130,7 @@ def configuration(hall: Hall) -> uvicorn.Config:
 
 
 def farewell(bench: PracticeBench | None, analyzed: Collection[str] = ()) -> str:
-    """Return what the person at the terminal has to know when the view is to end; empty where it ends at once.
+    """Return a message for the terminal when the view is to end; empty where it ends at once.
 
     Args:
         bench: the one for practice.

@@ -22,7 +22,7 @@ from starlette.websockets import WebSocketDisconnect
 from levilab.animation.three import three_js
 from levilab.errors import LevilabError
 from levilab.live.analyzed import FIGURES, REPORT, Analyses
-from levilab.live.choice import choices, newest, recorded_now
+from levilab.live.choice import choices, newest, running_run
 from levilab.live.desk import parts_for, scene_of_run
 from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
 from levilab.live.watch import Watch
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from levilab.live.running import Running
     from levilab.live.watch import FitTask
 
-#: Frames a second at most, so that 20 come to the page; and so long a page waits for one in which nothing is new [s].
+#: Frames a second at most, so that 20 come to the page; and the longest wait of a page without news [s].
 FRAMES_PER_S, PATIENCE_S = 22, 1.0
 #: Time between two looks for runs of other programs [s].
 _OTHERS_EVERY_S = 2.0
@@ -73,7 +73,7 @@ class Hall:
     analyses: Analyses = field(default_factory=Analyses)
 
     def is_run(self, name: str) -> bool:
-        """Whether a run of this name lies in the folder; a name with a way to elsewhere does not."""
+        """Return whether a run of this name lies in the folder; a name with a way to elsewhere does not."""
         plain = bool(name) and name == Path(name).name and name not in {".", ".."}
         try:
             return plain and (self.root / name / RECORD).exists()
@@ -117,7 +117,7 @@ class Hall:
         return scene_of_run(self.root / name) if self.is_run(name) else None
 
     async def read_on(self) -> None:
-        """Read what is new for all pages, for ever."""
+        """Read the news of all runs that pages show, for ever."""
         fitting: set[asyncio.Task[None]] = set()
         before = self._ticks()
         while True:
@@ -150,7 +150,7 @@ class Hall:
         if not desk.is_recording:
             if watch.followed and watch.followed.status == "running":
                 return
-            folder = await asyncio.to_thread(recorded_now, self.root, [*desk.folders])
+            folder = await asyncio.to_thread(running_run, self.root, [*desk.folders])
         if desk.is_recording:  # it may have begun meanwhile
             folder = desk.folder
         if folder:
@@ -161,14 +161,14 @@ class Hall:
 
     async def _fit(self, watch: Watch, task: FitTask) -> None:
         with watch.failing_alone():
-            watch.take_fit(task.folder, *await asyncio.to_thread(_timed, task.compute))
+            watch.take_fit(task.folder, *await asyncio.to_thread(_time_task, task.compute))
 
     def _announce(self) -> None:
         self.new.set()
         self.new = asyncio.Event()
 
     async def wait_for_news(self, watch: Watch, tick: object) -> None:
-        """Return when there is something newer than a page has, or it has waited long enough."""
+        """Return once there is news for a page, or it has waited long enough."""
         end = time.monotonic() + PATIENCE_S
         before = self.desk.count if self.desk else 0
         while (
@@ -178,7 +178,7 @@ class Hall:
                 await asyncio.wait_for(self.new.wait(), left)
 
     async def wait_for_answer(self, desk: Desk, number: int) -> PracticeEvent | None:
-        """Return what the bench for practice answers to a command; None where it takes longer than PATIENCE_S."""
+        """Return the answer of the bench for practice to a command; None if it takes longer than PATIENCE_S."""
         end = time.monotonic() + PATIENCE_S
         while number not in desk.answers and (left := end - time.monotonic()) > 0:
             with contextlib.suppress(TimeoutError):
@@ -186,7 +186,7 @@ class Hall:
         return desk.answers.get(number)
 
 
-def _timed(task: Callable[[], Running | None]) -> tuple[Running | None, float]:
+def _time_task(task: Callable[[], Running | None]) -> tuple[Running | None, float]:
     """Return the result of a task and the processor time of this thread [s]: waiting for others costs none."""
     begin = time.thread_time()
     return task(), time.thread_time() - begin
@@ -225,7 +225,7 @@ class Pages:
         return self._file(found) if found else _nothing()
 
     async def runs(self, _: Request) -> Response:
-        """Return the runs to choose from, and what the page has to know at first."""
+        """Return the runs to choose from, and the first data of the page."""
         hall = self.hall
         found = await asyncio.to_thread(choices, hall.root)
         first = hall.shown or newest(found) or ""
@@ -233,7 +233,7 @@ class Pages:
         return self._json({"runs": [asdict(one) for one in found], "first": first, "practice": practice})
 
     async def parts(self, request: Request) -> Response:
-        """Return what is drawn of the top."""
+        """Return the parts of the top to draw."""
         scene = self.hall.scene(request.query_params.get("run", ""))
         return self._json(await asyncio.to_thread(parts_for, scene))
 
@@ -246,7 +246,7 @@ class Pages:
         return self._file(path, REPORT_POLICY) if is_here else _nothing()
 
     async def analysis(self, request: Request) -> Response:
-        """How far a run's analysis is, and what it says."""
+        """Return the progress of a run's analysis, and its answer."""
         name = request.path_params["run"]
         return self._json(self.hall.analyses.about(self.hall.root / name) if self.hall.is_run(name) else {})
 
@@ -278,7 +278,7 @@ class Pages:
                 await asyncio.sleep(max(0.0, again - time.monotonic()))
                 again = time.monotonic() + 1 / FRAMES_PER_S
                 await hall.wait_for_news(watch, ask.get("tick"))
-                said = hall.desk.said_after(ask.get("said")) if hall.desk else []
+                said = hall.desk.events_after(ask.get("said")) if hall.desk else []
                 await socket.send_bytes(watch.frame(ask, said))
             await socket.close(1003 if text is None else 1009)
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 #: Bytes that are read at a time.
 PIECE_BYTES = 1 << 18
-#: A line that is longer is no line of ours, and is passed over [bytes].
+#: Longest line; a longer one is not ours, and is skipped [bytes].
 _LONGEST = 1 << 20
 
 

@@ -13,7 +13,7 @@ class View:
 
     Attributes:
         x, y: names of the columns.
-        x_label, y_label: in words.
+        x_label, y_label: names of the quantities.
     """
 
     x: str

@@ -96,7 +96,7 @@ class Watch:
         self._silent = True
         self._failure = ""  # what went wrong while this run was read
 
-    # --- what is new ---
+    # --- news ---
 
     @contextlib.contextmanager
     def failing_alone(self) -> Iterator[None]:
@@ -110,7 +110,7 @@ class Watch:
                 self.tick += 1
 
     def step(self) -> None:
-        """Read what is new; `tick` says whether there was anything."""
+        """Read the news of the run; `tick` counts them."""
         self._subscribe()
         for message in self._subscriber.receive() if self._subscriber else ():
             self._take(message)
@@ -140,7 +140,7 @@ class Watch:
         if self._subscriber and address == self._subscriber.address:
             return
         if self._subscriber and address is None:
-            return  # the run is over; what was said last remains
+            return  # the run is over; its last state remains
         if self._subscriber:
             self._subscriber.close()
             self._subscriber = None
@@ -177,7 +177,7 @@ class Watch:
     # --- the running fit, which the server computes beside the frames ---
 
     def fit_task(self) -> FitTask | None:
-        """Return what to compute in a thread, if it is time; `take_fit` takes the result."""
+        """Return the fit to compute in a thread, if it is time; `take_fit` takes the result."""
         followed = self.followed
         ended = followed is not None and followed.status != "running"
         if (
@@ -199,10 +199,10 @@ class Watch:
         return FitTask(followed.folder, compute)
 
     def take_fit(self, folder: Path, found: Running | None, took_s: float) -> None:
-        """Take in what was computed of a run, and the processor time that it took [s].
+        """Take in the fit of a run, and its processor time [s].
 
         It is dropped if another run is followed by now.  The time of the first fit that draws a line says nothing of
-        the next ones: it imports what it needs.
+        the next ones, as it has to import libraries.
         """
         took_s = took_s if self._has_fitted else 0.0
         self._has_fitted |= found is not None and found.curve is not None
@@ -216,12 +216,12 @@ class Watch:
     # --- what the page asks for ---
 
     def frame(self, ask: dict[str, Any], said: Sequence[Mapping[str, Any]] = ()) -> bytes:
-        """Return what a page does not have yet.
+        """Return the news for a page.
 
         Args:
-            ask: what it has: "run" (name), "readings", "events", "fit", "poses" (numbers), "records" (channel →
-                number); and what it wants: "columns" of its picture, and whether the "latest" readings alone.
-            said: what the bench for practice has said.
+            ask: the page's state: "run" (name), "readings", "events", "fit", "poses" (numbers), "records" (channel →
+                number); and its wishes: "columns" of its picture, and whether the "latest" readings alone.
+            said: the events of the bench for practice.
         """
         followed = self.followed
         name = followed.folder.name if followed else ""
@@ -232,12 +232,12 @@ class Watch:
             head["about"] = _about(followed, self._failure)
             if ask.get("readings") != followed.version or ask.get("changed"):
                 head["readings"] = _readings(followed, ask)
-            seen = _whole(ask.get("events"))
+            seen = _count_or_zero(ask.get("events"))
             head["events"] = followed.texts_after(seen if seen <= followed.event_count else 0)
         if ask.get("fit") != self.fit_version:
             head["fit"] = self._about_fit()
         head["records"] = self._new_records(ask.get("records"))
-        head["poses"] = self._new_poses(_whole(ask.get("poses")))
+        head["poses"] = self._new_poses(_count_or_zero(ask.get("poses")))
         return pack(head)
 
     def _about_bench(self) -> dict[str, Any] | None:
@@ -270,7 +270,7 @@ class Watch:
             self._subscriber = None
 
 
-def _whole(value: Any) -> int:
+def _count_or_zero(value: Any) -> int:
     return value if type(value) is int and value >= 0 else 0
 
 
@@ -296,7 +296,7 @@ def _about(followed: Followed, failure: str) -> dict[str, Any]:
 
 
 def _settings(instrument: dict[str, Any]) -> dict[str, Any]:
-    """Return what an instrument was set to at the start of a run, as far as the page shows it without the bench."""
+    """Return an instrument's settings at the start of a run that the page shows without the bench."""
     found = instrument.get("settings_start")
     found = found if isinstance(found, dict) else {}
     return {key: value for key, value in found.items() if key in _SETTINGS and isinstance(value, str | float | int)}
@@ -319,7 +319,7 @@ def _readings(followed: Followed, ask: dict[str, Any]) -> dict[str, Any]:
     x, low, high = groups.mean[place[view.x]], groups.low[place[view.y]], groups.high[place[view.y]]
     kept = np.isfinite(x) & np.isfinite(low)
     x, low, high = x[kept], low[kept], high[kept]
-    width = min(max(_whole(ask.get("columns")), _FEWEST_COLUMNS), _MOST_COLUMNS)
+    width = min(max(_count_or_zero(ask.get("columns")), _FEWEST_COLUMNS), _MOST_COLUMNS)
     single = groups.size == 1 and len(x) <= 2 * width
     if not single:
         order = np.argsort(x, kind="stable")
@@ -337,7 +337,7 @@ def _readings(followed: Followed, ask: dict[str, Any]) -> dict[str, Any]:
 
 
 def _trend(groups: Any, place: dict[str, int]) -> float | None:
-    """How fast the spin changes by the last readings [Hz/s]; None where it cannot be said."""
+    """Return the rate of change of the spin by the last readings [Hz/s]; None where it is unknown."""
     if "time_s" not in place or "spin_frequency_hz" not in place:
         return None
     t, f = (groups.mean[place[name]][-4:] for name in ("time_s", "spin_frequency_hz"))

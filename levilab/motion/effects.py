@@ -34,7 +34,7 @@ LEAST_M, LEAST_HZ = 1e-7, 1e-5
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect, and what it changes.
+    """One effect, and the changes by it.
 
     Attributes:
         name: of the effect.
@@ -73,7 +73,7 @@ class _Kind:
     off: dict[str, Any]
 
 
-def _leaning(scene: Scene) -> dict[str, Any]:
+def _lean_moment(scene: Scene) -> dict[str, Any]:
     """Return the change to a moment that leans by 1.77°, as the thesis's does, with the same part along the axis."""
     return {"top.moment_tilt": [0.03 / 0.97 * scene.top.moment_tilt[1], scene.top.moment_tilt[1]]}
 
@@ -117,7 +117,7 @@ KINDS = (
         "tilt of the moment",
         "by 1.77° in the top, as in the thesis, with the same part along the axis",
         lambda s: not s.top.aligned,
-        _leaning,
+        _lean_moment,
         {},
     ),
     _Kind(
@@ -145,7 +145,7 @@ KINDS = (
 
 
 def explain(scene: Scene, duration: float = 30.0) -> tuple[Effect, ...]:
-    """Return every effect of a scene with what it changes, the field's first.  Raises as `simulate` does."""
+    """Return every effect of a scene with its changes, the field's first.  Raises as `simulate` does."""
     if scene.observed == "spin":
         scene = scene.changed({"observed": "motion"})
     time = min(abs(duration), LONGEST)
@@ -155,14 +155,15 @@ def explain(scene: Scene, duration: float = 30.0) -> tuple[Effect, ...]:
 
 def _effect(kind: _Kind, scene: Scene, as_it_is: Trajectory, time: float) -> Effect:
     included = kind.included(scene)
-    changes = _without(kind, scene) if included else kind.on(scene)
+    off = kind.off or {"top.moment_tilt": [0.0, scene.top.moment_tilt[1]]}
+    changes = off if included else kind.on(scene)
     try:
         changed = scene.changed(changes)
         other = simulate(changed, time, tolerance=1e-6, rate=rate_for(changed))
     except (SceneError, SimulationError) as error:
         return Effect(kind.name, included, kind.what, math.nan, math.nan, math.nan, str(error))
     with_it, without = (as_it_is, other) if included else (other, as_it_is)
-    height, precession, spin = (a - b for a, b in zip(_observed(with_it), _observed(without), strict=True))
+    height, precession, spin = (a - b for a, b in zip(_observe(with_it), _observe(without), strict=True))
     return Effect(
         kind.name,
         included,
@@ -174,15 +175,11 @@ def _effect(kind: _Kind, scene: Scene, as_it_is: Trajectory, time: float) -> Eff
     )
 
 
-def _without(kind: _Kind, scene: Scene) -> dict[str, Any]:
-    return kind.off or {"top.moment_tilt": [0.0, scene.top.moment_tilt[1]]}
-
-
 def _zero_if_below(change: float, least: float) -> float:
     return 0.0 if abs(change) < least else change
 
 
-def _observed(motion: Trajectory) -> tuple[float, float, float]:
+def _observe(motion: Trajectory) -> tuple[float, float, float]:
     """Return mean height [m], precession frequency [Hz] and spin at the end [Hz]; NaN of a top that fell."""
     if not motion.survived:
         return math.nan, math.nan, math.nan
@@ -206,7 +203,7 @@ def _precession(motion: Trajectory) -> float:
 
 
 def _remark(included: bool, as_it_is: Trajectory, other: Trajectory) -> str:  # noqa: FBT001
-    """Return how the change decides whether the top stays up, in words; empty if it stays up either way."""
+    """Return a remark on a change that decides whether the top stays up; empty if it stays up either way."""
     if as_it_is.survived == other.survived:
         return "" if as_it_is.survived else "lost either way"
     assert other.fell or as_it_is.fell

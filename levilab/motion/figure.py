@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: A curve of more points is drawn as the envelope of so many pieces.
+#: A curve of more points is drawn as the envelope of this number of pieces.
 PIECES = 700
 #: A path of more points than these is no clearer.
 MOST_POINTS = 30_000
@@ -40,7 +40,7 @@ _NAMES_SHARE = 0.385
 #: A name in this row or higher leaves room for others below it.
 _FREE_ROWS = 2
 _FONT = 7.0
-#: A path is not magnified more than to this width [cm]: what is left then is rounding.
+#: A path is not magnified more than to this width [cm]: the rest is rounding.
 _SMALLEST_CM = 1e-4
 #: Height of the legend of the spin [inch].
 _LEGEND = 0.12
@@ -66,7 +66,7 @@ def motion_figure(summary: Summary) -> Figure:
 
 
 def _whole_figure(summary: Summary) -> Figure:
-    """Without the spectrum's part where there is none, and without the zoom where all is short."""
+    """Arrange the panels, without the spectrum where there is none, and without the zoom where all is short."""
     quantities = _quantities(summary)
     tops = 0.62 + _PATH + 0.74 + _PITCH * np.arange(len(quantities))
     tops[1:] += _LEGEND if quantities[1].has_legend else 0.0  # of the spin, between its title and its panel
@@ -101,7 +101,7 @@ def _has_spectrum(summary: Summary) -> bool:
 
 
 def _spin_figure(summary: Summary) -> Figure:
-    """Of a scene that has no motion."""
+    """Draw the spin of a scene that has no motion."""
     figure = Figure(figsize=(WIDE, 3.0))
     axes = panel(figure, _LEFT, 0.85, _FULL, 1.6)
     headline(figure, _finding(summary), "SYNTHETIC")
@@ -127,7 +127,7 @@ def _zoom(summary: Summary) -> tuple[float, float] | None:
 
 
 def _draw_paths(figure: Figure, summary: Summary) -> None:
-    """Both on the same scale in both directions, a circle is a circle; over the same x; its colour is the time."""
+    """Draw both paths on one scale in both directions, over the same x; the colour is the time."""
     step = max(1, len(summary.motion.time) // MOST_POINTS)
     place, time = 100 * summary.motion.position[::step], summary.motion.time[::step]
     wide = 2.4
@@ -220,15 +220,12 @@ def _spin(summary: Summary) -> _Quantity:
 def _energy_title(summary: Summary) -> str:
     there = changing_energy(summary.motion.scene)
     if not there:
-        return f"Error of the energy: it should stay as it is, and does {_exactly(summary.energy_change)}"
+        kept = f"to {digits(summary.energy_change, 1)}" if summary.energy_change else "exactly"
+        return f"Error of the energy: it should stay as it is, and does {kept}"
     own = " (without the drive's own part)" if "drive" in there else ""
     *others, last = there
     named = f"{', '.join(others)} and {last} change" if others else f"{last} changes"
     return f"Energy, change since the start: {named} it{own}"
-
-
-def _exactly(change: float) -> str:
-    return f"to {digits(change, 1)}" if change else "exactly"
 
 
 def _draw_quantity(axes: Axes, quantity: _Quantity, time: Array) -> None:
@@ -312,7 +309,7 @@ class _Label:
     text: str
 
     def fits(self, others: list[_Label]) -> bool:
-        """Whether it is inside of the panel and neither it nor its pole crosses another one."""
+        """Return whether it is inside of the panel and neither it nor its pole crosses another one."""
         inside = self.left >= 0 and self.right <= 1
         return inside and not any(self._crosses(other) or other._under(self) or self._under(other) for other in others)
 
@@ -321,16 +318,16 @@ class _Label:
         return self.row == other.row and not beside
 
     def _under(self, other: _Label) -> bool:
-        """Whether the other's pole goes up through this name."""
+        """Return whether the other's pole goes up through this name."""
         return self.row <= other.row and self.covers([other.pole])
 
     def covers(self, poles: list[float]) -> bool:
-        """Whether one of the poles would go through this name if it were high enough."""
+        """Return whether one of the poles would go through this name if it were high enough."""
         return any(self.left - _GAP / 2 < pole < self.right + _GAP / 2 for pole in poles)
 
 
 def _name_lines(axes: Axes, summary: Summary) -> None:
-    """Frequency and name of the strongest lines, where there is room; of sidebands, which come last, the frequency."""
+    """Write frequency and name at the strongest lines, where there is room; at sidebands the frequency alone."""
     flags: list[_Label] = []
     lines = sorted(summary.lines.lines, key=lambda line: line.sideband)[:MOST_NAMED]
     for k, line in enumerate(lines):
@@ -344,7 +341,7 @@ def _name_lines(axes: Axes, summary: Summary) -> None:
 
 
 def _place(axes: Axes, frequency: float, text: str, flags: list[_Label], waiting: list[float]) -> _Label | None:
-    """Where a name finds room that it does not take from poles to come: beside them, or high enough above."""
+    """Return a place for a name that leaves room for poles to come: beside them, or high enough above."""
     places = [flag for flag in _flags(axes, frequency, text) if flag.fits(flags)]
     beside = (flag for flag in places if not flag.covers(waiting))
     above = (flag for flag in places if flag.row >= _FREE_ROWS)
@@ -357,7 +354,7 @@ def _pole(axes: Axes, frequency: float) -> float:
 
 
 def _flags(axes: Axes, frequency: float, text: str) -> Iterator[_Label]:
-    """Where a name may hang: away from zero or towards it, in the lowest row first."""
+    """Yield places where a name may hang: away from zero or towards it, in the lowest row first."""
     pole = _pole(axes, frequency)
     probe = axes.text(0, 0, text, fontsize=_FONT)
     width = 1.03 * probe.get_window_extent().width / axes.get_window_extent().width

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 #: A line gets the name of a theoretical one within NEAR_HZ plus this share of its frequency: amplitudes of some tenths
-#: of a radian shift a line by as much.
+#: of a radian shift a line that far.
 NEAR_HZ, NEAR_SHARE = 0.1, 0.06
 #: A line within this distance of a stronger, named one is its sideband [Hz].
 SIDEBAND_HZ = 2.0

@@ -34,7 +34,7 @@ RATE_HZ = 50.0
 
 
 def can_lock(scene: Scene, until: float = math.inf) -> bool:
-    """Whether there is a drive up to a time [s], and a moment across the axis that it can turn the top by."""
+    """Return whether there is a drive up to a time [s], and a moment across the axis that it can turn the top by."""
     drive = scene.drive
     lasts = drive.off_s is None or drive.off_s >= until
     on = drive.waveform != "off" and drive.amplitude_t > 0 and lasts
@@ -60,9 +60,9 @@ def turns_behind(scene: Scene, states: Array) -> Array:
     Positive where the body is ahead.  From sample to sample the angle changes by what the spin says, give or take half
     a turn.  A drive that swings to and fro turns in either sense; the top goes with the one of its own spin.
     """
-    time, sense = states[..., TIME], copysign(1.0, _beside(scene.start.spin_hz))
-    turning = sense * _beside(scene.drive.frequency_hz)
-    spin = core_spin(states, _beside(scene.top.inertia_axial_kg_m2), _beside(scene.washers.inertia_kg_m2))
+    time, sense = states[..., TIME], copysign(1.0, _align(scene.start.spin_hz))
+    turning = sense * _align(scene.drive.frequency_hz)
+    spin = core_spin(states, _align(scene.top.inertia_axial_kg_m2), _align(scene.washers.inertia_kg_m2))
     rate = spin / (2 * math.pi) - turning
     followed = np.zeros(time.shape)
     np.cumsum((rate[..., 1:] + rate[..., :-1]) / 2 * np.diff(time), axis=-1, out=followed[..., 1:])
@@ -72,13 +72,13 @@ def turns_behind(scene: Scene, states: Array) -> Array:
     return np.asarray(sense * (followed + off))
 
 
-def _beside(number: Any) -> Any:
+def _align(number: Any) -> Any:
     """Return a number, or one of each top in a shape that goes with their samples."""
     return number[..., None] if isinstance(number, np.ndarray) else number
 
 
 def keeps_phase(scene: Scene, states: Array) -> NDArray[np.bool_]:
-    """Whether the body stays within one turn behind the drive, in the last part of these samples, shape (…).
+    """Return whether the body stays within one turn behind the drive, in the last part of these samples, shape (…).
 
     Args:
         scene: of the motion, or with `Numbers` of as many tops as states are of.
@@ -93,7 +93,7 @@ def keeps_phase(scene: Scene, states: Array) -> NDArray[np.bool_]:
 
 
 def is_locked(scene: Scene, states: Array, *, survived: bool) -> bool | None:
-    """Whether a top is locked to its drive at the end of its motion.
+    """Return whether a top is locked to its drive at the end of its motion.
 
     Args:
         scene: of the motion.
@@ -111,6 +111,6 @@ def is_locked(scene: Scene, states: Array, *, survived: bool) -> bool | None:
 
 
 def shows_lock(time: Array) -> bool:
-    """Whether samples at these times [s], shape (n,), are long enough, and close enough, to say what is locked."""
+    """Return whether samples at these times [s], shape (n,), are long and close enough to show a lock."""
     lasted = float(time[-1] - time[0])
     return LAST_SHARE * lasted >= SHORTEST_S * (1 - 1e-9) and len(time) >= lasted * RATE_HZ / 2

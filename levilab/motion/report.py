@@ -69,7 +69,7 @@ def motion_section(run: Run) -> Section:
 
 
 def motions_overview(runs: Sequence[Run]) -> Section:
-    """One section of many simulated motions: a row for each, no figures."""
+    """Return one section of many simulated motions: a row for each, no figures."""
     heads = ("run", "scene", "how it ended", "up for [s]", "spin at the end [Hz]")
     rows, unusable = [], []
     for run in runs:
@@ -89,7 +89,7 @@ def motions_overview(runs: Sequence[Run]) -> Section:
 
 
 def motion_values(runs: Sequence[Run]) -> tuple[tuple[str, ...], tuple[tuple[str | float | bool | None, ...], ...]]:
-    """Heads and rows of a table for programs: what run.json says of each motion in single numbers and words."""
+    """Return heads and rows of a table for programs: the single numbers and words of each motion in run.json."""
     found = [(run, document) for run in runs if (document := _document_or_none(run))]
     plain_keys = {
         key: None
@@ -113,7 +113,7 @@ def _document_or_none(run: Run) -> Mapping[str, Any] | None:
 def _document(run: Run) -> Mapping[str, Any]:
     found = (run.record.model_extra or {}).get("simulation")
     if not isinstance(found, dict) or not isinstance(found.get("end_s"), int | float):
-        raise DataError(f"{run.folder}: is {run.status} and says nothing of its motion; simulate it anew")
+        raise DataError(f"{run.folder}: is {run.status} and says nothing of its motion; simulate it again")
     return found
 
 
@@ -121,10 +121,10 @@ def _scene(run: Run) -> Scene:
     try:
         return scene_of(run.record.configuration["scene"])
     except (KeyError, TypeError, AttributeError, SceneError) as error:
-        raise DataError(f"{run.folder}: its scene cannot be read ({error}); simulate it anew") from error
+        raise DataError(f"{run.folder}: its scene cannot be read ({error}); simulate it again") from error
 
 
-# --- what it is like -----------------------------------------------------------------------------------
+# --- the motion in numbers -----------------------------------------------------------------------------------
 
 
 _LOCKED = {"True": " It is locked to its drive.", "False": " It is not locked to its drive."}
@@ -165,7 +165,7 @@ _LIFETIME, _WHOLE_TIME = "lifetime", "up for the whole time"
 
 
 def _time_up(found: Mapping[str, Any]) -> tuple[str, str, float, str]:
-    """How long the top was up: of one that did not fall that is as long as it was simulated, and no lifetime."""
+    """Return the column of the time up: a lifetime, or the simulated time of a top that did not fall."""
     return _LIFETIME if isinstance(found.get("fell"), dict) else _WHOLE_TIME, "s", 1.0, "end_s"
 
 
@@ -229,7 +229,7 @@ def _digits(found: Mapping[str, Any], key: str, count: int = 3) -> str:
     return plain(value, count) if isinstance(value, int | float) else "—"
 
 
-# --- what was simulated --------------------------------------------------------------------------------
+# --- the simulated scene --------------------------------------------------------------------------------
 
 
 def scene_blocks(scene: Scene, more: Sequence[Fact] = ()) -> tuple[Block, ...]:
@@ -248,7 +248,7 @@ def scene_blocks(scene: Scene, more: Sequence[Fact] = ()) -> tuple[Block, ...]:
         Fact("Left out", (", ".join(left_out) or "no effect that the simulator knows",)),
         *more,
     )
-    note = Note("What each effect changes, levilab simulate computes where it is asked to explain.")
+    note = Note("levilab simulate computes the change by each effect where it is asked to explain.")
     # a preset and its changes say all of it in few lines
     keys = Details(
         "All keys of the scene", (Code(scene.as_toml().strip()),), on_paper="whole" if changed is None else "out"
@@ -270,17 +270,17 @@ def _how_long(run: Run) -> tuple[Fact, ...]:
 
 
 def _pictures(run: Run, scene: Scene, name: str, found: Mapping[str, Any]) -> Iterator[Picture]:
-    summary = _again(run, scene, found)
+    summary = _simulate_again(run, scene, found)
     stored = run.folder / FIGURE
     if summary is None and not stored.is_file():
         return
     caption = "Path from the side and from above; height, spin, tilt and energy in time; the spectrum of the axis."
-    draw = partial(_drawn, summary) if summary else partial(_stored, stored)
+    draw = partial(_draw, summary) if summary else partial(_load_figure, stored)
     alt = f"Simulated motion of the scene {name}: path, height, spin, tilt, energy and spectrum"
     yield Picture("motion", f"Simulated motion of {name}, SYNTHETIC.", caption, alt, draw, raster=summary is None)
 
 
-def _again(run: Run, scene: Scene, found: Mapping[str, Any]) -> Summary | None:
+def _simulate_again(run: Run, scene: Scene, found: Mapping[str, Any]) -> Summary | None:
     """Return the motion computed once more; None where that takes long, or does not end in the same state."""
     settings, took = run.record.configuration, found.get("computing_time_s")
     if not isinstance(took, int | float) or took > LONGEST_S:
@@ -306,13 +306,13 @@ def _last_state(path: Path) -> str:
         return ""
 
 
-def _drawn(summary: Summary) -> Figure:
+def _draw(summary: Summary) -> Figure:
     from levilab.motion.figure import motion_figure  # with matplotlib
 
     return motion_figure(summary)
 
 
-def _stored(path: Path) -> Figure:
+def _load_figure(path: Path) -> Figure:
     from levilab.present.style import figure_of_png  # with matplotlib
 
     return figure_of_png(path.read_bytes())
@@ -324,7 +324,7 @@ def _stored(path: Path) -> Figure:
 def _reproduction(run: Run) -> Iterator[Block]:
     record = run.record
     if record.command_line:
-        yield Code(command_in_words(record.command_line))
+        yield Code(command_text(record.command_line))
     facts = [
         Fact("When", tuple(f"{utc[:19].replace('T', ' ')} UTC" for utc in (record.started_utc,) if utc)),
         Fact("Software", (", ".join(f"{name} {version}" for name, version in record.software.items()),)),
@@ -333,10 +333,10 @@ def _reproduction(run: Run) -> Iterator[Block]:
     yield Facts(tuple(fact for fact in facts if any(fact.texts)))
 
 
-def command_in_words(words: Sequence[str]) -> str:
+def command_text(words: Sequence[str]) -> str:
     """Return a recorded command line as one types it: ours without the place of its program.
 
-    >>> command_in_words(["/opt/bin/levilab", "simulate", "my scene.toml"])
+    >>> command_text(["/opt/bin/levilab", "simulate", "my scene.toml"])
     "levilab simulate 'my scene.toml'"
     """
     first, *others = words

@@ -39,7 +39,7 @@ _FIRST_S = 1e-3
 #: Rows in one block of states.csv.
 _ROWS = 1000
 
-#: Columns of states.csv: name, unit, what it is, and its values for a motion.
+#: Columns of states.csv: name, unit, meaning, and its values for a motion.
 COLUMNS: tuple[tuple[str, str, str, Callable[[Trajectory], Any]], ...] = (
     ("time_s", "s", "since the start; the last row is the end", lambda motion: motion.time),
     ("x_m", "m", "centre of mass, from the base's centre", lambda motion: motion.position[:, 0]),
@@ -93,11 +93,11 @@ def run_simulation(
     *,
     uses_states: bool = False,
 ) -> Simulation:
-    """Simulate, look at the motion, and write it down; what does not come to its end leaves nothing behind.
+    """Simulate a motion, analyze and write it; an interrupted simulation leaves nothing behind.
 
     Args:
-        request: what is simulated, and how.
-        message: called with what takes a moment.
+        request: scene, duration and accuracy.
+        message: called with the name of a step that takes a moment.
         progress: called with the share that is done.
         uses_states: whether the states at this rate are used without a folder, too: too low a rate is then noted.
 
@@ -107,14 +107,14 @@ def run_simulation(
     """
     factor = _samples_per_state(request)
     if request.out is None:
-        return Simulation(_simulated(request, factor, message, progress, uses_states=uses_states), None, factor)
+        return Simulation(_simulate(request, factor, message, progress, uses_states=uses_states), None, factor)
     with (
         interruption_postponed() as admit_interruption,
         RunWriter.create(request.out, _record(request), STATES) as writer,
     ):
         try:
             admit_interruption()  # from here on the folder is taken away again
-            summary = _simulated(request, factor, message, progress, uses_states=True)
+            summary = _simulate(request, factor, message, progress, uses_states=True)
             _write(summary, factor, writer)
         except BaseException:
             writer.discard()
@@ -139,7 +139,7 @@ def _samples_per_state(request: SimulationRequest) -> int:
     return max(min(wanted, int(MOST_STATES / states)), 1)
 
 
-def _simulated(
+def _simulate(
     request: SimulationRequest,
     factor: int,
     message: Callable[[str], None],
@@ -200,7 +200,7 @@ def kept_rows(motion: Trajectory, factor: int) -> np.ndarray[Any, np.dtype[np.in
 
 
 def state_rows(motion: Trajectory, rows: np.ndarray[Any, np.dtype[np.intp]]) -> Iterator[str]:
-    """Lines of states.csv, some at a time, in full precision."""
+    """Yield lines of states.csv, some at a time, in full precision."""
     table = np.column_stack([values(motion) for _, _, _, values in COLUMNS])
     for first in range(0, len(rows), _ROWS):
         block = table[rows[first : first + _ROWS]].tolist()

@@ -67,14 +67,14 @@ class Summary:
 
     @property
     def heights(self) -> str:
-        """The range of the heights, in words; a zero has no sign."""
+        """The range of the heights as text; a zero has no sign."""
         height = 100 * self.motion.position[:, 2]
         low, high, mean = (with_decimals(x, 3) for x in (height.min(), height.max(), height.mean()))
         return f"{low} to {high} cm, mean {mean} cm"
 
     @property
     def fell(self) -> str:
-        """How the top fell, in words; empty if it did not."""
+        """The description of the fall; empty if the top did not fall."""
         if self.motion.fell is None:
             return ""
         escape = self.motion.scene.escape
@@ -83,7 +83,7 @@ class Summary:
 
     @property
     def ending(self) -> str:
-        """How the motion ended, in words."""
+        """The description of the motion's end."""
         if self.motion.scene.observed == "spin":
             return f"the spin alone, {self.end:g} s"
         if self.motion.fell is None:
@@ -92,7 +92,7 @@ class Summary:
 
     @property
     def spin(self) -> str:
-        """The spin in words, with range and mean where its start and end do not tell them."""
+        """The spin as text, with range and mean where start and end do not show them."""
         spin = self.motion.spin_hz
         first, last, low, high = (float(x) for x in (spin[0], spin[-1], spin.min(), spin.max()))
         if high - low <= CONSTANT * abs(first):
@@ -136,7 +136,7 @@ def height_range(motion: Trajectory) -> tuple[float, float]:
 
 
 def changing_energy(scene: Scene) -> tuple[str, ...]:
-    """Return what changes the energy in a scene, in words; empty if the energy is conserved."""
+    """Return names of the effects that change the energy in a scene; empty if the energy is conserved."""
     there = {
         "drag": scene.drag.law != "none" and any(scene.drag.constants),
         "drive": scene.drive.waveform != "off" and scene.drive.amplitude_t > 0,

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def print_motion(summary: Summary, console: Console | None = None) -> None:
-    """How it ended, the motion in numbers, the lines of the axis, how good it is, and what to mind.
+    """Print the end of the motion, its numbers, the lines of the axis, the errors, and the warnings.
 
     Args:
         summary: of the motion.
@@ -45,7 +45,7 @@ def print_motion(summary: Summary, console: Console | None = None) -> None:
 
 
 def headline(summary: Summary) -> str:
-    """How it ended, in a line."""
+    """Return one line about the end of a motion."""
     name = summary.motion.scene.name or "the scene"
     if summary.motion.scene.observed == "spin":
         return f"{name}: the spin alone, for {summary.duration:g} s"
@@ -70,7 +70,7 @@ def _motion_facts(summary: Summary) -> list[tuple[str, str]]:
 
 
 def _angle(angle: float) -> str:
-    """In mrad only as long as it is small."""
+    """Return an angle, in mrad only if it is small."""
     degrees = f"{math.degrees(angle):.3g}°"
     return degrees if angle > 1 else f"{1000 * angle:.3g} mrad, {degrees}"
 
@@ -91,13 +91,13 @@ def _quality_facts(summary: Summary) -> list[tuple[str, str]]:
         change = summary.energy_change
         facts.append(("energy", f"constant to {change:.1g} of itself" if change else "exactly constant"))
     steps = f"{accuracy.steps} steps of at most {1000 * accuracy.step:.3g} ms by {accuracy.scheme}"
-    speed = f", {_rounded(summary.speed)} times faster than the real top" if summary.end >= 1 else ""
+    speed = f", {_format_speed(summary.speed)} times faster than the real top" if summary.end >= 1 else ""
     facts.append(("computed", steps + speed))  # of less than a second nothing but the overhead would be seen
     return facts
 
 
-def _rounded(speed: float) -> str:
-    """Two digits: more of a computer's speed is chance."""
+def _format_speed(speed: float) -> str:
+    """Return a speed with two digits: more of a computer's speed is chance."""
     return f"{float(f'{speed:.2g}'):,.0f}".replace(",", " ") if speed >= 10 else f"{speed:.2g}"
 
 
@@ -119,7 +119,7 @@ def _lines_table(summary: Summary) -> Table:
 
 
 def print_effects(effects: Sequence[Effect]) -> None:
-    """One row an effect: in or out, and what it changes."""
+    """Print one row an effect: in or out, and its influence."""
     changes = ("height \\[mm]", "precession \\[Hz]", "spin at the end \\[Hz]")
     table = new_table(
         "What is in this scene, and what is left out", "effect", "", *changes, "what it is, what else it does",
@@ -130,9 +130,9 @@ def print_effects(effects: Sequence[Effect]) -> None:
         table.add_row(
             effect.name,
             "in" if effect.included else "out",
-            _shown(effect.height_m, LEAST_M, 1e3),
-            _shown(effect.precession_hz, LEAST_HZ, 1),
-            _shown(effect.spin_hz, LEAST_HZ, 1),
+            _format_change(effect.height_m, LEAST_M, 1e3),
+            _format_change(effect.precession_hz, LEAST_HZ, 1),
+            _format_change(effect.spin_hz, LEAST_HZ, 1),
             escape(words),
         )
     table.caption = (
@@ -143,8 +143,8 @@ def print_effects(effects: Sequence[Effect]) -> None:
     terminal().print(table)
 
 
-def _shown(change: float, least: float, factor: float) -> str:
-    """Two digits: the next effect changes the third."""
+def _format_change(change: float, least: float, factor: float) -> str:
+    """Return a change with two digits: the next effect changes the third."""
     if math.isnan(change):
         return "–"
     return with_minus(f"{factor * change:+.2g}") if change else f"< {factor * least:g}"

@@ -39,10 +39,10 @@ def as_path(place: str | PathLike[str] | Run | None) -> Path | None:
 
 def assignments(settings: Mapping[str, Any]) -> tuple[str, ...]:
     """Return settings as one would type them, KEY=VALUE."""
-    return tuple(f"{key}={_typed(value)}" for key, value in settings.items())
+    return tuple(f"{key}={_type_value(value)}" for key, value in settings.items())
 
 
-def _typed(value: Any) -> str:
+def _type_value(value: Any) -> str:
     """Return a value as one would type it behind KEY=."""
     value = plain(value)
     return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)

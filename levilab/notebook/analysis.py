@@ -54,12 +54,12 @@ def analyze_data(data: One | Sequence[One], kind: str | None, given: Mapping[str
         raise UsageError("kind", f"{', '.join(ANALYSES)} or None is expected", value=kind)
     frames = [item for item in items if is_frame(item)]
     if not frames:
-        return _analyzed([_path(item) for item in items], kind, options, str)
+        return _analyze_paths([_path(item) for item in items], kind, options, str)
     folder = Path(tempfile.mkdtemp(prefix="levilab-"))
     in_words = partial(_in_rows, folder=folder, titles=0 if any(map(has_numbers_for_titles, frames)) else 1)
     try:
         paths = [_path(item, folder, str(k) * (len(items) > 1)) for k, item in enumerate(items, 1)]
-        result = _analyzed(paths, kind, options, in_words, folder)
+        result = _analyze_paths(paths, kind, options, in_words, folder)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -67,14 +67,17 @@ def analyze_data(data: One | Sequence[One], kind: str | None, given: Mapping[str
     return result
 
 
-def _analyzed(
+def _analyze_paths(
     paths: Sequence[Path],
     kind: str | None,
     options: Mapping[str, Any],
     in_words: Callable[[str], str],
     folder: Path | None = None,
 ) -> AnalysisResult:
-    """in_words: a message as the caller reads it; folder: in which DataFrames were written."""
+    """Analyze paths by a kind of analysis, or by the one that suits them all.
+
+    in_words: a message as the caller reads it; folder: of the files written from DataFrames.
+    """
     with _errors(in_words):
         if kind:
             analysis = ANALYSES[kind]
@@ -86,7 +89,7 @@ def _analyzed(
             _refuse_foreign(analysis, options)
             found = analysis.result.method.analyze_found(one.paths, one.found, analysis.options_from(options))
     copies = tuple(path for path in paths if path.parent == folder)
-    return AnalysisResult(analysis, _with_words(found, in_words), copies)
+    return AnalysisResult(analysis, _translate_warnings(found, in_words), copies)
 
 
 def _is_one(data: object) -> bool:
@@ -94,7 +97,7 @@ def _is_one(data: object) -> bool:
 
 
 def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
-    """Return where the data lie; a DataFrame is written into the folder."""
+    """Return the path of the data; a DataFrame is written into the folder."""
     if isinstance(item, Run):
         return item.folder
     if isinstance(item, str | PathLike):
@@ -155,7 +158,7 @@ def _in_rows(text: str, folder: Path, titles: int) -> str:
     return in_rows(text, folder, titles=titles) if _FRAME in text else text
 
 
-def _with_words(found: Any, in_words: Callable[[str], str]) -> Any:
+def _translate_warnings(found: Any, in_words: Callable[[str], str]) -> Any:
     """Replace the warnings about inputs by the caller's words."""
     sources = [replace(source, warnings=tuple(map(in_words, source.warnings))) for source in found.sources]
     return replace(found, sources=tuple(sources), warnings=tuple(map(in_words, found.warnings)))

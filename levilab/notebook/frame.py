@@ -46,7 +46,7 @@ def has_numbers_for_titles(frame: pd.DataFrame) -> bool:
 
 
 def in_rows(text: str, folder: Path, *, titles: int) -> str:
-    r"""Return a message about such a file in the words of a DataFrame: rows, counted from 0, and no folder.
+    r"""Translate a message about such a file for a DataFrame: rows, counted from 0, and no folder.
 
     Args:
         text: of the message.

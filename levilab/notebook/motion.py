@@ -43,7 +43,7 @@ class SimulatedMotion(Trajectory):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to know before using the numbers."""
+        """Warnings about the numbers."""
         return self._found.notes
 
     @property
@@ -65,7 +65,7 @@ class SimulatedMotion(Trajectory):
         return facts_as_html(headline(found), facts)
 
     def summary(self) -> str:
-        """Return what `levilab simulate` prints: how it ended, heights, spin, the lines of the axis, the errors."""
+        """Return the text that `levilab simulate` prints: end, heights, spin, the lines of the axis, the errors."""
         from levilab.present.terminal import as_text  # with rich
 
         return as_text(partial(print_motion, self._found))
@@ -77,7 +77,7 @@ class SimulatedMotion(Trajectory):
         return pd.DataFrame({name: values(self) for name, _, _, values in COLUMNS})
 
     def plot(self) -> Figure:
-        """Path, height, spin, tilt and energy in time, and the spectrum of the axis; it needs no display."""
+        """Draw path, height, spin, tilt and energy in time, and the spectrum of the axis; it needs no display."""
         from levilab.motion.figure import motion_figure  # with matplotlib
         from levilab.present.style import for_notebooks
 

@@ -59,7 +59,7 @@ class AnalysisResult:
 
     Attributes:
         analysis: the row of the catalogue.
-        found: what it found, with the readings.
+        found: its result, with the readings.
         copies: data files that DataFrames were written to, which `save` writes beside the result.
     """
 
@@ -79,17 +79,17 @@ class AnalysisResult:
 
     @property
     def synthetic(self) -> bool:
-        """Whether any of the inputs is known to be simulated or made up."""
+        """Whether any of the inputs is known to be synthetic."""
         return any(source.synthetic for source in self.found.sources)
 
     @property
     def verdict(self) -> str:
-        """What the data say, in a few sentences."""
+        """The answer of the data, in a few sentences."""
         return str(self.found.text)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to know before using the numbers."""
+        """Warnings about the numbers."""
         return tuple(unquoted(text) for text in self.found.all_warnings)
 
     @cached_property

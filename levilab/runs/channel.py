@@ -11,7 +11,7 @@ class Channel:
 
     Attributes:
         unit: "" for a pure number.
-        source: where it comes from, in words.
+        source: description of its origin.
     """
 
     name: str

@@ -24,7 +24,7 @@ _AGAINST = ("height_m", "time_s")
 
 
 def readings_figure(frame: pd.DataFrame, title: str) -> Figure:
-    """Each channel in a panel of its own, with its standard uncertainties where they are known.
+    """Draw each channel in a panel of its own, with its standard uncertainties where they are known.
 
     Args:
         frame: columns as in readings.csv.
@@ -37,13 +37,13 @@ def readings_figure(frame: pd.DataFrame, title: str) -> Figure:
         figure = Figure(figsize=(WIDE, _TOP + _PITCH * (max(len(names), 1) - 1) + _HEIGHT + _BOTTOM))
         headline(figure, title.replace("\\", "\\\\").replace("$", r"\$"))
         panels = [panel(figure, _LEFT, _TOP + _PITCH * k, _WIDTH, _HEIGHT) for k in range(max(len(names), 1))]
-        x = _shown(frame, against) if against else frame.index + 1
+        x = _in_axis_unit(frame, against) if against else frame.index + 1
         colour = LOOKS["readings"].colour
         for axes, name in zip(panels, names, strict=False):
             u = _uncertainty(frame, name)
             if u is not None:
-                axes.errorbar(x, _shown(frame, name), yerr=u, fmt="none", color=colour, elinewidth=0.8)
-            axes.plot(x, _shown(frame, name), ".", color=colour, gid=f"readings-{name}")
+                axes.errorbar(x, _in_axis_unit(frame, name), yerr=u, fmt="none", color=colour, elinewidth=0.8)
+            axes.plot(x, _in_axis_unit(frame, name), ".", color=colour, gid=f"readings-{name}")
             axes.set_ylabel(_axis(name), fontsize=8)
             axes.set_xlim(panels[0].get_xlim())
             axes.tick_params(labelbottom=axes is panels[-1])
@@ -52,7 +52,7 @@ def readings_figure(frame: pd.DataFrame, title: str) -> Figure:
 
 
 def _axis(column: str) -> str:
-    r"""Return a column's name for an axis: its quantity in words, its unit in brackets.
+    r"""Return a column's name for an axis: the quantity's name, its unit in brackets.
 
     >>> _axis("height_m"), _axis("precession_frequency_hz"), _axis("remark")
     ('height  [cm]', 'precession frequency\n[Hz]', 'remark')
@@ -63,7 +63,7 @@ def _axis(column: str) -> str:
     return f"{quantity.replace('_', ' ')}{'  ' if len(quantity) < _LONG else chr(10)}[{unit.shown.unit}]"
 
 
-def _shown(frame: pd.DataFrame, name: str) -> pd.Series:
+def _in_axis_unit(frame: pd.DataFrame, name: str) -> pd.Series:
     """Return a column in the unit of its axis."""
     _, unit = split(name)
     return frame[name] * unit.shown.factor if unit else frame[name]
@@ -73,4 +73,4 @@ def _uncertainty(frame: pd.DataFrame, name: str) -> pd.Series | None:
     """Return the column of its standard uncertainty, as spin_frequency_u_hz is of spin_frequency_hz."""
     quantity, unit = split(name)
     column = f"{quantity}_u_{unit.ending}" if unit else ""
-    return _shown(frame, column) if column in frame else None
+    return _in_axis_unit(frame, column) if column in frame else None

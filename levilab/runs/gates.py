@@ -67,7 +67,7 @@ def _belongs(event: dict[str, Any], after: float, until: float, drive: float) ->
 
 
 def _gates(entry: Any) -> Gates | None:
-    """Three columns of one length, three counts at least; None for anything else."""
+    """Return three columns of one length, three counts at least; None for anything else."""
     try:
         begin, end, frequency = (
             np.array([math.nan if value is None else value for value in entry[name]], dtype=np.float64)

@@ -36,7 +36,7 @@ class Listed:
         readings: how many there are.
         length_s: from time zero, or the first reading where that is not known, to the last reading or state; None
             where they have no times.
-        synthetic: whether any of it was simulated or made up.
+        synthetic: whether any of it is synthetic.
         note: as in run.json.
         problem: why it cannot be read.
         states: of a simulation, 0 for what was measured.
@@ -59,14 +59,14 @@ class Listed:
 
     @property
     def size(self) -> str:
-        """How much there is, in words where it is not readings."""
+        """The number of readings, or a description of other content."""
         if self.states:
             return f"{self.states} states"
         return f"{self.records} record{'s' * (self.records > 1)}" if self.records else str(self.readings)
 
 
 def list_runs(root: Path) -> list[Listed]:
-    """Every run at or below a folder, oldest first; a broken one is listed with what is wrong.  Raises DataError."""
+    """List every run at or below a folder, oldest first, the broken ones with their fault.  Raises DataError."""
     if root.is_file():
         raise DataError(f"{root}: is a file; name the folder that holds the runs")
     if not root.is_dir():
@@ -113,7 +113,7 @@ def _load(folder: Path) -> Run | None:
 
 
 def _content(path: str) -> bytes | None:
-    """Return what is in a file; None where it is no file, as a pipe, which would be waited for, or a long one."""
+    """Return the content of a file; None where it is no file, as a pipe, or a long one."""
     try:
         about = os.stat(path)  # noqa: PTH116 - of ten thousand folders
         if not stat.S_ISREG(about.st_mode) or about.st_size >= _GLANCED_BYTES:
@@ -133,7 +133,7 @@ class _Rows(NamedTuple):
 
 
 def _read(run: Run) -> _Rows:
-    """By reading them as an analysis does.  Raises DataError."""
+    """Read the readings as an analysis does.  Raises DataError."""
     if not (run.folder / READINGS).exists():
         return _Rows(0, None, of_records=False)
     table = run.readings()
@@ -173,17 +173,13 @@ def _glance(run: Run) -> _Rows | None:
     return _Rows(
         len(lines),
         _length(run, numbers[0], numbers[-len(titles)]),
-        "record" in titles and "record" in _channel_names(run),
+        "record" in titles and any(channel.get("name") == "record" for channel in run.record.channels),
     )
 
 
 def _length(run: Run, first: float, last: float) -> float:
-    """From time zero to the last reading [s]; limits and sweeps have their first one long after it."""
+    """Return the time from time zero to the last reading [s]; the first of a limit or a sweep may be long after it."""
     return last - (0.0 if run.record.time_zero_utc else first)
-
-
-def _channel_names(run: Run) -> set[str]:
-    return {channel.get("name", "") for channel in run.record.channels}
 
 
 def _table(of: dict[str, Any] | None, key: str) -> dict[str, Any]:
@@ -206,7 +202,7 @@ MOST_PROBLEMS = 5
 
 
 def print_runs(runs: Sequence[Listed], root: Path) -> None:
-    """Print the list of runs, and below it what is wrong with the broken ones."""
+    """Print the list of runs, and below it the faults of the broken ones."""
     console = terminal()
     if not runs:
         console.print(f"no runs in {escape(str(root))}")

@@ -120,7 +120,7 @@ class Run:
         return f"<Run: {self.record.experiment}{when}, {self.status}{made_up}, in {self.folder}>"
 
     def _repr_html_(self) -> str:
-        """As a notebook shows it."""
+        """Return the HTML that a notebook shows."""
         frame, problem = self._frame_or_problem()
         count = "" if frame is None else f"{len(frame)}, the first {min(len(frame), SHOWN_ROWS)} below"
         facts = [
@@ -159,7 +159,7 @@ class Run:
 
     @property
     def continued_in(self) -> Path | None:
-        """The folder that all of it was written to anew, where this one was damaged under way."""
+        """The folder to which the whole run was written again, where this one was damaged under way."""
         name = (self.record.model_extra or {}).get("continued_in")
         folder = self.folder.with_name(Path(str(name)).name) if name else None
         return folder if folder and (folder / RECORD).exists() else None
@@ -174,26 +174,26 @@ class Run:
         return load_traces(self.folder)
 
     def count(self) -> int:
-        """How many readings there are; a run of another kind, without readings.csv, has none."""
+        """Return the number of readings; a run of another kind, without readings.csv, has none."""
         return len(self.readings()) if (self.folder / READINGS).exists() else 0
 
     def elapsed(self) -> float:
-        """Seconds on the wall since time zero.  Raises DataError if the run ended before it, or the clock was set."""
+        """Return the time on the wall clock since time zero [s].  Raises DataError if the clock was set back."""
         if self.record.time_zero_utc is None:
             raise DataError(
-                f"{self.folder}: ended before its first reading, there is nothing to go on with: start anew"
+                f"{self.folder}: ended before its first reading, there is nothing to go on with: start again"
             )
         try:
             zero = datetime.fromisoformat(self.record.time_zero_utc)
         except ValueError as error:
-            raise DataError(f"{self.folder / RECORD}: time_zero_utc: {error}; correct it or start anew") from error
+            raise DataError(f"{self.folder / RECORD}: time_zero_utc: {error}; correct it or start again") from error
         zero = zero if zero.tzinfo else zero.replace(tzinfo=UTC)
         elapsed = (datetime.now(UTC) - zero).total_seconds()
         last = float(self.readings().column("time_s")[-1]) if self.count() else 0.0
         if elapsed <= last:
             raise DataError(
                 f"{self.folder}: by the computer's clock {elapsed:.0f} s have passed since its time zero, but its last "
-                f"reading is of {last:.0f} s: the clock was set back, correct it or start anew"
+                f"reading is of {last:.0f} s: the clock was set back, correct it or start again"
             )
         return elapsed
 
@@ -204,12 +204,12 @@ class Run:
         return [event for line in lines if (event := _event(line))]
 
     def warnings(self) -> tuple[str, ...]:
-        """Return what the experiment warned of while it ran, each once."""
+        """Return the experiment's warnings, each once."""
         return _warnings_of(self.events())
 
 
 def _warnings_of(events: list[dict[str, Any]]) -> tuple[str, ...]:
-    """Each warning once; of those that differ in their numbers alone the first, and how many there are."""
+    """Return each warning once; of those that differ only in their numbers the first, with a count."""
     texts = [str(event["text"]) for event in events if event["kind"] == RunEvent.WARNING]
     alike = Counter(_NUMBERS.sub("#", text) for text in texts)
     firsts = {_NUMBERS.sub("#", text): text for text in reversed(texts)}
@@ -230,7 +230,7 @@ def _event(line: str) -> dict[str, Any] | None:
 
 
 def _is_alive(folder: Path) -> bool:
-    """Whether a process holds the folder's lock.  Looking never creates a file."""
+    """Return whether a process holds the folder's lock.  Looking never creates a file."""
     from filelock import Timeout
 
     if not (folder / LOCK).exists():
@@ -270,7 +270,7 @@ def read_record(folder: Path) -> RunRecord:
 
 
 def find_run(name: Path, root: Path = Path("runs")) -> Path:
-    """Return the run folder that is meant: a path, or the name of a run in a folder, its time left out or not."""
+    """Return the run folder of a path, or of the name of a run in a folder, with or without its time."""
     if name.name != str(name) or name.exists() or not root.is_dir():
         return name
     named = runs_named(name.name, root)
@@ -278,7 +278,7 @@ def find_run(name: Path, root: Path = Path("runs")) -> Path:
 
 
 def runs_named(name: str, root: Path) -> list[Path]:
-    """Return the runs in a folder that have this name, their time left out or not."""
+    """Return the runs in a folder that have this name, with or without their time."""
     return [folder for folder in root.iterdir() if name in {folder.name, folder.name.split("Z-", 1)[-1]}]
 
 
@@ -303,7 +303,7 @@ def run_folders(root: Path) -> list[str]:
 
 
 def _identity(folder: str) -> object:
-    """Return what no two folders have in common; some file systems of networks number none."""
+    """Return an identity that no two folders share: a path, where the file system numbers no files."""
     try:
         there = os.stat(folder)  # noqa: PTH116 - of ten thousand folders
     except OSError:

@@ -75,7 +75,7 @@ class StoredTrace:
     Attributes:
         number: from 1 on.
         time_s: when it was complete, on the clock of the readings.
-        channel: what it shows.
+        channel: the quantity that it shows.
         trace: the record itself.
         announced: points that it was to have, None where it has them all.
     """
@@ -88,7 +88,7 @@ class StoredTrace:
 
     @property
     def how_short(self) -> str:
-        """How much there is of it, in words; empty where it is whole."""
+        """The part of an incomplete record that there is, as text; empty where it is whole."""
         if self.announced is None:
             return ""
         return f"was cut short: {self.trace.codes.size} of its {self.announced} points are kept"
@@ -101,7 +101,7 @@ def head_of(trace: Trace, number: int, time_s: float, channel: str, announced: i
         trace: the record.
         number: in the run, from 1 on.
         time_s: when it was taken, on the clock of the readings.
-        channel: what it shows.
+        channel: the quantity that it shows.
         announced: points that it is to have, where it has fewer.
     """
     return Head(
@@ -137,18 +137,18 @@ def append_arriving(folder: Path, codes: Codes) -> None:
 
 
 def is_arriving(folder: Path) -> bool:
-    """Whether a run folder says how to read a record that is on its way."""
+    """Return whether a run folder says how to read a record that is on its way."""
     return (folder / ARRIVING).is_file()
 
 
 def forget_arriving(folder: Path) -> None:
-    """Take away what is there of a record on its way, which is kept elsewhere, or of no use.  Raises OSError."""
+    """Remove the part of a record on its way, which is kept elsewhere, or of no use.  Raises OSError."""
     for name in (ARRIVING, ARRIVING_CODES):
         (folder / name).unlink(missing_ok=True)
 
 
 def arrived(folder: Path) -> StoredTrace | None:
-    """Return what had come of the record that was on its way when a process was killed; None where there is nothing.
+    """Return the part of the record that was on its way when a process was killed; None where there is none.
 
     Raises:
         DataError: what is there of it cannot be read.
@@ -162,7 +162,7 @@ def arrived(folder: Path) -> StoredTrace | None:
             return None
         whole = folder / _path(head.number)
         if whole.is_file():  # killed between codes and line
-            return _stored(head.model_copy(update={"announced": None}), np.load(whole, allow_pickle=False))
+            return _make_trace(head.model_copy(update={"announced": None}), np.load(whole, allow_pickle=False))
         content = codes.read_bytes() if codes.is_file() else b""
     except FileNotFoundError:  # the process that writes it has kept it meanwhile
         return None
@@ -172,7 +172,7 @@ def arrived(folder: Path) -> StoredTrace | None:
         raise DataError(f"{about}: does not say how to read {codes.name}, remove both ({error})") from error
     dtype = np.dtype(head.dtype)
     count = len(content) // dtype.itemsize
-    return _stored(head, np.frombuffer(content, dtype=dtype, count=count)) if count else None
+    return _make_trace(head, np.frombuffer(content, dtype=dtype, count=count)) if count else None
 
 
 def save_codes(folder: Path, head: Head, codes: Codes) -> str:
@@ -189,7 +189,7 @@ def save_codes(folder: Path, head: Head, codes: Codes) -> str:
 
 
 def _path(number: int) -> str:
-    """Of the codes of a record, in the run folder."""
+    """Return the path of the codes of a record, in the run folder."""
     return f"{FOLDER}/{number:06d}.npy"
 
 
@@ -200,7 +200,7 @@ def _make_folder(folder: Path) -> None:
 
 
 def has_codes(folder: Path, line: str) -> bool:
-    """Whether the codes that a line of the index describes are in a run folder."""
+    """Return whether the codes that a line of the index describes are in a run folder."""
     return (folder / _line(folder / INDEX, line).path).is_file()
 
 
@@ -215,12 +215,12 @@ def last_number(folder: Path) -> int:
 
 
 def described_times(folder: Path) -> list[float]:
-    """When the records that the index of a run folder describes were kept [s].  Raises DataError."""
+    """Return the times at which the records in a run folder's index were kept [s].  Raises DataError."""
     return [_line(folder / INDEX, line).time_s for line in _lines(folder)]
 
 
 def undescribed_codes(folder: Path) -> list[str]:
-    """Codes in a run folder that nothing describes, as their paths in it.  Raises DataError."""
+    """Return the paths of the codes in a run folder that its index does not describe.  Raises DataError."""
     described = {_line(folder / INDEX, line).path for line in _lines(folder)}
     if found := arrived(folder):
         described.add(_path(found.number))
@@ -271,10 +271,10 @@ def _load(folder: Path, record: Record) -> StoredTrace:
         raise DataError(f"{path}: cannot be read ({error.strerror}): {advice}") from error
     if hashlib.sha256(content).hexdigest() != record.sha256:
         raise DataError(f"{path}: is not what was recorded: its sha256 differs from the one in {INDEX}")
-    return _stored(record, np.load(io.BytesIO(content), allow_pickle=False))
+    return _make_trace(record, np.load(io.BytesIO(content), allow_pickle=False))
 
 
-def _stored(head: Head, codes: Codes) -> StoredTrace:
+def _make_trace(head: Head, codes: Codes) -> StoredTrace:
     trace = Trace(
         codes,
         head.dt_s,

@@ -20,17 +20,17 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: The drivers ask an oscilloscope so often whether its record is complete [s].
+#: Interval at which the drivers ask an oscilloscope whether its record is complete [s].
 SEEN_LATE_S = 0.02
 
 
 def has_traces(run: Run) -> bool:
-    """Whether a run keeps records of an oscilloscope, or what had come of one when it was killed."""
+    """Return whether a run keeps records of an oscilloscope, or what had come of one when it was killed."""
     return (run.folder / INDEX).is_file() or is_arriving(run.folder)
 
 
 def run_waveforms(run: Run) -> list[Waveform]:
-    """Each record of a run, in the order in which they were kept.
+    """Return each record of a run, in the order in which they were kept.
 
     A record ended when the oscilloscope said that it was complete, or up to SEEN_LATE_S before, and began so much
     earlier as it lasts.  Raises DataError for one that is damaged.

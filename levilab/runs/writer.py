@@ -2,7 +2,7 @@
 
 ``run.json`` is replaced atomically, ``readings.csv`` and ``events.jsonl`` are flushed to the disk row by row:
 a process that is killed between two rows loses nothing that it has shown. A folder that is removed under way is
-written anew, beside, from what this process holds in memory.
+written again, beside, from what this process holds in memory.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from instruments.drivers.oscilloscope import Trace
     from levilab.runs.run import Run, Status
 
-#: What grows line by line, and is kept in memory to be written anew.
+#: Files that grow line by line, kept in memory to be written again.
 _KEPT = (READINGS, EVENTS, traces.INDEX)
 #: Errors that free space would mend.
 _FULL = frozenset(getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG") if hasattr(errno, name))
@@ -70,7 +70,7 @@ class RunWriter:
     def __init__(self, folder: Path, record: RunRecord, tell: Callable[[str], None] = lambda _: None) -> None:
         self.folder, self.record, self.tell = folder, record, tell
         self._files: dict[str, _GrowingFile] = {}
-        self._kept: dict[str, list[bytes]] = {}  # what was appended line by line, to be written anew
+        self._kept: dict[str, list[bytes]] = {}  # all lines appended, to be written again
         self._created = False
         self.events = 0
         self._records = 0  # of the oscilloscope
@@ -167,7 +167,7 @@ class RunWriter:
         return gone
 
     def _holds_readings(self) -> bool:
-        """Whether there is more than a header, in memory or on the disk; what cannot be read may be readings."""
+        """Return whether there are readings, in memory or on the disk; an unreadable file may have some."""
         if self._lines_kept(READINGS) > 1:
             return True
         try:
@@ -231,7 +231,7 @@ class RunWriter:
         return self._keep_record(traces.head_of(trace, self._records + 1, time_s, channel), trace)
 
     def _keep_record(self, head: traces.Head, trace: Trace) -> int:
-        """Write the head of a record, its codes and their line: of a process that is killed all that had come stays."""
+        """Write the head of a record, its codes and their line; all of them survive a killed process."""
         self._records = max(self._records, head.number)
         with _explain_errors(f"write the record {head.number}", self.folder):
             self._rescue_if_lost()
@@ -247,12 +247,12 @@ class RunWriter:
         return head.number
 
     def arriving(self, time_s: float, trace: Trace, channel: str, points: int) -> None:
-        """Put down what has come so far of a record; the whole one is kept by `trace`.
+        """Write the part of a record that has come so far; the whole one is kept by `trace`.
 
         Args:
             time_s: when the record was taken, on the clock of the readings.
             trace: its first samples, at each call some more of one record.
-            channel: what it shows.
+            channel: the quantity that it shows.
             points: it is to have.
 
         Raises:
@@ -271,7 +271,7 @@ class RunWriter:
         self._arriving = self.folder, trace.codes.size
 
     def keep_what_arrived(self) -> str | None:
-        """Keep what has come of a record that was broken off; says what that is.  Raises CannotWrite."""
+        """Keep the part of a record that was broken off, and return its description.  Raises CannotWrite."""
         try:
             found = traces.arrived(self.folder)
         except DataError:  # the analysis says so
@@ -286,7 +286,7 @@ class RunWriter:
         return f"{traces.INDEX}: record {found.number} ({found.channel}) {found.how_short or 'was kept whole'}"
 
     def forget_what_arrived(self) -> None:
-        """Take away what has come of a record that is of no use.  Raises CannotWrite."""
+        """Remove the part of a record that is of no use.  Raises CannotWrite."""
         self._arriving = None
         with _explain_errors("clear up", self.folder):
             traces.forget_arriving(self.folder)
@@ -344,7 +344,7 @@ class RunWriter:
     # --- a folder that is removed under way ---
 
     def _rescue_if_lost(self) -> None:
-        """Write the run anew if what was written is no longer where it was written.  Raises OSError."""
+        """Write the run again if its files are no longer in their place.  Raises OSError."""
         kept = [file for name, file in self._files.items() if name in self._kept and name != STATES]
         if any(file.is_lost() for file in kept):
             self._rescue()
@@ -352,7 +352,7 @@ class RunWriter:
             replace_atomically(self.folder / RECORD, self.record.as_json())
 
     def _record_is_whole(self) -> bool:
-        """Whether run.json is there and can be read; a person may have changed it."""
+        """Return whether run.json is there and can be read; a person may have changed it."""
         try:
             if (self.folder / RECORD).stat().st_size == len(self.record.as_json().encode(errors="replace")):
                 return True
@@ -402,7 +402,7 @@ class RunWriter:
             replace_atomically(old / RECORD, self.record.model_copy(update=gone_on).as_json())
 
     def _forget_lost_records(self) -> int:
-        """Take records whose codes are gone out of the index; returns how many.
+        """Remove records whose codes are gone from the index; return their number.
 
         Codes are not kept in memory: a record may have as many as an oscilloscope holds.
         """
@@ -422,7 +422,7 @@ class _GrowingFile:
         self._file = path.open("ab")
         self._opened = os.fstat(self._file.fileno())
         self._size = self._opened.st_size
-        # some file systems number their files anew at each look
+        # some file systems give their files new numbers at each look
         self._comparable = os.path.samestat(self._opened, path.lstat())
 
     def append(self, data: bytes) -> None:
@@ -437,7 +437,7 @@ class _GrowingFile:
         self._file.close()
 
     def is_lost(self) -> bool:
-        """Whether the path no longer names this file, or not all of it."""
+        """Return whether the path no longer names this file, or not all of it."""
         if os.name == "nt":  # Windows removes no file that is open, and tells its size late
             return False
         try:
@@ -478,7 +478,7 @@ def _folder_beside(old: Path) -> Path:
 
 
 def _is_of(folder: Path, record: RunRecord) -> bool:
-    """Whether a folder's run.json is of this run, or so damaged that it says nothing."""
+    """Return whether a folder's run.json is of this run, or so damaged that it says nothing."""
     try:
         return read_record(folder).started_utc == record.started_utc
     except DataError:
@@ -498,7 +498,7 @@ def _cut_foreign_tail(path: Path, ours: bytes) -> None:
 
 
 def _copy_others(old: Path, new: Path, ours: set[str]) -> None:
-    """Copy what else lies in the old folder, where there is any of it."""
+    """Copy the other files and folders of the old folder, if there is one."""
     with contextlib.suppress(OSError):
         for path in old.iterdir():
             if path.name in ours or path.is_symlink() or path.name.endswith(".part"):
@@ -511,7 +511,7 @@ def _copy_others(old: Path, new: Path, ours: set[str]) -> None:
 
 
 def _new_folder(out: Path, experiment: str) -> Path:
-    """``<UTC>-<experiment>-<four hex digits>``, one that is not there yet."""
+    """Create a new folder ``<UTC>-<experiment>-<four hex digits>``."""
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     while True:
         folder = out / f"{stamp}-{experiment}-{secrets.token_hex(2)}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levilab.motion.report import SYNTHETIC, command_in_words, scene_blocks
+from levilab.motion.report import SYNTHETIC, command_text, scene_blocks
 from levilab.present.document.blocks import (
     Bullets,
     Code,
@@ -144,7 +144,7 @@ def _reproduction(store: Store) -> Iterator[Block]:
     attributes = dict(store.group.attrs)
     words = attributes.get("command_line")
     if isinstance(words, list) and words:
-        yield Code(command_in_words([str(word) for word in words]))
+        yield Code(command_text([str(word) for word in words]))
     software, processor = attributes.get("software"), attributes.get("processor")
     facts = []
     if isinstance(software, dict):

@@ -10,7 +10,7 @@ A bench's go on, little-endian:
 ====================  ===================================================================
 4 bytes               number of the message, which grows by one and begins again after 2³²
 2 bytes               which part of it this is, from 0
-2 bytes               of so many
+2 bytes               number of parts
 up to 8000 bytes      the part
 ====================  ===================================================================
 """
@@ -46,7 +46,7 @@ def wish(token: bytes) -> bytes:
 
 
 def is_wish(data: bytes, token: bytes) -> bool:
-    """Whether a datagram is a view's wish, with this token."""
+    """Return whether a datagram is a view's wish, with this token."""
     return hmac.compare_digest(data, wish(token))
 
 
@@ -68,7 +68,7 @@ class Joiner:
         self._open: OrderedDict[int, dict[int, bytes]] = OrderedDict()
 
     def join(self, data: bytes) -> bytes | None:
-        """Take in a datagram.  Returns the message that it completes, None where it completes none."""
+        """Take in a datagram.  Returns the message if it is complete now, else None."""
         if len(data) < _HEAD.size or len(data) > _HEAD.size + PART_BYTES:
             return None
         magic, token, number, part, parts = _HEAD.unpack_from(data)

@@ -42,7 +42,7 @@ def _same_length(*arrays: NDArray[Any]) -> None:
 
 @dataclass(frozen=True)
 class Drive:
-    """The generator as it was commanded; what it answers stands in the run's events and in run.json.
+    """The generator as it was commanded; its answers stand in the run's events and in run.json.
 
     Attributes:
         waveform: a short word, such as SIN.
@@ -136,7 +136,7 @@ class Record:
 
     Attributes:
         number: it grows with each record.
-        channel: what it shows, such as "light" or "drive".
+        channel: the quantity that it shows, such as "light" or "drive".
         time_s: when it was taken, on the clock of the bench [s].
         start_s: of its first step, from the trigger [s].
         step_s: length of a step [s].

@@ -78,7 +78,7 @@ class Publisher:
         return bool(self._views)
 
     def is_due(self) -> bool:
-        """Whether a view listens, and the last round of messages is long enough ago; then a new round begins."""
+        """Return whether a view listens, and the last round of messages is long enough ago; then a new round begins."""
         if self._socket is None or (now := self.clock()) < self._next:
             return False
         self._next = now + LEAST_PAUSE_S

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from levilab.telemetry.address import Address
     from levilab.telemetry.messages import Message
 
-#: It asks anew so often [s]; a bench forgets a view after three times that.
+#: Interval between two wishes of a view [s]; a bench forgets a view after three intervals.
 ASKS_EVERY_S = 1.0
 #: Most datagrams that are read at once, and room for those that have come since [bytes].
 _MOST_AT_ONCE, _ROOM_BYTES = 500, 1 << 20

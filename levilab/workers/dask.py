@@ -33,7 +33,7 @@ GOODBYE_S = 0.5
 
 
 def cluster(scheduler: str, *, patience_s: float = PATIENCE_S) -> Workers:
-    """Tasks on the workers of a Dask cluster.
+    """Return workers on a Dask cluster.
 
     Args:
         scheduler: its address, such as ``tcp://10.0.0.1:8786``, or the file that `dask scheduler --scheduler-file`
@@ -140,7 +140,7 @@ class Cluster(Executor):
 
     def _lost_scheduler(self) -> WorkersLost:
         return WorkersLost(
-            f"the Dask scheduler at {self._scheduler} is lost, with what was under way: start it and its workers anew"
+            f"the Dask scheduler at {self._scheduler} is lost, with the tasks under way: start it and its workers again"
         )
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002

@@ -28,7 +28,7 @@ class Outcome:
 
     Attributes:
         result: what the function returned.
-        error: what it raised.
+        error: the error that it raised.
         unusable: why this worker cannot do any task of this kind; empty if it can.
     """
 
@@ -96,7 +96,7 @@ def call_there(head: bytes, task: bytes) -> bytes:
     else:
         outcome = call_here(function, argument)
     if outcome.error is not None:
-        outcome = Outcome(error=_that_travels(outcome.error))
+        outcome = Outcome(error=_make_picklable(outcome.error))
     try:
         return _pickle(outcome, "result")
     except LevilabError as error:
@@ -127,7 +127,7 @@ def _function(head: bytes) -> Callable[[Any], Any]:
     return unpickled
 
 
-def _that_travels(error: Exception) -> Exception:
+def _make_picklable(error: Exception) -> Exception:
     """Return an error that can be unpickled, with the traceback as a note: the error itself where it can be."""
     note = "".join(traceback.format_exception(error)).rstrip()
     try:

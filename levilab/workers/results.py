@@ -40,7 +40,7 @@ class Done(Generic[T, R]):
     Attributes:
         task: as it was given.
         result: what the function returned; None if it failed.
-        error: what it raised, or WorkersLost if the task kills the process that does it; None if it succeeded.
+        error: the error of the task, or WorkersLost if the task kills the process that does it; None if it succeeded.
     """
 
     task: T
@@ -54,9 +54,9 @@ def results_of(
     """Yield the results of tasks as they come, in any order.
 
     An exception of the function is returned with its task; the other tasks continue.  If a worker process dies, all are
-    started anew, and only the tasks that were under way are computed again.  A task that was under way whenever workers
-    died, the last time alone, is returned as an error.  Ctrl-C ends the tasks under way; so does a caller that closes
-    the iterator (`contextlib.closing`), which Python by itself may do late.
+    started again, and only the tasks that were under way are computed again.  A task that was under way whenever
+    workers died, the last time alone, is returned as an error.  Ctrl-C ends the tasks under way; so does a caller
+    that closes the iterator (`contextlib.closing`), which Python by itself may do late.
 
     Args:
         function: pure, so that it may be done again; at the head of a module if it is done elsewhere.
@@ -122,7 +122,7 @@ class _Attempt(Generic[T]):
 
     @property
     def as_deadly(self) -> Done[T, Any]:
-        """The task with the error that it kills its worker."""
+        """The task, done with an error: it kills its worker."""
         return Done(self.task, None, WorkersLost("each process that does it dies: memory may be short"))
 
 
@@ -149,7 +149,7 @@ class _Queue(Generic[T]):
         return self.alone.popleft() if self.alone and nothing_under_way else None
 
     def put_back(self, attempts: Iterable[_Attempt[T]], suspects: int) -> None:
-        """Take back what was under way, in the order of submission; the pool broke by one of the first few."""
+        """Take back the tasks under way, in the order of submission; one of the first few broke the pool."""
         for place, attempt in enumerate(attempts):
             attempt.breaks += place < suspects
             (self.alone if attempt.is_to_be_alone else self.again).append(attempt)
@@ -214,7 +214,7 @@ def _outcome_of(future: _Future, pool: Executor, executor: Workers) -> Outcome |
     """
     if future.cancelled():
         executor.check(pool)
-        raise WorkersLost(f"the {executor.name} gave up what they were to do: start them anew")
+        raise WorkersLost(f"the {executor.name} gave up their tasks: start them again")
     error = future.exception()
     if error is None:
         outcome = unpack(future.result())
@@ -225,18 +225,14 @@ def _outcome_of(future: _Future, pool: Executor, executor: Workers) -> Outcome |
         return None
     if isinstance(error, BrokenExecutor) or not isinstance(error, Exception):
         raise error
-    why = f"{type(error).__name__}: {_first_line(error)}"
+    why = f"{type(error).__name__}: {str(error).strip().partition(chr(10))[0]}"
     raise WorkersLost(f"the {executor.name} cannot do the work ({why}): install the same on all machines")
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().partition("\n")[0]
 
 
 def _after_a_break(
     queued: _Queue[T], under_way: dict[_Future, _Attempt[T]], pool: Executor, executor: Workers
 ) -> Iterator[Done[T, Any]]:
-    """Yield what ended before the pool broke and queue the rest again."""
+    """Yield the results from before the pool broke, and queue the other tasks again."""
     lost = []
     for future, attempt in under_way.items():
         try:

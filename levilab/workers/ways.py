@@ -54,7 +54,7 @@ class Workers:
     is_death: Callable[[BaseException], bool] = _no_death
 
     def count_in(self, executor: Executor) -> int:
-        """How many tasks an open executor does at the same time."""
+        """Return the number of tasks that an open executor does at the same time."""
         return self.count if self.count_now is None else self.count_now(executor)
 
 
@@ -64,7 +64,7 @@ def this_process() -> Workers:
 
 
 def threads(count: int | None = None) -> Workers:
-    """Tasks in threads of this process, for functions that leave Python's lock to others most of the time.
+    """Return workers in threads of this process, for functions that release Python's lock most of the time.
 
     Args:
         count: None: one for each core that this process may use.
@@ -77,7 +77,7 @@ def threads(count: int | None = None) -> Workers:
 
 
 def processes(count: int | None = None) -> Workers:
-    """Tasks in processes of their own on this machine, started anew ("spawn") on every system.
+    """Return workers in processes of their own on this machine, started with "spawn" on every system.
 
     Args:
         count: None: one for each core that this process may use.

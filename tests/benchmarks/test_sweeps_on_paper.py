@@ -8,12 +8,12 @@ from support.paths import ROOT
 PAGE = ROOT / "docs/sweeps-at-scale.md"
 
 
-def test_the_page_holds_what_its_script_computes() -> None:
+def test_the_page_holds_what_its_script_computes():
     found = json.loads(sweeps_on_paper.RESULTS.read_text(encoding="utf-8"))
     assert sweeps_on_paper.page(found) in PAGE.read_text(encoding="utf-8")
 
 
-def test_a_parent_that_is_slower_allows_fewer_cores() -> None:
+def test_a_parent_that_is_slower_allows_fewer_cores():
     one = sweeps_on_paper.Measured(1e-3, 30.0, 10e-3, 2e-3, 2e-3, (17.0, 15.0), 3, 2000, 2e8)
     limits = {limit.name: limit for limit in sweeps_on_paper.limits_of(one, 2.0)}
     parent = limits["the parent, which writes"]

@@ -15,7 +15,7 @@ from instruments.virtual.bench.visa_library import library_for
 from levilab.bench.discover import driver_for_identity
 from levilab.world.bench import practice_world, virtual_bus
 from support import hostile
-from support.models import KIND_OF, ROWS, calls, measure
+from support.models import KIND_OF, PREPARE, ROWS, measure
 from support.paths import ROOT
 
 EACH = pytest.mark.parametrize("name", ROWS)
@@ -57,8 +57,7 @@ def test_a_driver_prepares_and_reads_its_twin(name):
 def test_settings_survive_a_round_trip(name):
     opened = Opened(name)
     driver = opened.driver
-    prepare, _ = calls(name)["prepare"]
-    prepare(driver)
+    PREPARE[KIND_OF[name]](driver)
     rows = [row.name for row in driver.declared()]
     before = {row: getattr(driver, row) for row in rows}
     opened.twin.execute("*RST")

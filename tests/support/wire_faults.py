@@ -101,6 +101,7 @@ ANSWERS = {
     "doubled later": lambda blow: Delivery(blow.data, later=blow.data),
     "garbled": lambda blow: Delivery(_garbled(blow)),
     "another digit": lambda blow: Delivery(_digit(blow)),
+    "another answer": lambda blow: Delivery(blow.fault.junk, marked=blow.fault.marked),
     "merged": lambda blow: Delivery((blow.before if blow.fault.marked else blow.fault.junk + b"\n") + blow.data),
     "rubbish before": lambda blow: Delivery(blow.fault.junk + blow.data),
     "rubbish behind": lambda blow: Delivery(blow.data + blow.fault.junk),

@@ -31,7 +31,7 @@ from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.servers.serial_port import HAS_PSEUDO_TERMINALS
 from instruments.virtual.servers.server import BenchServer
 from support import hostile
-from support.models import FAMILIES, KIND_OF, ROWS
+from support.models import FAMILIES, KIND_OF, PREPARE, ROWS
 from support.proxy import LOOPBACK, Proxy
 from support.waiting import HANG_GUARD_S
 from support.wire_faults import FaultyBench, Tapped, Wire
@@ -168,15 +168,11 @@ _SERIES = r"(DATA:REM|FETC:ARR)\?.*"
 def _counter(driver):
     timed = {"timed readings": _readings(_SERIES, lambda driver: driver.timed_readings(3))}
     return {
-        "prepare": Operation(_prepare_counter, _same_settings, remakes=True),
+        "prepare": Operation(PREPARE["counter"], _same_settings, remakes=True),
         "set gate": _set("gate", 0.25),
         "reading": _reading(r"READ\?"),
         "readings": _readings(_SERIES, lambda driver: driver.readings(3)),
     } | (timed if hasattr(driver, "timed_readings") else {})
-
-
-def _prepare_counter(driver):
-    driver.prepare(gate_s=0.5, trigger_level_v=0.6)
 
 
 def _switch_on(pair):
@@ -184,23 +180,15 @@ def _switch_on(pair):
         pair.tap.device.execute(f"{pair.driver.OUTPUT} ON")
 
 
-def _prepare_generator(driver):
-    driver.prepare(waveform="TRI", frequency_hz=25.0, amplitude_vpp=2.0, offset_v=0.5)
-
-
 def _generator(_driver):
     return {
-        "prepare": Operation(_prepare_generator, _same_settings, remakes=True),
+        "prepare": Operation(PREPARE["generator"], _same_settings, remakes=True),
         "set frequency": _set("frequency", 31.5),
         "on": _set("output", value=True),
         "off": Operation(
             lambda driver: driver.off(), lambda pair, _: pair.side.output is False, _switch_on, remakes=True
         ),
     }
-
-
-def _prepare_scope(driver):
-    driver.prepare(channels=[1], duration_s=0.1, points=1000, volts_per_division=0.5, trigger_level_v=0.6)
 
 
 def _acquire(driver):
@@ -275,7 +263,7 @@ def _are_blocks(pair, codes):
 
 def _scope(_driver):
     return {
-        "prepare": Operation(_prepare_scope, _same_settings, remakes=True),
+        "prepare": Operation(PREPARE["oscilloscope"], _same_settings, remakes=True),
         "set level": _set("trigger_level", 0.3),
         "acquire": Operation(_acquire, _has_record, remakes=True),
         "trace": Operation(lambda driver: driver.trace(1), _is_trace, remakes=True),
@@ -283,10 +271,6 @@ def _scope(_driver):
             lambda driver: b"".join(piece.tobytes() for piece in driver.blocks(1)), _are_blocks, remakes=True
         ),
     }
-
-
-def _prepare_magnetometer(driver):
-    driver.prepare(range_t=0.035)
 
 
 #: One of each unit of UNIT? in tesla.
@@ -300,7 +284,7 @@ def _is_field(pair, value):
 
 def _magnetometer(_driver):
     return {
-        "prepare": Operation(_prepare_magnetometer, _same_settings, remakes=True),
+        "prepare": Operation(PREPARE["magnetometer"], _same_settings, remakes=True),
         "set unit": _set("unit", "GAUSS"),
         "reading": Operation(lambda driver: driver.flux_density(), _is_field),
         "probe": Operation(lambda driver: driver.probe(), lambda pair, value: value == pair.side.probe()),
@@ -317,16 +301,16 @@ class Kind:
 
 
 _OF_KIND = {
-    "counter": (_prepare_counter, _counter),
-    "generator": (_prepare_generator, _generator),
-    "oscilloscope": (_prepare_scope, _scope),
-    "magnetometer": (_prepare_magnetometer, _magnetometer),
+    "counter": _counter,
+    "generator": _generator,
+    "oscilloscope": _scope,
+    "magnetometer": _magnetometer,
 }
 
 
 def _kind(name):
-    driver, (prepare, operations) = ROWS[name].driver, _OF_KIND[KIND_OF[name]]
-    return Kind(driver, prepare, _operations(driver, operations(driver)))
+    driver, kind = ROWS[name].driver, KIND_OF[name]
+    return Kind(driver, PREPARE[kind], _operations(driver, _OF_KIND[kind](driver)))
 
 
 #: The first model of each driver.

@@ -24,7 +24,7 @@ class Counter(Instrument, Protocol):
         """
 
     def frequency(self) -> float | None:
-        """One reading [Hz]; None when no signal crossed the trigger level.  Takes the gate time and more."""
+        """Return one reading [Hz]; None when no signal crossed the trigger level.  Takes the gate time and more."""
 
     def readings(self, count: int) -> NDArray[np.float64]:
         """Take this number of readings one after the other, shape (count,) [Hz], NaN where there was none.

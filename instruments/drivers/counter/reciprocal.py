@@ -57,12 +57,12 @@ class ReciprocalCounter(ScpiInstrument):
         if channel not in self.channels:
             raise OutOfRange(self.transport.address, "channel", channel, " or ".join(map(str, self.channels)))
         if channel != self.channel:
-            self.last_set.clear()  # what was set is the other input's
+            self.last_set.clear()  # these settings are the other input's
         self.channel = channel
         self.command(f"CONF:FREQ (@{channel})")
 
     def frequency(self) -> float | None:
-        """One reading [Hz], or None; see :class:`Counter`.  Raises CommandRefused if an error was waiting."""
+        """Return one reading [Hz], or None; see :class:`Counter`.  Raises CommandRefused if an error was waiting."""
         self._end_old_series()
         answer = self._ask("READ?", self._patience)
         with self.clearing_on_bad_answer():

@@ -51,7 +51,7 @@ class LoadSetting(Setting[float]):
 class OutputSwitch(Setting[bool]):
     """The output.  Where the coil has limits, nothing goes on that was not set under them."""
 
-    def __set__(self, instrument: Owner, value: bool) -> None:  # noqa: FBT001 - it is what is assigned
+    def __set__(self, instrument: Owner, value: bool) -> None:  # noqa: FBT001 - the assigned value
         drive = cast("DriveGenerator", instrument)
         if value and drive.limits != NO_LIMITS and not drive.prepared_here:
             allowed = "prepare() first: what stands there may be beyond limits.drive_amplitude_vpp in the bench file"
@@ -132,7 +132,7 @@ class DriveGenerator(ScpiInstrument):
             self.close()
 
     def command(self, message: str) -> None:
-        """As every instrument; after a reset, or one that was cut off, no program answers for the signal."""
+        """Send a command; after a reset, or one that was cut off, no program answers for the signal."""
         if message.upper().startswith("*RST"):
             self.prepared_here = False
         super().command(message)
@@ -152,7 +152,7 @@ class DriveGenerator(ScpiInstrument):
         self.prepared_here = True
 
     def _reset(self) -> None:
-        """All outputs off, nothing but a plain signal, voltages peak to peak at the open terminals."""
+        """Switch all outputs off, and choose a plain signal and voltages peak to peak at the open terminals."""
         self.command("*RST")
         self.command(f"{self.OUTPUT}:LOAD INF")
         self.command("VOLT:UNIT VPP")
@@ -168,7 +168,7 @@ class DriveGenerator(ScpiInstrument):
         self.waveform = waveform
 
     def outputs(self) -> tuple[str, ...]:
-        """How the headers of all its outputs begin."""
+        """Return the beginning of the headers of each output."""
         return (self.OUTPUT,)
 
     def off(self) -> None:

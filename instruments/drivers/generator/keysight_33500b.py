@@ -51,13 +51,13 @@ class Keysight33500B(DriveGenerator):
         self._model = ""
 
     def identity(self) -> str:
-        """As every instrument; it says how many channels there are."""
+        """Ask ``*IDN?``; the answer says how many channels there are."""
         answer = super().identity()
         self._model = answer.split(",")[1].strip().upper()
         return answer
 
     def outputs(self) -> tuple[str, ...]:
-        """How the headers of all its outputs begin; `*IDN?` is sent first where it was not sent yet."""
+        """Return the beginning of the headers of each output; `*IDN?` is sent first if it was not yet."""
         if not self._model:
             self.identity()
         return ("OUTP1", "OUTP2") if self._model in self.TWO_CHANNELS else ("OUTP1",)

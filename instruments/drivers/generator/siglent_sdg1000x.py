@@ -119,10 +119,10 @@ class SiglentSDG1000X(DriveGenerator):
         self.ask_back(setting, value)
 
     def forget_errors(self) -> None:
-        """There is no error queue."""
+        """Do nothing: there is no error queue."""
 
     def raise_errors(self, after: str) -> None:
-        """There is no error queue."""
+        """Do nothing: there is no error queue."""
 
     def _reset(self) -> None:
         self.command("*RST")
@@ -146,7 +146,7 @@ class SiglentSDG1000X(DriveGenerator):
             raise CommandRefused(self.transport.address, "C1:BSWV SYM,50", (f"SYM is {symmetry:g} afterwards",))
 
     def outputs(self) -> tuple[str, ...]:
-        """How the headers of both outputs begin."""
+        """Return the beginning of the headers of both outputs."""
         return ("C1:OUTP", "C2:OUTP")
 
     def _is_on(self, output: str) -> bool:

@@ -17,7 +17,7 @@ class Magnetometer(Instrument, Protocol):
         """Measure steady flux density up to this [T]; None: the instrument chooses its range."""
 
     def flux_density(self) -> float | None:
-        """One reading along the probe's axis [T]; None when it is beyond the range."""
+        """Return one reading along the probe's axis [T]; None when it is beyond the range."""
 
     def zero(self) -> None:
         """Take the present flux density for zero: with the probe in its zero-gauss chamber, and only there."""

@@ -50,7 +50,7 @@ class Coded(Setting[str]):
     def _parse(self, answer: str, form: Form) -> str:
         return self.word(answer)
 
-    def _expected(self, form: Form) -> str:
+    def _describe_expected(self, form: Form) -> str:
         return f"a number from {self.first} to {self.first + len(self.choices) - 1}"
 
     def _spell(self, value: str) -> str:
@@ -73,8 +73,8 @@ _UNIT = Coded("UNIT", str, choices=tuple(_UNITS_T))
 class LakeShoreGaussmeter(ScpiInstrument):
     """What the Lake Shore gaussmeters 425, 455 and 475 have in common.
 
-    They have no error queue, and ignore what they do not understand.  So each setting is asked back in the same
-    message, ``UNIT 2;UNIT?``: one exchange, for they want to be left alone between two.
+    They have no error queue, and ignore commands that they do not understand.  So each setting is asked back in
+    the same message, ``UNIT 2;UNIT?``: one exchange, as they need a pause between two.
     """
 
     #: Greatest flux density of each range [T], by probe, lowest first.
@@ -89,10 +89,10 @@ class LakeShoreGaussmeter(ScpiInstrument):
     mode: Setting[str]
 
     def forget_errors(self) -> None:
-        """There is no error queue."""
+        """Do nothing: there is no error queue."""
 
     def raise_errors(self, after: str) -> None:
-        """There is no error queue."""
+        """Do nothing: there is no error queue."""
 
     def command(self, message: str) -> None:
         """Set something and ask it back.  Raises CommandRefused when it is not so afterwards."""
@@ -108,7 +108,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
         return super().settings() | {"probe": probe, "range_t": self._range_t(probe)}
 
     def probe(self) -> str:
-        """HSE, HST or UHS: high sensitivity, high stability, ultra-high sensitivity.  Raises BadAnswer."""
+        """Return HSE, HST or UHS: high sensitivity, high stability, ultra-high sensitivity.  Raises BadAnswer."""
         answer = self.transport.query("TYPE?")
         if not re.fullmatch(r"[45][012]", answer, re.ASCII):
             self.reject("TYPE?", answer, "40 to 42, or 50 to 52: is a probe plugged in?")
@@ -123,7 +123,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
         return ranges[int(answer) - 1]
 
     def prepare(self, *, range_t: float | None) -> None:
-        """Steady fields in tesla; the smallest range that holds range_t; see :class:`Magnetometer`."""
+        """Measure steady fields in tesla, in the smallest range that holds range_t; see :class:`Magnetometer`."""
         self.unit = "TESLA"
         self.mode = self._STEADY
         if range_t is None:
@@ -137,7 +137,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
         self.command(f"RANGE {fitting[0]}")
 
     def flux_density(self) -> float | None:
-        """One reading [T]; see :class:`Magnetometer`.
+        """Return one reading [T]; see :class:`Magnetometer`.
 
         One message asks for the unit, the field, the unit again and the status: so the answer cannot be the one to
         another question.  The unit may be changed at the front panel between the two: then it is not known which one
@@ -149,7 +149,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
                 before, field, after, status = self._parts(answer)
                 if before == after:
                     return self._field_t(answer, field, _UNITS_T[before], status)
-        raise BadAnswer(self.transport.address, _READING, answer, "a unit that stays what it is")
+        raise BadAnswer(self.transport.address, _READING, answer, "a unit that does not change")
 
     def _parts(self, answer: str) -> tuple[str, str, str, int]:
         """Return unit, field, unit and status of an answer.  Raises BadAnswer."""
@@ -189,7 +189,7 @@ class LakeShoreGaussmeter(ScpiInstrument):
 
 
 def _whole_numbers(text: str) -> list[int] | None:
-    """Return the numbers of a list with commas; None if it is none."""
+    """Return the numbers of a list with commas; None for any other text."""
     return [int(part) for part in text.split(",")] if _LIST.matches(text) else None
 
 

@@ -37,7 +37,7 @@ class NeverTriggered(InstrumentError):
 
 
 class NothingAcquired(InstrumentError):
-    """A trace was asked for, but none was taken since the scope was prepared: what it holds would be an old one."""
+    """A trace was asked for, but none was taken since the scope was prepared: its record would be an old one."""
 
     def __init__(self, address: str) -> None:
         super().__init__(address, "nothing was acquired since the last preparation or failure: call acquire() first")
@@ -113,11 +113,11 @@ class Oscilloscope(Instrument, Protocol):
         """Set the scope up; the trigger is in the middle of the record.
 
         channels: which are recorded, all with the same scaling, input 1 MΩ, probe 1:1;
-        duration_s: the record is at least as long [s]; points: it has at least so many if the converter is fast enough
-        and the memory large enough; volts_per_division: of eight [V]; offset_v: voltage in the middle of the screen;
+        duration_s: the record is at least as long [s]; points: their least number, if the converter is fast enough and
+        the memory large enough; volts_per_division: of eight [V]; offset_v: voltage in the middle of the screen;
         coupling: DC or AC; trigger_level_v: [V]; trigger_slope: rising, falling or either; trigger_source: a channel;
         sweep: normal or single wait for the trigger, auto takes a record without one if it does not come.
-        Raises OutOfRange before anything is sent that the scope does not have, and for what it sets otherwise;
+        Raises OutOfRange before anything is sent that the scope does not have, and for a setting that it changes;
         CommandRefused; SettingsLost if it was reset meanwhile.
         """
 

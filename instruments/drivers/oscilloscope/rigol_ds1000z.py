@@ -106,7 +106,7 @@ class RigolDS1000Z(Scope):
     _PATIENCE = 0.1
 
     def _times(self, setup: Setup) -> dict[str, Value]:
-        """Twelve divisions of 1, 2 or 5 · 10ⁿ s: up to twice and a half as long as was asked for."""
+        """Choose twelve divisions of 1, 2 or 5 · 10ⁿ s: up to 2.5 times the duration that was asked for."""
         scale = self._time_scale(setup.duration_s)
         depth = self._depth(setup.points, len(setup.shown))
         self._duration = 12 * scale

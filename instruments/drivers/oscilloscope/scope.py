@@ -1,7 +1,7 @@
 """What the drivers of oscilloscopes do in the same way: preparing, waiting for the trigger, reading, and comparing.
 
 A scope that was reset, or whose keys were turned, gives good records of something else: its probe factor makes every
-voltage ten times too large, its level lets no pulse trigger.  So the driver keeps what it prepared, and compares before
+voltage ten times too large, its level lets no pulse trigger.  So the driver keeps its settings, and compares before
 it hands a record out and before it says that the signal never triggered.
 """
 
@@ -98,7 +98,7 @@ class Scope(ScpiInstrument):
         return {n: self.CHANNEL(self, n) for n in range(1, (self._inputs or 4) + 1)}
 
     def command(self, message: str) -> None:
-        """As every instrument; a reset takes the inputs' settings, too."""
+        """Send a command; a reset takes the inputs' settings, too."""
         super().command(message)
         if message.upper().startswith("*RST") and self._inputs:
             for channel in self.channel.values():
@@ -111,7 +111,7 @@ class Scope(ScpiInstrument):
         return int(digits[3]) if len(digits) > 3 and digits[3] in "1248" else 4
 
     def settings(self) -> dict[str, bool | float | str]:
-        """Every declared setting, those of the prepared channels as ``channel1_…``."""
+        """Return every declared setting, those of the prepared channels as ``channel1_…``."""
         channels = {
             f"channel{n}_{name}": value for n in self._channels for name, value in self.channel[n].settings().items()
         }
@@ -333,7 +333,7 @@ class Scope(ScpiInstrument):
         self._check("channel", channel, self._channels)
 
     def preamble(self, channel: int) -> Preamble:
-        """How the record of one channel is read; it is the one that is read next.  Raises NothingAcquired."""
+        """Read the preamble of one channel's record, the next to be fetched.  Raises NothingAcquired."""
         self._check_readable(channel)
         self._select(channel)
         answer = self.transport.query(":WAV:PRE?")
@@ -345,7 +345,7 @@ class Scope(ScpiInstrument):
             preamble = None
         # a scope prints all exponents with as many digits: where one has fewer, a byte is missing
         exponents = {len(field) for field in re.findall(r"[Ee][+-]\d+", answer)}
-        # 0: bytes, which is what was asked for; of some nothing follows, of others no record that any of these has
+        # 0: bytes, as requested; of other formats nothing follows, or no record that these scopes can have
         if preamble is None or len(exponents) > 1 or int(numbers[0]) != 0 or not preamble.plausible:
             self.reject(":WAV:PRE?", answer, "ten numbers, with format 0, points and their distance")
         return preamble

@@ -37,7 +37,7 @@ class Setup:
         return tuple(sorted({*self.channels, self.trigger_source}))
 
     def rounding(self, unit: str) -> float:
-        """How far from what it was given a scope may set a number of this unit."""
+        """Return the largest difference between a setting of this unit and the number that was sent."""
         return {"V": _OF_A_DIVISION * self.volts_per_division, "s": _OF_THE_RECORD * self.duration_s}.get(unit, 0.0)
 
 
@@ -59,7 +59,7 @@ class Channel(ScpiInstrument):
         self.scope, self.number, self.head = scope, number, self.HEAD.format(number)
 
     def header_in_use(self, header: str) -> str:
-        """With the name of the input."""
+        """Return the header with the name of the input."""
         return self.head + header
 
     def command(self, message: str) -> None:
@@ -67,11 +67,11 @@ class Channel(ScpiInstrument):
         self.scope.command(message)
 
     def reject(self, question: str, answer: str, expected: str) -> NoReturn:
-        """As the scope does."""
+        """Reject an answer as the scope does."""
         self.scope.reject(question, answer, expected)
 
     def rounding(self, row: Setting[Any]) -> float:
-        """As the scope does."""
+        """Return the rounding of the scope."""
         return self.scope.rounding(row)
 
     def __repr__(self) -> str:

@@ -62,7 +62,8 @@ class _SiglentChannel(Channel):
 
     def field_of(self, answer: str, header: str, key: str) -> str:
         """Return the text behind the header; a switch as 0 or 1."""
-        return _as_digit(_after_header(answer, self.header_in_use(header)))
+        text = _after_header(answer, self.header_in_use(header))
+        return {"ON": "1", "OFF": "0"}.get(text, text)
 
     def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
         """Ask for it: there is no error queue."""
@@ -72,10 +73,6 @@ class _SiglentChannel(Channel):
 def _single(value: float) -> float:
     """Return a number that came in single precision, which has seven digits: 0.2 instead of 0.20000000298."""
     return float(f"{value:.7g}")
-
-
-def _as_digit(text: str) -> str:
-    return {"ON": "1", "OFF": "0"}.get(text, text)
 
 
 class SiglentSDS1000XE(Scope):
@@ -125,7 +122,7 @@ class SiglentSDS1000XE(Scope):
     _PATIENCE = 0.1
 
     def header_in_use(self, header: str) -> str:
-        """Level and slope are those of the trigger's source."""
+        """Return the header; level and slope have that of the trigger's source."""
         if header not in {"TRLV", "TRSL"}:
             return header
         return f"C{self._setup.trigger_source if self._setup else 1}:{header}"
@@ -144,16 +141,16 @@ class SiglentSDS1000XE(Scope):
         self.ask_back(setting, value)
 
     def forget_errors(self) -> None:
-        """There is no error queue; answers are to have headers."""
+        """Ask for answers with headers; there is no error queue."""
         self.transport.write("CHDR SHORT")
 
     def raise_errors(self, after: str) -> None:
-        """There is no error queue."""
+        """Do nothing: there is no error queue."""
 
     # --- preparing ---
 
     def _times(self, setup: Setup) -> dict[str, Value]:
-        """Fourteen divisions of 1, 2 or 5 · 10ⁿ s: up to twice and a half as long as was asked for."""
+        """Choose fourteen divisions of 1, 2 or 5 · 10ⁿ s: up to 2.5 times the duration that was asked for."""
         if not 1 <= setup.points <= max(_DEPTHS.values()):
             raise OutOfRange(self.transport.address, "points", setup.points, f"1 to {max(_DEPTHS.values())}")
         scales = (float(f"{m}e{k}") for k in range(-9, 3) for m in (1, 2, 5))
@@ -206,7 +203,7 @@ class SiglentSDS1000XE(Scope):
     # --- reading ---
 
     def preamble(self, channel: int) -> Preamble:
-        """How the record of one channel is read; see the base."""
+        """Read the preamble of one channel's record; see the base."""
         self._check_readable(channel)
         self._channel = channel
         question = f"C{channel}:WF? DESC"

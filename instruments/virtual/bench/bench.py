@@ -44,7 +44,7 @@ class VirtualBench:
         return self.session(device, stream=wanted.startswith("ASRL") or wanted.endswith("::SOCKET"))
 
     def reachable(self, device: VirtualInstrument) -> bool:
-        """Whether a program can connect to this instrument now."""
+        """Return whether a program can connect to this instrument now."""
         return device.clock.now() >= self.unreachable_until.get(id(device), 0.0)
 
     def session(self, device: VirtualInstrument, *, stream: bool) -> Session:

@@ -103,7 +103,7 @@ class Serial(SerialBase):
         return len(sent)
 
     def flush(self) -> None:
-        """Nothing to do: `write` returns when all bytes have left."""
+        """Do nothing: `write` returns when all bytes have left."""
         self._open_line()
 
     def reset_input_buffer(self) -> None:
@@ -112,7 +112,7 @@ class Serial(SerialBase):
             line.discard()
 
     def reset_output_buffer(self) -> None:
-        """Nothing to do: `write` returns when all bytes have left."""
+        """Do nothing: `write` returns when all bytes have left."""
         self._open_line()
 
     # --- the other wires: three-wire lines have none ---

@@ -90,12 +90,12 @@ class SerialLine:
         self._received += received_as(data, far_end, self.settings)
 
     def read(self, count: int, timeout: float, *, until: bytes = b"") -> tuple[bytes, bool] | None:
-        """As Session.read.  Fewer bytes than `count`, without `until`, are a time-out (None), and are lost."""
+        """Wait for bytes, as Session.read; fewer than `count`, without `until`, are a time-out (None), and are lost."""
         got = self.receive(count, timeout, until=until)
         return (got, False) if got and (len(got) == count or got[-1:] == until) else None
 
     def waiting(self) -> int:
-        """How many received bytes the program has not read."""
+        """Return the number of received bytes that the program has not read."""
         clock = self.session.device.clock
         while (ready := self.session.ready()) is not None and ready <= clock.now():
             self._receive_ready()
@@ -113,11 +113,11 @@ class SerialLine:
         self.discard()
 
     def status_byte(self) -> int:
-        """As Session.status_byte."""
+        """Return the status byte; see Session."""
         return self.session.status_byte()
 
     def trigger(self) -> None:
-        """As Session.trigger."""
+        """Trigger the instrument; see Session."""
         self.session.trigger()
 
     def close(self) -> None:

@@ -70,7 +70,7 @@ class ClientLock:
         self.holders = [holder for holder in self.holders if holder is not who]
 
     def excludes(self, who: object) -> bool:
-        """Whether others hold the lock, and `who` does not."""
+        """Return whether others hold the lock, and `who` does not."""
         return bool(self.holders) and all(holder is not who for holder in self.holders)
 
 
@@ -78,7 +78,7 @@ class AnswerFault(Protocol):
     """A fault that changes answers on their way; see `faults.Fault`."""
 
     def strikes(self, message: str) -> bool:
-        """Whether the fault changes the answer to this message."""
+        """Return whether the fault changes the answer to this message."""
 
     def act(self, session: Session, answer: Answer) -> Answer | None:
         """Return the answer as the fault leaves it, None where it is lost."""
@@ -198,11 +198,11 @@ class Session:
                 self._change_state(Event.OVERFLOW)  # the program asks and never reads
 
     def is_abort(self, message: str) -> bool:
-        """Whether this message aborts what the instrument works on."""
+        """Return whether this message aborts what the instrument works on."""
         return self.device.is_abort(message)
 
     def bytes_are_abort(self, data: bytes, *, end: bool = True) -> bool:
-        """Whether these bytes are one whole message that aborts what the instrument works on."""
+        """Return whether these bytes are one whole message that aborts what the instrument works on."""
         whole = not self._framer.begun and ((end and not self.stream) or data.endswith(b"\n"))
         return whole and self.is_abort(data.decode("latin-1"))
 
@@ -211,7 +211,7 @@ class Session:
             raise LinkLost
 
     def _drop_abandoned_answers(self) -> None:
-        """Drop the answers of a measurement that was given up; the program may read to its end what it has begun."""
+        """Drop the answers of a measurement that was given up; an answer that the program has begun may be read."""
         if self._state is State.ANSWERED:
             self._drop_while(lambda answer: answer.epoch != self.device.epoch)
 
@@ -222,7 +222,7 @@ class Session:
             self._change_state(Event.DROP)
 
     def ready(self) -> float | None:
-        """When the next bytes of an answer are ready [s], None where no answer is under way."""
+        """Return the time at which the next bytes of an answer are ready [s], None where no answer is under way."""
         with self.lock:
             self._check_link()
             self._drop_abandoned_answers()
@@ -306,7 +306,7 @@ class Session:
                     self.device.end_since(answer.begun)
 
     def clear(self) -> None:
-        """Device clear: drop what is under way in either direction, keep the settings."""
+        """Clear the device: drop what is under way in either direction, keep the settings."""
         with self.lock:
             self._framer.clear()
             self._change_state(Event.CLEAR)

@@ -58,7 +58,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
 
     @staticmethod
     def get_library_paths() -> Iterable[LibraryPath]:
-        """One name: there is nothing to look for on disk."""
+        """Return one name: there is nothing to look for on disk."""
         return (LibraryPath("levilab"),)
 
     def _init(self) -> None:
@@ -253,7 +253,7 @@ def _read(link: Link, count: int, timeout: float, termchar: bytes) -> tuple[byte
 
 
 def _seconds(timeout: int) -> float:
-    """VISA's milliseconds in seconds; its largest number means without end."""
+    """Convert VISA's milliseconds to seconds; its largest number means without end."""
     return math.inf if timeout == constants.VI_TMO_INFINITE else timeout / 1000
 
 

@@ -149,13 +149,13 @@ class VirtualInstrument:
         return run_to_end(self.steps(message))
 
     def steps(self, message: str) -> Steps[Answer | None]:
-        """As execute(), in steps."""
+        """Run one message as execute() does, in steps."""
         self.begun = max(self._ready, self.clock.now())
         self._ready = self.begun + self.pace
         return self._answer((yield from self.parser.steps(message)))
 
     def is_abort(self, message: str) -> bool:
-        """Whether this message aborts the work on the one before it."""
+        """Return whether this message aborts the work on the one before it."""
         return False
 
     def catch_up(self) -> Steps[None]:
@@ -190,7 +190,7 @@ class VirtualInstrument:
         self._ready = max(self._ready, instant)
 
     def trigger(self) -> None:
-        """``*TRG``, or the interface's own trigger message."""
+        """Take ``*TRG``, or the interface's own trigger message."""
 
     # --- what the rows need ---
 

@@ -123,7 +123,7 @@ def _piece(text: str, start: int, end: int, block_end: int) -> str:
 
 
 def _end_of_block(text: str, head: int) -> int:
-    """Where the definite-length block ends whose # is at `head`; just behind the # where it is no block."""
+    """Return the end of the definite-length block whose # is at `head`; just behind the # where it is no block."""
     data = head + 2 + int(text[head + 1])
     length = text[head + 2 : data]
     return min(len(text), data + int(length)) if _DIGITS.fullmatch(length) else head + 1
@@ -201,7 +201,7 @@ class Framer:
         self._looked, self._block_end, self._quote, self._dropping = 0, 0, b"", False
 
     def _end_of_message(self) -> int | None:
-        """Where the line feed is that ends the first message, None where it has not come yet."""
+        """Return the place of the line feed that ends the first message, None where it has not come yet."""
         special = _SPECIAL_BYTE if self.blocks else _LINE_END
         while found := special.search(self._buffer, self._looked):
             what = found[0]
@@ -222,7 +222,7 @@ class Framer:
         return None
 
     def _end_of_block(self, head: int) -> int | None:
-        """Where the block ends whose head is here; just behind the head where it is no block; None: not known yet."""
+        """Return the end of the block at `head`; just behind the head where it is no block; None: not known yet."""
         digits = self._buffer[head + 2 : head + 2 + self._buffer[head + 1] - ord("0")]
         length = bytes(digits)
         if not length.isdigit() and length:

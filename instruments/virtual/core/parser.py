@@ -222,7 +222,7 @@ class Parser:
         return run_to_end(self.steps(message))
 
     def steps(self, message: str) -> Steps[str | None]:
-        """As run(), in steps: other work may come between two units of the message."""
+        """Run one message as run() does, in steps: other work may come between two units of it."""
         answers: list[str] = []
         length, begun = 0, False
         for unit in read_units(message, path_memory=self.path_memory):

@@ -14,5 +14,5 @@ Signal = Callable[[float, float, int], Array]
 
 
 def no_signal(_start: float, _step: float, n: int) -> Array:
-    """Nothing is connected: 0 V."""
+    """Return 0 V: nothing is connected."""
     return np.zeros(n)

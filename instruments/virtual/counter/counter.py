@@ -168,11 +168,11 @@ class VirtualCounter(VirtualInstrument):
         self._completion_awaited = False
 
     def is_idle(self, now: float) -> bool:
-        """Whether no measurement is under way at this time [s]."""
+        """Return whether no measurement is under way at this time [s]."""
         return self._run is None or (self._run.complete and self._memory.available(now) == self._memory.size)
 
     def available(self) -> int:
-        """How many readings are in the memory by now."""
+        """Return the number of readings in the memory by now."""
         if self._run and self._ready < NEVER:
             run_to_end(self._run.advance(self._ready))
         return self._memory.available(self._ready)
@@ -311,7 +311,7 @@ class VirtualCounter(VirtualInstrument):
         self.on_change(name)
 
     def automatic(self, channel: int) -> str:
-        """Whether the level is found automatically."""
+        """Return whether the level is found automatically."""
         return f"{self.settings[f'automatic{channel}']:d}"
 
     def configuration(self) -> str:

@@ -123,7 +123,7 @@ class EdgeFinder:
         return Edge(self._passed, float(self._times[0])) if self._times.size else None
 
     def count_before(self, instant: float) -> int:
-        """How many known edges lie before this time [s]."""
+        """Return the number of known edges before this time [s]."""
         return self._passed + int(np.searchsorted(self._times, instant))
 
     def refresh(self, instant: float) -> None:

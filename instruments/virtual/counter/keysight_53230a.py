@@ -271,7 +271,7 @@ class Virtual53230A(VirtualCounter):
     # --- inputs ---
 
     def _wide(self, channel: int) -> float:
-        """How much larger everything is in the 50 V range."""
+        """Return the factor of all voltages in the 50 V range."""
         return 10.0 if self.value(f"range{channel}") > 5 else 1.0
 
     def greatest_level(self, channel: int) -> float:
@@ -385,7 +385,7 @@ class Virtual53230A(VirtualCounter):
         return ",".join(self.spell(found[name]) for name in names)
 
     def counted(self) -> int:
-        """How many readings the statistics are of."""
+        """Return the number of readings in the statistics."""
         return self.available() - self._counted_from
 
     def clear_statistics(self) -> None:

@@ -108,7 +108,7 @@ def period(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
 
 
 def single_period(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
-    """One period [s]."""
+    """Measure one period [s]."""
     return (yield from period(inputs, channel, GateTime(gate.begin, 0.0, gate.deadline)))
 
 

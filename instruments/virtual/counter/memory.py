@@ -1,4 +1,4 @@
-"""The memory of the virtual counters for their readings, and statistics of what it holds."""
+"""The memory of the virtual counters for their readings, and their statistics."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Memory:
         self.n_fetched = max(0, self.n_fetched - count)
 
     def available(self, now: float) -> int:
-        """How many readings there are by this time [s]."""
+        """Return the number of readings by this time [s]."""
         return int(np.searchsorted(np.frombuffer(self._done), now, "right")) if self._done else 0
 
     def truncate(self, now: float) -> None:
@@ -65,16 +65,16 @@ class Memory:
         return len(self._done)
 
     def done(self, back: int) -> float:
-        """When the last reading was complete, or the one `back` before it [s]; −∞ where that one is dropped."""
+        """Return when the last reading was complete, or the one `back` before it [s]; −∞ where it is dropped."""
         return self._done[-1 - back] if back < len(self._done) else -math.inf
 
     def slice(self, start: int, stop: int) -> tuple[Array, Array]:
-        """Values and time stamps of the readings from start to stop."""
+        """Return values and time stamps of the readings from start to stop."""
         return np.array(self._values[start:stop]), np.array(self._stamps[start:stop])
 
 
 def statistics(values: Array) -> dict[str, float]:
-    """Mean, standard deviation, extremes and Allan deviation of readings.
+    """Return mean, standard deviation, extremes and Allan deviation of readings.
 
     Without a reading each is the instruments' "not a number"; of one reading the deviations are 0.
 

@@ -154,7 +154,7 @@ class _Pacing:
     _ticks: int = field(default=0)
 
     def gate(self, opened: float, begins: bool) -> float:  # noqa: FBT001
-        """How long this measurement's gate is, to end at its tick [s]."""
+        """Return the length of this measurement's gate, to end at its tick [s]."""
         if begins or math.isnan(self._origin):
             self._origin, self._ticks = opened, 0
         self._ticks = max(self._ticks + 1, math.ceil((opened - self._origin) / self.aperture))
@@ -236,7 +236,7 @@ class VirtualCNT91(VirtualCounter):
         """MEASure?: CONFigure, INITiate and FETCh?."""
         self.configure(name, parameters, array=array)
         self.initiate()
-        return (yield from self.fetch(int(self._wanted()) if array else 1))
+        return (yield from self.fetch(int(self._result_count()) if array else 1))
 
     def initiate(self, *, endless: bool = False) -> None:
         """INITiate."""
@@ -248,7 +248,7 @@ class VirtualCNT91(VirtualCounter):
         def measure(inputs: Inputs, begin: float, number: int) -> Measurement:
             deadline = begin + timeout
             if number == 0 and arming in {"EXT1", "EXT2"}:
-                begin = yield from self._armed(inputs, int(arming[-1]), begin)
+                begin = yield from self._arming_time(inputs, int(arming[-1]), begin)
                 deadline = begin + timeout
             gate = aperture
             if gapless:
@@ -262,7 +262,7 @@ class VirtualCNT91(VirtualCounter):
                 begin=self._ready,
                 inputs=self.inputs(),
                 measure=measure,
-                samples=math.inf if endless else self._wanted(),
+                samples=math.inf if endless else self._result_count(),
                 dead_time=dead,
                 delay=self.value("arming_delay"),
                 shortest=aperture if self.kind in {"FREQ", "PER"} else 0.0,
@@ -272,8 +272,8 @@ class VirtualCNT91(VirtualCounter):
         )
 
     @staticmethod
-    def _armed(inputs: Inputs, channel: int, begin: float) -> Generator[Wanted, None, float]:
-        """When the arming input has its edge."""
+    def _arming_time(inputs: Inputs, channel: int, begin: float) -> Generator[Wanted, None, float]:
+        """Return the time of the arming input's edge [s]."""
         edge = yield from first_edge(inputs.finder(channel, begin), begin, math.inf)
         return edge.time if edge else begin
 
@@ -288,7 +288,7 @@ class VirtualCNT91(VirtualCounter):
         return number_text(value)
 
     def spell_whole(self, value: float) -> str:
-        """No plus sign, and infinity as a number."""
+        """Return the number without a plus sign, and infinity as a number."""
         return number_text(value) if value >= INFINITY else str(round(value))
 
     # --- inputs ---
@@ -317,8 +317,8 @@ class VirtualCNT91(VirtualCounter):
 
     # --- series ---
 
-    def _wanted(self) -> float:
-        """Results of one INITiate."""
+    def _result_count(self) -> float:
+        """Return the number of results of one INITiate."""
         if self.settings["averaging"]:
             return self.value("averaged")
         return self.value("armings") * self.value("triggers")
@@ -331,10 +331,10 @@ class VirtualCNT91(VirtualCounter):
     def read_array(self, parameters: list[str]) -> Steps[str]:
         """Execute READ:ARRay? n, which is READ? with n results.  Raises ScpiError."""
         count = self._size(parameters)
-        if count > self._wanted():
+        if count > self._result_count():
             raise ScpiError(-221)
         self._restart()
-        most = count if math.isfinite(count) else min(self._wanted(), self.value("most"))
+        most = count if math.isfinite(count) else min(self._result_count(), self.value("most"))
         return (yield from self.fetch(int(most)))
 
     def _restart(self) -> None:
@@ -366,7 +366,7 @@ class VirtualCNT91(VirtualCounter):
         return (yield from self.fetch(int(min(fresh, self.value("most"))), size_known=False))
 
     def fetch(self, count: int, *, size_known: bool = True) -> Steps[str]:
-        """So many results, from where the last fetch ended; a negative number: the last ones, the place is kept."""
+        """Fetch results from where the last fetch ended; a negative number: the last ones, the place is kept."""
         if self._run is None and not self._memory.size:
             raise ScpiError(-230)
         if self.settings["averaging"]:
@@ -386,21 +386,21 @@ class VirtualCNT91(VirtualCounter):
         return self._spell(*self._memory.slice(start, start + count), size_known=size_known)
 
     def _wait_until(self, held: int) -> Steps[bool]:
-        """Wait until the memory holds this many.  Raises ScpiError if it never will."""
+        """Wait until the memory holds this number of readings.  Raises ScpiError if it never will."""
         gone = self._run.n_taken - self._memory.size if self._run else 0
         if held > self._memory.size and (self._run is None or gone + held > self._run.wanted):
             raise ScpiError(-230)
         return (yield from self.wait_for(gone + held))
 
     def _fetch_statistic(self) -> Steps[str]:
-        """With statistics on, what is fetched is their result."""
+        """Fetch the statistics' result in place of readings, where statistics are on."""
         if not (yield from self.wait_for()):
             return ""
         name = {"MEAN": "mean", "SDEV": "sdev", "MIN": "min", "MAX": "max", "ADEV": "adev", "MINM": "min"}
         return number_text(self.statistics()[name[str(self.settings["average_type"])]])
 
     def all_statistics(self) -> Steps[str]:
-        """Mean, standard deviation, least, greatest, peak to peak."""
+        """Return mean, standard deviation, least, greatest, peak to peak."""
         yield from self.wait_for()
         found = self.statistics()
         return ",".join(number_text(found[name]) for name in ("mean", "sdev", "min", "max", "ptp"))
@@ -408,7 +408,7 @@ class VirtualCNT91(VirtualCounter):
     # --- formats ---
 
     def _spell(self, values: Array, stamps: Array, *, size_known: bool = True) -> str:
-        """Results in the format that is set (handbook, 8-36 and 8-39).
+        """Return results in the format that is set (handbook, 8-36 and 8-39).
 
         REAL is a block of eight bytes for each number, PACKed one block for all, time stamps in it as whole
         picoseconds; and if the size was not asked for, its length has six digits.

@@ -21,7 +21,7 @@ _EDGES = (5e-9, 100e-9)
 
 
 def _square(frequency: float) -> tuple[float, float]:
-    """20 to 80 % up to 10 MHz, 40 to 60 % above."""
+    """Return the limits of the duty cycle: 20 to 80 % up to 10 MHz, 40 to 60 % above."""
     return (20.0, 80.0) if frequency <= 10e6 else (40.0, 60.0)
 
 
@@ -85,7 +85,7 @@ class Virtual33220A(VirtualGenerator):
     ROWS: ClassVar = SHARED
 
     def spell(self, value: float) -> str:
-        """Fourteen digits: +1.0000000000000E+03."""
+        """Return a number with fourteen digits: +1.0000000000000E+03."""
         return f"{value:+.13E}"
 
     # --- arbitrary waveforms: one in the volatile memory, four that are kept, and the built-in ones ---

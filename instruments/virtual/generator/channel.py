@@ -1,4 +1,4 @@
-"""One output of a virtual function generator: its settings, their limits, its triggers, and what it puts out.
+"""One output of a virtual function generator: its settings, their limits, its triggers, and its signal.
 
 Sources: Agilent/Keysight 33500 Series Operating and Service Guide (limits, couplings); Agilent 33220A User's Guide;
 the state after ``*RST`` as a public driver of the family lists it.  The real instrument does not refuse a number
@@ -135,7 +135,7 @@ class Channel:
         return float(self[name])
 
     def on(self, mode: str) -> bool:
-        """Whether a mode is on; not every family has every mode."""
+        """Return whether a mode is on; not every family has every mode."""
         return bool(self._settings.get(self.prefix + mode))
 
     def conflict(self, text: str) -> None:
@@ -196,27 +196,27 @@ class Channel:
         return self.number("arb_rate") / self.points if self.sampled else self.number("frequency")
 
     def set_frequency(self, value: float) -> None:
-        """Of the waveform that is selected [Hz]."""
+        """Set the frequency of the selected waveform [Hz]."""
         if self.sampled:
             self["arb_rate"] = value * self.points
         else:
             self["frequency"] = value
 
     def set_rate(self, value: float) -> None:
-        """Return the samples per second of an arbitrary waveform."""
+        """Set the samples per second of an arbitrary waveform."""
         self["arb_rate"] = value
 
     def frequency_limits(self) -> tuple[float, float]:
-        """Of the waveform that is selected [Hz]."""
+        """Return the limits of the frequency of the selected waveform [Hz]."""
         top = self.waveform.top
         return self.waveform.bottom, top / self.points if self.sampled else top
 
     def period(self) -> float:
-        """Of all waveforms but samples [s]."""
+        """Return the period, of all waveforms but samples [s]."""
         return 1 / self.number("frequency")
 
     def set_period(self, value: float) -> None:
-        """Of all waveforms but samples [s]."""
+        """Set the period, of all waveforms but samples [s]."""
         self["frequency"] = 1 / value
 
     def square_periods(self) -> tuple[float, float]:
@@ -239,7 +239,7 @@ class Channel:
         self["sweep_start"], self["sweep_stop"] = value - half, value + half
 
     def sweep_span(self) -> float:
-        """From start to stop [Hz]."""
+        """Return the span from start to stop [Hz]."""
         return self.number("sweep_stop") - self.number("sweep_start")
 
     def set_sweep_span(self, value: float) -> None:
@@ -263,13 +263,13 @@ class Channel:
         return -top, top
 
     def amplitude_limits(self) -> tuple[float, float]:
-        """Of the peak-to-peak voltage [V]; there is always some, even where the limits leave no room for it."""
+        """Return the limits of the peak-to-peak voltage [V]; the upper one is never below the lower one."""
         low, high = self.voltage_limits()
         least = 2 * self.family.least_vpp * self.load_factor
         return least, max(least, high - low)
 
     def offset_limits(self) -> tuple[float, float]:
-        """Of the offset at the amplitude there is [V]; a DC voltage has no amplitude."""
+        """Return the limits of the offset at the present amplitude [V]; a DC voltage has no amplitude."""
         low, high = self.voltage_limits()
         half = 0.0 if self["waveform"] == "DC" else self.number("amplitude_vpp") / 2
         return min(0.0, low + half), max(0.0, high - half)
@@ -302,12 +302,12 @@ class Channel:
         return round(self.number("offset") - self.number("amplitude_vpp") / 2, 12)
 
     def high_limits(self) -> tuple[float, float]:
-        """Of the high level [V]."""
+        """Return the limits of the high level [V]."""
         low, high = self.voltage_limits()
         return low + self._step(), high
 
     def low_limits(self) -> tuple[float, float]:
-        """Of the low level [V]."""
+        """Return the limits of the low level [V]."""
         low, high = self.voltage_limits()
         return low, high - self._step()
 
@@ -346,35 +346,35 @@ class Channel:
     # --- pulses ---
 
     def pulse_limits(self) -> tuple[float, float]:
-        """Of the width of a pulse at the period there is [s]."""
+        """Return the limits of the width of a pulse at the present period [s]."""
         least = max(self.family.shortest_pulse, self.family.shortest_edge / self.family.edge_part)
         return least, 1 / self.number("frequency") - least
 
     def set_width(self, width: float) -> None:
-        """Return the width of pulses [s], and with it their duty cycle."""
+        """Set the width of pulses [s], and with it their duty cycle."""
         self["pulse_width"], self["pulse_duty"] = width, 100 * width * self.number("frequency")
 
     def pulse_duties(self) -> tuple[float, float]:
-        """Of the duty cycle of pulses at the period there is [%]."""
+        """Return the limits of the duty cycle of pulses at the present period [%]."""
         low, high = self.pulse_limits()
         return 100 * low * self.number("frequency"), 100 * high * self.number("frequency")
 
     def set_pulse_duty(self, duty: float) -> None:
-        """Return the duty cycle of pulses [%], and with it their width."""
+        """Set the duty cycle of pulses [%], and with it their width."""
         self["pulse_duty"], self["pulse_width"] = duty, duty / 100 / self.number("frequency")
 
     def set_edges(self, time: float) -> None:
-        """Both edges of pulses [s]."""
+        """Set both edges of pulses [s]."""
         self["pulse_leading"] = self["pulse_trailing"] = time
 
     # --- triggers ---
 
     def set_burst_cycles(self, cycles: float) -> None:
-        """How many cycles a burst has, a whole number."""
+        """Set the number of cycles of a burst, a whole number."""
         self["burst_cycles"] = float(round(cycles))
 
     def burst_periods(self) -> tuple[float, float]:
-        """Of the time between bursts that start by themselves [s]."""
+        """Return the limits of the time between bursts that start by themselves [s]."""
         return 1e-6, self.family.longest_burst
 
     @property
@@ -423,7 +423,7 @@ class Channel:
         )
 
     def _is_gated(self) -> bool:
-        """Whether a closed gate keeps the signal in: nothing is plugged into the virtual one's gate."""
+        """Return whether a closed gate keeps the signal in: nothing is plugged into the virtual one's gate."""
         return self["burst_mode"] == "GAT" and self["gate_polarity"] == "NORM"
 
     def _burst(self) -> Burst | None:

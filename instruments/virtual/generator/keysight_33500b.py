@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def _square_33500(frequency: float) -> tuple[float, float]:
-    """0.01 to 99.99 %, and no pulse shorter than 16 ns."""
+    """Return the limits of the duty cycle: 0.01 to 99.99 %, and no pulse shorter than 16 ns."""
     least = max(0.01, 100 * 16e-9 * frequency)
     return least, 100 - least
 

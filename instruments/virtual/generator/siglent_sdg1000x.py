@@ -106,7 +106,7 @@ def _key(n: int, name: str) -> str:
 
 
 def _pairs(parameters: list[str]) -> list[tuple[str, str]]:
-    """Names and what stands behind each.  Raises ScpiError."""
+    """Return names and the text behind each.  Raises ScpiError."""
     if not parameters or len(parameters) % 2:
         raise ScpiError(-109)
     return [(name.upper(), value) for name, value in zip(parameters[::2], parameters[1::2], strict=True)]
@@ -135,7 +135,7 @@ class VirtualSDG1000X(VirtualInstrument):
         self._listener = listener
 
     def spell(self, value: float) -> str:
-        """Six digits, and none that is zero at the end: 1000, 0.001."""
+        """Return a number with six digits, without zeros at the end: 1000, 0.001."""
         return f"{value:.6g}"
 
     def reply(self, header: str, text: str, unit: str = "") -> str:
@@ -156,7 +156,7 @@ class VirtualSDG1000X(VirtualInstrument):
         return float(self.settings[_key(n, name)])
 
     def _load_factor(self, n: int) -> float:
-        """Of the open-circuit voltage at the load."""
+        """Return the part of the open-circuit voltage that is at the load."""
         load = self._number(n, "load")
         return 1.0 if load >= INFINITE else load / (load + SOURCE_OHM)
 

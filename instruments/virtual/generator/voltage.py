@@ -46,7 +46,7 @@ def voltage(output: Output, turns: Array, times: Array) -> Array:
 
 
 def fundamental(output: Output) -> float:
-    """Amplitude of the first harmonic [V]; of bursts with pauses its mean over their period."""
+    """Return the amplitude of the first harmonic [V]; of bursts with pauses its mean over their period."""
     one = _FUNDAMENTALS.get(output.waveform, _none)(output) if output.amplitude else 0.0
     return output.amplitude * one * _busy(output)
 
@@ -71,7 +71,7 @@ def _square(turns: Array, _: Array, output: Output) -> Array:
 
 
 def _slopes(turns: Array, rises: float) -> Array:
-    """Up for this part of a period, down for the rest."""
+    """Return a line that rises from −1 to 1 for this part of a period and falls for the rest."""
     place = (turns + rises / 2) % 1.0
     up = 2 * place / (rises or 1.0) - 1
     down = 1 - 2 * (place - rises) / ((1 - rises) or 1.0)
@@ -87,7 +87,7 @@ def _triangle(turns: Array, _: Array, _output: Output) -> Array:
 
 
 def _hold_samples(turns: Array, _: Array, output: Output) -> Array:
-    """Each sample holds until the next; 1e-9: a time that is meant to be that of a sample may be a little before it."""
+    """Hold each sample until the next; 1e-9 allows for the rounding of times just before a sample."""
     samples = _samples(output)
     return samples[(((turns % 1.0) * samples.size + 1e-9).astype(np.int64)) % samples.size]
 
@@ -97,7 +97,7 @@ def _samples(output: Output) -> Array:
 
 
 def _noise(_: Array, times: Array, _output: Output) -> Array:
-    """Noise, always the same at the same time: a table whose index is a hash of the time (splitmix64)."""
+    """Return noise that is always the same at the same time: a table whose index is a hash of the time (splitmix64)."""
     # 0.38: no round time lies between two cells, where rounding would choose
     cell = np.floor(times / _NOISE_CELL + 0.38).astype(np.int64).astype(np.uint64)
     cell = (cell ^ (cell >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -111,13 +111,13 @@ def _noise_table() -> Array:
 
 
 def _bits(turns: Array, _: Array, _output: Output) -> Array:
-    """PN7, the sequence after ``*RST``; a turn is a bit."""
+    """Return PN7, the sequence after ``*RST``; a turn is a bit."""
     return _pn7()[np.floor(turns).astype(np.int64) % 127]
 
 
 @cache
 def _pn7() -> Array:
-    """x⁷ + x⁶ + 1."""
+    """Return the sequence of the polynomial x⁷ + x⁶ + 1."""
     register, bits = 127, []
     for _ in range(127):
         bits.append(1.0 if register & 1 else -1.0)

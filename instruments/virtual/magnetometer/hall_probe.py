@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-#: An alternating field is looked at so long [s], so often.
+#: An alternating field: duration [s] and number of samples of one reading.
 _WINDOW, _LOOKS = 0.2, 512
-#: A steady one so often, within the time constant of the filter.
+#: A steady field: samples within the time constant of the filter.
 _STEADY_LOOKS = 16
 
 
@@ -40,7 +40,7 @@ class Reading:
 class HallProbe:
     """A probe at its place.
 
-    flux_density: along its axis, at a time [s] → [T]; zero_error: what it shows without a field [T].
+    flux_density: along its axis, at a time [s] → [T]; zero_error: its reading without a field [T].
     """
 
     flux_density: Callable[[float], float]
@@ -67,7 +67,7 @@ class HallProbe:
 
 
 def _frequency(field: NDArray[np.float64], step: float) -> float:
-    """Of an alternating field, by its rising crossings of the mean [Hz]; 0 if there are fewer than two."""
+    """Return the frequency of an alternating field, by its rising crossings of the mean [Hz]; 0 of fewer than two."""
     level = field - field.mean()
     rising = np.flatnonzero((level[:-1] < 0) & (level[1:] >= 0))
     if len(rising) < 2:

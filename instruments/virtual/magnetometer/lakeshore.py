@@ -241,7 +241,7 @@ class VirtualGaussmeter(VirtualInstrument):
     # --- readings ---
 
     def _time_constant(self) -> float:
-        """Of the filter for steady fields [s]."""
+        """Return the time constant of the filter for steady fields [s]."""
         raise NotImplementedError
 
     def _counts(self) -> float:
@@ -249,7 +249,7 @@ class VirtualGaussmeter(VirtualInstrument):
         raise NotImplementedError
 
     def _interval(self) -> float:
-        """From one reading to the next [s]."""
+        """Return the time from one reading to the next [s]."""
         return 1 / 30
 
     def reading(self) -> Reading:
@@ -264,7 +264,7 @@ class VirtualGaussmeter(VirtualInstrument):
         return last
 
     def _mode(self) -> int:
-        """1: steady, 2: RMS, 3: peak."""
+        """Return the mode: 1 steady, 2 RMS, 3 peak."""
         return int(self.value("mode"))
 
     def measured(self) -> float:
@@ -277,7 +277,7 @@ class VirtualGaussmeter(VirtualInstrument):
         return reading.steady - self._zero
 
     def _peak(self, reading: Reading) -> float:
-        """Which of the peaks is shown [T]."""
+        """Return the peak on display [T]."""
         return reading.highest + self._hall.zero_error
 
     def shown(self) -> float:
@@ -316,7 +316,7 @@ class VirtualGaussmeter(VirtualInstrument):
         self.relative_to = self._unit() * number(parameters[0], low=-limit, high=limit, default=0.0)
 
     def alarms(self) -> tuple[bool, bool]:
-        """Whether the low and the high alarm are on."""
+        """Return whether the low and the high alarm are on."""
         if not self.value("alarm") or self.probe is None:
             return False, False
         size = self.measured() / self._unit()

@@ -99,7 +99,7 @@ class Acquisition:
         self.latest = old
 
     def stop(self, now: float) -> None:
-        """Acquire no more; a scope that ran on its own keeps what it has just seen."""
+        """Acquire no more; a scope that ran on its own keeps its last record."""
         self.follow(now)
         if self.armed is not None and self.latest is None and self._plan.automatic:
             trigger = max(now - self._plan.length, 0.0) - self._plan.record.origin
@@ -112,7 +112,7 @@ class Acquisition:
             self._forced = max(now, self.filled)
 
     def block(self) -> None:
-        """No trigger comes: the instrument is busy until a device clear."""
+        """Stay busy until a device clear: no trigger comes."""
         self.blocked = True
 
     def unblock(self) -> None:
@@ -173,7 +173,7 @@ class Acquisition:
         return True
 
     def running(self, now: float) -> bool:
-        """Whether the scope acquires or waits for a trigger."""
+        """Return whether the scope acquires or waits for a trigger."""
         self.follow(now)
         return self.armed is not None
 

@@ -66,14 +66,14 @@ _MEASUREMENTS = {
 }
 #: Measurements whose answers are percentages.
 _PERCENT = {"PDUTY", "NDUTY", "OVERSHOOT", "PRESHOOT"}
-#: Words before the source that say over what is measured.
+#: Words before the source: the interval of the measurement.
 _INTERVALS = ("CYCLe", "DISPlay", "AC", "DC")
 #: Sources that a waveform may have beside the channels; this model has nothing in them.
 _EMPTY_SOURCES = ("FUNCtion", "MATH", "FFT", "WMEMory1", "WMEMory2", "EXTernal", "ABUS")
 
 
 def _levels(scope: VirtualDSOX1000) -> tuple[float, float]:
-    """Three quarters of the full scale from the middle of the screen."""
+    """Return the limits of the level: three quarters of the full scale from the middle of the screen."""
     channel = scope.source_channel() or 1
     reach, middle = 6 * scope.division(channel), scope.value(f"chan{channel}_offset")
     return middle - reach, middle + reach
@@ -213,7 +213,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         super().__init__(clock, signals=signals, channels=channels, identity=identity)
 
     def spell(self, value: float) -> str:
-        """Seven digits, as in the preamble of a real one."""
+        """Return a number with seven digits, as in the preamble of a real one."""
         return f"{value:+.6E}"
 
     # --- acquiring ---
@@ -314,18 +314,18 @@ class VirtualDSOX1000(VirtualOscilloscope):
         return rate, max(2, round(rate * length))
 
     def screen(self) -> tuple[float, float]:
-        """Ten divisions, the reference one from the left, in the middle, or one from the right."""
+        """Return ten divisions, the reference one from the left, in the middle, or one from the right."""
         scale = self.value("time_scale")
         before = {"LEFT": 1, "CENT": 5, "RIGH": 9}[str(self.settings["time_reference"])]
         return self.value("time_offset") - before * scale, 10 * scale
 
     def scaling(self, channel: int) -> tuple[float, int]:
-        """199 codes for eight divisions.  The offset, in the middle, is set to whole codes."""
+        """Return volts per code (199 for eight divisions) and the code of 0 V: the offset is set to whole codes."""
         volts_per_code = 8 * self.division(channel) / _CODES_ON_SCREEN
         return volts_per_code, self.middle - round(self.value(f"chan{channel}_offset") / volts_per_code)
 
     def codes_on_screen(self, channel: int) -> tuple[float, float]:
-        """Eight divisions around the middle."""
+        """Return the codes of eight divisions around the middle."""
         return float(self.middle), float(_CODES_ON_SCREEN)
 
     def fit(self, channel: int, middle: float, division: float) -> None:
@@ -404,7 +404,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
     # --- measurements and pictures ---
 
     def set_source(self, parameters: list[str]) -> None:
-        """One source, or two, of which only the first is measured."""
+        """Set one source, or two, of which only the first is measured."""
         if not 1 <= len(parameters) <= 2:
             raise ScpiError(-109 if not parameters else -108)
         self.settings["measure_source"] = f"CHAN{self.channel_of(parameters[0])}"
@@ -438,7 +438,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         return ",".join(self._value(name, channel) for name, channel in self._results) or "NONE"
 
     def picture(self, parameters: list[str]) -> str:
-        """``[<format>[,<palette>]]``.  Raises ScpiError."""
+        """Return the picture, for ``[<format>[,<palette>]]``.  Raises ScpiError."""
         if len(parameters) > 2:
             raise ScpiError(-108)
         form, palette = (*parameters, *("BMP", "COLor")[len(parameters) :])

@@ -46,7 +46,7 @@ class Measured:
         return _level(self.volts, upper=False)
 
     def crossings(self, part: float, *, rising: bool) -> Volts:
-        """Where the trace crosses base + part·(top − base), in samples, interpolated."""
+        """Return the places where the trace crosses base + part·(top − base), in samples, interpolated."""
         amplitude = self.top - self.base
         sign = 1.0 if rising else -1.0
         level = sign * (self.base + part * amplitude)
@@ -81,7 +81,7 @@ class Measured:
         return _mean_gap(self.falls, self.rises) * self.step
 
     def transition(self, *, rising: bool) -> float:
-        """Mean time from 10 % to 90 % or back [s]."""
+        """Return the mean time from 10 % to 90 % or back [s]."""
         first, last = (0.1, 0.9) if rising else (0.9, 0.1)
         return _mean_gap(self.crossings(first, rising=rising), self.crossings(last, rising=rising)) * self.step
 
@@ -92,11 +92,11 @@ class Measured:
         return self.volts[round(self.rises[0]) : round(self.rises[-1])]
 
     def overshoot(self) -> float:
-        """How far the trace goes beyond its top, in parts of the amplitude."""
+        """Return the height of the trace above its top, in parts of the amplitude."""
         return (float(self.volts.max()) - self.top) / self._amplitude()
 
     def preshoot(self) -> float:
-        """How far the trace goes below its base, in parts of the amplitude."""
+        """Return the depth of the trace below its base, in parts of the amplitude."""
         return (self.base - float(self.volts.min())) / self._amplitude()
 
     def _amplitude(self) -> float:
@@ -171,7 +171,7 @@ MEASUREMENTS: dict[str, Callable[[Measured], float]] = {
 
 
 def measure(name: str, trace: Measured) -> float | None:
-    """One of the measurements, or None where the trace does not show what it needs.
+    """Return one of the measurements, or None where the trace does not show enough for it.
 
     >>> square = np.repeat([0.0, 1.0, 0.0, 1.0, 0.0], 100)
     >>> measure("FREQUENCY", Measured(square, step=1e-3, start=0.0))

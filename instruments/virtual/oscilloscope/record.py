@@ -84,7 +84,7 @@ class Record:
         return replace(self, trigger=trigger, forced=forced, _kept={})
 
     def codes(self, channel: int, first: int, count: int, *, of: int, start: float, step: float) -> Codes:
-        """Codes first … first + count − 1 of those that begin at start [s from the trigger], a step apart [s].
+        """Return codes first … first + count − 1 of those that begin at start [s from the trigger], a step apart [s].
 
         of: how many there are.
         """
@@ -125,7 +125,7 @@ class Edge:
     _looks: int = 0
 
     def until(self, stop: float) -> float | None:
-        """When the first edge is, if it is before stop [s]."""
+        """Return the time of the first edge, if it is before stop [s]."""
         self._armed = self._armed or [False] * len(self.slopes)
         while self.position < stop:
             n = min(_FINE_LOOKS, math.ceil((stop - self.position) / self.step) + 1)

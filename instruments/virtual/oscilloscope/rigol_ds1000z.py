@@ -28,7 +28,7 @@ _ON_SCREEN = 1200
 #: Points that one block may have, by format.
 _LONGEST = {"BYTE": 250_000, "WORD": 125_000, "ASC": 15_625}
 
-#: The items of :MEASure:ITEM as this maker spells them, and what they are called here.
+#: The items of :MEASure:ITEM as this maker spells them, and their names here.
 _ITEMS = {
     "VMAX": "VMAX",
     "VMIN": "VMIN",
@@ -189,7 +189,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
     ROWS: ClassVar = (*_CONTROL, *_TIME, *_TRIGGER, *_WAVEFORM, *_REST)
 
     def spell(self, value: float) -> str:
-        """As in the preamble that public drivers quote: 2.000000e-05."""
+        """Return a number as in the preamble that public drivers quote: 2.000000e-05."""
         return f"{value:.6e}"
 
     # --- acquiring ---
@@ -279,7 +279,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
         return tuple(depth // share for depth in _DEPTHS)
 
     def _share(self) -> int:
-        """By how many the converter and the memory are shared: 1, 2 or 4."""
+        """Return the number of channels that share converter and memory: 1, 2 or 4."""
         return {0: 1, 1: 1, 2: 2}.get(len(self.shown()), 4)
 
     # --- scaling ---
@@ -296,7 +296,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
         return min(fastest, points / length), points
 
     def screen(self) -> tuple[float, float]:
-        """Twelve divisions around the offset."""
+        """Return twelve divisions around the offset."""
         scale = self.value("time_scale")
         return self.value("time_offset") - 6 * scale, 12 * scale
 
@@ -362,18 +362,18 @@ class VirtualDS1000Z(VirtualOscilloscope):
         """MEASure:ITEM: a measurement for the screen; it must exist.  Raises ScpiError."""
         if not parameters:
             raise ScpiError(-109)
-        _named(parameters[0])
+        _name_of_item(parameters[0])
         self._where(parameters[1:])
 
     def item(self, parameters: list[str]) -> str:
         """MEASure:ITEM?: what is measured.  Raises ScpiError."""
         if not parameters:
             raise ScpiError(-109)
-        name, channel = _named(parameters[0]), self._where(parameters[1:])
+        name, channel = _name_of_item(parameters[0]), self._where(parameters[1:])
         return self.spell(self.measured(name, channel))
 
     def statistic(self, parameters: list[str]) -> str:
-        """Statistics of one: every value but the deviation is the present one."""
+        """Return a statistic of a measurement: every value but the deviation is the present one."""
         if not parameters:
             raise ScpiError(-109)
         kind = choice(parameters[0], _STATISTICS)
@@ -393,11 +393,11 @@ class VirtualDS1000Z(VirtualOscilloscope):
 
 
 def _refuse_mathematics(on: bool) -> None:  # noqa: FBT001
-    """There is no mathematics in this model.  Raises ScpiError when it is switched on."""
+    """Refuse mathematics, which this model has not.  Raises ScpiError when it is switched on."""
     if on:
         raise ScpiError(-221)
 
 
-def _named(item: str) -> str:
+def _name_of_item(item: str) -> str:
     spelled = choice(item, _WORDS)
     return next(name for word, name in _ITEMS.items() if choice(word, (word,)) == spelled)

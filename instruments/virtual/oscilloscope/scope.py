@@ -90,11 +90,11 @@ class VirtualOscilloscope(VirtualInstrument):
         raise NotImplementedError
 
     def screen(self) -> tuple[float, float]:
-        """Where the screen begins [s from the trigger] and how long it is [s]."""
+        """Return the beginning of the screen [s from the trigger] and its length [s]."""
         raise NotImplementedError
 
     def scaling(self, channel: int) -> tuple[float, int]:
-        """Volts per code and the code of 0 V, which may lie beyond the converter.
+        """Return volts per code and the code of 0 V, which may lie beyond the converter.
 
         The offset is what is added to the trace: it lifts it by whole codes.
         """
@@ -116,7 +116,7 @@ class VirtualOscilloscope(VirtualInstrument):
         return "trigger_level"
 
     def source_word(self, channel: int) -> str:
-        """Return a channel as a source of the trigger."""
+        """Return the word for a channel as the trigger's source."""
         return f"CHAN{channel}"
 
     def slope_name(self, channel: int) -> str:
@@ -124,11 +124,11 @@ class VirtualOscilloscope(VirtualInstrument):
         return "trigger_slope"
 
     def division(self, channel: int) -> float:
-        """Volts per division."""
+        """Return the volts per division."""
         return self.value(f"chan{channel}_scale")
 
     def probe(self, channel: int) -> float:
-        """How many times less than the probe's tip the input sees."""
+        """Return the factor by which the voltage at the probe's tip exceeds that at the input."""
         return self.value(f"chan{channel}_probe")
 
     def shown(self) -> list[int]:
@@ -159,7 +159,7 @@ class VirtualOscilloscope(VirtualInstrument):
             self.acquisition.arm_again(self.now)
 
     def _follow_probe(self, channel: str, ratio: float) -> None:
-        """With another probe the same volts at the input are other volts at its tip: scale and offset go with it."""
+        """Scale the settings with the probe: the same volts at the input are other volts at its tip."""
         for what in ("scale", "offset"):
             self.settings[f"{channel}_{what}"] = ratio * float(self.settings[f"{channel}_{what}"])
         number = int(channel.removeprefix("chan"))
@@ -176,15 +176,15 @@ class VirtualOscilloscope(VirtualInstrument):
     # --- the setup as a whole ---
 
     def setup(self) -> bytes:
-        """All settings, as messages that restore them."""
+        """Return all settings, as messages that restore them."""
         headers = self._headers().items()
-        return "\n".join(f"{header} {self._spelled(name)}" for name, header in headers).encode("latin-1")
+        return "\n".join(f"{header} {self._spell_setting(name)}" for name, header in headers).encode("latin-1")
 
     def _headers(self) -> dict[str, str]:
-        """Each setting that is part of the setup, and the shortest header of its row."""
+        """Return each setting that is part of the setup, and the shortest header of its row."""
         return {name: ":" + short_header(row.header) for row in self.commands.rows for name in row.defaults()}
 
-    def _spelled(self, name: str) -> str:
+    def _spell_setting(self, name: str) -> str:
         value: Value = self.settings[name]
         if isinstance(value, bool):
             return str(int(value))
@@ -290,7 +290,7 @@ class VirtualOscilloscope(VirtualInstrument):
         self.force()
 
     def running(self) -> bool:
-        """Whether the scope acquires or waits for a trigger."""
+        """Return whether the scope acquires or waits for a trigger."""
         return self.acquisition.running(self.now)
 
     def digitize(self) -> None:
@@ -345,12 +345,12 @@ class VirtualOscilloscope(VirtualInstrument):
         return Measured((codes.astype(np.float64) - scale.zero) * scale.volts_per_code, step, start)
 
     def measured(self, name: str, channel: int) -> float:
-        """Return a measurement on the screen, or what stands for none."""
+        """Return a measurement on the screen, or the number for none."""
         value = measure(name, self.on_screen(channel))
         return self.no_measurement if value is None else value
 
     def traces_on_screen(self) -> dict[int, NDArray[np.float64]]:
-        """For the picture: each shown trace, 800 columns from the lower edge of the screen, 0, to the upper, 1."""
+        """Return each trace on the screen for the picture: 800 columns, from the lower edge, 0, to the upper, 1."""
         record = self.record()
         heights: dict[int, NDArray[np.float64]] = {}
         start, length = record.screen
@@ -371,7 +371,7 @@ class VirtualOscilloscope(VirtualInstrument):
             self.on_change(name)
 
     def autoscale(self) -> None:
-        """Scale, offset, time base and level to fit what stands at the inputs."""
+        """Fit scale, offset, time base and level to the signals at the inputs."""
         for n in self.channels:
             signal, factor = self._signals.get(n, no_signal), self.probe(n)
             volts = factor * signal(max(0.0, self.now - 0.5), COARSEST, round(0.5 / COARSEST))
@@ -405,7 +405,7 @@ PRESETS = (Both("*SAV", lambda s, p: s.keep(p)), Both("*RCL", lambda s, p: s.rec
 
 
 def at_input(lowest: float, highest: float) -> Callable[[VirtualOscilloscope, int], tuple[float, float]]:
-    """Limits that hold at a channel's input [V]: at the tip of its probe they are its factor larger."""
+    """Return limits that hold at a channel's input [V]: at the tip of its probe they are its factor larger."""
     return lambda scope, n: (lowest * scope.probe(n), highest * scope.probe(n))
 
 

@@ -36,7 +36,7 @@ _DESCRIPTOR = 346
 #: Bits of INR?: a new record; the trigger is ready.
 _NEW_RECORD, _READY = 1, 8192
 
-#: What PAVA? measures, and what it is called here; units.
+#: Measurements of PAVA?: their names here, and units.
 _MEASUREMENTS = {
     "PKPK": ("VPP", "V"),
     "MAX": ("VMAX", "V"),
@@ -128,11 +128,11 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         self._setup = {"SP": 0, "NP": 0, "FP": 0}
 
     def spell(self, value: float) -> str:
-        """Three digits, as a real one answers: 5.00E-01."""
+        """Return a number with three digits, as a real one answers: 5.00E-01."""
         return f"{value:.2E}"
 
     def reply(self, header: str, text: str, unit: str = "") -> str:
-        """With header and unit, as long as CHDR is not OFF."""
+        """Return an answer with header and unit, as long as CHDR is not OFF."""
         if self.settings["header"] == "OFF":
             return text
         words = header.partition("|")
@@ -144,11 +144,11 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     # --- the trigger ---
 
     def level_name(self, channel: int) -> str:
-        """Each channel has its own level."""
+        """Return the name of the level; each channel has its own."""
         return f"chan{channel}_level"
 
     def slope_name(self, channel: int) -> str:
-        """Each channel has its own slope."""
+        """Return the name of the slope; each channel has its own."""
         return f"chan{channel}_slope"
 
     def source_word(self, channel: int) -> str:
@@ -175,7 +175,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         return self.reply("TRSE", f"EDGE,SR,{self.settings['trigger_source']},HT,OFF")
 
     def on_number_change(self, name: str, before: float) -> None:
-        """TRMD begins and ends to acquire, as the keys do."""
+        """Start or stop the acquisition with TRMD, as the keys do."""
         super().on_number_change(name, before)
         if name == "trigger_sweep":
             if self.settings[name] == "STOP":
@@ -228,7 +228,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         return -max(5.0, 7 * self.value("time_scale")), 7 * self.value("time_scale")
 
     def _is_halved(self) -> bool:
-        """Whether a pair of channels, 1 and 2 or 3 and 4, shares its converter and memory."""
+        """Return whether a pair of channels, 1 and 2 or 3 and 4, shares its converter and memory."""
         shown = self.shown()
         return {1, 2} <= set(shown) or {3, 4} <= set(shown)
 
@@ -253,7 +253,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         return rate, max(2, round(rate * length))
 
     def screen(self) -> tuple[float, float]:
-        """Fourteen divisions around the delay, which counts the other way round."""
+        """Return fourteen divisions around the delay, which counts the other way round."""
         length = _COLUMNS * self.value("time_scale")
         return -self.value("time_offset") - length / 2, length
 
@@ -301,7 +301,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         return bytes((codes[:: places.step] ^ 0x80).tobytes())
 
     def _descriptor(self, record: Record, n: int) -> bytes:
-        """WAVEDESC, as far as its places are known."""
+        """Return WAVEDESC, as far as its places are known."""
         scale = record.inputs[n]
         descriptor = bytearray(_DESCRIPTOR)
 

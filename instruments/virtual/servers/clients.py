@@ -77,7 +77,7 @@ class Job:
         return self.message is not None
 
     def may_have_turn(self) -> bool:
-        """Whether the instrument may take the message now."""
+        """Return whether the instrument may take the message now."""
         link = self.link
         if link.instrument.working:
             return link.session.is_abort(self.message or "") and not link.is_locked_out()
@@ -180,7 +180,7 @@ class ServedInstrument:
     # --- waiting ---
 
     def wall_duration_until(self, instant: float) -> float:
-        """How long until this time of the bench [s], by the wall clock; a clock that jumps takes no time."""
+        """Return the time until this time of the bench [s], by the wall clock; a clock that jumps takes no time."""
         clock = self.device.clock
         missing = instant - clock.now()
         if missing <= 0:
@@ -268,11 +268,11 @@ class Link:
             raise self.error
 
     def is_abort(self, data: bytes, *, end: bool = True) -> bool:
-        """Whether these bytes end what the instrument works on; see Session.is_abort."""
+        """Return whether these bytes end what the instrument works on; see Session.is_abort."""
         return self.instrument.working and not self.is_locked_out() and self.session.bytes_are_abort(data, end=end)
 
     def is_busy(self) -> bool:
-        """Whether messages of this client wait, or the instrument works on one."""
+        """Return whether messages of this client wait, or the instrument works on one."""
         return any(job.link is self for job in self.instrument.jobs())
 
     async def wait_until_done(
@@ -312,7 +312,7 @@ class Link:
         self.instrument.notify()
 
     def clear(self) -> None:
-        """Device clear; a client that is locked out clears its own messages only, and the instrument works on."""
+        """Clear the device; a client that is locked out clears its own messages only, and the instrument works on."""
         self.instrument.drop(self)
         if self.is_locked_out():
             self.session = self._new(stream=self.session.stream)
@@ -338,7 +338,7 @@ class Link:
     # --- from the instrument ---
 
     def seconds_until_ready(self) -> float | None:
-        """How long until the next bytes of an answer are ready [s], by the wall clock; None: no answer is under way."""
+        """Return the time until the next bytes of an answer are ready [s], by the wall clock; None: no answer."""
         self._raise_error()
         instant = self.session.ready()
         if instant is None:
@@ -346,7 +346,7 @@ class Link:
         return instant if instant >= INFINITY else self.instrument.wall_duration_until(instant)
 
     def answers_wait(self) -> bool:
-        """Whether an answer is under way or ready."""
+        """Return whether an answer is under way or ready."""
         with contextlib.suppress(LinkLost):
             return self.session.ready() is not None
         return False
@@ -373,13 +373,13 @@ class Link:
         return await self._wait_until(is_ready, timeout, give_up, lambda: seconds)
 
     def take(self, count: int, *, until: bytes = b"") -> tuple[bytes, bool]:
-        """At most `count` bytes of what is ready, and whether the answer ends with them; see Session.take."""
+        """Take at most `count` bytes of what is ready, and whether the answer ends with them; see Session.take."""
         taken = self.session.take(count, until=until)
         self.instrument.notify()
         return taken
 
     def is_idle(self) -> bool:
-        """Whether the instrument has nothing to do for this client, and no answer is under way."""
+        """Return whether the instrument has nothing to do for this client, and no answer is under way."""
         return not self.is_busy() and self.seconds_until_ready() is None
 
     def status_byte(self, *, unread: bool = False) -> int:
@@ -390,11 +390,11 @@ class Link:
     # --- locks ---
 
     def is_locked_out(self) -> bool:
-        """Whether another client has locked the instrument."""
+        """Return whether another client has locked the instrument."""
         return self.session.client_lock.excludes(self.session)
 
     def has_lock(self) -> bool:
-        """Whether this client has locked the instrument, alone or with others."""
+        """Return whether this client has locked the instrument, alone or with others."""
         return any(holder is self.session for holder in self.session.client_lock.holders)
 
     async def wait_unlocked(self, timeout: float | None = None, *, give_up: Callable[[], bool] = lambda: False) -> bool:

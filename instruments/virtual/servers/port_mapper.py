@@ -79,7 +79,7 @@ class PortMapper:
         loop = asyncio.get_running_loop()
         while True:
             try:
-                # a longer datagram loses its end, and what is left is no call
+                # a longer datagram loses its end, and the rest is no call
                 record, client = await loop.sock_recvfrom(datagrams, _LONGEST)
                 with contextlib.suppress(Disconnected):
                     await loop.sock_sendto(datagrams, await answer(self._program, record), client)

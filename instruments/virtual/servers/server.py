@@ -61,7 +61,7 @@ class ListenAt:
         return socket.gethostname() if self.host in {"", "0.0.0.0"} else self.host  # noqa: S104 - only asked for
 
     def of_instrument(self, index: int) -> ListenAt:
-        """Where the instrument of this index listens: at an address of its own where it has a port mapper."""
+        """Return the address of the instrument of this index: its own where it has a port mapper."""
         return self if self.port_mapper is None else replace(self, host=f"127.0.0.{2 + index}")
 
     def ports(self, index: int) -> Iterator[int]:

@@ -50,10 +50,10 @@ class FieldSettings(ExperimentSettings):
     lowest_m: float = Field(default=0.03, description="put the probe at this height,")
     highest_m: float = Field(default=0.11, description="go on up to this one")
     step_m: PositiveFloat = Field(default=0.005, description="in such steps;")
-    readings: PositiveInt = Field(default=10, ge=2, description="at each, so many readings,")
-    interval_s: PositiveFloat = Field(default=0.2, description="one every so often,")
-    settle_s: NonNegativeFloat = Field(default=1.0, description="after a pause for the filter")
-    range_t: NonNegativeFloat = Field(default=0.035, description="in this range; 0: as the instrument chooses")
+    readings: PositiveInt = Field(default=10, ge=2, description="number of readings at each height")
+    interval_s: PositiveFloat = Field(default=0.2, description="time from one reading to the next")
+    settle_s: NonNegativeFloat = Field(default=1.0, description="pause before the first one, for the filter")
+    range_t: NonNegativeFloat = Field(default=0.035, description="range of the magnetometer; 0: as it chooses")
     height_u_m: NonNegativeFloat = Field(default=2e-4, description="standard uncertainty of setting a height")
     gain_u: NonNegativeFloat = Field(
         default=0.0012, description="of the magnetometer's scale, relative (0.2 % of reading: 0.2 %/√3)"
@@ -114,7 +114,7 @@ class FieldSettings(ExperimentSettings):
 
 
 def channels(settings: FieldSettings) -> tuple[Channel, ...]:
-    """Return the uncertainties of all that is known, and that of the mean alone: only the latter is a reading's own."""
+    """Return the channels, with all uncertainties known and that of the mean, the only one of a reading's own."""
     return (
         Channel("time_s", "s", "bench clock, from the zero of the probe"),
         Channel("height_m", "m", "of the probe on the axis, as the person set or typed it"),
@@ -209,17 +209,17 @@ def _place(session: Session[FieldSettings], height: float, which: str) -> float:
         answer = session.ask(PlaceProbe(text, height))
         if not answer:
             return height
-        typed = typed_height(answer)
+        typed = parse_height(answer)
         if typed is not None:
             session.event(RunEvent.ANOTHER_HEIGHT, f"the probe stands at {1e3 * typed:.2f} mm", height_m=typed)
             return typed
         session.event(RunEvent.NOT_UNDERSTOOD, f"{answer[:40]!r} is no height: a number in mm is expected, as 61.5")
 
 
-def typed_height(answer: str) -> float | None:
+def parse_height(answer: str) -> float | None:
     """Return a height as a person types it, in mm where no unit is said [m]; None for what is none.
 
-    >>> typed_height("61,5"), typed_height("6.15 cm"), typed_height("high")
+    >>> parse_height("61,5"), parse_height("6.15 cm"), parse_height("high")
     (0.0615, 0.0615, None)
     """
     match = _TYPED.fullmatch(answer.strip())
@@ -247,7 +247,7 @@ def _measure(session: Session[FieldSettings], height: float) -> Row:
 
 
 def _read(session: Session[FieldSettings], height: float) -> float:
-    """One reading [T], after the interval.  Raises ExperimentFailed beyond the range."""
+    """Return one reading [T], after the interval.  Raises ExperimentFailed beyond the range."""
     session.wait(session.settings.interval_s)
     flux_density = session.bench.magnetometer.flux_density()
     if flux_density is None:
@@ -262,7 +262,7 @@ def _read(session: Session[FieldSettings], height: float) -> float:
 
 
 def _mean(settings: FieldSettings, values: list[float]) -> Row:
-    """Mean and standard uncertainties [T]; readings that all show the same digits are known to half of the last one."""
+    """Return mean and standard uncertainties [T]; readings that are all equal are known to half of the last digit."""
     n = len(values)
     mean = math.fsum(values) / n
     scatter = math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (n - 1) / n)
@@ -277,7 +277,7 @@ def _mean(settings: FieldSettings, values: list[float]) -> Row:
 
 
 def _digit(values: list[float]) -> float:
-    """Return the last digit of the instrument [T]: the smallest step between readings, else that of six digits."""
+    """Return the last digit of the instrument [T]: the least step between readings, or that of six digits."""
     different = sorted(set(values))
     steps = [b - a for a, b in pairwise(different)]
     largest = max(abs(value) for value in values)

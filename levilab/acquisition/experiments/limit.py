@@ -38,10 +38,10 @@ if TYPE_CHECKING:
     from levilab.acquisition.session import Row, Session
     from levilab.bench.config import Limits
 
-#: A top that the drive does not take up is given up after so many falls.
+#: A top that the drive does not take up is given up after this many falls.
 _MOST_FALLS = 3
-#: The tape of a creeping top is compared with the drive by so many counts, so far below the limit [Hz]: nearer to it
-#: the top may already fall behind.
+#: Number of counts that compare the tape of a creeping top with the drive, and their distance below the limit [Hz]:
+#: nearer to it the top may already fall behind.
 _COMPARED, _BELOW_HZ = 20, 5.0
 
 
@@ -51,12 +51,12 @@ class LimitSettings(DriveSettings):
     one_top: ClassVar[bool] = False
 
     which: Literal["lower", "upper"] = Field(default="lower", description="lower, or upper")
-    repetitions: PositiveInt = Field(default=10, description="so many tops, one after another")
+    repetitions: PositiveInt = Field(default=10, description="number of tops, one after another")
     drive_frequency_hz: PositiveFloat = Field(default=30.0, description="each is driven to this first,")
-    creep_hz_per_s: PositiveFloat = Field(default=0.1, description="upper: from there so fast,")
-    highest_hz: PositiveFloat = Field(default=100.0, description="and no higher than this")
+    creep_hz_per_s: PositiveFloat = Field(default=0.1, description="upper: rate of the drive from there on")
+    highest_hz: PositiveFloat = Field(default=100.0, description="upper: the highest frequency of the drive")
     float_s: PositiveFloat = Field(default=600.0, description="time that a person has to float the top")
-    interval_s: PositiveFloat = Field(default=2.0, description="looked at so often,")
+    interval_s: PositiveFloat = Field(default=2.0, description="time from one look to the next")
     gate_s: PositiveFloat = Field(default=0.5, description="length of a count")
     longest_s: PositiveFloat = Field(default=6 * 3600.0, description="an end if it takes longer")
 
@@ -87,7 +87,7 @@ def channels(settings: LimitSettings) -> tuple[Channel, ...]:
 
 
 def run(session: Session[LimitSettings]) -> None:
-    """Lose the top, note its limit, float it again; so many times."""
+    """Lose the top, note its limit, float it again; repeat."""
     settings = session.settings
     prepare_counter(session)
     session.begin(lambda: None, resumed="going on with the next top")
@@ -118,8 +118,8 @@ def _with_a_top(
 ) -> bool:
     """Measure the limit of a top; one that the drive does not take up falls after a while, and is floated again.
 
-    Returns False where the time is over.  Raises DidNotFollow after so many falls: what was measured is kept, and the
-    run can be resumed.
+    Returns False where the time is over.  Raises DidNotFollow after the last of several falls: all limits are kept,
+    and the run can be resumed.
     """
     falls, fell = 0, True
     while not is_over(session):
@@ -147,7 +147,7 @@ def _have_the_next_top(session: Session[LimitSettings]) -> bool:
 
 
 def _spins_freely(session: Session[LimitSettings]) -> bool:
-    """Whether the last top still spins, faster than the drive is to begin: one that only lost its lock."""
+    """Return whether the last top still spins, faster than the drive is to begin: one that only lost its lock."""
     spin = spin_now(session)
     return spin is not None and spin > session.settings.drive_frequency_hz
 
@@ -270,7 +270,7 @@ def _limit_of_loss(settings: LimitSettings, between: tuple[float, float], seen: 
     seen: each count until then, with the drive's frequency [Hz].
     """
     held, drive = between
-    # a top that slips is taken for held until it is far behind; but it only slows, so its limit is above what was seen
+    # a top that slips is taken for held until it is far behind; but it only slows, so its limit is above the counts
     low = min(held, seen[-1][0]) if seen else held
     return {
         "spin_frequency_hz": (low + drive) / 2,
@@ -284,7 +284,7 @@ def _limit_of_loss(settings: LimitSettings, between: tuple[float, float], seen: 
 def _say_how_it_was_lost(
     session: Session[LimitSettings], lost: NotHeld, limit: Row, seen: list[tuple[float, float]]
 ) -> None:
-    """Whether the top is still up, and whether its tape slipped on the way; once the limit is kept."""
+    """Return whether the top is still up, and whether its tape slipped on the way; once the limit is kept."""
     top = FreeTop(session)
     is_up = lost.spin is not None or top.read() is not None or top.missed[-1] is Missed.UNSTEADY
     kind, what = (RunEvent.LOCK_LOST, "the drive lost the top") if is_up else (RunEvent.TOP_LOST, "the top fell")

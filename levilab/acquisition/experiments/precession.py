@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 #: Points of a sweep, at most.
 _MOST_POINTS = 1000
-#: A locked top swings about the drive, by some tenths of a hertz: so many looks in a row have a mean this near to it
-#: [Hz]; after so many looks it is not locked.
+#: A locked top swings about the drive, by some tenths of a hertz: the mean of these looks in a row is this near to it
+#: [Hz]; after the last number of looks it is not locked.
 _LOOKS, _LOCKED_WITHIN_HZ, _MOST_LOOKS = 3, 0.25, 12
 #: Shortest and longest gate, in parts of `gate_s`, and longest pause before one, in periods of the drive.
 _GATES, _PAUSES = (0.75, 1.25), 4.0
@@ -57,14 +57,14 @@ class PrecessionSettings(DriveSettings):
 
     drive_frequency_hz: PositiveFloat = Field(default=44.0, description="the top is driven up to this first,")
     first_hz: PositiveFloat = Field(default=44.0, description="sweep the drive from this")
-    last_hz: PositiveFloat = Field(default=28.0, description="to this; the top is lost rather at the lower end,")
-    step_hz: PositiveFloat = Field(default=2.0, description="in steps of this;")
+    last_hz: PositiveFloat = Field(default=28.0, description="to this: a top is lost rather at the lower end")
+    step_hz: PositiveFloat = Field(default=2.0, description="in steps of this")
     frequencies_hz: tuple[PositiveFloat, ...] | None = Field(
         default=None, description="or these, in this order", examples=[[44.0, 38.0, 33.0, 28.0]]
     )
-    hold_s: NonNegativeFloat = Field(default=20.0, description="and held so long at each point of the sweep")
-    interval_s: PositiveFloat = Field(default=2.0, description="look every so often whether it is locked,")
-    counts: PositiveInt = Field(default=10, ge=3, description="and count spin and laser so many times")
+    hold_s: NonNegativeFloat = Field(default=20.0, description="time for which it is held at each point of the sweep")
+    interval_s: PositiveFloat = Field(default=2.0, description="time from one look at the lock to the next")
+    counts: PositiveInt = Field(default=10, ge=3, description="number of counts of spin and of laser at each point")
     laser_input: Literal[1, 2] = Field(
         default=2, description="of the counter; 1: you are asked to change the cable each time"
     )
@@ -110,12 +110,12 @@ class PrecessionSettings(DriveSettings):
 
 
 def also_needs(settings: PrecessionSettings) -> tuple[str, ...]:
-    """Return the oscilloscope is needed for records only."""
+    """Return the oscilloscope, if there are to be records."""
     return ("oscilloscope",) if settings.record_s else ()
 
 
 def channels(settings: PrecessionSettings) -> tuple[Channel, ...]:
-    """One reading a point of the sweep."""
+    """Return the channels of a reading; each point of the sweep gives one."""
     over = f"{settings.counts} gates of {settings.gate_s:g} s"
     one = "that of one count in the configuration" if settings.reading_u_hz else f"scatter of {over}"
     u = f"{one} over √{settings.counts}"
@@ -136,21 +136,21 @@ def channels(settings: PrecessionSettings) -> tuple[Channel, ...]:
 
 
 def run(session: Session[PrecessionSettings]) -> None:
-    """Drive the top up and through the sweep; where it is lost, drive it up anew."""
+    """Drive the top up and through the sweep; where it is lost, drive it up again."""
     settings = session.settings
     if settings.laser_input == 1 and session.writer.record.seed is not None:
         raise ExperimentFailed(
             "the virtual bench has no person who could change the counter's cable (precession.laser_input = 1): take 2"
         )
     prepare_counter(session)
-    session.begin(lambda: None, resumed="the top is driven up anew")
+    session.begin(lambda: None, resumed="the top is driven up again")
     left = settings.sweep[_points_done(session.rows, settings.sweep) :]
     sweep_drive(session, left, lambda drive: _point(session, drive))
     session.event(RunEvent.DRIVE_OFF, f"drive off, {len(session.rows)} of {len(settings.sweep)} points were measured")
 
 
 def _points_done(rows: list[Row], sweep: tuple[float, ...]) -> int:
-    """Return the first point after those that the readings are of, in order."""
+    """Return the index of the first point after those with readings, in order."""
     done = 0
     for row in rows:
         drive = row["drive_frequency_hz"]
@@ -160,7 +160,7 @@ def _points_done(rows: list[Row], sweep: tuple[float, ...]) -> int:
 
 
 def _time_left(settings: PrecessionSettings, done: int) -> float:
-    """Until the end, if the lock holds [s]."""
+    """Return the time that the rest of the sweep takes, if the lock holds [s]."""
     left = settings.sweep[max(done - 1, 0) :]
     way = sum(abs(b - a) for a, b in pairwise(left))
     looks = _LOOKS * max(settings.interval_s, settings.gate_s)
@@ -180,7 +180,7 @@ def _point(session: Session[PrecessionSettings], drive: float) -> None:
     session.writer.event(session.now(), RunEvent.COUNTED, text, drive_frequency_hz=drive, **counts)
     left = _time_left(settings, _points_done([*session.rows, row], settings.sweep))
     session.keep(row | {"time_s": session.now()}, left)
-    if settings.record_s:  # last: what was counted is kept where the record is broken off
+    if settings.record_s:  # last: the counts are kept where the record is broken off
         _record(session, drive)
 
 
@@ -201,15 +201,15 @@ def _wait_for_lock(session: Session[PrecessionSettings], drive: float) -> None:
 
 
 def _measure(session: Session[PrecessionSettings], drive: float) -> tuple[Row, dict[str, Any]]:
-    """Spin and precession of a locked top, and the gates that they are from.  Raises as `_point`."""
+    """Measure spin and precession of a locked top, with the gates behind them.  Raises as `_point`."""
     settings = session.settings
-    spins = _counted(session, drive, "spin_frequency_hz", settings.trigger_level_v, 1)
+    spins = _count_gates(session, drive, "spin_frequency_hz", settings.trigger_level_v, 1)
     _still_held(session, drive, spins.frequency)
     _calm(session, drive, swing_of(spins))
     if settings.laser_input == 1:
         session.ask(Task("Connect the laser's phototransistor to the counter's input 1, in place of the tape's."))
     level_v, channel = settings.laser_trigger_level_v, settings.laser_input
-    laser = _counted(session, drive, "precession_frequency_hz", level_v, channel)
+    laser = _count_gates(session, drive, "precession_frequency_hz", level_v, channel)
     if settings.laser_input == 1:
         session.ask(Task("Connect the tape's phototransistor to the counter's input 1 again."))
     prepare_counter_again(session)
@@ -250,7 +250,7 @@ def _calm(session: Session[PrecessionSettings], drive: float, swing: Swing | Non
 
 
 def calming_step(swing: Swing, drive: float, now: float, limits: DriveLimits) -> tuple[float, float] | None:
-    """When the drive's frequency is to differ for _STEP_S [s], and what it is then [Hz].
+    """Return when to begin a step of the drive's frequency [s], and the frequency during it [Hz].
 
     Forward where the top is farthest ahead, else back where it is farthest behind, whichever comes first and is within
     the limits of the drive; None where neither is.
@@ -265,7 +265,7 @@ def calming_step(swing: Swing, drive: float, now: float, limits: DriveLimits) ->
     return None
 
 
-def _counted(session: Session[PrecessionSettings], drive: float, what: str, level_v: float, channel: int) -> Gates:
+def _count_gates(session: Session[PrecessionSettings], drive: float, what: str, level_v: float, channel: int) -> Gates:
     """Return the gates of an input of the counter.
 
     A gate begins and ends with a pulse.  Pulses come early and late where a nutation goes on beside the wobble in step,

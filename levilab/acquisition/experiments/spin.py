@@ -22,9 +22,9 @@ _USUAL_HZ_PER_S, _USUAL_HZ = 0.0964, 30.0
 _USUAL_U_HZ = 0.03
 #: Of the spin: a larger uncertainty counts as this.
 _MOST_U = 0.1
-#: Readings that differ by so many of their standard uncertainties show the rate of the fall.
+#: Readings that differ by this multiple of their u show the rate of the fall.
 _CLEAR = 8.0
-#: Air takes a thousandth of a free top's spin a second at least (0.3 %/s is usual) [1/s]; half of it, after so long a
+#: Air takes a thousandth of a free top's spin a second at least (0.3 %/s is usual) [1/s]; half of it, after this
 #: time [s], is much more than the noise of a reading.
 _LEAST_LOSS_PER_S, _SEEN_TO_FALL_S = 1e-3, 60.0
 #: The drag of every law is between these powers of the spin.
@@ -36,7 +36,7 @@ class SpinSettings(DriveSettings):
 
 
 def channels(settings: SpinSettings) -> tuple[Channel, ...]:
-    """Without reading_u_hz the column of uncertainties is left out."""
+    """Return the channels; without reading_u_hz there is no column of uncertainties."""
     columns = (
         Channel("time_s", "s", "bench clock, from the moment the drive is off"),
         Channel("spin_frequency_hz", "Hz", "frequency counter on the phototransistor, one pulse a turn"),
@@ -66,7 +66,7 @@ def run(session: Session[SpinSettings]) -> None:
 
 
 def keeps_its_spin(first: Row, last: Row) -> bool:
-    """Whether a top has lost much less of its spin than air takes from a free one, after a while."""
+    """Return whether a top has lost much less of its spin than air takes from a free one, after a while."""
     lapse = last["time_s"] - first["time_s"]
     return lapse >= _SEEN_TO_FALL_S and last["spin_frequency_hz"] > first["spin_frequency_hz"] * math.exp(
         -_LEAST_LOSS_PER_S / 2 * lapse
@@ -86,7 +86,7 @@ def _why_it_keeps_its_spin(session: Session[SpinSettings], first: Row, last: Row
 
 
 def time_left(first: Row, middle: Row, last: Row, longest_s: float) -> tuple[float, float]:
-    """Until the spins between which a top falls, and no longer than the run goes on, at least and at most [s].
+    """Return the least and the greatest time until the fall, at most the time left of the run [s].
 
     Drag slows the spin by dν/dt ∝ −νᵖ, with p from 1 (Stokes) to 2 (Newton).  The first and the last reading show the
     rate, the one in the middle shows p.  Until readings differ by much more than their noise, the rate is the usual one
@@ -109,14 +109,14 @@ def time_left(first: Row, middle: Row, last: Row, longest_s: float) -> tuple[flo
     for power, falls_hz, sign in zip(powers, FALLS_BETWEEN_HZ, (1, -1), strict=True):
         off = sign * math.sqrt(2) * u
         usual = _USUAL_HZ_PER_S * _USUAL_HZ**-power
-        per_second = _passed(start + off, now - off, power) / lapse if seen else usual
-        ends.append(time + _passed(now - off, falls_hz, power) / per_second)
+        per_second = _power_integral(start + off, now - off, power) / lapse if seen else usual
+        ends.append(time + _power_integral(now - off, falls_hz, power) / per_second)
     least, most = (max(0.0, min(end, longest_s) - time) for end in ends)
     return least, most
 
 
 def _powers(first: Row, middle: Row, last: Row, u: float) -> tuple[float, float]:
-    """Between which powers of the spin the drag is, from three readings of standard uncertainty u [Hz].
+    """Return the range of powers of the spin in the drag, from three readings of standard uncertainty u [Hz].
 
     The part of ∫ dν/νᵖ that is passed in the middle is that of the time, and goes nearly evenly with p from 1 to 2.
     """
@@ -124,15 +124,15 @@ def _powers(first: Row, middle: Row, last: Row, u: float) -> tuple[float, float]
     if not (start - half > _CLEAR * u and half - now > _CLEAR * u):
         return _POWERS
     of_time = (middle["time_s"] - first["time_s"]) / (last["time_s"] - first["time_s"])
-    least, most = (_passed(start, half, power) / _passed(start, now, power) for power in _POWERS)
+    least, most = (_power_integral(start, half, power) / _power_integral(start, now, power) for power in _POWERS)
     power = 1 + (of_time - least) / (most - least)
     # the middle reading counts once, the two others by parts whose sum is 1: √1.5 u in all, at half time
-    u_power = math.sqrt(1.5) * u * half**-1.5 / _passed(start, now, 1.5) / abs(most - least)
+    u_power = math.sqrt(1.5) * u * half**-1.5 / _power_integral(start, now, 1.5) / abs(most - least)
     low, high = (min(max(end, _POWERS[0]), _POWERS[1]) for end in (power - 2 * u_power, power + 2 * u_power))
     return low, high
 
 
-def _passed(start: float, end: float, power: float) -> float:
+def _power_integral(start: float, end: float, power: float) -> float:
     """∫ dν/νᵖ from one spin down to another, which time increases evenly."""
     return math.log(start / end) if power == 1 else (end ** (1 - power) - start ** (1 - power)) / (power - 1)
 

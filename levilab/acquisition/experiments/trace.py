@@ -57,8 +57,8 @@ class TraceSettings(ExperimentSettings):
         default=(1,), description="channels of the oscilloscope to record,"
     )
     shows: tuple[str, ...] = Field(default=(TAPE,), description="what each of them shows")
-    duration_s: PositiveFloat = Field(default=0.5, description="a record is at least so long")
-    points: PositiveInt = Field(default=6000, description="and has at least so many points")
+    duration_s: PositiveFloat = Field(default=0.5, description="least length of a record")
+    points: PositiveInt = Field(default=6000, description="least number of points of a record")
     volts_per_division: float = Field(default=0.2, ge=1e-3, le=10.0)
     offset_v: float = Field(default=0.65, ge=-100.0, le=100.0, description="voltage in the middle of the screen")
     coupling: Literal["DC", "AC"] = Field(default="DC", description="DC or AC")
@@ -69,9 +69,11 @@ class TraceSettings(ExperimentSettings):
     trigger_slope: Literal["rising", "falling", "either"] = Field(
         default="rising", description="rising, falling or either"
     )
-    trigger_patience_s: PositiveFloat = Field(default=5.0, description="give up where no trigger comes for so long")
-    records: PositiveInt = Field(default=10, description="so many records,")
-    interval_s: PositiveFloat = Field(default=10.0, description="one every so often, or as fast as it goes")
+    trigger_patience_s: PositiveFloat = Field(default=5.0, description="longest wait for a trigger")
+    records: PositiveInt = Field(default=10, description="number of records")
+    interval_s: PositiveFloat = Field(
+        default=10.0, description="time from one record to the next, if the scope is fast enough"
+    )
     drive_frequency_hz: PositiveFloat | None = Field(
         default=None, description="drive meanwhile; needs the generator", examples=[30.0]
     )
@@ -155,7 +157,7 @@ def _note_what_was_cut_short(session: Session[TraceSettings]) -> None:
     # the channels of a record are kept after its time was noted, and before its row
     more = sum(time >= last for time in described_times(folder)) - (channels if session.rows else 0)
     if more > 0:
-        text = f"record {number} was cut short after {more} of {channels} channels; it is taken anew"
+        text = f"record {number} was cut short after {more} of {channels} channels; it is taken again"
         session.event(RunEvent.CUT_SHORT, text, record=number)
 
 
@@ -234,7 +236,7 @@ class _Watch:
 
 
 def spin_of_record(trace: Trace, level_v: float) -> float | None:
-    """How often a second the signal passes a level upwards: the median of the intervals [Hz]; None of fewer than three.
+    """Return the rate of rises through a level: the median of the intervals [Hz]; None of fewer than three.
 
     It passes once more only after it was below by a quarter of its range: noise on a flank is no pulse.
     """
@@ -252,7 +254,7 @@ def spin_of_record(trace: Trace, level_v: float) -> float | None:
 
 
 def _take(session: Session[TraceSettings]) -> list[Trace]:
-    """Take and keep a record, a trace each channel; none where the oscilloscope was lost and is set up anew.
+    """Take and keep a record, a trace each channel; none where the oscilloscope was lost and is set up again.
 
     Raises ExperimentFailed where no trigger comes.
     """
@@ -275,7 +277,7 @@ def _take(session: Session[TraceSettings]) -> list[Trace]:
     except InstrumentError as error:
         if traces:
             text = f"record {number} was cut short after {len(traces)} of {len(settings.channels)} channels"
-            session.event(RunEvent.CUT_SHORT, f"{text}; it is taken anew", record=number)
+            session.event(RunEvent.CUT_SHORT, f"{text}; it is taken again", record=number)
         session.reconnect("oscilloscope", error, lambda: _prepare_scope(session))
         return []
     _keep(session, traces, now)
@@ -290,7 +292,7 @@ def _why_no_trigger(session: Session[TraceSettings]) -> str:
     try:
         _prepare_scope(session, sweep="auto")
         session.bench.oscilloscope.acquire(timeout_s=settings.trigger_patience_s)
-        low, high = _range(session.bench.oscilloscope.trace(_shown(settings)))
+        low, high = _range(session.bench.oscilloscope.trace(_channel_in_message(settings)))
     except InstrumentError:
         low = high = math.nan
     if math.isnan(low):
@@ -302,7 +304,7 @@ def _why_no_trigger(session: Session[TraceSettings]) -> str:
     return f"{said}: the signal there lies between {low:.2f} and {high:.2f} V; {advice}"
 
 
-def _shown(settings: TraceSettings) -> int:
+def _channel_in_message(settings: TraceSettings) -> int:
     """Return the channel whose range the message names: the one that triggers, if it is recorded."""
     return settings.trigger_source if settings.trigger_source in settings.channels else settings.channels[0]
 
@@ -316,7 +318,7 @@ def _range(trace: Trace) -> tuple[float, float]:
 def _keep(session: Session[TraceSettings], traces: list[Trace], time_s: float) -> None:
     """Keep the row that says that the traces of a record are there.  time_s: when it was taken."""
     settings, number = session.settings, len(session.rows) + 1
-    shown = next(trace for trace in traces if trace.channel == _shown(settings))
+    shown = next(trace for trace in traces if trace.channel == _channel_in_message(settings))
     low, high = _range(shown)
     row: Row = {"time_s": time_s, "record": number}
     if not math.isnan(low):

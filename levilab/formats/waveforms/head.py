@@ -81,7 +81,7 @@ def _encoding(head: bytes) -> str:
 
 
 def pieces(path: Path, encoding: str, first_line: int) -> Iterator[tuple[int, str, bool]]:
-    """Whole lines of a file from a line on, about a million characters at a time.
+    """Yield whole lines of a file from a line on, about a million characters at a time.
 
     Yields:
         The 1-based number of the first line, the lines, and whether these are the last ones; only there the last line

@@ -19,7 +19,7 @@ import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from levilab.formats.columns import NoSuchColumn, TableError, quoted, shorten
+from levilab.formats.columns import NoSuchColumn, TableError, quote_names, shorten
 from levilab.formats.dialect import Dialect, filled_count, find_dialect
 from levilab.formats.layout import SAMPLE, Layout, lay_out
 from levilab.formats.titles import (
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 #: What is read.
 WANTED = "samples beside their times, a scope's CSV, WAV, .npy, or a column of pulse times is expected"
-#: A header ends within so many lines.
+#: Longest header [lines].
 MOST_LINES = 200
 #: What stands for a unit beside its symbol.
 _UNIT_WORDS = dict.fromkeys(("volt", "volts", "voltage", "value", "spannung", "y"), "V") | dict.fromkeys(
@@ -91,7 +91,7 @@ class Header:
     """What stands above or beside the samples.
 
     Attributes:
-        format: what wrote it, in words.
+        format: name of the program or instrument that wrote it.
         dialect: of the lines.
         first_line: 1-based line of the first row.
         columns: the channels.
@@ -135,15 +135,15 @@ def read_header(head: Head, dialect: Dialect, columns: Mapping[str, str]) -> Hea
     """
     lines = [line.lstrip("#") for line in head.lines[:MOST_LINES]]
     rows = [[field.strip().strip('"').strip() for field in dialect.split(line)] for line in lines]
-    for recognise in (_rigol, _beside, _keyed, _titled, _stepped):
+    for recognise in (_recognise_rigol, _recognise_beside, _recognise_keyed, _recognise_titled, _recognise_stepped):
         header = recognise(head, dialect, rows)
         if header:
             return header
-    return _plain(head, dialect, columns)
+    return _recognise_plain(head, dialect, columns)
 
 
 def printed(text: str, dialect: Dialect) -> Printed | None:
-    """Return a number and how finely it is printed; None if it is none.
+    """Return a number and its last printed digit; None for any other text.
 
     >>> printed("-250.0000E-03", Dialect(",", "."))
     Printed(value=-0.25, resolution=1e-07)
@@ -162,7 +162,7 @@ def printed(text: str, dialect: Dialect) -> Printed | None:
 
 
 def dialect_of(head: Head) -> Dialect:
-    """As of any table; one number a line makes a table, too, here."""
+    """Find the dialect as for any table; here one number a line is a table, too."""
     sample = head.lines[-SAMPLE:]
     found = find_dialect(sample)
     texts = [line.strip() for line in sample if line.strip()]
@@ -202,7 +202,7 @@ def _is_number(text: str, dialect: Dialect) -> bool:
 
 
 def _first_row(rows: Sequence[Sequence[str]], after: int, index: int, dialect: Dialect) -> int | None:
-    """Index of the first row below `after` with a number at `index`."""
+    """Return the index of the first row below `after` with a number at `index`."""
     return next(
         (k for k in range(after + 1, len(rows)) if index < len(rows[k]) and _is_number(rows[k][index], dialect)), None
     )
@@ -232,7 +232,7 @@ def _with_samples(
 # --- one vendor's header each --------------------------------------------------------------------------
 
 
-def _rigol(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
+def _recognise_rigol(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
     """Recognise start and increment in the second row, below their titles; the samples numbered or not."""
     title = [text.casefold() for text in rows[0]] if len(rows) > 1 else []
     if "start" not in title or "increment" not in title:
@@ -242,12 +242,12 @@ def _rigol(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Heade
         for key in ("start", "increment")
     )
     if start is None or step is None:
-        raise TableError(head.path, "has no numbers below Start and Increment: export it anew", line=2)
+        raise TableError(head.path, "has no numbers below Start and Increment: export it again", line=2)
     numbered = title[0] in {"x", "sequence"}
     channels = range(int(numbered), min(title.index("start"), title.index("increment")))
     first = _first_row(rows, 1, 0, dialect)
     if first is None or not channels:
-        raise TableError(head.path, "holds a header of Rigol's and no samples: export it anew", line=len(rows))
+        raise TableError(head.path, "holds a header of Rigol's and no samples: export it again", line=len(rows))
     columns = [SampleColumn(_signal(rows[0][k]), *_from_unit(rows[1], k)) for k in channels]
     kept, begin = _with_samples(columns, rows, first, dialect)
     return Header(
@@ -266,7 +266,7 @@ def _from_unit(units: Sequence[str], index: int) -> tuple[str, int, float]:
     return unit, index, factor
 
 
-def _titled(_: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
+def _recognise_titled(_: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
     """Recognise names above a row of units, "second" first, as Keysight, Rigol and UltraScope write; no increment."""
     k = next((k for k, row in enumerate(rows) if k and _are_units(row) and len(rows[k - 1]) >= filled_count(row)), None)
     names = rows[k - 1] if k else rows[0]
@@ -288,11 +288,11 @@ def _is_time(text: str) -> bool:
 
 
 def _are_units(row: Sequence[str]) -> bool:
-    """Return whether a row holds units alone, that of the times in words first."""
+    """Return whether a row holds units alone, the name of the times first."""
     return row[0].casefold() in {"second", "seconds"} and all(_is_unit_word(text) for text in row[1:] if text)
 
 
-def _beside(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
+def _recognise_beside(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
     """Recognise Tektronix TDS: the header stands beside the first rows, time and samples in the last columns."""
     if len(rows) < 2 or rows[0][0].casefold() != "record length" or len(rows[0]) < 5:
         return None
@@ -317,7 +317,7 @@ def _beside(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Head
 _KEYS = frozenset({"record length", "sample interval", "sample rate", "source"})
 
 
-def _keyed(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
+def _recognise_keyed(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
     """Recognise a key and its value a line, then the titles, time first: Siglent; Tektronix MDO, MSO, TBS."""
     titles = next((k for k, row in enumerate(rows) if len(row) > 1 and row[0].casefold() in {"time", "second"}), None)
     if titles is None:
@@ -327,7 +327,7 @@ def _keyed(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Heade
         return None
     first = _first_row(rows, titles, 0, dialect)
     if first is None:
-        raise TableError(head.path, "holds the header of a scope and no samples: export it anew", line=len(rows))
+        raise TableError(head.path, "holds the header of a scope and no samples: export it again", line=len(rows))
     names = [cell for cell in keys.get("source", ()) if cell]
     units = [cell.partition(":") for cell in keys.get("vertical units", ()) if cell]
     columns = []
@@ -350,7 +350,7 @@ def _keyed(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Heade
     )
 
 
-def _stepped(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
+def _recognise_stepped(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]) -> Header | None:
     """Recognise samples without times, numbered or not, below keys that give their interval: OWON, Hantek."""
     first = _first_row(rows, 0, 0, dialect)
     keys = _keys(rows[:first]) if first is not None else {}
@@ -396,7 +396,7 @@ def _interval(head: Head, keys: Mapping[str, Sequence[str]], dialect: Dialect) -
     if interval is None and rate is not None and rate.value > 0:
         interval = Printed(1 / rate.value, rate.resolution / rate.value**2)
     if interval is not None and not interval.value > 0:
-        raise TableError(head.path, f"its header says a sample interval of {interval.value:g} s: export it anew")
+        raise TableError(head.path, f"its header says a sample interval of {interval.value:g} s: export it again")
     return interval
 
 
@@ -418,7 +418,7 @@ def _count(keys: Mapping[str, Sequence[str]], dialect: Dialect) -> int | None:
 # --- headers of no particular maker --------------------------------------------------------------------
 
 
-def _plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) -> Header:
+def _recognise_plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) -> Header:
     """Recognise a column of times and others beside it, with titles or without."""
     layout = lay_out(list(head.lines), head.encoding, dialect, b"")
     titles = [read_title(text) for text in layout.header]
@@ -437,11 +437,11 @@ def _plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) -> Header:
             given = (titles[k].unit if titles else None) or beneath
             unit, factor = _unit(given)
             certain = certain and bool(given) and unit == "V"
-            columns.append(SampleColumn(_bare(names[k]), unit, k, factor))
+            columns.append(SampleColumn(_without_unit(names[k]), unit, k, factor))
     rows = [dialect.split(line) for line in head.lines[layout.first_line - 1 :][:MOST_LINES] if not dialect.skips(line)]
     kept = _with_samples(columns, rows, 0, dialect)[0] if rows else ()
     if not kept:
-        raise NoWaveform(head.path, f"has no samples beside its times, its columns are {quoted(names)}")
+        raise NoWaveform(head.path, f"has no samples beside its times, its columns are {quote_names(names)}")
     return Header(
         "CSV",
         dialect,
@@ -457,14 +457,14 @@ def _plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) -> Header:
 _NO_READINGS = ("time_s", "drive_amplitude_v")
 
 
-def _bare(title: str) -> str:
+def _without_unit(title: str) -> str:
     """Return a title without its unit."""
     bare = re.sub(r" ?/? ?[\[(][^\[\]()]*[\])]$| ?/ ?\S+$", "", without_runs_of_blanks(title)[:LONGEST_TITLE])
     return shorten(bare.strip() or title)
 
 
 def _time_column(head: Head, layout: Layout, wanted: Mapping[str, str]) -> int:
-    """Index of the column of times: as named, by its title, else the first where there are no titles."""
+    """Return the index of the column of times: by name, by its title, else the first where there are no titles."""
     name = wanted.get("t") or wanted.get("time_s")
     folded = [title.casefold() for title in layout.header]
     if name is not None:
@@ -473,14 +473,14 @@ def _time_column(head: Head, layout: Layout, wanted: Mapping[str, str]) -> int:
         if name.isdecimal() and 1 <= int(name) <= layout.width:
             return int(name) - 1
         raise TableError(
-            head.path, f"has no column '{shorten(name)}'; it has {quoted(layout.header)}: correct `columns`"
+            head.path, f"has no column '{shorten(name)}'; it has {quote_names(layout.header)}: correct `columns`"
         )
     if not layout.header:
         return 0
     known = [k for k, text in enumerate(layout.header) if read_title(text).column == "time_s" or folded[k] in _TIMES]
     if len(known) != 1:
         raise NoWaveform(
-            head.path, f"no title is known to be a time among {quoted(layout.header)}: say `columns` = t=NAME"
+            head.path, f"no title is known to be a time among {quote_names(layout.header)}: say `columns` = t=NAME"
         )
     return known[0]
 

@@ -68,7 +68,7 @@ def _load(path: Path) -> NDArray[Any]:
         data: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
     except _BROKEN as error:
         raise TableError(
-            path, f"is no NumPy array that can be read ({shorten(str(error), 80)}): save it anew"
+            path, f"is no NumPy array that can be read ({shorten(str(error), 80)}): save it again"
         ) from error
     if data.dtype.kind not in "iuf" or data.dtype.itemsize > 8:
         raise TableError(path, f"holds {data.dtype}, plain numbers are expected: save them with numpy.save")

@@ -1,4 +1,4 @@
-"""Any file with samples or pulse times, recognised by what it begins with."""
+"""Any file with samples or pulse times, recognised by its first bytes."""
 
 from __future__ import annotations
 

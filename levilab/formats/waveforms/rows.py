@@ -71,7 +71,7 @@ def read_blocks(path: Path, encoding: str, dialect: Dialect, first_line: int, us
 
 
 def _at_once(text: str, dialect: Dialect, used: Sequence[int]) -> Array | None:
-    """All rows by pandas; None where a line is not plain."""
+    """Read all rows by pandas; None where a line is not plain."""
     import pandas as pd
 
     if not text.strip():
@@ -132,8 +132,8 @@ def _number(path: Path, text: str, line: int, dialect: Dialect) -> float:
     if not abs(value) < HIGHEST:
         raise TableError(
             path,
-            f"'{shorten(text)}' is a missing sample, but samples are evenly spaced: export the record anew, or cut the "
-            "file there",
+            f"'{shorten(text)}' is a missing sample, but samples are evenly spaced: export the record again, or cut "
+            "the file there",
             line=line,
         )
     return value

@@ -77,7 +77,7 @@ class _Clock:
         self._sum_up(values)
 
     def _sum_up(self, values: Array) -> None:
-        """Add a block to the straight line."""
+        """Add a block of values to the sums of the straight line."""
         n, m = self.count, len(values)
         numbers = n + np.arange(m, dtype=np.float64)
         means = float(numbers.mean()), float(values.mean())
@@ -192,7 +192,7 @@ def _check_numbers(path: Path, clock: _Clock) -> None:
             raise TableError(
                 path,
                 f"its samples are numbered, and {difference:g} lies from one to the next, 1 is expected: "
-                "export the record anew",
+                "export the record again",
                 line=line,
             )
 
@@ -214,20 +214,20 @@ def _printed_times(path: Path, header: Header, survey: _Survey, rate: float | No
     allowed = max(1.01 * clock.resolution * unit, min(SINGLE * largest, mean / 4)) + 1e-9 * mean
     _check_even(path, clock, unit, mean, allowed)
     if header.step is None:
-        return _fitted(path, clock, unit, first=first, mean=mean, allowed=allowed)
+        return _fit_step(path, clock, unit, first=first, mean=mean, allowed=allowed)
     step, u = header.step.value, 0.505 * header.step.resolution
     off = abs(mean - step)
     if off <= u + allowed / (n - 1):
         return _Times(first, step if off <= SAME * step or u <= allowed / (n - 1) else mean)
-    return _contradiction(path, header, first, mean)
+    return _times_by_header(path, header, first, mean)
 
 
 #: Relative uncertainty of the step below which nothing is said of it: of a frequency it is 0.03 mHz at 30 Hz.
 _FINE = 1e-6
 
 
-def _fitted(path: Path, clock: _Clock, unit: float, *, first: float, mean: float, allowed: float) -> _Times:
-    """Where times alone give the step: from the ends, or by a straight line where they lost digits."""
+def _fit_step(path: Path, clock: _Clock, unit: float, *, first: float, mean: float, allowed: float) -> _Times:
+    """Return the step from the times alone: from the ends, or by a straight line where they lost digits."""
     if allowed / (clock.count - 1) < 1e-3 * _FINE * mean:
         return _Times(first, mean)
     step, resolution = clock.slope * unit, clock.resolution * unit
@@ -251,8 +251,8 @@ def _check_even(path: Path, clock: _Clock, unit: float, mean: float, allowed: fl
             )
 
 
-def _contradiction(path: Path, header: Header, first: float, mean: float) -> _Times:
-    """Header and printed times disagree: a unit of the times that only the step shows, else a reason to refuse."""
+def _times_by_header(path: Path, header: Header, first: float, mean: float) -> _Times:
+    """Return the times in the unit that makes header and printed times agree.  Raises TableError without one."""
     step = header.step.value if header.step else mean
     factor = next((unit for unit in _UNITS if abs(mean / step / unit - 1) < 1e-3), None)
     if factor is None:

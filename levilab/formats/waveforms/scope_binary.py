@@ -76,7 +76,7 @@ def read_scope_binary(path: Path) -> Waveform:
 
 
 def _about_times(path: Path, times: Array, step: float) -> list[str]:
-    """Whether the times that RigolWFM gives are as far apart as it says."""
+    """Return a warning if RigolWFM's times are not as far apart as it says."""
     mean = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else step
     if abs(mean / step - 1) <= _EVEN:
         return []

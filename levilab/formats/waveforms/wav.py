@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 #: Samples of integers → (value of silence, full scale).
 _SCALES = {"u1": (128.0, 128.0), "i2": (0.0, 32768.0), "i4": (0.0, 2147483648.0)}
 UNIT = "full scale"
-_ADVICE = "export it anew as PCM or float WAV"
+_ADVICE = "export it again as PCM or float WAV"
 
 
 def read_wav(path: Path) -> Waveform:
@@ -84,7 +84,7 @@ def _signals(channels: int) -> tuple[Signal, ...]:
 
 
 def _bits(path: Path) -> int:
-    """Bits of a sample, 0 where they are not found; the format is the first chunk of nearly all files."""
+    """Return the bits of a sample, 0 where they are not found; the format is the first chunk of nearly all files."""
     with path.open("rb") as stream:
         head = stream.read(4096)
     place = head.find(b"fmt ")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.errors import UsageError
-from levilab.formats.columns import TableError, quoted, shorten
+from levilab.formats.columns import TableError, quote_names, shorten
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -50,7 +50,7 @@ class Waveform:
 
     Attributes:
         path: the file.
-        format: what wrote it, in words.
+        format: name of the program or instrument that wrote it.
         start: time of the first sample [s].
         step: from one sample to the next [s]; step_u: its standard uncertainty [s], where it comes from rounded times.
         count: samples of each channel.
@@ -82,7 +82,7 @@ class Waveform:
         return (self.count - 1) * self.step
 
     def signal(self, wanted: str | None = None) -> int:
-        """Index of a channel by its name, in any case, or its 1-based number; of the first without a name.
+        """Return the index of a channel by its name, in any case, or its 1-based number; the first without a name.
 
         Raises:
             NoSuchSignal: there is none of that name.
@@ -94,7 +94,7 @@ class Waveform:
             return names.index(wanted.strip().casefold())
         if wanted.strip().isdecimal() and 1 <= int(wanted) <= len(names):
             return int(wanted) - 1
-        has = quoted(signal.name for signal in self.signals)
+        has = quote_names(signal.name for signal in self.signals)
         raise NoSuchSignal(
             "channel", f"{shorten(str(self.path), 200)} has {has}: name one of them", value=f"'{shorten(wanted)}'"
         )
@@ -104,12 +104,12 @@ class Waveform:
         return self.read(self.signal(wanted))
 
     def samples(self, wanted: str | None = None) -> Array:
-        """All samples of a channel, shape (count,)."""
+        """Return all samples of a channel, shape (count,)."""
         found = list(self.blocks(wanted))
         return np.concatenate(found) if found else np.zeros(0)
 
     def at_rate(self, rate: float | None) -> Waveform:
-        """Return the same at a rate that is given [Hz], with a warning where it is another than the file's."""
+        """Return the record at a given rate [Hz], with a warning where it differs from the file's."""
         if rate is None:
             return self
         warnings = (*self.warnings, *about_rate(self.path, self.step, rate))

@@ -5,7 +5,7 @@ import {drawReadings, drawRecords, saidOf, sheet} from "./plot.js";
 import {openPractice} from "./practice.js";
 import {between, by, fixed, lapse, make, short, typeset, write} from "./words.js";
 
-/** Spoken news come at most so often [ms]. */
+/** Least time between spoken news [ms]. */
 const NEWS_EVERY_MS = 6000;
 /** Events in the list. */
 const MOST_EVENTS = 200;
@@ -15,7 +15,7 @@ const STATES = {
 };
 const LONGER = {  // what stands beside the state
   setup: "some seconds; up to a minute at the first start, which compiles",
-  unreachable: "it is tried again; start levilab live anew if it was ended",
+  unreachable: "it is tried again; start levilab live again if it was ended",
 };
 /** A record of the oscilloscope that is older is marked with its age [s of bench time; where that is faster, of the wall]: without pulses a count takes 2.5 s. */
 const OLD_S = 3;
@@ -238,7 +238,7 @@ function show() {
   speak(state, left);
 }
 
-/** The time that is left, in words: that of the fit, whose line is drawn, else what the bench says; "" where it is not known. */
+/** The time that is left, as text: that of the fit, whose line is drawn, else what the bench says; "" where it is not known. */
 function leftOf(about, bench, elapsed) {
   if (about?.status !== "running") return "";
   if (data.end && Number.isFinite(elapsed)) return between(...data.end.map((end) => end - elapsed));

@@ -9,7 +9,7 @@ import {SOFTWARE} from "./plot.js";
 
 /** Poses that are kept: at most 20 s of the bench's time. */
 const KEPT = 8000;
-/** A picture at most so often on the average without a graphics card [ms]: the screen's own times are 17 ms apart. */
+/** Least mean time between pictures without a graphics card [ms]: the screen's own times are 17 ms apart. */
 const LEAST_MS = SOFTWARE ? 46 : 0;
 
 /** Pixels without a graphics card, as a part of those that are shown: half would do, but is coarse to look at. */
@@ -46,7 +46,7 @@ export async function openSpace(canvas, description) {
   let playhead = NaN, last = 0, drawnAt = 0, moved = true, rate = 1, speed = 1, paused = false, frames = 0;
 
   function add(start, step, position, quaternion, up) {
-    if (times.length && start < times.at(-1) - 1e-9) [times, places, turns, ups] = [[], [], [], []];  // a bench anew
+    if (times.length && start < times.at(-1) - 1e-9) [times, places, turns, ups] = [[], [], [], []];  // a new bench
     for (let k = 0; k < up.length; k += 1) {
       times.push(start + k * step);
       places.push(position.subarray(3 * k, 3 * k + 3));
@@ -56,7 +56,7 @@ export async function openSpace(canvas, description) {
     if (times.length > KEPT) for (const list of [times, places, turns, ups]) list.splice(0, list.length - KEPT);
   }
 
-  /** Where the playhead is after so many seconds on the wall [s]. */
+  /** Move the playhead on by these seconds on the wall [s]. */
   function advance(seconds) {
     const newest = times.at(-1), late = 0.12 * speed;
     if (!(playhead >= times[0] && playhead <= newest)) playhead = Math.max(times[0], newest - late);
@@ -127,7 +127,7 @@ export async function openSpace(canvas, description) {
       build(described);
       resize();
       if (!state) return;
-      advance(0);  // the poses may have begun anew, and a picture that stands still has not followed
+      advance(0);  // the poses may have begun again, and a picture that stands still has not followed
       state = show();
     },
     setRate: (value) => { rate = value; },

@@ -32,7 +32,7 @@ export function sheet(canvas) {
   };
 }
 
-/** Round numbers from low to high, about so many. */
+/** Return about `count` round numbers from low to high. */
 export function ticks(low, high, count) {
   if (!(high > low)) return [low];
   const raw = (high - low) / Math.max(count, 1), power = 10 ** Math.floor(Math.log10(raw));
@@ -200,7 +200,7 @@ export function drawReadings(paper, data, pointed) {
   return {place, left, width, nearest: (px) => nearest(x, toX, px)};
 }
 
-/** A reading in words, for the pointer and for those who hear it. */
+/** Return a reading as text, for the pointer and for screen readers. */
 export function saidOf(data, drawn, k) {
   const [fx, fy] = [data.xAxis[2], data.yAxis[2]];
   const unit = data.yAxis[1], digits = unit === "Hz" ? 4 : 3;
@@ -267,7 +267,7 @@ const FAINT = 0.45;
  * Draw the oscilloscope's screen: each channel's latest record, one below the other, on one scale of time.
  *
  * @param records channel, low, high, start_s, step_s, and said: how old it is, "" for a new one.
- * @returns the same in words.
+ * @returns the same as text.
  */
 export function drawRecords(paper, records) {
   const paint = colours(), {context: c} = paper;

@@ -3,7 +3,7 @@
 import {GONE, read} from "./connection.js";
 import {by, make, numberIn, write} from "./words.js";
 
-/** A slider that is moved sends at most so often [ms]. */
+/** Least time between two messages of a slider [ms]. */
 const SENDS_EVERY_MS = 120;
 
 /**

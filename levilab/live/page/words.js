@@ -8,11 +8,11 @@ export function write(id, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** A number with so many decimals; a dash where there is none. */
+/** Return a number with these decimals; a dash where there is none. */
 export const fixed = (value, decimals) =>
   Number.isFinite(value) ? value.toFixed(decimals).replace("-", "−") : "–";
 
-/** A number to so many digits, without zeros at the end. */
+/** Return a number to these digits, without zeros at the end. */
 export const short = (value, digits = 4) =>
   Number.isFinite(value) ? String(Number(value.toPrecision(digits))).replace("-", "−") : "–";
 
@@ -29,7 +29,7 @@ export function lapse(seconds) {
 /** The number that a person typed, with a decimal point or a decimal comma; NaN where it is none. */
 export const numberIn = (text) => /^[+\u2212-]?(\d+[.,]?\d*|[.,]\d+)$/.test(text.trim()) ? Number(text.trim().replace("\u2212", "-").replace(",", ".")) : NaN;
 
-/** Two limits of a time that is left [s], in words: "about 20 to 40 s", "at most 30 s"; "" where both are over. */
+/** Return two limits of a time that is left [s] as text: "about 20 to 40 s", "at most 30 s"; "" where both are over. */
 export function between(from, to) {
   const round = (seconds) => Math.round(seconds / 5) * 5;
   if (to < 0) return "";
@@ -58,7 +58,7 @@ export function make(tag, text = "", className = "") {
   return element;
 }
 
-/** The colours of the style sheet, by their names; read anew when the day turns to night. */
+/** The colours of the style sheet, by their names; read again when the day turns to night. */
 export function colours() {
   const style = getComputedStyle(document.documentElement);
   return new Proxy({}, {get: (_, name) => style.getPropertyValue(`--${name}`).trim()});

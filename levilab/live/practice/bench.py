@@ -76,7 +76,7 @@ class PracticeBench:
             BenchGone: the process has ended.
         """
         self._number += 1
-        gone = BenchGone("the bench for practice has ended, or was not started: start it anew")
+        gone = BenchGone("the bench for practice has ended, or was not started: start it again")
         if self._pipe is None:
             raise gone
         try:
@@ -93,7 +93,7 @@ class PracticeBench:
         return bool(self._runs) and not self.is_over
 
     def events(self) -> list[PracticeEvent]:
-        """Return what the bench has reported since the last call; "ended" is the last of all."""
+        """Return the events of the bench since the last call; "ended" is the last of all."""
         found: list[PracticeEvent] = []
         while not self.is_over and self._pipe is not None:
             try:

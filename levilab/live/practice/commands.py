@@ -59,7 +59,7 @@ class MatchDrive(Settings):
 
 
 class PutBack(Settings):
-    """Spin the top by hand and let it float; one that still floats, perhaps too slowly, is spun anew."""
+    """Spin the top by hand and let it float; one that still floats, perhaps too slowly, is spun again."""
 
     do: Literal["put the top back"] = "put the top back"
 
@@ -111,10 +111,10 @@ _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discrimin
 
 
 def command_of(table: Any) -> Command:
-    """Return the command that a table of plain values is, such as {"do": "pause", "on": True}.
+    """Return the command in a table of plain values, such as {"do": "pause", "on": True}.
 
     Raises:
-        CommandRefused: it is none.
+        CommandRefused: the table is not a command.
     """
     try:
         return _COMMANDS.validate_python(table)
@@ -132,7 +132,7 @@ class PracticeEvent:
     Attributes:
         kind: "ready" once the instruments answer; "done" or "refused" for each command; "message", a line for the
             person at the bench; "recording" and "recorded", a run; "ended", the process is over.
-        text: in words; data, as everything that a run contains.
+        text: for people, but data like everything in a run.
         number: of the command that it answers, or that began the run; None where there is none.
         folder: of the run.
         status: of the run that ended: finished, interrupted or failed.

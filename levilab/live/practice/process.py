@@ -71,9 +71,9 @@ RAMP_STEP_S = 0.5
 #: The drive can take hold of a top that spins as fast as it is set, within this [Hz].
 CATCHES_WITHIN_HZ = 1.0
 #: A top that the drive took hold of swings about it by less than this [Hz], on the ramp, too.  One that is not held
-#: loses 0.1 Hz/s to the air: so long after the drive has yielded it is compared [s].  So far off [Hz] it is lost.
+#: loses 0.1 Hz/s to the air: it is compared this long after the drive has yielded [s], and lost beyond this [Hz].
 SWINGS_HZ, COMPARED_S, LOST_HZ = 0.4, 6.0, 1.0
-#: A top that follows the drive so much higher than where it took hold was tuned up [Hz].
+#: A top that follows the drive this far above where it took hold was tuned up [Hz].
 TUNED_UP_HZ = 0.5
 #: Experiments for which a top has to be up when they begin; for `limit` the virtual person puts one back.
 NEED_A_TOP = frozenset({"spin", "precession", "trace"})
@@ -177,7 +177,7 @@ def _in_words(spin: float | None) -> str:
 
 
 def work(options: PracticeOptions, pipe: Connection) -> None:
-    """Be the bench until the far end of the pipe is closed, or a signal asks for the end."""
+    """Run the bench until the far end of the pipe is closed, or a signal asks for the end."""
     with watching_for_end() as end:
         report = Reporter(pipe)
         try:
@@ -208,7 +208,7 @@ class Reporter:
 
 
 class LinesToReport(Display):
-    """The display of a run that is recorded: what it says goes to the person at the bench."""
+    """The display of a run that is recorded: its messages go to the person at the bench."""
 
     def __init__(self, report: Reporter) -> None:
         self._report = report
@@ -254,7 +254,7 @@ class PracticeProcess:
         self._number: int | None = None  # of the command that wanted it
         self._stopped = ""  # why the run that is recorded is to end
         self._over = False
-        self._looking = False  # whether `look` is under way: what it does may wait, too
+        self._looking = False  # whether `look` is under way: its work may wait, too
         self._hold: Hold | None = None  # of the drive, while it is on near the top's spin
         self._took_hold = self._tuned_up = False  # whether a person has come so far
         self._paused = False  # by a person
@@ -268,7 +268,7 @@ class PracticeProcess:
     # --- the bench ---
 
     def run(self) -> None:
-        """Be the bench until the end."""
+        """Run the bench until the end."""
         address = self._publisher.address
         said: dict[str, Any] = {"port": address.port, "token": address.token.hex()} if address else {}
         ready = PracticeEvent("ready", f"the top of the scene {self.scene.name}", scene=self.scene.as_table(), **said)
@@ -286,7 +286,7 @@ class PracticeProcess:
             self._wanted = None
 
     def _is_called_away(self) -> bool:
-        """Whether a run is to be recorded, or the bench is to end; a command may say so during a count."""
+        """Return whether a run is to be recorded, or the bench is to end; a command may say so during a count."""
         return self._over or self._wanted is not None
 
     def _next_run(self) -> RecordRun | None:
@@ -407,7 +407,7 @@ class PracticeProcess:
         self._sent.send_poses(self._publisher, self._wiring.poses, self.clock.now())
 
     def state(self) -> State:
-        """Return what views are shown."""
+        """Return the state for the views."""
         speed = self.clock.speed if math.isfinite(self.clock.speed) else None
         here: dict[str, Any] = {"virtual": True, "speed": speed, "paused": self._paused, "probe_m": self._probe_m}
         here |= {"took_hold": self._took_hold, "tuned_up": self._tuned_up}
@@ -430,7 +430,7 @@ class PracticeProcess:
 
     @singledispatchmethod
     def _carry_out(self, command: Command) -> str:
-        """Carry out a command.  Returns what was done; raises CommandRefused and what instruments raise."""
+        """Carry out a command.  Returns a text of what was done; raises CommandRefused and InstrumentError."""
         raise CommandRefused(f"{command!r}: this bench cannot do that")
 
     @_carry_out.register
@@ -472,7 +472,7 @@ class PracticeProcess:
         return "the top floats again"
 
     def _floats(self) -> bool:
-        """Whether the top is up now, as a person at the bench sees; the counter knows it a second later."""
+        """Return whether the top is up now, as a person at the bench sees; the counter knows it a second later."""
         poses = self._wiring.poses
         return poses is not None and bool(poses(self.clock.now(), RAMP_STEP_S, 1).up[0])
 
@@ -641,7 +641,7 @@ class PracticeProcess:
         return float(bench.generator.last_set.get("frequency_hz", 0.0))
 
     def _move_drive(self) -> None:
-        """Move the drive's frequency on towards where it is going, as far as the ramp comes in the time since."""
+        """Move the drive's frequency towards its goal, as far as the ramp has gone since the last move."""
         since = self.clock.now() - self._moved
         yields = self._hold is not None and self._hold.is_under_way
         if self._bench is None or not self._knobs.on or yields or since < RAMP_STEP_S:
@@ -687,7 +687,7 @@ class PracticeProcess:
 
     @contextlib.contextmanager
     def _watching(self, session: Session[Any], wiring: Wiring) -> Iterator[Callable[[], None]]:
-        """Yield what the session and the clock call while a run is recorded."""
+        """Yield the function that session and clock call while a run is recorded."""
         self._session, self._folder = session, str(session.writer.folder)
         if self._stopped:
             session.stop.by = self._stopped

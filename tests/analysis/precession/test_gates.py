@@ -66,7 +66,7 @@ def test_a_gate_that_lost_a_pulse_is_left_out_and_one_that_scatters_stays():
     assert rates_at_point(few, few)[1].freedom == 2
 
 
-def test_whole_counts_are_told_from_another_rate_by_gates_of_different_length():
+def test_whole_counts_are_distinguished_from_another_rate_by_gates_of_different_length():
     laser = counted(np.random.default_rng(6), 38.0, size=0.0)
     missed = Gates(laser.begin, laser.end, laser.frequency - 1 / laser.length)
     assert whole_counts(missed, 38.0) == -1

@@ -213,7 +213,7 @@ def test_a_word_without_choices_cannot_be_declared():
 def test_an_identity_has_four_fields(driver, answer):
     with (
         conversation(driver, ("*IDN?", answer), (CLEAR, None)) as instrument,
-        pytest.raises(BadAnswer, match="four fields with commas between them: maker, model") as bad,
+        pytest.raises(BadAnswer) as bad,
     ):
         instrument.identity()
     assert bad.value.answer == answer
@@ -229,12 +229,6 @@ def test_what_is_no_entry_of_the_error_queue_is_not_taken_for_no_error(answer):
         pytest.raises(BadAnswer, match="SYST:ERR"),
     ):
         instrument.command("FOO")
-
-
-def test_a_long_bad_answer_is_shortened_in_the_message_only():
-    error = BadAnswer("A", "DATA?", "9" * 1000, "a number")
-    assert len(error.answer) == 1000
-    assert len(str(error)) < 300
 
 
 # --- counters ---

@@ -10,7 +10,7 @@ from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.drivers.generator.siglent_sdg1000x import SiglentSDG1000X
 from instruments.drivers.scpi import ScpiInstrument, parse_reading
 from instruments.drivers.setting import Setting
-from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, OutOfRange, WrongInstrument
+from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
 from support.conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 
 #: Headers as in the programmer's references, numbers as the instruments print them (INSTRUMENTS: 15 digits, NR3).
@@ -297,15 +297,3 @@ def test_closing_the_driver_closes_its_transport():
     with conversation(ScpiInstrument) as instrument:
         instrument.close()
     assert instrument.transport.closed
-
-
-def test_every_error_is_an_instrument_error_that_carries_its_address():
-    for error in (
-        BadAnswer("GPIB0::1", "FREQ?", "?", "a number"),
-        CommandRefused("GPIB0::1", "FOO", ("-113",)),
-        OutOfRange("GPIB0::1", "gate", 2, "1"),
-        WrongInstrument("GPIB0::1", "x", "y"),
-    ):
-        assert isinstance(error, InstrumentError)
-        assert error.address == "GPIB0::1"
-        assert str(error).startswith("GPIB0::1: ")

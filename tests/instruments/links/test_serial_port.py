@@ -6,7 +6,6 @@ import os
 import socketserver
 import sys
 import threading
-import time
 
 import pytest
 import pyvisa
@@ -20,7 +19,6 @@ from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnected, Occupied, OutOfRange
 from instruments.links.serial_port import SerialTransport, port_name
 from instruments.virtual.bench.bench import VirtualBench
-from instruments.virtual.bench.faults import FAULTS, Fault
 from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.line import LineSettings, received_as
@@ -161,13 +159,6 @@ def test_an_interrupted_wait_leaves_no_answer_for_the_next_question(slow, clock,
     assert slow.query("LIST?") == "1,2,1,1,1"
 
 
-def test_an_answer_that_is_no_text_raises_and_is_forgotten(slow):
-    with pytest.raises(BadAnswer, match="plain text") as bad:
-        slow.query("BIN?")
-    assert bad.value.question == "BIN?"
-    assert slow.query("LIST?") == "1,2,1,1,1"
-
-
 def test_a_block_of_any_bytes_comes_whole(slow):
     assert slow.query_block("DATA?") == ANY_BYTES
     assert slow.query("LIST?") == "1,2,1,1,1"
@@ -188,56 +179,7 @@ def test_clearing_drops_what_is_under_way(slow, clock):
     assert slow.query("LIST?") == "1,2,1,1,1"
 
 
-def test_the_log_gets_the_bytes_of_both_directions(bench):
-    traffic = []
-    with contextlib.closing(SerialTransport(SLOW, log=lambda *line: traffic.append(line))) as transport:
-        transport.write("*CLS")
-        transport.query("*IDN?")
-        transport.query_block("DATA?")
-    assert traffic == [
-        (SLOW, ">", b"*CLS\n"),
-        (SLOW, ">", b"*IDN?\n"),
-        (SLOW, "<", IDENTITY.encode() + b"\n"),
-        (SLOW, ">", b"DATA?\n"),
-        (SLOW, "<", ANY_BYTES[:64] + b"... (1024 bytes)\n"),
-    ]
-
-
-def test_the_instrument_is_left_alone_between_two_exchanges(bench, monkeypatch):
-    now, slept = [100.0], []
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(time, "sleep", slept.append)
-    with contextlib.closing(SerialTransport(SLOW, pause=0.03)) as transport:
-        transport.query("*IDN?")
-        transport.query("*IDN?")
-        now[0] += 0.02
-        transport.query("*IDN?")
-    assert slept == [pytest.approx(0.03), pytest.approx(0.01)]  # and before the first one not at all
-
-
 # --- faults ---
-
-
-@pytest.mark.parametrize("what", FAULTS)
-def test_after_each_fault_there_is_an_error_or_the_right_reading_and_soon_right_ones_again(bench, clock, what):
-    magnetometer = LakeShore425(SerialTransport(METER, **LINE))
-    magnetometer.prepare(range_t=0.02)
-    bench.faults.append(Fault(what, question=r"RDGFIELD\?", after=1))
-    readings = []
-    for _ in range(20):
-        clock.sleep(1.0)
-        try:
-            readings.append(magnetometer.flux_density())
-        except (NoAnswer, BadAnswer):
-            pass
-        except NotConnected:
-            for client_lock in bench._client_locks.values():  # the other program has ended
-                client_lock.holders.clear()
-            with contextlib.suppress(NotConnected):
-                magnetometer.transport.reopen()
-    assert readings == pytest.approx([0.0123] * len(readings), rel=3e-4)
-    assert len(readings) >= 12
-    magnetometer.close()
 
 
 def test_a_port_that_another_program_has_taken_is_occupied(bench):
@@ -267,8 +209,9 @@ def test_wrong_settings_raise_each_time_with_a_hint(bench, wrong, error):
 
 
 def test_a_parity_that_does_not_exist_is_refused():
-    with pytest.raises(OutOfRange, match="parity = Odd is refused, allowed is one of none, odd"):
+    with pytest.raises(OutOfRange) as refused:
         SerialTransport(METER, parity="Odd")
+    assert (refused.value.name, refused.value.value) == ("parity", "Odd")
 
 
 @pytest.mark.parametrize("wrong", [{"data_bits": 9}, {"stop_bits": 3}, {"baud_rate": -1}])
@@ -437,11 +380,6 @@ def test_the_error_of_a_forbidden_port_names_its_group(monkeypatch, tmp_path):
         SerialTransport(str(port))
 
 
-def test_a_port_that_is_not_there():
-    with pytest.raises(NotConnected, match="cannot be opened"):
-        SerialTransport("/dev/no-such-port")
-
-
 def test_a_locked_port_is_occupied_until_it_is_given_back(bench):
     first, second = SerialTransport(SLOW), SerialTransport(SLOW)
     first.lock()
@@ -455,15 +393,6 @@ def test_a_locked_port_is_occupied_until_it_is_given_back(bench):
     with contextlib.closing(SerialTransport(SLOW)) as third:
         third.lock()
         assert third.query("*IDN?") == IDENTITY
-
-
-@pytest.mark.parametrize("act", ["query", "write", "query_block", "clear", "reopen", "lock"])
-def test_a_closed_link_says_that_it_was_closed_whatever_it_is_used_for(bench, act):
-    transport = SerialTransport(SLOW)
-    transport.close()
-    transport.close()
-    with pytest.raises(NotConnected, match="this session was closed: open another one"):
-        getattr(transport, act)(*(["*IDN?"] if act in {"query", "write", "query_block"} else []))
 
 
 # --- the URL handler ---
@@ -568,7 +497,7 @@ def test_a_line_behind_a_socket_that_is_lost_and_found_again():
     with serving() as address, contextlib.closing(SerialTransport(address, timeout=AT_MOST)) as transport:
         transport.lock()  # sockets have none
         assert transport.query("TEXT?") == "+1.0"
-        with pytest.raises(NotConnected, match="no link at 'BYE'"):
+        with pytest.raises(NotConnected):
             transport.query("BYE")
         transport.reopen()
         assert transport.query("TEXT?") == "+1.0"

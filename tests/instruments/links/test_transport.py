@@ -75,7 +75,7 @@ def link(port, **options):
 def test_a_link_that_broke_is_made_anew_before_the_next_message(port):
     one = link(port)
     port.broken = True
-    with pytest.raises(NotConnected, match=r"no link at 'READ\?' \(gone\): check"):
+    with pytest.raises(NotConnected, match="gone"):
         one.query("READ?")
     assert one.query("READ?") == "+1.0"
     assert port.opened == 2

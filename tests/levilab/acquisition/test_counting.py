@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
@@ -13,17 +12,17 @@ from levilab.acquisition.counting import AnotherTop, FreeTop, Missed
 class Bench:
     """A counter that counts these spins [Hz], one each 10 s, and what was said of them."""
 
-    def __init__(self, *spins: float | None) -> None:
+    def __init__(self, *spins):
         self.spins, self.time = iter(spins), 90.0
         self.events: list[tuple[str, str]] = []
         self.warnings: list[str] = []
 
-    def frequency(self) -> float | None:
+    def frequency(self):
         self.time += 5.0
         return next(self.spins)
 
-    def top(self, *before: tuple[float, float]) -> FreeTop[Any]:
-        session: Any = SimpleNamespace(
+    def top(self, *before):
+        session = SimpleNamespace(
             bench=SimpleNamespace(counter=self),
             settings=SimpleNamespace(reading_u_hz=None, gate_s=5.0),
             now=lambda: self.time,
@@ -35,7 +34,7 @@ class Bench:
         return FreeTop(session, [{"time_s": time, "spin_frequency_hz": spin} for time, spin in before])
 
 
-def test_a_top_that_was_set_spinning_meanwhile_is_recognised() -> None:
+def test_a_top_that_was_set_spinning_meanwhile_is_recognised():
     """As after a resume: 31 Hz, then 39 Hz twice; a single pair of such counts may be a disturbance."""
     bench = Bench(39.0, 39.0, 30.3, 39.0, 39.0, 38.9, 38.8, 38.7, 38.6)
     top = bench.top((70.0, 31.6), (80.0, 31.3), (90.0, 31.0))
@@ -50,7 +49,7 @@ def test_a_top_that_was_set_spinning_meanwhile_is_recognised() -> None:
     assert top.fall(200.0) == ""
 
 
-def test_counts_of_twice_the_spin_are_no_readings_and_warned_of_once() -> None:
+def test_counts_of_twice_the_spin_are_no_readings_and_warned_of_once():
     bench = Bench(61.8, 61.7, 61.4, 61.3, 30.1)
     top = bench.top((90.0, 31.0))
     assert (top.read(), top.read()) == (None, None)
@@ -64,7 +63,7 @@ def test_counts_of_twice_the_spin_are_no_readings_and_warned_of_once() -> None:
     assert reading["spin_frequency_hz"] == 30.1
 
 
-def test_after_a_miscount_the_true_spin_is_taken_again() -> None:
+def test_after_a_miscount_the_true_spin_is_taken_again():
     """15.5 Hz could be; 30.8 Hz twice after it shows that it was not."""
     bench = Bench(30.8, 30.7, 30.4)
     top = bench.top((80.0, 31.2), (90.0, 15.5))
@@ -75,7 +74,7 @@ def test_after_a_miscount_the_true_spin_is_taken_again() -> None:
     assert top.read()
 
 
-def test_a_lower_spin_that_two_counts_agree_on_is_a_reading() -> None:
+def test_a_lower_spin_that_two_counts_agree_on_is_a_reading():
     top = Bench(12.0, 12.0).top((90.0, 31.0))  # touched
     reading = top.read()
     assert reading
@@ -83,7 +82,7 @@ def test_a_lower_spin_that_two_counts_agree_on_is_a_reading() -> None:
 
 
 @pytest.mark.parametrize(("spin", "taken"), [(31.9, True), (15.4, True), (15.0, False), (32.6, False), (40.0, False)])
-def test_a_first_count_is_taken_from_half_of_the_last_spin_to_five_per_cent_more(spin: float, taken: bool) -> None:
+def test_a_first_count_is_taken_from_half_of_the_last_spin_to_five_per_cent_more(spin, taken):
     """The gate's middle is 2.5 s after the last reading: a top loses half at once, and half again each 100 s."""
     bench = Bench(spin, None)
     reading = bench.top((90.0, 31.0)).read()

@@ -1,12 +1,9 @@
 """A sweep of the drive, by a plain experiment: a point that fails is recorded, and the sweep goes on."""
 
-from __future__ import annotations
-
 import math
 import signal
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -18,7 +15,7 @@ from levilab.acquisition.driving import (
     FailedPoint,
     NotHeld,
     _hold,
-    _until,
+    _ramp_end,
     has_drifted,
     held_spin,
     sweep_drive,
@@ -32,30 +29,18 @@ from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import Phase, SpinScene, SpinWorld
 from support.acquisitions import Silent
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from pathlib import Path
-
-    from levilab.acquisition.session import Session
-    from levilab.runs.run import Run
-
 CHANNELS = (Channel("time_s", "s", "bench clock"), Channel("drive_frequency_hz", "Hz", "generator"))
 #: Up to 30 Hz, where the top of a SpinScene begins, and on in quick steps; a top that has lost its lock is soon down.
 SETTINGS = DriveSettings(drive_frequency_hz=30.0, ramp_hz_per_s=0.25, hold_s=0.0, gate_s=0.5, longest_s=20_000.0)
 SCENE = SpinScene(fall_hz=24.0)
 
 
-def swept(
-    out: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    points: Sequence[float],
-    at_point: Callable[[Session[DriveSettings], float], None] = lambda _, __: None,
-) -> tuple[Run, tuple[FailedPoint, ...]]:
+def swept(out, monkeypatch, points, at_point=lambda _, __: None):
     """A sweep that keeps a row a point, in the place of the experiment `precession`."""
-    failed: list[FailedPoint] = []
+    failed = []
 
-    def run(session: Session[DriveSettings]) -> None:
-        def measure(drive: float) -> None:
+    def run(session):
+        def measure(drive):
             at_point(session, drive)
             held_spin(session, drive)
             session.keep({"time_s": session.now(), "drive_frequency_hz": drive}, 0.0)
@@ -73,25 +58,25 @@ def swept(
     return acquire(request, Silent()), tuple(failed)
 
 
-def measured(run: Run) -> list[float]:
+def measured(run):
     return run.readings().column("drive_frequency_hz").tolist()
 
 
-def events(run: Run, kind: str) -> list[str]:
+def events(run, kind):
     return [event["text"] for event in run.events() if event["kind"] == kind]
 
 
 @pytest.mark.parametrize(("speed", "says"), [(1.0, ", 40.00 Hz in 3:20 min"), (math.inf, "")])
-def test_a_ramp_that_a_person_waits_for_says_when_it_ends(speed: float, says: str) -> None:
-    session: Any = SimpleNamespace(bench=SimpleNamespace(clock=SimpleNamespace(speed=speed)))
-    assert _until(session, 40.0, 200.0) == says
-    assert _until(session, 40.0, 0.0) == ""
+def test_a_ramp_that_a_person_waits_for_says_when_it_ends(speed, says):
+    session = SimpleNamespace(bench=SimpleNamespace(clock=SimpleNamespace(speed=speed)))
+    assert _ramp_end(session, 40.0, 200.0) == says
+    assert _ramp_end(session, 40.0, 0.0) == ""
 
 
-def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(tmp_path, monkeypatch):
     """The drive comes back to 31 Hz, which held the top last, not to 30 Hz, where it began."""
 
-    def lose(_: Any, drive: float) -> None:
+    def lose(_, drive):
         if drive == 32.0:
             raise NotHeld(31.2, drive)
 
@@ -108,11 +93,11 @@ def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(tmp_path: Path, mo
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
 
-def test_a_top_that_falls_is_asked_for_and_the_sweep_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_top_that_falls_is_asked_for_and_the_sweep_goes_on(tmp_path, monkeypatch):
     """At the first try of 31.5 Hz the drive is too weak, and the top falls while it is tried to take it up again."""
-    weak: list[float] = []
+    weak = []
 
-    def weaken(session: Session[Any], drive: float) -> None:
+    def weaken(session, drive):
         if drive == 31.5 and not weak:
             weak.append(drive)
             session.bench.outputs_off()
@@ -124,12 +109,10 @@ def test_a_top_that_falls_is_asked_for_and_the_sweep_goes_on(tmp_path: Path, mon
     assert "no light pulses under a drive of 31.50 Hz; try 1 of 2" in events(run, "lock lost")[0]
 
 
-def test_a_top_that_no_drive_takes_up_again_ends_the_sweep_with_what_was_measured(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_top_that_no_drive_takes_up_again_ends_the_sweep_with_what_was_measured(tmp_path, monkeypatch):
     """DidNotFollow costs tries of points, as a lost lock does."""
 
-    def forbid(session: Session[Any], drive: float) -> None:
+    def forbid(session, drive):
         if drive > 31.0:
             session.bench.generator.off()
             monkeypatch.setattr(
@@ -144,10 +127,10 @@ def test_a_top_that_no_drive_takes_up_again_ends_the_sweep_with_what_was_measure
     assert events(run, "ended")[0].endswith("the sweep ends here; not tried: 33 Hz")
 
 
-def test_a_generator_that_fails_on_the_way_costs_no_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    lost: list[float] = []
+def test_a_generator_that_fails_on_the_way_costs_no_point(tmp_path, monkeypatch):
+    lost = []
 
-    def fail(session: Session[Any], drive: float) -> None:
+    def fail(session, drive):
         if drive == 31.5 and not lost:
             lost.append(drive)
             raise NoAnswer(session.bench.address("generator"), "OUTP1?", 1.0)
@@ -170,16 +153,16 @@ def test_a_generator_that_fails_on_the_way_costs_no_point(tmp_path: Path, monkey
         ([30.0, 30.0, 30.0, 29.8, 29.8, 29.8], True),
     ],
 )
-def test_counts_of_a_top_that_was_lost_drift_off(counts: list[float], drifts: bool) -> None:
+def test_counts_of_a_top_that_was_lost_drift_off(counts, drifts):
     assert has_drifted(counts) is drifts
 
 
-def test_a_top_lost_while_it_is_held_is_not_compared_with_its_drive(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_top_lost_while_it_is_held_is_not_compared_with_its_drive(monkeypatch):
     """It is within 1 Hz of the drive to the end of the hold, as a tape that slips is."""
-    said: list[str] = []
+    said = []
     counts = iter([30.0 - 0.1 * max(k - 11, 0) for k in range(20)])
     monkeypatch.setattr("levilab.acquisition.driving.held_spin", lambda *_: next(counts))
-    session: Any = SimpleNamespace(
+    session = SimpleNamespace(
         settings=DriveSettings(hold_s=20.0, gate_s=1.0),
         progress=lambda *_: None,
         event=lambda *texts, **_: said.append(texts[1]),
@@ -191,17 +174,17 @@ def test_a_top_lost_while_it_is_held_is_not_compared_with_its_drive(monkeypatch:
     assert said == []
 
 
-def test_ctrl_c_ends_a_hold_after_the_count_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_ends_a_hold_after_the_count_under_way(monkeypatch):
     """Not after all of its counts, 20 s later, with the drive on."""
     stop, counts = Stop(), []
 
-    def count(*_: Any) -> float:
+    def count(*_):
         counts.append(30.0)
         stop(signal.SIGINT, None)
         return 30.0
 
     monkeypatch.setattr("levilab.acquisition.driving.held_spin", count)
-    session: Any = SimpleNamespace(settings=DriveSettings(hold_s=20.0), progress=lambda *_: None, stop=stop)
+    session = SimpleNamespace(settings=DriveSettings(hold_s=20.0), progress=lambda *_: None, stop=stop)
     with pytest.raises(Interrupted):
         _hold(session, 30.0)
     assert len(counts) == 1

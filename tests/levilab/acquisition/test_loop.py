@@ -6,8 +6,7 @@ import dataclasses
 import itertools
 import json
 import signal
-from datetime import UTC, datetime, tzinfo
-from typing import TYPE_CHECKING, Any, Self
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from instruments.clock import VirtualClock
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
-from instruments.errors import InstrumentError, NoAnswer
+from instruments.errors import InstrumentError
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from levilab.acquisition.counting import is_plausible
@@ -36,25 +35,13 @@ from levilab.world.bench import VIRTUAL, virtual_bus
 from levilab.world.spin_world import Phase, SpinScene, SpinWorld, random_scene
 from support.acquisitions import BEFORE, LET_GO_AT_ONCE, Impatient, Silent, in_world, mock, of_scene
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
-    import pandas as pd
-    from numpy.typing import NDArray
-
-    from levilab.acquisition.session import Row
-    from levilab.runs.run import Status
-
-    Array = NDArray[np.float64]
-
-
-def watch_outputs(patch: pytest.MonkeyPatch) -> list[bool]:
+def watch_outputs(patch):
     """What the generator's output is set to from now on, in order."""
-    seen: list[bool] = []
+    seen = []
     on_change = Virtual33500B.on_change
 
-    def watched(self: Virtual33500B, name: str) -> None:
+    def watched(self, name):
         if name == "1:output":
             seen.append(bool(self.settings["1:output"]))
         on_change(self, name)
@@ -64,7 +51,7 @@ def watch_outputs(patch: pytest.MonkeyPatch) -> list[bool]:
 
 
 @pytest.fixture
-def outputs(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+def outputs(monkeypatch):
     """What the generator's output was set to, in order."""
     return watch_outputs(monkeypatch)
 
@@ -79,7 +66,7 @@ class Whole:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
+def whole(tmp_path_factory):
     show = Silent()
     with pytest.MonkeyPatch.context() as patch:
         outputs = watch_outputs(patch)
@@ -88,16 +75,16 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
 
 
 @pytest.fixture
-def usual(whole: Whole) -> Run:
+def usual(whole):
     return whole.run
 
 
 @pytest.fixture(scope="module")
-def in_full_motion(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def in_full_motion(tmp_path_factory):
     return acquire(mock(tmp_path_factory.mktemp("motion"), 5, scene="spindown"), Silent())
 
 
-def test_a_spin_down_is_read_every_ten_seconds_until_the_top_falls(whole: Whole) -> None:
+def test_a_spin_down_is_read_every_ten_seconds_until_the_top_falls(whole):
     run = whole.run
     frame = run.readings().frame
     assert run.status == "finished"
@@ -111,7 +98,7 @@ def test_a_spin_down_is_read_every_ten_seconds_until_the_top_falls(whole: Whole)
 
 
 @pytest.fixture(scope="module")
-def ten_runs(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[SpinWorld, pd.DataFrame]]:
+def ten_runs(tmp_path_factory):
     """Worlds with the readings that were taken in each, seeds 0 to 9."""
     out, found = tmp_path_factory.mktemp("ten"), []
     for seed in range(10):
@@ -120,9 +107,7 @@ def ten_runs(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[SpinWorld, 
     return found
 
 
-def test_the_readings_follow_the_law_of_the_world_within_their_uncertainty(
-    ten_runs: list[tuple[SpinWorld, pd.DataFrame]],
-) -> None:
+def test_the_readings_follow_the_law_of_the_world_within_their_uncertainty(ten_runs):
     """χ² over ten runs about the true curve: only the gate's finite length (2e-5 Hz) and the start come between."""
     chi_square, n = 0.0, 0
     for world, frame in ten_runs:
@@ -137,7 +122,7 @@ def test_the_readings_follow_the_law_of_the_world_within_their_uncertainty(
     assert chi_square / n == pytest.approx(1, abs=3 * np.sqrt(2 / n))  # 3 standard deviations of χ²/n: 0.3
 
 
-def test_what_was_done_stands_in_run_json(usual: Run) -> None:
+def test_what_was_done_stands_in_run_json(usual):
     record = json.loads((usual.folder / "run.json").read_text(encoding="utf-8"))
     assert record["schema"] == "levilab-run/1"
     assert record["synthetic"] is True
@@ -150,24 +135,24 @@ def test_what_was_done_stands_in_run_json(usual: Run) -> None:
     assert record["software"]["levilab"]
 
 
-def test_the_same_seed_gives_the_same_readings_and_another_one_others(usual: Run, tmp_path: Path) -> None:
+def test_the_same_seed_gives_the_same_readings_and_another_one_others(usual, tmp_path):
     runs = [usual, *(acquire(mock(tmp_path, seed), Silent()) for seed in (1, 6))]
     first, again, other = ((run.folder / "readings.csv").read_bytes() for run in runs)
     assert first == again != other
 
 
-def test_what_was_shown_is_what_stands_in_the_folder(whole: Whole) -> None:
+def test_what_was_shown_is_what_stands_in_the_folder(whole):
     frame = whole.run.readings().frame
     assert [float(text.split()[0]) for text in whole.show.readings] == [round(t, 2) for t in frame["time_s"]]
 
 
-def test_the_wire_log_holds_every_byte(usual: Run) -> None:
+def test_the_wire_log_holds_every_byte(usual):
     log = (usual.folder / "wire.log").read_text(encoding="utf-8")
     assert log.count("> b'READ?\\n'") == len(usual.readings().frame) + BEFORE + 2  # and two at the fall
     assert "> b'OUTP1 OFF\\n'" in log
 
 
-def test_a_top_that_is_not_there_is_an_error_that_says_what_to_look_at(tmp_path: Path, outputs: list[bool]) -> None:
+def test_a_top_that_is_not_there_is_an_error_that_says_what_to_look_at(tmp_path, outputs):
     with pytest.raises(ExperimentFailed, match="trigger level"):
         acquire(of_scene(tmp_path, SpinScene(start_hz=5.0)), Silent())
     (run,) = [Run.load(path) for path in tmp_path.iterdir()]
@@ -175,7 +160,7 @@ def test_a_top_that_is_not_there_is_an_error_that_says_what_to_look_at(tmp_path:
     assert not outputs or outputs[-1] is False
 
 
-def test_a_top_that_does_not_follow_the_drive_is_an_error(tmp_path: Path, outputs: list[bool]) -> None:
+def test_a_top_that_does_not_follow_the_drive_is_an_error(tmp_path, outputs):
     weak = SpinSettings(drive_amplitude_vpp=0.5)
     with pytest.raises(ExperimentFailed, match=r"did not follow .*: ramp slower \(.* or drive harder"):
         acquire(of_scene(tmp_path, SpinScene(), weak), Silent())
@@ -187,7 +172,7 @@ def test_a_top_that_does_not_follow_the_drive_is_an_error(tmp_path: Path, output
 
 
 @pytest.mark.parametrize("frequency", [5.0, 100.0])
-def test_a_drive_beyond_the_window_is_answered_with_the_window(tmp_path: Path, frequency: float) -> None:
+def test_a_drive_beyond_the_window_is_answered_with_the_window(tmp_path, frequency):
     """No ramp and no amplitude brings a top to where it does not float."""
     asked = SpinSettings(drive_frequency_hz=frequency, ramp_hz_per_s=0.5)
     with pytest.raises(ExperimentFailed, match=r"floats only between 21\.65 and 80\.60 Hz: ask for") as failed:
@@ -195,14 +180,14 @@ def test_a_drive_beyond_the_window_is_answered_with_the_window(tmp_path: Path, f
     assert "ramp slower" not in str(failed.value)
 
 
-def test_a_top_that_never_falls_ends_at_the_longest_time(tmp_path: Path) -> None:
+def test_a_top_that_never_falls_ends_at_the_longest_time(tmp_path):
     scene = SpinScene(fall_hz=1.0, constants=(1e-6,))
     run = acquire(of_scene(tmp_path, scene, SpinSettings(longest_s=100.0)), Silent())
     assert run.status == "finished"
     assert len(run.readings().frame) == 11
 
 
-def test_a_top_that_keeps_its_spin_is_noticed_once_while_it_is_read(tmp_path: Path, usual: Run) -> None:
+def test_a_top_that_keeps_its_spin_is_noticed_once_while_it_is_read(tmp_path, usual):
     """After a minute, in which air takes a sixth of the spin; a top that spins down is not noticed."""
     scene = SpinScene(fall_hz=1.0, constants=(1e-6,))
     run = acquire(of_scene(tmp_path, scene, SpinSettings(longest_s=150.0)), Silent())
@@ -213,7 +198,7 @@ def test_a_top_that_keeps_its_spin_is_noticed_once_while_it_is_read(tmp_path: Pa
     assert "does not fall" not in {event["kind"] for event in usual.events()}
 
 
-def test_a_scene_without_drag_is_named_as_the_reason(tmp_path: Path) -> None:
+def test_a_scene_without_drag_is_named_as_the_reason(tmp_path):
     settings = (*LET_GO_AT_ONCE, "longest_s=80")
     options = AcquisitionOptions(mock=True, out=tmp_path, seed=1, scene="driven", settings=settings)
     run = acquire(request_for("spin", options), Silent())
@@ -222,9 +207,7 @@ def test_a_scene_without_drag_is_named_as_the_reason(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_the_run_with_outputs_off_and_all_readings(
-    tmp_path: Path, outputs: list[bool], number: signal.Signals
-) -> None:
+def test_a_signal_ends_the_run_with_outputs_off_and_all_readings(tmp_path, outputs, number):
     show = Impatient(5, number)
     run = acquire(mock(tmp_path), show)
     assert run.status == "interrupted"
@@ -234,19 +217,17 @@ def test_a_signal_ends_the_run_with_outputs_off_and_all_readings(
     assert show.after_close == [run.events()[-1]["text"]], "not above a bench whose drive was on"
 
 
-def test_ctrl_c_twice_breaks_through_an_exchange_and_outputs_go_off(
-    tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ctrl_c_twice_breaks_through_an_exchange_and_outputs_go_off(tmp_path, outputs, monkeypatch):
     count = itertools.count()
 
-    def hangs(self: Keysight53230A) -> float | None:
+    def hangs(self):
         if next(count) == 4:
             signal.raise_signal(signal.SIGINT)
             signal.raise_signal(signal.SIGINT)
             pytest.fail("the second signal did not break through")
         return read(self)
 
-    read: Callable[[Keysight53230A], float | None] = Keysight53230A.frequency
+    read = Keysight53230A.frequency
     monkeypatch.setattr(Keysight53230A, "frequency", hangs)
     run = acquire(mock(tmp_path), Silent())
     assert run.status == "interrupted"
@@ -254,12 +235,10 @@ def test_ctrl_c_twice_breaks_through_an_exchange_and_outputs_go_off(
 
 
 @pytest.mark.parametrize("when", [0, 1, 2, 20, 28, 29, BEFORE - 1, BEFORE, BEFORE + 1, BEFORE + 12])
-def test_an_exception_at_any_moment_leaves_outputs_off_and_the_readings_so_far(
-    tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch, when: int
-) -> None:
+def test_an_exception_at_any_moment_leaves_outputs_off_and_the_readings_so_far(tmp_path, outputs, monkeypatch, when):
     count = itertools.count()
 
-    def fails(self: Keysight53230A) -> float | None:
+    def fails(self):
         if next(count) == when:
             raise ExperimentFailed("no more of it")
         return read(self)
@@ -275,16 +254,14 @@ def test_an_exception_at_any_moment_leaves_outputs_off_and_the_readings_so_far(
     assert "no more of it" in run.events()[-1]["text"]
 
 
-def counting(monkeypatch: pytest.MonkeyPatch, wrong: Callable[[int, float | None], float | None]) -> None:
+def counting(monkeypatch, wrong):
     """Let the counter miscount: `wrong` gets the number of the count, the first reading is BEFORE, and its value."""
     count = itertools.count()
     read = Keysight53230A.frequency
     monkeypatch.setattr(Keysight53230A, "frequency", lambda self: wrong(next(count), read(self)))
 
 
-def test_a_fallen_top_that_rattles_is_not_taken_for_a_spinning_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_fallen_top_that_rattles_is_not_taken_for_a_spinning_one(tmp_path, monkeypatch):
     rattle = itertools.cycle([180.0, 3.0, 95.0])
     counting(monkeypatch, lambda _, spin: spin or next(rattle))
     run = acquire(mock(tmp_path), Silent())
@@ -295,9 +272,7 @@ def test_a_fallen_top_that_rattles_is_not_taken_for_a_spinning_one(
 
 
 @pytest.mark.parametrize(("reading", "factor"), [(1, 2.0), (5, 2.0), (5, 0.45), (5, 1.3), (12, 1.1)])
-def test_a_miscount_that_cannot_be_is_asked_again_and_not_kept(
-    usual: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reading: int, factor: float
-) -> None:
+def test_a_miscount_that_cannot_be_is_asked_again_and_not_kept(usual, tmp_path, monkeypatch, reading, factor):
     whole = usual.readings().frame
     counting(monkeypatch, lambda k, spin: spin * factor if spin and k == BEFORE + reading else spin)
     run = acquire(mock(tmp_path), Silent())
@@ -313,9 +288,7 @@ def test_a_miscount_that_cannot_be_is_asked_again_and_not_kept(
     assert np.allclose(frame["spin_frequency_hz"], whole["spin_frequency_hz"], rtol=0, atol=0.3)
 
 
-def test_a_miscount_that_could_be_stands_for_the_analysis_to_find(
-    usual: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_miscount_that_could_be_stands_for_the_analysis_to_find(usual, tmp_path, monkeypatch):
     whole = usual.readings().frame
     counting(monkeypatch, lambda k, spin: spin * 0.8 if spin and k == BEFORE + 7 else spin)
     frame = acquire(mock(tmp_path), Silent()).readings().frame
@@ -327,7 +300,7 @@ def test_a_miscount_that_could_be_stands_for_the_analysis_to_find(
     ("gap_s", "share", "plausible"),
     [(1.0, 1.048, True), (1.0, 1.05, False), (600.0, 0.58, False), (10.0, 0.467, True), (10.0, 0.466, False)],
 )
-def test_a_free_top_keeps_its_spin_within_what_air_takes(gap_s: float, share: float, plausible: bool) -> None:
+def test_a_free_top_keeps_its_spin_within_what_air_takes(gap_s, share, plausible):
     """At most 5 % more, less 0.1 %/s (1.049 after 1 s, 0.576 after 600 s); at least 0.4665 after 10 s."""
     last = {"time_s": 50.0, "spin_frequency_hz": 30.0}
     reading = {"time_s": 50.0 + gap_s, "spin_frequency_hz": 30.0 * share}
@@ -335,20 +308,17 @@ def test_a_free_top_keeps_its_spin_within_what_air_takes(gap_s: float, share: fl
 
 
 @pytest.mark.parametrize("moment", range(3))
-def test_a_signal_while_connecting_never_lets_the_drive_on(
-    tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch, moment: int
-) -> None:
+def test_a_signal_while_connecting_never_lets_the_drive_on(tmp_path, outputs, monkeypatch, moment):
     asked = itertools.count()
-    driver: Any = Keysight53230A if moment % 2 else Keysight33500B
+    driver = Keysight53230A if moment % 2 else Keysight33500B
     identity = driver.identity
 
-    def interrupted(self: Any) -> str:
+    def interrupted(self):
         if next(asked) == moment // 2:
             signal.raise_signal(signal.SIGINT)
-        answer: str = identity(self)
-        return answer
+        return identity(self)
 
-    def and_again(self: RunWriter, status: Status) -> None:  # an impatient person's do not tear what is kept
+    def and_again(self, status):  # an impatient person's do not tear what is kept
         signal.raise_signal(signal.SIGINT)
         signal.raise_signal(signal.SIGINT)
         finish(self, status)
@@ -361,9 +331,7 @@ def test_a_signal_while_connecting_never_lets_the_drive_on(
     assert True not in outputs
 
 
-def test_the_time_of_a_reading_is_the_middle_of_its_gate(
-    ten_runs: list[tuple[SpinWorld, pd.DataFrame]],
-) -> None:
+def test_the_time_of_a_reading_is_the_middle_of_its_gate(ten_runs):
     """At 0.1 Hz/s a time stamp that is half a gate off would be 0.05 Hz off, which the mean of ten runs shows."""
     off = []
     for world, frame in ten_runs:
@@ -375,10 +343,10 @@ def test_the_time_of_a_reading_is_the_middle_of_its_gate(
     assert abs(np.mean(off)) < 0.012
 
 
-def test_errors_that_an_earlier_program_left_are_not_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_errors_that_an_earlier_program_left_are_not_ours(tmp_path, monkeypatch):
     init = Virtual33500B.__init__
 
-    def soiled(self: Virtual33500B, *args: Any, **named: Any) -> None:
+    def soiled(self, *args, **named):
         init(self, *args, **named)
         self.execute("NONSENSE")
 
@@ -386,25 +354,14 @@ def test_errors_that_an_earlier_program_left_are_not_ours(tmp_path: Path, monkey
     assert acquire(mock(tmp_path), Silent()).status == "finished"
 
 
-def test_a_generator_that_no_longer_answers_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def mute(self: Keysight33500B) -> None:
-        raise NoAnswer("generator", "OUTP1 OFF", 2.0)
-
-    monkeypatch.setattr(Keysight33500B, "off", mute)
-    with pytest.raises(InstrumentError, match="MAY STILL BE ON"):
-        acquire(mock(tmp_path), Silent())
-
-
-def test_a_full_disk_in_the_middle_leaves_outputs_off_and_the_shown_readings(
-    tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_in_the_middle_leaves_outputs_off_and_the_shown_readings(tmp_path, outputs, monkeypatch):
     class Filling(Silent):
-        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
+        def reading(self, text, elapsed, remaining):
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 7:
                 monkeypatch.setattr("levilab.runs.writer.os.fsync", full)
 
-    def full(_: int) -> None:
+    def full(_):
         raise OSError(28, "No space left on device")
 
     show = Filling()
@@ -417,7 +374,7 @@ def test_a_full_disk_in_the_middle_leaves_outputs_off_and_the_shown_readings(
     assert [round(t, 2) for t in run.readings().frame["time_s"]][:7] == shown
 
 
-def test_an_interrupted_run_is_resumed_where_it_was_left(usual: Run, tmp_path: Path) -> None:
+def test_an_interrupted_run_is_resumed_where_it_was_left(usual, tmp_path):
     half = acquire(mock(tmp_path), Impatient(8))
     run = acquire(mock(tmp_path, None, resume=half.folder, note="second half"), Silent())
     whole, frame = usual.readings().frame, run.readings().frame
@@ -429,21 +386,21 @@ def test_an_interrupted_run_is_resumed_where_it_was_left(usual: Run, tmp_path: P
 
 
 @pytest.mark.parametrize("highest", [28.0, 40.0])
-def test_the_first_time_left_is_right_within_a_third(tmp_path: Path, highest: float) -> None:
+def test_the_first_time_left_is_right_within_a_third(tmp_path, highest):
     show = Silent()
     acquire(of_scene(tmp_path, SpinScene(start_hz=26.0), SpinSettings(drive_frequency_hz=highest)), show)
     lasted = float(show.readings[-1].split()[0]) - float(show.readings[0].split()[0]) + 5.0
     assert show.left[0] == pytest.approx(lasted, rel=0.33)
 
 
-def readings_of(law: str, constants: tuple[float, ...], times: Array, noise: Array | float = 0.0) -> list[Row]:
+def readings_of(law, constants, times, noise=0.0):
     """Readings of a top that slows down from 40 Hz."""
     spin = DECAYS[law].after(80 * np.pi, times, *constants) / (2 * np.pi) + noise
     return [{"time_s": time, "spin_frequency_hz": hz} for time, hz in zip(times.tolist(), spin.tolist(), strict=True)]
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_a_top_falls_within_the_time_left_under_every_law_of_drag(law: str) -> None:
+def test_a_top_falls_within_the_time_left_under_every_law_of_drag(law):
     """Constants differ by 20 %, readings scatter by 0.03 Hz; the range is of about two standard uncertainties."""
     held = []
     for seed in range(20):
@@ -461,7 +418,7 @@ def test_a_top_falls_within_the_time_left_under_every_law_of_drag(law: str) -> N
 
 
 @pytest.mark.parametrize(("law", "off"), [("stokes", 0.003), ("disc", 0.003), ("newton", 0.003), ("mixed", 0.02)])
-def test_the_time_left_of_exact_readings_is_that_of_their_law(law: str, off: float) -> None:
+def test_the_time_left_of_exact_readings_is_that_of_their_law(law, off):
     """From 40 to about 32 Hz: the power is interpolated, and that of the mixed law falls with the spin."""
     constants = LAWS[law].usual
     first, middle, last = (
@@ -474,7 +431,7 @@ def test_the_time_left_of_exact_readings_is_that_of_their_law(law: str, off: flo
 
 
 @pytest.mark.parametrize("u", [1e-9, 0.5, 1e6])
-def test_any_uncertainty_of_readings_leaves_a_time_left(u: float) -> None:
+def test_any_uncertainty_of_readings_leaves_a_time_left(u):
     rows = [{**row, "spin_frequency_u_hz": u} for row in readings_of("disc", (2.34e-4,), np.arange(0.0, 150.0, 10.0))]
     for k, row in enumerate(rows):
         least, most = time_left(rows[0], rows[k // 2], row, 1800.0)
@@ -483,15 +440,15 @@ def test_any_uncertainty_of_readings_leaves_a_time_left(u: float) -> None:
     assert time_left(rows[0], rows[2], backwards, 1800.0)[1] > 0.0  # a clock that went back is an error of its own
 
 
-def test_the_practice_benchs_top_falls_within_the_time_left_that_is_shown(tmp_path: Path) -> None:
+def test_the_practice_benchs_top_falls_within_the_time_left_that_is_shown(tmp_path):
     """A tilted moment brings it down at 23.3 Hz, long before the published tops' 21.86 Hz."""
 
     class Watching(Silent):
-        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
+        def reading(self, text, elapsed, remaining):
             super().reading(text, elapsed, remaining)
             between.append((elapsed + remaining[0], elapsed + remaining[1]))
 
-    between: list[tuple[float, float]] = []
+    between = []
     run = acquire(mock(tmp_path, 3, scene="practice"), Watching())
     (fell,) = [event["time_s"] for event in run.events() if event["kind"] == "fell"]
     for earliest, latest in between[len(between) // 2 :]:
@@ -499,7 +456,7 @@ def test_the_practice_benchs_top_falls_within_the_time_left_that_is_shown(tmp_pa
         assert latest - earliest > 30.0
 
 
-def test_a_resume_that_fails_keeps_the_run_and_its_readings(tmp_path: Path) -> None:
+def test_a_resume_that_fails_keeps_the_run_and_its_readings(tmp_path):
     """A run without instruments in its record, as other programs write it, whose bench does not answer any more."""
     half = acquire(mock(tmp_path, 3), Impatient(8))
     before = half.readings().frame
@@ -520,8 +477,8 @@ def test_a_resume_that_fails_keeps_the_run_and_its_readings(tmp_path: Path) -> N
     assert kept.readings().frame.equals(before)
 
 
-def test_why_a_run_failed_is_written_down_without_backquotes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(self: RunWriter, row: object) -> None:
+def test_why_a_run_failed_is_written_down_without_backquotes(tmp_path, monkeypatch):
+    def full(self, row):
         raise CannotWrite("the disk is full: choose another place with `out`")
 
     monkeypatch.setattr(RunWriter, "reading", full)
@@ -531,9 +488,9 @@ def test_why_a_run_failed_is_written_down_without_backquotes(tmp_path: Path, mon
     assert Run.load(folder).events()[-1]["text"] == "the disk is full: choose another place with out"
 
 
-def test_what_a_resumed_virtual_run_goes_through_again_is_not_shown(tmp_path: Path) -> None:
+def test_what_a_resumed_virtual_run_goes_through_again_is_not_shown(tmp_path):
     class Bar(Silent):
-        def preparing(self, text: str, fraction: float) -> None:
+        def preparing(self, text, fraction):
             self.messages.append(text)
 
     half, first = acquire(mock(tmp_path, 3), show := Bar()), Bar()
@@ -544,12 +501,10 @@ def test_what_a_resumed_virtual_run_goes_through_again_is_not_shown(tmp_path: Pa
     assert not any("drive" in text for text in first.messages)
 
 
-def test_a_wire_log_that_cannot_be_written_does_not_keep_the_output_on(
-    tmp_path: Path, outputs: list[bool], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_wire_log_that_cannot_be_written_does_not_keep_the_output_on(tmp_path, outputs, monkeypatch):
     append = RunWriter._append
 
-    def full(self: RunWriter, name: str, line: str, *, sync: bool = True) -> None:
+    def full(self, name, line, *, sync=True):
         if name == "wire.log" and "OUTP1 ON" in line:
             raise OSError(28, "No space left on device")
         append(self, name, line, sync=sync)
@@ -561,7 +516,7 @@ def test_a_wire_log_that_cannot_be_written_does_not_keep_the_output_on(
     assert (run.record.model_extra or {})["wire_log_ended"] == "No space left on device"
 
 
-def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path, monkeypatch):
     """As without a world: instruments from the configuration, and a top that has gone on since its time zero."""
     clock = VirtualClock()
     library = library_for(virtual_bus(SpinWorld(SpinScene(), clock)))
@@ -575,7 +530,7 @@ def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path: Path, monk
 
     class Then(datetime):
         @classmethod
-        def now(cls, tz: tzinfo | None = None) -> Self:
+        def now(cls, tz=None):
             return cls.fromtimestamp(zero.timestamp() + 72.5, tz)
 
     monkeypatch.setattr("levilab.runs.run.datetime", Then)
@@ -590,7 +545,7 @@ def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path: Path, monk
 # --- a top in full motion ---
 
 
-def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(in_full_motion: Run) -> None:
+def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(in_full_motion):
     from levilab.pipelines.options import SpinDownOptions
     from levilab.pipelines.spindown.analysis import analyze_spindowns
     from levilab.simulator import preset
@@ -607,9 +562,7 @@ def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(in_full_motion: Ru
     assert disc.value == pytest.approx(2.34e-4, rel=0.009)
 
 
-def test_a_run_in_full_motion_is_repeated_by_its_seed_and_resumed_in_its_scene(
-    in_full_motion: Run, tmp_path: Path
-) -> None:
+def test_a_run_in_full_motion_is_repeated_by_its_seed_and_resumed_in_its_scene(in_full_motion, tmp_path):
     whole = in_full_motion.readings().frame
     half = acquire(mock(tmp_path, 5, scene="spindown"), Impatient(3))
     assert half.status == "interrupted"

@@ -1,9 +1,6 @@
 """An instrument that fails in the middle of a run: events, reached again, set up anew; a gap, and no made-up value."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -19,17 +16,9 @@ from levilab.world import bench as benches
 from levilab.world.bench import VIRTUAL, virtual_bus
 from support.acquisitions import BEFORE, Silent, mock
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-    from instruments.virtual.bench.bench import VirtualBench
-    from levilab.acquisition.experiment import CounterSettings
-    from levilab.acquisition.session import Session
-    from levilab.runs.run import Run
-
-
-def acquired(folder: Path, monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Run:
-    def with_faults(*given: object) -> VirtualBench:
+def acquired(folder, monkeypatch, *faults):
+    def with_faults(*given):
         bus = virtual_bus(*given)  # type: ignore[arg-type]
         bus.faults.extend(faults)
         return bus
@@ -39,11 +28,11 @@ def acquired(folder: Path, monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> R
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def whole(tmp_path_factory):
     return acquire(mock(tmp_path_factory.mktemp("whole")), Silent())
 
 
-def kinds(run: Run) -> list[str]:
+def kinds(run):
     return [event["kind"] for event in run.events()]
 
 
@@ -67,7 +56,7 @@ COSTS = {
 }
 
 
-def test_every_fault_is_tried() -> None:
+def test_every_fault_is_tried():
     assert set(COSTS) | {"taken by another"} == set(FAULTS)
 
 
@@ -76,9 +65,7 @@ OFTEN = [(what, times) for what in COSTS for times in (1, 3) if what != "9.91E37
 
 
 @pytest.mark.parametrize(("what", "times"), OFTEN)
-def test_a_fault_of_a_reading_is_reported_and_the_run_goes_on(
-    what: str, times: int, whole: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_fault_of_a_reading_is_reported_and_the_run_goes_on(what, times, whole, tmp_path, monkeypatch):
     # two readings come before the drive is off
     run = acquired(tmp_path, monkeypatch, Fault(what, question=r"READ\?", after=BEFORE + 6, times=times))
     before, frame = whole.readings().frame, run.readings().frame
@@ -96,9 +83,7 @@ def test_a_fault_of_a_reading_is_reported_and_the_run_goes_on(
         assert "found again" in kinds(run)
 
 
-def test_an_instrument_that_is_gone_for_a_while_is_tried_until_it_is_back(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_instrument_that_is_gone_for_a_while_is_tried_until_it_is_back(tmp_path, monkeypatch):
     run = acquired(tmp_path, monkeypatch, Fault("away for 5 s", question=r"READ\?", after=BEFORE + 6))
     tries = [event for event in run.events() if event["kind"] == "not reached"]
     assert len(tries) == 3  # at once, and 1 s and 3 s later; 7 s later it is back
@@ -107,9 +92,7 @@ def test_an_instrument_that_is_gone_for_a_while_is_tried_until_it_is_back(
     assert gaps.max() == pytest.approx(20.0, abs=1.0)  # one reading of every 10 s is missing
 
 
-def test_an_instrument_that_another_program_keeps_ends_the_run_and_keeps_its_readings(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_instrument_that_another_program_keeps_ends_the_run_and_keeps_its_readings(tmp_path, monkeypatch):
     from levilab.runs.run import Run
 
     with pytest.raises(InstrumentError, match="locked"):
@@ -120,9 +103,7 @@ def test_an_instrument_that_another_program_keeps_ends_the_run_and_keeps_its_rea
     assert kinds(run).count("not reached") == 6
 
 
-def test_an_instrument_that_is_lost_again_and_again_is_given_up(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_instrument_that_is_lost_again_and_again_is_given_up(tmp_path, monkeypatch):
     from levilab.runs.run import Run
 
     with pytest.raises(InstrumentError):
@@ -131,18 +112,14 @@ def test_an_instrument_that_is_lost_again_and_again_is_given_up(
     assert kinds(run).count("instrument lost") == MOST_LOSSES + 1
 
 
-def test_settings_changed_by_hand_are_reported_by_name_and_set_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_settings_changed_by_hand_are_reported_by_name_and_set_again(tmp_path, monkeypatch):
     run = acquired(tmp_path, monkeypatch, Fault("reset", question=r"READ\?", after=BEFORE + 6))
     (lost,) = [event for event in run.events() if event["kind"] == "instrument lost"]
     assert "gate_s = 0.1 instead of 1.0" in lost["text"]
     assert run.record.instruments["counter"]["settings_end"]["gate_s"] == 1.0
 
 
-def test_a_drive_whose_link_is_lost_is_switched_off_over_a_new_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_drive_whose_link_is_lost_is_switched_off_over_a_new_one(tmp_path, monkeypatch):
     # the first question after the ramp of 25 steps is whether the output is off
     run = acquired(tmp_path, monkeypatch, Fault("disconnected", question=r"OUTP1\?", after=2))
     assert run.status == "finished"
@@ -150,9 +127,7 @@ def test_a_drive_whose_link_is_lost_is_switched_off_over_a_new_one(
 
 
 @pytest.mark.parametrize("when", range(2, 10))
-def test_a_reset_while_it_is_set_up_is_found_before_anything_is_measured(
-    when: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_reset_while_it_is_set_up_is_found_before_anything_is_measured(when, tmp_path, monkeypatch):
     # each command of the setting up is followed by a look into the error queue
     with pytest.raises(InstrumentError, match=r"_s = |_v = |coupling|automatic_level|impedance"):
         acquired(tmp_path, monkeypatch, Fault("reset", question=r"SYST:ERR\?", after=when))
@@ -160,21 +135,17 @@ def test_a_reset_while_it_is_set_up_is_found_before_anything_is_measured(
 
 @pytest.mark.parametrize("after", [0, 1])
 @pytest.mark.parametrize("what", ["no answer", "disconnected", "reset"])
-def test_a_counter_that_fails_before_the_first_reading_is_reached_again(
-    what: str, after: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_counter_that_fails_before_the_first_reading_is_reached_again(what, after, tmp_path, monkeypatch):
     run = acquired(tmp_path, monkeypatch, Fault(what, question=r"READ\?", after=after))
     assert run.status == "finished"
     assert kinds(run)[:3].count("found again") == 1
     assert kinds(run).count("drive on") == 1
 
 
-def test_a_counter_that_is_reset_while_the_drive_takes_hold_counts_on_with_short_gates(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    gates: list[float | None] = []
+def test_a_counter_that_is_reset_while_the_drive_takes_hold_counts_on_with_short_gates(tmp_path, monkeypatch):
+    gates = []
 
-    def prepare(session: Session[CounterSettings], gate_s: float | None = None) -> None:
+    def prepare(session, gate_s=None):
         gates.append(gate_s)
         prepare_counter(session, gate_s)
 
@@ -184,9 +155,7 @@ def test_a_counter_that_is_reset_while_the_drive_takes_hold_counts_on_with_short
     assert gates == [GRIP_GATE_S, GRIP_GATE_S, None]
 
 
-def test_a_generator_that_fails_on_the_way_up_is_off_and_the_way_is_gone_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_generator_that_fails_on_the_way_up_is_off_and_the_way_is_gone_again(tmp_path, monkeypatch):
     # at the generator's address only the ramp asks for its error queue so often
     cut = Fault("disconnected", question=r"SYST:ERR\?", after=110)
     run = acquired(tmp_path, monkeypatch, cut)
@@ -197,11 +166,11 @@ def test_a_generator_that_fails_on_the_way_up_is_off_and_the_way_is_gone_again(
     assert 30 < run.readings().frame["spin_frequency_hz"].iloc[0] < 36
 
 
-def test_what_was_missed_is_not_caught_up_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_missed_is_not_caught_up_with(tmp_path, monkeypatch):
     order = mock(tmp_path)
     often = settings_of(order.config, "spin").model_copy(update={"interval_s": 2.0})
 
-    def with_faults(*given: object) -> VirtualBench:
+    def with_faults(*given):
         bus = virtual_bus(*given)  # type: ignore[arg-type]
         bus.faults.append(Fault("away for 5 s", question=r"READ\?", after=BEFORE + 6))
         return bus
@@ -213,12 +182,10 @@ def test_what_was_missed_is_not_caught_up_with(tmp_path: Path, monkeypatch: pyte
     assert gaps.min() > 1.9
 
 
-def test_a_drive_that_was_left_on_goes_off_even_if_the_counter_is_not_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    left: list[VirtualBench] = []
+def test_a_drive_that_was_left_on_goes_off_even_if_the_counter_is_not_there(tmp_path, monkeypatch):
+    left = []
 
-    def left_on(*given: object) -> VirtualBench:
+    def left_on(*given):
         bus = virtual_bus(*given)  # type: ignore[arg-type]
         generator, counter = (bus.instruments[VIRTUAL[kind].address] for kind in ("generator", "counter"))
         generator.execute("OUTP1 ON")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -20,27 +19,19 @@ from levilab.telemetry.publisher import LEAST_PAUSE_S, Publisher
 from levilab.telemetry.subscriber import Subscriber
 from support.acquisitions import Silent
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    from levilab.acquisition.session import Session
-    from levilab.bench.wiring import Wiring
-    from levilab.telemetry.messages import Message
-
 SHORT = ("spin.drive_frequency_hz=30.5", "spin.hold_s=0", "spin.interval_s=2", "spin.longest_s=30")
 
 
-def request(out: Path, experiment: str = "spin", *settings: str, **options: Any) -> Any:
+def request(out, experiment="spin", *settings, **options):
     return request_for(experiment, AcquisitionOptions(mock=True, out=out, seed=3, settings=settings, **options))
 
 
-def watched(out: Path, experiment: str = "spin", *settings: str) -> tuple[list[Message], Any]:
+def watched(out, experiment="spin", *settings):
     """Messages of a run to a view that asks each time, on a wall clock that goes on with each look."""
-    seen: list[Message] = []
+    seen = []
 
     @contextlib.contextmanager
-    def watch(session: Session[Any], wiring: Wiring) -> Iterator[Callable[[], None]]:
+    def watch(session, wiring):
         wall = [0.0]
         with Publisher(lambda: wall[0]) as publisher:
             look = Onlooker(session, publisher, wiring.poses)
@@ -49,7 +40,7 @@ def watched(out: Path, experiment: str = "spin", *settings: str) -> tuple[list[M
             assert found == publisher.address is not None
             with Subscriber(found, lambda: wall[0]) as view:
 
-                def step() -> None:
+                def step():
                     wall[0] += LEAST_PAUSE_S
                     seen.extend(view.receive())
                     look()
@@ -61,11 +52,11 @@ def watched(out: Path, experiment: str = "spin", *settings: str) -> tuple[list[M
 
 
 @pytest.fixture(scope="module")
-def spin_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Message], Any]:
+def spin_run(tmp_path_factory):
     return watched(tmp_path_factory.mktemp("runs"), "spin", *SHORT)
 
 
-def test_a_view_sees_the_drive_the_count_and_the_readings(spin_run: tuple[list[Message], Any]) -> None:
+def test_a_view_sees_the_drive_the_count_and_the_readings(spin_run):
     messages, run = spin_run
     states = [message for message in messages if isinstance(message, State)]
     driven = [state for state in states if state.drive and state.drive.output]
@@ -87,7 +78,7 @@ def test_a_view_sees_the_drive_the_count_and_the_readings(spin_run: tuple[list[M
     assert min(left) >= 0
 
 
-def test_the_poses_of_one_message_go_on_where_the_last_ended(spin_run: tuple[list[Message], Any]) -> None:
+def test_the_poses_of_one_message_go_on_where_the_last_ended(spin_run):
     messages, _ = spin_run
     chunks = [message for message in messages if isinstance(message, Poses)]
     ends = [chunk.start_s + chunk.step_s * len(chunk.up) for chunk in chunks]
@@ -98,7 +89,7 @@ def test_the_poses_of_one_message_go_on_where_the_last_ended(spin_run: tuple[lis
     assert any(abs(gap) < 1e-9 for gap in gaps)
 
 
-def test_watching_changes_no_reading(spin_run: tuple[list[Message], Any], tmp_path: Path) -> None:
+def test_watching_changes_no_reading(spin_run, tmp_path):
     _, run = spin_run
     other = acquire(request(tmp_path, "spin", *SHORT), Silent())
     assert (run.folder / "readings.csv").read_bytes() == (other.folder / "readings.csv").read_bytes()
@@ -106,14 +97,14 @@ def test_watching_changes_no_reading(spin_run: tuple[list[Message], Any], tmp_pa
     assert not (other.folder / FILE).exists()
 
 
-def test_where_no_view_listens_nothing_is_computed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    calls: list[str] = []
-    looks: list[int] = []
+def test_where_no_view_listens_nothing_is_computed(tmp_path, monkeypatch):
+    calls = []
+    looks = []
     monkeypatch.setattr(onlooker, "state_of", lambda *_, **__: calls.append("state"))
     monkeypatch.setattr(Sent, "send_poses", lambda *_: calls.append("poses"))
 
     @contextlib.contextmanager
-    def counting(session: Session[Any], wiring: Wiring) -> Iterator[Callable[[], None]]:
+    def counting(session, wiring):
         with publishing(session, wiring) as look:
             yield lambda: (looks.append(1), look())[1]
 
@@ -122,14 +113,14 @@ def test_where_no_view_listens_nothing_is_computed(tmp_path: Path, monkeypatch: 
     assert calls == []
 
 
-def test_a_terminal_that_wants_it_sees_the_state(tmp_path: Path) -> None:
+def test_a_terminal_that_wants_it_sees_the_state(tmp_path):
     class Screen(Silent):
         states: tuple[State, ...] = ()
 
-        def is_due(self) -> bool:
+        def is_due(self):
             return True
 
-        def state(self, state: State) -> None:
+        def state(self, state):
             self.states += (state,)
 
     acquire(request(tmp_path, "field", "field.highest_m=0.065"), screen := Screen())
@@ -137,7 +128,7 @@ def test_a_terminal_that_wants_it_sees_the_state(tmp_path: Path) -> None:
     assert screen.states[-1].drive is None
 
 
-def test_records_reach_the_view_by_their_lows_and_highs(tmp_path: Path) -> None:
+def test_records_reach_the_view_by_their_lows_and_highs(tmp_path):
     messages, run = watched(tmp_path, "trace", "trace.records=2", "trace.interval_s=2")
     records = [message for message in messages if isinstance(message, Record)]
     assert {(record.number, record.channel) for record in records} >= {(1, "tape")}
@@ -151,7 +142,7 @@ CODES = np.array([10, 12, 200, 11, 10, 9, 10, 250], dtype=np.uint8)
 
 
 @pytest.mark.parametrize("scale", [0.01, -0.01])
-def test_a_long_record_keeps_its_extremes(scale: float) -> None:
+def test_a_long_record_keeps_its_extremes(scale):
     codes = np.full(1_000_003, 100, dtype=np.uint8)
     codes[500_000], codes[777_777] = 3, 250
     record = record_of(1, "light", 5.0, Trace(codes, 1e-6, -0.5, scale, 1.0, 1))
@@ -162,7 +153,7 @@ def test_a_long_record_keeps_its_extremes(scale: float) -> None:
     assert (record.low <= record.high).all()
 
 
-def test_samples_that_are_none_are_left_out() -> None:
+def test_samples_that_are_none_are_left_out():
     codes = np.tile(CODES, 300)
     codes[:4] = 0
     trace = Trace(codes, 1e-3, 0.0, 0.1, 0.0, 1)
@@ -173,11 +164,11 @@ def test_samples_that_are_none_are_left_out() -> None:
     assert record_of(1, "x", 0.0, replace(trace, codes=codes[:0])).low.size == 0
 
 
-def test_a_record_is_sent_again_for_views_that_come_later() -> None:
-    sent: list[Any] = []
+def test_a_record_is_sent_again_for_views_that_come_later():
+    sent = []
 
     class Noting(Publisher):
-        def send(self, message: Message) -> None:
+        def send(self, message):
             sent.append(message)
 
     wall = [0.0]
@@ -190,7 +181,7 @@ def test_a_record_is_sent_again_for_views_that_come_later() -> None:
         assert sent[0] is sent[1]
 
 
-def test_the_clock_has_nothing_to_do_meanwhile_after_the_run(tmp_path: Path) -> None:
+def test_the_clock_has_nothing_to_do_meanwhile_after_the_run(tmp_path):
     asked = request(tmp_path, "field", "field.highest_m=0.065")
     wiring = asked.wiring()
     acquire(replace(asked, wiring=lambda: wiring), Silent())

@@ -6,7 +6,7 @@ import dataclasses
 import shutil
 import signal
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,11 +29,6 @@ from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
 from support.acquisitions import Silent
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from levilab.bench.person import Person, Task
-
 
 class ScanSettings(ExperimentSettings):
     """Heights at which the field is measured [m]."""
@@ -49,7 +44,7 @@ CHANNELS = (
 )
 
 
-def scan(session: Session[ScanSettings]) -> None:
+def scan(session):
     """At each height: the person moves the probe, then a field, a record, and a reading of both."""
     bench = session.bench
     bench.magnetometer.prepare(range_t=None)
@@ -74,13 +69,11 @@ SCAN = Experiment(
     channels=lambda _: CHANNELS,
     run=scan,
 )
-SCAN_TABLES: type[BenchConfig] = create_model(
-    "ScanTables", __base__=BenchConfig, scan=(ScanSettings, Field(default_factory=ScanSettings))
-)
+SCAN_TABLES = create_model("ScanTables", __base__=BenchConfig, scan=(ScanSettings, Field(default_factory=ScanSettings)))
 
 
 @pytest.fixture
-def request_of_a_scan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AcquisitionRequest:
+def request_of_a_scan(tmp_path, monkeypatch):
     monkeypatch.setitem(EXPERIMENTS, "scan", SCAN)
     world = SpinWorld(SpinScene(), VirtualClock())
     return AcquisitionRequest(
@@ -88,13 +81,13 @@ def request_of_a_scan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Acquis
     )
 
 
-def with_person(request: AcquisitionRequest, person: Person) -> AcquisitionRequest:
+def with_person(request, person):
     """The same with this person at the bench."""
     wiring = dataclasses.replace(request.wiring(), person=person)
     return dataclasses.replace(request, wiring=lambda: wiring)
 
 
-def test_an_experiment_of_another_shape_writes_what_it_declares(request_of_a_scan: AcquisitionRequest) -> None:
+def test_an_experiment_of_another_shape_writes_what_it_declares(request_of_a_scan):
     run = acquire(request_of_a_scan, Silent())
     assert run.status == "finished"
     assert sorted(run.record.instruments) == ["magnetometer", "oscilloscope"]
@@ -106,35 +99,33 @@ def test_an_experiment_of_another_shape_writes_what_it_declares(request_of_a_sca
     assert frame["light_v"].between(0.0, 1.3).all()
 
 
-def test_a_reading_is_shown_with_its_units_and_the_time_left(request_of_a_scan: AcquisitionRequest) -> None:
+def test_a_reading_is_shown_with_its_units_and_the_time_left(request_of_a_scan):
     show = Silent()
     acquire(request_of_a_scan, show)
     assert show.left == [4.0, 2.0, 0.0]
     assert [text.split()[3::2] for text in show.readings] == [["m", "T", "V"]] * 3
 
 
-def test_what_is_left_at_least_and_at_most_is_kept_shown_and_seen_as_a_pair(
-    request_of_a_scan: AcquisitionRequest, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_left_at_least_and_at_most_is_kept_shown_and_seen_as_a_pair(request_of_a_scan, monkeypatch):
     class Watching(Silent):
-        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
+        def reading(self, text, elapsed, remaining):
             shown.append(remaining)
 
-    def uncertain(session: Session[ScanSettings]) -> None:
+    def uncertain(session):
         session.begin(lambda: None)
         session.keep(dict.fromkeys([channel.name for channel in CHANNELS], session.now()), (10.0, 30.0))
         state = state_of(session, virtual=True)
         seen.append((state.least_left_s, state.time_left_s))
 
-    shown: list[tuple[float, float]] = []
-    seen: list[tuple[float | None, float | None]] = []
+    shown = []
+    seen = []
     monkeypatch.setitem(EXPERIMENTS, "scan", dataclasses.replace(SCAN, run=uncertain))
     assert acquire(request_of_a_scan, Watching()).status == "finished"
     assert shown == [(10.0, 30.0)]
     assert seen == [(pytest.approx(10.0), pytest.approx(30.0))]
 
 
-def test_the_points_of_a_scans_values_stand_below_each_other(tmp_path: Path) -> None:
+def test_the_points_of_a_scans_values_stand_below_each_other(tmp_path):
     show = Silent()
     options = AcquisitionOptions(mock=True, out=tmp_path, seed=1, settings=("field.lowest_m=0.06",))
     acquire(request_for("field", options), show)
@@ -142,7 +133,7 @@ def test_the_points_of_a_scans_values_stand_below_each_other(tmp_path: Path) -> 
     assert len({tuple(k for k, c in enumerate(text) if c == ".") for text in show.readings}) == 1
 
 
-def test_records_are_kept_raw_and_come_back_in_volts(request_of_a_scan: AcquisitionRequest) -> None:
+def test_records_are_kept_raw_and_come_back_in_volts(request_of_a_scan):
     run = acquire(request_of_a_scan, Silent())
     stored = run.traces()
     assert [one.number for one in stored] == [1, 2, 3]
@@ -153,7 +144,7 @@ def test_records_are_kept_raw_and_come_back_in_volts(request_of_a_scan: Acquisit
         assert np.nanmean(one.trace.volts) == pytest.approx(mean, rel=1e-12)
 
 
-def test_codes_that_were_changed_afterwards_are_refused(request_of_a_scan: AcquisitionRequest) -> None:
+def test_codes_that_were_changed_afterwards_are_refused(request_of_a_scan):
     run = acquire(request_of_a_scan, Silent())
     codes = run.folder / "traces/000002.npy"
     codes.write_bytes(codes.read_bytes()[:-1] + b"\x00")
@@ -170,9 +161,7 @@ def test_codes_that_were_changed_afterwards_are_refused(request_of_a_scan: Acqui
         ('{"path": "../../elsewhere.npy"}', "describes no record"),
     ],
 )
-def test_an_index_that_is_damaged_is_refused_in_a_line(
-    request_of_a_scan: AcquisitionRequest, line: str, says: str
-) -> None:
+def test_an_index_that_is_damaged_is_refused_in_a_line(request_of_a_scan, line, says):
     run = acquire(request_of_a_scan, Silent())
     (run.folder / "traces.jsonl").write_text(line + "\n", encoding="utf-8")
     with pytest.raises(DataError, match=r"traces\.jsonl: a line") as caught:
@@ -180,11 +169,11 @@ def test_an_index_that_is_damaged_is_refused_in_a_line(
     assert says in str(caught.value)
 
 
-def test_the_person_is_asked_and_the_answer_is_kept(request_of_a_scan: AcquisitionRequest) -> None:
+def test_the_person_is_asked_and_the_answer_is_kept(request_of_a_scan):
     answers = iter(["", " at 6.1 cm, the stand slips ", ""])
-    asked: list[str] = []
+    asked = []
 
-    def person(task: Task) -> str:
+    def person(task):
         asked.append(task.text)
         return next(answers)
 
@@ -197,8 +186,8 @@ def test_the_person_is_asked_and_the_answer_is_kept(request_of_a_scan: Acquisiti
     assert ("answered", "at 6.1 cm, the stand slips") in happened
 
 
-def test_the_first_ctrl_c_ends_a_question(request_of_a_scan: AcquisitionRequest) -> None:
-    def leaves(_: Task) -> str:
+def test_the_first_ctrl_c_ends_a_question(request_of_a_scan):
+    def leaves(_):
         signal.raise_signal(signal.SIGINT)
         pytest.fail("the signal did not break through")
 
@@ -206,9 +195,7 @@ def test_the_first_ctrl_c_ends_a_question(request_of_a_scan: AcquisitionRequest)
     assert run.status == "interrupted"
 
 
-def test_a_clock_that_goes_back_is_no_reading(
-    request_of_a_scan: AcquisitionRequest, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_clock_that_goes_back_is_no_reading(request_of_a_scan, monkeypatch):
     times = iter([5.0, 5.0, 5.0, 4.0, 4.0, 4.0])
     monkeypatch.setattr(Session, "now", lambda _: next(times, 4.0))
     with pytest.raises(ExperimentFailed, match="the clock went back"):
@@ -218,31 +205,31 @@ def test_a_clock_that_goes_back_is_no_reading(
 # --- readings at an interval ---
 
 
-def session_at(seconds: float, waited: list[float], step: Callable[[], None]) -> Session[Any]:
+def session_at(seconds, waited, step):
     """A session whose waits are noted, and whose clock goes on by what a reading takes [s]."""
 
     class Noting(Session[Any]):
         clock = seconds
 
-        def now(self) -> float:
+        def now(self):
             return self.clock
 
-        def wait(self, duration: float) -> None:
+        def wait(self, duration):
             waited.append(duration)
             self.clock += max(duration, 0.0)
             step()
 
-        def event(self, kind: str, text: str, **data: Any) -> None:
+        def event(self, kind, text, **data):
             waited.append(-1.0)
 
-    session: Any = Noting.__new__(Noting)
+    session = Noting.__new__(Noting)
     session.rows, session._lost, session.zero = [], False, 0.0
     session.writer = type("Writer", (), {"record": type("Record", (), {"experiment": "scan"})})
     return session
 
 
-def test_readings_come_at_whole_multiples_of_the_interval_until_the_longest_time() -> None:
-    session: Any = session_at(0.0, [], lambda: None)
+def test_readings_come_at_whole_multiples_of_the_interval_until_the_longest_time():
+    session = session_at(0.0, [], lambda: None)
     seen = []
     for time in session.readings_every(10.0, 35.0):
         seen.append(time)
@@ -250,8 +237,8 @@ def test_readings_come_at_whole_multiples_of_the_interval_until_the_longest_time
     assert seen == [0.0, 10.0, 20.0, 30.0, 40.0]
 
 
-def test_readings_missed_while_an_instrument_was_lost_are_not_caught_up_with() -> None:
-    session: Any = session_at(0.0, [], lambda: None)
+def test_readings_missed_while_an_instrument_was_lost_are_not_caught_up_with():
+    session = session_at(0.0, [], lambda: None)
     seen = []
     for time in session.readings_every(10.0, 60.0):
         seen.append(time)
@@ -260,8 +247,8 @@ def test_readings_missed_while_an_instrument_was_lost_are_not_caught_up_with() -
     assert seen == [0.0, 10.0, 40.0, 50.0, 60.0]
 
 
-def test_a_reading_that_takes_too_long_is_followed_at_once_by_the_next() -> None:
-    session: Any = session_at(0.0, [], lambda: None)
+def test_a_reading_that_takes_too_long_is_followed_at_once_by_the_next():
+    session = session_at(0.0, [], lambda: None)
     seen = []
     for time in session.readings_every(10.0, 45.0):
         seen.append(time)
@@ -269,7 +256,7 @@ def test_a_reading_that_takes_too_long_is_followed_at_once_by_the_next() -> None
     assert seen == [0.0, 10.0, 35.0, 36.0, 40.0, 50.0]
 
 
-def test_the_run_that_is_listed_has_its_traces_described(request_of_a_scan: AcquisitionRequest) -> None:
+def test_the_run_that_is_listed_has_its_traces_described(request_of_a_scan):
     run = acquire(request_of_a_scan, Silent())
     package = (run.folder / "datapackage.json").read_text(encoding="utf-8")
     assert "traces/000003.npy" in package
@@ -277,7 +264,7 @@ def test_the_run_that_is_listed_has_its_traces_described(request_of_a_scan: Acqu
     assert Run.load(run.folder).count() == 3
 
 
-def test_a_run_whose_time_zero_is_not_known_is_not_called_empty(sample_data: Path, tmp_path: Path) -> None:
+def test_a_run_whose_time_zero_is_not_known_is_not_called_empty(sample_data, tmp_path):
     folder = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
     record = Run.load(folder).record
     assert record.time_zero_utc is None
@@ -286,8 +273,8 @@ def test_a_run_whose_time_zero_is_not_known_is_not_called_empty(sample_data: Pat
         request_for("spin", AcquisitionOptions(resume=folder))
 
 
-def test_a_run_that_is_not_there_is_looked_for_in_words(tmp_path: Path) -> None:
-    def refused(name: str) -> str:
+def test_a_run_that_is_not_there_is_looked_for_in_words(tmp_path):
+    def refused(name):
         with pytest.raises(DataError) as caught:
             request_for("spin", AcquisitionOptions(resume=Path(name), out=tmp_path / "runs"))
         return str(caught.value)

@@ -1,13 +1,10 @@
 """The page of an animation in a browser: it draws, plays, obeys keys, and stays whole whatever a scene is called."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import html
 import io
 import re
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -20,12 +17,6 @@ from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 from support.browser import PHONE, watch
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    import playwright.sync_api as pw
-
 pytest.importorskip("nicegui", reason="three.js comes out of it: pip install 'levilab[live]'")
 
 HOSTILE = "</script><img src=x onerror=alert(1)>{{ 7 * 7 }}<!--"
@@ -34,21 +25,21 @@ WINDOW = {"width": 640, "height": 700}
 
 
 @pytest.fixture(scope="module")
-def page_of_top() -> Page:
+def page_of_top():
     scene = preset("loose-washers").changed({"name": HOSTILE, "description": f"{HOSTILE} \u2028 '\""})
     motion = simulate(scene, 1.0, rate=480.0)
     return Page(poses_of(motion, 0.0, 1.0, 480), summarise(motion, 1.0, 100.0, 0.1), 0.1)
 
 
 @pytest.fixture(scope="module")
-def path(page_of_top: Page, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def path(page_of_top, tmp_path_factory):
     place = tmp_path_factory.mktemp("page") / "top.html"
     place.write_bytes(as_page(page_of_top))
     return place
 
 
 @pytest.fixture(scope="module")
-def opened(browser: pw.Browser, path: Path) -> Iterator[pw.Page]:
+def opened(browser, path):
     """One page for the tests that change nothing for good; it does not start by itself."""
     with watch(browser, viewport=WINDOW, reduced_motion="reduce") as page:
         page.goto(path.as_uri())
@@ -56,13 +47,13 @@ def opened(browser: pw.Browser, path: Path) -> Iterator[pw.Page]:
         yield page
 
 
-def canvas(page: pw.Page) -> np.ndarray:
+def canvas(page):
     """The pixels of the picture."""
     pixels = page.locator("#stage > canvas").screenshot()
     return np.asarray(Image.open(io.BytesIO(pixels)).convert("RGB"), dtype=int)
 
 
-def seek(page: pw.Page, share: float) -> None:
+def seek(page, share):
     drawn = page.locator("#stage").get_attribute("data-drawn")
     page.locator("#scrub").evaluate(
         "(s, share) => { s.value = share * s.max; s.dispatchEvent(new Event('input')) }", share
@@ -71,24 +62,24 @@ def seek(page: pw.Page, share: float) -> None:
     shows(page, share)  # not a picture that was under way
 
 
-def press_and_see(page: pw.Page, key: str) -> None:
+def press_and_see(page, key):
     drawn = page.locator("#stage").get_attribute("data-drawn")
     page.keyboard.press(key)
     page.wait_for_function("before => document.getElementById('stage').dataset.drawn > Number(before)", arg=drawn)
 
 
-def shows(page: pw.Page, time: float) -> None:
+def shows(page, time):
     """Wait until the page shows a time [s], which has three decimals."""
     page.wait_for_function(
         "t => Math.abs(Number(document.getElementById('read-time').textContent) - t) < 1.5e-3", arg=time
     )
 
 
-def read(page: pw.Page, name: str) -> float:
+def read(page, name):
     return float(page.locator(f"#read-{name}").inner_text().replace("−", "-"))
 
 
-def test_it_is_small_and_has_the_same_bytes_each_time(page_of_top: Page, path: Path) -> None:
+def test_it_is_small_and_has_the_same_bytes_each_time(page_of_top, path):
     content = path.read_bytes()
     assert content == as_page(page_of_top)
     assert len(content) < LARGEST
@@ -99,7 +90,7 @@ def test_it_is_small_and_has_the_same_bytes_each_time(page_of_top: Page, path: P
     assert len(content) - poses < LARGEST - most_poses(10) * 10 * 16 / 3
 
 
-def test_only_what_has_its_hash_may_run(path: Path) -> None:
+def test_only_what_has_its_hash_may_run(path):
     text = path.read_text(encoding="utf-8")
     policy = re.search(r'Content-Security-Policy" content="([^"]*)"', text)
     assert policy
@@ -114,7 +105,7 @@ def test_only_what_has_its_hash_may_run(path: Path) -> None:
     assert len(re.findall(r"</script", text)) == 5  # data, poses, three, top and the player
 
 
-def test_it_draws_and_the_picture_changes_with_the_time(opened: pw.Page) -> None:
+def test_it_draws_and_the_picture_changes_with_the_time(opened):
     seek(opened, 0.1)
     first = canvas(opened)
     assert first.std() > 20  # not blank
@@ -122,7 +113,7 @@ def test_it_draws_and_the_picture_changes_with_the_time(opened: pw.Page) -> None
     assert (np.abs(canvas(opened) - first).sum(axis=2) > 60).sum() > 200
 
 
-def test_it_reads_what_the_poses_are(opened: pw.Page, page_of_top: Page) -> None:
+def test_it_reads_what_the_poses_are(opened, page_of_top):
     poses = page_of_top.poses
     seek(opened, 0.5)
     k = 240
@@ -134,14 +125,14 @@ def test_it_reads_what_the_poses_are(opened: pw.Page, page_of_top: Page) -> None
     assert read(opened, "drive") == pytest.approx(0.4 * poses.drive[k], abs=6e-3)
 
 
-def test_a_scenes_name_is_text(opened: pw.Page) -> None:
+def test_a_scenes_name_is_text(opened):
     assert opened.locator("h1").inner_text() == f"Levitron: {HOSTILE}"
     assert opened.locator("img").count() == 0
     assert "simulation" in opened.locator(".badge").inner_text()
     assert HOSTILE in opened.locator("table").inner_text()
 
 
-def test_it_stands_still_where_less_motion_is_wanted_until_it_is_played(opened: pw.Page) -> None:
+def test_it_stands_still_where_less_motion_is_wanted_until_it_is_played(opened):
     seek(opened, 0.2)
     play = opened.get_by_role("button", name="Play")
     assert play.is_visible()
@@ -154,7 +145,7 @@ def test_it_stands_still_where_less_motion_is_wanted_until_it_is_played(opened: 
     assert play.is_visible()
 
 
-def test_keys_play_step_change_the_speed_and_turn_the_view(opened: pw.Page) -> None:
+def test_keys_play_step_change_the_speed_and_turn_the_view(opened):
     opened.locator("body").evaluate("() => document.activeElement.blur()")
     seek(opened, 0.4)
     step = 1 / 480
@@ -181,9 +172,7 @@ def test_keys_play_step_change_the_speed_and_turn_the_view(opened: pw.Page) -> N
     assert (np.abs(canvas(opened) - seen)[inner].sum(axis=2) > 60).sum() < 100
 
 
-def test_on_a_telephone_in_the_dark_nothing_is_wider_than_the_screen(
-    watched: Callable[..., pw.Page], path: Path
-) -> None:
+def test_on_a_telephone_in_the_dark_nothing_is_wider_than_the_screen(watched, path):
     page = watched(viewport=PHONE, color_scheme="dark", has_touch=True)
     page.goto(path.as_uri())
     page.wait_for_selector("#stage[data-drawn]")
@@ -195,7 +184,7 @@ def test_on_a_telephone_in_the_dark_nothing_is_wider_than_the_screen(
     assert [text for text in texts if re.search(r"\d (mm|cm|s|Hz|mT|g|A)\b", text)] == []
 
 
-def test_without_script_there_are_a_picture_and_the_numbers(watched: Callable[..., pw.Page], path: Path) -> None:
+def test_without_script_there_are_a_picture_and_the_numbers(watched, path):
     page = watched(viewport=WINDOW, java_script_enabled=False)
     page.goto(path.as_uri())
     assert page.locator("#still img").is_visible()

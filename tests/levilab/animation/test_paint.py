@@ -1,9 +1,6 @@
 """Pictures without a browser: what hides what, pixel by pixel; and films of them."""
 
-from __future__ import annotations
-
 import io
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -16,9 +13,6 @@ from levilab.animation.poses import Poses, poses_of
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
 PARTS = parts_of(preset("undriven"))
 RADIUS, HALF = 0.0144, 0.00165
 #: The camera stands at this azimuth.
@@ -26,22 +20,22 @@ NEAR = -1.25
 
 
 @pytest.fixture(scope="module")
-def painter() -> Painter:
+def painter():
     return Painter(PARTS, (480, 480))
 
 
 @pytest.fixture(scope="module")
-def poses() -> Poses:
+def poses():
     return poses_of(simulate(preset("driven"), 0.2, rate=480.0), 0.0, 0.1, 60)
 
 
-def pose(height: float = 0.073, turn: float = 0.0, *, upside_down: bool = False) -> Pose:
+def pose(height=0.073, turn=0.0, *, upside_down=False):
     cosine, sine = np.cos(turn), np.sin(turn)
     matrix = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
     return Pose(np.array([0, 0, height]), matrix @ np.diag([1, -1, -1]) if upside_down else matrix, sense=0)
 
 
-def kind(painter: Painter, picture: Image.Image, point: Sequence[float]) -> str:
+def kind(painter, picture, point):
     """The part whose colour is nearest in hue and brightness to that of a pixel."""
     x, y = painter.where(point)
     seen = np.array(picture.getpixel((round(x), round(y))), dtype=float)
@@ -50,11 +44,11 @@ def kind(painter: Painter, picture: Image.Image, point: Sequence[float]) -> str:
     return min(tones, key=lambda tone: float(np.linalg.norm(seen - tone[1])))[0]
 
 
-def around(radius: float, height: float, azimuth: float = NEAR) -> list[float]:
+def around(radius, height, azimuth=NEAR):
     return [radius * np.cos(azimuth), radius * np.sin(azimuth), height]
 
 
-def test_upper_parts_hide_lower_ones_from_above(painter: Painter) -> None:
+def test_upper_parts_hide_lower_ones_from_above(painter):
     picture, z = painter.picture(pose()), 0.073 + HALF
     assert kind(painter, picture, around(0.87 * RADIUS, z + 0.15 * RADIUS)) == "disc"
     assert kind(painter, picture, around(0.40 * RADIUS, z + 0.527 * RADIUS)) == "washers"
@@ -62,33 +56,33 @@ def test_upper_parts_hide_lower_ones_from_above(painter: Painter) -> None:
     assert kind(painter, picture, around(RADIUS, 0.073)) == "magnet"
 
 
-def test_lower_parts_hide_upper_ones_from_below(painter: Painter) -> None:
+def test_lower_parts_hide_upper_ones_from_below(painter):
     picture = painter.picture(pose(upside_down=True))
     assert kind(painter, picture, [0.0, 0.0, 0.073 + HALF + 0.2 * RADIUS]) == "stem"  # the tip, which is now above
     assert kind(painter, picture, around(0.6 * RADIUS, 0.073 + HALF)) in {"magnet", "base"}  # of one grey
     assert kind(painter, picture, around(0.86 * RADIUS, 0.073 - HALF - 0.15 * RADIUS)) in {"disc", "magnet"}
 
 
-def test_the_tape_is_seen_on_the_near_side_alone(painter: Painter) -> None:
+def test_the_tape_is_seen_on_the_near_side_alone(painter):
     rim = around(RADIUS, 0.073)
     assert kind(painter, painter.picture(pose(turn=NEAR)), rim) in {"tape", "stem", "background"}
     assert kind(painter, painter.picture(pose(turn=NEAR + np.pi)), rim) == "magnet"
 
 
-def test_the_mark_on_the_disc_turns_with_the_top(painter: Painter) -> None:
+def test_the_mark_on_the_disc_turns_with_the_top(painter):
     place = around(0.75 * RADIUS, 0.073 + HALF + 0.30 * RADIUS)
     assert kind(painter, painter.picture(pose(turn=NEAR + np.pi)), place) == "mark"
     assert kind(painter, painter.picture(pose(turn=NEAR)), place) == "disc"
 
 
-def test_the_near_half_of_the_base_hides_a_top_in_its_hole(painter: Painter) -> None:
+def test_the_near_half_of_the_base_hides_a_top_in_its_hole(painter):
     near_edge = around(0.045, PARTS["base"]["top"])
     low = painter.picture(pose(height=0.001))
     assert kind(painter, low, near_edge) == "base"
     assert kind(painter, low, around(0.16 * RADIUS, 0.001 + HALF + 1.15 * RADIUS)) == "stem"
 
 
-def test_a_top_that_fell_lies_on_the_ground_and_one_that_floats_stays(painter: Painter) -> None:
+def test_a_top_that_fell_lies_on_the_ground_and_one_that_floats_stays(painter):
     axes = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     positions = np.array([[0.001, 0.0, 0.073], [0.002, 0.0, -0.05], [0.0, 0.003, -0.05]])
     raised = painter.above_ground(positions, axes)
@@ -97,13 +91,13 @@ def test_a_top_that_fell_lies_on_the_ground_and_one_that_floats_stays(painter: P
     assert raised[:, 2] == pytest.approx([0.073, ground + tip, ground + RADIUS], abs=1e-9)
 
 
-def test_what_floats_is_drawn_before_the_base(painter: Painter) -> None:
+def test_what_floats_is_drawn_before_the_base(painter):
     empty, full = (np.asarray(painter.picture(pose(height=z)), dtype=int) for z in (0.3, 0.055))
     x, y = painter.where([0.0, 0.0, 0.055])
     assert np.abs(full[round(y), round(x)] - empty[round(y), round(x)]).sum() > 50
 
 
-def test_the_path_and_the_dark_theme_change_the_picture(poses: Poses) -> None:
+def test_the_path_and_the_dark_theme_change_the_picture(poses):
     begin, end = (np.asarray(still(Film(poses, 0.05, 20.0, (320, 320)), k), dtype=int) for k in (0, 60))
     assert (np.abs(begin - end).sum(axis=2) > 30).sum() > 500
     dark = np.asarray(still(Film(poses, None, 20.0, (320, 320), theme="dark"), 0))
@@ -111,7 +105,7 @@ def test_the_path_and_the_dark_theme_change_the_picture(poses: Poses) -> None:
     assert begin.mean() > 150
 
 
-def test_a_path_behind_the_numbers_does_not_cross_them(painter: Painter, poses: Poses) -> None:
+def test_a_path_behind_the_numbers_does_not_cross_them(painter, poses):
     left = np.array([np.sin(NEAR), -np.cos(NEAR), 0.0])
     positions = poses.positions + 0.048 * left  # where the numbers stand
     positions[:, 2] += np.linspace(0.02, -0.03, len(positions))
@@ -119,7 +113,7 @@ def test_a_path_behind_the_numbers_does_not_cross_them(painter: Painter, poses: 
     film = Film(Poses(**fields), 0.05, 20.0, (480, 480))
     path = np.array(painter.colours["path"])
 
-    def in_its_colour(*, with_words: bool) -> int:
+    def in_its_colour(*, with_words):
         numbers = np.asarray(still(film, 60, with_words=with_words), dtype=int)[95:185, 15:165]
         return int((np.abs(numbers - path).sum(axis=2) < 150).sum())
 
@@ -127,8 +121,8 @@ def test_a_path_behind_the_numbers_does_not_cross_them(painter: Painter, poses: 
     assert in_its_colour(with_words=True) == 0
 
 
-def test_a_gif_has_its_pictures_its_time_and_the_same_bytes_each_time(poses: Poses) -> None:
-    shares: list[float] = []
+def test_a_gif_has_its_pictures_its_time_and_the_same_bytes_each_time(poses):
+    shares = []
     film = Film(poses, 0.05, 20.0, (480, 480), every=3)
     content = as_gif(film, shares.append)
     assert content == as_gif(film, lambda _: None)
@@ -141,9 +135,7 @@ def test_a_gif_has_its_pictures_its_time_and_the_same_bytes_each_time(poses: Pos
     assert len(shares) == 21
 
 
-def test_an_mp4_has_its_pictures_its_time_and_the_same_bytes_each_time(
-    poses: Poses, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_an_mp4_has_its_pictures_its_time_and_the_same_bytes_each_time(poses, tmp_path_factory):
     encoder = pytest.importorskip("imageio_ffmpeg", reason="pip install 'levilab[video]'")
     film = Film(poses, 0.05, 30.0, (320, 320), every=3)
     content = as_mp4(film, lambda _: None)
@@ -153,7 +145,7 @@ def test_an_mp4_has_its_pictures_its_time_and_the_same_bytes_each_time(
     assert encoder.count_frames_and_secs(path) == pytest.approx((21, 21 / 30), abs=0.02)
 
 
-def test_a_long_name_and_a_strange_one_are_written(poses: Poses) -> None:
+def test_a_long_name_and_a_strange_one_are_written(poses):
     scene = poses.scene.changed({"name": "Kreisel №7 " * 9})
     fields = {name: getattr(poses, name) for name in Poses.__dataclass_fields__}
     plain, named = (

@@ -1,7 +1,5 @@
 """The poses of an animation: where the top is, and how far it has turned."""
 
-from __future__ import annotations
-
 import json
 import math
 from itertools import pairwise
@@ -28,7 +26,7 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_poses_are_those_of_the_trajectory_within_the_simulators_error(name: str) -> None:
+def test_poses_are_those_of_the_trajectory_within_the_simulators_error(name):
     motion = simulate(SCENES[name], 1.5, rate=480.0)
     poses = poses_of(motion, 0.5, 1.25, 360)
     rows = slice(240, 601)
@@ -41,7 +39,7 @@ def test_poses_are_those_of_the_trajectory_within_the_simulators_error(name: str
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_the_turn_between_two_poses_is_the_spin_about_the_axis(name: str) -> None:
+def test_the_turn_between_two_poses_is_the_spin_about_the_axis(name):
     motion = simulate(SCENES[name], 0.3, rate=None)
     poses = poses_of(motion, 0.05, 0.3, 4000)
     turns = Rotation.from_quat(poses.quaternions)
@@ -53,7 +51,7 @@ def test_the_turn_between_two_poses_is_the_spin_about_the_axis(name: str) -> Non
     assert about == pytest.approx((poses.spins[1:] + poses.spins[:-1]) / 2, rel=1e-5)
 
 
-def test_a_span_between_two_samples_begins_where_it_should() -> None:
+def test_a_span_between_two_samples_begins_where_it_should():
     motion = simulate(UNDRIVEN, 1.0, rate=10.0)
     exact = simulate(UNDRIVEN, 0.537, rate=None)
     poses = poses_of(motion, 0.537, 0.6, 20)
@@ -61,7 +59,7 @@ def test_a_span_between_two_samples_begins_where_it_should() -> None:
     assert poses.times[[0, -1]] == pytest.approx([0.537, 0.6])
 
 
-def test_poses_go_up_to_the_fall() -> None:
+def test_poses_go_up_to_the_fall():
     motion = simulate(UNDRIVEN.changed({"start.spin_hz": 20.0}), 2.0, rate=480.0)
     assert motion.fell is not None
     poses = poses_of(motion, 0.0, float(motion.time[-1]), 200)
@@ -70,7 +68,7 @@ def test_poses_go_up_to_the_fall() -> None:
     assert poses.positions[-1, 2] == pytest.approx(0.0, abs=0.004)  # it falls at some m/s
 
 
-def test_loose_washers_turn_at_their_own_rate() -> None:
+def test_loose_washers_turn_at_their_own_rate():
     motion = simulate(preset("loose-washers"), 0.5, rate=480.0)
     poses = poses_of(motion, 0.0, 0.5, 240)
     behind = np.trapezoid(motion.spin_hz - motion.washer_spin_hz, motion.time)
@@ -80,7 +78,7 @@ def test_loose_washers_turn_at_their_own_rate() -> None:
 
 
 @given(st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(lambda q: math.hypot(*q) > 0.1))
-def test_quaternions_are_scipys(numbers: list[float]) -> None:
+def test_quaternions_are_scipys(numbers):
     turn = Rotation.from_quat(numbers)
     matrix = turn.as_matrix()
     (found,) = quaternions_of(matrix[None, :, 0], matrix[None, :, 2])
@@ -93,14 +91,14 @@ def test_quaternions_are_scipys(numbers: list[float]) -> None:
     [("off", [0, 0, 0]), ("sine", [0, 1, -1]), ("triangle", [0, 1, -1]), ("square", [1, 1, -1]),
      ("unipolar", [1, 1, 0])],
 )  # fmt: skip
-def test_the_drives_arrow_has_the_drives_waveform(waveform: str, values: list[float]) -> None:
+def test_the_drives_arrow_has_the_drives_waveform(waveform, values):
     drive = Drive.model_validate({"waveform": waveform, "frequency_hz": 10.0, "phase_rad": 0.0, "off_s": 0.09})
     assert drive_share(drive, np.array([0.0, 0.025, 0.075])) == pytest.approx(values, abs=1e-12)
     assert drive_share(drive, np.array([0.125])) == 0
 
 
 @pytest.mark.parametrize("name", presets())
-def test_parts_stand_one_after_another_are_convex_and_go_into_json(name: str) -> None:
+def test_parts_stand_one_after_another_are_convex_and_go_into_json(name):
     parts = json.loads(json.dumps(parts_of(preset(name)), allow_nan=False))
     heights = [[z for _, z in part["outline"]] for part in parts["parts"]]
     assert all(max(lower) <= min(upper) + 1e-12 for lower, upper in pairwise(heights))
@@ -115,7 +113,7 @@ def test_parts_stand_one_after_another_are_convex_and_go_into_json(name: str) ->
     assert {mark["part"] for mark in parts["marks"]} <= {part["name"] for part in parts["parts"]}
 
 
-def test_the_tape_is_on_washers_that_slip_and_else_on_the_rim() -> None:
+def test_the_tape_is_on_washers_that_slip_and_else_on_the_rim():
     (tape, mark), (loose_tape, loose_mark) = (parts_of(preset(name))["marks"] for name in ("driven", "loose-washers"))
     assert (tape["turns"], mark["turns"], tape["part"]) == ("top", "top", "magnet")
     assert (loose_tape["turns"], loose_mark["turns"]) == ("washers", "top")

@@ -1,10 +1,7 @@
 """`levilab simulate --animate` as a user runs it: what it writes, and what it refuses."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
-from typing import Any
 
 import pytest
 from PIL import Image
@@ -16,7 +13,7 @@ from support.commands import command
 SHORT = ("simulate", "undriven", "--duration", "0.2", "--animate-to", "0.05")
 
 
-def test_a_film_of_the_chosen_span_is_written(tmp_path: Path) -> None:
+def test_a_film_of_the_chosen_span_is_written(tmp_path):
     ended = command(*SHORT, "--animate", "films/top.gif", cwd=tmp_path)
     assert ended.status == 0
     shown = "the motion from 0 s to 0.05 s, at 1/20 of real speed"
@@ -25,7 +22,7 @@ def test_a_film_of_the_chosen_span_is_written(tmp_path: Path) -> None:
         assert film.n_frames == 21  # type: ignore[attr-defined]
 
 
-def test_a_fall_is_what_is_shown_unless_a_span_is_given(tmp_path: Path) -> None:
+def test_a_fall_is_what_is_shown_unless_a_span_is_given(tmp_path):
     words = ("simulate", "undriven", "--duration", "2", "--set", "start.spin_hz=20", "--json")
     ended = command(*words, "--animate", "fall.html", cwd=tmp_path)
     assert ended.status == 0
@@ -51,9 +48,7 @@ def test_a_fall_is_what_is_shown_unless_a_span_is_given(tmp_path: Path) -> None:
         (("--animate", "a.html", "--set", "observed=spin"), "take observed = motion"),
     ],
 )
-def test_what_makes_no_sense_is_refused_before_anything_is_simulated(
-    words: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_makes_no_sense_is_refused_before_anything_is_simulated(words, said, tmp_path, monkeypatch):
     monkeypatch.setattr("levilab.motion.simulation.simulate", None)
     ended = command("simulate", "undriven", "--duration", "5", *words, cwd=tmp_path)
     assert ended.status == 2
@@ -65,9 +60,7 @@ def test_what_makes_no_sense_is_refused_before_anything_is_simulated(
     ("words", "longest"),
     [(("a.html", "--animate-to", "90"), "6"), (("a.gif", "--animate-to", "5", "--animate-speed", "0.01"), "1.5 s")],
 )
-def test_a_span_that_is_too_long_for_the_file_names_the_longest_one(
-    words: tuple[str, ...], longest: str, tmp_path: Path
-) -> None:
+def test_a_span_that_is_too_long_for_the_file_names_the_longest_one(words, longest, tmp_path):
     start = ("--duration", "90", "--animate-from", "0", "--animate")
     ended = command("simulate", "undriven", *start, *words, cwd=tmp_path)
     assert ended.status == 2
@@ -79,9 +72,7 @@ def test_a_span_that_is_too_long_for_the_file_names_the_longest_one(
     ("name", "library", "extra"),
     [("a.html", "nicegui", ".[live]"), ("a.mp4", "imageio_ffmpeg", ".[video]")],
 )
-def test_a_missing_library_is_named_before_anything_is_simulated(
-    name: str, library: str, extra: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_library_is_named_before_anything_is_simulated(name, library, extra, tmp_path, monkeypatch):
     found = importlib.util.find_spec
     for module in ("three", "film"):
         monkeypatch.setattr(
@@ -95,8 +86,8 @@ def test_a_missing_library_is_named_before_anything_is_simulated(
     assert "Traceback" not in ended.err
 
 
-def test_ctrl_c_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: Any) -> bytes:
+def test_ctrl_c_leaves_nothing(tmp_path, monkeypatch):
+    def interrupted(*_):
         raise KeyboardInterrupt
 
     film = request.FORMATS[".gif"]
@@ -107,7 +98,7 @@ def test_ctrl_c_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert not list(tmp_path.iterdir())
 
 
-def test_a_place_that_cannot_be_written_is_said_in_one_line(tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_is_said_in_one_line(tmp_path):
     (tmp_path / "file").write_text("here", encoding="utf-8")
     ended = command(*SHORT, "--animate", "file/top.gif", cwd=tmp_path)
     assert ended.status not in {0, 2}
@@ -115,7 +106,7 @@ def test_a_place_that_cannot_be_written_is_said_in_one_line(tmp_path: Path) -> N
     assert "--animate" in ended.err
 
 
-def test_a_film_that_shows_a_turn_in_few_pictures_says_so(tmp_path: Path) -> None:
+def test_a_film_that_shows_a_turn_in_few_pictures_says_so(tmp_path):
     ended = command(*SHORT, "--animate", "top.gif", "--animate-speed", "1", cwd=tmp_path)
     assert ended.status == 0
     assert "0.7 pictures of each turn" in ended.err

@@ -255,28 +255,6 @@ def test_a_spin_down_that_the_bench_does_not_stand_is_refused_beforehand(limits,
     SpinSettings().check("spin", Limits())
 
 
-@pytest.mark.parametrize(
-    ("signal", "name"),
-    [
-        ({"frequency_hz": 30.0, "amplitude_vpp": 4.01}, "drive_amplitude_vpp"),
-        ({"frequency_hz": 50.1, "amplitude_vpp": 4.0}, "drive_frequency_hz"),
-        ({"frequency_hz": float("nan"), "amplitude_vpp": 4.0}, "drive_frequency_hz"),
-        ({"frequency_hz": 30.0, "amplitude_vpp": float("nan")}, "drive_amplitude_vpp"),
-        ({"frequency_hz": 30.0, "amplitude_vpp": 4.0, "offset_v": -1.1}, "drive_offset_v"),
-        ({"frequency_hz": 30.0, "amplitude_vpp": 4.0, "offset_v": float("nan")}, "drive_offset_v"),
-        ({"frequency_hz": 4.9, "amplitude_vpp": 4.0}, "drive_lowest_hz"),
-    ],
-)
-def test_a_drive_beyond_the_limits_is_refused_by_name_and_nothing_is_sent(world, signal, name):
-    with open_bench(virtual_wiring(world, TIGHT), KINDS) as bench:
-        with pytest.raises(OutOfRange) as refusal:
-            drive(bench, **signal)
-        assert world.field == 0
-        assert all(field == 0 for *_, field in world.coil)
-    assert refusal.value.name == name
-    assert f"limits.{name} in the bench file" in str(refusal.value)
-
-
 def test_a_drive_at_the_limits_is_allowed(world):
     limits = Limits(drive_amplitude_vpp=4.0, drive_frequency_hz=50.0)
     with open_bench(virtual_wiring(world, limits), KINDS) as bench:

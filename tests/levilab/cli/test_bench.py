@@ -72,7 +72,7 @@ def test_what_was_found_becomes_a_bench_that_can_be_read_and_checked(tmp_path):
     ]
 
 
-def test_kinds_that_were_not_found_stand_there_as_comments_and_others_are_told(tmp_path):
+def test_kinds_that_were_not_found_stand_there_as_comments_and_others_are_named(tmp_path):
     path = tmp_path / "bench.toml"
     odd = 'maker,"quoted" <tag> \\ ,1,2'
     found = [
@@ -138,7 +138,7 @@ ramp_hz_per_s = 0.05            # no faster than it can follow
 drive_amplitude_vpp = 10.0
 drive_waveform = "SIN"          # SIN, SQU or TRI
 hold_s = 20.0                   # hold it there, and compare its spin with the drive
-interval_s = 10.0               # then read every so often,
+interval_s = 10.0               # time from one reading to the next
 gate_s = 1.0                    # length of a count
 trigger_level_v = 0.6           # half way between dark and the pulse of the tape
 # reading_u_hz = 0.03           # standard uncertainty of a reading, if you know it
@@ -171,16 +171,13 @@ def test_signs_that_no_file_can_hold_are_no_part_of_a_name(tmp_path):
     assert read_bench(path, Configuration).counter is None
 
 
-def test_a_wrong_key_is_reported_before_the_one_that_it_was_to_be(tmp_path):
-    path = tmp_path / "bench.toml"
-    path.write_text('[counter]\nmodell = "53230A"\naddress = "A::1"\n', encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"counter\.modell is no key known here: did you mean model\?"):
-        read_bench(path, Configuration)
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [
+        (
+            "[counter]\nmodell = '53230A'\naddress = 'A::1'\n",
+            "counter.modell is no key known here: did you mean model?",
+        ),
         ("[countr]\nmodel = 'x'\n", "countr is no key known here: did you mean counter?"),
         ("[spin]\nintervall_s = 3\n", "spin.intervall_s is no key known here: did you mean interval_s?"),
         ("[limits]\nxyz = 3\n", "limits.xyz is no key known here: known are drive_amplitude_vpp, "),
@@ -194,7 +191,7 @@ def test_a_key_that_is_nearly_right_is_reported_with_the_right_one(tmp_path, tex
     assert says in str(error.value)
 
 
-def test_no_library_and_no_bench_are_told(levilab, tmp_path):
+def test_a_missing_library_and_bench_are_reported(levilab, tmp_path):
     assert 'take visa_library = "@py"' in levilab("bench", "init", "--library", "@nolibrary", check=3).stderr
     assert "no such file" in levilab("bench", "check", check=1).stderr
     (tmp_path / "empty.toml").write_text("", encoding="utf-8")

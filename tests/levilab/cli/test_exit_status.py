@@ -1,12 +1,9 @@
 """How each command ends on each mistake: 2 for wrong usage, 1 for a known failure, 3 for an instrument, in one line."""
 
-from __future__ import annotations
-
 import ast
 import errno
 import inspect
 import re
-from typing import TYPE_CHECKING, Any, NoReturn
 
 import pytest
 
@@ -17,9 +14,6 @@ from levilab.errors import LevilabError, UsageError
 from support.commands import command
 from support.paths import ROOT, SAMPLE_DATA
 from support.spin_downs import spin_down_csv
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 SAMPLE = str(SAMPLE_DATA / "spin-down-1")
 LIMITS = str(SAMPLE_DATA / "lower-limits")
@@ -138,7 +132,7 @@ TABLE = [
 
 
 @pytest.fixture
-def place(tmp_path: Path) -> Path:
+def place(tmp_path):
     """A folder with a file, and a bench at a port where nothing listens."""
     (tmp_path / "file").write_text("", encoding="utf-8")
     (tmp_path / "bench.toml").write_text(
@@ -150,7 +144,7 @@ def place(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(("words", "status", "says"), TABLE, ids=[words for words, _, _ in TABLE])
-def test_each_mistake_has_its_exit_status_and_one_line(place: Path, words: str, status: int, says: str) -> None:
+def test_each_mistake_has_its_exit_status_and_one_line(place, words, status, says):
     ended = command(*words.split(), cwd=place)
     assert ended.status == status, ended
     if words != "bench check":  # which tells of every instrument
@@ -161,14 +155,14 @@ def test_each_mistake_has_its_exit_status_and_one_line(place: Path, words: str, 
     assert {path.name for path in place.iterdir()} <= {"file", "bench.toml", "runs"}
 
 
-def test_only_titles_of_the_analysis_that_was_asked_for_are_named(tmp_path: Path) -> None:
+def test_only_titles_of_the_analysis_that_was_asked_for_are_named(tmp_path):
     (tmp_path / "odd.csv").write_text("p,q\n1,2\n2,3\n3,4\n", encoding="utf-8")
     spins = command("analyze", "spindown", "odd.csv", cwd=tmp_path).err
     assert "(time_s, spin_frequency_hz, t, f [Hz], rpm …) among 'p', 'q'" in spins
     assert "(height_m, flux_density_t, z [mm], B [mT] …)" in command("analyze", "field", "odd.csv", cwd=tmp_path).err
 
 
-def test_the_virtual_bench_is_no_advice_to_those_who_use_it(place: Path) -> None:
+def test_the_virtual_bench_is_no_advice_to_those_who_use_it(place):
     advice = ", or try --mock"
     assert advice in command("acquire", "spin", "--bench", "other.toml", cwd=place).err
     assert advice not in command("acquire", "spin", "--mock", "--bench", "other.toml", cwd=place).err
@@ -182,24 +176,24 @@ def test_the_virtual_bench_is_no_advice_to_those_who_use_it(place: Path) -> None
         ("acquire spin --mock --seed abc", "'abc': a whole number is expected"),
     ],
 )
-def test_a_number_written_otherwise_is_shown_with_how_to_write_it(place: Path, words: str, says: str) -> None:
+def test_a_number_written_otherwise_is_shown_with_how_to_write_it(place, words, says):
     ended = command(*words.split(), cwd=place)
     assert ended.status == exit_codes.WRONG_USAGE
     assert says in " ".join(ended.err.replace("│", " ").split())
 
 
 @pytest.mark.parametrize("words", NOT_UNDERSTOOD)
-def test_what_is_not_understood_is_wrong_usage(place: Path, words: str) -> None:
+def test_what_is_not_understood_is_wrong_usage(place, words):
     assert command(*words.split(), cwd=place).status == exit_codes.WRONG_USAGE
 
 
 @pytest.mark.parametrize("words", ["runs", "analyze", "analyze spindown"])
-def test_what_may_not_be_read_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: str) -> None:
+def test_what_may_not_be_read_is_said_in_one_line(monkeypatch, tmp_path, words):
     """Typer would refuse it as wrong usage of `levilab analyze each`, with no advice."""
     monkeypatch.setattr("os.access", lambda *_, **__: False)
     file = spin_down_csv(tmp_path / "closed.csv")
 
-    def refuse(*_: Any, **__: Any) -> NoReturn:
+    def refuse(*_, **__):
         raise PermissionError(errno.EACCES, "Permission denied", str(file))
 
     monkeypatch.setattr("pathlib.Path.open", refuse)
@@ -211,18 +205,16 @@ def test_what_may_not_be_read_is_said_in_one_line(monkeypatch: pytest.MonkeyPatc
     )
 
 
-def test_an_interrupted_command_ends_with_130(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def interrupted(_: object) -> None:
+def test_an_interrupted_command_ends_with_130(monkeypatch, tmp_path):
+    def interrupted(_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("levilab.runs.listing.list_runs", interrupted)
     assert command("runs", ".", cwd=tmp_path).status == exit_codes.INTERRUPTED
 
 
-def test_an_interrupted_analysis_says_in_one_line_what_is_lost(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, sample_data: Path
-) -> None:
-    def interrupted(*_: object, **__: object) -> None:
+def test_an_interrupted_analysis_says_in_one_line_what_is_lost(monkeypatch, tmp_path, sample_data):
+    def interrupted(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", interrupted)
@@ -234,15 +226,15 @@ def test_an_interrupted_analysis_says_in_one_line_what_is_lost(
         assert says in ended.err
 
 
-def test_the_exit_statuses_know_only_the_trees_of_errors() -> None:
+def test_the_exit_statuses_know_only_the_trees_of_errors():
     """A class of another room needs no row of its own: it says what it is by its base."""
     tree = ast.parse(inspect.getsource(exit_codes))
     imported = {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     assert imported <= {"__future__", "analysis.errors", "instruments.errors", "levilab.errors"}
 
 
-def test_a_defect_of_the_program_stays_loud(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def broken(_: object) -> None:
+def test_a_defect_of_the_program_stays_loud(monkeypatch, tmp_path):
+    def broken(_):
         raise ZeroDivisionError
 
     monkeypatch.setattr("levilab.runs.listing.list_runs", broken)
@@ -254,7 +246,7 @@ def test_a_defect_of_the_program_stays_loud(monkeypatch: pytest.MonkeyPatch, tmp
 # --- the names of options ---
 
 
-def test_a_quantity_in_a_message_becomes_its_option() -> None:
+def test_a_quantity_in_a_message_becomes_its_option():
     texts = {
         "choose another place with `out`": "choose another place with --out",
         "take `rate` = 500 or less": "take --rate 500 or less",
@@ -269,7 +261,7 @@ def test_a_quantity_in_a_message_becomes_its_option() -> None:
     assert in_options(UsageError("survival", "is a map"), app) == "--map: is a map"
 
 
-def test_one_quantity_has_one_option_in_all_commands() -> None:
+def test_one_quantity_has_one_option_in_all_commands():
     names = option_names(app)
     assert names["settings"] == ("--set", "")
     assert names["save"] == ("--save", "--no-save")
@@ -282,7 +274,7 @@ ROOMS = ("runs", "formats", "motion", "stability")
 
 
 @pytest.mark.parametrize("room", ROOMS)
-def test_messages_below_the_command_line_name_quantities_not_options(room: str) -> None:
+def test_messages_below_the_command_line_name_quantities_not_options(room):
     names = option_names(app)
     for path in (ROOT / "levilab" / room).glob("*.py"):
         text = path.read_text(encoding="utf-8")

@@ -1,9 +1,5 @@
 """Commands are made when they are called: the first page of help makes none."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import typer.main
 from typer.testing import CliRunner
 
@@ -11,11 +7,8 @@ from levilab.cli.later import Later
 from levilab.cli.main import app
 from support.commands import command
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-
-def test_the_first_help_lists_every_command_and_makes_none(monkeypatch) -> None:
+def test_the_first_help_lists_every_command_and_makes_none(monkeypatch):
     made = []
     monkeypatch.setattr(Later, "command", property(lambda self: made.append(self.name)))
     shown = CliRunner().invoke(app, ["--help"]).stdout
@@ -25,7 +18,7 @@ def test_the_first_help_lists_every_command_and_makes_none(monkeypatch) -> None:
     assert made == []
 
 
-def test_a_command_has_the_texts_of_its_stand_in_and_the_options_of_its_function() -> None:
+def test_a_command_has_the_texts_of_its_stand_in_and_the_options_of_its_function():
     stand_in = typer.main.get_command(app).commands["report"]  # type: ignore[attr-defined]
     assert stand_in.params == []
     assert {"paths", "output", "columns"} <= {one.name for one in stand_in.command.params}
@@ -33,11 +26,11 @@ def test_a_command_has_the_texts_of_its_stand_in_and_the_options_of_its_function
     assert stand_in.command.epilog == "Example: levilab report sample_data/ -o report.html, or -o report.pdf --tables"
 
 
-def test_a_misspelt_command_below_a_stand_in_gets_its_suggestion(tmp_path: Path) -> None:
+def test_a_misspelt_command_below_a_stand_in_gets_its_suggestion(tmp_path):
     assert "Did you mean 'spin'?" in command("acquire", "spni", cwd=tmp_path).err
 
 
-def test_a_wrong_value_is_refused_in_plain_words(tmp_path: Path) -> None:
+def test_a_wrong_value_is_refused_in_plain_words(tmp_path):
     said = command("bench", "serve", "--speed", "fast", cwd=tmp_path).err
     assert "'--speed': 'fast': a number is expected" in said
     assert "Input should" not in said

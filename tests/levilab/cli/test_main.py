@@ -1,14 +1,11 @@
 """The commands as a user runs them: what they print, what they refuse, and with which exit status."""
 
-from __future__ import annotations
-
 import html
 import json
 import re
 import shutil
 import subprocess
 import sys
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -25,42 +22,34 @@ from support.spin_downs import spin_down_csv
 from support.trials import with_few_trials
 from support.waiting import HANG_GUARD_S
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    Command = Callable[..., subprocess.CompletedProcess[str]]
-
 HELP = ["", "acquire", "acquire spin", "analyze", "analyze spindown", "analyze spin", "report", "simulate", "runs"]
 
 
 @pytest.mark.parametrize("command", HELP)
-def test_every_command_has_help_and_the_ones_that_do_something_an_example(levilab: Command, command: str) -> None:
+def test_every_command_has_help_and_the_ones_that_do_something_an_example(levilab, command):
     text = levilab(*command.split(), "--help").stdout
     assert "Usage:" in text
     if command not in {"", "acquire", "analyze"}:
         assert f"Example: levilab {command}" in text
 
 
-def test_each_experiment_and_each_analysis_has_its_command() -> None:
+def test_each_experiment_and_each_analysis_has_its_command():
     assert EXPERIMENT_HELP.keys() == EXPERIMENTS.keys()
     assert COMMANDS.keys() - {"each"} == ANALYSES.keys()
 
 
-def test_each_analysis_has_its_options() -> None:
+def test_each_analysis_has_its_options():
     assert {name: type(analysis.options_from({})) for name, analysis in ANALYSES.items()} == KINDS
 
 
-def test_the_version_is_printed(levilab: Command) -> None:
+def test_the_version_is_printed(levilab):
     from importlib.metadata import version
 
     assert levilab("--version").stdout == f"levilab {version('levilab')}\n"
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_acquire_analyze_report_and_list_from_an_empty_folder(
-    levilab: Command, levilab_process: Command, tmp_path: Path
-) -> None:
+def test_acquire_analyze_report_and_list_from_an_empty_folder(levilab, levilab_process, tmp_path):
     for decoy in ("analysis.py", "instruments.py", "pyvisa_levilab.py"):
         (tmp_path / decoy).write_text("raise SystemExit('the decoy was imported')", encoding="utf-8")
     acquired = levilab_process("acquire", "spin", "--mock", *QUICKLY, "--note", "one")
@@ -79,7 +68,7 @@ def test_acquire_analyze_report_and_list_from_an_empty_folder(
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_json_is_one_document_and_nothing_else(levilab: Command) -> None:
+def test_json_is_one_document_and_nothing_else(levilab):
     acquired = json.loads(levilab("acquire", "spin", "--mock", *QUICKLY, "--seed", "2", "--json").stdout)
     assert acquired["status"] == "finished"
     result = json.loads(levilab("analyze", "spindown", acquired["run"], "--json").stdout)
@@ -89,7 +78,7 @@ def test_json_is_one_document_and_nothing_else(levilab: Command) -> None:
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_no_save_writes_nothing_and_out_writes_there(levilab: Command, tmp_path: Path) -> None:
+def test_no_save_writes_nothing_and_out_writes_there(levilab, tmp_path):
     path = spin_down_csv(tmp_path / "my.csv")
     levilab("analyze", "spindown", path, "--no-save")
     assert list(tmp_path.iterdir()) == [path]
@@ -98,7 +87,7 @@ def test_no_save_writes_nothing_and_out_writes_there(levilab: Command, tmp_path:
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> None:
+def test_an_analysis_need_not_be_named(levilab, sample_data):
     run = sample_data / "spin-down-1"
     named = levilab("analyze", "spindown", run, "--no-save")
     assert levilab("analyze", run, "--no-save").stdout == named.stdout
@@ -115,7 +104,7 @@ def test_an_analysis_need_not_be_named(levilab: Command, sample_data: Path) -> N
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_options_may_stand_before_the_name_of_an_analysis(levilab: Command, sample_data: Path) -> None:
+def test_options_may_stand_before_the_name_of_an_analysis(levilab, sample_data):
     named = levilab("analyze", "spindown", sample_data, "--no-save").stdout
     for first in (["--out", "spindown"], ["--out=there"], ["--no-save"], ["--tilt", "auto"]):
         assert levilab("analyze", *first, "spindown", sample_data, "--no-save").stdout == named
@@ -123,9 +112,7 @@ def test_options_may_stand_before_the_name_of_an_analysis(levilab: Command, samp
     assert "spindown: there is no such file" in levilab("analyze", "--no-save", "--", "spindown", check=1).stderr
 
 
-def test_the_spin_of_a_record_is_printed_and_written_beside_it(
-    levilab: Command, sample_data: Path, tmp_path: Path
-) -> None:
+def test_the_spin_of_a_record_is_printed_and_written_beside_it(levilab, sample_data, tmp_path):
     path = shutil.copy(sample_data / "scope-files" / "rigol-ds1000z.csv", tmp_path)
     done = levilab("analyze", "spin", path)
     assert re.search(r"The spin is 30\.00\d\d\(\d+\) Hz", done.stdout)
@@ -140,9 +127,7 @@ def test_the_spin_of_a_record_is_printed_and_written_beside_it(
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_notes_name_options_on_the_terminal_and_quantities_where_stored(
-    levilab: Command, tmp_path: Path, sample_data: Path
-) -> None:
+def test_notes_name_options_on_the_terminal_and_quantities_where_stored(levilab, tmp_path, sample_data):
     runs = tmp_path / "runs"
     for name in ("sound", "torn"):
         shutil.copytree(sample_data / "spin-down-1", runs / name)
@@ -158,7 +143,7 @@ def test_notes_name_options_on_the_terminal_and_quantities_where_stored(
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab: Command, tmp_path: Path) -> None:
+def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab, tmp_path):
     for k, (name, *options) in enumerate((("a.csv",), ("b.csv", "--tilt", "none"))):
         levilab("analyze", "spindown", spin_down_csv(tmp_path / name, seed=k), *options)
     names = {path.name for path in tmp_path.iterdir()}
@@ -173,14 +158,14 @@ def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab:
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levilab: Command, sample_data: Path) -> None:
+def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levilab, sample_data):
     done = levilab("analyze", "spindown", sample_data, "--no-save")
     assert "skipped" not in done.stdout
     assert "skipped 3 limit runs\n" in done.stderr
     assert "lasts [s]" in done.stdout
 
 
-def test_a_result_that_is_damaged_ends_the_report_with_one_line(levilab: Command, tmp_path: Path) -> None:
+def test_a_result_that_is_damaged_ends_the_report_with_one_line(levilab, tmp_path):
     path = spin_down_csv(tmp_path / "my.csv")
     (tmp_path / "my.csv.result.json").write_text("{", encoding="utf-8")
     (line,) = levilab("report", path, check=1).stderr.splitlines()
@@ -188,7 +173,7 @@ def test_a_result_that_is_damaged_ends_the_report_with_one_line(levilab: Command
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_columns_of_another_name_are_mapped(levilab: Command, tmp_path: Path) -> None:
+def test_columns_of_another_name_are_mapped(levilab, tmp_path):
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     path.write_text(path.read_text().replace("time_s,spin_frequency_hz", "Uhr,Kanal 2").replace(",", ";"), "utf-8")
     refused = levilab("analyze", "spindown", path, check=1)
@@ -202,11 +187,11 @@ ROWS = [f"{10 * k},{40 - k},0.03" for k in range(8)]
 HEADER = "time_s,spin_frequency_hz,spin_frequency_u_hz"
 
 
-def table(*rows: str) -> str:
+def table(*rows):
     return "\n".join([HEADER, *rows, ""])
 
 
-def with_row(k: int, row: str) -> str:
+def with_row(k, row):
     return table(*ROWS[:k], row, *ROWS[k + 1 :])
 
 
@@ -229,7 +214,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_bad_data_get_one_clear_line_and_status_1(levilab: Command, tmp_path: Path, name: str) -> None:
+def test_bad_data_get_one_clear_line_and_status_1(levilab, tmp_path, name):
     text, says = REFUSED[name]
     path = tmp_path / "my.csv"
     path.write_bytes(text.encode("latin-1"))
@@ -255,9 +240,7 @@ TAKEN = {
 
 
 @pytest.mark.parametrize("name", TAKEN)
-def test_imperfect_data_are_analyzed_with_a_warning_and_without_nan(
-    levilab: Command, tmp_path: Path, name: str
-) -> None:
+def test_imperfect_data_are_analyzed_with_a_warning_and_without_nan(levilab, tmp_path, name):
     text, says, used = TAKEN[name]
     path = tmp_path / "my.csv"
     path.write_text(text, encoding="utf-8")
@@ -267,7 +250,7 @@ def test_imperfect_data_are_analyzed_with_a_warning_and_without_nan(
     assert any(says in warning for warning in [*result["warnings"], *result["runs"][0]["warnings"]])
 
 
-def test_an_instrument_that_does_not_answer_is_status_3(levilab: Command, tmp_path: Path) -> None:
+def test_an_instrument_that_does_not_answer_is_status_3(levilab, tmp_path):
     """Nothing listens on port 9 of this machine; the link is refused at once."""
     (tmp_path / "bench.toml").write_text(
         '[counter]\nmodel = "53230A"\naddress = "TCPIP0::127.0.0.1::9::SOCKET"\n'
@@ -280,7 +263,7 @@ def test_an_instrument_that_does_not_answer_is_status_3(levilab: Command, tmp_pa
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_run_is_meant_by_its_short_name_and_not_resumed_once_finished(levilab: Command) -> None:
+def test_a_run_is_meant_by_its_short_name_and_not_resumed_once_finished(levilab):
     run = json.loads(levilab("acquire", "spin", "--mock", *QUICKLY, "--json").stdout)["run"]
     short = run.split("Z-")[1]
     assert short in levilab("runs").stdout
@@ -289,7 +272,7 @@ def test_a_run_is_meant_by_its_short_name_and_not_resumed_once_finished(levilab:
         assert "is finished" in levilab("acquire", "spin", "--resume", name, check=1).stderr
 
 
-def test_a_reader_that_goes_away_costs_neither_the_run_nor_the_result(tmp_path: Path) -> None:
+def test_a_reader_that_goes_away_costs_neither_the_run_nor_the_result(tmp_path):
     """As in `levilab … | head -1`: the first line is read, then the pipe is closed."""
     for words in (["acquire", "spin", "--mock", *QUICKLY], ["analyze", "spindown", "runs"]):
         process = subprocess.Popen(
@@ -307,13 +290,13 @@ def test_a_reader_that_goes_away_costs_neither_the_run_nor_the_result(tmp_path: 
     assert (run / "result.json").exists()
 
 
-def test_the_bench_file_sets_the_experiment_of_the_virtual_bench_too(levilab: Command, tmp_path: Path) -> None:
+def test_the_bench_file_sets_the_experiment_of_the_virtual_bench_too(levilab, tmp_path):
     (tmp_path / "mine.toml").write_text("[spin]\ninterval_s = 20.0\n", encoding="utf-8")
     words = ("acquire", "spin", "--mock", *QUICKLY, "--bench", "mine.toml", "--json")
     assert 8 <= json.loads(levilab(*words).stdout)["readings"] <= 11
 
 
-def test_a_drive_beyond_the_limits_is_refused_before_anything_is_touched(levilab: Command, tmp_path: Path) -> None:
+def test_a_drive_beyond_the_limits_is_refused_before_anything_is_touched(levilab, tmp_path):
     (tmp_path / "mine.toml").write_text("[limits]\ndrive_amplitude_vpp = 4.0\n", encoding="utf-8")
     refused = levilab("acquire", "spin", "--mock", "--bench", "mine.toml", check=1)
     assert "spin.drive_amplitude_vpp = 10 is more than this bench allows" in refused.stderr
@@ -321,7 +304,7 @@ def test_a_drive_beyond_the_limits_is_refused_before_anything_is_touched(levilab
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_result_that_cannot_be_written_is_shown(levilab: Command, tmp_path: Path) -> None:
+def test_a_result_that_cannot_be_written_is_shown(levilab, tmp_path):
     path = spin_down_csv(tmp_path / "my.csv")
     done = levilab("analyze", "spindown", path, "--out", path / "below", check=1)
     assert "What the data say" in done.stdout
@@ -329,7 +312,7 @@ def test_a_result_that_cannot_be_written_is_shown(levilab: Command, tmp_path: Pa
 
 
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
-def test_an_old_code_page_costs_no_number_its_exponent(tmp_path: Path, encoding: str) -> None:
+def test_an_old_code_page_costs_no_number_its_exponent(tmp_path, encoding):
     """As PYTHONIOENCODING and an old Windows have it: such streams refuse what they cannot carry."""
     path = spin_down_csv(tmp_path / "my.csv")
     done = command("analyze", "spindown", path, "--no-save", cwd=tmp_path, encoding=encoding)
@@ -344,7 +327,7 @@ HEAVY = {"numpy", "scipy", "pandas", "matplotlib", "lmfit", "pyvisa", "jinja2", 
 
 
 #: What commands that follow each other in one process may have imported by then.
-IMPORTS: list[tuple[list[list[str]], set[str]]] = [
+IMPORTS = [
     (
         [["--help"], ["acquire", "spin", "--help"], ["simulate", "--help"], ["simulate", "nowhere"], ["--version"]],
         set[str](),
@@ -355,9 +338,7 @@ IMPORTS: list[tuple[list[list[str]], set[str]]] = [
 
 
 @pytest.mark.parametrize(("commands", "allowed"), IMPORTS, ids=["help", "runs", "acquire"])
-def test_nothing_heavy_is_imported_where_it_is_not_used(
-    tmp_path: Path, commands: list[list[str]], allowed: set[str]
-) -> None:
+def test_nothing_heavy_is_imported_where_it_is_not_used(tmp_path, commands, allowed):
     program = (
         "import sys\nfrom levilab.cli.main import main\n"
         f"for words in {commands!r}:\n    sys.argv = ['levilab', *words]\n"
@@ -379,5 +360,5 @@ def test_nothing_heavy_is_imported_where_it_is_not_used(
         assert seen <= allowed, words
 
 
-def test_help_lists_the_scenes_that_come_with_levilab() -> None:
+def test_help_lists_the_scenes_that_come_with_levilab():
     assert sorted(SCENES.split(", ")) == presets()

@@ -1,18 +1,12 @@
 """Where a command writes, when nothing reads there any more."""
 
-from __future__ import annotations
-
 import os
 import sys
-from typing import TYPE_CHECKING
 
 from levilab.cli.output import message
 
-if TYPE_CHECKING:
-    import pytest
 
-
-def test_messages_to_a_closed_standard_error_end_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_to_a_closed_standard_error_end_nothing(monkeypatch):
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "w", encoding="utf-8") as closed:

@@ -1,14 +1,11 @@
 """The console script that pyproject.toml names."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
 import sys
 import tomllib
 from importlib.metadata import EntryPoint
-from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -19,15 +16,12 @@ from levilab.interruption import End, ignore_all_signals
 from support.commands import command
 from support.paths import ROOT
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-
-def interrupt(*_: Any) -> None:
+def interrupt(*_):
     raise KeyboardInterrupt
 
 
-def test_the_console_script_starts_the_application() -> None:
+def test_the_console_script_starts_the_application():
     scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]
     assert EntryPoint("levilab", scripts["levilab"], "console_scripts").load() is main
 
@@ -50,7 +44,7 @@ main()
 
 
 @pytest.mark.parametrize(("given", "taken"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "2"}, "2")])
-def test_numpy_is_loaded_with_one_thread_for_its_matrices(given: dict[str, str], taken: str) -> None:
+def test_numpy_is_loaded_with_one_thread_for_its_matrices(given, taken):
     environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"} | given
     ended = subprocess.run(
         [sys.executable, "-c", AT_NUMPY], env=environment, capture_output=True, text=True, check=True
@@ -58,10 +52,8 @@ def test_numpy_is_loaded_with_one_thread_for_its_matrices(given: dict[str, str],
     assert ended.stdout.split() == [taken]
 
 
-def test_ctrl_c_at_the_start_ends_in_one_line(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    afterwards: list[Any] = []  # one more Ctrl-C while Python ends changes nothing
+def test_ctrl_c_at_the_start_ends_in_one_line(monkeypatch, capsys):
+    afterwards = []  # one more Ctrl-C while Python ends changes nothing
     monkeypatch.setattr("levilab.cli.start.end_process_at_interruption", afterwards.append)
     monkeypatch.setattr("atexit.register", afterwards.append)
     monkeypatch.setattr("levilab.cli.main.main", interrupt)
@@ -72,7 +64,7 @@ def test_ctrl_c_at_the_start_ends_in_one_line(
     assert capsys.readouterr().err == "levilab: interrupted\n"
 
 
-def test_ctrl_c_in_an_exec_of_a_library_does_not_end_the_process_by_the_signal() -> None:
+def test_ctrl_c_in_an_exec_of_a_library_does_not_end_the_process_by_the_signal():
     """Python notes that one passed an exec() of text, here as of a dataclass, and would end with −2."""
     program = """
 import levilab.cli.main
@@ -85,16 +77,16 @@ main()
     assert (ended.returncode, ended.stderr) == (INTERRUPTED, "levilab: interrupted\n")
 
 
-def test_ctrl_c_while_a_command_is_imported_ends_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_while_a_command_is_imported_ends_in_one_line(tmp_path, monkeypatch):
     monkeypatch.setattr(Later, "command", property(interrupt))
     ended = command("report", "x", cwd=tmp_path)
     assert (ended.status, ended.err) == (INTERRUPTED, "levilab: interrupted\n")
 
 
-def test_ctrl_c_ends_the_process_while_a_command_is_imported() -> None:
-    handlers: list[Any] = []
+def test_ctrl_c_ends_the_process_while_a_command_is_imported():
+    handlers = []
 
-    def made() -> Any:
+    def made():
         handlers.append(signal.getsignal(signal.SIGINT))
         return lambda: None
 
@@ -104,13 +96,13 @@ def test_ctrl_c_ends_the_process_while_a_command_is_imported() -> None:
     assert signal.getsignal(signal.SIGINT) is before
 
 
-def test_a_signal_after_the_run_changes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    handlers: list[Any] = []
+def test_a_signal_after_the_run_changes_nothing(tmp_path, monkeypatch):
+    handlers = []
 
     class Kept:
         status, folder = "finished", "somewhere"
 
-        def count(self) -> int:
+        def count(self):
             handlers.append(signal.getsignal(signal.SIGTERM))
             return 3
 

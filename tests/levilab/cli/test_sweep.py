@@ -1,20 +1,14 @@
 """levilab sweep, as a user calls it: begin, interrupt, go on, show; and what it refuses."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
-from typing import TYPE_CHECKING
 
 import pytest
 
 from levilab.sweeps import run as run_module
 from levilab.sweeps.observables import NAMES
 from support.commands import command
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 SPINS, MASSES = "start.spin_hz=18:24:40", "top.mass_kg=0.0250:0.0254:20"
 MAP = (
@@ -24,7 +18,7 @@ MAP = (
 
 
 @pytest.fixture(scope="module")
-def shown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+def shown(tmp_path_factory):
     """A folder with a map that is complete, and what the command printed."""
     folder = tmp_path_factory.mktemp("sweep")
     ended = command(*MAP, cwd=folder)
@@ -34,9 +28,7 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return folder, ended.out
 
 
-def test_a_map_is_summarised_drawn_and_shown_again_without_simulating(
-    shown: tuple[Path, str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_map_is_summarised_drawn_and_shown_again_without_simulating(shown, monkeypatch):
     folder, printed = shown
     assert "undriven: 40 × 20 points, each up to 0.3 s" in printed
     assert "start.spin_hz from 18 to 24 Hz, 40 values" in printed
@@ -50,7 +42,7 @@ def test_a_map_is_summarised_drawn_and_shown_again_without_simulating(
     assert "nothing is left to compute" in command(*MAP, "--resume", cwd=folder).err
 
 
-def test_json_has_the_plan_and_each_column_in_numbers(shown: tuple[Path, str]) -> None:
+def test_json_has_the_plan_and_each_column_in_numbers(shown):
     ended = command("sweep", "map.zarr", "--json", cwd=shown[0])
     found = json.loads(ended.out)
     assert (found["points"], found["computed"], found["plan"]["duration_s"]) == (800, 800, 0.3)
@@ -59,9 +51,7 @@ def test_json_has_the_plan_and_each_column_in_numbers(shown: tuple[Path, str]) -
     assert found["figures"] == ["map.zarr.survived.png"]
 
 
-def test_after_ctrl_c_the_printed_command_continues_to_the_same_result(
-    shown: tuple[Path, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_after_ctrl_c_the_printed_command_continues_to_the_same_result(shown, tmp_path, monkeypatch):
     calls, compute = [], run_module.compute
 
     def interrupted(task):
@@ -106,9 +96,7 @@ def test_after_ctrl_c_the_printed_command_continues_to_the_same_result(
         ),
     ],
 )
-def test_a_wrong_option_is_an_error_before_anything_is_computed(
-    words: tuple[str, ...], said: str, shown: tuple[Path, str], tmp_path: Path
-) -> None:
+def test_a_wrong_option_is_an_error_before_anything_is_computed(words, said, shown, tmp_path):
     shutil.copytree(shown[0] / "map.zarr", tmp_path / "map.zarr")
     ended = command("sweep", *words, cwd=tmp_path)
     assert said in ended.err
@@ -116,13 +104,13 @@ def test_a_wrong_option_is_an_error_before_anything_is_computed(
     assert [path.name for path in tmp_path.iterdir() if path.suffix == ".zarr"] == ["map.zarr"]
 
 
-def test_the_help_names_all_that_can_be_observed(tmp_path: Path) -> None:
+def test_the_help_names_all_that_can_be_observed(tmp_path):
     shown = command("sweep", "--help", cwd=tmp_path).out
     words = set(re.findall(r"[a-z_]+", shown.replace("\n", " ")))
     assert set(NAMES) <= words
 
 
-def test_few_points_in_a_row_are_printed_one_by_one(tmp_path: Path) -> None:
+def test_few_points_in_a_row_are_printed_one_by_one(tmp_path):
     (tmp_path / "points.csv").write_text("start.spin_hz,start.tilt_rad\n18,0.01\n30,0.02\n", encoding="utf-8")
     ended = command("sweep", "undriven", "--points", "points.csv", "--duration", "0.5", cwd=tmp_path)
     assert ended.status == 0, ended.err

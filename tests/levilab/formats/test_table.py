@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from levilab.errors import DataError, UsageError
 from levilab.formats import dialect
-from levilab.formats.columns import Column, NoSuchColumn, NoTable, TableError, quoted, shorten
+from levilab.formats.columns import Column, NoSuchColumn, NoTable, TableError, quote_names, shorten
 from levilab.formats.dialect import DIALECTS, Dialect
 from levilab.formats.layout import Layout, sniff
 from levilab.formats.rows import FEW, _read_at_once, _read_lines
@@ -150,7 +150,7 @@ def test_dates_count_from_the_first_that_is_written(table_file):
 @pytest.mark.parametrize(
     "missed", ["", "-", "--", "n/a", "nan", "NaN", "inf", "-Infinity", "9.91E37", "9.9e+37", "1e999"]
 )
-def test_a_missed_reading_is_left_out_and_told(missed, table_file):
+def test_a_missed_reading_is_left_out_with_a_warning(missed, table_file):
     table = read_table(table_file(f"t,f\n0,61.5\n0.2,{missed}\n0.5,61.25\n1,61\n"))
     assert table.column(T).tolist() == PLAIN[T]
     assert table.lines.tolist() == [2, 4, 5]
@@ -184,9 +184,11 @@ def test_a_column_of_true_and_false_is_refused_by_its_line(table_file):
     (("Datum", "Temperatur", "Kommentar"), ("2024-01-05", "21.5", "kalt")),
     (("Temperatur", "Kommentar"), ("21", "kalt")),
 ])  # fmt: skip
-def test_a_table_with_words_in_it_is_told_which_titles_are_known(separator, header, row, table_file):
+def test_the_error_of_a_table_of_words_names_the_known_titles(separator, header, row, table_file):
     path = table_file("\n".join(map(separator.join, [header, *[row] * 19])) + "\n")
-    with pytest.raises(NoSuchColumn, match=f'no title is known .* among {quoted(header)}: say `columns` = "t=NAME'):
+    with pytest.raises(
+        NoSuchColumn, match=f'no title is known .* among {quote_names(header)}: say `columns` = "t=NAME'
+    ):
         read_table(path)
     with pytest.raises(TableError, match="line 2: 'kalt' stands in column 'Kommentar'"):
         read_table(path, columns={"t": "Temperatur", "f": "Kommentar"})
@@ -207,7 +209,7 @@ def test_an_empty_column_of_uncertainties_costs_no_readings(table_file):
 
 @BOTH_WAYS
 @pytest.mark.parametrize("last", ["1.5", "1.5,6x", "1.5,60.5,7", "1.5,-e"])
-def test_a_torn_last_line_is_left_out_and_told(last, table_file):
+def test_a_torn_last_line_is_left_out_with_a_warning(last, table_file):
     table = read_table(table_file("t,f\n0,61.5\n0.5,61.25\n1,61\n" + last))
     assert table.column(T).tolist() == PLAIN[T]
     assert f"line 5: '{last}' was cut off" in table.warnings[0]
@@ -244,7 +246,7 @@ def test_columns_can_be_named(text, columns, expected, table_file):
         np.testing.assert_allclose(table.column(name), values, rtol=4e-16)
 
 
-def test_a_known_quantity_in_an_unknown_unit_is_not_used_and_told(table_file):
+def test_a_known_quantity_in_an_unknown_unit_is_left_out_with_a_warning(table_file):
     table = read_table(table_file("t,f,u [ppm]\n0,61.5,1\n0.5,61.25,1\n1,61,1\n"))
     assert list(table.frame) == [T, F]
     assert "'ppm' is no unit of frequency" in table.warnings[0]
@@ -628,7 +630,7 @@ def test_what_is_another_kind_of_text_is_named(table_file, text, says):
     ],
     ids=["blanks", "blanks about a stroke", "no-break blanks", "brackets"],
 )
-def test_a_title_of_many_blanks_or_brackets_is_read_at_once(tmp_path: Path, title: str) -> None:
+def test_a_title_of_many_blanks_or_brackets_is_read_at_once(tmp_path, title):
     """Forms that look at each pair of places of a title took minutes; the hang guard ends a test that does so again."""
     file = tmp_path / "odd.csv"
     file.write_text(f"time_s,{title}\n" + "".join(f"{k},{30 - k}\n" for k in range(5)), encoding="utf-8")

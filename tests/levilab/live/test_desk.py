@@ -23,4 +23,4 @@ def test_what_is_said_of_a_run_is_marked_since_it_stands_among_its_events() -> N
     desk = Desk(Talking([PracticeEvent(kind, "x", folder="runs/one") for kind in kinds]))  # type: ignore[arg-type]
     desk.step()
     assert desk.about["runs"] == ["one"]
-    assert [one["of_run"] for one in desk.said_after(0)] == [False, False, True, False, False, False]
+    assert [one["of_run"] for one in desk.events_after(0)] == [False, False, True, False, False, False]

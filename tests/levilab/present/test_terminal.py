@@ -18,7 +18,7 @@ from levilab.telemetry.messages import State
 HEADS = ("what is set", "now", "what may stand there", "what it means to the person at the bench")
 ROWS = (
     ("drive_amplitude_vpp", "10.0", "a number above 0 [V peak to peak]", ""),
-    ("trigger_patience_s", "5.0", "a number above 0 [s]", "give up where no trigger comes for so long"),
+    ("trigger_patience_s", "5.0", "a number above 0 [s]", "longest wait for a trigger"),
 )
 TABLE = table("Settings of an experiment", HEADS, ROWS, numbers=["now"])
 WORDS = {word for text in (*HEADS[1:], *ROWS[0], *ROWS[1]) for word in text.split()}

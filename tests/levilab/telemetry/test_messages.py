@@ -1,7 +1,5 @@
 """Messages and their bytes: what goes in comes out, and anything else is no message."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import fields
 
@@ -11,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from levilab.telemetry.codec import MalformedMessage
-from levilab.telemetry.messages import Counting, Drive, Message, Poses, Record, State, decode, encode
+from levilab.telemetry.messages import Counting, Drive, Poses, Record, State, decode, encode
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=30)
@@ -48,7 +46,7 @@ POSES = (
 )
 
 
-def floats(rows: int, width: int) -> np.ndarray:
+def floats(rows, width):
     return np.random.default_rng(rows).normal(size=(rows, width) if width > 1 else rows).astype(np.float32)
 
 
@@ -61,10 +59,10 @@ records = st.builds(
 poses = st.builds(
     lambda n, at: Poses(at, 0.0025, floats(n, 3), floats(n, 4), floats(n, 1) > 0), st.integers(0, 400), numbers
 )
-messages: st.SearchStrategy[Message] = st.one_of(states, records, poses)
+messages = st.one_of(states, records, poses)
 
 
-def same(a: Message, b: Message) -> bool:
+def same(a, b):
     return type(a) is type(b) and all(
         np.array_equal(getattr(a, one.name), getattr(b, one.name))
         if isinstance(getattr(a, one.name), np.ndarray)
@@ -74,12 +72,12 @@ def same(a: Message, b: Message) -> bool:
 
 
 @given(messages)
-def test_a_message_comes_out_as_it_went_in(message: Message) -> None:
+def test_a_message_comes_out_as_it_went_in(message):
     assert same(decode(encode(message)), message)
 
 
 @given(messages, st.data())
-def test_bytes_that_were_changed_are_a_message_or_none(message: Message, data: st.DataObject) -> None:
+def test_bytes_that_were_changed_are_a_message_or_none(message, data):
     sent = bytearray(encode(message))
     for _ in range(data.draw(st.integers(1, 4))):
         sent[data.draw(st.integers(0, len(sent) - 1))] = data.draw(st.integers(0, 255))
@@ -92,7 +90,7 @@ def test_bytes_that_were_changed_are_a_message_or_none(message: Message, data: s
 
 
 @given(st.binary(max_size=300))
-def test_any_bytes_are_no_message(data: bytes) -> None:
+def test_any_bytes_are_no_message(data):
     with pytest.raises(MalformedMessage):
         decode(data)
 
@@ -106,12 +104,12 @@ def test_any_bytes_are_no_message(data: bytes) -> None:
         POSES % ("[1e3,3]", "[1,4]", "[1]"), POSES % ("7", "[1,4]", "[1]"), POSES % ("[0,3]", "[0,4]", "[0]") + "x",
     ],
 )  # fmt: skip
-def test_a_head_that_says_something_else_is_refused(head: str) -> None:
+def test_a_head_that_says_something_else_is_refused(head):
     with pytest.raises(MalformedMessage):
         decode(len(head).to_bytes(4, "little") + head.encode() + bytes(32))
 
 
-def test_what_is_not_a_number_is_left_out_and_a_newer_key_ignored() -> None:
+def test_what_is_not_a_number_is_left_out_and_a_newer_key_ignored():
     sent = encode(State(1.0, share=math.nan, last={"a": math.inf, "b": 2.0}))
     assert decode(sent) == State(1.0, last={"b": 2.0})
     assert decode(sent.replace(b'"paused"', b'"newers"')) == State(1.0, last={"b": 2.0})

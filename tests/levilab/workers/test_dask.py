@@ -1,13 +1,10 @@
 """Tasks on a Dask cluster whose processes are really killed."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import signal
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -17,11 +14,8 @@ from support import tasks
 from support.dask_cluster import DaskCluster
 from support.worker_sockets import DEADLINE_S, listening, worker_at_work
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-
-def test_a_killed_worker_of_a_cluster_costs_no_bit(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_killed_worker_of_a_cluster_costs_no_bit(tmp_path, capfd):
     given = [(n, str(tmp_path)) for n in range(20)]
     with DaskCluster(workers=2) as dask:
         workers = cluster(dask.address)
@@ -38,7 +32,7 @@ def test_a_killed_worker_of_a_cluster_costs_no_bit(tmp_path: Path, capfd: pytest
     assert logging.getLogger("distributed.client").isEnabledFor(logging.ERROR)  # again
 
 
-def test_a_lost_scheduler_ends_the_work_at_once(capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_lost_scheduler_ends_the_work_at_once(capfd):
     with (
         DaskCluster(workers=1, threads=2) as dask,
         listening() as server,
@@ -46,7 +40,7 @@ def test_a_lost_scheduler_ends_the_work_at_once(capfd: pytest.CaptureFixture[str
     ):
         some_came = threading.Event()
 
-        def kill_the_scheduler() -> None:
+        def kill_the_scheduler():
             with contextlib.ExitStack() as one:
                 try:
                     one.enter_context(worker_at_work(server))
@@ -67,10 +61,10 @@ def test_a_lost_scheduler_ends_the_work_at_once(capfd: pytest.CaptureFixture[str
     assert capfd.readouterr().err == ""
 
 
-def test_ctrl_c_leaves_a_cluster_at_once() -> None:
+def test_ctrl_c_leaves_a_cluster_at_once():
     with DaskCluster(workers=1) as dask, listening() as server, ThreadPoolExecutor(1) as beside:
 
-        def interrupt() -> None:
+        def interrupt():
             with contextlib.ExitStack() as one:
                 try:
                     one.enter_context(worker_at_work(server))
@@ -78,7 +72,7 @@ def test_ctrl_c_leaves_a_cluster_at_once() -> None:
                     signal.raise_signal(signal.SIGINT)
                 assert left.result(DEADLINE_S)
 
-        left: Future[bool] = Future()
+        left = Future()
         ended = beside.submit(interrupt)
         results = results_of(tasks.wait_for_ever, [server.getsockname()] * 10, cluster(dask.address))
         with pytest.raises(KeyboardInterrupt), contextlib.closing(results):
@@ -87,13 +81,13 @@ def test_ctrl_c_leaves_a_cluster_at_once() -> None:
         ended.result(2 * DEADLINE_S)
 
 
-def test_a_cluster_without_workers_says_how_to_start_one() -> None:
+def test_a_cluster_without_workers_says_how_to_start_one():
     with DaskCluster(workers=0) as dask, pytest.raises(WorkersLost, match=f"dask worker {dask.address}"):
         list(results_of(tasks.square, [1], cluster(dask.address, patience_s=0)))
 
 
 @pytest.mark.parametrize("address", ["nowhere.json", "tcp://127.0.0.1:1", "gopher://127.0.0.1:1", "cluster"])
-def test_a_wrong_address_of_a_scheduler_is_an_error_in_one_line(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_address_of_a_scheduler_is_an_error_in_one_line(address, monkeypatch):
     monkeypatch.setattr("levilab.workers.dask.ANSWER_S", 0.2)
     with pytest.raises(LevilabError) as raised:
         list(results_of(tasks.square, [1], cluster(address)))

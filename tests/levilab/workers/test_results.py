@@ -1,7 +1,5 @@
 """Tasks are done where there is room, and come back; workers are really killed."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import itertools
@@ -11,7 +9,6 @@ import subprocess
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -20,31 +17,27 @@ from levilab.workers import Workers, packing, processes, results_of, this_proces
 from support import tasks
 from support.worker_sockets import DEADLINE_S, assert_dead, listening, worker_at_work
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
 WAYS = {"this process": this_process(), "threads": threads(2), "processes": processes(2)}
 
 
 @pytest.mark.parametrize("name", WAYS)
-def test_every_way_gives_back_the_same_bits(name: str) -> None:
+def test_every_way_gives_back_the_same_bits(name):
     found = {done.task: done.result for done in results_of(tasks.noise, range(20), WAYS[name])}
     assert found == {n: tasks.noise(n) for n in range(20)}
 
 
 @pytest.mark.parametrize("name", WAYS)
-def test_what_a_function_raises_comes_back_with_its_task(name: str) -> None:
+def test_what_a_function_raises_comes_back_with_its_task(name):
     ended = list(results_of(tasks.refuse_seven, range(10), WAYS[name]))
     assert sorted(done.task for done in ended) == list(range(10))
     assert [(done.task, str(done.error)) for done in ended if done.error] == [(7, "seven is refused")]
     assert all(done.result == done.task for done in ended if not done.error)
 
 
-def test_tasks_are_taken_only_as_they_are_needed() -> None:
+def test_tasks_are_taken_only_as_they_are_needed():
     taken = []
 
-    def endless() -> Iterator[int]:
+    def endless():
         for n in itertools.count():
             taken.append(n)
             yield n
@@ -54,24 +47,24 @@ def test_tasks_are_taken_only_as_they_are_needed() -> None:
     assert len(taken) <= 100 + 8
 
 
-def test_any_executor_of_a_caller_fits() -> None:
+def test_any_executor_of_a_caller_fits():
     own = Workers(lambda: ThreadPoolExecutor(1), count=1)
     assert [done.result for done in results_of(tasks.square, [1, 2, 3], own)] == [1, 4, 9]
 
 
-def test_an_executor_that_gives_up_its_tasks_ends_the_work() -> None:
+def test_an_executor_that_gives_up_its_tasks_ends_the_work():
     class GivesUp(ThreadPoolExecutor):
-        def submit(self, *arguments: Any, **named: Any) -> Any:
+        def submit(self, *arguments, **named):
             future = super().submit(threading.Event().wait, 0)
             future = type(future)()
             future.cancel()
             return future
 
-    with pytest.raises(WorkersLost, match="the batch jobs gave up what they were to do"):
+    with pytest.raises(WorkersLost, match="the batch jobs gave up their tasks"):
         list(results_of(tasks.square, [1], Workers(GivesUp, name="batch jobs")))
 
 
-def test_a_worker_ignores_ctrl_c_and_has_one_thread() -> None:
+def test_a_worker_ignores_ctrl_c_and_has_one_thread():
     [done] = results_of(tasks.surroundings, [0], processes(1))
     assert done.result == {"interrupted": False, "threads": "1", "main": None}
 
@@ -87,30 +80,30 @@ raise SystemExit(first.exitcode)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal is blocked there")
-def test_the_first_process_that_is_started_leaves_ctrl_c_to_its_parent_too() -> None:
+def test_the_first_process_that_is_started_leaves_ctrl_c_to_its_parent_too():
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     subprocess.run([sys.executable, "-c", FIRST], env=environment, check=True)
 
 
-def test_an_error_that_cannot_be_unpickled_keeps_its_words() -> None:
+def test_an_error_that_cannot_be_unpickled_keeps_its_words():
     [done] = results_of(tasks.raise_two_words, [0], processes(1))
     assert isinstance(done.error, RuntimeError)
     assert str(done.error) == "TwoWords: one and two"
     assert "tasks.py" in done.error.__notes__[0]
 
 
-def test_a_function_that_cannot_be_sent_is_refused() -> None:
+def test_a_function_that_cannot_be_sent_is_refused():
     with pytest.raises(LevilabError, match="a function at the head of a module"):
         list(results_of(lambda task: task, [0], processes(1)))
 
 
-def test_a_function_of_the_script_that_runs_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_function_of_the_script_that_runs_is_refused(monkeypatch):
     monkeypatch.setattr(tasks.square, "__module__", "__main__")
     with pytest.raises(LevilabError, match="put it into a module"):
         list(results_of(functools.partial(tasks.square), [0], processes(1)))
 
 
-def test_a_worker_with_other_versions_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_with_other_versions_is_named(monkeypatch):
     here = packing.version_of
     monkeypatch.setattr(packing, "version_of", lambda name: "0.1" if name == "numba" else here(name))
     expected = f"one of the worker processes has numba {here('numba')} instead of 0.1"
@@ -118,29 +111,29 @@ def test_a_worker_with_other_versions_is_named(monkeypatch: pytest.MonkeyPatch) 
         list(results_of(tasks.square, [0], processes(1)))
 
 
-def test_a_killed_worker_costs_only_what_was_under_way(tmp_path: Path) -> None:
+def test_a_killed_worker_costs_only_what_was_under_way(tmp_path):
     given = [(n, str(tmp_path)) for n in range(12)]
     found = {done.task[0]: done.result for done in results_of(tasks.die_at_three_once, given, processes(2))}
     assert (tmp_path / "died").exists()
     assert found == {n: tasks.noise(n) for n in range(12)}
 
 
-def test_a_task_that_kills_its_worker_is_an_error_and_the_others_are_done() -> None:
+def test_a_task_that_kills_its_worker_is_an_error_and_the_others_are_done():
     ended = {done.task: done for done in results_of(tasks.die_at_three, range(8), processes(2))}
     assert isinstance(ended[3].error, WorkersLost)
     assert "each process that does it dies" in str(ended[3].error)
     assert sorted(done.result for done in ended.values() if done.error is None) == [0, 1, 2, 4, 5, 6, 7]
 
 
-def test_workers_that_always_die_end_the_work() -> None:
+def test_workers_that_always_die_end_the_work():
     with pytest.raises(WorkersLost, match="died 5 times in a row before one gave a result"):
         list(results_of(tasks.die_at_three, [3] * 20, processes(1)))
 
 
-def test_ctrl_c_ends_workers_in_the_middle_of_a_task() -> None:
+def test_ctrl_c_ends_workers_in_the_middle_of_a_task():
     with listening() as server, ThreadPoolExecutor(1) as beside:
 
-        def interrupt() -> None:
+        def interrupt():
             with contextlib.ExitStack() as both:
                 try:
                     workers = [both.enter_context(worker_at_work(server)) for _ in range(2)]
@@ -163,7 +156,7 @@ list(results_of(wait_for_ever, [{address}] * 2, processes(2)))
 """
 
 
-def test_workers_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
+def test_workers_do_not_outlive_a_killed_parent(tmp_path):
     with listening() as server, contextlib.ExitStack() as both:
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
         script = tmp_path / "script.py"  # without `if __name__ == "__main__"`
@@ -177,6 +170,6 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
             assert_dead(worker)
 
 
-def test_a_count_of_workers_below_one_is_refused() -> None:
+def test_a_count_of_workers_below_one_is_refused():
     with pytest.raises(UsageError, match="workers = 0"):
         processes(0)

@@ -14,7 +14,6 @@ from instruments.clock import VirtualClock
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange
-from instruments.ieee488 import NOT_A_NUMBER
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
@@ -55,8 +54,9 @@ def test_the_other_input_is_set_up_with_its_own_suffix():
 
 @pytest.mark.parametrize("driver", [Keysight53230A, PendulumCNT91])
 def test_an_input_that_counts_no_slow_pulses_is_refused(driver):
-    with conversation(driver) as counter, pytest.raises(OutOfRange, match="channel = 3 is refused"):
+    with conversation(driver) as counter, pytest.raises(OutOfRange) as refused:
         counter.prepare(gate_s=1.0, trigger_level_v=0.6, channel=3)
+    assert (refused.value.name, refused.value.value) == ("channel", 3)
 
 
 @pytest.mark.parametrize(("gate", "patience"), [(0.1, 1.2), (1.0, 3.0), (10.0, 21.0)])
@@ -77,9 +77,10 @@ def test_the_longest_gate_meets_the_longest_time_out():
 def test_a_gate_that_the_counter_does_not_have_is_refused_by_name():
     with (
         conversation(Keysight53230A, *accepted("CONF:FREQ (@1)", "SENS:FREQ:GATE:SOUR TIME")) as counter,
-        pytest.raises(OutOfRange, match=r"gate = 0\.0 is refused"),
+        pytest.raises(OutOfRange) as refused,
     ):
         counter.prepare(gate_s=0.0, trigger_level_v=0.6)
+    assert (refused.value.name, refused.value.value) == ("gate", 0.0)
 
 
 def test_a_reading_is_a_number_in_hertz():
@@ -111,12 +112,6 @@ def test_garbage_is_no_reading_but_an_error(garbage):
     with conversation(Keysight53230A, *lines) as counter, pytest.raises(BadAnswer) as bad:
         counter.frequency()
     assert (bad.value.question, bad.value.answer) == ("READ?", garbage)
-
-
-def test_a_refused_step_of_the_preparation_ends_it():
-    refused = [("CONF:FREQ (@1)", None), ("SYST:ERR?", '-221,"Settings conflict"'), NO_ERROR]
-    with conversation(Keysight53230A, *refused) as counter, pytest.raises(CommandRefused, match="CONF:FREQ"):
-        counter.prepare(gate_s=1.0, trigger_level_v=0.6)
 
 
 def test_an_error_that_waits_is_raised_before_a_number_is_believed():
@@ -165,8 +160,9 @@ def test_a_series_of_the_wrong_length_is_none():
         ("*CLS", None),
         *accepted("ABOR", "SAMP:COUN 1"),
     ]
-    with conversation(Keysight53230A, *lines) as counter, pytest.raises(BadAnswer, match="3 numbers, not 2"):
+    with conversation(Keysight53230A, *lines) as counter, pytest.raises(BadAnswer) as bad:
         counter.readings(3)
+    assert bad.value.answer == "+2.5E+01,+2.5E+01"
 
 
 @pytest.mark.parametrize("driver", [Keysight53230A, PendulumCNT91])
@@ -314,21 +310,6 @@ def test_a_dark_room_is_no_reading_and_no_error(bench):
     assert counter.frequency() is None
 
 
-def test_a_level_above_the_pulses_is_no_reading(bench):
-    counter, _ = bench
-    counter.prepare(gate_s=0.1, trigger_level_v=1.5)
-    assert counter.frequency() is None
-
-
-def test_a_series_is_as_good_as_single_readings_which_work_afterwards(bench):
-    counter, _ = bench
-    counter.prepare(gate_s=0.1, trigger_level_v=0.6)
-    found = counter.readings(25)
-    assert found.shape == (25,)
-    np.testing.assert_allclose(found, 25.0, rtol=1e-4)
-    assert counter.frequency() == pytest.approx(25.0, rel=1e-4)
-
-
 def test_a_series_into_the_dark_ends_with_missing_readings(bench):
     counter, clock = bench
     counter.prepare(gate_s=0.1, trigger_level_v=0.6)
@@ -337,16 +318,6 @@ def test_a_series_into_the_dark_ends_with_missing_readings(bench):
     missing = np.isnan(found)
     assert 5 <= np.argmax(missing) <= 9
     assert missing[np.argmax(missing) :].all()
-
-
-def test_the_settings_can_all_be_asked_for(bench):
-    counter, _ = bench
-    counter.prepare(gate_s=1.0, trigger_level_v=0.6)
-    settings = counter.settings()
-    assert settings["trigger_level_v"] == 0.6
-    assert settings["gate_s"] == 1.0
-    assert settings["coupling"] == "DC"
-    assert NOT_A_NUMBER not in settings.values()
 
 
 #: What becomes of joined answers in counters that IEEE 488.2, 8.4.1, does not describe; None: no answer at all.
@@ -418,8 +389,9 @@ def test_a_series_whose_end_could_not_be_sent_is_ended_before_the_next_reading()
     reading = [NO_ERROR, ("READ?", "+2.50000000000000E+001")]
     lines = [*accepted("SAMP:COUN 3", "INIT"), *dead, *back, *reading, *reading]
     with conversation(Keysight53230A, *lines) as counter:
-        with pytest.raises(NoAnswer, match="DATA:REM"):
+        with pytest.raises(NoAnswer) as silence:
             counter.readings(3)
+        assert silence.value.question == "DATA:REM? 3,WAIT"
         assert [counter.frequency(), counter.frequency()] == [25.0, 25.0]
 
 

@@ -9,13 +9,13 @@ from instruments.clock import VirtualClock
 from instruments.drivers.generator import Limits
 from instruments.drivers.generator.agilent_33220a import Agilent33220A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
-from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
+from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.generator.agilent_33220a import Virtual33220A
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
-from support.conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
+from support.conversation import CLEAR, SILENCE, accepted, conversation
 
 
 def test_the_signal_is_set_for_a_coil_from_a_clean_state_with_the_offset_gone_before_the_amplitude_comes():
@@ -77,14 +77,16 @@ def test_a_silent_generator_is_not_taken_for_one_that_is_off():
 def test_a_signal_beyond_the_terminals_is_refused_before_anything_is_sent():
     with conversation(Keysight33500B) as generator:
         for amplitude, offset in ((20.5, 0.0), (20.0, -0.1), (12.0, 4.1), (float("nan"), 0.0), (1.0, float("nan"))):
-            with pytest.raises(OutOfRange, match="up to 10 V"):
+            with pytest.raises(OutOfRange) as refused:
                 generator.prepare(waveform="SIN", frequency_hz=30.5, amplitude_vpp=amplitude, offset_v=offset)
+            assert "10 V" in refused.value.allowed
 
 
 def test_an_amplitude_that_is_too_small_stops_the_preparation_before_it_is_sent():
     lines = accepted("*RST", "OUTP1:LOAD INF", "VOLT:UNIT VPP", "FUNC SIN", "FREQ 30.5", "VOLT:OFFS 0.0")
-    with conversation(Keysight33500B, *lines) as generator, pytest.raises(OutOfRange, match=r"0\.002 to 20 Vpp"):
+    with conversation(Keysight33500B, *lines) as generator, pytest.raises(OutOfRange) as refused:
         generator.prepare(waveform="SIN", frequency_hz=30.5, amplitude_vpp=0.001)
+    assert (refused.value.name, refused.value.value) == ("amplitude", 0.001)
 
 
 LIMITS = Limits(drive_amplitude_vpp=4.0, drive_offset_v=1.0, drive_frequency_hz=50.0, drive_lowest_hz=5.0)
@@ -109,8 +111,9 @@ FORBIDDEN = [
 def test_no_setting_gets_around_the_limits_of_the_bench(driver, name, value, limit):
     with conversation(driver) as generator:  # nothing is sent
         generator.limits = LIMITS
-        with pytest.raises(OutOfRange, match=rf"limits\.{limit} in the bench file"):
+        with pytest.raises(OutOfRange) as refused:
             setattr(generator, name, value)
+        assert f"limits.{limit}" in refused.value.allowed
 
 
 @pytest.mark.parametrize("driver", [Keysight33500B, Agilent33220A])
@@ -156,12 +159,6 @@ def test_without_new_limits_what_was_prepared_goes_on():
         generator.output = True
 
 
-def test_what_the_generator_itself_finds_wrong_raises():
-    refused = [("VOLT 10.0", None), ("SYST:ERR?", '-222,"Data out of range;value clipped to upper limit"'), NO_ERROR]
-    with conversation(Keysight33500B, *refused) as generator, pytest.raises(CommandRefused, match="clipped"):
-        generator.amplitude = 10.0
-
-
 # --- the older family ---
 
 
@@ -196,36 +193,12 @@ def test_a_setting_of_the_older_generator_is_sent_and_asked_for(name, value, sen
         assert getattr(generator, name) == value
 
 
-def test_the_older_generators_settings_all_have_their_units():
-    with conversation(
-        Agilent33220A, *((sent.split()[0] + "?", answer) for _, _, sent, answer in WIRE_33220A)
-    ) as generator:
-        assert list(generator.settings()) == [
-            *("waveform", "symmetry_percent", "frequency_hz", "amplitude_vpp", "offset_v", "load_ohm", "output")
-        ]
-
-
 @pytest.mark.parametrize(
     ("name", "value"), [("waveform", "TRI"), ("frequency", 21e6), ("amplitude", 0.01), ("offset", 11.0)]
 )
 def test_what_the_older_generator_cannot_do_is_refused_before_it_is_sent(name, value):
     with conversation(Agilent33220A) as generator, pytest.raises(OutOfRange):
         setattr(generator, name, value)
-
-
-@pytest.mark.parametrize(
-    ("driver", "answer"),
-    [
-        (Agilent33220A, "Agilent Technologies,33220A,MY44033103,2.02-2.02-22-2"),
-        (Keysight33500B, "Agilent Technologies,33522B,MY52812345,3.05-1.19-2.00-52-00"),
-    ],
-)
-def test_each_driver_knows_its_own_model_and_not_the_others(driver, answer):
-    other = Keysight33500B if driver is Agilent33220A else Agilent33220A
-    with conversation(driver, ("*IDN?", answer)) as generator:
-        assert generator.identity() == answer
-    with conversation(other, ("*IDN?", answer)) as generator, pytest.raises(WrongInstrument):
-        generator.identity()
 
 
 # --- the same experiment, whatever the model ---
@@ -246,7 +219,7 @@ def test_both_families_put_the_same_signal_on_the_coil(driver, device, waveform)
     assert (signal.frequency, signal.amplitude, signal.offset) == (30.5, 6.0, 0.0)
     generator.frequency, generator.offset = 31.0, 1.5
     assert (generator.frequency, generator.offset) == (31.0, 1.5)
-    with pytest.raises(OutOfRange, match="up to 10 V"):
+    with pytest.raises(OutOfRange):
         generator.offset = 8.0  # 6 V are there already
     assert virtual.signal().offset == 1.5  # refused, not clipped
     generator.off()

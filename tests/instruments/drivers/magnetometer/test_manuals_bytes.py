@@ -136,7 +136,7 @@ def test_a_reading_during_which_the_unit_changed_is_taken_again():
 
 def test_a_unit_that_changes_all_the_time_raises():
     lines = [reading("+100.000E-05", unit=unit, after=after) for unit, after in ("21", "12", "24")]
-    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer, match="a unit that stays"):
+    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer):
         magnetometer.flux_density()
 
 
@@ -232,8 +232,9 @@ def test_a_status_is_three_digits(answer):
 @pytest.mark.parametrize("answer", ["0", "5", "+2", "1_", "+190.050E-04", ""])
 def test_a_range_that_the_probe_does_not_have_is_refused(answer):
     lines = [("TYPE?", "40"), ("UNIT?", "2"), ("AUTO?", "0"), ("RDGMODE?", "1,1,1"), ("RANGE?", answer), CLEARED]
-    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer, match="from 1 to 4"):
+    with conversation(LakeShore425, *lines) as magnetometer, pytest.raises(BadAnswer) as bad:
         magnetometer.settings()
+    assert (bad.value.question, bad.value.answer) == ("RANGE?", answer)
 
 
 def test_a_475_that_is_silent_after_a_zero_raises():
@@ -262,5 +263,6 @@ def test_there_is_no_error_queue_to_read():
 
 
 def test_a_word_that_is_no_unit_is_refused():
-    with conversation(LakeShore425) as magnetometer, pytest.raises(OutOfRange, match="unit = FURLONG"):
+    with conversation(LakeShore425) as magnetometer, pytest.raises(OutOfRange) as refused:
         magnetometer.unit = "FURLONG"
+    assert (refused.value.name, refused.value.value) == ("unit", "FURLONG")

@@ -5,13 +5,11 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
-from instruments.errors import NoAnswer
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
-from support.gaussmeters import meter
 
 DRIVERS = [(LakeShore425, Virtual425, "425"), (LakeShore475, Virtual475, "475"), (LakeShore475, Virtual475, "455")]
 
@@ -39,12 +37,3 @@ def test_the_drivers_measure_zero_and_notice_an_overload(driver, kind, model):
     field[0] = -0.03
     device.clock.sleep(2.0)
     assert magnetometer.flux_density() == pytest.approx(-0.03, rel=2e-4)
-
-
-def test_a_meter_that_does_not_answer_costs_its_time_out_and_no_more():
-    device = meter()
-    address = "GPIB0::12::INSTR"
-    transport = VisaTransport(address, library=library_for(VirtualBench({address: device})), timeout=3.0)
-    with pytest.raises(NoAnswer):
-        transport.query("NOSUCH?")
-    assert device.clock.now() == pytest.approx(3.0, abs=0.1)

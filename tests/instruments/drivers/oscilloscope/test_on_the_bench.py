@@ -1,12 +1,10 @@
 """The drivers of the oscilloscopes at the virtual ones."""
 
 import contextlib
-import json
 import tracemalloc
 
 import numpy as np
 import pytest
-import pyvisa
 
 from instruments.clock import VirtualClock
 from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired
@@ -62,8 +60,9 @@ def test_the_driver_says_when_the_scope_never_triggers(driver, make):
     scope = driver(transport, clock=clock)
     scope.prepare(**PULSES, trigger_level_v=1.25)
     before = clock.now()
-    with pytest.raises(NeverTriggered, match=r"1\.25 V on CHAN1"):
+    with pytest.raises(NeverTriggered) as never:
         scope.acquire(timeout_s=5.0)
+    assert (never.value.level_v, never.value.source) == (pytest.approx(1.25, abs=0.01), "CHAN1")
     assert clock.now() - before == pytest.approx(5.1, abs=0.3)
     assert not device.running()
     scope.prepare(**PULSES, trigger_level_v=0.65)  # and goes on
@@ -78,19 +77,6 @@ def test_with_sweep_auto_the_driver_shows_what_there_is(driver, make):
     scope.prepare(**PULSES, trigger_level_v=1.25, sweep="auto")
     scope.acquire(timeout_s=1.0)
     assert scope.trace(1).volts == pytest.approx(0.5, abs=0.005)
-    transport.close()
-
-
-@BOTH
-def test_the_settings_have_their_units(driver, make):
-    _, transport, clock = bench(make, pulses)
-    scope = driver(transport, clock=clock)
-    scope.prepare(**PULSES, trigger_level_v=0.65)
-    settings = scope.settings()
-    assert settings["trigger_level_v"] == pytest.approx(0.65)
-    assert settings["channel1_scale_v"] == pytest.approx(0.2)
-    assert settings["channel1_probe_factor"] == 1.0
-    json.dumps(settings)
     transport.close()
 
 
@@ -109,17 +95,6 @@ def test_24_million_points_stream_through_the_memory_of_a_few_pieces():
     # of a piece: volts, scaled volts, their codes in floating point, and the bytes on their way
     assert peak < 60 * PIECE
     transport.close()
-
-
-def test_pyvisa_reads_the_block_as_of_any_scope():
-    device, transport, _ = bench(VirtualDSOX1000, constant(0.2))
-    transport.close()
-    manager = pyvisa.ResourceManager(library_for(VirtualBench({"GPIB0::7::INSTR": device})))
-    scope = manager.open_resource("GPIB0::7::INSTR")
-    scope.write(":WAV:FORM WORD;UNS 1;POIN 1000")
-    codes = scope.query_binary_values(":WAV:DATA?", datatype="H", is_big_endian=True, container=np.array)
-    assert codes.size == 1000
-    scope.close()
 
 
 # --- a scope that is changed under way ---
@@ -150,7 +125,7 @@ READING = pytest.mark.parametrize("how", ["trace", "blocks"])
 def test_a_reset_after_the_preparation_gives_no_trace(driver, make, how):
     with prepared(driver, make) as (device, scope, _):
         device.reset()
-        with pytest.raises(SettingsLost, match=r"probe_factor = 10\.0 instead of 1\.0") as lost:
+        with pytest.raises(SettingsLost, match="probe_factor") as lost:
             read(scope, how)
         assert {"channel1_scale_v", "channel1_offset_v", "trigger_level_v"} <= set(lost.value.changed)
         with pytest.raises(NothingAcquired):
@@ -214,13 +189,6 @@ def test_a_key_of_the_front_panel_raises_instead_of_giving_a_trace(driver, make,
             read(scope, "trace")
         assert len(lost.value.changed) == 1
         assert name is None or name in lost.value.changed
-
-
-@BOTH
-def test_what_is_rounded_is_not_changed(driver, make):
-    with prepared(driver, make) as (device, scope, _):
-        device.settings |= {"chan1_offset": 1.005 * device.settings["chan1_offset"], "trigger_level": 0.66}
-        assert read(scope, "trace").size >= 10_000
 
 
 @BOTH

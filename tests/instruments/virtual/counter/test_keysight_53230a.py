@@ -131,14 +131,6 @@ def test_alternating_coupling_and_level_nought_find_nothing_or_count_noise_at_25
     assert sum(map(right, readings_at_all_places(messages))) <= 4  # by chance
 
 
-def test_the_input_has_two_ranges():
-    device = counter(pulses(40.0))
-    for range_v in (50, 5):
-        assert float(ask(device, f"INP:RANG {range_v};RANG?")) == range_v
-    send(device, b"INP:RANG 6\n")
-    assert errors(device) == [-224]
-
-
 @pytest.mark.parametrize(("coupling", "seen"), [("DC", True), ("AC", False)])
 def test_alternating_coupling_takes_the_mean_away(coupling, seen):
     # dark 0.1 V and a mean of 1.1 V·0.03·1.064 on it: without them the pulses reach 1.065 V
@@ -317,13 +309,6 @@ def test_abort_ends_a_measurement_and_keeps_what_it_brought(five):
     send(five, b"ABOR\n")
     assert len(numbers(ask(five, "FETC?"))) == 2
     assert ask(five, "*OPC?;:STAT:OPER:COND?") == "1;+0"
-
-
-def test_a_device_clear_ends_a_reading():
-    device = counter(pulses(40.0), FIXED_LEVEL, "INP1:LEV1 2", "SYST:TIM INF")
-    assert reading(device, timeout=5.0)[0] is None
-    cable(device).clear()
-    assert ask(device, "*OPC?") == "1"
 
 
 def test_operation_complete_is_noted_when_the_last_reading_is_there(five):

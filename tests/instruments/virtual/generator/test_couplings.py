@@ -12,74 +12,18 @@ from instruments.virtual.generator.agilent_33220a import Virtual33220A
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from support.wire import ask, cable, send
 
-HEADERS = (
-    *(
-        "FREQ",
-        "FUNC",
-        "VOLT",
-        "VOLT:OFFS",
-        "VOLT:HIGH",
-        "VOLT:LOW",
-        "VOLT:UNIT",
-        "OUTP",
-        "OUTP:LOAD",
-        "PHAS",
-        "APPL:SIN",
-    ),
-    *("FUNC:PULS:WIDT", "FUNC:PULS:DCYC", "FUNC:PULS:TRAN", "FUNC:PULS:HOLD", "FUNC:PULS:PER", "FUNC:SQU:DCYC"),
-    *("BURS:STAT", "BURS:NCYC", "BURS:INT:PER", "BURS:MODE", "TRIG:SOUR", "SWE:STAT", "*TRG", "*RST", "FUNC:ARB:SRAT"),
-    *(
-        "VOLT:LIM:STAT",
-        "VOLT:LIM:HIGH",
-        "VOLT:LIM:LOW",
-        "DATA:ARB A,",
-        "DATA VOLATILE,",
-        "FUNC:ARB",
-        "FUNC:USER",
-        "ABOR",
-    ),
-    *("APPL:DC", "UNIT:ANGL", "FUNC:ARB:FREQ", "TRIG:DEL", "DATA:ARB:DAC B,#216"),
-)
-WORDS = (
-    *(
-        "SIN",
-        "SQU",
-        "PULS",
-        "RAMP",
-        "DC",
-        "NOIS",
-        "PRBS",
-        "ARB",
-        "USER",
-        "MIN",
-        "MAX",
-        "DEF",
-        "INF",
-        "ON",
-        "OFF",
-        "DBM",
-        "VRMS",
-    ),
-    *(
-        "VPP",
-        "BUS",
-        "IMM",
-        "GAT",
-        "TRIG",
-        "DCYC",
-        "WIDT",
-        "0",
-        "1",
-        "-5",
-        "1e-9",
-        "4.7",
-        "1e6",
-        "3e7",
-        "9.9e37",
-        "1e999",
-    ),
-    *("A", "VOLATILE", "0,0,0,0,0,0,0,1", "1 MHZ,20,-3", "2 DBM", "-300 DBM", "RAD", "abcdefghijklmnop"),
-)
+_HEADERS = """
+FREQ FUNC VOLT VOLT:OFFS VOLT:HIGH VOLT:LOW VOLT:UNIT OUTP OUTP:LOAD PHAS APPL:SIN FUNC:PULS:WIDT FUNC:PULS:DCYC
+FUNC:PULS:TRAN FUNC:PULS:HOLD FUNC:PULS:PER FUNC:SQU:DCYC BURS:STAT BURS:NCYC BURS:INT:PER BURS:MODE TRIG:SOUR
+SWE:STAT *TRG *RST FUNC:ARB:SRAT VOLT:LIM:STAT VOLT:LIM:HIGH VOLT:LIM:LOW FUNC:ARB FUNC:USER ABOR APPL:DC UNIT:ANGL
+FUNC:ARB:FREQ TRIG:DEL
+"""
+HEADERS = (*_HEADERS.split(), "DATA:ARB A,", "DATA VOLATILE,", "DATA:ARB:DAC B,#216")
+_WORDS = """
+SIN SQU PULS RAMP DC NOIS PRBS ARB USER MIN MAX DEF INF ON OFF DBM VRMS VPP BUS IMM GAT TRIG DCYC WIDT 0 1 -5 1e-9 4.7
+1e6 3e7 9.9e37 1e999 A VOLATILE 0,0,0,0,0,0,0,1 RAD abcdefghijklmnop
+"""
+WORDS = (*_WORDS.split(), "1 MHZ,20,-3", "2 DBM", "-300 DBM")
 
 
 @settings(deadline=None, max_examples=60)

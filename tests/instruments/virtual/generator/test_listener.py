@@ -5,9 +5,7 @@ Source: Agilent/Keysight 33500 Series Operating and Service Guide, unless a test
 
 import pytest
 
-from instruments.clock import VirtualClock
 from instruments.virtual.generator.channel import Output
-from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from support.generators import number
 from support.wire import ask, received, send
 
@@ -55,10 +53,6 @@ def test_the_output_is_off_after_reset(generator, changes):
     send(generator, b"FREQ 40\nVOLT 10\nOUTP ON\n*RST\n")
     assert changes[-1][1] == Output("SIN", 1000.0, 0.0, 0.0)
     assert generator.signal().amplitude == 0.0
-
-
-def test_a_generator_works_without_a_listener():
-    send(Virtual33500B(VirtualClock()), b"OUTP ON\n")
 
 
 def test_the_coil_hangs_on_channel_one(generator, changes):

@@ -3,8 +3,6 @@
 Source: Agilent/Keysight 33500 Series Operating and Service Guide, unless a test names another.
 """
 
-import math
-
 import pytest
 
 from support.generators import entries, number
@@ -49,10 +47,3 @@ def test_a_fast_square_has_less_room_for_its_duty_cycle(generator, older):
     send(older, b"FUNC SQU;FUNC:SQU:DCYC 80;:FREQ 15 MHZ\n")
     assert number(older, "FUNC:SQU:DCYC?") == 60.0
     assert errors(generator) == errors(older) == [-221]
-
-
-def test_a_phase_is_in_the_unit_that_is_set(either):
-    send(either, b"PHAS 90\nUNIT:ANGL RAD\n")
-    assert number(either, "PHAS?") == pytest.approx(math.pi / 2)
-    send(either, b"PHAS 1\nUNIT:ANGL DEG\n")
-    assert number(either, "PHAS?") == pytest.approx(math.degrees(1))

@@ -12,34 +12,6 @@ from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from support.generators import number
 from support.wire import ask, errors, send
 
-
-@pytest.mark.parametrize(
-    "message",
-    [
-        *("OUTP:SYNC OFF", "OUTP:TRIG ON", "OUTP:TRIG:SLOP NEG", "OUTP:POL INV", "TRIG:SLOP NEG", "SWE:SPAC LOG"),
-        *("BURS:MODE GAT", "BURS:GATE:POL INV", "FORM:BORD SWAP", "UNIT:ANGL RAD", "SYST:BEEP:STAT OFF", "DISP OFF"),
-        *("AM:SOUR EXT", "FM:INT:FUNC SQU", "VOLT:RANG:AUTO OFF", "SYST:COMM:RLST REM"),
-    ],
-)
-def test_a_word_or_a_switch_is_kept(either, message):
-    header, _, word = message.partition(" ")
-    assert ask(either, f"{message};:{header}?") == {"ON": "1", "OFF": "0"}.get(word, word)
-    assert errors(either) == []
-
-
-@pytest.mark.parametrize(
-    "message",
-    [
-        *("OUTP1:SYNC:SOUR CH2", "OUTP2:SYNC:MODE CARR", "TRIG2:SOUR TIM", "SOUR2:FUNC:ARB:FILT NORM"),
-        *("FUNC:ARB:ADV TRIG", "FUNC:PRBS:DATA PN9", "SOUR2:SUM:SOUR EXT", "INIT2:CONT OFF", "OUTP2:MODE GAT"),
-    ],
-)
-def test_a_word_or_a_switch_of_the_newer_one_is_kept(generator, message):
-    header, _, word = message.partition(" ")
-    assert ask(generator, f"{message};:{header}?") == {"ON": "1", "OFF": "0"}.get(word, word)
-    assert errors(generator) == []
-
-
 #: The state after *RST as a public driver of the family lists it (without the edges, which are the 33600's there).
 AFTER_RESET = """\
 SOUR1:AM:DEPT +1.000000000000000E+02|SOUR1:AM:DSSC 0|SOUR1:AM:INT:FREQ +1.000000000000000E+02|SOUR1:AM:INT:FUNC SIN

@@ -32,11 +32,3 @@ def test_a_reset_of_the_475_leaves_the_masks_of_the_status():
     device = meter(Virtual475)
     send(device, b"*ESE 48;*SRE 16;FOO;*RST\n")
     assert ask(device, "*ESE?;*SRE?;*STB?") == "48;16;032"
-
-
-def test_the_475_keeps_what_other_programs_set():
-    # InstrumentKit's Lakeshore475 uses these
-    device = meter(Virtual475)
-    assert ask(device, "TUNIT 2;TUNIT?;CMODE 1;CMODE?") == "2;1"
-    assert [float(part) for part in ask(device, "CPARAM 2,3,4.5,6;CPARAM?").split(",")] == [2.0, 3.0, 4.5, 6.0]
-    assert float(ask(device, "CSETP 12.5;CSETP?")) == 12.5

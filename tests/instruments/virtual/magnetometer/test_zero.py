@@ -94,10 +94,6 @@ def test_alarms_and_the_relay(alarm, on):
     assert bool(int(ask(device, "OPST?")) & 8) is ("1" in on)
 
 
-def test_an_alarm_is_answered_as_it_was_set():
-    assert ask(meter(), "ALARM 1,1,100.5,300.25,1,0,0;ALARM?") == "1,1,+100.500E+00,+300.250E+00,1,0,0"
-
-
 @EACH
 def test_without_a_probe_there_is_no_field(kind):
     device = meter(kind, probe=None)

@@ -71,13 +71,6 @@ def test_the_keysight_gives_as_many_points_as_it_was_asked_for(mode, points):
     assert len(block(device, ":WAV:DATA?")[1]) == points == int(ask(device, ":WAV:POIN?"))
 
 
-@pytest.mark.parametrize(
-    ("set_", "answer"), [("MAX", "24000000"), ("min", "12000"), ("1.2e6", "1200000"), ("auto", "AUTO")]
-)
-def test_the_memory_depth_is_answered_as_a_whole_number(set_, answer):
-    assert ask(rigol(pulses, f":ACQ:MDEP {set_}"), ":ACQ:MDEP?") == answer
-
-
 @pytest.mark.parametrize(("form", "most"), [("BYTE", 250_000), ("WORD", 125_000), ("ASC", 15_625)])
 def test_a_block_of_the_rigol_has_a_limit(form, most):
     device = rigol_stopped(pulses, ":ACQ:MDEP 1200000")

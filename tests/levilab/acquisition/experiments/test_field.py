@@ -1,16 +1,13 @@
 """The Hall scan on the virtual bench: what it writes, what the person may answer, and what goes wrong."""
 
-from __future__ import annotations
-
 import dataclasses
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from instruments.clock import VirtualClock
-from levilab.acquisition.experiments.field import FieldSettings, _mean, typed_height
+from levilab.acquisition.experiments.field import FieldSettings, _mean, parse_height
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
@@ -22,17 +19,12 @@ from levilab.world.bench import virtual_bus, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
 from support.acquisitions import Impatient, Silent
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from levilab.bench.person import Task
-
 #: Few heights and readings: what is tested is what happens to them.
 SHORT = FieldSettings(lowest_m=0.04, highest_m=0.08, step_m=0.01, readings=3, settle_s=0.1)
 BASE = Base(thickness_m=0.015, origin_m=0.0008, background_t=3e-5)
 
 
-def request_of(out: Path, settings: FieldSettings = SHORT, base: Base = BASE, **changes: Any) -> AcquisitionRequest:
+def request_of(out, settings=SHORT, base=BASE, **changes):
     """A scan of this base, its probe put in place exactly."""
     world = SpinWorld(SpinScene(base=base), VirtualClock())
     wiring = dataclasses.replace(virtual_wiring(world), **changes)
@@ -40,7 +32,7 @@ def request_of(out: Path, settings: FieldSettings = SHORT, base: Base = BASE, **
     return AcquisitionRequest("field", config, lambda: wiring, out=out, synthetic_how="a test")
 
 
-def test_the_readings_are_the_base_field_within_their_uncertainty(tmp_path: Path) -> None:
+def test_the_readings_are_the_base_field_within_their_uncertainty(tmp_path):
     show = Silent()
     run = acquire(request_of(tmp_path), show)
     assert run.status == "finished"
@@ -55,13 +47,13 @@ def test_the_readings_are_the_base_field_within_their_uncertainty(tmp_path: Path
     assert show.left == sorted(show.left, reverse=True)
 
 
-def test_the_probe_is_zeroed_in_its_chamber_first(tmp_path: Path) -> None:
+def test_the_probe_is_zeroed_in_its_chamber_first(tmp_path):
     """The virtual gaussmeter shows 80 µT and more without it; the background is the base's surroundings', and stays."""
-    asked: list[Task] = []
+    asked = []
     world = SpinWorld(SpinScene(base=Base(strength_t_m=1e-9, background_t=4e-5)), VirtualClock())
     wiring = virtual_wiring(world)
 
-    def person(task: Task) -> str:
+    def person(task):
         asked.append(task)
         return wiring.person(task)
 
@@ -75,13 +67,13 @@ def test_the_probe_is_zeroed_in_its_chamber_first(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("lost", "warned"), [(0.0, False), (0.001, False), (0.02, True)])
-def test_a_drift_shows_at_the_height_that_is_read_again(tmp_path: Path, lost: float, warned: bool) -> None:
+def test_a_drift_shows_at_the_height_that_is_read_again(tmp_path, lost, warned):
     """A ferrite loses 0.1 % in half a kelvin, which setting the height may hide, and 2 % in ten."""
     world = SpinWorld(SpinScene(base=BASE), VirtualClock())
     wiring = virtual_wiring(world)
     weaker = dataclasses.replace(BASE, strength_t_m=BASE.strength_t_m * (1 - lost))
 
-    def person(task: Task) -> str:
+    def person(task):
         if isinstance(task, PlaceProbe) and "again" in task.text:
             assert task.height_m == 0.05  # where the field is largest
             world.scene = dataclasses.replace(world.scene, base=weaker)
@@ -99,11 +91,11 @@ def test_a_drift_shows_at_the_height_that_is_read_again(tmp_path: Path, lost: fl
     assert any(one["kind"] == "warning" for one in run.events()) is warned
 
 
-def test_a_height_that_is_typed_is_the_one_that_is_kept(tmp_path: Path) -> None:
+def test_a_height_that_is_typed_is_the_one_that_is_kept(tmp_path):
     answers = iter(["", "41,5", "high", "4.9 cm", "", "", "", ""])
-    asked: list[Task] = []
+    asked = []
 
-    def person(task: Task) -> str:
+    def person(task):
         asked.append(task)
         return next(answers)
 
@@ -121,24 +113,24 @@ def test_a_height_that_is_typed_is_the_one_that_is_kept(tmp_path: Path) -> None:
     [("61.5", 0.0615), ("61,5 mm", 0.0615), ("+6 cm", 0.06), ("0.06 m", 0.06), ("-5", -0.005), ("6e1", None),
      ("9999", None), ("mm", None)],
 )  # fmt: skip
-def test_heights_as_people_type_them(typed: str, height: float | None) -> None:
-    assert typed_height(typed) == height
+def test_heights_as_people_type_them(typed, height):
+    assert parse_height(typed) == height
 
 
-def test_a_field_beyond_the_range_ends_the_scan_in_a_sentence(tmp_path: Path) -> None:
+def test_a_field_beyond_the_range_ends_the_scan_in_a_sentence(tmp_path):
     settings = SHORT.model_copy(update={"range_t": 0.003})
     with pytest.raises(ExperimentFailed, match=r"at 40\.0 mm is beyond the range of 3 mT.*field\.range_t"):
         acquire(request_of(tmp_path, settings), Silent())
 
 
-def test_the_range_may_be_left_to_the_instrument(tmp_path: Path) -> None:
+def test_the_range_may_be_left_to_the_instrument(tmp_path):
     for range_t, automatic in ((0.0, "ON"), (0.035, "OFF")):
         run = acquire(request_of(tmp_path, SHORT.model_copy(update={"range_t": range_t})), Silent())
         assert run.status == "finished"
         assert run.record.instruments["magnetometer"]["settings_end"]["automatic_range"] == automatic
 
 
-def test_an_interrupted_scan_goes_on_at_the_next_height(tmp_path: Path) -> None:
+def test_an_interrupted_scan_goes_on_at_the_next_height(tmp_path):
     bench = tmp_path / "bench.toml"
     bench.write_text("[field]\nlowest_m = 0.04\nhighest_m = 0.08\nstep_m = 0.01\nreadings = 3\n", encoding="utf-8")
     options = AcquisitionOptions(mock=True, bench=bench, out=tmp_path, seed=5)
@@ -153,14 +145,14 @@ def test_an_interrupted_scan_goes_on_at_the_next_height(tmp_path: Path) -> None:
     assert f"strength {base.strength_t_m:.6e} T m" in (again.record.synthetic_how or "")
 
 
-def test_a_magnetometer_that_is_reset_on_the_way_is_set_up_anew(tmp_path: Path) -> None:
+def test_a_magnetometer_that_is_reset_on_the_way_is_set_up_anew(tmp_path):
     """After the second height another program resets it: the third is read once more, in the range of the others."""
     world = SpinWorld(SpinScene(base=BASE), VirtualClock())
     bus = virtual_bus(world)
-    meter: Any = bus.instruments["ASRLmagnetometer.levilab::INSTR"]
+    meter = bus.instruments["ASRLmagnetometer.levilab::INSTR"]
 
     class Resets(Silent):
-        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
+        def reading(self, text, elapsed, remaining):
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 2:
                 meter.reset()
@@ -183,7 +175,7 @@ def test_a_magnetometer_that_is_reset_on_the_way_is_set_up_anew(tmp_path: Path) 
         ({"lowest_m": 0.2}, "make 0 heights"),
     ],
 )
-def test_heights_that_make_no_scan_are_refused(settings: dict[str, float], says: str) -> None:
+def test_heights_that_make_no_scan_are_refused(settings, says):
     with pytest.raises(ValidationError) as caught:
         FieldSettings(**settings)  # type: ignore[arg-type]
     assert says in str(caught.value)
@@ -196,12 +188,12 @@ def test_heights_that_make_no_scan_are_refused(settings: dict[str, float], says:
         ({"lowest_m": 30.0, "highest_m": 110.0, "step_m": 5.0}, "is it in metres"),
     ],
 )
-def test_bases_and_heights_that_cannot_be_are_refused(settings: dict[str, float], says: str) -> None:
+def test_bases_and_heights_that_cannot_be_are_refused(settings, says):
     with pytest.raises(ConfigError, match=says):
         FieldSettings(**settings).check("field", Limits())  # type: ignore[arg-type]
 
 
-def test_readings_that_all_show_the_same_are_uncertain_by_their_last_digit() -> None:
+def test_readings_that_all_show_the_same_are_uncertain_by_their_last_digit():
     # a rectangular distribution, GUM 4.3.7: its width over 2√3, here that of the last of six digits, 10 nT
     row = _mean(SHORT, [1.2345e-3] * 4)
     assert row["flux_density_mean_u_t"] == pytest.approx(1e-8 / 2 / 3**0.5)

@@ -1,10 +1,7 @@
 """The sweep of the drive: on the virtual bench in full motion once, its decisions with a top that only spins."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -28,23 +25,17 @@ from levilab.world.spin_world import SpinScene, SpinWorld
 from support.acquisitions import Impatient, Silent
 from support.commands import command
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from levilab.bench.person import Task
-    from levilab.world.spin_world import Array
-
 QUICK = {"hold_s": 1.0, "counts": 3, "gate_s": 0.5, "interval_s": 1.0, "ramp_hz_per_s": 0.2}
 
 
 class Wobbling(SpinWorld):
     """A top that only spins; the laser sees it as often as the lamp does."""
 
-    def laser(self, start: float, step: float, n: int) -> Array:
+    def laser(self, start, step, n):
         return self.light(start, step, n)
 
 
-def request(out: Path, world: SpinWorld, **settings: Any) -> AcquisitionRequest:
+def request(out, world, **settings):
     """A sweep of a top that is in this world, as on a real bench: without a seed."""
     chosen = {"drive_frequency_hz": 30.0, "frequencies_hz": (30.5, 31.0, 32.0)} | QUICK | settings
     config = with_settings(Configuration(), "precession", PrecessionSettings(**chosen))
@@ -53,15 +44,15 @@ def request(out: Path, world: SpinWorld, **settings: Any) -> AcquisitionRequest:
     )
 
 
-def events(run: Run, *kinds: str) -> list[str]:
+def events(run, *kinds):
     return [event["text"] for event in run.events() if event["kind"] in kinds]
 
 
-def kept(out: Path) -> Run:
+def kept(out):
     return Run.load(next(out.iterdir()))
 
 
-def test_a_sweep_in_full_motion_finds_a_locked_top(tmp_path: Path) -> None:
+def test_a_sweep_in_full_motion_finds_a_locked_top(tmp_path):
     options = AcquisitionOptions(mock=True, out=tmp_path, seed=1)
     asked = request_for("precession", options)
     quick = QUICK | {
@@ -96,7 +87,7 @@ def test_a_sweep_in_full_motion_finds_a_locked_top(tmp_path: Path) -> None:
     assert all(one.coherence.locked for one in found.coherences)
 
 
-def test_an_interrupted_sweep_goes_on_at_the_next_point(tmp_path: Path) -> None:
+def test_an_interrupted_sweep_goes_on_at_the_next_point(tmp_path):
     first = request(tmp_path, Wobbling(SpinScene(), VirtualClock()))
     run = acquire(first, Impatient(1))
     assert (run.status, run.count()) == ("interrupted", 1)
@@ -109,8 +100,8 @@ def test_an_interrupted_sweep_goes_on_at_the_next_point(tmp_path: Path) -> None:
     np.testing.assert_allclose(readings.column("precession_frequency_hz"), [30.5, 31.0, 32.0], atol=0.2)
 
 
-def test_a_point_whose_record_is_broken_off_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(*_: Any) -> None:
+def test_a_point_whose_record_is_broken_off_is_kept(tmp_path, monkeypatch):
+    def interrupt(*_):
         assert kept(tmp_path).count() == 1  # on the disk, before a record that may be a minute on its way
         raise Interrupted("SIGINT")
 
@@ -119,7 +110,7 @@ def test_a_point_whose_record_is_broken_off_is_kept(tmp_path: Path, monkeypatch:
     assert (run.status, run.count()) == ("interrupted", 1)
 
 
-def test_a_swing_is_taken_off_within_the_limits_of_the_drive() -> None:
+def test_a_swing_is_taken_off_within_the_limits_of_the_drive():
     """Its crest is at 3 s, half a swing lasts 2 s: it goes forward at 11 s or, at its upper limit, back at 13 s."""
     swing = Swing(frequency=0.25, size=0.3, crest=3.0)
     at_11, at_13 = (10.85, 41.0), (12.85, 39.0)
@@ -128,7 +119,7 @@ def test_a_swing_is_taken_off_within_the_limits_of_the_drive() -> None:
     assert calming_step(swing, 40.0, 10.0, Limits(drive_frequency_hz=40.5, drive_lowest_hz=39.5)) is None
 
 
-def test_a_top_that_swings_is_calmed_at_each_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_top_that_swings_is_calmed_at_each_point(tmp_path, monkeypatch):
     swing = Swing(frequency=0.25, size=0.3, crest=3.0)
     monkeypatch.setattr("levilab.acquisition.experiments.precession.swing_of", lambda _: swing)
     run = acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock())), Silent())
@@ -136,7 +127,7 @@ def test_a_top_that_swings_is_calmed_at_each_point(tmp_path: Path, monkeypatch: 
     np.testing.assert_allclose(run.readings().column("spin_frequency_hz"), [30.5, 31.0, 32.0], atol=0.2)
 
 
-def test_a_sweep_that_is_resumed_on_another_day_goes_on(tmp_path: Path) -> None:
+def test_a_sweep_that_is_resumed_on_another_day_goes_on(tmp_path):
     """The time that it may take does not run while it lies still."""
     first = request(tmp_path, Wobbling(SpinScene(), VirtualClock()))
     run = acquire(first, Impatient(1))
@@ -147,12 +138,10 @@ def test_a_sweep_that_is_resumed_on_another_day_goes_on(tmp_path: Path) -> None:
     assert again.count() == 3
 
 
-def test_a_counter_that_fails_between_laser_and_tape_is_reached_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    calls: list[int] = []
+def test_a_counter_that_fails_between_laser_and_tape_is_reached_again(tmp_path, monkeypatch):
+    calls = []
 
-    def prepare(session: Any, gate_s: float | None = None) -> None:
+    def prepare(session, gate_s=None):
         calls.append(len(calls))
         if len(calls) == 3:  # the first two are for the drive to take hold, and after that
             raise NoAnswer(session.bench.address("counter"), "*OPC?", 1.0)
@@ -164,13 +153,13 @@ def test_a_counter_that_fails_between_laser_and_tape_is_reached_again(
     assert len(events(run, "found again")) == 1
 
 
-def test_a_sweep_whose_time_is_over_says_so_once(tmp_path: Path) -> None:
+def test_a_sweep_whose_time_is_over_says_so_once(tmp_path):
     run = acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock()), longest_s=20.0), Silent())
     assert 0 < run.count() < 3
     assert len(events(run, "longest")) == 1
 
 
-def test_where_the_lock_is_lost_the_top_is_driven_up_anew(tmp_path: Path) -> None:
+def test_where_the_lock_is_lost_the_top_is_driven_up_anew(tmp_path):
     # 8 Hz in two steps of a second: no drive pulls a top so fast
     world = Wobbling(SpinScene(drag="stokes", constants=(1e-5,)), VirtualClock())
     run = acquire(request(tmp_path, world, frequencies_hz=(30.1, 38.0, 46.0, 54.0, 62.0), ramp_hz_per_s=4.0), Silent())
@@ -182,14 +171,14 @@ def test_where_the_lock_is_lost_the_top_is_driven_up_anew(tmp_path: Path) -> Non
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
 
-def test_a_top_that_fell_is_asked_for(tmp_path: Path) -> None:
+def test_a_top_that_fell_is_asked_for(tmp_path):
     # let go at 30.1 Hz it falls within two seconds
     world = Wobbling(SpinScene(start_hz=30.5, drag="stokes", constants=(0.003,), fall_hz=29.95), VirtualClock())
-    asked: list[str] = []
+    asked = []
     wanted = request(tmp_path, world, frequencies_hz=(30.1, 35.0, 36.0), ramp_hz_per_s=4.0)
     wiring = wanted.wiring()
 
-    def person(task: Task) -> str:
+    def person(task):
         asked.append(task.text)
         return wiring.person(task)
 
@@ -199,7 +188,7 @@ def test_a_top_that_fell_is_asked_for(tmp_path: Path) -> None:
     assert all("float" in text for text in asked)
 
 
-def test_a_counter_with_one_input_has_its_cable_changed_at_each_point(tmp_path: Path) -> None:
+def test_a_counter_with_one_input_has_its_cable_changed_at_each_point(tmp_path):
     run = acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock()), laser_input=1), Silent())
     assert run.count() == 3
     there, back = "in place of the tape's", "the tape's phototransistor"
@@ -207,7 +196,7 @@ def test_a_counter_with_one_input_has_its_cable_changed_at_each_point(tmp_path: 
     assert [next(words for words in (there, back) if words in text) for text in tasks] == 3 * [there, back]
 
 
-def test_a_beam_that_is_never_cut_ends_the_sweep_in_one_line(tmp_path: Path) -> None:
+def test_a_beam_that_is_never_cut_ends_the_sweep_in_one_line(tmp_path):
     with pytest.raises(ExperimentFailed, match=r"no laser pulses at 0.65 V, input 2: .*laser_trigger_level_v"):
         acquire(request(tmp_path, SpinWorld(SpinScene(), VirtualClock())), Silent())
     run = kept(tmp_path)
@@ -218,13 +207,13 @@ def test_a_beam_that_is_never_cut_ends_the_sweep_in_one_line(tmp_path: Path) -> 
 class MissedAt31(Wobbling):
     """The stem misses the beam where the drive is at 31 Hz."""
 
-    def laser(self, start: float, step: float, n: int) -> Array:
+    def laser(self, start, step, n):
         spin, _ = self.motion(np.array([start]))
         seen = super().laser(start, step, n)
         return np.zeros_like(seen) if abs(spin[0] / (2 * np.pi) - 31) < 0.2 else seen
 
 
-def test_a_point_at_which_the_beam_is_hardly_cut_is_left_out(tmp_path: Path) -> None:
+def test_a_point_at_which_the_beam_is_hardly_cut_is_left_out(tmp_path):
     show = Silent()
     run = acquire(request(tmp_path, MissedAt31(SpinScene(), VirtualClock())), show)
     assert run.status == "finished"
@@ -248,7 +237,7 @@ def test_a_point_at_which_the_beam_is_hardly_cut_is_left_out(tmp_path: Path) -> 
         ("laser_input = 3", "laser_input"),
     ],
 )
-def test_what_is_no_sweep_costs_one_line(tmp_path: Path, table: str, said: str) -> None:
+def test_what_is_no_sweep_costs_one_line(tmp_path, table, said):
     (tmp_path / "bench.toml").write_text(f"[precession]\n{table}\n", encoding="utf-8")
     ended = command("acquire", "precession", "--mock", "--bench", "bench.toml", cwd=tmp_path)
     assert ended.status == 1
@@ -256,7 +245,7 @@ def test_what_is_no_sweep_costs_one_line(tmp_path: Path, table: str, said: str) 
     assert said in line
 
 
-def test_the_time_left_of_a_sweep_is_that_of_its_way_and_of_its_holds() -> None:
+def test_the_time_left_of_a_sweep_is_that_of_its_way_and_of_its_holds():
     settings = PrecessionSettings(first_hz=34.0, last_hz=30.0, step_hz=2.0, ramp_hz_per_s=0.2)
     faster = settings.model_copy(update={"ramp_hz_per_s": 0.4})
     assert _time_left(settings, 0) - _time_left(faster, 0) == pytest.approx((34.0 - 30.0) / 0.2 / 2)

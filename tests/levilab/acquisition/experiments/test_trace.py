@@ -1,10 +1,7 @@
 """Records of the oscilloscope: from the virtual bench into a run folder, and every way out of it."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -13,7 +10,7 @@ from instruments.clock import VirtualClock
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import OutOfRange
 from instruments.virtual.core.trigger import crossings
-from levilab.acquisition.loop import AcquisitionRequest, acquire
+from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import settings_of
@@ -25,10 +22,6 @@ from levilab.world.bench import VIRTUAL, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 from support.acquisitions import Impatient, Silent
 from support.commands import command
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
 
 #: The thesis's driven top, put where it floats: as IC1 it swings so far that the laser misses it now and then.
 CALM = """
@@ -46,26 +39,26 @@ CALM = """
 """
 
 
-def mock_trace(folder: Path, lines: str = "", **options: Any) -> AcquisitionRequest:
+def mock_trace(folder, lines="", **options):
     """Records on the virtual bench, with lines of the bench file's table [trace]."""
     bench = folder / "bench.toml"
     bench.write_text(f"[trace]\n{lines}\n", encoding="utf-8")
     return request_for("trace", AcquisitionOptions(mock=True, bench=bench, out=folder / "runs", **options))
 
 
-def pulses(run: Run, k: int, slope: float = 1.0) -> Any:
+def pulses(run, k, slope=1.0):
     """When the pulses of a trace begin [s]."""
     trace = run.traces()[k].trace
     return crossings(slope * trace.volts, slope * 0.65, 0.1) * trace.dt_s
 
 
-def frequency(run: Run, k: int) -> float:
+def frequency(run, k):
     """From the first pulse of a trace to the last [Hz]."""
     edges = pulses(run, k)
     return float((edges.size - 1) / np.ptp(edges))
 
 
-def test_the_tape_is_recorded_raw_with_what_reads_it(tmp_path: Path) -> None:
+def test_the_tape_is_recorded_raw_with_what_reads_it(tmp_path):
     run = acquire(mock_trace(tmp_path, "records = 3", seed=1), Silent())
     assert run.status == "finished"
     traces = run.traces()
@@ -83,7 +76,7 @@ def test_the_tape_is_recorded_raw_with_what_reads_it(tmp_path: Path) -> None:
     assert (listed.size, listed.experiment) == ("3 records", "trace")
 
 
-def test_a_given_setting_leaves_the_others_to_the_scene(tmp_path: Path) -> None:
+def test_a_given_setting_leaves_the_others_to_the_scene(tmp_path):
     (tmp_path / "calm.toml").write_text(CALM, encoding="utf-8")
     scene = str(tmp_path / "calm.toml")
     plain, given = (
@@ -95,7 +88,7 @@ def test_a_given_setting_leaves_the_others_to_the_scene(tmp_path: Path) -> None:
     assert given.drive_frequency_hz == plain.drive_frequency_hz
 
 
-def test_with_a_scene_the_laser_is_recorded_beside_the_tape(tmp_path: Path) -> None:
+def test_with_a_scene_the_laser_is_recorded_beside_the_tape(tmp_path):
     (tmp_path / "calm.toml").write_text(CALM, encoding="utf-8")
     run = acquire(mock_trace(tmp_path, "records = 2", scene=str(tmp_path / "calm.toml"), seed=1), Silent())
     assert [t.channel for t in run.traces()] == ["tape", "laser"] * 2
@@ -108,7 +101,7 @@ def test_with_a_scene_the_laser_is_recorded_beside_the_tape(tmp_path: Path) -> N
         assert tape.size > 12
 
 
-def test_a_resumed_run_keeps_its_records_and_counts_on(tmp_path: Path) -> None:
+def test_a_resumed_run_keeps_its_records_and_counts_on(tmp_path):
     first = acquire(mock_trace(tmp_path, "records = 4\ninterval_s = 2.0", seed=3), Impatient(2))
     assert first.status == "interrupted"
     before = [(path.name, path.read_bytes()) for path in sorted((first.folder / "traces").iterdir())]
@@ -139,7 +132,7 @@ def test_a_resumed_run_keeps_its_records_and_counts_on(tmp_path: Path) -> None:
     ],
     ids=["level", "dark", "elsewhere"],
 )
-def test_without_a_trigger_the_level_and_the_signal_are_told(tmp_path: Path, settings: str, said: str) -> None:
+def test_without_a_trigger_the_error_has_the_level_and_the_signal(tmp_path, settings, said):
     with pytest.raises(ExperimentFailed, match=said):
         acquire(mock_trace(tmp_path, settings + "\ndrive_frequency_hz = 30.0", seed=1), Silent())
     [folder] = (tmp_path / "runs").iterdir()
@@ -147,14 +140,14 @@ def test_without_a_trigger_the_level_and_the_signal_are_told(tmp_path: Path, set
     assert listed.status == "failed"
 
 
-def test_a_channel_that_the_scope_does_not_have_is_refused(tmp_path: Path) -> None:
+def test_a_channel_that_the_scope_does_not_have_is_refused(tmp_path):
     with pytest.raises(OutOfRange, match="channel = 7 is refused, allowed is one of 1, 2, 3, 4"):
         acquire(mock_trace(tmp_path, "channels = [1, 7]", seed=1), Silent())
     with pytest.raises(ConfigError, match="each channel is expected once"):
         mock_trace(tmp_path, "channels = [1, 1]")
 
 
-def test_a_channel_that_shows_nothing_or_too_much_is_reported(tmp_path: Path) -> None:
+def test_a_channel_that_shows_nothing_or_too_much_is_reported(tmp_path):
     settings = "records = 1\nchannels = [1, 4]\nvolts_per_division = 0.1\npoints = 1000"
     run = acquire(mock_trace(tmp_path, settings, seed=1), Silent())
     texts = [event["text"] for event in run.events()]
@@ -162,10 +155,10 @@ def test_a_channel_that_shows_nothing_or_too_much_is_reported(tmp_path: Path) ->
     assert "channel 4 (channel 4) shows nothing" in texts[1]
 
 
-def test_a_record_without_a_single_sample_is_kept_and_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_record_without_a_single_sample_is_kept_and_reported(tmp_path, monkeypatch):
     whole = RigolDS1000Z.trace
 
-    def hollow(scope: Any, channel: int, arrived: Any = None) -> Any:
+    def hollow(scope, channel, arrived=None):
         trace = whole(scope, channel, arrived)
         return replace(trace, codes=np.zeros_like(trace.codes), none=0)
 
@@ -177,12 +170,12 @@ def test_a_record_without_a_single_sample_is_kept_and_told(tmp_path: Path, monke
     assert run.readings().frame[["lowest_v", "highest_v"]].isna().all(axis=None)
 
 
-def test_a_channel_that_another_program_turns_off_is_turned_on_again(tmp_path: Path) -> None:
+def test_a_channel_that_another_program_turns_off_is_turned_on_again(tmp_path):
     request = mock_trace(tmp_path, "records = 2\ninterval_s = 2.0", seed=1)
     wiring = virtual_wiring(SpinWorld(random_scene(1), VirtualClock()))
 
     class Meddler(Silent):
-        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
+        def reading(self, text, elapsed, remaining):
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 1:
                 scope = wiring.library.bench.instruments[VIRTUAL["oscilloscope"].address]
@@ -194,13 +187,13 @@ def test_a_channel_that_another_program_turns_off_is_turned_on_again(tmp_path: P
     assert len(run.traces()) == 2
 
 
-def watched(tmp_path: Path, message: str, scene: SpinScene | None = None) -> Run:
+def watched(tmp_path, message, scene=None):
     """Three driven records; after the first the generator gets this message from its front panel."""
     settings = "records = 3\ninterval_s = 2.0\npoints = 1000\ndrive_frequency_hz = 30.0"
     wiring = virtual_wiring(SpinWorld(scene or SpinScene(), VirtualClock()))
 
     class Meddler(Silent):
-        def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
+        def reading(self, text, elapsed, remaining):
             super().reading(text, elapsed, remaining)
             if len(self.readings) == 1:
                 wiring.library.bench.instruments[VIRTUAL["generator"].address].execute(message)
@@ -209,7 +202,7 @@ def watched(tmp_path: Path, message: str, scene: SpinScene | None = None) -> Run
 
 
 @pytest.mark.parametrize("message", ["FREQ 35", "OUTP1 OFF", "VOLT 1"])
-def test_a_drive_that_is_changed_by_hand_is_seen_after_the_record(tmp_path: Path, message: str) -> None:
+def test_a_drive_that_is_changed_by_hand_is_seen_after_the_record(tmp_path, message):
     run = watched(tmp_path, message)
     assert run.count() == 3
     kinds = [event["kind"] for event in run.events()]
@@ -220,7 +213,7 @@ def test_a_drive_that_is_changed_by_hand_is_seen_after_the_record(tmp_path: Path
     assert (settings["frequency_hz"], settings["output"]) == (30.0, False)
 
 
-def test_a_top_that_the_drive_does_not_hold_is_warned_of_once(tmp_path: Path) -> None:
+def test_a_top_that_the_drive_does_not_hold_is_warned_of_once(tmp_path):
     """It begins at 27 Hz, which no drive of 30 Hz takes hold of."""
     run = watched(tmp_path, "*CLS", SpinScene(start_hz=27.0))
     (warning,) = run.warnings()
@@ -228,7 +221,7 @@ def test_a_top_that_the_drive_does_not_hold_is_warned_of_once(tmp_path: Path) ->
     assert "the drive of 30 Hz lost the top" in warning
 
 
-def test_what_was_cut_short_is_said_and_taken_anew(tmp_path: Path) -> None:
+def test_what_was_cut_short_is_said_and_taken_anew(tmp_path):
     """Killed in the second record: codes of its first channel with a line, those of its second without."""
     settings = "records = 2\ninterval_s = 2.0\npoints = 1000\nchannels = [1, 2]"
     whole = acquire(mock_trace(tmp_path, settings, seed=3), Silent())
@@ -241,18 +234,18 @@ def test_what_was_cut_short_is_said_and_taken_anew(tmp_path: Path) -> None:
     run = acquire(request_for("trace", AcquisitionOptions(resume=whole.folder, out=tmp_path)), Silent())
     cut = [event["text"] for event in run.events() if event["kind"] == "cut short"]
     assert cut[0].startswith("traces/000004.npy: the run was cut short before traces.jsonl said how to read it")
-    assert cut[1] == "record 2 was cut short after 1 of 2 channels; it is taken anew"
+    assert cut[1] == "record 2 was cut short after 1 of 2 channels; it is taken again"
     assert [one.number for one in run.traces()] == [1, 2, 3, 5, 6]
     assert run.count() == 2
 
 
-def test_what_had_come_of_a_record_when_killed_is_found_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_had_come_of_a_record_when_killed_is_found_again(tmp_path, monkeypatch):
     """Killed before the third of three pieces of the second record: of the folder at that moment a copy is made."""
     left, copied = tmp_path / "left", 0
     monkeypatch.setattr(RigolDS1000Z, "_LONGEST_BLOCK", 5000)
     whole = RunWriter.arriving
 
-    def arriving(writer: RunWriter, time_s: float, trace: Any, *more: Any) -> None:
+    def arriving(writer, time_s, trace, *more):
         nonlocal copied
         whole(writer, time_s, trace, *more)
         if trace.codes.size == 10_000 and (writer.folder / "traces" / "000001.npy").exists():
@@ -287,7 +280,7 @@ def test_what_had_come_of_a_record_when_killed_is_found_again(tmp_path: Path, mo
     assert kinds[0] == "traces.jsonl: record 2 (tape) was cut short: 10000 of its 12000 points are kept"
 
 
-def test_the_generator_is_needed_only_by_a_drive(tmp_path: Path) -> None:
+def test_the_generator_is_needed_only_by_a_drive(tmp_path):
     bench = tmp_path / "bench.toml"
     scope = '[oscilloscope]\nmodel = "DS1000Z"\naddress = "TCPIP0::192.0.2.1::inst0::INSTR"\n'
     bench.write_text(scope, encoding="utf-8")
@@ -300,7 +293,7 @@ def test_the_generator_is_needed_only_by_a_drive(tmp_path: Path) -> None:
         request_for("trace", AcquisitionOptions(bench=bench, out=tmp_path))
 
 
-def test_time_left_is_that_of_the_records_to_come(tmp_path: Path) -> None:
+def test_time_left_is_that_of_the_records_to_come(tmp_path):
     show = Silent()
     acquire(mock_trace(tmp_path, "records = 3\ninterval_s = 2.0", seed=1), show)
     assert show.left == [4.0, 2.0, 0.0]

@@ -1,14 +1,11 @@
 """Samples out of files: every vendor's header, their traps, what is refused and how, and memory that does not grow."""
 
-from __future__ import annotations
-
 import codecs
 import re
 import sys
 import tracemalloc
 import types
 import wave
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -22,20 +19,14 @@ from levilab.formats.waveforms.header import NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    Write = Callable[..., Path]
-
 FEW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 #: Of the sample files, which sample_data/make.py writes from one signal.
 STEP, COUNT, START = 2.5e-4, 2000, -0.25
 
 
 @pytest.fixture
-def write(tmp_path: Path) -> Write:
-    def file(content: str | bytes, name: str = "data.csv") -> Path:
+def write(tmp_path):
+    def file(content, name="data.csv"):
         path = tmp_path / name
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
         return path
@@ -43,7 +34,7 @@ def write(tmp_path: Path) -> Write:
     return file
 
 
-def waveform(path: Path, **given: Any) -> Waveform:
+def waveform(path, **given):
     record = read_record(path, **given)
     assert isinstance(record, Waveform)
     return record
@@ -65,7 +56,7 @@ SCOPE_FILES = {
 
 
 @pytest.mark.parametrize("name", SCOPE_FILES)
-def test_a_record_reads_the_same_from_every_makers_scope(name: str, sample_data: Path) -> None:
+def test_a_record_reads_the_same_from_every_makers_scope(name, sample_data):
     written = np.load(sample_data / "scope-files" / "samples-4000hz.npy").astype(np.float64)
     record = waveform(sample_data / "scope-files" / name, rate=4000.0 if name.endswith(".npy") else None)
     origin, start, channel, unit = SCOPE_FILES[name]
@@ -78,7 +69,7 @@ def test_a_record_reads_the_same_from_every_makers_scope(name: str, sample_data:
     np.testing.assert_allclose(scale * record.samples(), written, atol=step, rtol=0)
 
 
-def test_times_that_lost_digits_give_the_step_by_a_line_and_say_so(sample_data: Path) -> None:
+def test_times_that_lost_digits_give_the_step_by_a_line_and_say_so(sample_data):
     record = waveform(sample_data / "scope-files" / "rigol-ds1000e.csv")
     assert record.step == pytest.approx(STEP, rel=9e-5)  # what the warning says
     assert "is known to 9×10⁻⁵ of it" in record.warnings[0]
@@ -86,7 +77,7 @@ def test_times_that_lost_digits_give_the_step_by_a_line_and_say_so(sample_data: 
     assert abs(record.step - STEP) < abs(ends - STEP) / 5  # first and last time alone are far off
 
 
-def rows(n: int = 20, first: int = 0) -> str:
+def rows(n=20, first=0):
     return "".join(f"{k},{k % 5}.5,\n" for k in range(first, first + n))
 
 
@@ -121,7 +112,7 @@ def rows(n: int = 20, first: int = 0) -> str:
         ("t/us\tu/mV\n" + "".join(f"{k}\t1\n" for k in range(20)), 0.0, 1e-6, "u V"),
     ],
 )  # fmt: skip
-def test_headers_with_their_variants(tmp_path: Path, text: str, start: float, step: float, channels: str) -> None:
+def test_headers_with_their_variants(tmp_path, text, start, step, channels):
     path = tmp_path / "data.csv"
     path.write_text(text, encoding="utf-8")
     record = waveform(path)
@@ -130,7 +121,7 @@ def test_headers_with_their_variants(tmp_path: Path, text: str, start: float, st
     assert record.count == 20
 
 
-def test_times_in_single_precision_are_even_enough(write: Write) -> None:
+def test_times_in_single_precision_are_even_enough(write):
     """As a DS1102E prints them: -5.9999997e-04, -5.9800001e-04."""
     times = (np.arange(300) * 2e-6 - 6e-4).astype(np.float32)
     text = "X,CH1,\nSecond,Volt,\n" + "".join(f"{t:.7e},1.0,\n" for t in times.tolist())
@@ -142,31 +133,31 @@ def test_times_in_single_precision_are_even_enough(write: Write) -> None:
 SIGLENT = "Record Length,Analog:{n}\nSample Interval,Analog:{step}\nHorizontal Units,{unit}\nSource,CH1\nSecond,Volt\n"
 
 
-def siglent(step: str, printed: float, *, unit: str = "s", digits: int = 11, count: int = 20) -> str:
+def siglent(step, printed, *, unit="s", digits=11, count=20):
     above = SIGLENT.format(n=count, step=step, unit=unit)
     return above + "".join(f"{k * printed:.{digits}f},{k % 5}\n" for k in range(20))
 
 
-def test_the_step_comes_from_the_header_where_times_lost_digits(write: Write) -> None:
+def test_the_step_comes_from_the_header_where_times_lost_digits(write):
     record = waveform(write(siglent("0.000012340000", 1.234e-5, digits=4)))
     assert record.step == 1.234e-5
     assert record.warnings == ()
 
 
-def test_times_in_microseconds_below_a_header_in_seconds_are_told(write: Write) -> None:
+def test_times_in_microseconds_below_a_header_in_seconds_are_warned_of(write):
     record = waveform(write(siglent("2e-6", 2.0, unit="us")))
     assert record.step == 2e-6
     assert "are taken to be in units of 1e-06 s" in record.warnings[0]
 
 
-def test_a_header_that_its_times_contradict_is_refused_with_both(write: Write) -> None:
+def test_a_header_that_its_times_contradict_is_refused_with_both(write):
     path = write(siglent("2e-5", 4e-5))
     with pytest.raises(TableError, match=r"interval of 2e-05 s.*4e-05 s.*`rate` = 50000 or 25000"):
         read_record(path)
     assert waveform(path, rate=25000.0).step == 4e-5
 
 
-def test_a_record_shorter_than_announced_is_reported(write: Write) -> None:
+def test_a_record_shorter_than_announced_is_reported(write):
     assert waveform(write(siglent("1e-3", 1e-3, count=99))).warnings == (
         "data.csv: its header announces 99 samples, it holds 20",
     )
@@ -190,13 +181,13 @@ PLAIN = "t [s];u [mV]\n" + "".join(f"{k / 1000:.4f};{100 * k}\n".replace(".", ",
     ],
     ids=["CRLF", "trailing", "NUL", "UTF-16", "UTF-16 LE bare", "UTF-16 BE bare", "BOM", "Latin-1", "blank lines"],
 )
-def test_the_way_a_file_is_written_does_not_matter(content: bytes, write: Write) -> None:
+def test_the_way_a_file_is_written_does_not_matter(content, write):
     record = waveform(write(content))
     np.testing.assert_allclose(record.samples(), 0.1 * np.arange(20), rtol=1e-12)
     assert (record.step, record.signals[0].unit) == (pytest.approx(1e-3), "V")
 
 
-def test_a_torn_last_line_is_left_out_and_told(write: Write) -> None:
+def test_a_torn_last_line_is_left_out_with_a_warning(write):
     record = waveform(write(PLAIN + "0,02"))
     assert record.count == 20
     assert "line 22: '0,02' was cut off" in record.warnings[0]
@@ -213,7 +204,7 @@ def test_a_torn_last_line_is_left_out_and_told(write: Write) -> None:
         ("X,CH1,Start,Increment\nSequence,Volt,0,1e-3\n" + rows(5), "holds 5 samples, at least 16"),
     ],
 )
-def test_a_damaged_record_is_refused_with_its_line(text: str, says: str, write: Write) -> None:
+def test_a_damaged_record_is_refused_with_its_line(text, says, write):
     with pytest.raises(TableError) as caught:
         read_record(write(text))
     assert says in str(caught.value)
@@ -229,12 +220,12 @@ def test_a_damaged_record_is_refused_with_its_line(text: str, says: str, write: 
         "hello\n",
     ],
 )
-def test_readings_are_no_samples(text: str, write: Write) -> None:
+def test_readings_are_no_samples(text, write):
     with pytest.raises(NoWaveform):
         read_record(write(text))
 
 
-def test_a_channel_is_chosen_by_name_or_number(sample_data: Path) -> None:
+def test_a_channel_is_chosen_by_name_or_number(sample_data):
     record = waveform(sample_data / "scope-files" / "rigol-ds1000z.csv")
     assert [record.signal(wanted) for wanted in (None, "ch2", "2", "CH1")] == [0, 1, 1, 0]
     assert record.samples("CH2").max() == 0.02
@@ -250,21 +241,21 @@ def test_a_channel_is_chosen_by_name_or_number(sample_data: Path) -> None:
         "0,1\r\n0,2\r\n0,35\r\n0,4\r\n0,0\n".replace("0,0\n", "1,05\n"),
     ],
 )
-def test_a_column_of_times_is_a_list_of_pulses(text: str, write: Write) -> None:
+def test_a_column_of_times_is_a_list_of_pulses(text, write):
     record = read_record(write(text, "pulses.txt"))
     assert isinstance(record, PulseTimes)
     np.testing.assert_allclose(record.times[:4], [0.1, 0.2, 0.35, 0.4], rtol=1e-12)
 
 
 @pytest.mark.parametrize("title", ["f [Hz]", "rpm", "signal [V]", "height"])
-def test_a_column_of_another_quantity_is_no_list_of_pulses(title: str, write: Write) -> None:
+def test_a_column_of_another_quantity_is_no_list_of_pulses(title, write):
     """The numbers increase, as times do."""
     seen = re.escape(title.replace(" ", ""))
     with pytest.raises(NoWaveform, match=f"one column, '{seen}', which is no time"):
         read_record(write(f"{title}\n" + "".join(f"{20 + k / 25}\n" for k in range(40))))
 
 
-def test_arrays_need_a_rate_unless_they_hold_pulse_times(tmp_path: Path) -> None:
+def test_arrays_need_a_rate_unless_they_hold_pulse_times(tmp_path):
     path = tmp_path / "a.npy"
     np.save(path, np.sin(np.arange(40.0)).reshape(2, 20))
     with pytest.raises(TableError, match="say `rate` in Hz"):
@@ -272,20 +263,20 @@ def test_arrays_need_a_rate_unless_they_hold_pulse_times(tmp_path: Path) -> None
     np.save(path, np.arange(5.0))
     assert isinstance(read_record(path), PulseTimes)
     np.save(path, np.array([{}]), allow_pickle=True)
-    with pytest.raises(TableError, match="save it anew"):
+    with pytest.raises(TableError, match="save it again"):
         read_record(path)
     with pytest.raises(UsageError, match="rate"):
         read_record(path, rate=-1.0)
 
 
-def test_a_given_rate_goes_before_that_of_a_wav(sample_data: Path) -> None:
+def test_a_given_rate_goes_before_that_of_a_wav(sample_data):
     record = waveform(sample_data / "scope-files" / "recording.wav", rate=8000.0)
     assert record.step == 1 / 8000
     assert "8000 Hz takes the place of 4000 Hz" in record.warnings[0]
 
 
 @pytest.mark.parametrize("bits", [8, 16, 24, 32])
-def test_wav_of_every_width(bits: int, tmp_path: Path) -> None:
+def test_wav_of_every_width(bits, tmp_path):
     samples = np.array([0.0, 0.5, -0.5, 0.25] * 8)
     codes = np.round(samples * 2 ** (bits - 1)).astype(np.int64) + (128 if bits == 8 else 0)
     both = np.repeat(codes, 2)  # two channels
@@ -298,9 +289,7 @@ def test_wav_of_every_width(bits: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["csv", "wav"])
-def test_a_file_larger_than_memory_is_read_in_pieces(
-    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_larger_than_memory_is_read_in_pieces(kind, tmp_path, monkeypatch):
     """Five times as many samples take no more memory, which is less than the larger file's numbers would."""
     monkeypatch.setattr(head, "PIECE", 1 << 15)
     monkeypatch.setattr(wav, "BLOCK", 1 << 11)
@@ -326,7 +315,7 @@ def test_a_file_larger_than_memory_is_read_in_pieces(
     assert peaks[1] < (2 if kind == "csv" else 1) * 8 * 100_000  # the numbers of two columns, of one
 
 
-def read_or_refused(path: Path, rate: float | None) -> Waveform | PulseTimes | None:
+def read_or_refused(path, rate):
     """What is read, or None for a known failure of one line that names the file."""
     message = ""
     try:
@@ -347,7 +336,7 @@ def read_or_refused(path: Path, rate: float | None) -> Waveform | PulseTimes | N
 @example("x-axis,1\nsecond,Volt\n1\n")
 @example("Source,CH1\nSecond,Volt\n" + "1,1\n" * 20)
 @example("0\n" * 20)
-def test_any_text_is_read_or_refused_in_one_line(write: Write, text: str) -> None:
+def test_any_text_is_read_or_refused_in_one_line(write, text):
     path = write(text)
     for rate in (None, 1000.0):
         record = read_or_refused(path, rate)
@@ -362,7 +351,7 @@ def test_any_text_is_read_or_refused_in_one_line(write: Write, text: str) -> Non
 @given(
     st.binary(max_size=120), st.sampled_from([b"", b"RIFF\x24\0\0\0WAVEfmt ", b"\x93NUMPY\x01\0", b"RF64\0\0\0\0WAVE"])
 )
-def test_any_bytes_are_read_or_refused_in_one_line(write: Write, content: bytes, magic: bytes) -> None:
+def test_any_bytes_are_read_or_refused_in_one_line(write, content, magic):
     read_or_refused(write(magic + content, "a.dat" if magic else "a.bin"), 1000.0)
 
 
@@ -372,16 +361,14 @@ def test_any_bytes_are_read_or_refused_in_one_line(write: Write, content: bytes,
     edits=st.lists(st.tuples(st.integers(0, 400), st.sampled_from(list(b'0.,;-e \n"#x\0'))), min_size=1, max_size=4),
 )
 @example(name="samples-4000hz.npy", edits=[(60, ord("("))])
-def test_a_damaged_header_is_read_or_refused_in_one_line(
-    write: Write, sample_data: Path, name: str, edits: list[tuple[int, int]]
-) -> None:
+def test_a_damaged_header_is_read_or_refused_in_one_line(write, sample_data, name, edits):
     content = bytearray((sample_data / "scope-files" / name).read_bytes()[:2000])
     for place, byte in edits:
         content[place] = byte
     read_or_refused(write(bytes(content), name), None)
 
 
-def test_binary_files_need_the_extra(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_binary_files_need_the_extra(write, monkeypatch):
     monkeypatch.setitem(sys.modules, "RigolWFM.wfm", None)
     with pytest.raises(TableError, match=r'pip install "\.\[scope\]"'):
         read_record(write(b"\xa5\xa5\0\0", "a.wfm"))
@@ -390,7 +377,7 @@ def test_binary_files_need_the_extra(write: Write, monkeypatch: pytest.MonkeyPat
 class FakeChannel:
     """What RigolWFM gives of a channel (1.6.0, channel.py)."""
 
-    def __init__(self, number: int, volts: Any) -> None:
+    def __init__(self, number, volts):
         self.channel_number, self.volts, self.seconds_per_point = number, volts, 1e-3
         self.times = np.arange(20) * 1e-3 - 0.01
 
@@ -400,18 +387,18 @@ class FakeRecord:
 
     parser_name, header_name = "wfm1000z", "DS1054Z"
 
-    def __init__(self, channels: list[FakeChannel]) -> None:
+    def __init__(self, channels):
         self.channels = channels
 
     @classmethod
-    def from_file(cls, name: str) -> FakeRecord:
+    def from_file(cls, name):
         if "broken" in name:
             raise KeyError(name)
         sys.stdout.write("reading")
         return cls([FakeChannel(1, np.linspace(0, 1, 20)), FakeChannel(2, None)])
 
 
-def test_binary_files_are_read_by_rigolwfm(write: Write, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+def test_binary_files_are_read_by_rigolwfm(write, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "RigolWFM", types.ModuleType("RigolWFM"))
     monkeypatch.setitem(sys.modules, "RigolWFM.wfm", types.SimpleNamespace(Wfm=FakeRecord))  # type: ignore[arg-type]
     record = waveform(write(b"\xa5\xa5\0\0", "a.wfm"))

@@ -59,7 +59,7 @@ def test_where_the_parent_dies_the_run_is_kept_and_the_process_ends(tmp_path: Pa
 def test_a_bench_that_is_not_there_says_so(tmp_path: Path) -> None:
     bench = PracticeBench(tmp_path)
     assert bench.events() == []
-    with pytest.raises(BenchGone, match="start it anew"):
+    with pytest.raises(BenchGone, match="start it again"):
         bench.command(Pause(on=True))
     bench.close()
 
