@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 #: A search ends where a step moves no parameter by more of its u; the answer is within the square of that.
 _CLOSE = 0.05
 _MOST_STEPS = 30
-#: Shares of a step: a search that whole steps lead to and fro, or astray, begins again with halves.
-_SHARES = (1.0, 0.5)
+#: Share of each step, in a search begun again where whole steps led to and fro.
+_SHORTER = 0.5
 #: Of more readings means over neighbours are fitted, for which a spin-down is straight within the noise.
 _MOST = 3000
 #: Of a step: the longest in a, and in A in units of its prior u.  The tilt bends more than linearly beyond.
@@ -245,10 +245,10 @@ def solution(
     form: DragLaw | CountedLaw = with_tilt or law
     expected, u = with_tilt.expected if with_tilt else (np.empty(0), np.empty(0))
     start = np.concatenate([q, expected])
-    for share in _SHARES:
-        q, close, found = _search(form, few, start, (expected, u), share=share, rho=rho)
-        if close:
-            break
+    q, close, found = _search(form, few, start, (expected, u), share=1.0, rho=rho)
+    if not close:
+        with_shorter = _search(form, few, start, (expected, u), share=_SHORTER, rho=rho)
+        q, close, found = with_shorter if with_shorter[1] else (q, close, found)
     left, slopes = _of_readings(form, readings, q)
     return Solution(law, with_tilt, readings, q, converged and close, left, slopes, found)
 
