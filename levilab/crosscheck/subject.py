@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from analysis.uncertainty import Estimate
     from levilab.acquisition.loop import AcquisitionRequest
     from levilab.runs.run import Run
 
@@ -88,8 +89,8 @@ def acquired(
     return run
 
 
-def pull_of(quantity: str, entry: dict[str, Any] | None, truth: float) -> Pull:
-    """The pull of a quantity as result.json has it.  Raises TrialFailed where it holds no value or no uncertainty."""
-    if not entry or entry["value"] is None or not entry["u"]:
+def pull_of(quantity: str, found: Estimate | None, truth: float) -> Pull:
+    """Return the pull of an estimate.  Raises TrialFailed where it has no value or no uncertainty."""
+    if found is None or found.value is None or not found.u:
         raise TrialFailed(f"{quantity}: the analysis gives no value with an uncertainty")
-    return Pull(quantity, entry["value"], entry["u"], truth)
+    return Pull(quantity, found.value, found.u, truth)

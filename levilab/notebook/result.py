@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -143,7 +143,7 @@ class AnalysisResult:
         """Return the tables and sentences that `levilab analyze` prints."""
         from levilab.present.terminal import as_text  # with rich
 
-        return as_text(partial(_print, self))
+        return as_text(lambda console: print_analysis(self.analysis, self.found, console=console))
 
     def to_dataframe(self, table: TableName = "values") -> pd.DataFrame:
         """Return the result as a table.
@@ -212,10 +212,6 @@ class AnalysisResult:
             return [*written, *save_result(self.analysis, found, place)]
         except CannotWrite as error:
             raise CannotWrite(error.problem, _ELSEWHERE) from error
-
-
-def _print(result: AnalysisResult, console: Any) -> None:
-    print_analysis(result.analysis, result.found, console=console)
 
 
 def _copy(path: Path, folder: Path) -> Path:

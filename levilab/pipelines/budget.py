@@ -86,18 +86,15 @@ def direct_row(  # noqa: PLR0917 - the fields of a row
     note: str,
     remedy: str,
     kind: Literal["A", "B"] = "B",
-    *,
-    included: bool = True,
 ) -> Component:
     """Return a row whose size is known in the result's own unit alone [`unit`]; see `Component`."""
-    return Component(name, what, kind, part, unit, 1.0, included, note, remedy)
+    return Component(name, what, kind, part, unit, 1.0, note=note, remedy=remedy)
 
 
 def gate_of(source: Source[Any], experiment: str) -> float | None:
     """Return the counter's gate [s], where a run says it."""
-    settings = source.run.record.configuration.get(experiment) if source.run else None
-    gate = settings.get("gate_s") if isinstance(settings, dict) else None
-    return float(gate) if isinstance(gate, int | float) and 0 < gate < _LONGEST_GATE_S else None
+    gate = setting_of(source, experiment, "gate_s")
+    return gate if gate is not None and 0 < gate < _LONGEST_GATE_S else None
 
 
 def setting_of(source: Source[Any], experiment: str, name: str) -> float | None:

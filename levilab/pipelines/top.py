@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING, Any
 from analysis.errors import AnalysisError
 from analysis.numbers import digits
 from analysis.top import Cylinder, Top, top_of
-from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.files import finite
 from levilab.formats.device import read_device
 from levilab.pipelines.field.device import parts_of
+from levilab.pipelines.row import Quantity
 from levilab.present.numbers import with_uncertainty
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from analysis.uncertainty import Estimate
 
 SCHEMA = "levilab-top/1"
 
@@ -67,13 +69,8 @@ def top_table(found: Calculated) -> Table:
 
 
 def _cells(top: Top) -> tuple[str, ...]:
-    shown = ((top.mass, 1e3, "g"), (top.transverse, 1e7, "g cm²"), (top.axial, 1e7, "g cm²"), (top.centre, 1e3, "mm"))
-    return tuple(with_uncertainty(_in(estimate, factor, unit)) for estimate, factor, unit in shown)
-
-
-def _in(estimate: Estimate, factor: float, unit: str) -> Estimate:
-    value, u = (None if one is None else factor * one for one in (estimate.value, estimate.u))
-    return Estimate(value, u, unit)
+    estimates = (top.mass, top.transverse, top.axial, top.centre)
+    return tuple(with_uncertainty(Quantity("", one.unit, "", fine=True).show(one)) for one in estimates)
 
 
 def top_text(found: Calculated) -> str:
@@ -96,15 +93,13 @@ def top_document(found: Calculated) -> dict[str, Any]:
     def values(estimates: dict[str, Estimate]) -> dict[str, Any]:
         return {name: {"value": one.value, "u": one.u, "unit": one.unit} for name, one in estimates.items()}
 
-    document: dict[str, Any] = finite(
-        {
-            "schema": SCHEMA,
-            "values": values(found.values),
-            "covariance": found.top.covariance.tolist(),
-            "parts": [
-                {"name": part.name, "values": values(Calculated((part,), (alone,), alone).values)}
-                for part, alone in zip(found.parts, found.alone, strict=True)
-            ],
-        }
-    )
+    document: dict[str, Any] = finite({
+        "schema": SCHEMA,
+        "values": values(found.values),
+        "covariance": found.top.covariance.tolist(),
+        "parts": [
+            {"name": part.name, "values": values(Calculated((part,), (alone,), alone).values)}
+            for part, alone in zip(found.parts, found.alone, strict=True)
+        ],
+    })  # fmt: skip
     return document

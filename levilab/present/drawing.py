@@ -145,14 +145,14 @@ def run_look(k: int, total: int) -> Look:
     return Look(GREY, marker="o")
 
 
-def limits_about(values: ArrayLike, margin: float = 0.06, least: float = 0.0) -> tuple[float, float]:
-    """Limits of an axis that hold all finite values, with a margin, and are no nearer to each other than `least`.
+def limits_about(values: ArrayLike, margin: float) -> tuple[float, float]:
+    """Return limits of an axis that hold all finite values, with a margin as a share of their range.
 
-    >>> limits_about([1.0, 3.0], 0.5), limits_about([2.0], least=1.0)
-    ((0.0, 4.0), (1.5, 2.5))
+    >>> limits_about([1.0, 3.0], 0.5), limits_about([2.0], 0.5)
+    ((0.0, 4.0), (0.0, 4.0))
     """
     finite = np.asarray(values, dtype=np.float64)
     finite = finite[np.isfinite(finite)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
-    add = max(margin * (high - low), (least - (high - low)) / 2)
-    return low - (add or abs(low) or 1.0), high + (add or abs(high) or 1.0)
+    add = margin * (high - low) or abs(high) or 1.0
+    return low - add, high + add

@@ -132,18 +132,14 @@ def signed(value: float, decimals: int) -> str:
     return with_minus(text) if float(text) else text[1:]
 
 
-def decimals_of(u: float | None, most: int = 5) -> int:
-    """Digits behind the point that a number of such an uncertainty has by the rule of the Particle Data Group.
-
-    Args:
-        u: the standard uncertainty; None where it is not known.
-        most: digits where it is not known.
+def decimals_of(u: float | None) -> int:
+    """Return the digits behind the point of a number by its u and the rule of the Particle Data Group; 5 without u.
 
     >>> decimals_of(0.03), decimals_of(0.00102), decimals_of(35.0), decimals_of(0.0962), decimals_of(None)
     (3, 4, 0, 2, 5)
     """
     if not u or not math.isfinite(u):
-        return most
+        return 5
     hundreds = float(f"{u:.2e}".partition("e")[0]) * 100
     power = math.floor(math.log10(u))
     return max(1 - power if hundreds <= 354 else -power, 0)

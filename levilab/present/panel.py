@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
@@ -76,13 +77,8 @@ class Trend:
     @property
     def rate(self) -> float | None:
         """The slope of the straight line through the answers [unit/s]; None of fewer than three."""
-        n = len(self.answers)
-        if n < _FEWEST:
-            return None
-        mean_t = math.fsum(t for t, _ in self.answers) / n
-        mean_v = math.fsum(v for _, v in self.answers) / n
-        spread = math.fsum((t - mean_t) ** 2 for t, _ in self.answers)
-        return math.fsum((t - mean_t) * (v - mean_v) for t, v in self.answers) / spread if spread else None
+        times, values = zip(*self.answers, strict=True) if len(self.answers) >= _FEWEST else ((), ())
+        return statistics.linear_regression(times, values).slope if len(set(times)) > 1 else None
 
     @property
     def spark(self) -> str:

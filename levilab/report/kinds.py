@@ -38,16 +38,14 @@ class Kind:
         when: an input ended, or was begun, as a time of ISO 8601; None where that is not known.
         tables: the values of the inputs found, for files beside the report.
         experiment: of runs that are of this kind, which the analyses pass over; empty where they are no runs.
-        is_synthetic: whether no instrument measured them.
     """
 
     name: str
     find: Callable[[Path], Sequence[Path]]
     sections: Callable[[Sequence[Path]], tuple[Section, ...]]
-    when: Callable[[Path], str | None]
+    when: Callable[[Path], str | None] = lambda _: None
     tables: Callable[[Sequence[Path]], tuple[Values, ...]] = lambda _: ()
     experiment: str = ""
-    is_synthetic: bool = True
 
 
 # --- simulated motions ---------------------------------------------------------------------------------
@@ -134,10 +132,6 @@ def _stability_files(path: Path) -> list[Path]:
     return [path] if path.suffix == ".json" and _json_in(path).get("schema") == STABILITY else []
 
 
-def _stability_sections(files: Sequence[Path]) -> tuple[Section, ...]:
-    return tuple(map(stability_section, files))
-
-
 def _json_in(file: Path) -> dict[str, Any]:
     """Return the table in a file of JSON; an empty one where there is none."""
     try:
@@ -147,12 +141,8 @@ def _json_in(file: Path) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-def _not_known(_: Path) -> None:
-    """No time."""
-
-
 KINDS: tuple[Kind, ...] = (
     Kind("simulated motion", _motions, _motion_sections, _motion_ended, _motion_tables, experiment=MOTION),
     Kind("sweep", _stores, _sweep_sections, _sweep_begun, _sweep_tables),
-    Kind("result of stability", _stability_files, _stability_sections, _not_known),
+    Kind("result of stability", _stability_files, lambda files: tuple(map(stability_section, files))),
 )

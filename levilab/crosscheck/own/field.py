@@ -9,8 +9,8 @@ import numpy as np
 
 from analysis.field.fit import PARAMETERS, Prior, fit_scan
 from analysis.field.ring import on_axis
-from levilab.crosscheck.own.model import Own, pull
-from levilab.crosscheck.subject import Trial
+from levilab.crosscheck.own.model import Own
+from levilab.crosscheck.subject import Trial, pull_of
 
 if TYPE_CHECKING:
     from analysis.field.fit import FieldScan, Known
@@ -41,7 +41,7 @@ def own(found: FieldAnalysis) -> Own:
         again = fit_scan(scan.height, b, known, u_b, u_z, free_radii=options.free_radii)
         return Trial(
             [
-                pull(name, again.parameters[name], float(scan.values[PARAMETERS.index(name)]))
+                pull_of(name, again.parameters[name], float(scan.values[PARAMETERS.index(name)]))
                 for name in _COMPARED
                 if again.parameters[name].u
             ]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.limits import Sample, combine
-from levilab.crosscheck.own.model import Own, pull
-from levilab.crosscheck.subject import Trial, TrialFailed
+from levilab.crosscheck.own.model import Own
+from levilab.crosscheck.subject import Trial, TrialFailed, pull_of
 
 if TYPE_CHECKING:
     from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
@@ -26,7 +26,7 @@ def own(found: LimitAnalysis) -> Own:
             raise TrialFailed("a single limit has no scatter to make others by")
         return Trial(
             [
-                pull(_name(group, groups), combine(_samples(random, found, group)).mean, truth)
+                pull_of(_name(group, groups), combine(_samples(random, found, group)).mean, truth)
                 for group in groups
                 if (truth := group.statistics.mean.value) is not None
             ]

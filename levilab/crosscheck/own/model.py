@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from levilab.crosscheck.subject import Pull, TrialFailed
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     import numpy as np
 
-    from analysis.uncertainty import Estimate
     from levilab.crosscheck.subject import Trial
 
 
@@ -44,10 +41,3 @@ class Own:
     expected_share: float = 0.0
     freedom: Mapping[str, int] = field(default_factory=dict)
     more: tuple[str, ...] = ()
-
-
-def pull(quantity: str, found: Estimate | None, truth: float) -> Pull:
-    """The pull of an estimate.  Raises TrialFailed where it has no value or no uncertainty."""
-    if found is None or found.value is None or not found.u:
-        raise TrialFailed(f"{quantity}: the analysis gives no value with an uncertainty")
-    return Pull(quantity, found.value, found.u, truth)

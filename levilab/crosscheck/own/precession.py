@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.precession.sweep import EXCLUDED_P, Sweep, fit_sweep
-from levilab.crosscheck.own.model import Own, pull
-from levilab.crosscheck.subject import Trial
+from levilab.crosscheck.own.model import Own
+from levilab.crosscheck.subject import Trial, pull_of
 from levilab.pipelines.precession.analysis import intercept_of, slope_of
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def own(found: PrecessionAnalysis) -> Own:
         again = fit_sweep(sweep, orthogonal=options.orthogonal, keep_miscounts=True)
         p = again.line.p_against(line.slope, line.intercept)
         return Trial(
-            [pull("slope", slope_of(again), line.slope), pull("intercept", intercept_of(again), line.intercept)],
+            [pull_of("slope", slope_of(again), line.slope), pull_of("intercept", intercept_of(again), line.intercept)],
             excluded=None if p is None else p < EXCLUDED_P,
         )
 

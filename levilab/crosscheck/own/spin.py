@@ -9,8 +9,8 @@ import numpy as np
 
 from analysis.budget import rest
 from analysis.pulses import spin_of_times, spin_of_trace
-from levilab.crosscheck.own.model import Own, pull
-from levilab.crosscheck.subject import Trial, TrialFailed
+from levilab.crosscheck.own.model import Own
+from levilab.crosscheck.subject import Trial, TrialFailed, pull_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -69,14 +69,14 @@ def _pulse_times(spin: SpinFrequency) -> Array:
     return np.asarray(times)
 
 
-def _compared(found: SpinFrequency, spin: SpinFrequency, shift: float = 0.0) -> Trial:
+def _compared(found: SpinFrequency, spin: SpinFrequency) -> Trial:
     """The pulls of what was found: the truth at its own reference time."""
     frequency, chirp, bend = _motion(spin)
-    at = found.reference_time - shift
+    at = found.reference_time
     return Trial(
         [
-            pull("frequency", found.frequency, frequency + chirp * at + bend * at**2 / 2),
-            pull("chirp", found.chirp, chirp + bend * at),
+            pull_of("frequency", found.frequency, frequency + chirp * at + bend * at**2 / 2),
+            pull_of("chirp", found.chirp, chirp + bend * at),
         ],
         widened=found.freedom,
     )

@@ -12,8 +12,8 @@ from analysis.spindown.combine import combine
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import fit_spin_down
 from analysis.spindown.tilt import counted
-from levilab.crosscheck.own.model import OF_ONE_RUN, Own, pull
-from levilab.crosscheck.subject import Trial
+from levilab.crosscheck.own.model import OF_ONE_RUN, Own
+from levilab.crosscheck.subject import Trial, pull_of
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.spindown.analysis import EXPERIMENT
 from levilab.simulator import laws
@@ -175,22 +175,22 @@ def _trial(
         if several:
             of_run = fits[-1].fit(law).parameters
             pulls += [
-                pull(f"{name}{OF_ONE_RUN}", of_run[name], truth)
+                pull_of(f"{name}{OF_ONE_RUN}", of_run[name], truth)
                 for name, truth in zip(constants, truths, strict=True)
                 if name != "c"
             ]
     together = combine(fits)
     found = together.fit(law).constants if several else fits[0].fit(law).parameters
-    pulls += [pull(name, found[name], mean) for name, mean in zip(constants, means, strict=True) if name != "c"]
+    pulls += [pull_of(name, found[name], mean) for name, mean in zip(constants, means, strict=True) if name != "c"]
     if not several:
         truth = runs[0].fit.parameters["start_frequency"].value or 0.0
-        pulls.append(pull("start_frequency", found["start_frequency"], truth))
+        pulls.append(pull_of("start_frequency", found["start_frequency"], truth))
     exponent = laws.LAWS[law].exponent if law in laws.LAWS else None
     if law == "power":
         exponent = float(np.mean([run.fit.parameters["exponent"].value or 0.0 for run in runs]))
     if exponent is not None:
         of_power = together.fit("power").constants if several else fits[0].fit("power").parameters
-        pulls.append(pull("exponent", of_power["exponent"], exponent))
+        pulls.append(pull_of("exponent", of_power["exponent"], exponent))
     return Trial(pulls, law=together.best, excluded=law in together.verdict.excluded)
 
 

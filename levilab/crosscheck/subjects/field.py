@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +15,10 @@ from levilab.simulator.scene import Scene
 from levilab.world.base import random_base
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
+
+    from analysis.uncertainty import Estimate
 
 #: The true moment [A m²], and how well it is stated, relative; how well a mass [kg] and a height [m] are measured.
 MOMENT, MOMENT_U, MASS_U, HEIGHT_U = 0.714, 0.01, 1e-5, 2e-4
@@ -65,10 +68,9 @@ def _options(top: dict[str, float], **where: float) -> FieldOptions:
     return FieldOptions(device=Device.model_validate({"top": top | inertias}), **where)  # type: ignore[arg-type]
 
 
-def _values(folder: Path, options: FieldOptions) -> dict[str, Any]:
-    """What the analysis says of a run, as result.json has it."""
-    analysis = ANALYSES["field"]
-    values: dict[str, Any] = analysis.document(analysis.analyze([folder], options), folder)["values"]
+def _values(folder: Path, options: FieldOptions) -> Mapping[str, Estimate]:
+    """Return what the analysis finds in a run."""
+    values: Mapping[str, Estimate] = ANALYSES["field"].analyze([folder], options).values
     return values
 
 

@@ -12,7 +12,7 @@ from analysis.spindown.tilt import DRIVEN
 from instruments.clock import VirtualClock
 from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
-from levilab.crosscheck.subjects.spindown import Fitted, spindown_of
+from levilab.crosscheck.subjects.spindown import spindown_of
 from levilab.simulator.kernels.motion import R
 from levilab.simulator.scene import Scene, preset
 from levilab.simulator.single import simulate
@@ -20,8 +20,11 @@ from levilab.simulator.start import nutating_start, start_of, steady_rates
 from levilab.world.bench import scene_world, virtual_wiring
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
+    from analysis.spindown.fit import SpinDown
+    from analysis.uncertainty import Estimate
     from levilab.acquisition.loop import AcquisitionRequest
     from levilab.bench.wiring import Wiring
     from levilab.runs.run import Run
@@ -56,10 +59,9 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     coefficient: Any = scene.drag.coefficient
     run = acquired("spin", seed, folder, lambda request: _in_world(request, scene, seed))
     found = spindown_of(run.folder)
-    parameters = found.models["disc"]["parameters"]
     return [
-        pull_of("disc c32", parameters["c32"], coefficient),
-        pull_of("exponent", found.models["power"]["parameters"]["exponent"], 1.5),
+        pull_of("disc c32", found.fit("disc").parameters["c32"], coefficient),
+        pull_of("exponent", found.fit("power").parameters["exponent"], 1.5),
         _fall(found, run, scene),
     ]
 
@@ -75,7 +77,7 @@ def _in_world(request: AcquisitionRequest, scene: Scene, seed: int) -> Acquisiti
     return replace(request, config=config, wiring=wiring, scene=scene.as_table(), world=None)
 
 
-def _fall(found: Fitted, run: Run, scene: Scene) -> Pull:
+def _fall(found: SpinDown, run: Run, scene: Scene) -> Pull:
     """When the top falls, by the fitted law in the simulator, beside what was seen of it [s].
 
     It was seen to have fallen between the end of the gate of its last reading and that of the next one, which came to
@@ -83,29 +85,31 @@ def _fall(found: Fitted, run: Run, scene: Scene) -> Pull:
     prediction is the middle between the least and the most of it that they allow, half their distance a part of its
     uncertainty.
     """
-    parameters = found.models["disc"]["parameters"]
-    constant, start = parameters["c32"], parameters["start_frequency"]["value"]
-    fitted = scene.changed({"drag.coefficient": constant["value"], "start.spin_hz": start})
+    parameters = found.fit("disc").parameters
+    constant, start = parameters["c32"], parameters["start_frequency"].value
+    if not constant.value or constant.u is None:
+        raise TrialFailed("disc c32: the analysis gives no value with an uncertainty")
+    fitted = scene.changed({"drag.coefficient": constant.value, "start.spin_hz": start})
     readings = run.readings()
     wobble, u_wobble = _wobble(parameters, float(np.exp(np.log(readings.column("spin_frequency_hz")).mean())))
     late, early = (_simulated_fall(fitted, max(wobble + sign * u_wobble, _LEAST_HZ)) for sign in (-1, 1))
     times = readings.column("time_s")
     interval, gate = float(np.median(np.diff(times))), float(run.record.configuration["spin"]["gate_s"])
     # a given spin is reached in a time that goes as 1/C
-    by_constant = (late + early) / 2 * constant["u"] / constant["value"]
+    by_constant = (late + early) / 2 * constant.u / constant.value
     u = math.hypot(interval / math.sqrt(12), (late - early) / 2, by_constant)
     return Pull("fall", found.start_time + (late + early) / 2, u, float(times[-1]) + (interval + gate) / 2)
 
 
-def _wobble(parameters: dict[str, Any], typical_hz: float) -> tuple[float, float]:
+def _wobble(parameters: Mapping[str, Estimate], typical_hz: float) -> tuple[float, float]:
     """K of the nutation and its u [Hz], as fitted, or as a drive leaves it where the fit has none.
 
     One top in ten has two to five times what is expected, and the fit draws that back to it: so far from normal is what
     a drive leaves that its spread is added to u.
     """
     fitted, spread = parameters.get("wobble"), DRIVEN.u * typical_hz
-    if fitted and fitted["value"] is not None and fitted["u"]:
-        return fitted["value"], math.hypot(fitted["u"], spread)
+    if fitted and fitted.value is not None and fitted.u:
+        return fitted.value, math.hypot(fitted.u, spread)
     return DRIVEN.value * typical_hz, 2 * spread
 
 

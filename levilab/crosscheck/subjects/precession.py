@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from levilab.crosscheck.subject import Pull, Subject, acquired, pull_of
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.precession.analysis import intercept_of, slope_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -15,9 +16,8 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     """One sweep of a top in full motion; the seed draws the phase at which the drive takes hold, and the noise."""
     run = acquired("precession", seed, folder, lambda request: request)
     analysis = ANALYSES["precession"]
-    found = analysis.analyze([run.folder], analysis.options_from({}))
-    (one,) = analysis.document(found, folder)["runs"]
-    return [pull_of("slope", one["values"]["slope"], 1.0), pull_of("intercept", one["values"]["intercept"], 0.0)]
+    (found,) = analysis.analyze([run.folder], analysis.options_from({})).runs
+    return [pull_of("slope", slope_of(found.fit), 1.0), pull_of("intercept", intercept_of(found.fit), 0.0)]
 
 
 SUBJECT = Subject(

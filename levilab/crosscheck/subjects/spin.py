@@ -60,16 +60,14 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     start = world.looks.get(record.count)
     if start is None:
         raise TrialFailed("the oscilloscope took its record in several pieces: its time is not known")
-    found = ANALYSES["spin"]
-    options = found.options_from({})
-    (one,) = found.document(found.analyze([run.folder], options), folder)["runs"]
-    values = one["values"]
+    analysis = ANALYSES["spin"]
+    (found,) = analysis.analyze([run.folder], analysis.options_from({})).runs
     # the run's time counts from its own zero; the record has the same first sample in both
-    moment = values["reference_time"]["value"] - record.start + start
+    moment = found.spin.reference_time - record.start + start
     before, here, after = world.motion(moment + np.array([-_APART_S, 0.0, _APART_S]))[0] / (2 * math.pi)
     return [
-        pull_of("frequency", values["frequency"], float(here)),
-        pull_of("chirp", values["chirp"], float(after - before) / (2 * _APART_S)),
+        pull_of("frequency", found.spin.frequency, float(here)),
+        pull_of("chirp", found.spin.chirp, float(after - before) / (2 * _APART_S)),
     ]
 
 

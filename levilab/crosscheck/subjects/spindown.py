@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from levilab.world.spin_world import SpinScene, SpinWorld
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from analysis.spindown.fit import SpinDown
     from levilab.acquisition.loop import AcquisitionRequest
 
 #: The spin at which the drive goes off [Hz].
@@ -44,15 +45,14 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     )
     run = acquired("spin", seed, folder, lambda request: _in_world(request, scene))
     found = spindown_of(run.folder, tilt="none")  # a count of this world is the spin
-    models = found.models
     pulls = [
-        pull_of(f"{law} {name}", models[law]["parameters"][name], truth)
+        pull_of(f"{law} {name}", found.fit(law).parameters[name], truth)
         for name, truth in zip(names, scene.constants, strict=True)
     ]
     spin = DECAYS[law].after(2 * math.pi * START_HZ, found.start_time, *scene.constants) / (2 * math.pi)
-    pulls.append(pull_of("start frequency", models[law]["parameters"]["start_frequency"], float(spin)))
+    pulls.append(pull_of("start frequency", found.fit(law).parameters["start_frequency"], float(spin)))
     if exponent is not None:
-        pulls.append(pull_of("exponent", models["power"]["parameters"]["exponent"], exponent))
+        pulls.append(pull_of("exponent", found.fit("power").parameters["exponent"], exponent))
     pulls.append(_fall(found, law, names, scene))
     return pulls
 
@@ -61,31 +61,20 @@ def _in_world(request: AcquisitionRequest, scene: SpinScene) -> AcquisitionReque
     return replace(request, wiring=lambda: virtual_wiring(SpinWorld(scene, VirtualClock()), request.config.limits))
 
 
-@dataclass(frozen=True)
-class Fitted:
-    """What the analysis says of a run, as result.json has it.
-
-    models: by the names of the laws; start_time: of the first reading, to which the start frequency belongs [s].
-    """
-
-    models: dict[str, dict[str, Any]]
-    start_time: float
-
-
-def spindown_of(folder: Path, **options: Any) -> Fitted:
-    """The analysis of a run."""
+def spindown_of(folder: Path, **options: Any) -> SpinDown:
+    """Return the only spin-down of a run."""
     analysis = ANALYSES["spindown"]
-    (run,) = analysis.document(analysis.analyze([folder], analysis.options_from(options)), folder)["runs"]
-    return Fitted({model["name"]: model for model in run["models"]}, run["values"]["start_time"]["value"])
+    run: SpinDown
+    (run,) = analysis.analyze([folder], analysis.options_from(options)).runs
+    return run
 
 
-def _fall(found: Fitted, law: str, names: tuple[str, ...], scene: SpinScene) -> Pull:
+def _fall(found: SpinDown, law: str, names: tuple[str, ...], scene: SpinScene) -> Pull:
     """When the top falls, by the fitted law in the simulator, beside the world's own moment [s]."""
-    model = found.models[law]
-    parameters = model["parameters"]
+    fit = found.fit(law)
     order = ("start_frequency", *names)
-    values = np.array([parameters[name]["value"] for name in order])
-    step = np.array([parameters[name]["u"] for name in order])
+    values = np.array([fit.parameters[name].value for name in order], dtype=np.float64)
+    step = np.array([fit.parameters[name].u for name in order], dtype=np.float64)
 
     def fall_time(numbers: Any) -> float:
         constants = tuple(map(float, numbers[1:]))
@@ -93,7 +82,7 @@ def _fall(found: Fitted, law: str, names: tuple[str, ...], scene: SpinScene) -> 
 
     middle = fall_time(values)
     slope = np.array([fall_time(values + row) - middle for row in np.diag(step)]) / step
-    covariance = np.array(model["covariance"], dtype=np.float64)
+    covariance = np.asarray(fit.covariance, dtype=np.float64)
     u = math.sqrt(float(slope @ covariance @ slope))
     truth = DECAYS[law].elapsed(2 * math.pi * START_HZ, 2 * math.pi * scene.fall_hz, *scene.constants)
     return Pull("fall", middle, u, float(truth))

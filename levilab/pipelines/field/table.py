@@ -65,20 +65,10 @@ def base_table(scan: FieldScan) -> Table:
     rows = []
     for name, estimate in scan.parameters.items():
         prior = scan.known.prior(name)
-        before = "" if prior is None else _prior(name, prior.value, prior.u, estimate)
-        rows.append(
-            (
-                QUANTITIES[name].shown_symbol,
-                with_uncertainty(QUANTITIES[name].show(estimate)),
-                before,
-                _learned(scan, name),
-            )
-        )
+        known = [] if prior is None else [replace(estimate, value=prior.value, u=prior.u)]
+        found, *before = (with_uncertainty(QUANTITIES[name].show(one)) for one in (estimate, *known))
+        rows.append((QUANTITIES[name].shown_symbol, found, "".join(before), _learned(scan, name)))
     return table("The base", ("", "found", "known before", "what the scan adds"), rows)
-
-
-def _prior(name: str, value: float, u: float, like: Estimate) -> str:
-    return with_uncertainty(QUANTITIES[name].show(replace(like, value=value, u=u)))
 
 
 def _learned(scan: FieldScan, name: str) -> str:

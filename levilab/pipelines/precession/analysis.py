@@ -130,11 +130,7 @@ def combine(runs: Sequence[PrecessionRun], options: PrecessionOptions) -> SweepF
     assert precession is not None
     sweep = Sweep(drive, precession, joined("u"), joined("u_drive"), joined("spin"), joined("u_spin"))
     fit = fit_sweep(sweep, orthogonal=options.orthogonal, keep_miscounts=True)
-    return _with_warnings(fit, _about_slopes(fits))
-
-
-def _with_warnings(fit: SweepFit, texts: Iterable[str]) -> SweepFit:
-    return replace(fit, warnings=(*fit.warnings, *texts))
+    return replace(fit, warnings=(*fit.warnings, *_about_slopes(fits)))
 
 
 def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[str]:

@@ -33,7 +33,6 @@ from levilab.runs.waveforms import has_traces
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
-    from pathlib import Path
 
     from analysis.pulses import Phase, Track
     from levilab.formats.waveforms.waveform import Waveform
@@ -197,14 +196,6 @@ METHOD = Method(
     of_files=frozenset({"columns", "rate"}),  # a run may have records of several channels
     skips=True,
 )
-
-
-def analyze_spins(paths: Sequence[Path], options: SpinOptions) -> SpinAnalysis:
-    """Find the spin frequency of every record found at the paths.
-
-    Raises DataError for what cannot be used; the text names the file.
-    """
-    return METHOD.analyze(paths, options)
 
 
 def _of_times(times: Array) -> SpinRun:

@@ -250,18 +250,6 @@ def test_imperfect_data_are_analyzed_with_a_warning_and_without_nan(levilab, tmp
     assert any(says in warning for warning in [*result["warnings"], *result["runs"][0]["warnings"]])
 
 
-def test_an_instrument_that_does_not_answer_is_status_3(levilab, tmp_path):
-    """Nothing listens on port 9 of this machine; the link is refused at once."""
-    (tmp_path / "bench.toml").write_text(
-        '[counter]\nmodel = "53230A"\naddress = "TCPIP0::127.0.0.1::9::SOCKET"\n'
-        '[generator]\nmodel = "33500B"\naddress = "TCPIP0::127.0.0.1::9::SOCKET"\n',
-        encoding="utf-8",
-    )
-    refused = levilab("acquire", "spin", check=3)
-    assert refused.stderr.splitlines()[-1].startswith("levilab: TCPIP0::127.0.0.1::9::SOCKET: ")
-    assert list((tmp_path / "runs").iterdir()) == []  # there is nothing to keep
-
-
 @pytest.mark.usefixtures("undrawn_figures")
 def test_a_run_is_meant_by_its_short_name_and_not_resumed_once_finished(levilab):
     run = json.loads(levilab("acquire", "spin", "--mock", *QUICKLY, "--json").stdout)["run"]

@@ -96,7 +96,7 @@ def spread(mean: float, deviation: float, n: int = 400) -> Spread:
 
 def test_a_bias_and_a_u_that_is_too_small_are_noticed_and_a_u_too_large_is_named():
     assert spread(0.0, 1.0).verdict is Verdict.RIGHT
-    assert spread(0.4, 1.0).verdict is Verdict.WRONG
+    assert spread(0.4, 1.0).verdict is spread(-0.4, 1.0).verdict is Verdict.WRONG
     assert spread(0.0, 1.4).verdict is Verdict.WRONG
     assert spread(0.0, 0.5).verdict is Verdict.TOO_LARGE
 

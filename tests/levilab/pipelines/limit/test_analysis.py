@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +31,7 @@ from levilab.report.tables.values import of_analysis
 from support.spin_downs import spin_down_csv
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
 
@@ -75,6 +77,13 @@ def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Pa
     }  # fmt: skip
 
 
+def change(run: Path, settings: Mapping[str, float] = MappingProxyType({}), **entries: object) -> None:
+    """Change settings of the experiment and entries of run.json."""
+    record = json.loads((run / "run.json").read_text(encoding="utf-8"))
+    record["configuration"]["limit"] |= settings
+    (run / "run.json").write_text(json.dumps(record | entries), encoding="utf-8")
+
+
 def marks_of_budgets(analysis: LimitAnalysis) -> list[str]:
     return [mark_of(analysis.inputs_of(budget.group)) for budget in analysis.budget]
 
@@ -83,10 +92,7 @@ def test_groups_of_the_same_mean_are_told_apart(sample_data: Path, tmp_path: Pat
     limits = ["67.5,0.25", "68.5,0.25", "68,0.25", "69,0.25"]
     for name, changes, rows in (("a", {}, limits), ("b", {"drive_amplitude_vpp": 20.0}, reversed(limits))):
         folder = shutil.copytree(sample_data / "upper-limits", tmp_path / name)
-        record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        record["configuration"]["limit"] |= changes
-        record["synthetic"] = name == "a"
-        (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
+        change(folder, changes, synthetic=name == "a")
         text = "\n".join(["spin_frequency_hz,spin_frequency_u_hz", *rows, ""])
         (folder / "readings.csv").write_text(text, encoding="utf-8")
     analysis = ANALYSES["limit"].analyze([tmp_path], LimitOptions())
@@ -109,9 +115,7 @@ def test_measured_and_made_up_runs_are_never_one_mean(sample_data: Path, tmp_pat
     """Three runs of one top, of which the second is made up and lies 10 Hz higher; the third is the first, reversed."""
     for name, synthetic in (("a", False), ("b", True), ("c", False)):
         folder = shutil.copytree(sample_data / "lower-limits", tmp_path / name)
-        record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        record |= {"synthetic": synthetic, "synthetic_how": "made up" if synthetic else None}
-        (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
+        change(folder, synthetic=synthetic, synthetic_how="made up" if synthetic else None)
         head, *limits = (folder / "readings.csv").read_text(encoding="utf-8").split()
         limits = {"a": limits, "b": [f"{32.0 + 0.1 * k:.1f}" for k in range(10)], "c": limits[::-1]}[name]
         (folder / "readings.csv").write_text("\n".join([head, *limits, ""]), encoding="utf-8")
@@ -212,9 +216,7 @@ def test_runs_of_other_conditions_stand_apart(sample_data: Path, tmp_path: Path)
     names = {"one": {}, "two": {}} | changed
     for k, (name, changes) in enumerate(names.items()):
         folder = shutil.copytree(sample_data / "upper-limits", tmp_path / name)
-        record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        record["configuration"]["limit"] |= changes
-        (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
+        change(folder, changes)
         off = 4.0 * k + np.tile([-0.1, 0.1], 4)
         rows = ["spin_frequency_hz,spin_frequency_u_hz", *(f"{67 + one},0.05" for one in off)]
         (folder / "readings.csv").write_text("\n".join([*rows, ""]), encoding="utf-8")

@@ -15,7 +15,7 @@ from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions, SpinOptions
-from levilab.pipelines.spin.analysis import Series, analyze_spins
+from levilab.pipelines.spin.analysis import METHOD, Series
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spin.meaning import meaning
 from levilab.pipelines.spin.report import spin_part
@@ -30,6 +30,7 @@ from support.detector import C32, RELEASE_HZ, coasting_turns, coasting_wav, puls
 from support.figures import faults
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from pathlib import Path
 
 
@@ -40,7 +41,7 @@ def true_frequency(name: str, time: float) -> float:
 
 
 def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data: Path) -> None:
-    analysis = analyze_spins([sample_data / "scope-files"], SpinOptions(rate=None))
+    analysis = METHOD.analyze([sample_data / "scope-files"], SpinOptions(rate=None))
     assert len(analysis.runs) == 11  # the array needs a rate
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
         frequency, chirp = run.spin.frequency, run.spin.chirp
@@ -54,28 +55,28 @@ def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data: Pat
 def test_a_laser_and_a_drive_are_no_spin(sample_data: Path) -> None:
     sweep = sample_data / "precession-sweep"
     with pytest.raises(DoesNotSuit, match="records of laser and drive, none of which shows the spin: levilab analyze"):
-        analyze_spins([sweep], SpinOptions())
-    named = analyze_spins([sweep], SpinOptions(channel="laser"))
+        METHOD.analyze([sweep], SpinOptions())
+    named = METHOD.analyze([sweep], SpinOptions(channel="laser"))
     assert any("the frequency of laser is no spin, but how often" in text for text in named.all_warnings)
 
 
 def test_options_reach_the_file_and_the_method(sample_data: Path) -> None:
     array = sample_data / "scope-files" / "samples-4000hz.npy"
-    (run,) = analyze_spins([array], SpinOptions(rate=4000.0, method="edges")).runs
+    (run,) = METHOD.analyze([array], SpinOptions(rate=4000.0, method="edges")).runs
     assert run.spin.method == "edges"
     assert run.spin.frequency.value == pytest.approx(true_frequency("x.npy", run.spin.reference_time), abs=0.01)
     two = sample_data / "scope-files" / "rigol-ds1000z.csv"
-    other = analyze_spins([two], SpinOptions(channel="2")).runs[0].spin
+    other = METHOD.analyze([two], SpinOptions(channel="2")).runs[0].spin
     assert other.frequency.value == pytest.approx(50, abs=0.01)  # 40 samples high, 40 low, at 4000 a second
     assert any(
         "CH1 is analyzed, the option `channel` chooses another" in text
-        for text in analyze_spins([two], SpinOptions()).all_warnings
+        for text in METHOD.analyze([two], SpinOptions()).all_warnings
     )
 
 
 def test_a_long_record_is_followed_and_feeds_the_drag_laws(tmp_path: Path) -> None:
     path = coasting_wav(tmp_path / "long.wav")
-    (run,) = analyze_spins([path], SpinOptions()).runs
+    (run,) = METHOD.analyze([path], SpinOptions()).runs
     assert len(run.series) == 15  # windows of 2 s
     omega = ((2 * np.pi * RELEASE_HZ) ** -0.5 + C32 * run.series.time / 2) ** -2
     pulls = (run.series.frequency - omega / (2 * np.pi)) / run.series.u
@@ -104,7 +105,7 @@ def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path: Path) -> None:
     path.write_text("pulse time [s]\n" + "".join(f"{x:.7f}\n" for x in times), encoding="utf-8")
     disc = analyze_spindowns([path], SpinDownOptions()).runs[0].fit("disc").parameters["c32"]
     assert disc.value == pytest.approx(C32, rel=1e-3)
-    assert len(analyze_spins([path], SpinOptions()).runs[0].series) == 15
+    assert len(METHOD.analyze([path], SpinOptions()).runs[0].series) == 15
 
 
 def test_a_record_that_is_too_short_is_no_spin_down(sample_data: Path) -> None:
@@ -112,26 +113,31 @@ def test_a_record_that_is_too_short_is_no_spin_down(sample_data: Path) -> None:
         analyze_spindowns([sample_data / "scope-files" / "recording.wav"], SpinDownOptions())
 
 
-@pytest.fixture
-def traced(tmp_path: Path) -> Path:
-    """A run with three records of the light at 30, 29 and 28 Hz."""
+def run_of(runs: Path, records: Iterable[Trace]) -> Path:
+    """A run with records of the light, 10 s apart."""
     channels = [{"name": "time_s", "unit": "s", "source": "a test"}]
     record = RunRecord(experiment="trace", status="running", started_utc=utc_now(), channels=channels)
-    with RunWriter.create(tmp_path / "runs", record, tell=lambda _: None) as writer:
-        for k in range(3):
-            t = -0.2 + np.arange(1600) / 4000
-            codes = np.round(pulses((30 - k) * t, seed=k) / 0.01).astype(np.uint8)
-            trace = Trace(codes, dt_s=2.5e-4, t0_s=-0.2, volts_per_code=0.01, offset_v=0.0, channel=1)
+    with RunWriter.create(runs, record, tell=lambda _: None) as writer:
+        for k, trace in enumerate(records):
             writer.trace(10.0 * k, trace, "light")
         writer.finish("finished")
     return writer.folder
+
+
+@pytest.fixture
+def traced(tmp_path: Path) -> Path:
+    """A run with three records of the light at 30, 29 and 28 Hz."""
+    t = -0.2 + np.arange(1600) / 4000
+    codes = (np.round(pulses((30 - k) * t, seed=k) / 0.01).astype(np.uint8) for k in range(3))
+    of_one: dict[str, Any] = {"dt_s": 2.5e-4, "t0_s": -0.2, "volts_per_code": 0.01, "offset_v": 0.0, "channel": 1}
+    return run_of(tmp_path / "runs", (Trace(one, **of_one) for one in codes))
 
 
 def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> None:
     waveform = run_waveforms(Run.load(traced))[1]
     assert (waveform.start, waveform.step, waveform.count) == (pytest.approx(9.6), 2.5e-4, 1600)
     assert waveform.samples().max() == pytest.approx(1.1, abs=0.1)
-    analysis = analyze_spins([traced], SpinOptions())
+    analysis = METHOD.analyze([traced], SpinOptions())
     series = analysis.runs[0].series
     assert series.frequency == pytest.approx([30, 29, 28], abs=0.01)
     assert series.time == pytest.approx([-0.2, 9.8, 19.8], abs=0.05)  # the middles of 0.4 s before they were complete
@@ -153,18 +159,13 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> Non
 def test_a_run_that_was_killed_before_its_first_record_has_nothing_to_analyze(traced: Path) -> None:
     (traced / "traces.jsonl").unlink()
     with pytest.raises(DataError, match=r"holds no traces\.jsonl, so nothing was recorded; analyze another run"):
-        analyze_spins([traced], SpinOptions())
+        METHOD.analyze([traced], SpinOptions())
 
 
 def test_records_of_a_run_that_are_left_out_are_counted_in_a_note(traced: Path) -> None:
-    channels = [{"name": "time_s", "unit": "s", "source": "a test"}]
-    record = RunRecord(experiment="trace", status="running", started_utc=utc_now(), channels=channels)
-    with RunWriter.create(traced.parent, record, tell=lambda _: None) as writer:
-        for k, stored in enumerate(Run.load(traced).traces()):
-            dark = np.full_like(stored.trace.codes, 10)
-            writer.trace(10.0 * k, stored.trace if k else replace(stored.trace, codes=dark), "light")
-        writer.finish("finished")
-    analysis = analyze_spins([writer.folder], SpinOptions())
+    first, *others = (stored.trace for stored in Run.load(traced).traces())
+    dark = replace(first, codes=np.full_like(first.codes, 10))
+    analysis = METHOD.analyze([run_of(traced.parent, [dark, *others])], SpinOptions())
     assert len(analysis.runs[0].series) == 2
     (note,) = [text for text in analysis.all_warnings if text.endswith("(no-pulses)")]
     assert "1 of 3 records are left out, the last of them for this: 0 pulses" in note
@@ -172,23 +173,17 @@ def test_records_of_a_run_that_are_left_out_are_counted_in_a_note(traced: Path) 
 
 def test_a_finding_in_some_records_of_a_run_names_them(traced: Path) -> None:
     """The table shows the record in the middle alone."""
-    channels = [{"name": "time_s", "unit": "s", "source": "a test"}]
-    record = RunRecord(experiment="trace", status="running", started_utc=utc_now(), channels=channels)
-    with RunWriter.create(traced.parent, record, tell=lambda _: None) as writer:
-        for k, stored in enumerate(Run.load(traced).traces()):
-            codes = stored.trace.codes.copy()
-            if k == 2:  # at 28 Hz, from -0.2 s on: its sixth turn
-                codes[int((0 - 0.5 / 28 + 0.2) * 4000) : int((0.5 / 28 + 0.2) * 4000)] = 10
-            writer.trace(10.0 * k, replace(stored.trace, codes=codes), "light")
-        writer.finish("finished")
-    analysis = analyze_spins([writer.folder], SpinOptions())
+    *others, last = (stored.trace for stored in Run.load(traced).traces())
+    codes = last.codes.copy()  # at 28 Hz, from -0.2 s on: its sixth turn
+    codes[int((0 - 0.5 / 28 + 0.2) * 4000) : int((0.5 / 28 + 0.2) * 4000)] = 10
+    analysis = METHOD.analyze([run_of(traced.parent, [*others, replace(last, codes=codes)])], SpinOptions())
     assert analysis.runs[0].spin.missing == 0
     assert [text for text in analysis.all_warnings if text.endswith("record 3: 1 turn has no pulse (missing)")]
 
 
 def test_the_result_says_what_the_interface_promises(sample_data: Path, tmp_path: Path) -> None:
     shutil.copy(sample_data / "scope-files" / "keysight-dsox.csv", tmp_path)
-    analysis = analyze_spins([tmp_path / "keysight-dsox.csv"], SpinOptions())
+    analysis = METHOD.analyze([tmp_path / "keysight-dsox.csv"], SpinOptions())
     written = save_found(ANALYSES["spin"], analysis)[0]
     assert written.name == "keysight-dsox.csv.result.spin.json"
     result = json.loads(written.read_text(encoding="utf-8"), parse_constant=pytest.fail)
@@ -203,7 +198,7 @@ def test_findings_are_notes_with_their_names(tmp_path: Path) -> None:
     t = np.arange(4000) / 1000
     turns = 30 * t
     signal = np.where(np.isin(np.rint(turns), (20, 21, 50)), 0.1, pulses(turns))  # three turns without their pulse
-    analysis = analyze_spins([write_wav(tmp_path / "a.wav", signal, 1000)], SpinOptions())
+    analysis = METHOD.analyze([write_wav(tmp_path / "a.wav", signal, 1000)], SpinOptions())
     assert analysis.runs[0].spin.missing == 3
     assert any(text.endswith("(missing)") for text in analysis.all_warnings)
 
@@ -211,10 +206,10 @@ def test_findings_are_notes_with_their_names(tmp_path: Path) -> None:
 def test_a_record_without_pulses_is_refused_in_one_line(tmp_path: Path) -> None:
     path = write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
     with pytest.raises(DataError, match=r"dark\.wav: 0 pulses in 4 s, at least 4 are needed"):
-        analyze_spins([path], SpinOptions())
+        METHOD.analyze([path], SpinOptions())
 
 
-@pytest.mark.parametrize("find", [analyze_spins, ANALYSES["spin"].recall])
+@pytest.mark.parametrize("find", [METHOD.analyze, ANALYSES["spin"].recall])
 def test_a_record_without_pulses_among_others_is_passed_over(find: Any, tmp_path: Path) -> None:
     """By a report, too, which recalls."""
     write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
@@ -263,7 +258,7 @@ def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(
         "long": [coasting_wav(tmp_path / "long.wav", seconds=14, rate=4000)] if what == "long" else [],
         "many": [sample_data / "scope-files"],
     }
-    figure = spin_figure(analyze_spins(files[what], SpinOptions()))
+    figure = spin_figure(METHOD.analyze(files[what], SpinOptions()))
     panels = figure.get_axes()
     assert len(panels) == (12 if what == "many" else 4)
     assert faults(figure) == []
@@ -293,7 +288,7 @@ def test_residuals_of_a_bent_frequency_have_no_bend_left(what: str, tmp_path: Pa
         text = "time [s],signal [V]\n" + "".join(f"{a:.4f},{b:.4f}\n" for a, b in zip(time, light, strict=True))
     file = tmp_path / "curved.csv"
     file.write_text(text, encoding="utf-8")
-    analysis = analyze_spins([file], SpinOptions())
+    analysis = METHOD.analyze([file], SpinOptions())
     bend = analysis.runs[0].spin.bend
     assert bend.value == pytest.approx(0.6, abs=4 * bend.u)
     panel = spin_figure(analysis).get_axes()[2]
@@ -313,7 +308,7 @@ def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_
     """
     settings = {"trace.records": 50, "trace.interval_s": 2.0}
     run = levilab.acquire("trace", mock=True, seed=2, out=tmp_path, settings=settings)
-    found = analyze_spins([run.folder], SpinOptions()).runs[0]
+    found = METHOD.analyze([run.folder], SpinOptions()).runs[0]
     straight, weight = found.series.frequency**-0.5, 2 * found.series.frequency**1.5 / found.series.u
     line = np.polynomial.Polynomial.fit(found.series.time, straight, 1, w=weight)
     squares = float((((straight - line(found.series.time)) * weight) ** 2).sum())
@@ -325,7 +320,7 @@ def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_
 
 
 def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data: Path) -> None:
-    found = analyze_spins([sample_data / "trace-tape"], SpinOptions())
+    found = METHOD.analyze([sample_data / "trace-tape"], SpinOptions())
     (run,) = found.runs
     assert run.which == "record 3 of 5"
     assert run.trend
@@ -341,7 +336,7 @@ def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data: Pat
 
 
 def test_of_a_single_record_the_slope_is_its_own(sample_data: Path) -> None:
-    found = analyze_spins([sample_data / "scope-files"], SpinOptions())
+    found = METHOD.analyze([sample_data / "scope-files"], SpinOptions())
     single = [run for run in found.runs if not run.which]
     assert single
     assert all(run.trend is None for run in single)
