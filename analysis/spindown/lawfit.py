@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 #: A search ends where a step moves no parameter by more of its u; the answer is within the square of that.
 _CLOSE = 0.05
 _MOST_STEPS = 30
+#: Share of each step, in a search begun again where whole steps led to and fro.
+_SHORTER = 0.5
 #: Of more readings means over neighbours are fitted, for which a spin-down is straight within the noise.
 _MOST = 3000
 #: Of a step: the longest in a, and in A in units of its prior u.  The tilt bends more than linearly beyond.
@@ -234,24 +236,52 @@ def solution(
         nutation: as expected.
         rho: correlations of neighbouring readings' noise that are possible.
     """
-    few, p = readings.means(_MOST), len(law.parameters)
+    few = readings.means(_MOST)
     tau, weight = few.tau, few.weight
     q, converged = solve(
         lambda q: (law.spin(tau, q) - few.x) * weight, lambda q: law.gradient(tau, q) * weight, _start(law, few)
     )
-    least = ROUNDING * float(np.max(weight))
     with_tilt = CountedLaw(law, float(readings.x[-1]), readings.reference_hz, top, nutation) if tilt else None
     form: DragLaw | CountedLaw = with_tilt or law
     expected, u = with_tilt.expected if with_tilt else (np.empty(0), np.empty(0))
-    q = np.concatenate([q, expected])
-    found, close, left, slopes = None, False, *_of_readings(form, few, q)
+    start = np.concatenate([q, expected])
+    q, close, found = _search(form, few, start, (expected, u), share=1.0, rho=rho)
+    if not close:
+        with_shorter = _search(form, few, start, (expected, u), share=_SHORTER, rho=rho)
+        q, close, found = with_shorter if with_shorter[1] else (q, close, found)
+    left, slopes = _of_readings(form, readings, q)
+    return Solution(law, with_tilt, readings, q, converged and close, left, slopes, found)
+
+
+def _search(
+    form: DragLaw | CountedLaw,
+    readings: Readings,
+    start: Array,
+    prior: tuple[Array, Array],
+    *,
+    share: float,
+    rho: Array,
+) -> tuple[Array, bool, Posterior | None]:
+    """Return where a search ends, whether it converged, and the posterior there.
+
+    Args:
+        form: the law, or the count under it.
+        readings: to which it is fitted.
+        start: first parameters, shape (p,).
+        prior: expected values and u of the last parameters, those of the tilt, shapes (k,).
+        share: of each step, that is taken.
+        rho: correlations of neighbouring readings' noise that are possible.
+    """
+    expected, u = prior
+    p, least = len(start) - len(expected), ROUNDING * float(np.max(readings.weight))
+    q, found = start, None
     with np.errstate(all="ignore"):
         for _ in range(_MOST_STEPS):
+            left, slopes = _of_readings(form, readings, q)
             if not (np.isfinite(slopes).all() and np.isfinite(left).all()):
-                found = None
-                break
+                return q, False, None
             found = posterior(
-                few.time, left, slopes, (expected - q[p:], u), stated=readings.sigma_known, least=least, rho=rho
+                readings.time, left, slopes, (expected - q[p:], u), stated=readings.sigma_known, least=least, rho=rho
             )
             if found is None:
                 break
@@ -259,18 +289,15 @@ def solution(
             step[p + MORE :] = 0.0  # κ and β stay as they were given
             close = bool((np.abs(step) <= _CLOSE * own).all())
             if close or not np.isfinite(step).all():
-                break
-            if with_tilt:
+                return q, close, found
+            if len(expected):
                 step *= min(
                     1.0,
                     _LONGEST_GAP / max(abs(float(step[p + 1])), _LONGEST_GAP),
                     _LONGEST_TILT * u[0] / max(abs(float(step[p])), _LONGEST_TILT * u[0]),
                 )
-            q = q + step
-            left, slopes = _of_readings(form, few, q)
-        if few is not readings:
-            left, slopes = _of_readings(form, readings, q)
-    return Solution(law, with_tilt, readings, q, converged and close, left, slopes, found)
+            q = q + share * step
+    return q, False, found
 
 
 def _of_readings(form: DragLaw | CountedLaw, readings: Readings, q: Array) -> tuple[Array, Array]:

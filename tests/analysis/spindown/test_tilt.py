@@ -271,3 +271,14 @@ def test_a_wave_about_a_law_is_no_noise():
     usual = spin("disc", t, 40.0, 2.34e-4) + rng.normal(0, 0.01, t.size)
     assert fit_spin_down(t, usual, 0.01, tilt=False).verdict.describes
     assert not fit_spin_down(t, usual + 0.5 * np.sin(t / 12), 0.01, tilt=False).verdict.describes
+
+
+@pytest.mark.parametrize("seed", [4, 9, 10])
+def test_a_search_that_whole_steps_lead_astray_is_begun_again(seed):
+    """Readings by the disc law every 2 s until 0.3 Hz above the resonance: mixed follows them as well."""
+    q = np.array([1.2158, 0.3843, 5.4e-4, 0.757, 1.22e-3])  # of a driven top on the virtual bench
+    f = 27.95 * counted(LAWS["disc"], np.linspace(0, 1, 62), q, THESIS_TOP)
+    f += np.random.default_rng(seed).normal(0, 0.0077, 62)
+    found = fit_spin_down(np.linspace(0, 122, 62), f, laws=("disc", "mixed"), driven=True)
+    assert not [remark for fit in found.fits for remark in fit.remarks if remark.kind == "not converged"]
+    assert found.verdict.excluded == ()

@@ -113,7 +113,9 @@ def test_an_angular_frequency_in_1_per_s_is_in_rad_per_s(title, table_file):
     assert any("rad/s" in warning for warning in table.warnings)
 
 
-@pytest.mark.parametrize("title", ["f in 1/s", "Drehzahl [1/s]", "Drehzahl n / s^-1", "Frequenz f", "ω in Hz"])
+@pytest.mark.parametrize(
+    "title", ["f in 1/s", "Drehzahl [1/s]", "Drehzahl n / s^-1", "Frequenz f", "ω in Hz", "n / s⁻¹"]
+)
 def test_turns_in_1_per_s_stay_turns(title, table_file):
     table = read_table(table_file(f"Zeit t in s;{title}\n0;61.5\n0.5;61.25\n1;61\n"))
     np.testing.assert_array_equal(table.column(T), PLAIN[T])
