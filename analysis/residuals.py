@@ -116,16 +116,17 @@ def studentised(residuals: Array, leverage: Array, n_parameters: int, floor: flo
     return np.asarray(residuals / np.sqrt(np.maximum(others, floor**2) * free))
 
 
-def gross_errors(t: Array, n_parameters: int, p: float = 1e-3) -> NDArray[np.intp]:
-    """Indices of studentised residuals too large for noise, worst first.
+def gross_errors(t: Array, n_parameters: int) -> NDArray[np.intp]:
+    """Return the indices of studentised residuals too large for noise, worst first."""
+    found = np.flatnonzero(np.abs(t) > gross_limit(len(t), n_parameters))
+    return found[np.argsort(-np.abs(t[found]))]
 
-    Too large: two-sided p, multiplied by the number of readings (Bonferroni), below the given one.
-    """
+
+def gross_limit(n: int, n_parameters: int, p: float = 1e-3) -> float:
+    """Return the studentised residual that one of n has by noise with probability p, two-sided (Bonferroni)."""
     from scipy.special import stdtrit
 
-    limit = -float(stdtrit(len(t) - n_parameters - 1, p / len(t) / 2))
-    found = np.flatnonzero(np.abs(t) > limit)
-    return found[np.argsort(-np.abs(t[found]))]
+    return -float(stdtrit(n - n_parameters - 1, p / n / 2))
 
 
 # --- changes ---------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import UnknownName
-from analysis.residuals import Change, gross_errors, largest_change, studentised
+from analysis.residuals import Change, gross_errors, gross_limit, largest_change, studentised
 from analysis.spindown.drag import LAWS
 from analysis.spindown.lawfit import LawFit, Solution, fit_law, solution
 from analysis.spindown.posterior import INDEPENDENT, RHO
@@ -130,11 +130,16 @@ def fit_spin_down(
     given = checked(time, spin_frequency, u)
     model = _Model(tilt, top, DRIVEN if driven else CALM)
     outliers = _search_outliers(given, model)
-    readings = given if keep_outliers or not len(outliers) else given.without(outliers)
-    found = {name: model.fit(name, readings) for name in chosen}
-    stats, criterion = weigh({name: each.statistics for name, each in found.items()})
-    fits = {name: fit_law(each, gate) for name, each in found.items()}
-    best = next(iter(stats))
+    while True:
+        readings = given if keep_outliers or not len(outliers) else given.without(outliers)
+        found = {name: model.fit(name, readings) for name in chosen}
+        stats, criterion = weigh({name: each.statistics for name, each in found.items()})
+        fits = {name: fit_law(each, gate) for name, each in found.items()}
+        best = next(iter(stats))
+        agree = _agree(given, outliers, fits[best], stats[best])
+        if keep_outliers or not agree.any():
+            break
+        outliers = outliers[~agree]
     decision = verdict(stats, criterion, change=_change(found[best], found.get("power")))
     return SpinDown(
         fits=tuple(replace(fits[name], statistics=stats[name]) for name in chosen),
@@ -212,6 +217,17 @@ def _search_outliers(readings: Readings, model: _Model) -> NDArray[np.intp]:
         if not len(worst):
             return np.sort(left_out)
         left_out = np.append(left_out, kept[worst])
+
+
+def _agree(given: Readings, outliers: NDArray[np.intp], best: LawFit, stats: Statistics) -> NDArray[np.bool_]:
+    """Return which of the readings left out are none: near the resonance the search may end in another optimum."""
+    if not len(outliers) or stats.degrees_of_freedom < 2:
+        return np.zeros(len(outliers), dtype=bool)
+    off = np.abs(given.frequency[outliers] - best.spin_frequency(given.time[outliers]))
+    scatter = stats.rms_residual * np.sqrt(stats.n / stats.degrees_of_freedom)
+    unit = scatter if given.u is None else np.maximum(given.u[outliers], scatter)
+    limit = gross_limit(stats.n + 1, stats.n - stats.degrees_of_freedom)
+    return np.asarray(off < limit * unit)
 
 
 MISCOUNT, FAR, WINDOW = 0.25, 8.0, 5  # relative; robust standard deviations; readings that a median is taken over

@@ -31,7 +31,8 @@ LIVE = """
 import numpy as np
 from levilab.live.running import spin_down
 time = np.linspace(0.0, 60.0, 101)  # ends before the top leans
-print(spin_down({"time_s": time, "spin_frequency_hz": drag.spin("turbulent", time, 40.0, 4e-5)}, 1).head)
+noise = 0.01 * np.random.default_rng(1).standard_normal(101)
+print(spin_down({"time_s": time, "spin_frequency_hz": drag.spin("turbulent", time, 40.0, 4e-5) + noise}, 1).head)
 """
 
 
