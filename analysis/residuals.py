@@ -133,7 +133,7 @@ def gross_limit(n: int, n_parameters: int, p: float = 1e-3) -> float:
 
 #: Noise that a lab may have: what neighbours share beyond this is no noise.
 NOISE = 0.8
-#: Up to so many places every stretch between two of them is tried; of more readings so many, evenly distributed.
+#: Places, evenly distributed over the readings, between two of which every stretch is tried: at most this number.
 _PLACES = 40
 #: More readings than this are judged by means over neighbours.
 _MOST_MEANS = 300

@@ -2,7 +2,7 @@
 
 ``python benchmarks/spindown_motion.py`` analyzes
 
-- counts of 60 tops in full motion, drawn anew (mass, inertia, tilt of the moment, law of drag and its constants, first
+- counts of 60 tops in full motion, at random (mass, inertia, tilt of the moment, law of drag and its constants, first
   spin, start, place of the tape), with the virtual counter until they fall, without and with noise added;
 - readings of a top that only spins, 500 of each kind: u stated or not, neighbours correlated by 0, 0.3 and 0.7;
 - readings that no law describes, 100 of each kind.

@@ -355,7 +355,7 @@ def _of_priors(found: Solution, slopes: Array) -> Array:
 
 
 def _shared(found: Solution, slopes: Array) -> dict[str, float]:
-    """Return the part of each u that all runs of one top share: by A, a, κ and β; it nutates anew in each run."""
+    """Return the part of each u that all runs of one top share: by A, a, κ and β, not by the nutation."""
     rows = np.delete(_of_priors(found, slopes), MORE - 1, axis=0)
     shared = np.linalg.norm(rows, axis=0)
     return {n: float(part) for n, part in zip(found.form.parameters, shared, strict=True) if np.isfinite(part)}

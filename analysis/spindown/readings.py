@@ -47,7 +47,7 @@ class Readings:
         return self.u is not None
 
     def means(self, most: int) -> "Readings":
-        """Return at most so many means over neighbours, each with its u; the readings themselves where they are fewer.
+        """Return at most `most` means over neighbours, each with its u; the readings themselves where they are fewer.
 
         Neighbours count as independent here: what they are not shows in the scatter of the means.
         """

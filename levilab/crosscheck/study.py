@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 COVERAGE = math.erf(1 / math.sqrt(2))
 #: How often chance alone may condemn a right study: the room of each of its numbers follows from that.
 FALSE_ALARM = 0.01
-#: Up to so many degrees of freedom a standard deviation of pulls says nothing.
+#: Degrees of freedom up to which a standard deviation of pulls says nothing.
 LONG_TAILS = 8
 _NUMBER = re.compile(r"(\d+(?:\.\d+)?)")
 

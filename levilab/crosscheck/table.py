@@ -1,4 +1,4 @@
-"""A cross-check as people see it: the table, what it says as text, the blocks of a report."""
+"""A cross-check as people see it: the table, its meaning as text, the blocks of a report."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from levilab.present.document.blocks import Block
 
 _NUMBERS = ("pulls", "mean pull", "s.d. of pulls\n(wanted)", "within 1 u\n(wanted)", "u/value")
-#: From so many degrees of freedom on u is as if known.
+#: Degrees of freedom from which on u is as if known.
 _MANY = 30
 
 

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, PlainSerializer
 from levilab.errors import DataError, unquoted
 from levilab.files import finite
 from levilab.pipelines.analyzed import FOR_THIS_PAGE, A, Method, Opt, Origin, R, S
-from levilab.pipelines.result import ANEW, SCHEMA, Archive, Earlier, Part, Result, relative
+from levilab.pipelines.result import AGAIN, SCHEMA, Archive, Earlier, Part, Result, relative
 from levilab.pipelines.sources import collect
 from levilab.runs.run import find_run
 from levilab.software import software_versions
@@ -190,7 +190,7 @@ class Document(Generic[S, R, Opt, A, D]):
         try:
             self.check(part.result)
         except ValueError as error:
-            raise DataError(f"{earlier.file}: {error}: {ANEW}") from error
+            raise DataError(f"{earlier.file}: {error}: {AGAIN}") from error
         return source, part.result, Origin(self._options(earlier), earlier.text, part.budget)
 
 

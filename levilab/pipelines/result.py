@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 SCHEMA: Literal["levilab-result/1"] = "levilab-result/1"
 RESULT = "result.json"
-ANEW = "analyze anew with levilab analyze"
-_ANEW_OR_AWAY = f"{ANEW}, or move the file away"
+AGAIN = "analyze again with levilab analyze"
+_AGAIN_OR_AWAY = f"{AGAIN}, or move the file away"
 
 
 # --- what is in it -------------------------------------------------------------------------------------
@@ -237,7 +237,7 @@ def read_result(path: Path, model: type[R]) -> R | None:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise ResultError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
+        raise ResultError(f"{path}: {in_one_line(error)}; {_AGAIN_OR_AWAY}") from error
 
 
 def is_of_another(path: Path, analysis: str) -> bool:
@@ -253,13 +253,13 @@ def _read(path: Path) -> dict[str, Any]:
     try:
         data = parse_json(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ResultError(f"{path}: cannot be read ({error.strerror}); {_ANEW_OR_AWAY}") from error
+        raise ResultError(f"{path}: cannot be read ({error.strerror}); {_AGAIN_OR_AWAY}") from error
     except ValueError as error:
-        raise NoResult(f"{path}: is cut off or not JSON ({error}); {_ANEW_OR_AWAY}") from error
+        raise NoResult(f"{path}: is cut off or not JSON ({error}); {_AGAIN_OR_AWAY}") from error
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         seen = data.get("schema") if isinstance(data, dict) else type(data).__name__
         ours = isinstance(seen, str) and seen.startswith("levilab-result/")
-        text = f"{path}: schema is {repr(seen)[:60]}, expected {SCHEMA!r} of this version; {_ANEW_OR_AWAY}"
+        text = f"{path}: schema is {repr(seen)[:60]}, expected {SCHEMA!r} of this version; {_AGAIN_OR_AWAY}"
         raise ResultError(text) if ours else NoResult(text)
     return data
 
@@ -286,7 +286,7 @@ def read_inputs(path: Path) -> Written:
     try:
         written = _Head.model_validate(data)
     except ValidationError as error:
-        raise ResultError(f"{path}: {in_one_line(error)}; {_ANEW_OR_AWAY}") from error
+        raise ResultError(f"{path}: {in_one_line(error)}; {_AGAIN_OR_AWAY}") from error
     inputs = tuple(path.parent / run.path for run in written.runs)
     for one in inputs:
         if not one.exists():

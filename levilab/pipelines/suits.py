@@ -34,12 +34,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Suiting:
-    """An analysis, and what it takes.
+    """An analysis, and the inputs that suit it.
 
     Attributes:
         analysis: the row of the catalogue.
         paths: those of the paths with something for it.
-        found: what it takes there.
+        found: the inputs there that suit it.
     """
 
     analysis: Analysis[Any]

@@ -114,7 +114,7 @@ def list_in_words(names: Sequence[str]) -> str:
 
 
 def with_decimals(value: float, decimals: int) -> str:
-    """Return a number with so many digits after the point; a zero has no sign.
+    """Return a number with this number of digits after the point; a zero has no sign.
 
     >>> with_decimals(-0.254, 2), with_decimals(-0.001, 2)
     ('−0.25', '0.00')
@@ -177,7 +177,7 @@ def short_name(name: str) -> str:
 
 
 def plain(value: float | None, count: int = 3) -> str:
-    """Return a statistic in so many digits, zeros at the end included; a larger number in whole ones; a dash for none.
+    """Return a statistic to `count` digits, with zeros at the end; a larger number in whole ones; a dash for none.
 
     >>> plain(0.0312345), plain(0.21), plain(4478.2), plain(2.34e-14, 2), plain(None)
     ('0.0312', '0.210', '4478', '2.3×10⁻¹⁴', '—')

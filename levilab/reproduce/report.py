@@ -35,7 +35,7 @@ HOW_TO_READ = (
     "or within a tolerance that its row gives with the reason. Where it differs, the reason is computed, too, and "
     "shown: what it makes of our number must give the published one. Below each number that ours is compared with "
     "stands what it is. Published: a source prints it, and nothing here was adjusted to it. Fitted: a mass was chosen "
-    "for it. By construction: readings were made up to return it. Our second way: where a figure has no numbers, they "
+    "for it. By construction: readings were made to return it. Our second way: where a figure has no numbers, they "
     "were computed by us with other code, apart from levilab; these test levilab, not the source."
 )
 

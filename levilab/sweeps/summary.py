@@ -109,7 +109,7 @@ def _finite(number: float) -> float | None:
 
 # --- tables ---
 
-#: A sweep of one dimension with at most so many points is printed point by point.
+#: Points of a sweep of one dimension that is printed point by point, at most.
 FEW_POINTS = 40
 
 

@@ -85,7 +85,7 @@ UNDRIVEN, DURATION = MOTIONS["undriven"], 5.0
 
 
 def references() -> dict[str, Any]:
-    """Return the true ends, from heyoka in extended precision (`python benchmarks/references.py` writes them anew).
+    """Return the true ends, from heyoka in extended precision (`python benchmarks/references.py` writes them again).
 
     "places_m": of each motion by its name and its length in whole seconds; "ensemble_m": of some tops of the ensemble.
     """

@@ -60,7 +60,7 @@ class Peer:
 
 
 def best_time(work: Callable[[], Any], least: float = 0.1) -> float:
-    """Return the shortest of several times [s]: as many as fit into `least`, at least one."""
+    """Return the shortest time [s] of the calls that fit into `least`, at least one."""
     return best_time_and_result(work, least)[0]
 
 

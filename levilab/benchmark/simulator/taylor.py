@@ -99,7 +99,7 @@ def heyoka_integrator(motion: Motion, tolerance: float) -> Any:
 
 @cache
 def heyoka_batch(motion: Motion, tolerance: float, lanes: int) -> Any:
-    """Return an integrator of so many tops, built once, whose μ/m is a parameter of each."""
+    """Return an integrator of this number of tops, built once, whose μ/m is a parameter of each."""
     import heyoka as hy
 
     starts = np.repeat(heyoka_start(motion)[:, None], lanes, axis=1)

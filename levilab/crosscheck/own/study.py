@@ -28,9 +28,9 @@ OWN: Mapping[str, Callable[[Any], Own]] = MappingProxyType({
 })  # fmt: skip
 #: Number of trials where none is asked for.
 TRIALS = 200
-#: A report makes as many as fit into this processor time [s], but at least ENOUGH ...
+#: A report makes the trials that fit into this processor time [s], but at least ENOUGH ...
 REPORT_S, ENOUGH = 2.0, 25
-#: ... up to this time [s]: then as many as fit into that, which say less, and none below FEWEST.
+#: ... up to this time [s]: then the trials that fit into it, which say less, and none below FEWEST.
 LONGEST_S, FEWEST = 4.0, 5
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import statistics
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.present.numbers import with_uncertainty
-from levilab.stability.published.printed import published, several
+from levilab.stability.thesis import MEASURED_HZ, MEASURED_U_HZ
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,13 +44,7 @@ def _sentences(group: Limits) -> Iterator[str]:
         f"mean of {found.n} is {digits(ratio)} times as good."
     )
     if group.which == "lower":
-        value, u = published("thesis")["measured.mean"].value, _u_of_the_thesis()
+        value, u = MEASURED_HZ, MEASURED_U_HZ
         away = abs(mean.value - value) / math.hypot(mean.u, u)
         said = "which agrees" if away < 2 else f"{digits(away)} u from it: another top, or mass"
         yield f"The thesis's ten tops have {with_uncertainty(Estimate(value, u, 'Hz'))}, {said}."
-
-
-def _u_of_the_thesis() -> float:
-    """Return the standard error of the thesis's mean [Hz], which it does not print, from its limits."""
-    limits = [one.value for one in several("thesis", "measured.limits")]
-    return statistics.stdev(limits) / math.sqrt(len(limits))

@@ -82,7 +82,7 @@ _POINTS = (
 
 
 def _power(analysis: PrecessionAnalysis) -> tuple[Block, ...]:
-    """Return what it takes to tell the published slope from 1."""
+    """Return the effort that distinguishes the published slope from 1."""
     found = power_table(analysis.combined)
     note = "The slope of 1.05 was published without an uncertainty."
     return (Tabular("precession-power", found, note, first_column_wraps=True),) if found.rows else ()

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 #: u of an exponent, or of an angle [rad], that no measurement has.
 TOO_SMALL = 5e-10
-#: A tilt of the moment is mentioned where it is so many times its u.
+#: A tilt of the moment is mentioned from this multiple of its u on.
 SEEN = 2.0
 
 

@@ -257,7 +257,7 @@ _LONG_WORD = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
 
 
 def _divisible(text: str) -> list[str | None]:
-    """Return a text with None wherever a word of more than so many letters may be divided.
+    """Return a text with None wherever a word longer than this may be divided.
 
     >>> _divisible("in runs/20261120T101500Z-spin-7f3a or x.csv")
     ['in runs/', None, '20261120T101500Z-', None, 'spin-', None, '7f3a or x.csv']

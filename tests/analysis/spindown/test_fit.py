@@ -191,7 +191,7 @@ def test_one_uncertainty_each_weighs_the_readings():
     y[3] += 0.5
     u[3] = 1e6  # such a reading says nothing: the fit is that of the others
     others = fit_spin_down(np.delete(T, 3), np.delete(y, 3), SIGMA).fit("disc")
-    # but for what it says of its neighbours' noise, whose correlation is not known: a sixth of their u
+    # but for its part in the correlation of the noise, whose correlation is not known: a sixth of their u
     assert (np.abs(values(fit_spin_down(T, y, u).fit("disc")) - values(others)) < uncertainties(others) / 6).all()
 
 
