@@ -21,7 +21,7 @@ EXACT_SIGNS = 200
 
 @lru_cache(maxsize=256)
 def _runs_distribution(rare: int, common: int) -> tuple[float, ...]:
-    """Probability of 0, 1, 2, … runs in a random order of two signs (Wald & Wolfowitz 1940, eq. 1)."""
+    """Return the probability of 0, 1, 2, … runs in a random order of two signs (Wald & Wolfowitz 1940, eq. 1)."""
     ways = [0] * (2 * rare + 2)
     for k in range(1, rare + 1):
         ways[2 * k] = 2 * comb(rare - 1, k - 1) * comb(common - 1, k - 1)
@@ -31,7 +31,7 @@ def _runs_distribution(rare: int, common: int) -> tuple[float, ...]:
 
 
 def _signs(series: Array) -> tuple[int, int, int]:
-    """How many of the rarer and of the commoner sign, and of runs; zeros are left out."""
+    """Count the rarer sign, the commoner sign, and the runs; zeros are left out."""
     positive = series[series != 0] > 0
     plus = int(np.count_nonzero(positive))
     minus = positive.size - plus
@@ -59,7 +59,7 @@ def _normal_p(signs: list[tuple[int, int, int]]) -> float:
 
 
 def runs_test_p(*series: Array) -> float | None:
-    """Two-sided p of the Wald–Wolfowitz runs test on the signs of residuals; small: they are in no random order.
+    """Return the two-sided p of the Wald–Wolfowitz runs test on the signs of residuals; small: no random order.
 
     Several series: their numbers of runs are added, and the sum is judged by the convolution of their distributions.
     That keeps the direction (too few runs in each), which adding up two-sided p-values after Fisher would lose.
@@ -85,7 +85,7 @@ def runs_test_p(*series: Array) -> float | None:
 
 
 def durbin_watson(*series: Array) -> float | None:
-    """Durbin–Watson statistic: near 2 for noise, well below when neighbours resemble each other.
+    """Return the Durbin–Watson statistic: near 2 for noise, well below when neighbours resemble each other.
 
     Σ(eᵢ − eᵢ₋₁)²/Σeᵢ², both sums over all series (J. Durbin & G. S. Watson, Biometrika 37, 409 (1950)).
     None where all residuals are zero.
@@ -99,7 +99,7 @@ def durbin_watson(*series: Array) -> float | None:
 
 
 def studentised(residuals: Array, leverage: Array, n_parameters: int, floor: float) -> Array:
-    """Each residual in units of the scatter of the others, with its own leverage allowed for.
+    """Return each residual in units of the scatter of the others, with its own leverage allowed for.
 
     Args:
         residuals: of equal variance, shape (n,).

@@ -95,7 +95,7 @@ class Stop:
 
 
 def _ignored_by_nohup(number: int) -> bool:
-    """Whether a signal is the one that nohup ignores, so that the run outlives its terminal."""
+    """Return whether a signal is the one that nohup ignores, so that the run outlives its terminal."""
     return signal.Signals(number).name == "SIGHUP" and signal.getsignal(number) is signal.SIG_IGN
 
 

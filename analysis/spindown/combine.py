@@ -84,7 +84,7 @@ class Combined:
 
 
 def combine(runs: Sequence[SpinDown]) -> Combined:
-    """Means of the constants over several runs, and the law the runs favour together.
+    """Return the means of the constants over several runs, and the law that the runs favour together.
 
     The criteria treat all runs as one experiment with p parameters for each run: with known uncertainties χ² is
     added up, otherwise all readings share one unknown uncertainty.
@@ -212,7 +212,7 @@ def _means(runs: Sequence[Mapping[str, Estimate]], names: Sequence[str]) -> dict
 
 
 def mean(estimates: Sequence[Estimate], shared_u: Sequence[float] = ()) -> Mean:
-    """The mean of one constant over the runs that have it, with u = s/√N from their scatter s (GUM 4.2).
+    """Return the mean of one constant over the runs that have it, with u = s/√N from their scatter s (GUM 4.2).
 
     Few runs may agree by chance: u is no smaller than the runs' own uncertainties leave to their mean, √Σu²/N.
     Of one run: its own value and u.  The part of u that is the same in all runs, as that of a tilt, does not show in

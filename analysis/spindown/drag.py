@@ -50,7 +50,7 @@ def _quotient(difference: Array, divisor: Array, y: Array, series: Array) -> Arr
 
 
 def _decay(tau: Array, x0: float, kappa: float, m: float) -> tuple[Array, Array, Array, float]:
-    """S = κ x₀ᵐ τ, mS (above −1), x, and x₀ᵐ, for a power law: x = x₀ exp(−ln(1 + mS)/m)."""
+    """Return S = κ x₀ᵐ τ, mS (above −1), x, and x₀ᵐ, for a power law: x = x₀ exp(−ln(1 + mS)/m)."""
     log_x0 = float(np.log(max(x0, 1e-80)))
     scale = float(np.exp(min(max(m * log_x0, -LARGEST_LOG), LARGEST_LOG)))
     s = _clip((kappa * scale) * tau, LARGEST_DECAY)
@@ -69,7 +69,7 @@ def _power(tau: Array, q: Array, m: float | None = None) -> Array:
 
 
 def _power_gradient(tau: Array, q: Array, m: float | None = None) -> Array:
-    """Slopes of `_power` with x₀, κ and, if it is free, m: shape (p, n)."""
+    """Return the slopes of `_power` with x₀, κ and, if it is free, m: shape (p, n)."""
     exponent = float(q[2]) if m is None else m
     s, ms, x, scale = _decay(tau, q[0], q[1], exponent)
     falling = x / (1 + ms)
@@ -82,13 +82,13 @@ def _power_gradient(tau: Array, q: Array, m: float | None = None) -> Array:
 
 
 def _power_slowing(x: Array, q: Array, m: float | None = None) -> Array:
-    """−dx/dτ of a power law."""
+    """Return −dx/dτ of a power law."""
     order = q[2] if m is None else m
     return np.asarray(q[1] * np.exp(_clip((order + 1) * np.log(x), LARGEST_LOG)))
 
 
 def _mixture(tau: Array, x0: float, alpha: float, beta: float) -> tuple[Array, Array, Array, Array]:
-    """For x = x₀ e⁻ʸ/(1 + β x₀ τ E): y = ατ, e⁻ʸ, E = (1 − e⁻ʸ)/y, and the denominator."""
+    """Return y = ατ, e⁻ʸ, E = (1 − e⁻ʸ)/y and the denominator of x = x₀ e⁻ʸ/(1 + β x₀ τ E)."""
     y = _clip(alpha * tau, LARGEST_LOG)
     fall = np.exp(-y)
     mean = _or_one(-np.expm1(-y), y)
@@ -96,13 +96,13 @@ def _mixture(tau: Array, x0: float, alpha: float, beta: float) -> tuple[Array, A
 
 
 def _mixed(tau: Array, q: Array) -> Array:
-    """Spin of the mixed law; q is (x₀, α, β)."""
+    """Return the spin of the mixed law; q is (x₀, α, β)."""
     _, fall, _, grown = _mixture(tau, q[0], q[1], q[2])
     return np.asarray(q[0] * fall / grown)
 
 
 def _mixed_gradient(tau: Array, q: Array) -> Array:
-    """Slopes of `_mixed` with x₀, α, β: shape (3, n)."""
+    """Return the slopes of `_mixed` with x₀, α, β: shape (3, n)."""
     y, fall, mean, grown = _mixture(tau, q[0], q[1], q[2])
     slope = _quotient(fall - mean, y, y, _MIXED_SERIES)  # dE/dy
     x = q[0] * fall / grown
@@ -111,7 +111,7 @@ def _mixed_gradient(tau: Array, q: Array) -> Array:
 
 
 def _mixed_slowing(x: Array, q: Array) -> Array:
-    """−dx/dτ of the mixed law."""
+    """Return −dx/dτ of the mixed law."""
     return np.asarray((q[1] + q[2] * x) * x)
 
 
@@ -204,7 +204,7 @@ class DragLaw:
         return values, slopes
 
     def dimensionless(self, values: ArrayLike, reference_hz: float, duration: float) -> Array:
-        """The parameters q for a start frequency [Hz] and constants: the inverse of `natural`."""
+        """Return the parameters q for a start frequency [Hz] and constants: the inverse of `natural`."""
         q = np.array(values, dtype=float)
         q[0] /= reference_hz
         if not self.orders:

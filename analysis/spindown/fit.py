@@ -64,7 +64,7 @@ class SpinDown:
         return is_correlated(self.correlation)
 
     def fit(self, name: str) -> LawFit:
-        """The fit of one law."""
+        """Return the fit of one law."""
         return next(fit for fit in self.fits if fit.name == name)
 
 

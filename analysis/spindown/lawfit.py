@@ -94,13 +94,13 @@ class LawFit:
         return LAWS[self.name]
 
     def spin_frequency(self, time: ArrayLike) -> Array:
-        """The fitted curve [Hz] at times [s] on the clock of the readings, shape (n,)."""
+        """Return the fitted curve [Hz] at times [s] on the clock of the readings, shape (n,)."""
         frequency, duration = self.reference
         tau = (np.asarray(time, dtype=float) - self.start_time) / duration
         return frequency * counted(self.law, tau, self.solution, self.top)
 
     def forecast(self, time: ArrayLike, last: float) -> Array:
-        """The spin [Hz] of a top that the law alone slows from where the fitted curve stands at the last reading.
+        """Return the spin [Hz] of a top that the law alone slows, from the fitted curve at the last reading on.
 
         The count's tilt is left out: beyond the readings its curve runs into the resonance, which no top reaches.
 
@@ -115,7 +115,7 @@ class LawFit:
         return frequency * self.law.spin(tau, np.concatenate([now, constants]))
 
     def u_spin_frequency(self, time: ArrayLike) -> Array | None:
-        """The standard uncertainty of the fitted curve [Hz] at times [s], shape (n,); None where it is undefined.
+        """Return the standard uncertainty of the fitted curve [Hz] at times [s], shape (n,); None if undefined.
 
         That of the parameters with their correlation, and nothing for the law itself.
         """
@@ -405,7 +405,7 @@ def _moved_by_gate(found: Solution, slopes: Array, gate: float) -> Array:
 
 
 def straight_line(x: Array, y: Array, weight: Array | None = None) -> tuple[float, float, float | None]:
-    """Intercept and slope of a straight line, and the slope's standard error by the scatter about it.
+    """Return intercept and slope of a straight line, and the slope's standard error by the scatter about it.
 
     Args:
         x: shape (n,).
@@ -424,12 +424,12 @@ def straight_line(x: Array, y: Array, weight: Array | None = None) -> tuple[floa
 
 
 def _straightened(x: Array, m: float) -> Array:
-    """What falls or rises in a straight line, of slope κ, under a power law of order m."""
+    """Return the quantity that is linear in time, with slope κ, under a power law of order m."""
     return -np.log(x) if m == 0 else x**-m / m
 
 
 def linearised(law: DragLaw, readings: Readings) -> dict[str, Estimate]:
-    """The thesis's way: the unweighted straight line through ln ω, 1/ω or ω^(−1/2), on which noise weighs unevenly."""
+    """Fit the thesis's straight line through ln ω, 1/ω or ω^(−1/2), unweighted, so that noise weighs unevenly."""
     (m,) = law.orders
     omega = 2 * np.pi * readings.frequency
     _, slope, u = straight_line(readings.time - readings.start_time, _straightened(omega, m))
@@ -437,7 +437,7 @@ def linearised(law: DragLaw, readings: Readings) -> dict[str, Estimate]:
 
 
 def _start(law: DragLaw, readings: Readings) -> Array:
-    """Parameters to start from: the same straight line, weighted; the disc's for laws with two constants."""
+    """Return parameters to start from: the same straight line, weighted; the disc's for laws with two constants."""
     m = law.orders[0] if len(law.orders) == 1 else 0.5
     weight = (readings.x ** (m + 1) * readings.weight) ** 2
     intercept, kappa, _ = straight_line(readings.tau, _straightened(readings.x, m), weight)

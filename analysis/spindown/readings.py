@@ -72,7 +72,7 @@ class Readings:
         )
 
     def without(self, left_out: NDArray[np.intp]) -> "Readings":
-        """The same readings, some left out; start and units stay."""
+        """Return the same readings, some left out; start and units stay."""
         keep = np.ones(len(self), dtype=bool)
         keep[left_out] = False
         return Readings(
@@ -89,7 +89,7 @@ class Readings:
 
 
 def checked(time: ArrayLike, frequency: ArrayLike, u: ArrayLike | None) -> Readings:
-    """Readings that a spin-down can be fitted to.
+    """Return readings that a spin-down can be fitted to.
 
     Raises:
         ShapesDiffer, TooFewReadings, NotFinite, TimesNotIncreasing, NotPositive: as they say.
@@ -124,7 +124,7 @@ def checked(time: ArrayLike, frequency: ArrayLike, u: ArrayLike | None) -> Readi
 
 
 def _column(quantity: str, values: ArrayLike, n: int | None, *, spread: bool = False) -> Array:
-    """A column of its own, which cannot be changed: results must not change with the caller's array."""
+    """Return a column of its own, which cannot be changed: results must not change with the caller's array."""
     column = np.array(values, dtype=float)
     if spread and column.ndim == 0 and n is not None:
         column = np.full(n, column)
@@ -147,7 +147,7 @@ def _all_positive(quantity: str, column: Array) -> None:
 
 
 def must_fall(frequency: Array) -> None:
-    """Raises NoSpinDown.  The medians of the first and last third decide, so that one miscounted reading does not."""
+    """Refuse a frequency that does not fall, by medians of the first and last third: one miscount decides nothing."""
     third = -(-len(frequency) // 3)
     first, last = float(np.median(frequency[:third])), float(np.median(frequency[-third:]))
     if last >= first * (1 - 1e-12):

@@ -133,17 +133,17 @@ class CountedLaw:
         return value, np.array([LAST_TILT2_U * nearer, LAST_GAP_U, self.nutation.u, top.kappa_u, top.beta_u])
 
     def shape(self, q: Array) -> tuple[float, float, float]:
-        """δ², ν_r/ν_ref, and K/ν_ref, from A, a and K/ν_ref."""
+        """Return δ², ν_r/ν_ref, and K/ν_ref, from A, a and K/ν_ref."""
         a = min(max(float(q[1]), -5.0), 40.0)
         s = min(max(float(q[0]) * float(np.exp(min(2 * a, 8.0))), -0.01), 0.1)
         return s, self.last / float(np.sqrt(1 + np.exp(a))), float(q[2])
 
     def spin(self, tau: Array, q: Array) -> Array:
-        """What the counter counts, shape (n,)."""
+        """Return the counted frequency, shape (n,)."""
         return np.asarray(self.spins(tau, q[None])[0])
 
     def gradient(self, tau: Array, q: Array) -> Array:
-        """Its slopes with q, shape (p, n), by differences: good to 1e-6 of themselves."""
+        """Return the slopes with q, shape (p, n), by differences: good to 1e-6 of themselves."""
         sizes = 1e-5 * np.maximum(np.abs(q), 0.1)
         sizes[-UNCERTAIN:] = [1e-4, 1e-3, 1e-4, 1e-3, 1e-2]
         steps, p = np.diag(sizes), len(q)
@@ -151,7 +151,7 @@ class CountedLaw:
         return np.asarray((spins[:p] - spins[p:]) / (2 * sizes[:, None]))
 
     def spins(self, tau: Array, rows: Array) -> Array:
-        """The same for several q, shape (r, p) → (r, n)."""
+        """Return the same for several q, shape (r, p) → (r, n)."""
         p = len(self.law.parameters)
         shapes = np.array([[*self.shape(q[p:]), *q[p + MORE :]] for q in rows])
         with np.errstate(all="ignore"):
@@ -164,7 +164,7 @@ class CountedLaw:
             )
 
     def natural(self, q: Array, reference_hz: float, duration: float) -> tuple[Array, Array]:
-        """As `DragLaw.natural`, then δ [rad], ν_r [Hz] and K [Hz]; slopes of shape (p + 3, p + 5).
+        """Return `DragLaw.natural`, then δ [rad], ν_r [Hz] and K [Hz]; slopes of shape (p + 3, p + 5).
 
         δ is the root of δ², which noise may make negative: then it is 0, with the slope of the uncertainty's own root.
         """
@@ -184,13 +184,13 @@ class CountedLaw:
         return np.array([*values, delta, resonance * reference_hz, wobble * reference_hz]), full
 
     def solution(self, q: Array) -> Array:
-        """The law's parameters, then δ², ν_r/ν_ref and K/ν_ref, shape (p + 3,)."""
+        """Return the law's parameters, then δ², ν_r/ν_ref and K/ν_ref, shape (p + 3,)."""
         n = len(self.law.parameters)
         return np.array([*q[:n], *self.shape(q[n:])])
 
 
 def counted(law: DragLaw, tau: Array, solution: Array, top: Top = THESIS_TOP) -> Array:
-    """The curve of a solution, with the tilt where it has one (δ², ν_r/ν_ref, K/ν_ref at its end); shape (n,)."""
+    """Return the curve of a solution, with the tilt where it has one (δ², ν_r/ν_ref, K/ν_ref at its end)."""
     p = len(law.parameters)
     if len(solution) == p:
         return law.spin(tau, solution)
@@ -210,7 +210,7 @@ class _Path:
 
 
 def _path(log_eta: Array, s: Array, kappa: Array, beta: Array) -> _Path:
-    """The way at these points, for each s.
+    """Return the path at these points, for each s.
 
     With w = 1 + sη², l = 1 + βs(η + η²/2) and sin²θ = sη²/w: Ω² = (1 + 1/η) l √w, and
     dΩ/d ln η = Ω/2 [βs(η + η²)/l + sin²θ − 1/(1 + η)].
@@ -310,13 +310,13 @@ def _nodes(first: Array, s: Array, kappa: Array, beta: Array) -> tuple[Array, _P
 
 
 def _time_slope(law: DragLaw, path: _Path, q: Array, resonance: Array) -> Array:
-    """dτ/d ln η."""
+    """Return dτ/d ln η."""
     slowing = law.slowing(resonance * path.spin * path.axial, q) * path.axial
     return np.asarray(-resonance * path.momentum_slope / np.where(np.abs(slowing) > 1e-30, slowing, 1e-30))
 
 
 def _hermite(at: Array, x: Array, y: Array, slope: Array) -> Array:
-    """y(at) by a cubic between the nodes x, which rise; beyond them by a straight line; shape (r, n) of (r, k)."""
+    """Return y(at) by a cubic between the nodes x, which rise, and a straight line beyond; (r, n) of (r, k)."""
     found = np.array([row.searchsorted(wanted) for row, wanted in zip(x, at, strict=True)])
     k = np.minimum(np.maximum(found - 1, 0), x.shape[1] - 2)
     k += x.shape[1] * np.arange(len(x))[:, None]  # of the flat arrays

@@ -31,7 +31,7 @@ _FARTHEST = 4.0
 
 
 def crosscheck_figure(checked: Sequence[Study]) -> Figure:
-    """Histograms of pulls; vermilion and hatched where they are not as wanted."""
+    """Draw histograms of pulls; vermilion and hatched where they are not as wanted."""
     panels = [(one.name, spread) for one in checked for spread in one.spreads]
     rows = max(1, math.ceil(len(panels) / _COLUMNS))
     with mpl.rc_context(STYLE):

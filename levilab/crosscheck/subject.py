@@ -76,7 +76,7 @@ class Subject:
 def acquired(
     experiment: str, seed: int, folder: Path, change: Callable[[AcquisitionRequest], AcquisitionRequest]
 ) -> Run:
-    """A finished run of a mock experiment.  change: puts it into a world of known numbers.
+    """Return a finished run of a mock experiment.  change: puts it into a world of known numbers.
 
     Raises TrialFailed; KeyboardInterrupt where Ctrl-C ended the run: it is meant for the whole cross-check.
     """

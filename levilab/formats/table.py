@@ -65,7 +65,7 @@ class Table:
     factors: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
-        """How many readings there are."""
+        """Return the number of readings."""
         return self.lines.size
 
     @cached_property

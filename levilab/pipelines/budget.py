@@ -254,7 +254,7 @@ def budget_blocks(
     of: str = "",
     mark: Callable[[Budget], str] | None = None,
 ) -> tuple[Block, ...]:
-    """Each budget as a table with what dominates it in a sentence, then where the numbers come from; empty of none.
+    """Return each budget as a table with its largest part in a sentence, then the sources of the numbers.
 
     Args:
         budgets: of the results.
@@ -284,6 +284,6 @@ EXPLAINED = (
 
 
 def notes_of(budgets: Sequence[Budget]) -> list[str]:
-    """Where the numbers of the rows come from, each once."""
+    """Return the sources of the numbers in the rows, each once."""
     said = (f"{one.source}: {one.note}" for budget in budgets for one in budget.components if one.note)
     return list(dict.fromkeys(said))

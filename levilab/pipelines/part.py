@@ -84,7 +84,7 @@ class ReportPart:
 
 
 def first_of(shown: int, count: int) -> str:
-    """Which part of a listing is printed; empty where it is all.
+    """Return which part of a listing is printed; empty for the whole.
 
     >>> first_of(200, 20000), first_of(20, 20)
     ('The first 200 of 20000; all of them are in the data.', '')

@@ -52,7 +52,7 @@ def for_encoding(text: str, encoding: str | None) -> str:
 
 
 def never_fail_to_encode(error: UnicodeError) -> tuple[str, int]:
-    """For `codecs.register_error`: what reaches a stream that cannot carry it, spelled as `for_encoding` does."""
+    """Spell what reaches a stream that cannot carry it as `for_encoding` does (for `codecs.register_error`)."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     end = error.end
@@ -79,7 +79,7 @@ def _lowered(raised: str) -> str:
 
 
 def _spelled(one: str) -> str:
-    """One character in ASCII; a question mark where there is no way."""
+    """Return one character in ASCII; a question mark where there is no way."""
     if one in _SPELLED:
         return _SPELLED[one]
     if unicodedata.combining(one):

@@ -21,7 +21,7 @@ def local(utc: str | None) -> datetime | None:
 
 
 def moment(when: datetime) -> str:
-    """Day and clock time with the offset.
+    """Return day and clock time with the offset.
 
     >>> moment(datetime.fromisoformat("2026-11-21T01:52:00+01:00"))
     '2026-11-21 01:52:00 +01:00'

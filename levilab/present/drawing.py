@@ -130,14 +130,14 @@ def curve(axes: Axes, time: Array, values: Array, look: Look, *, pieces: int = 6
 
 
 def _oscillates(found: Columns) -> bool:
-    """Whether the curve swings within its pieces: further than from one to the next, and so far that it is seen."""
+    """Return whether the curve swings within its pieces: further than from one to the next, and visibly."""
     within = found.high - found.low
     whole = float(np.max(found.high) - np.min(found.low))
     return bool(np.median(within) > 0.05 * whole and within.sum() > 1.5 * np.abs(np.diff(found.mean)).sum())
 
 
 def run_look(k: int, total: int) -> Look:
-    """How the k-th of several runs is drawn: by a marker and a colour of its own while there are few."""
+    """Return how the k-th of several runs is drawn: by a marker and a colour of its own while there are few."""
     if total == 1:
         return Look(SERIES[0], marker=MARKERS[0])
     if total <= len(MARKERS):

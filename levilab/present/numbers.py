@@ -22,7 +22,7 @@ MOST_DECIMALS = 1e-6
 
 
 def with_uncertainty(estimate: Estimate) -> str:
-    """Value and standard uncertainty in its last digits, with the unit.
+    """Return value and standard uncertainty in its last digits, with the unit.
 
     >>> from analysis.uncertainty import Estimate
     >>> with_uncertainty(Estimate(0.00318175, 3.06e-5, "1/s"))
@@ -37,7 +37,7 @@ def with_uncertainty(estimate: Estimate) -> str:
 
 
 def in_one_line(estimate: Estimate) -> str:
-    """Value, standard uncertainty in its last digits and unit, in characters that every program prints.
+    """Return value, standard uncertainty in its last digits and unit, in characters that every program prints.
 
     >>> from analysis.uncertainty import Estimate
     >>> in_one_line(Estimate(0.003262, 2.3e-5, "1/s")), in_one_line(Estimate(1.7151e-5, 1.7e-7, "1/rad"))
@@ -54,12 +54,12 @@ def in_one_line(estimate: Estimate) -> str:
 
 
 def without_unit(estimate: Estimate) -> str:
-    """Value and standard uncertainty alone, for a column whose head has the unit; a dash where there is none."""
+    """Return value and u alone, for a column whose head has the unit; a dash where there is none."""
     return "—" if estimate.value is None else _number(estimate.value, estimate.u)
 
 
 def column(estimates: Iterable[Estimate | None]) -> list[str]:
-    """Values and standard uncertainties for one column, all with a power of ten or none; a dash for None.
+    """Return values with u for one column, all with a power of ten or none; a dash for None.
 
     >>> from analysis.uncertainty import Estimate
     >>> column([Estimate(0.008, 0.007, "Hz"), Estimate(0.013, 0.008, "Hz"), None])
@@ -146,7 +146,7 @@ def decimals_of(u: float | None) -> int:
 
 
 def off(value: float, u: float | None) -> str:
-    """How far a reading is off, with the digits of its uncertainty and a sign.
+    """Return how far a reading is off, with the digits of its uncertainty and a sign.
 
     >>> off(0.02149, 0.03), off(-1e-9, 0.03)
     ('+0.021', '0.000')

@@ -148,7 +148,7 @@ def _instruments(state: State) -> Iterator[Piece]:
 
 
 def _bar(state: State, width: int, *, plain: bool) -> Line:
-    """Share that is done, and time left; while the bench is prepared, what it does."""
+    """Return the share that is done, and the time left; while the bench is prepared, its present step."""
     share, said = _progress(state)
     room = min(40, max(8, width - len(said) - 2)) if width >= _NARROW else max(4, width - len(said) - 2)
     if len(said) + 6 > width:

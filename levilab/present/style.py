@@ -25,7 +25,7 @@ NARROW, WIDE = 3.4, 7.0
 
 
 def _sheet() -> dict[str, Any]:
-    """Matplotlib's defaults with levilab.mplstyle over them; a person's matplotlibrc changes nothing."""
+    """Return matplotlib's defaults with levilab.mplstyle over them; a person's matplotlibrc changes nothing."""
     own = resources.files("levilab.present") / "levilab.mplstyle"
     with resources.as_file(own) as path:
         sheet = mpl.rc_params_from_file(path, use_default_template=False)

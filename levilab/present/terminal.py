@@ -41,7 +41,7 @@ class Terminal(Console):
     """
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """All texts come through here: those printed, a table's cells, its title and its caption."""
+        """Replace characters in all texts: those printed, a table's cells, its title and its caption."""
         return super().render_str(self.spelled(text), **options)
 
     def spelled(self, text: str) -> str:

@@ -20,7 +20,7 @@ _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, 
 
 
 def settings_in_words(settings: Mapping[str, Any]) -> str:
-    """All settings in one line; a generator's drive first.
+    """Return all settings in one line; a generator's drive first.
 
     >>> settings_in_words({"automatic_level": False, "gate_s": 1.0, "impedance_ohm": 1e6})
     'automatic level off, gate 1 s, impedance 1 MΩ'

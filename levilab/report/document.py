@@ -140,7 +140,7 @@ def picture_of(analysis: Analysis[A], found: A, part: ReportPart) -> Picture:
 def _of_one_analysis(
     found: Analyzed[Any, Any, Any, Any], part: ReportPart, blocks: Iterable[Block], *, first: bool
 ) -> Section:
-    """One of several analyses, below a heading of its own."""
+    """Return one of several analyses, below a heading of its own."""
     mixed = _mixes(found)
     mark = _banner(found.sources, mixed=True) if mixed else None
     return Section(
@@ -153,20 +153,20 @@ def _of_one_analysis(
 
 
 def _title(counts: str, others: Sequence[Section]) -> str:
-    """Of a document of several parts; counts: of the measurements, empty for none."""
+    """Return the title of a document of several parts; counts: of the measurements, empty for none."""
     if not counts:
         return others[0].title if len(others) == 1 else f"Report of {len(others)} simulations"
     return f"Report of {counts}{', with simulations' if others else ''}"
 
 
 def _lead(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
-    """How much was used."""
+    """Return the amount of data used."""
     warnings = "" if found.grouped_warnings else ", no warnings"
     return f"{count_inputs(found.sources)}, {part.lead}{warnings}"
 
 
 def _measured(results: Results, parts: Sequence[ReportPart]) -> Section:
-    """Each input: when, under which conditions, with which instruments; what happened; its readings."""
+    """Return each input: when, under which conditions, with which instruments; what happened; its readings."""
     abouts: dict[Path, list[About]] = {}
     for (_, found), part in zip(results, parts, strict=True):
         several = len(found.sources) > 1
@@ -180,7 +180,7 @@ def _measured(results: Results, parts: Sequence[ReportPart]) -> Section:
 
 
 def _overview(inputs: Sequence[Input]) -> Iterable[Block]:
-    """Many inputs: what they share once, and the rest folded away."""
+    """Return many inputs: what they share once, and the rest folded away."""
     common = in_common(inputs)
     if common:
         yield Section("All of them alike", (Facts(common),))
@@ -202,12 +202,12 @@ def _document_banner(results: Results, sources: Sequence[Source[Any]], others: S
 
 
 def _mixes(found: Analyzed[Any, Any, Any, Any]) -> bool:
-    """Whether numbers are of real and synthetic inputs together."""
+    """Return whether numbers are of real and synthetic inputs together."""
     return any(0 < sum(one.synthetic for one in together) < len(together) for together in found.averaged)
 
 
 def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner | None:
-    """Which inputs are synthetic, and what that does to numbers that are of both together."""
+    """Return which inputs are synthetic, and a warning of numbers that mix them with real ones."""
     total, made_up = len(sources), [source.name for source in sources if source.synthetic]
     files = sum(source.run is None for source in sources)
     if not made_up:
@@ -249,7 +249,7 @@ def notebook_blocks(analysis: Analysis[A], found: A) -> tuple[Block, ...]:
 
 
 def count_inputs(sources: Sequence[Source[Any]]) -> str:
-    """How many inputs of which kind: "4 runs and 1 data file"."""
+    """Return how many inputs of which kind: "4 runs and 1 data file"."""
     files = sum(source.run is None for source in sources)
     kinds = ((len(sources) - files, "run"), (files, "data file"))
     return " and ".join(f"{n} {kind}{'s' * (n > 1)}" for n, kind in kinds if n)

@@ -132,7 +132,7 @@ def _of_several(about: About) -> Fact:
 
 
 def _sentence(how: str, seed: int | None) -> str:
-    """How it was made, without saying again that it is synthetic."""
+    """Return how the input was made, without saying again that it is synthetic."""
     text = how.removeprefix("SYNTHETIC").lstrip(":, ") or how
     return text if seed is None else f"{text} (seed {seed})"
 
@@ -176,7 +176,7 @@ def _events(source: Source[Any]) -> tuple[Block, ...]:
 
 
 def _moment(event: Mapping[str, Any], zero: str | None) -> str:
-    """When on the clock of the readings; "before" time zero there is none."""
+    """Return when on the clock of the readings; "before" time zero there is none."""
     if event["time_s"] is not None:
         return f"{event['time_s']:.1f} s"
     return "before" if zero is None or str(event.get("utc", zero)) < zero else ""
@@ -213,7 +213,7 @@ def _conditions(record: RunRecord) -> tuple[str, ...]:
 
 
 def _instrument(about: Mapping[str, Any]) -> tuple[str, ...]:
-    """Who answered, where, and the settings of the measurement: those at its end, else those at its start."""
+    """Return the instrument's identity and link, and the settings of the measurement: at its end, else at its start."""
     where = f"{about.get('identity', 'did not answer')} at {about.get('address', 'an unknown address')}"
     at_start, at_end = (about.get(when) for when in ("settings_start", "settings_end"))
     if isinstance(at_end, dict):
@@ -224,7 +224,7 @@ def _instrument(about: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _changes(source: Source[Any]) -> tuple[Block, ...]:
-    """Which settings differ between start and end."""
+    """Return which settings differ between start and end."""
     instruments = source.run.record.instruments if source.run else {}
     both = [
         (kind.capitalize(), about["settings_start"], about["settings_end"])

@@ -124,7 +124,7 @@ def _writing(output: Path) -> AbstractContextManager[None]:
 
 
 def _sorted_by_kind(paths: Sequence[Path]) -> tuple[Found, list[Path]]:
-    """Each kind of input that is no measurement, with those that lie at the paths; and the paths for the analyses."""
+    """Return each kind of input that is no measurement, with those at the paths; and the paths for the analyses."""
     inputs = {path: [(kind, kind.find(path)) for kind in KINDS] for path in paths}
     found = [
         (kind, list(dict.fromkeys(one for of_path in inputs.values() for one in dict(of_path)[kind]))) for kind in KINDS
@@ -147,12 +147,12 @@ def _results(
 
 
 def _holds_more(folder: Path, taken: Collection[Path]) -> bool:
-    """Whether a folder holds more than inputs of the other kinds."""
+    """Return whether a folder holds more than inputs of the other kinds."""
     return folder not in taken and (any(run not in taken for run in find_runs(folder)) or bool(data_files(folder)))
 
 
 def _newest(results: Results, others: Found) -> datetime | None:
-    """When the newest of the inputs ended; None where none of them says."""
+    """Return when the newest of the inputs ended; None where none of them says."""
     records = [source.run.record for _, found in results for source in found.sources if source.run]
     texts = [record.ended_utc or record.started_utc for record in records]
     texts += [kind.when(path) for kind, found in others for path in found]
@@ -203,5 +203,5 @@ def render_part(analysis: Analysis[A], found: A) -> str:
 
 
 def _digest(found: Any) -> str:
-    """Letters that differ where the inputs do: ids of two results in one notebook do not meet."""
+    """Return letters that differ where the inputs do: ids of two results in one notebook do not meet."""
     return sha256("".join(source.sha256 for source in found.sources).encode()).hexdigest()[:8]

@@ -73,7 +73,7 @@ def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked | No
 
 
 def _commands(results: Sequence[tuple[Analysis[Any], Any]], typed: Sequence[Path]) -> Iterator[str]:
-    """Those of the analyses."""
+    """Return the commands of the analyses."""
     for analysis, found in results:
         options = list(dict.fromkeys(_options(origin.options) for origin in found.origins))
         for given in options:
@@ -84,7 +84,7 @@ def _commands(results: Sequence[tuple[Analysis[Any], Any]], typed: Sequence[Path
 
 
 def named_in_commands(sources: Sequence[Source[Any]], typed: Sequence[Path] = ()) -> list[str]:
-    """As one types them; of many the paths that were typed and hold them, or else their folders."""
+    """Return the paths as one types them; of many those typed that hold them, or else their folders."""
     paths = [source.path for source in sources]
     if len(paths) > _MOST_NAMED:
         if holding := [path for path in typed if any(one.is_relative_to(path) for one in paths)]:
@@ -143,7 +143,7 @@ def _others(results: Sequence[tuple[Analysis[Any], Any]]) -> tuple[Note, ...]:
 
 
 def _given(options: Any) -> Iterator[str]:
-    """Names of the options that are not at their defaults and do not stand in the commands."""
+    """Yield the names of options that are not at their defaults and do not stand in the commands."""
     usual = type(options)()
     for name in options_of(type(options)):
         value = getattr(options, name)
@@ -152,7 +152,7 @@ def _given(options: Any) -> Iterator[str]:
 
 
 def _data(sources: Sequence[Source[Any]]) -> Tabular:
-    """Each input with its seed and its hash."""
+    """Return each input with its seed and its hash."""
     rows = [
         (
             source.name,
@@ -195,7 +195,7 @@ def _typed(words: Sequence[str]) -> str:
 
 
 def _versions(software: dict[str, str]) -> str:
-    """Levilab first.
+    """Return the versions, levilab's first.
 
     >>> _versions({"python": "3.11.7", "levilab": "0.1.0"})
     'levilab 0.1.0, python 3.11.7'

@@ -79,7 +79,7 @@ def counted() -> Counted:
 
 
 def about_window() -> list[Finding]:
-    """The edges of the exact window beside the thesis's limits, at the mass of its simulations."""
+    """Compare the edges of the exact window with the thesis's limits, at the mass of its simulations."""
     found = stability_of(started(ABOVE))
     assert found.floating is not None
     low, high = found.floating.spins[0]
@@ -108,7 +108,7 @@ def about_window() -> list[Finding]:
 
 
 def _why_above(edge: float) -> str:
-    """Why a start has a limit above the edge [Hz] of the window; empty where that is not what is found."""
+    """Return why a start has a limit above the edge [Hz] of the window; empty where that is not what is found."""
     scene, limit = started(ABOVE), SIMULATED_HZ[ABOVE][1]
     height = stability_of(scene).equilibria[-1].height
     rate = 2 * math.pi * float(np.abs(modes_at(scene, height, BEYOND_HZ).imag).max())
@@ -124,7 +124,7 @@ def _why_above(edge: float) -> str:
 
 
 def about_counter(seen: Counted) -> list[Finding]:
-    """What a counter counts, and what that does to the exponent of the drag."""
+    """Compute how the count differs from the spin, and how that changes the exponent of the drag."""
     laws = ("disc", "power")
     of_spin, of_count = (
         fit_spin_down(seen.time, values, 0.003, laws=laws, tilt=False, keep_outliers=True)
@@ -162,7 +162,7 @@ def about_counter(seen: Counted) -> list[Finding]:
 
 
 def about_lock() -> list[Finding]:
-    """Precession against drive: the line of a locked top, and its joint test."""
+    """Test precession against drive: the line of a locked top."""
     found = []
     for drive in DRIVES_HZ.tolist():
         scene = preset("precession").changed(

@@ -284,7 +284,7 @@ def statement(
 
 
 def _with_unit(number: str, unit: str) -> str:
-    """A number's text with its unit; a degree stands at the number.
+    """Return a number's text with its unit; a degree stands at the number.
 
     >>> _with_unit("1.5", "°"), _with_unit("0.0032", "1/s"), _with_unit("82", "")
     ('1.5°', '0.0032 s⁻¹', '82')
@@ -293,7 +293,7 @@ def _with_unit(number: str, unit: str) -> str:
 
 
 def _like(value: float, published: Printed) -> str:
-    """A number with as many decimals as the print has and one more, so that its rounding can be seen, at least two.
+    """Return a number with one decimal more than the print, at least two, so that its rounding is seen.
 
     >>> from levilab.stability.published.printed import Printed
     >>> _like(22.0799, Printed("22.06", "Hz", "", "")), _like(1.76004e-5, Printed("1.760e-5", "1/rad", "", ""))
@@ -307,7 +307,7 @@ def _like(value: float, published: Printed) -> str:
 
 
 def _raised(text: str) -> str:
-    """A number's text with its power of ten as people write it."""
+    """Return a number's text with its power of ten as people write it."""
     mantissa, _, power = text.lower().partition("e")
     return f"{mantissa}×10{power.translate(_HIGH)}" if power else text
 
@@ -316,19 +316,19 @@ _HIGH = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def counts(findings: Iterable[Finding]) -> dict[Verdict, int]:
-    """How many of each verdict, in their order."""
+    """Count the findings of each verdict, in their order."""
     found = [one.verdict for one in findings]
     return {verdict: found.count(verdict) for verdict in Verdict}
 
 
 def agreeing(findings: Iterable[Finding]) -> dict[Comparison, int]:
-    """How many agree, by what their comparison is worth."""
+    """Count those that agree, by the worth of their comparison."""
     found = [one.comparison for one in findings if one.verdict is Verdict.AGREES]
     return {comparison: found.count(comparison) for comparison in Comparison}
 
 
 def as_document(finding: Finding) -> dict[str, Any]:
-    """A finding for JSON: texts as people see them, and the numbers with full precision."""
+    """Return a finding for JSON: texts as people see them, and the numbers with full precision."""
     document: dict[str, Any] = {
         "name": finding.name,
         "place": finding.place,

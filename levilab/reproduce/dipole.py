@@ -32,7 +32,7 @@ DISC = POINT | {"top.magnet": "disc"}
 
 
 def by_rings(height: float) -> float:
-    """The mean of B_z [T] over the disc at a height [m], by a rule that shares no node with the simulator's.
+    """Return the mean of B_z [T] over the disc at a height [m], by a rule that shares no node with the simulator's.
 
     Rings of equal width, weighted by r, where the simulator's are of equal area; on a radius alone, since the field
     has no angle.

@@ -48,12 +48,12 @@ def azimuth(motion: Trajectory, fastest: float) -> Azimuth:
 
 
 def wave(lines: AxisLines, name: str) -> float:
-    """The frequency of the line with a name [Hz], NaN without one."""
+    """Return the frequency of the line with a name [Hz], NaN without one."""
     return next((line.frequency for line in lines.lines if line.name == name), math.nan)
 
 
 def sideband(lines: AxisLines) -> float:
-    """The distance of the sidebands next to the drive's line [Hz]: the spin's swing about the drive."""
+    """Return the distance of the sidebands next to the drive's line [Hz]: the spin's swing about the drive."""
     drive = wave(lines, "drive")
     return min(
         (abs(line.frequency - drive) for line in lines.lines if line.name.startswith("drive ")), default=math.nan
@@ -61,7 +61,7 @@ def sideband(lines: AxisLines) -> float:
 
 
 def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
-    """What the run says of the spin."""
+    """Compare the spin of the run."""
     spin, drive = motion.spin_hz, THESIS["driven.drive"]
     turns = float(np.trapezoid(spin, motion.time)) / float(motion.time[-1])
     locked = is_locked(motion.scene, motion.states, survived=motion.survived)
@@ -114,7 +114,7 @@ def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
 
 
 def power_near(lines: AxisLines, width: float) -> float:
-    """The share of the power of n_x + i n_y within a distance [Hz] of a line with a name; NaN without a spectrum."""
+    """Return the share of the power of n_x + i n_y within a distance [Hz] of a line; NaN without a spectrum."""
     if lines.spectrum is None:
         return math.nan
     frequency, amplitude = lines.spectrum
@@ -124,7 +124,7 @@ def power_near(lines: AxisLines, width: float) -> float:
 
 
 def of_azimuth(found: Azimuth, lines: AxisLines) -> list[Finding]:
-    """Why φ̇ looks chaotic, and the spectrum does not."""
+    """Explain why φ̇ looks chaotic, and the spectrum does not."""
     named = [line for line in lines.lines if line.name]
     power = sum(line.amplitude**2 for line in named)
     all_power = float(np.mean(np.abs(lines.signal[0]) ** 2)) if lines.signal else math.nan

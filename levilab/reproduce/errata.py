@@ -37,7 +37,7 @@ ON_AXIS = {"start.position_m": [0.0, 0.0, 0.073], "start.velocity_m_s": [0.0, 0.
 
 
 def rate(scene: Scene, value: Callable[[Trajectory], Array]) -> float:
-    """The rate of change of a quantity of the motion at its start, from the simulated motion alone."""
+    """Return the rate of change of a quantity of the motion at its start, from the simulated motion alone."""
     ends = [
         float(value(simulate(scene, sign * _H_S, tolerance=1e-14, rate=None, step=_H_S / 4))[-1]) for sign in (1, -1)
     ]
@@ -45,14 +45,14 @@ def rate(scene: Scene, value: Callable[[Trajectory], Array]) -> float:
 
 
 def bend(scene: Scene, value: Callable[[Trajectory], Array], h: float = 5e-5) -> float:
-    """The second rate of change at the start."""
+    """Return the second rate of change at the start."""
     motions = [simulate(scene, sign * h, tolerance=1e-14, rate=None, step=h / 8) for sign in (1, -1)]
     after, before = (float(value(one)[-1]) for one in motions)
     return (after - 2 * float(value(motions[0])[0]) + before) / h**2
 
 
 def centre_of_mass() -> Finding:
-    """The centre of mass of the disc on the floor, from its two faces."""
+    """Compute the centre of mass of the disc on the floor, from its two faces."""
     top, grams = preset("undriven").top, 1e3 * MASS_KG
     height = 100 * top.magnet_height_m
     nodes, weights = np.polynomial.legendre.leggauss(4)
@@ -72,7 +72,7 @@ def centre_of_mass() -> Finding:
 
 
 def rotation() -> Finding:
-    """The kinetic energy that is gained is the potential energy that is lost."""
+    """Compare the kinetic energy that is gained with the potential energy that is lost."""
     scene = started("IC1")
     top = scene.top
     motion = simulate(scene, 0.3, tolerance=1e-10, rate=10.0)
@@ -96,7 +96,7 @@ def rotation() -> Finding:
 
 
 def fourth_power() -> Finding:
-    """The coefficient of r⁴ in the potential's series, from the exact field beside the axis."""
+    """Compute the coefficient of r⁴ in the potential's series, from the exact field beside the axis."""
     z, base = 0.073, preset("undriven").base
     ring = Ring(base.strength_t_m, 0.0, 0.0, base.inner_radius_m, base.outer_radius_m)
     b, _, second, _, fourth = ring_on_axis(ring, np.array([z]), 5)[:, 0]
@@ -118,7 +118,7 @@ def fourth_power() -> Finding:
 
 
 def thickness() -> Finding:
-    """The field of a base of one material, twice as thick: two bases on each other."""
+    """Compute the field of a base of one material, twice as thick: two bases on each other."""
     a, b, z, h = 0.030, 0.055, np.array([0.073]), 0.002
 
     def flux(strength: float, thick: float, origin: float) -> float:
@@ -139,7 +139,7 @@ def thickness() -> Finding:
 
 
 def bracket() -> Finding:
-    """The rise of |B| beside the axis, in the thesis's units."""
+    """Compute the rise of |B| beside the axis, in the thesis's units."""
     base, z = preset("undriven").base, 0.073
     a, aside = 100 * base.inner_radius_m, 0.02
     exact = field_of(base.inner_radius_m, base.outer_radius_m, base.strength_t_m, "exact")
@@ -160,7 +160,7 @@ def bracket() -> Finding:
 
 
 def least_spin() -> Finding:
-    """The spin at which the two fast roots of a top on a fixed point become real, found by looking at the roots.
+    """Find the spin at which the two fast roots of a top on a fixed point become real, from the roots.
 
     Of the top of the first chapter, where it floats: a heavier one floats lower, in a stronger field, and needs more.
     """
@@ -189,7 +189,7 @@ def least_spin() -> Finding:
 
 
 def drive() -> list[Finding]:
-    """The torque of the drive on an upright top at the start."""
+    """Compute the torque of the drive on an upright top at the start."""
     scene = preset("driven").changed({**ON_AXIS, "start.tilt_rad": 0.0})
     top = scene.top
     torque = top.moment_a_m2 * top.moment_tilt[0] * scene.drive.amplitude_t
@@ -222,7 +222,7 @@ def drive() -> list[Finding]:
 
 
 def drag() -> list[Finding]:
-    """What drag does to the spin: backwards, by Newton's law, and as a torque."""
+    """Compute the effect of drag on the spin: backwards, by Newton's law, and as a torque."""
     from scipy.integrate import solve_ivp
 
     backwards = preset("friction").changed({**ON_AXIS, "start.spin_hz": -30.0})
@@ -280,12 +280,12 @@ def drag() -> list[Finding]:
 
 
 def several_mean(name: str) -> float:
-    """The mean of a printed list."""
+    """Compute the mean of a printed list."""
     return float(np.mean([THESIS[f"{name}.{k}"].value for k in range(4)]))
 
 
 def tilting() -> Finding:
-    """The equation of θ at the start, on the axis, in the thesis's units."""
+    """Compute the equation of θ at the start, on the axis, in the thesis's units."""
     scene = started("IC1").changed({**ON_AXIS, "start.tilt_rad": 0.1})
     top, spin, theta = scene.top, 2 * math.pi * scene.start.spin_hz, scene.start.tilt_rad
     sin, cos = math.sin(theta), math.cos(theta)
@@ -307,7 +307,7 @@ def tilting() -> Finding:
 
 
 def force() -> Finding:
-    """The force on a top below the height at which it floats."""
+    """Compute the force on a top below the height at which it floats."""
     scene = started("IC1").changed({**ON_AXIS, "start.position_m": [0.0, 0.0, 0.071], "start.tilt_rad": 0.0})
     top = scene.top
     upward = top.moment_a_m2 * float(on_axis(base_field(scene), np.array([0.071]))[1, 0]) / top.mass_kg
@@ -325,7 +325,7 @@ def force() -> Finding:
 
 
 def table_of_parameters() -> list[Finding]:
-    """Units and mass of Table 3.1."""
+    """Compare units and mass of Table 3.1."""
     scene = preset("undriven")
     rho, mu = THESIS["device.strength"].value, THESIS["device.moment"].value
     a, b, g = (THESIS[f"device.{key}"].value for key in ("inner_radius", "outer_radius", "gravity"))
@@ -361,7 +361,7 @@ def table_of_parameters() -> list[Finding]:
 
 
 def tilt_of_moment() -> Finding:
-    """How far the moment of (4.4) leans: from the torque of a field along the axis."""
+    """Compute the lean of the moment of (4.4), from the torque of a field along the axis."""
     across, along = preset("driven").top.moment_tilt
     moment = np.array([across, 0.0, along])
     torque = np.cross(moment, [0.0, 0.0, 1.0])
@@ -379,7 +379,7 @@ def tilt_of_moment() -> Finding:
 
 
 def third_start() -> Finding:
-    """The lower limit from x = 0.50 and 0.30 cm."""
+    """Simulate the lower limit from x = 0.50 and 0.30 cm."""
     printed, step = THESIS["limits.lower.IC3"], 0.05
     spins = scan(21.8, 25.3, step)
     aside = np.array([0.005, 0.003])

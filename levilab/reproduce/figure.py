@@ -49,13 +49,13 @@ Box = tuple[float, float, float, float]
 
 
 def _figure(height: float, *boxes: Box) -> tuple[Figure, list[Axes]]:
-    """A wide figure and its panels; placed by hand, since automatic layouts differ in the last bit."""
+    """Return a wide figure and its panels; placed by hand, since automatic layouts differ in the last bit."""
     figure = Figure(figsize=(WIDE, height))
     return figure, [figure.add_axes(box) for box in boxes]
 
 
 def _band(axes: Axes, time: Array, values: Array, colour: str) -> None:
-    """A curve, or the band between its least and greatest values where it has too many points."""
+    """Draw a curve, or the band between its least and greatest values where it has too many points."""
     if time.size <= 2 * PIECES:
         axes.plot(time, values, color=colour, linewidth=0.8)
         return
@@ -84,7 +84,7 @@ class Contours:
 
 
 def rim(shown: Contours) -> float:
-    """The energy of the lowest pass out of the trap [µJ]: up to there its basin does not reach the picture's edge."""
+    """Return the energy of the lowest pass out of the trap [µJ]: below it a basin stays inside the picture."""
     from scipy.ndimage import label
 
     centre = (int(np.argmin(np.abs(shown.z - shown.height))), int(np.argmin(np.abs(shown.r))))
@@ -100,7 +100,7 @@ def rim(shown: Contours) -> float:
 
 @mpl.rc_context(STYLE)
 def contour_figure(shown: Sequence[Contours], names: Sequence[str]) -> Figure:
-    """The potential of tops of several masses."""
+    """Draw the potential of tops of several masses."""
     width = 0.27
     figure, panels = _figure(2.9, *[(0.075 + k * 0.315, 0.16, width, 0.74) for k in range(len(shown))])
     for axes, one, name in zip(panels, shown, names, strict=True):
@@ -117,7 +117,7 @@ def contour_figure(shown: Sequence[Contours], names: Sequence[str]) -> Figure:
 
 @mpl.rc_context(STYLE)
 def window_figure(over: MassWindows, estimate: float) -> Figure:
-    """The window of spin over mass."""
+    """Draw the window of spin over mass."""
     figure, (axes,) = _figure(3.2, (0.085, 0.15, 0.57, 0.79))
     masses = 1e3 * over.masses
     up = LOOKS["up"].colour
@@ -162,7 +162,7 @@ class Scans:
 
 @mpl.rc_context(STYLE)
 def limits_figure(shown: Scans) -> Figure:
-    """Scans of the upper limit, and what the lower ones depend on."""
+    """Draw scans of the upper limit, and the dependences of the lower ones."""
     figure, panels = _figure(
         5.2, (0.085, 0.63, 0.9, 0.26), (0.085, 0.1, 0.26, 0.37), (0.49, 0.1, 0.205, 0.37), (0.785, 0.1, 0.2, 0.37)
     )
@@ -228,7 +228,7 @@ def _draw_aside(axes: Axes, shown: Scans) -> None:
 
 @mpl.rc_context(STYLE)
 def paths_figure(shown: Mapping[str, Trajectory]) -> Figure:
-    """Paths over x and z."""
+    """Draw paths over x and z."""
     figure, panels = _figure(
         4.6, *[(0.085 + 0.48 * (k % 2), 0.59 - 0.48 * (k // 2), 0.41, 0.35) for k in range(len(shown))]
     )
@@ -243,7 +243,7 @@ def paths_figure(shown: Mapping[str, Trajectory]) -> Figure:
 
 @mpl.rc_context(STYLE)
 def fall_figure(motion: Trajectory) -> Figure:
-    """Tilt, height and spin up to the fall."""
+    """Draw tilt, height and spin up to the fall."""
     boxes = [(0.085, 0.68 - 0.285 * k, 0.43, 0.25) for k in range(3)]
     boxes += [(0.585, 0.68 - 0.285 * k, 0.4, 0.25) for k in range(3)]
     figure, panels = _figure(4.6, *boxes)
@@ -271,7 +271,7 @@ def fall_figure(motion: Trajectory) -> Figure:
 
 @mpl.rc_context(STYLE)
 def tilted_figure(motions: tuple[Trajectory, Trajectory]) -> Figure:
-    """The axis from above, with a tilted and an aligned moment."""
+    """Draw the axis from above, with a tilted and an aligned moment."""
     figure, panels = _figure(3.3, (0.1, 0.14, 0.37, 0.78), (0.6, 0.14, 0.37, 0.78))
     most = max(float(np.abs(motion.axis[:, :2]).max()) for motion in motions) * 1.05e3
     for axes, motion, name in zip(panels, motions, ("moment tilted by 1.77°", "moment along the axis"), strict=True):
@@ -284,7 +284,7 @@ def tilted_figure(motions: tuple[Trajectory, Trajectory]) -> Figure:
 
 @mpl.rc_context(STYLE)
 def driven_figure(motion: Trajectory) -> Figure:
-    """The spin of the driven top."""
+    """Draw the spin of the driven top."""
     figure, panels = _figure(3.6, (0.085, 0.63, 0.89, 0.29), (0.085, 0.13, 0.89, 0.29))
     drive = motion.scene.drive.frequency_hz
     early = motion.time <= 20.0
@@ -330,7 +330,7 @@ _SLOW_HZ = 2.0
 
 @mpl.rc_context(STYLE)
 def azimuth_figure(motion: Trajectory, found: Azimuth, lines: AxisLines) -> Figure:
-    """The azimuth's rate, and the spectrum of the axis."""
+    """Draw the azimuth's rate, and the spectrum of the axis."""
     figure, panels = _figure(4.6, (0.085, 0.63, 0.5, 0.3), (0.68, 0.63, 0.305, 0.3), (0.085, 0.11, 0.9, 0.35))
     early = motion.time <= 5.0
     rate = np.where(np.abs(found.rate) > _CUT_HZ, np.nan, found.rate)
@@ -376,7 +376,7 @@ def azimuth_figure(motion: Trajectory, found: Azimuth, lines: AxisLines) -> Figu
 
 @mpl.rc_context(STYLE)
 def spindown_figure(runs: Sequence[tuple[Array, SpinDown]]) -> Figure:
-    """What three laws leave over of the runs."""
+    """Draw the residuals of the runs from three laws."""
     laws = (("stokes", "n = 1"), ("disc", "n = 3/2"), ("newton", "n = 2"))
     figure, panels = _figure(3.0, *[(0.085 + k * 0.305, 0.15, 0.285, 0.75) for k in range(3)])
     most = 1050 * max(float(np.abs(fit.fit(law).residuals).max()) for _, fit in runs for law, _ in laws)
@@ -397,7 +397,7 @@ def spindown_figure(runs: Sequence[tuple[Array, SpinDown]]) -> Figure:
 
 @mpl.rc_context(STYLE)
 def statistics_figure(values: Array, found: Statistics, edge: float) -> Figure:
-    """The ten limits, and their normal quantiles."""
+    """Draw the ten limits, and their normal quantiles."""
     from scipy.special import ndtri
 
     assert found.mean.value is not None
@@ -423,7 +423,7 @@ def statistics_figure(values: Array, found: Statistics, edge: float) -> Figure:
 
 @mpl.rc_context(STYLE)
 def counter_figure(spin: Array, count: Array, cosine: Array) -> Figure:
-    """The count less the spin."""
+    """Draw the count less the spin."""
     figure, (axes,) = _figure(2.9, (0.1, 0.16, 0.885, 0.78))
     order = np.argsort(spin)
     axes.plot(spin[order], 1e3 * (cosine - spin)[order], color=LOOKS["tilt"].colour, label="ω₃(1/cos θ − 1)/2π")
@@ -438,7 +438,7 @@ def counter_figure(spin: Array, count: Array, cosine: Array) -> Figure:
 
 @mpl.rc_context(STYLE)
 def dipole_figure(z: Array, fields: tuple[Array, Array], height: float) -> Figure:
-    """What a disc feels over what a point feels, and the curvature of the field of both."""
+    """Draw the force on a disc less that on a point, and the curvature of the field of both."""
     figure, panels = _figure(2.9, (0.085, 0.17, 0.4, 0.74), (0.575, 0.17, 0.41, 0.74))
     left, right = panels
     for k, name, colour, line in ((0, "energy, B", BLUE, "-"), (1, "force, B′", VERMILION, (0, (4, 2)))):
@@ -462,7 +462,7 @@ def dipole_figure(z: Array, fields: tuple[Array, Array], height: float) -> Figur
 def simon_figure(
     scans: Sequence[tuple[str, Array, Flags, tuple[float, float], tuple[float, float]]],
 ) -> Figure:
-    """Survival of the three tops over spin."""
+    """Draw survival of the three tops over spin."""
     figure, panels = _figure(2.9, *[(0.14, 0.67 - 0.265 * k, 0.845, 0.14) for k in range(len(scans))])
     for axes, (name, spins, up, window, printed) in zip(panels, scans, strict=True):
         extent = (spins[0] - 0.5, spins[-1] + 0.5, 0.0, 1.0)
@@ -487,7 +487,7 @@ def simon_figure(
 
 @mpl.rc_context(STYLE)
 def gans_figure(spins: Array, tilts: Array, up: Flags, window: tuple[float, float]) -> Figure:
-    """Survival over spin and tilt."""
+    """Draw survival over spin and tilt."""
     figure, (axes,) = _figure(3.0, (0.085, 0.15, 0.66, 0.8))
     axes.pcolormesh(spins, tilts, up.T.astype(float), cmap=FATES, vmin=0, vmax=1, shading="nearest", rasterized=True)
     axes.set_yscale("log")

@@ -43,7 +43,7 @@ def unit_hz() -> float:
 
 
 def scene() -> Scene:
-    """The paper's model with the program's parameters: at rest where it floats, with its spin and tilt."""
+    """Return the paper's model with the program's parameters: at rest where it floats, with its spin and tilt."""
     get = {key: GANS[f"model.{key}"].value for key in ("transverse", "axial", "strength", "spin", "tilt")}
     inertia = MASS_KG * RADIUS_M**2
     strength = get["strength"] * MASS_KG * GRAVITY * RADIUS_M**2 / (4 * math.pi * HALF_WIDTH * MOMENT_A_M2)
@@ -68,7 +68,7 @@ def scene() -> Scene:
 
 
 def edges_by_hand() -> tuple[float, float]:
-    """The upper region's edges for a ring of dipoles, from the polynomials of its field [R].
+    """Return the upper region's edges for a ring of dipoles, from the polynomials of its field [R].
 
     ψ = Z/(1 + Z²)^(3/2): up and down it is stable above the zero of ψ⁗ in 8Z⁴ − 24Z² + 3, sideways below the zero of
     ψ″² − 2ψ‴ψ′, with the derivatives as polynomials over powers of 1 + Z².
@@ -86,18 +86,18 @@ def edges_by_hand() -> tuple[float, float]:
 
 
 def _zeros(polynomial: Any) -> list[float]:
-    """Real zeros above 0."""
+    """Return the real zeros above 0."""
     return [float(root.real) for root in polynomial.roots() if abs(root.imag) < 1e-9 and root.real > 1e-9]
 
 
 def survival_map() -> Flags:
-    """Which tops are up over spin and tilt, shape (spins, tilts)."""
+    """Return which tops are up over spin and tilt, shape (spins, tilts)."""
     over = {"start.spin_hz": SPINS[:, None] * unit_hz(), "start.tilt_rad": TILTS[None, :]}
     return many(scene(), over, DURATION_S).survived
 
 
 def amplitudes() -> tuple[Array, float]:
-    """Largest distance from the axis over the tilt of the start [R], and the power of the tilt with which it grows."""
+    """Return the largest distance from the axis over the start's tilt [R], and the power of the tilt it grows with."""
     found = many(scene(), {"start.tilt_rad": SMALL_TILTS}, 10.0, rate=200.0, columns=[0, 1])
     away = np.max(np.hypot(found.samples[..., 0], found.samples[..., 1]), axis=-1) / RADIUS_M
     return away, float(np.polyfit(np.log(SMALL_TILTS), np.log(away), 1)[0])

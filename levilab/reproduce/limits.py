@@ -54,7 +54,7 @@ class Upper:
 
 
 def lower_over_masses(name: str) -> Array:
-    """The lower limit from a start for each of the masses, shape (n,) [Hz]; NaN where the scan does not hold it."""
+    """Return the lower limit from a start for each mass, shape (n,) [Hz]; NaN outside of the scan."""
     printed = SIMULATED_HZ[name][0]
     spins = scan(printed - AROUND_HZ, printed + AROUND_HZ, STEP_HZ)
     up = many(started(name), {"start.spin_hz": spins[None, :], "top.mass_kg": MASSES_KG[:, None]}).survived
@@ -62,7 +62,7 @@ def lower_over_masses(name: str) -> Array:
 
 
 def best_mass(lower: dict[str, Array]) -> tuple[float, Array]:
-    """The mass [kg] whose lower limits are nearest to the four printed ones, and the rms difference of each [Hz]."""
+    """Return the mass [kg] whose lower limits are nearest to the four printed ones, and each rms difference [Hz]."""
     off = np.array([lower[name] - SIMULATED_HZ[name][0] for name in STARTS])
     rms = np.sqrt(np.mean(off**2, axis=0))
     return float(MASSES_KG[np.nanargmin(rms)]), rms
@@ -76,13 +76,13 @@ def upper_scan(name: str, spins: Array) -> Upper:
 
 
 def falls(name: str, *settings: str) -> Array:
-    """The spins at which tops with the thesis's drag come down to 6 cm, from starts alike, shape (n,) [Hz]."""
+    """Return the spins at which tops with the thesis's drag come down to 6 cm, from starts alike, shape (n,) [Hz]."""
     scene = started(name, "friction", f"escape.height_m={FALL_M}", *settings)
     return many(scene, {"start.spin_hz": DRAG_STARTS_HZ}, DRAG_S).spin_hz
 
 
 def lower_checks(lower: dict[str, Array], mass: float) -> list[Finding]:
-    """The lower limits at the mass that fits all."""
+    """Compare the lower limits at the mass that fits all."""
     at = int(np.argmin(np.abs(MASSES_KG - mass)))
     found: list[Finding] = [
         statement(
@@ -109,7 +109,7 @@ def lower_checks(lower: dict[str, Array], mass: float) -> list[Finding]:
 
 
 def upper_checks(uppers: dict[str, Upper]) -> list[Finding]:
-    """The upper limits: a single number only where no island is."""
+    """Compare the upper limits: a single number only where no island is."""
     edge = stability_of(started("IC1")).floating
     assert edge is not None
     found: list[Finding] = []
@@ -133,7 +133,7 @@ def upper_checks(uppers: dict[str, Upper]) -> list[Finding]:
 
 
 def drag_checks() -> tuple[list[Finding], dict[str, Array]]:
-    """The spin at the fall with drag: of many starts alike, since the phase at the fall decides."""
+    """Compare the spin at the fall with drag: of many starts alike, since the phase at the fall decides."""
     spins = {name: falls(name) for name in STARTS}
     found: list[Finding] = []
     for name, ends in spins.items():
@@ -159,7 +159,7 @@ def drag_checks() -> tuple[list[Finding], dict[str, Array]]:
 
 
 def misprint(with_030: Array) -> tuple[list[Finding], Array]:
-    """The third start as printed and with other places beside the axis.
+    """Simulate the third start as printed and with other places beside the axis.
 
     Args:
         with_030: spins at the fall with x = 0.30 cm, shape (n,) [Hz].

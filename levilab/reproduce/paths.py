@@ -37,7 +37,7 @@ NEAR = 0.06
 
 
 def paths() -> tuple[list[Finding], dict[str, Trajectory]]:
-    """The four paths, and whether their constants of motion are constant and their lines those of theory."""
+    """Simulate the four paths, and compare their constants of motion, and their lines with theory."""
     shown = {name: simulate(started(name), PATH_S, tolerance=1e-8, rate=PATH_HZ) for name in STARTS}
     found: list[Finding] = []
     for name, motion in shown.items():
@@ -58,7 +58,7 @@ def paths() -> tuple[list[Finding], dict[str, Trajectory]]:
 
 
 def modes() -> list[Finding]:
-    """The lines of the calm start IC2 beside the roots of the quartic."""
+    """Compare the lines of the calm start IC2 with the roots of the quartic."""
     scene = started("IC2")
     found = stability_of(scene)
     motion = simulate(scene, DURATION_S, tolerance=1e-8, rate=float(math.ceil(rate_for(scene))))
@@ -97,7 +97,7 @@ def compare_sleeping_limits(scene: Scene) -> tuple[float, str, bool]:
 
 
 def fall() -> tuple[Finding, Trajectory]:
-    """A top with drag from 30 Hz: how its tilt grows at the end."""
+    """Simulate a top with drag from 30 Hz: how its tilt grows at the end."""
     scene = started("IC1", "friction", f"escape.height_m={FALL_M}")
     motion = simulate(scene, FALL_S, tolerance=1e-6, rate=FALL_HZ)
     early = motion.time < motion.time[-1] - SHOWN_S
@@ -120,7 +120,7 @@ def fall() -> tuple[Finding, Trajectory]:
 
 
 def sudden_fall() -> Finding:
-    """Without drag, just below the lower limit: when the tilt is very large."""
+    """Find when the tilt is very large, without drag, just below the lower limit."""
     limit = SIMULATED_HZ["IC1"][0]
     spins = limit - 0.01 * np.arange(1, 4)
     times = []
@@ -138,7 +138,7 @@ def sudden_fall() -> Finding:
 
 
 def shorter_run() -> Finding:
-    """How much earlier a top with a tilted moment falls, with drag: of starts alike, for several masses."""
+    """Compute how much earlier a top with a tilted moment falls, with drag: of starts alike, for several masses."""
     aligned = started("IC1", "friction", f"escape.height_m={FALL_M}")
     leaning = aligned.changed({"top.moment_tilt": list(preset("tilted").top.moment_tilt)})
     spins = 30.0 + 0.001 * np.arange(24)
@@ -162,7 +162,7 @@ def shorter_run() -> Finding:
 
 
 def tilted() -> tuple[list[Finding], tuple[Trajectory, Trajectory]]:
-    """A moment that is tilted in the top beside one that is as strong along the axis, but aligned."""
+    """Simulate a moment tilted in the top beside one that is as strong along the axis, but aligned."""
     scene = preset("tilted")
     across, along = scene.top.moment_tilt
     aligned = scene.changed({"top.moment_tilt": [0.0, along]})

@@ -41,7 +41,7 @@ HOW_TO_READ = (
 
 
 def format_of(output: Path) -> Format:
-    """The format that a file's name asks for.  Raises UnknownFormat, or what the format itself lacks."""
+    """Return the format that a file's name asks for.  Raises UnknownFormat, or what the format itself lacks."""
     found = FORMATS.get(output.suffix.lower())
     if found is None:
         raise UnknownFormat("output", "a name that ends in .html or .pdf is expected", value=output)
@@ -64,7 +64,7 @@ def write(found: Reproduction, output: Path) -> Path:
 
 
 def document_of(found: Reproduction) -> Document:
-    """The report; the same findings always make the same."""
+    """Return the report; the same findings always make the same."""
     unexpected = tuple(f"{chapter.title}: {finding.name}: {finding.why}" for chapter, finding in found.unexpected)
     counted = Tabular("overview", overview(found), first_column_wraps=True, narrow="turn")
     summary: list[Block] = [Verdict(in_words(found)), counted, Paragraph(HOW_TO_READ)]

@@ -56,7 +56,7 @@ class Reproduction:
 
 
 def chosen(only: str | None) -> list[Chapter]:
-    """The chapters of a list with commas, in the order of the report; all for None.
+    """Return the chapters of a list with commas, in the order of the report; all for None.
 
     Raises:
         UsageError: there is no such chapter, or the list is empty.
@@ -84,7 +84,7 @@ def reproduce(chapters: Iterable[Chapter], progress: Callable[[float, str], None
 
 
 def document(found: Reproduction) -> dict[str, Any]:
-    """All of it for JSON."""
+    """Return all of it for JSON."""
     return {
         "schema": SCHEMA,
         "synthetic": True,

@@ -67,7 +67,7 @@ class Simon:
 
 
 def row(number: str) -> Simon:
-    """A row of the table."""
+    """Return a row of the table."""
     get = {key: SIMON[f"top.{number}.{key}"].value for key in ("mass", "moment", "axial", "transverse")}
     flux = tuple(SIMON[f"top.{number}.{key}"].value for key in ("field", "slope", "half_bend"))
     top = SymmetricTop(get["mass"], get["transverse"], get["axial"], -get["moment"])
@@ -75,7 +75,7 @@ def row(number: str) -> Simon:
 
 
 def base_like(simon: Simon, ratio: float = RATIO) -> tuple[float, float, float]:
-    """A thin ring whose field has these B, B′, B″ at some height: inner radius [m], strength [T m], height [m].
+    """Return a thin ring whose field has these B, B′, B″ at some height: inner radius [m], strength [T m], height [m].
 
     With lengths in parts of the inner radius, B B″/B′² is a function of the height alone; there the radius follows
     from B/B′, and the strength from B.
@@ -105,7 +105,7 @@ def base_like(simon: Simon, ratio: float = RATIO) -> tuple[float, float, float]:
 
 
 def scene_of(simon: Simon, start: tuple[float, float], ratio: float = RATIO) -> Scene:
-    """The top over a ring with the paper's field where it floats, to r² in the potential, as the paper has it."""
+    """Return the top over a ring with the paper's field at its height, to r² in the potential, as the paper has it."""
     a, strength, height = base_like(simon, ratio)
     return preset("undriven").changed(
         {
@@ -126,7 +126,7 @@ def scene_of(simon: Simon, start: tuple[float, float], ratio: float = RATIO) -> 
 
 
 def limits(scene: Scene, simon: Simon) -> tuple[float, float, Array, Flags]:
-    """Simulated lower and upper limit [rad/s], the spins of the scan [rad/s], and which tops are up."""
+    """Simulate lower and upper limit [rad/s], the spins of the scan [rad/s], and which tops are up."""
     low, high = simon.window
     spins = scan(math.floor(0.9 * low), math.ceil(1.12 * high), STEP_RAD_S)
     up = many(scene, {"start.spin_hz": spins / TURN}, DURATION_S).survived
@@ -137,12 +137,12 @@ def limits(scene: Scene, simon: Simon) -> tuple[float, float, Array, Flags]:
 
 
 def lasting(simon: Simon, spin: float) -> float:
-    """How long a calm top lasts at a spin [rad/s], up to the duration of the scans [s]."""
+    """Return how long a calm top lasts at a spin [rad/s], up to the duration of the scans [s]."""
     return float(many(scene_of(simon, STARTS[0]), {"start.spin_hz": [spin / TURN]}, DURATION_S).time[0])
 
 
 def _among(values: list[float]) -> Among:
-    """A limit that depends on the start, which the paper does not give [rad/s]."""
+    """Return a limit that depends on the start, which the paper does not give [rad/s]."""
     low, high = min(values), max(values)
     starts = " and ".join(f"{1e3 * away:g} mm, {1e3 * tilt:g} mrad" for away, tilt in (STARTS[0], STARTS[-1]))
     why = (

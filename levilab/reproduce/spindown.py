@@ -33,7 +33,7 @@ KARMAN = 0.616
 
 
 def karman_disc() -> float:
-    """C of a laminar disc of the top's radius in air, with no free number [(rad/s)^-1/2/s].
+    """Return C of a laminar disc of the top's radius in air, with no free number [(rad/s)^-1/2/s].
 
     >>> f"{karman_disc():.3e}"
     '2.234e-04'
@@ -43,13 +43,13 @@ def karman_disc() -> float:
 
 
 def readings() -> tuple[MadeUp, ...]:
-    """The four runs, made up."""
+    """Return the four synthetic runs."""
     constants = zip(several("thesis", "spindown.c1"), several("thesis", "spindown.c2"), READINGS, strict=True)
     return tuple(solve(c1.value, c2.value, n) for c1, c2, n in constants)
 
 
 def straight(runs: tuple[MadeUp, ...]) -> list[Finding]:
-    """The straight lines through ln ω and 1/ω."""
+    """Compare the straight lines through ln ω and 1/ω."""
     found: list[Finding] = []
     for number, run in enumerate(runs):
         c1, c2 = straight_lines(run.time, run.spin)
@@ -64,7 +64,7 @@ def straight(runs: tuple[MadeUp, ...]) -> list[Finding]:
 
 
 def disc_law(fits: tuple[SpinDown, ...]) -> list[Finding]:
-    """The constant of the disc's law of each run, and which law describes the runs."""
+    """Compare the constant of the disc's law of each run, and which law describes the runs."""
     found: list[Finding] = []
     for number, fit in enumerate(fits):
         printed = several("thesis", "spindown.c32")[number]

@@ -36,7 +36,7 @@ def normality(values: Array) -> tuple[float, float]:
 
 
 def _trend(p: float) -> str:
-    """What the p-value of a trend says.
+    """Return the verdict of a trend's p-value.
 
     >>> _trend(0.5), _trend(0.06), _trend(0.04)
     ('no trend', 'a trend is neither shown nor excluded', 'a trend')

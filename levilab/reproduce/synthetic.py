@@ -51,12 +51,12 @@ def straight_lines(t: Array, nu: Array) -> tuple[float, float]:
 
 
 def as_printed(c1: float, c2: float) -> tuple[str, str]:
-    """The two constants with the digits of the thesis."""
+    """Return the two constants with the digits of the thesis."""
     return f"{c1:.6f}", f"{c2:.3e}"
 
 
 def solve(c1: float, c2: float, n: int) -> MadeUp:
-    """Readings that give the published constants to every printed digit, after rounding, and how they were made.
+    """Find readings that give the published constants to every printed digit, after rounding.
 
     The first seed is taken for which rounding does not move a digit and the start lies within 0.25 Hz of 40.
 

@@ -32,7 +32,7 @@ KINDS = {
 
 
 def findings_table(title: str, findings: Sequence[Finding]) -> Table:
-    """A row a finding; those that nothing explains are red."""
+    """Return a row a finding; those that nothing explains are red."""
     return table(
         title, HEADS, [Row(_cells(one), "outlier" if one.verdict is Verdict.UNEXPECTED else "") for one in findings]
     )
@@ -44,7 +44,7 @@ def _cells(one: Finding) -> tuple[str, ...]:
 
 
 def _compared_with(one: Finding) -> str:
-    """What ours is compared with, and below it what that is."""
+    """Return the value to compare with, and below it the kind of comparison."""
     if one.comparison is None:
         return one.published_text
     what = "what the print gives" if one.kind is Kind.EQUATION else one.comparison.value
@@ -52,7 +52,7 @@ def _compared_with(one: Finding) -> str:
 
 
 def overview(found: Reproduction) -> Table:
-    """A row a chapter: how many agree, of each kind, differ for a reason, are found here alone, are unexpected."""
+    """Return a table with a row a chapter: counts of each verdict."""
     heads = ("chapter", *KINDS.values(), "differ for\na reason", "found\nhere", "unexpected")
     rows = [
         Row((f"{chapter.title} ({chapter.name})", *numbers(of_chapter.findings)))
@@ -63,13 +63,13 @@ def overview(found: Reproduction) -> Table:
 
 
 def numbers(findings: Sequence[Finding]) -> list[str]:
-    """The counts of a row of the overview."""
+    """Return the counts of a row of the overview."""
     others = [count for verdict, count in counts(findings).items() if verdict is not Verdict.AGREES]
     return [str(n) for n in (*agreeing(findings).values(), *others)]
 
 
 def in_words(found: Reproduction) -> str:
-    """The counts in a sentence."""
+    """Return the counts in a sentence."""
     agree, differ, added, unexpected = (found.counts[verdict] for verdict in Verdict)
     independent, ranges, fitted, constructed, recomputed = agreeing(found.findings).values()
     said = (

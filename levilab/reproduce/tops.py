@@ -35,7 +35,7 @@ FALL_M = 0.06
 
 
 def started(name: str, scene: str = "undriven", *settings: str) -> Scene:
-    """A preset from a start of the thesis, with the mass of its simulations.
+    """Return a preset from a start of the thesis, with the mass of its simulations.
 
     >>> started("IC3").start.position_m, started("IC4").top.mass_kg
     ((0.003, 0.0, 0.0725), 0.025285)
@@ -44,7 +44,7 @@ def started(name: str, scene: str = "undriven", *settings: str) -> Scene:
 
 
 def estimate_hz() -> float:
-    """The thesis's own estimate of the least spin [Hz], of the mass and at the height that give what it prints.
+    """Return the thesis's own estimate of the least spin [Hz], of the mass and at the height that give what it prints.
 
     >>> f"{estimate_hz():.3f}"
     '14.005'
@@ -59,7 +59,7 @@ def many(scene: Scene, over: Mapping[str, ArrayLike], duration: float = DURATION
 
 
 def scan(low: float, high: float, step: float) -> Array:
-    """Spins from low to high [Hz], both included.
+    """Return spins from low to high [Hz], both included.
 
     >>> scan(21.9, 22.0, 0.05).tolist()
     [21.9, 21.95, 22.0]
@@ -68,5 +68,5 @@ def scan(low: float, high: float, step: float) -> Array:
 
 
 def survivors(scene: Scene, spins: Array, duration: float = DURATION_S) -> Flags:
-    """Which tops are still up after a time [s]."""
+    """Return which tops are still up after a time [s]."""
     return many(scene, {"start.spin_hz": spins}, duration).survived

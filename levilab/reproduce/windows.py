@@ -29,7 +29,7 @@ RESTING = 0.0360
 
 
 def heights_and_masses(scene: Scene, prefix: str) -> list[Finding]:
-    """The edges of the heights in parts of the inner radius, as the reference has them."""
+    """Compare the edges of the heights in parts of the inner radius with the reference."""
     found, a = stability_of(scene), scene.base.inner_radius_m
     low, high = found.windows
     edges = {"low": low.low, "low_end": low.high, "high": high.low, "high_end": high.high}
@@ -58,7 +58,7 @@ def effective_masses() -> list[Finding]:
 
 
 def device() -> list[Finding]:
-    """What the thesis says of its own top: masses, height, and its estimate of the least spin."""
+    """Compare the thesis's statements on its own top: masses, height, and its estimate of the least spin."""
     found = stability_of(preset("undriven"))
     window = found.lifted[-1]
     assert found.floating is not None
@@ -108,7 +108,7 @@ def device() -> list[Finding]:
 
 
 def contours(scene: Scene) -> Contours:
-    """U = mgz + |μ||B| − its value at the minimum, over r and z [J], in the exact field."""
+    """Return U = mgz + |μ||B| − its value at the minimum, over r and z [J], in the exact field."""
     from levilab.simulator.field import flux_density
     from levilab.simulator.model import base_field
 

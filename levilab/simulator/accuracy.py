@@ -72,7 +72,7 @@ def _strongest_damping(drag: Any, start: Array) -> Any:
 
 
 def has_kink(drag: Any) -> bool:
-    """Whether the drag's law has |ω| in it: then it is not smooth at ω = 0, and a step across that loses its order."""
+    """Return whether the drag's law has |ω| in it: a step across ω = 0, where it is not smooth, loses its order."""
     if isinstance(drag, braking.WasherDragFlow):
         return not (_is_linear(drag.washers) and _is_linear(drag.core))
     return isinstance(drag, braking.DragFlow) and not _is_linear(drag.law)
@@ -87,7 +87,7 @@ def _name_of(law: Any) -> str:
 
 
 def comes_near_zero(spins: Array) -> NDArray[np.bool_]:
-    """Whether spins at successive moments pass zero, or may have passed it in between.
+    """Return whether spins at successive moments pass zero, or may have passed it in between.
 
     Args:
         spins: shape (moments, …) [rad/s].

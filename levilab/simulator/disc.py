@@ -36,12 +36,12 @@ class Rule(NamedTuple):
     angles: int
 
     def with_more(self, number: int) -> Rule:
-        """So many more of each, or fewer: one of each less has an error that is well above that of this rule."""
+        """Return the rule with so many more of each, or fewer: one of each less has a well larger error."""
         return Rule(max(self.rings + number, 1), max(self.layers + number, 1), max(self.angles + number, 3))
 
 
 def rule_for(radius: Any, height: Any, distance: Any) -> Rule:
-    """The smallest rule for a disc of this radius and height at this distance from the base's nearest edge, all [m].
+    """Return the smallest rule for a disc of this radius and height at this distance from the base's edge, all [m].
 
     >>> rule_for(0.0144, 0.0033, 0.0763)
     Rule(rings=4, layers=4, angles=8)
@@ -57,12 +57,12 @@ def rule_for(radius: Any, height: Any, distance: Any) -> Rule:
 
 
 def _number(factor: float, rate: Any, most: int) -> int:
-    """The least n with factor · rateⁿ ≤ TARGET."""
+    """Return the least n with factor · rateⁿ ≤ TARGET."""
     return most if rate >= 1 else min(max(int(uniform(ceil(math.log(TARGET / factor) / log(rate)))), 1), most)
 
 
 def distance_to(base: Base, place: Any) -> Any:
-    """The distance [m] of a place, three numbers, from the nearest edge of the base."""
+    """Return the distance [m] of a place, three numbers, from the nearest edge of the base."""
     away = hypot(place[0], place[1])
     above = largest(abs(place[2] - base.origin_m) - base.thickness_m / 2, 0.0)
     inner, outer = (hypot(radius - away, above) for radius in (base.inner_radius_m, base.outer_radius_m))
@@ -70,7 +70,7 @@ def distance_to(base: Base, place: Any) -> Any:
 
 
 def nodes_of(top: Top, rule: Rule) -> Array:
-    """The nodes of a rule, shape (n, 4): place along e₁, e₂, axis [m], and weight; the weights add up to 1."""
+    """Return the nodes of a rule, shape (n, 4): place along e₁, e₂, axis [m], and weight; the weights add up to 1."""
     x, wx = np.polynomial.legendre.leggauss(rule.rings)
     z, wz = np.polynomial.legendre.leggauss(rule.layers)
     radius, height = uniform(top.magnet_radius_m), uniform(top.magnet_height_m)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def energy(scene: Scene, model: Model, states: Array) -> Array:
-    """Energy [J] of states of shape (n, 18), without the drive's part; constant where there is no drag and no drive.
+    """Return the energy [J] of states, shape (n, 18), without the drive's part; constant without drag and drive.
 
     If some numbers of scene and model are those of n tops, each has a state.
     """
@@ -60,7 +60,7 @@ def magnetic_energy(model: Model, states: Array) -> Array:
 
 
 def core_spin(states: Array, axial: ArrayLike, washers: ArrayLike) -> Array:
-    """ω₃ [rad/s] of the top, or of its core where washers are loose, which carries the magnet.
+    """Return ω₃ [rad/s] of the top, or of its core where washers are loose, which carries the magnet.
 
     Args:
         states: shape (…, 18).
@@ -72,17 +72,17 @@ def core_spin(states: Array, axial: ArrayLike, washers: ArrayLike) -> Array:
 
 
 def both_spins(states: Array, axial: ArrayLike, washers: ArrayLike) -> Array:
-    """ω₃ of the core as `core_spin` and that of loose washers, shape (…, 2) [rad/s]; both the same where none are."""
+    """Return ω₃ of the core as `core_spin` and that of loose washers, shape (…, 2) [rad/s]; without them the same."""
     core, washers = core_spin(states, axial, washers), np.asarray(washers)
     loose = states[..., LOOSE] / np.where(washers > 0, washers, 1.0)
     return np.stack([core, np.where(washers > 0, loose, core)], axis=-1)
 
 
 def spin_of(scene: Scene, states: Array) -> Array:
-    """ω₃ = L·n/I₃ of the states [rad/s]; with loose washers that of the core, which carries the magnet."""
+    """Return ω₃ = L·n/I₃ of the states [rad/s]; with loose washers that of the core, which carries the magnet."""
     return core_spin(np.atleast_2d(states), scene.top.inertia_axial_kg_m2, scene.washers.inertia_kg_m2)
 
 
 def spins_of(scene: Scene, states: Array) -> Array:
-    """ω₃ of the top, or of its core, and that of loose washers, shape (n, 2) [rad/s]; both the same where none are."""
+    """Return ω₃ of the top, or of its core, and that of loose washers, shape (n, 2) [rad/s]; without them the same."""
     return both_spins(np.atleast_2d(states), scene.top.inertia_axial_kg_m2, scene.washers.inertia_kg_m2)

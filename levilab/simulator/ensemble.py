@@ -381,7 +381,7 @@ def _check_counts(some: Batch, duration: float, steps: Array) -> None:
 
 
 def _limits(some: Batch) -> tuple[Array, Array]:
-    """Radius and height of each top's escape, shape (n,) [m]."""
+    """Return radius and height of each top's escape, shape (n,) [m]."""
     return some.runs[:, RADIUS], some.runs[:, HEIGHT]
 
 
@@ -446,7 +446,7 @@ def _estimates(some: Batch, states: Array, steps: Array) -> tuple[Array, Array]:
 
 
 def _may_have_stopped(some: Batch, states: Array) -> NDArray[np.bool_]:
-    """Whether the spin of each top, or that of its washers, may have passed zero on the way to its end.
+    """Return whether the spin of each top, or that of its washers, may have passed zero on the way to its end.
 
     Only start and end are known: it may have, if the spin is slow at one of them, or has changed by half.
     """

@@ -65,7 +65,7 @@ class Stability:
 
 
 def top_of(scene: Scene) -> stability.SymmetricTop:
-    """The scene's top, with the part of its moment that lies along the axis."""
+    """Return the scene's top, with the part of its moment that lies along the axis."""
     top = scene.top
     return stability.SymmetricTop(
         top.mass_kg,
@@ -83,7 +83,7 @@ _HEIGHT_FOR_NODES = 2.0
 
 
 def _nodes(scene: Scene, angles: int) -> Array:
-    """The nodes of the scene's magnet, with so many angles."""
+    """Return the nodes of the scene's magnet, with so many angles."""
     top, distance = scene.top, math.hypot(1, _HEIGHT_FOR_NODES) * scene.base.inner_radius_m
     return nodes_of(top, rule_for(top.magnet_radius_m, top.magnet_height_m, distance)._replace(angles=angles))
 
@@ -93,7 +93,7 @@ _DX, _DTHETA = 1e-4, 1e-3
 
 
 def _disc_stiffnesses(scene: Scene) -> Callable[[Array], Array]:
-    """The stiffnesses of a magnet of finite size, from its energy when it is moved and tilted a little."""
+    """Return the stiffnesses of a magnet of finite size, from its energy when it is moved and tilted a little."""
     field = base_field(scene)
     nodes = _nodes(scene, angles=4)  # to the second order in x and θ no fourth harmonic of the angle is felt
     moment = scene.top.moment_a_m2 * scene.top.moment_tilt[1]
@@ -142,12 +142,12 @@ def axial_field(scene: Scene) -> stability.AxialField:
 
 
 def modes_at(scene: Scene, height: float, spin_hz: float) -> NDArray[np.complex128]:
-    """The four sideways modes [Hz] of the scene's top at a height [m] and a spin [Hz]; complex where unstable."""
+    """Return the four sideways modes [Hz] of the scene's top at a height [m] and spin [Hz]; complex if unstable."""
     return stability.modes(axial_field(scene), top_of(scene), height, spin_hz)
 
 
 def stability_of(scene: Scene) -> Stability:
-    """Windows, equilibria and modes of a scene's top, upright on the axis of its base (a lean of it is left out)."""
+    """Return windows, equilibria and modes of a scene's top, upright on the axis of its base (lean left out)."""
     if scene.gravity_m_s2 == 0:
         raise SceneError(WEIGHTLESS)
     top, field = top_of(scene), axial_field(scene)
@@ -184,7 +184,7 @@ def _lifts(window: stability.Window, top: stability.SymmetricTop, field: stabili
 def nearest_mass(
     windows: tuple[stability.Window, ...], top: stability.SymmetricTop, field: stability.AxialField
 ) -> float | None:
-    """The mass [kg] nearest to the top's that floats; a thousandth inside of its window, whose edge holds nothing."""
+    """Return the mass [kg] nearest to the top's that floats, a thousandth inside of its window; None if none does."""
     candidates = []
     for window in (w for w in windows if _lifts(w, top, field)):
         margin = (window.heavy - window.light) / 1000
@@ -193,7 +193,7 @@ def nearest_mass(
 
 
 def floating_height(scene: Scene) -> Any:
-    """The height [m] at which the scene's top floats.  Raises SceneError, with the nearest mass that does.
+    """Return the height [m] at which the scene's top floats.  Raises SceneError, with the nearest mass that does.
 
     If numbers of the scene are those of many tops, so is the height.
     """
@@ -393,7 +393,7 @@ def _real_roots(cubics: Array) -> Array:
 
 
 def advice(found: Stability) -> str:
-    """Why a top does not float, and which one does."""
+    """Return why a top does not float, and which one does."""
     if found.top.moment == 0:
         return (
             "top.moment_tilt.1 = 0: a field lifts an upright top by the part of its moment that lies along its axis; "

@@ -23,7 +23,7 @@ _MOST = 60
 
 
 def exit_speeds(states: Array, across_height: NDArray[np.bool_]) -> Array:
-    """How fast [m/s] states leave across the limit of height or else of radius, never below 1e-12, shape (n,)."""
+    """Return how fast [m/s] states leave across the limit of height or radius, at least 1e-12, shape (n,)."""
     x, y, _ = states[:, R].T
     vx, vy, vz = states[:, V].T
     outwards = (x * vx + y * vy) / np.maximum(np.hypot(x, y), 1e-300)
@@ -31,18 +31,18 @@ def exit_speeds(states: Array, across_height: NDArray[np.bool_]) -> Array:
 
 
 def crossed_height(states: Array, escape: Limits) -> NDArray[np.bool_]:
-    """Whether it is the height that states are farther outside of, or nearer to, than the radius."""
+    """Return whether states are farther outside of, or nearer to, the height than the radius."""
     return np.asarray(np.argmin(_margins(states, escape), axis=0) == 0)
 
 
 def _margins(states: Array, escape: Limits) -> Array:
-    """How far [m] inside of the height and of the radius, shape (2, n)."""
+    """Return how far inside of the height and of the radius states are [m], shape (2, n)."""
     x, y, z = states[:, R].T
     return np.array([z - escape[1], escape[0] - np.hypot(x, y)])
 
 
 def at_the_crossing(after: Array, lengths: Array, escape: Limits, moved: Callable[[Array, Array], Array]) -> Array:
-    """The states at the limits, shape (n, 18), of tops that a step of these lengths [s] took there.
+    """Return the states at the limits, shape (n, 18), of tops that a step of these lengths [s] took there.
 
     Args:
         after: at the step's end, shape (n, 18).
@@ -72,7 +72,7 @@ def at_the_crossing(after: Array, lengths: Array, escape: Limits, moved: Callabl
 
 
 def _margin_rates(states: Array, height: NDArray[np.bool_]) -> Array:
-    """How fast the margin shrinks [m/s]; 1e-300 where it does not, which sends Newton out of the bracket."""
+    """Return how fast the margin shrinks [m/s]; 1e-300 where it does not, which sends Newton out of the bracket."""
     x, y, _ = states[:, R].T
     vx, vy, vz = states[:, V].T
     shrinking = np.where(height, -vz, (x * vx + y * vy) / np.maximum(np.hypot(x, y), 1e-300))
@@ -80,13 +80,13 @@ def _margin_rates(states: Array, height: NDArray[np.bool_]) -> Array:
 
 
 def margins(state: Array, escape: tuple[float, float]) -> dict[str, float]:
-    """How far [m] a state is inside of either limit; negative outside."""
+    """Return how far [m] a state is inside of either limit; negative outside."""
     x, y, z = state[R]
     return {"radius": escape[0] - float(np.hypot(x, y)), "height": float(z) - escape[1]}
 
 
 def exit_speed(state: Array, name: str) -> float:
-    """How fast [m/s] a state moves across the limit of that name; never quite 0."""
+    """Return how fast [m/s] a state moves across the limit of that name; never quite 0."""
     x, y, _ = state[R]
     vx, vy, vz = state[V]
     across = vz if name == "height" else (x * vx + y * vy) / max(float(np.hypot(x, y)), 1e-300)
@@ -96,7 +96,7 @@ def exit_speed(state: Array, name: str) -> float:
 def locate_escape(
     before: Array, length: float, moved: Callable[[Array, float], Array], escape: tuple[float, float]
 ) -> Event:
-    """The escape within a step from a state.
+    """Return the escape within a step from a state.
 
     Args:
         before: that state, shape (18,).
@@ -112,7 +112,7 @@ def locate_escape(
 def locate_zero(
     name: str, before: Array, length: float, moved: Callable[[Array, float], Array], value: Callable[[Array], float]
 ) -> Event:
-    """The moment within a step at which a value passes through zero, to the last digits of the time."""
+    """Return the moment within a step at which a value passes through zero, to the last digits of the time."""
     if value(before) == 0:
         return Event(name, float(before[TIME]), before)
     # relative to the step: xtol below the rounding of the time itself

@@ -38,7 +38,7 @@ def field_of(
     thickness: float = 0.0,
     origin: float = 0.0,
 ) -> Field:
-    """The field of a ring magnet.
+    """Return the field of a ring magnet.
 
     Args:
         inner_radius: [m].

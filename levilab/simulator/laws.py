@@ -23,7 +23,7 @@ class DragLaw:
     exponent: float | None
 
     def is_linear(self, constants: tuple[float, ...]) -> bool:
-        """Whether the drag is in proportion to the spin: any other has |ω| in it, and a kink at ω = 0."""
+        """Return whether the drag is in proportion to the spin: any other has |ω| in it, and a kink at ω = 0."""
         return self.exponent == 1 or constants[-1] == 0
 
 

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 def model_of(scene: Scene, place: Any = None, more_nodes: int = 0) -> Model:
-    """The numbers of a scene, typed by what it models; of many tops, if some of its numbers are `Numbers`.
+    """Return the numbers of a scene, typed by what it models; of many tops, if some of its numbers are `Numbers`.
 
     place: where the motion begins, three numbers [m], which a magnet of finite size takes its number of nodes from; the
     scene's own position if none is given.  more_nodes: rings, layers and angles beyond that number, negative for fewer,
@@ -45,7 +45,7 @@ def model_of(scene: Scene, place: Any = None, more_nodes: int = 0) -> Model:
 
 
 def base_field(scene: Scene, times: float = 1.0) -> Any:
-    """The field of the scene's base, one of the kinds of `levilab.simulator.kernels.fields`, times a factor."""
+    """Return the field of the scene's base, one of the kinds of `levilab.simulator.kernels.fields`, times a factor."""
     base = scene.base
     strength = base.strength_t_m * times
     radii = base.inner_radius_m, base.outer_radius_m
@@ -53,7 +53,7 @@ def base_field(scene: Scene, times: float = 1.0) -> Any:
 
 
 def _moment(scene: Scene) -> float:
-    """What the fields are multiplied by [A m²]: of an aligned dipole all of it, else the fractions stay apart."""
+    """Return the factor of the fields [A m²]: the whole of an aligned dipole, else the fractions stay apart."""
     top = scene.top
     return top.moment_a_m2 if has_attitude(scene) else top.moment_a_m2 * top.moment_tilt[1]
 
@@ -66,7 +66,7 @@ def gravity(scene: Scene) -> tuple[float, float, float]:
 
 
 def has_attitude(scene: Scene) -> bool:
-    """Whether the motion depends on how far the top has turned about its own axis."""
+    """Return whether the motion depends on how far the top has turned about its own axis."""
     return bool(scene.top.moment_tilt[0] != 0 or scene.top.magnet == "disc" or scene.washers.inertia_kg_m2 > 0)
 
 
@@ -99,7 +99,7 @@ def _drag(scene: Scene) -> Any:
 
 
 def _loose_drag(scene: Scene) -> braking.WasherDragFlow:
-    """The torque of the air is shared: each part slows as by a law of its own, scaled by I₃ over its inertia."""
+    """Return the shared torque of the air: each part slows as by a law of its own, scaled by I₃ over its inertia."""
     axial, washers = scene.top.inertia_axial_kg_m2, scene.washers.inertia_kg_m2
     core, share = axial - washers, scene.washers.drag_share
     law = braking.Stokes if scene.drag.law == "none" else braking.LAWS[scene.drag.law][0]

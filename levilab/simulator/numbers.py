@@ -92,32 +92,32 @@ sin, cos, log, hypot = (_of_each(function) for function in (math.sin, math.cos, 
 
 
 def sqrt(x: Any) -> Any:
-    """The root, which is exact to the last bit in either library."""
+    """Return the root, which is exact to the last bit in either library."""
     return np.sqrt(x) if isinstance(x, Numbers) else math.sqrt(x)
 
 
 def ceil(x: Any) -> Any:
-    """The next whole number."""
+    """Return the next whole number."""
     return np.ceil(x) if isinstance(x, Numbers) else math.ceil(x)
 
 
 def copysign(x: Any, sign: Any) -> Any:
-    """The size of one number with the sign of another."""
+    """Return the size of one number with the sign of another."""
     return np.copysign(x, sign) if isinstance(x, Numbers) or isinstance(sign, Numbers) else math.copysign(x, sign)
 
 
 def smallest(*values: Any) -> Any:
-    """The smallest, for each top."""
+    """Return the smallest, for each top."""
     return np.minimum.reduce(np.broadcast_arrays(*values)).view(Numbers) if _any(values) else min(values)
 
 
 def largest(*values: Any) -> Any:
-    """The largest, for each top."""
+    """Return the largest, for each top."""
     return np.maximum.reduce(np.broadcast_arrays(*values)).view(Numbers) if _any(values) else max(values)
 
 
 def length(vector: Any) -> Any:
-    """The length of a vector of three numbers."""
+    """Return the length of a vector of three numbers."""
     x, y, z = vector
     return sqrt(x * x + y * y + z * z)
 

@@ -36,7 +36,7 @@ def _numbers(count: int) -> BeforeValidator:
 
 
 def _one_or_two(value: Any) -> Any:
-    """A constant of drag is one number, or two; pydantic's own words for a union name its parts as keys."""
+    """Read a constant of drag, one number or two; pydantic's own words for a union name its parts as keys."""
     numbers = list(value) if isinstance(value, list | tuple) else [value]
     if value is None or (1 <= len(numbers) <= 2 and all(map(_from_zero, numbers))):
         return tuple(numbers) if len(numbers) == 2 else numbers[0]

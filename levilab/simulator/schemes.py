@@ -43,7 +43,7 @@ class Scheme:
 
 
 def _nystrom(name: str, order: int, drifts: list[float], kicks: list[float]) -> Scheme:
-    """From the first half of each: the rest follows from symmetry and from both sums being 1."""
+    """Return a scheme from the first half of each: the rest follows from symmetry and from both sums being 1."""
     a = [*drifts, 1 - 2 * sum(drifts)] if len(drifts) == len(kicks) + 1 else [*drifts, 0.5 - sum(drifts)]
     b = [*kicks, 0.5 - sum(kicks)] if len(drifts) == len(kicks) + 1 else [*kicks, 1 - 2 * sum(kicks)]
     even = len(drifts) == len(kicks) + 1

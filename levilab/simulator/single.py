@@ -266,7 +266,7 @@ _CLOSE_S = 0.0101
 
 
 def _crosses_kink(problem: Problem, run: Run, step: float) -> bool:
-    """Whether the spin, or that of loose washers, passes zero under a drag that is not smooth there."""
+    """Return whether the spin, or that of loose washers, passes zero under a drag that is not smooth there."""
     if not has_kink(problem.model.drag):
         return False
     states = run.states
@@ -319,7 +319,7 @@ def _run(problem: Problem, wanted: _Wanted, step: float) -> Run:
 
 
 def _are_wanted(times: Array, samples: Array, apart: float) -> NDArray[np.bool_]:
-    """Whether each time is a sample, the first or the last one, shape (n,).
+    """Return whether each time is a sample, the first or the last one, shape (n,).
 
     A kink within `apart` [s] of a sample, which is rounding, counts as that sample.
     """

@@ -24,7 +24,7 @@ _OPTION = "--{}"
 
 
 def stability_section(path: Path) -> Section:
-    """The section of such a file.  Raises DataError for one that is damaged."""
+    """Return the section of such a file.  Raises DataError for one that is damaged."""
     try:
         found = parse_json(path.read_text(encoding="utf-8"))
         scene = scene_of(found["scene"])

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def intervals(flags: Flags) -> list[tuple[int, int]]:
-    """First and last index of every run of flags that are set.
+    """Return first and last index of every run of flags that are set.
 
     >>> intervals(np.array([True, False, True, True]))
     [(0, 0), (2, 3)]
@@ -29,26 +29,26 @@ def intervals(flags: Flags) -> list[tuple[int, int]]:
 
 
 def lower_limit(spins: Array, up: Flags) -> float:
-    """The spin from which on every top of a scan is up [Hz]; NaN if the last one is not."""
+    """Return the spin from which on every top of a scan is up [Hz]; NaN if the last one is not."""
     lost = np.flatnonzero(~up)
     first = lost[-1] + 1 if lost.size else 0
     return float(spins[first]) if first < spins.size else math.nan
 
 
 def all_up_until(spins: Array, up: Flags) -> float:
-    """The spin up to which every top of a scan is up [Hz]; NaN if the first one is lost."""
+    """Return the spin up to which every top of a scan is up [Hz]; NaN if the first one is lost."""
     lost = np.flatnonzero(~up)
     last = lost[0] - 1 if lost.size else spins.size - 1
     return float(spins[last]) if last >= 0 else math.nan
 
 
 def last_up(spins: Array, up: Flags) -> float:
-    """The highest spin of a top that is up [Hz]; NaN if none is."""
+    """Return the highest spin of a top that is up [Hz]; NaN if none is."""
     found = np.flatnonzero(up)
     return float(spins[found[-1]]) if found.size else math.nan
 
 
 def upper_edges(spins: Array, up: Flags) -> Array:
-    """The spins above which a scan changes from up to lost [Hz], each in the middle of a step, shape (n,)."""
+    """Return the spins above which a scan changes from up to lost [Hz], each in the middle of a step, shape (n,)."""
     ends = np.flatnonzero(up[:-1] & ~up[1:])
     return np.asarray((spins[ends] + spins[ends + 1]) / 2)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def _range(which: int) -> str:
-    """The range of the simulated lower (0) or upper (1) limits."""
+    """Return the range of the simulated lower (0) or upper (1) limits."""
     limits = [pair[which] for pair in SIMULATED_HZ.values()]
     return f"{min(limits):.2f} – {max(limits):.2f}"
 
@@ -51,7 +51,7 @@ LEFT_OUT: tuple[tuple[Callable[[Scene], bool], str], ...] = (
 
 
 def print_stability(found: Stability) -> None:
-    """The windows, the equilibria, the spins; with the thesis's figures beside where it is the thesis's device."""
+    """Print the windows, the equilibria, the spins; beside the thesis's figures for the thesis's device."""
     out = terminal()
     out.print(f"[bold]{escape(found.scene.name or 'the scene')}: {escape(_headline(found))}[/bold]")
     out.print(_windows_table(found))
@@ -128,7 +128,7 @@ def _modes(found: Stability) -> str:
 
 
 def remarks(found: Stability) -> list[str]:
-    """What to mind."""
+    """Return what to mind."""
     scene = found.scene
     said = [text for is_there, text in LEFT_OUT if is_there(scene)]
     if scene.base.tilt_rad:

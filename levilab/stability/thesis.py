@@ -33,7 +33,7 @@ HIGHEST_HZ = _THESIS["measured.highest"].value
 
 
 def is_thesis_device(scene: Scene) -> bool:
-    """Whether base and top are the thesis's, whatever the mass: it prints one that its own field cannot lift."""
+    """Return whether base and top are the thesis's, whatever the mass: it prints one that its own field cannot lift."""
     base, top = scene.base, scene.top
     ring = (base.inner_radius_m, base.outer_radius_m, base.strength_t_m, base.thickness_m)
     body = (top.inertia_transverse_kg_m2, top.inertia_axial_kg_m2, abs(top.moment_a_m2))

@@ -84,7 +84,7 @@ def begin_adaptive(store: Store, observable: str = "survived", *, stride: int = 
 
 
 def is_adaptive(store: Store) -> bool:
-    """Whether a store is refined along a boundary."""
+    """Return whether a store is refined along a boundary."""
     return ASKED in store.group.attrs
 
 

@@ -146,7 +146,7 @@ def map_figure(found: Map, column: str = "survived", notes: Sequence[str] = ()) 
 
 
 def has_figure(plan: Plan) -> bool:
-    """Whether a plan has a figure: two or three axes that form a grid."""
+    """Return whether a plan has a figure: two or three axes that form a grid."""
     return not plan.is_table and 2 <= len(plan.axes) <= 3 and min(plan.shape) > 1
 
 
@@ -300,7 +300,7 @@ def _theories(plan: Plan, view: _View) -> list[_Theory | None]:
 
 
 def _changes_the_window(axis: Axis) -> bool:
-    """Whether the window is another along an axis; how the top starts does not change it."""
+    """Return whether the window is another along an axis; how the top starts does not change it."""
     return axis.key.startswith(("top.", "base.", "gravity"))
 
 

@@ -32,7 +32,7 @@ class Quantity:
         return f"{self.name}  [{self.unit}]" if self.unit else self.name
 
     def text(self, value: float) -> str:
-        """A value in SI, as people read it."""
+        """Return a value in SI, as people read it."""
         return f"{value * self.factor:.4g} {self.unit}".strip()
 
 

@@ -45,7 +45,7 @@ MOST_IN_A_TABLE = 100_000
 
 
 def sweep_section(path: Path) -> Section:
-    """The section of a store.  Raises DataError for a folder that is none, or damaged."""
+    """Return the section of a store.  Raises DataError for a folder that is none, or damaged."""
     store = Store.open(path)
     summary = summarise(store)
     report = report_in(store)
@@ -67,7 +67,7 @@ def sweep_section(path: Path) -> Section:
 
 
 def sweep_values(path: Path) -> tuple[tuple[str, ...], tuple[tuple[Any, ...], ...]] | None:
-    """Heads and rows of a table for programs: the points that are computed; None for a store of too many."""
+    """Return heads and rows of a table for programs: the points that are computed; None for too many."""
     store = Store.open(path)
     plan = store.plan
     if plan.size > MOST_IN_A_TABLE:
@@ -82,7 +82,7 @@ def sweep_values(path: Path) -> tuple[tuple[str, ...], tuple[tuple[Any, ...], ..
 
 
 def _cell(value: Any) -> Any:
-    """A value as Python's own; None for one that is not defined."""
+    """Return a value as Python's own; None for one that is not defined."""
     plain = value.item()
     return None if isinstance(plain, float) and not math.isfinite(plain) else plain
 

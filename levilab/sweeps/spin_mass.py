@@ -61,7 +61,7 @@ def span_of(name: str, text: str) -> Span:
 
 
 def check_duration(duration: float) -> float:
-    """How long a top of a map has to stay up [s].  Raises UsageError."""
+    """Check how long a top of a map has to stay up [s].  Raises UsageError."""
     if not 0 < duration < math.inf:
         raise UsageError("duration", "a number of seconds above 0 is expected", value=duration)
     return duration

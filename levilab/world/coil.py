@@ -28,7 +28,7 @@ class _Stretch:
     turns: float
 
     def field(self, times: Array) -> Array:
-        """The field at times within it [T]."""
+        """Return the field at times within it [T]."""
         since, burst = times - self.origin, self.output.burst
         if burst is None or burst.period is None:
             return voltage(self.output, self.turns + self.output.frequency * since, times)
@@ -39,7 +39,7 @@ class _Stretch:
 
 
 def _goes_on(before: Output, after: Output) -> bool:
-    """Whether bursts that start by themselves go on in their rhythm."""
+    """Return whether bursts that start by themselves go on in their rhythm."""
     return (before.burst, before.frequency) == (after.burst, after.frequency)
 
 
@@ -62,7 +62,7 @@ class Coil:
         self.history = Timeline(-math.inf, _Stretch(Output("DC", 0.0, 0.0, 0.0), 0.0, 0.0))
 
     def change(self, time: float, output: Output) -> None:
-        """From this time [s] on it is this, amplitude and offset in T; what was said of later times is gone."""
+        """Let the coil have this output from this time [s] on, in T; later changes are dropped."""
         last = self.history.at(math.nextafter(time, -math.inf))
         same = last.output == output and last.output.samples is output.samples
         if same and last is self.history.last:
@@ -82,12 +82,12 @@ class Coil:
         return _Stretch(output, time, turns % 127.0)
 
     def turns(self, time: float) -> float:
-        """How many turns the waveform has made at this time, without the phase that it is set to."""
+        """Return the turns that the waveform has made at this time, without the phase that it is set to."""
         now = self.history.at(time)
         return now.turns + now.output.frequency * (time - now.origin)
 
     def field(self, times: Array) -> Array:
-        """The field at these times, shape (n,) [T]."""
+        """Return the field at these times, shape (n,) [T]."""
         field = np.empty_like(times)
         for stretch, part in self.history.pieces(times):
             field[part] = stretch.field(times[part])

@@ -78,7 +78,7 @@ class Tape:
         return np.asarray(np.exp(-2 * (lift / self.view_m) ** 2))
 
     def pulse(self, turns: Array, rate: Array) -> Array:
-        """The pulses behind the phototransistor's pole, shape (n,): a Gaussian of height 1 in the middle of every turn.
+        """Return the pulses behind the phototransistor's pole, shape (n,): a Gaussian of height 1 in mid turn.
 
         Args:
             turns: since the tape was opposite to the lamp.
@@ -98,7 +98,7 @@ class Tape:
         return answer
 
     def mean_voltage(self, turns: Array, rate: Array, times: Array, height: Array | float = 1.0) -> Array:
-        """The voltage without its noise, shape (n,) [V].
+        """Return the voltage without its noise, shape (n,) [V].
 
         Args:
             turns: since the tape was opposite to the lamp, shape (n,).
@@ -212,11 +212,11 @@ class Laser:
         return np.asarray(1.0 - 0.5 * blocked)
 
     def voltage_at_rest(self, times: Array, seed: int) -> Array:
-        """The voltage behind a stem at rest on the axis [V], shape (n,)."""
+        """Return the voltage behind a stem at rest on the axis [V], shape (n,)."""
         return self._amplified(np.broadcast_to(self.light(np.zeros(1)), times.shape), times, seed, moving=False)
 
     def voltage(self, times: Array, stem: Callable[[Array], tuple[Array, NDArray[np.bool_]]], seed: int) -> Array:
-        """The amplifier's voltage at evenly spaced times [s], shape (n,) [V].
+        """Return the amplifier's voltage at evenly spaced times [s], shape (n,) [V].
 
         Args:
             times: shape (n,) [s].

@@ -139,7 +139,7 @@ class MotionWorld:
         }
 
     def light(self, start: float, step: float, n: int) -> Array:
-        """The phototransistor's voltage; see World."""
+        """Return the phototransistor's voltage; see World."""
         self._drop_history()
         times = start + step * np.arange(n, dtype=np.float64)
         return self._mean_voltage(times) + self._tape.noise_at(times, self._seed)
@@ -170,20 +170,20 @@ class MotionWorld:
         return np.asarray(found[(found >= start) & (found < stop)])
 
     def laser(self, start: float, step: float, n: int) -> Array:
-        """The voltage of the laser's phototransistor; see World."""
+        """Return the voltage of the laser's phototransistor; see World."""
         self._drop_history()
         return self._laser.voltage(start + step * np.arange(n, dtype=np.float64), self._flight.stem, self._seed)
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
-        """The coil's field; see World."""
+        """Return the coil's field; see World."""
         return self._coil.field(start + step * np.arange(n, dtype=np.float64))
 
     def flux_density(self, time: float) -> float:
-        """The base's field at the probe; the coil's lies across it, and the top's is left out."""
+        """Return the base's field at the probe; the coil's lies across it, and the top's is left out."""
         return self._probe_t
 
     def poses(self, start: float, step: float, n: int) -> Poses:
-        """The top's place and attitude; see World."""
+        """Return the top's place and attitude; see World."""
         times = start + step * np.arange(n, dtype=np.float64)
         return poses_of(*self._flight.attitude(times), start=start, step=step)
 

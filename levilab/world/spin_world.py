@@ -51,13 +51,13 @@ class World(Protocol):
         """Simulate up to the present time, and drop history older than KEPT_S."""
 
     def light(self, start: float, step: float, n: int) -> Array:
-        """The phototransistor's voltage at start + step·k, shape (n,) [V]."""
+        """Return the phototransistor's voltage at start + step·k, shape (n,) [V]."""
 
     def crossings(self, start: float, stop: float, triggers: Thresholds) -> Array | None:
         """Return when a trigger fires from start to stop, shape (m,) [s]; None where only a trace can show it."""
 
     def laser(self, start: float, step: float, n: int) -> Array:
-        """The voltage of the phototransistor behind the stem at start + step·k, shape (n,) [V]."""
+        """Return the voltage of the phototransistor behind the stem at start + step·k, shape (n,) [V]."""
 
     def drive(self, time: float, output: Output) -> None:
         """Set the coil's field from a time on.
@@ -78,16 +78,16 @@ class World(Protocol):
         """Take the top out of the air by hand, if it floats: none is up until the next one is put there."""
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
-        """The coil's field at start + step·k, shape (n,) [T]."""
+        """Return the coil's field at start + step·k, shape (n,) [T]."""
 
     def flux_density(self, time: float) -> float:
-        """The flux density at the magnetometer's probe, along the base's axis [T]."""
+        """Return the flux density at the magnetometer's probe, along the base's axis [T]."""
 
     def place_probe(self, height_m: float | None) -> None:
         """Put the magnetometer's probe on the axis, at a height above the base [m]; None: into its chamber."""
 
     def poses(self, start: float, step: float, n: int) -> Poses:
-        """The top's place and attitude at start + step·k, for a view."""
+        """Return the top's place and attitude at start + step·k, for a view."""
 
 
 @dataclass(frozen=True)
@@ -330,7 +330,7 @@ class SpinWorld:
     # --- what the instruments measure ---
 
     def light(self, start: float, step: float, n: int) -> Array:
-        """The phototransistor's voltage; see :class:`World`."""
+        """Return the phototransistor's voltage; see :class:`World`."""
         times = start + step * np.arange(n, dtype=np.float64)
         return self._mean_voltage(times) + self.scene.tape.noise_at(times, self.scene.seed)
 
@@ -363,22 +363,22 @@ class SpinWorld:
         return np.asarray(found[(found >= start) & (found < stop) & (spin > 0)])
 
     def laser(self, start: float, step: float, n: int) -> Array:
-        """The voltage of the laser's phototransistor; see :class:`World`.
+        """Return the voltage of the laser's phototransistor; see :class:`World`.
 
         A top that only spins has its stem at rest on the axis: the beam is steady, and a counter counts nothing.
         """
         return self.scene.laser.voltage_at_rest(start + step * np.arange(n, dtype=np.float64), self.scene.seed)
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
-        """The coil's field; see :class:`World`."""
+        """Return the coil's field; see :class:`World`."""
         return self._coil.field(start + step * np.arange(n, dtype=np.float64))
 
     def flux_density(self, time: float) -> float:
-        """The base's field along the axis; the coil's lies across it, so the probe does not measure that."""
+        """Return the base's field along the axis; the coil's lies across it, so the probe does not measure that."""
         return self._probe_t
 
     def poses(self, start: float, step: float, n: int) -> Poses:
-        """A top upright and at rest, which turns; see :class:`World`."""
+        """Return a top upright and at rest, which turns; see :class:`World`."""
         times = start + step * np.arange(n, dtype=np.float64)
         spin, angle = self.motion(times)
         up, zero = spin > 0, np.zeros_like(times)

@@ -44,7 +44,7 @@ class Timeline(Generic[T]):
         return self._items[-1]
 
     def at(self, time: float) -> T:
-        """What holds at this time; before all others the first."""
+        """Return the item that holds at this time; before all others the first."""
         return self._items[max(bisect_right(self._starts, time) - 1, 0)]
 
     def cut(self, time: float) -> None:
@@ -53,7 +53,7 @@ class Timeline(Generic[T]):
         del self._starts[k:], self._items[k:]
 
     def append(self, start: float, item: T) -> None:
-        """From this time on, no earlier than all others, it is this."""
+        """Let the item hold from this time on, which is no earlier than all others."""
         self._starts.append(start)
         self._items.append(item)
 
@@ -64,12 +64,12 @@ class Timeline(Generic[T]):
             del self._starts[:stale], self._items[:stale]
 
     def between(self, start: float, stop: float) -> Iterator[tuple[T, float]]:
-        """What holds at some time from start to stop, with the time at which it ends."""
+        """Yield each item that holds at some time from start to stop, with the time at which it ends."""
         low, high = max(bisect_right(self._starts, start) - 1, 0), bisect_left(self._starts, stop)
         yield from zip(self._items[low:high], [*self._starts[low + 1 : high + 1], math.inf], strict=False)
 
     def pieces(self, times: Array) -> Iterator[tuple[T, slice]]:
-        """What holds at these times, shape (n,), piece by piece: an item and which of the times are its."""
+        """Yield the items that hold at these times, shape (n,): an item and the slice of its times."""
         if not times.size:
             return
         low = max(bisect_right(self._starts, float(times.min())) - 1, 0)

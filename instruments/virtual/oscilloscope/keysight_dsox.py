@@ -276,7 +276,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
     # --- settings as a whole ---
 
     def whole_channel(self, n: int) -> str:
-        """As ``:CHAN1?`` answers after ``*RST``: ``:CHAN1:RANG +40.0E+00;OFFS +0.00000E+00;…``."""
+        """Return the answer to ``:CHAN1?`` after ``*RST``: ``:CHAN1:RANG +40.0E+00;OFFS +0.00000E+00;…``."""
         s, name = self.settings, f"chan{n}_"
         return (
             f":CHAN{n}:RANG {8 * self.value(name + 'scale'):+.5E};OFFS {self.value(name + 'offset'):+.5E};"
@@ -287,7 +287,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         )
 
     def whole_time(self) -> str:
-        """As ``:TIM?`` answers."""
+        """Return the answer to ``:TIM?``."""
         s = self.settings
         ten = 10 * self.value("time_scale")
         return f":TIM:MODE {s['time_mode']};REF {s['time_reference']};MAIN:RANG {ten:+.5E};POS {self._position()}"
@@ -296,7 +296,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         return f"{self.value('time_offset'):+.6E}"
 
     def whole_trigger(self) -> str:
-        """As ``:TRIG?`` answers."""
+        """Return the answer to ``:TRIG?``."""
         s = self.settings
         return (
             f":TRIG:MODE {s['trigger_mode']};SWE {s['trigger_sweep']};NREJ {int(s['noise_rejection'])};"

@@ -31,7 +31,7 @@ LINES = {
 
 @mpl.rc_context(STYLE)
 def estimators_figure(found: Study) -> Figure:
-    """Three panels: RMSE over the bound, speed, and coverage of the hard cases."""
+    """Draw three panels: RMSE over the bound, speed, and coverage of the hard cases."""
     rows = len(found.hard)
     figure = Figure(figsize=(WIDE, 4.6 + 0.17 * rows))
     headline(figure, _title(found))

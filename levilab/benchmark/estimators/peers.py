@@ -25,7 +25,7 @@ def fft_peak(samples: Array, rate: float) -> float:
 
 
 def autocorrelation(samples: Array, rate: float) -> float:
-    """One over the lag at which the trace resembles itself most, placed by a parabola."""
+    """Return one over the lag at which the trace resembles itself most, placed by a parabola."""
     n = samples.size
     power = np.abs(np.fft.rfft(samples - samples.mean(), 2 * n)) ** 2
     alike = np.fft.irfft(power)
@@ -35,7 +35,7 @@ def autocorrelation(samples: Array, rate: float) -> float:
 
 
 def mean_period(samples: Array, rate: float) -> float:
-    """Scipy's find_peaks above half the height, half a turn apart at least, and the mean of the intervals."""
+    """Return one over the mean interval of scipy's find_peaks above half the height, half a turn apart at least."""
     from scipy.signal import find_peaks
 
     peaks, _ = find_peaks(samples, height=0.5 * float(samples.max()), distance=int(0.5 * rate / HIGH))

@@ -136,7 +136,7 @@ def study(
 
 
 def _at(snr: float, trials: int, seed: int = SEED) -> list[Score]:
-    """All methods on the same traces, one after the other on each."""
+    """Try all methods on the same traces, one after the other on each."""
     found = {name: Trials() for name in (*OURS, *PEERS)}
     random = np.random.default_rng([seed, round(snr)])
     for number in range(-1, trials):  # the first is not counted: caches, imports
@@ -217,7 +217,7 @@ def _score(name: str, snr: float, found: Trials, limit: float | None) -> Score:
 
 
 def _shape(pulls: Array) -> tuple[float | None, float | None, float | None]:
-    """Mean, standard deviation, and kurtosis less that of a normal distribution; None of none."""
+    """Return mean, standard deviation, and kurtosis less that of a normal distribution; None of none."""
     if pulls.size < 2 or not (sd := float(pulls.std())) > 0:
         return None, None, None
     mean = float(pulls.mean())

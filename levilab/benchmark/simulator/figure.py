@@ -37,7 +37,7 @@ RANGE = (1e-1, 3e-12)
 
 @mpl.rc_context(STYLE)
 def work_precision_figure(found: Comparison) -> Figure:
-    """Error at the end falling to the right, speed upwards; the names beside, fastest first."""
+    """Draw speed against the error at the end, which falls to the right; the names beside, fastest first."""
     figure = Figure(figsize=(WIDE, 4.1))
     headline(figure, TITLE)
     axes = panel(figure, 0.75, 0.55, 4.2, 3.0)

@@ -23,7 +23,7 @@ _COMPARED = ("strength", "origin", "thickness", "background")
 
 
 def own(found: FieldAnalysis) -> Own:
-    """The trials of the first scan."""
+    """Return the trials of the first scan."""
     scan, source, options = found.runs[0].scan, found.sources[0], found.options
     order = np.argsort(source.readings.height, kind="stable")
     u_z = source.readings.height_u
@@ -56,7 +56,7 @@ def own(found: FieldAnalysis) -> Own:
 
 
 def _known(random: np.random.Generator, scan: FieldScan) -> Known:
-    """What calliper and data sheet would have said of the fitted base."""
+    """Return the dimensions that calliper and data sheet would give of the fitted base."""
     said: dict[str, Any] = {
         name: Prior(float(scan.values[k]) + prior.u * random.standard_normal(), prior.u)
         for k, name in enumerate(PARAMETERS)

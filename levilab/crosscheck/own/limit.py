@@ -18,7 +18,7 @@ _COST_S = 0.0005
 
 
 def own(found: LimitAnalysis) -> Own:
-    """The trials of limits: each group of runs under the same conditions."""
+    """Return the trials of limits: each group of runs under the same conditions."""
     groups = [group for group in found.groups if group.statistics.scatter]
 
     def trial(random: np.random.Generator) -> Trial:
@@ -45,7 +45,7 @@ def _name(group: Limits, groups: list[Limits]) -> str:
 
 
 def _samples(random: np.random.Generator, found: LimitAnalysis, group: Limits) -> list[Sample]:
-    """The limits of each run; the drive's steps are the same for all tops, and lie anywhere."""
+    """Return the limits of each run; the drive's steps are the same for all tops, and lie anywhere."""
     statistics = group.statistics
     scatter = (statistics.scatter.value or 0.0) if statistics.scatter else 0.0
     between = (statistics.between.value or 0.0) if statistics.between else 0.0

@@ -19,7 +19,7 @@ _COST_S = 0.003
 
 
 def own(found: PrecessionAnalysis) -> Own:
-    """The trials of sweeps: the line through the points of all of them."""
+    """Return the trials of sweeps: the line through the points of all of them."""
     fit, options = found.combined, found.options
     line = fit.line
     used = np.array([point.used for point in fit.points])

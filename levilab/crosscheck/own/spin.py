@@ -27,7 +27,7 @@ _NARROWEST, _WIDEST = 0.002, 0.12
 
 
 def own(found: SpinAnalysis) -> Own:
-    """The trials of the first input; of a long record or of several, of the window or record in the middle."""
+    """Return the trials of the first input; of a long record or of several, of the window or record in the middle."""
     run, source, options = found.runs[0], found.sources[0], found.options
     spin = run.spin
     turns = spin.pulses + spin.missing
@@ -46,7 +46,7 @@ def own(found: SpinAnalysis) -> Own:
 
 
 def _phase(spin: SpinFrequency, times: Array) -> Array:
-    """Turns since the reference time, under a drag, shape (n,)."""
+    """Return the turns since the reference time, under a drag, shape (n,)."""
     frequency, chirp, bend = _motion(spin)
     return np.asarray(times * (frequency + times * (chirp / 2 + times * bend / 6)))
 
@@ -59,7 +59,7 @@ def _motion(spin: SpinFrequency) -> tuple[float, float, float]:
 
 
 def _pulse_times(spin: SpinFrequency) -> Array:
-    """When the pulses pass, from the reference time on, shape (n,) [s]."""
+    """Return the times at which the pulses pass, from the reference time on, shape (n,) [s]."""
     frequency, chirp, bend = _motion(spin)
     turns = np.arange(spin.pulses + spin.missing, dtype=float)
     turns -= turns.mean()
@@ -70,7 +70,7 @@ def _pulse_times(spin: SpinFrequency) -> Array:
 
 
 def _compared(found: SpinFrequency, spin: SpinFrequency) -> Trial:
-    """The pulls of what was found: the truth at its own reference time."""
+    """Return the pulls of a fit, against the truth at its own reference time."""
     frequency, chirp, bend = _motion(spin)
     at = found.reference_time
     return Trial(
@@ -93,7 +93,7 @@ def _of_times(random: np.random.Generator, spin: SpinFrequency) -> Trial:
 def _of_trace(
     random: np.random.Generator, spin: SpinFrequency, rate: float, n: int, *, method: str, code: float
 ) -> Trial:
-    """Gaussian pulses of unit height, as wide as the bound of the result says of such noise."""
+    """Try Gaussian pulses of unit height, as wide as the bound of the result implies for such noise."""
     assert spin.bound is not None
     assert spin.snr_db is not None
     frequency, _, _ = _motion(spin)

@@ -71,7 +71,7 @@ class _Run:
         return cost + (_COST_OF_TILT_S + n * _TILTED_READING_S if self.tilt else 0.0)
 
     def curve(self, factors: Sequence[float]) -> Array:
-        """The mean over the gate of what the counter counts, shape (n,) [Hz]."""
+        """Return the mean of the counted frequency over the gate, shape (n,) [Hz]."""
         frequency, duration = self.fit.reference
         solution = self.fit.solution.copy()
         solution[1 : 1 + len(factors)] *= factors
@@ -87,7 +87,7 @@ class _Run:
 
 
 def own(found: SpinDownAnalysis) -> Own:
-    """The trials of spin-downs: all runs anew in each."""
+    """Return the trials of spin-downs: each simulates all runs again."""
     law = found.combined.best
     runs = [_run(found, k, run.fit(law), run) for k, run in enumerate(found.runs)]
     constants = [name for name in LAWS[law].constants if name != "exponent"]
@@ -122,7 +122,7 @@ def _run(found: SpinDownAnalysis, k: int, fit: LawFit, run: SpinDown) -> _Run:
 
 
 def _scatter(fit: LawFit, run: SpinDown) -> Array:
-    """Standard deviation of each reading, shape (n,) [Hz]: as stated, or more where they scatter more."""
+    """Return the standard deviation of each reading, shape (n,) [Hz]: as stated, or more where they scatter more."""
     stats = fit.statistics
     if run.u is not None:
         return np.asarray(run.u * np.sqrt(stats.variance_factor))
@@ -130,7 +130,7 @@ def _scatter(fit: LawFit, run: SpinDown) -> Array:
 
 
 def _between(found: SpinDownAnalysis, law: str, constants: Sequence[str]) -> list[float]:
-    """Relative standard deviation of each constant from run to run beyond what the readings of each leave."""
+    """Return the relative scatter of each constant between runs, beyond that of the readings of each run."""
     means = found.combined.fit(law).constants
     spread = []
     for name in constants:
@@ -142,7 +142,7 @@ def _between(found: SpinDownAnalysis, law: str, constants: Sequence[str]) -> lis
 
 
 def _freedom(found: SpinDownAnalysis, law: str, constants: Sequence[str]) -> dict[str, int]:
-    """Degrees of freedom of the means whose u comes from the scatter of the runs."""
+    """Return the degrees of freedom of the means whose u comes from the scatter of the runs."""
     freedom = {}
     for name in constants:
         mean = found.combined.fit(law).constants[name]
@@ -155,7 +155,7 @@ def _freedom(found: SpinDownAnalysis, law: str, constants: Sequence[str]) -> dic
 def _trial(
     random: np.random.Generator, runs: Sequence[_Run], law: str, constants: Sequence[str], spread: Sequence[float]
 ) -> Trial:
-    """All runs made up and analyzed."""
+    """Simulate and analyze all runs."""
     several = len(runs) > 1
     means = [float(np.mean([run.fit.parameters[name].value or 0.0 for run in runs])) for name in constants]
     fits, pulls = [], []
@@ -195,7 +195,7 @@ def _trial(
 
 
 def _noise(random: np.random.Generator, n: int, rho: float) -> Array:
-    """Noise of unit variance whose neighbours have a correlation, shape (n,)."""
+    """Return noise of unit variance whose neighbours have a correlation, shape (n,)."""
     news = random.standard_normal(n)
     if rho <= 0:
         return np.asarray(news)

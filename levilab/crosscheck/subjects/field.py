@@ -25,7 +25,7 @@ MOMENT, MOMENT_U, MASS_U, HEIGHT_U = 0.714, 0.01, 1e-5, 2e-4
 
 
 def trial(seed: int, folder: Path) -> list[Pull]:
-    """One scan: the base, the heights that the person misses, and what is said of the top are drawn by the seed.
+    """Try one scan: the seed draws the base, the errors of the heights, and the stated masses of the top.
 
     The truths of heights, masses, and spins are the simulator's, whose field is another formula.
     """

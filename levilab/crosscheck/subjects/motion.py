@@ -38,7 +38,7 @@ _LEAST_HZ = 1e-6
 
 
 def drawn_scene(seed: int) -> Scene:
-    """A top of this seed: mass, tilt of the moment, drag and first spin."""
+    """Return a top of this seed: mass, tilt of the moment, drag and first spin."""
     random = np.random.default_rng((seed, 3))
     tilt = float(random.uniform(0.022, 0.034))
     coefficient = USUAL * float(random.uniform(0.85, 1.15))
@@ -54,7 +54,7 @@ def drawn_scene(seed: int) -> Scene:
 
 
 def trial(seed: int, folder: Path) -> list[Pull]:
-    """One spin-down of a drawn top."""
+    """Try one spin-down of a drawn top."""
     scene = drawn_scene(seed)
     coefficient: Any = scene.drag.coefficient
     run = acquired("spin", seed, folder, lambda request: _in_world(request, scene, seed))
@@ -67,7 +67,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
 
 
 def _in_world(request: AcquisitionRequest, scene: Scene, seed: int) -> AcquisitionRequest:
-    """The same request in this world.  No u of a reading is stated: that of a request is of a top that only spins."""
+    """Return the request in this world, without the stated u: that is of a top that only spins."""
 
     def wiring() -> Wiring:
         return virtual_wiring(scene_world(scene, VirtualClock, lambda _: None, seed=seed), request.config.limits)
@@ -78,7 +78,7 @@ def _in_world(request: AcquisitionRequest, scene: Scene, seed: int) -> Acquisiti
 
 
 def _fall(found: SpinDown, run: Run, scene: Scene) -> Pull:
-    """When the top falls, by the fitted law in the simulator, beside what was seen of it [s].
+    """Return when the top falls, by the fitted law in the simulator, beside what was seen of it [s].
 
     It was seen to have fallen between the end of the gate of its last reading and that of the next one, which came to
     none.  A drive leaves a nutation, and the more of it the earlier a top falls; the counts show how much.  The
@@ -102,7 +102,7 @@ def _fall(found: SpinDown, run: Run, scene: Scene) -> Pull:
 
 
 def _wobble(parameters: Mapping[str, Estimate], typical_hz: float) -> tuple[float, float]:
-    """K of the nutation and its u [Hz], as fitted, or as a drive leaves it where the fit has none.
+    """Return K of the nutation and its u [Hz], as fitted, or as a drive leaves it where the fit has none.
 
     One top in ten has two to five times what is expected, and the fit draws that back to it: so far from normal is what
     a drive leaves that its spread is added to u.
@@ -114,7 +114,7 @@ def _wobble(parameters: Mapping[str, Estimate], typical_hz: float) -> tuple[floa
 
 
 def nutation(scene: Scene, wobble_hz: float) -> float:
-    """The angle [rad] of a nutation that adds so much to the count, K/√((ν/ν_s)² − 1) (`analysis.spindown.tilt`).
+    """Return the angle [rad] of a nutation that adds so much to the count, K/√((ν/ν_s)² − 1).
 
     It adds half the square of the angle times its frequency.  With f and p the frequencies of nutation and precession
     the root is (f − p)/2√(fp).
@@ -126,7 +126,7 @@ def nutation(scene: Scene, wobble_hz: float) -> float:
 
 
 def _simulated_fall(scene: Scene, wobble_hz: float) -> float:
-    """When the top of a scene falls that nutates so much [s].  Raises TrialFailed."""
+    """Return the time [s] at which the top of a scene falls that nutates so much.  Raises TrialFailed."""
     nutating = scene.changed({"start.tilt_rad": nutation(scene, wobble_hz)})
     motion = simulate(nutating, LONGEST_S, tolerance=1e-6, rate=None, start=nutating_start(nutating))
     if motion.fell is None:

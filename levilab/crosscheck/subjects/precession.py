@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def trial(seed: int, folder: Path) -> list[Pull]:
-    """One sweep of a top in full motion; the seed draws the phase at which the drive takes hold, and the noise."""
+    """Try one sweep of a top in full motion; the seed draws the phase at which the drive takes hold, and the noise."""
     run = acquired("precession", seed, folder, lambda request: request)
     analysis = ANALYSES["precession"]
     (found,) = analysis.analyze([run.folder], analysis.options_from({})).runs

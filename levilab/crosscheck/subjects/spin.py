@@ -41,7 +41,7 @@ class _Watched(SpinWorld):
 
 
 def trial(seed: int, folder: Path) -> list[Pull]:
-    """One record: spin, drag, tape, noise, jitter of the pulses and the record's length are drawn by the seed."""
+    """Try one record: the seed draws spin, drag, tape, noise, jitter of the pulses and the record's length."""
     random = np.random.default_rng((seed, 5))
     law = sorted(LAWS)[int(random.integers(len(LAWS)))]
     scene = SpinScene(

@@ -31,7 +31,7 @@ RATE = 10.0
 
 
 def trial(seed: int, folder: Path) -> list[Pull]:
-    """One spin-down: drag, fall and scatter of the pulses are drawn by the seed."""
+    """Try one spin-down: the seed draws drag, fall and scatter of the pulses."""
     random = np.random.default_rng((seed, 2))
     law = sorted(LAWS)[int(random.integers(len(LAWS)))]
     usual, names, exponent = LAWS[law].usual, LAWS[law].names, LAWS[law].exponent
@@ -70,7 +70,7 @@ def spindown_of(folder: Path, **options: Any) -> SpinDown:
 
 
 def _fall(found: SpinDown, law: str, names: tuple[str, ...], scene: SpinScene) -> Pull:
-    """When the top falls, by the fitted law in the simulator, beside the world's own moment [s]."""
+    """Return when the top falls, by the fitted law in the simulator, beside the world's own moment [s]."""
     fit = found.fit(law)
     order = ("start_frequency", *names)
     values = np.array([fit.parameters[name].value for name in order], dtype=np.float64)
@@ -89,7 +89,7 @@ def _fall(found: SpinDown, law: str, names: tuple[str, ...], scene: SpinScene) -
 
 
 def fall_of_spin(law: str, constants: tuple[float, ...], start_hz: float, fall_hz: float) -> float:
-    """When a simulated spin under this law comes down to that of the fall [s].  Raises TrialFailed."""
+    """Return the time [s] at which a simulated spin under this law is that of the fall.  Raises TrialFailed."""
     scene = Scene(observed="spin").changed(
         {"drag.law": law, "drag.coefficient": list(constants) if len(constants) > 1 else constants[0],
          "start.spin_hz": start_hz}

@@ -98,7 +98,7 @@ class FieldAnalysis(Analyzed[FieldReadings, FieldRun, None, FieldOptions]):
 
 
 def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> FieldRun:
-    """One input fitted, and what follows.  Raises DataError, which names the file."""
+    """Fit one input, and compute what follows.  Raises DataError, which names the file."""
     readings = source.readings
     known = known_of(source, options.device)
     try:
@@ -134,7 +134,7 @@ METHOD = Method(
 
 
 def means(runs: Sequence[Mapping[str, Estimate]]) -> dict[str, Mean]:
-    """Unweighted means over scans, of the quantities that all of them have.
+    """Return unweighted means over scans, of the quantities that all of them have.
 
     What calliper and data sheet leave open is common to all scans, and no mean makes it smaller: u is that of one scan,
     or s/√N where the scans scatter more.
@@ -207,7 +207,7 @@ def _learned_in_words(scan: FieldScan) -> str:
 
 
 def _advice(values: Mapping[str, Estimate]) -> str:
-    """Which mass to set, and what to mind."""
+    """Return the mass to set, and what to mind."""
     if "mass_to_set" not in values:
         return ""
     shown = {name: _shown(name, value) for name, value in values.items() if name in QUANTITIES}

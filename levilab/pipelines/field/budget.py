@@ -40,7 +40,7 @@ _TYPE_A = frozenset({"readings", "excess"})
 
 
 def budget_of_run(source: Source[FieldReadings], run: FieldRun, _: FieldOptions) -> tuple[Budget, ...]:
-    """Of the parameters of one scan."""
+    """Return the budgets of the parameters of one scan."""
     scan, readings = run.scan, source.readings
     u_z = np.zeros(len(readings)) if readings.height_u is None else readings.height_u
     parts = parts_of(scan, u_z[np.argsort(readings.height, kind="stable")])
@@ -102,7 +102,7 @@ def _not_in_u(scan: FieldScan, name: str) -> tuple[Component, ...]:
 
 
 def budget_of_all(analysis: FieldAnalysis) -> tuple[Budget, ...]:
-    """Of the means over several scans: what is common to them is no smaller than in one."""
+    """Return the budgets of the means over several scans: what is common to them is no smaller than in one."""
     of_runs = [{budget.quantity: budget for budget in origin.budget or ()} for origin in analysis.origins]
     return tuple(
         _of_mean(analysis, name, [one[name] for one in of_runs])
@@ -112,7 +112,7 @@ def budget_of_all(analysis: FieldAnalysis) -> tuple[Budget, ...]:
 
 
 def _of_mean(analysis: FieldAnalysis, name: str, budgets: Sequence[Budget]) -> Budget:
-    """U of a mean is that of one scan, in the square mean, or s/√N where the scans scatter more."""
+    """Return u of a mean: that of one scan, in the square mean, or s/√N where the scans scatter more."""
     mean, n = analysis.values[name], len(budgets)
     u = mean.u or 0.0
     own = math.sqrt(sum(one.u**2 for one in budgets) / n)

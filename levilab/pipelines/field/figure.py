@@ -40,7 +40,7 @@ _INSIDE = 1e-6
 
 
 def field_figure(analysis: FieldAnalysis) -> Figure:
-    """Flux density and fit, residuals in units of their uncertainty, and what follows: masses, heights, spins."""
+    """Draw flux density and fit, residuals in units of their uncertainty, and what follows: masses, heights, spins."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, 6.9))
         headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
@@ -104,7 +104,7 @@ def _points_label(analysis: FieldAnalysis, k: int) -> str | None:
 
 
 def _mark_window(axes: Axes, analysis: FieldAnalysis) -> None:
-    """Where tops float, and the height of the one to set."""
+    """Mark the heights at which tops float, and the height of the one to set."""
     values = analysis.values
     if "lowest_height" not in values:
         return
@@ -140,7 +140,7 @@ def _draw_residuals(axes: Axes, analysis: FieldAnalysis, limits: tuple[float, fl
 
 
 def _draw_masses(axes: Axes, run: FieldRun) -> None:
-    """Which mass floats at which height, with its uncertainty."""
+    """Draw the mass that floats over the height, with its uncertainty."""
     floating, ring, top = run.floating, run.scan.ring, run.top
     assert floating is not None
     low, high = floating["lowest_height"], floating["highest_height"]
@@ -165,7 +165,7 @@ def _draw_masses(axes: Axes, run: FieldRun) -> None:
 
 
 def _draw_spins(axes: Axes, run: FieldRun) -> None:
-    """At which spins tops of these masses float."""
+    """Draw the spins at which tops of these masses float."""
     floating = run.floating
     assert floating is not None
     light, heavy = floating["lightest_mass"], floating["heaviest_mass"]

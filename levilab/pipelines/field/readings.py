@@ -63,7 +63,7 @@ class FieldReadings:
         return float(np.abs(self.flux_density).max())
 
     def same_as(self, other: FieldReadings) -> bool:
-        """Whether heights and flux densities are the same, but for the rounding of another unit in the file."""
+        """Return whether heights and flux densities are the same, but for the rounding of another unit in the file."""
         pairs = ((self.height, other.height), (self.flux_density, other.flux_density))
         return len(self) == len(other) and all(
             bool(np.allclose(a, b, rtol=_SAME, atol=_SAME * float(np.abs(b).max()))) for a, b in pairs

@@ -161,7 +161,7 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
         return tuple(tuple(self.sources[k] for k in group.runs) for group in self.groups)
 
     def inputs_of(self, group: int | None) -> Sequence[Source[LimitReadings]]:
-        """Those of the same conditions, by their number in `groups`; None: all inputs."""
+        """Return the inputs of the same conditions, by their number in `groups`; None: all inputs."""
         return self.sources if group is None else self.averaged[group]
 
     def prefix(self, group: Limits) -> str:
@@ -193,7 +193,7 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
 
 
 def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
-    """One input.  Raises DataError, which names the file."""
+    """Analyze one input.  Raises DataError, which names the file."""
     device = device_of(source)
     which = _which(source, device)
     try:
@@ -239,12 +239,12 @@ def tell_apart(groups: Iterable[Limits]) -> tuple[Limits, ...]:
 
 
 def synthetic_source(source: Source[LimitReadings]) -> bool | None:
-    """Whether an input was simulated or made up; None of a data file, which does not say it."""
+    """Return whether an input was simulated or made up; None of a data file, which does not say it."""
     return source.synthetic if source.run else None
 
 
 def synthetic_runs(runs: Iterable[Limits]) -> bool | None:
-    """Whether runs were simulated or made up; None where that is not known of all, or not alike."""
+    """Return whether runs were simulated or made up; None where that is not known of all, or not alike."""
     kinds = {run.conditions.synthetic for run in runs}
     return kinds.pop() if len(kinds) == 1 else None
 
@@ -275,7 +275,7 @@ def _sample(source: Source[LimitReadings], which: Which, options: LimitOptions) 
 
 
 def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> Conditions:
-    """As the run's configuration and its record say."""
+    """Return the conditions by the run's configuration and its record."""
     said = _settings_of(source)
     if which == "lower" or not said:
         return Conditions(which, device.name, synthetic=synthetic_source(source))
@@ -307,7 +307,7 @@ def _comparisons(statistics: Statistics, device: Device, which: Which) -> tuple[
 
 
 def _which(source: Source[LimitReadings], device: Device) -> Which:
-    """As the run says; else the limit whose edge is nearer."""
+    """Return the limit that the run names; else the limit whose edge is nearer."""
     said = _settings_of(source).get("which")
     if said in {"lower", "upper"}:
         return "upper" if said == "upper" else "lower"

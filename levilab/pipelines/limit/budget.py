@@ -23,12 +23,12 @@ _TO_HALVE = 4
 
 
 def budget_of_run(source: Source[LimitReadings], run: Limits, options: LimitOptions) -> tuple[Budget, ...]:
-    """Of the mean of one run."""
+    """Return the budget of the mean of one run."""
     return _budgets([source], run, options)
 
 
 def budget_of_all(analysis: LimitAnalysis) -> tuple[Budget, ...]:
-    """Of the means of all conditions."""
+    """Return the budgets of the means of all conditions."""
     return tuple(
         replace(budget, group=k)
         for k, (sources, group) in enumerate(zip(analysis.averaged, analysis.groups, strict=True))

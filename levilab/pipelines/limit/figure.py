@@ -40,7 +40,7 @@ _BINS, _REACH, _FEWEST = 14, 3.5, 5
 
 
 def limit_figure(analysis: LimitAnalysis) -> Figure:
-    """For each of the conditions the limits top by top with mean, scatter and theory, and how they are distributed."""
+    """Draw for each of the conditions the limits top by top with mean, scatter and theory, and their distribution."""
     with mpl.rc_context(STYLE):
         legends = [_legend_lines(group) for group in analysis.groups]
         height = _HEAD + sum(_ABOVE + _PANEL + _BELOW + _LINE * lines for lines in legends)
@@ -64,7 +64,7 @@ def _finding(analysis: LimitAnalysis) -> str:
 
 
 def _legend_lines(group: Limits) -> int:
-    """Lines that a legend of two columns may take."""
+    """Return the number of lines that a legend of two columns may take."""
     found = group.statistics
     runs = len(group.runs) if len(group.runs) <= len(MARKERS) else 1
     entries = runs + bool(found.outliers) + 1 + 2 * bool(found.scatter) + len(group.comparisons) + 1
@@ -157,7 +157,7 @@ def _draw_theory(axes: Axes, name: str, expected: float) -> None:
 
 
 def _shade_beyond_window(axes: Axes, group: Limits) -> None:
-    """Where small motions of the top grow, so that no spin keeps it up."""
+    """Shade the spins at which small motions of the top grow, so that it cannot float."""
     window = (group.device.linear_lower_hz, group.device.linear_upper_hz)
     low, high = axes.get_ylim()
     label: str | None = f"small motions grow: outside the linear window, {window[0]:.2f} to {window[1]:.2f} Hz"

@@ -58,7 +58,7 @@ class LimitReadings:
         return float(np.abs(self.limit).max())
 
     def same_as(self, other: LimitReadings) -> bool:
-        """Whether these are the same limits, but for the rounding of another unit in the file."""
+        """Return whether these are the same limits, but for the rounding of another unit in the file."""
         return len(self) == len(other) and bool(np.allclose(self.limit, other.limit, rtol=_SAME, atol=0))
 
 

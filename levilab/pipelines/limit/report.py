@@ -22,7 +22,7 @@ _MOST_SHOWN = 200
 
 
 def limit_part(analysis: LimitAnalysis) -> ReportPart:
-    """Verdict, statistics, theory, and the limits."""
+    """Return verdict, statistics, theory, and the limits."""
     n = sum(run.statistics.n for run in analysis.runs)
     return ReportPart(
         subject="limits of the spin",

@@ -29,12 +29,12 @@ _TO_HALVE = 4
 
 
 def budget_of_run(source: Source[Readings], run: PrecessionRun, options: PrecessionOptions) -> tuple[Budget, ...]:
-    """Of slope and intercept of one sweep."""
+    """Return the budgets of slope and intercept of one sweep."""
     return _budgets(source, run.fit, options)
 
 
 def budget_of_all(analysis: PrecessionAnalysis) -> tuple[Budget, ...]:
-    """Of the line through the points of all sweeps."""
+    """Return the budgets of the line through the points of all sweeps."""
     return _budgets(analysis.sources[0], analysis.combined, analysis.options)
 
 

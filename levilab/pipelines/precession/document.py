@@ -96,7 +96,7 @@ def _robust(fit: SweepFit) -> dict[str, Any]:
 
 
 def _statistics(fit: SweepFit, residual: np.ndarray, line: Line | None) -> dict[str, Any]:
-    """line: None for the median line, which goes through all points."""
+    """Return the statistics of a line.  line: None for the median line, which goes through all points."""
     if line:
         residual = residual[[point.used for point in fit.points]]
     chi_square = line.chi_square if line else None

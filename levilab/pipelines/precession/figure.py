@@ -33,7 +33,7 @@ _LEFT, _WIDTH, _BESIDE = 0.66, 3.95, 1.03
 
 
 def precession_figure(analysis: PrecessionAnalysis) -> Figure:
-    """Points with line and bands; departures from a locked top; what each point does to the line; phase lock."""
+    """Draw points with line and bands, departures from a locked top, the influence of each point, phase lock."""
     phases = any(run.coherences for run in analysis.runs)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, 6.8))
@@ -96,7 +96,7 @@ def _used(fit: SweepFit) -> NDArray[np.bool_]:
 
 
 def _usual_u(fit: SweepFit) -> float:
-    """Of a point, before it is scaled [Hz]; where none is given, 1: the scale is the scatter itself."""
+    """Return u of a point before it is scaled [Hz]; where none is given, 1: the scale is the scatter itself."""
     u = fit.column("u")[_used(fit)]
     return float(np.median(u)) if np.isfinite(u).all() else 1.0
 
@@ -156,7 +156,7 @@ def _draw_left_out(axes: Axes, fit: SweepFit) -> None:
 
 
 def _draw_departures(axes: Axes, analysis: PrecessionAnalysis) -> None:
-    """ν_p − ν_d with the u of each point, which differ: noise about zero for a locked top."""
+    """Draw ν_p − ν_d with the u of each point, which differ: noise about zero for a locked top."""
     fit = analysis.combined
     axes.axhline(0, linewidth=1, **LOOKS["locked"].as_line)
     x = _span(fit)
@@ -185,7 +185,7 @@ def _draw_departures(axes: Axes, analysis: PrecessionAnalysis) -> None:
 
 
 def _draw_leverage(axes: Axes, analysis: PrecessionAnalysis) -> None:
-    """How far the line follows each point."""
+    """Draw how far the line follows each point."""
     for k, run in enumerate(analysis.runs):
         drive, leverage, used = run.fit.column("drive"), run.fit.column("leverage"), _used(run.fit)
         axes.vlines(drive[used], 0, leverage[used], color="black", linewidth=1)
@@ -197,7 +197,7 @@ def _draw_leverage(axes: Axes, analysis: PrecessionAnalysis) -> None:
 
 
 def _draw_changes(axes: Axes, analysis: PrecessionAnalysis) -> None:
-    """By how much the slope changes without each point."""
+    """Draw the change of the slope without each point."""
     axes.axhline(0, color="black", linewidth=0.8)
     tallest = 1.0
     for k, run in enumerate(analysis.runs):

@@ -73,7 +73,7 @@ class Readings:
         return float(np.abs(self.precession).max())
 
     def same_as(self, other: Readings) -> bool:
-        """Whether these are the same points, but for the rounding of another unit in the file."""
+        """Return whether these are the same points, but for the rounding of another unit in the file."""
         pairs = ((self.drive, other.drive), (self.precession, other.precession))
         return len(self) == len(other) and all(bool(np.allclose(a, b, rtol=SAME, atol=0)) for a, b in pairs)
 
@@ -123,7 +123,7 @@ def _from_gates(readings: Readings, gates: Sequence[tuple[Gates, Gates]], given_
 
 
 def _about_gates(readings: Readings, lasers: Sequence[Rate]) -> Iterable[str]:
-    """Which gates were left out."""
+    """Return a remark on the gates that were left out."""
     for k, (rate, drive) in enumerate(zip(lasers, readings.drive.tolist(), strict=True), 1):
         for gate, pulses in rate.wrong:
             yield f"point {k}, at {drive:.5g} Hz: gate {gate + 1} counted {pulses_too_many(pulses)}, and is left out"

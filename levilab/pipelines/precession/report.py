@@ -38,7 +38,7 @@ MOST_POINTS = 200
 
 
 def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
-    """Verdict, lines, power, phase lock, and the points."""
+    """Return verdict, lines, power, phase lock, and the points."""
     return ReportPart(
         subject="precession",
         heading="Precession of a driven top",
@@ -89,7 +89,7 @@ def _power(analysis: PrecessionAnalysis) -> tuple[Block, ...]:
 
 
 def _phases(analysis: PrecessionAnalysis) -> tuple[Block, ...]:
-    """How firmly the laser's pulses follow the drive, run by run."""
+    """Return how firmly the laser's pulses follow the drive, run by run."""
     several = len(analysis.runs) > 1
     names = [f" of {source.name}" if several else "" for source in analysis.sources]
     tables = [
@@ -136,7 +136,7 @@ def _in_words(source: Source[Readings], run: PrecessionRun, options: PrecessionO
 
 
 def _uncertainty(source: Source[Readings], run: PrecessionRun, options: PrecessionOptions) -> str:
-    """How large u of a point is, and where it comes from."""
+    """Return how large u of a point is, and where it comes from."""
     u = run.fit.column("u")
     if not np.isfinite(u).all():
         return "u of a point: not known, taken from the scatter about the line"

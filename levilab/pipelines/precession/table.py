@@ -64,7 +64,7 @@ def lines_table(analysis: PrecessionAnalysis) -> Table:
 
 
 def line_name(fit: SweepFit) -> str:
-    """Which line, through how many points."""
+    """Return the name of the line, and through how many points it goes."""
     kind = "orthogonal" if fit.line.orthogonal else "weighted" if fit.line.chi_square is not None else "least squares"
     return f"{kind}, {fit.line.n} points"
 
@@ -137,7 +137,7 @@ def _point_cells(fit: SweepFit, point: Point, departure: str) -> tuple[str, ...]
 
 
 def coherence_table(run: PrecessionRun, name: str = "") -> Table:
-    """How firmly the laser's pulses follow the drive, record by record."""
+    """Return how firmly the laser's pulses follow the drive, record by record."""
     drifts = column(
         Estimate(1e3 * one.coherence.drift_hz, 1e3 * one.coherence.u_drift_hz, "mHz") for one in run.coherences
     )

@@ -264,7 +264,7 @@ def parts_of(spin: SpinFrequency, found: SpinFrequency) -> dict[str, UParts]:
 
 
 def _code(samples: Array, spin: SpinFrequency) -> float | None:
-    """One step of the numbers of a record over the noise of a sample; None where that is not known."""
+    """Return one step of the numbers of a record over the noise of a sample; None where that is not known."""
     some = np.unique(samples[:_MOST_FOR_STEP])
     if spin.snr_db is None or some.size < 2:
         return None

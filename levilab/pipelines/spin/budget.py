@@ -24,7 +24,7 @@ _BY_LENGTH = {"frequency": "√8", "chirp": "√32"}
 
 
 def budget_of_run(source: Source[Records], run: SpinRun, options: SpinOptions) -> tuple[Budget, ...]:
-    """Of frequency and slope of one record; of a long one or of several, of the window or record in the middle."""
+    """Return the budgets of one record; of a long one or of several, of the window or record in the middle."""
     made = []
     for name, by_clock in (("frequency", 1.0), ("chirp", 2.0)):
         estimate: Estimate = getattr(run.spin, name)
@@ -76,7 +76,7 @@ def _bound(spin: SpinFrequency, name: str) -> float | None:
 
 
 def _of_the_rest(parts: UParts, estimate: Estimate) -> Iterator[Component]:
-    """How the slope changes, and what the file says of its sampling interval."""
+    """Return the change of the slope, and the file's own sampling interval."""
     if parts.drag > 0:
         note = "as a drag in proportion to ω^(1.5 ± 0.5), an even drive or a swing changes it, and as the pulses show"
         yield direct_row("drag", "law by which the slope changes", parts.drag, estimate.unit, note, "a shorter record")

@@ -52,7 +52,7 @@ class _Excerpt:
 
 
 def spin_figure(analysis: SpinAnalysis) -> Figure:
-    """For each input its trace with the turns found in it, all turns laid over each other, residuals, and frequency."""
+    """Draw for each input its trace with the turns, all turns over each other, residuals, and frequency."""
     shown = list(zip(analysis.sources, analysis.runs, strict=True))[:MOST_DRAWN]
     with mpl.rc_context(STYLE):
         head = _HEAD if len(analysis.runs) > 1 else _HEAD - 0.2
@@ -205,7 +205,7 @@ def _levels(signal: Array, turns: Array) -> tuple[float, float]:
 
 
 def _fold(signal: Array, turns: Array) -> tuple[Array, Array]:
-    """Mean signal against the part of a turn, −½ to ½."""
+    """Return the mean signal against the part of a turn, −½ to ½."""
     off = turns - np.rint(turns)
     good = np.isfinite(signal)
     bins = np.clip(((off[good] + 0.5) * BINS).astype(np.intp), 0, BINS - 1)
@@ -240,7 +240,7 @@ def _draw_trace(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
 
 
 def _draw_folded(axes: Axes, excerpt: _Excerpt) -> None:
-    """All turns over each other."""
+    """Draw all turns over each other."""
     part = _thin(len(excerpt.turns))
     off = excerpt.turns - np.rint(excerpt.turns)
     style: Any = {"marker": ".", "markersize": 2, "linestyle": "none", "color": FIT, "alpha": 0.4, "rasterized": True}
@@ -292,7 +292,7 @@ def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
 
 
 def _draw_series(axes: Axes, run: SpinRun, excerpt: _Excerpt, gid: str) -> None:
-    """Frequency against time: of windows or records, or by the fit of the only one."""
+    """Draw frequency against time: of windows or records, or by the fit of the only one."""
     series, spin = run.series, run.spin
     if len(series) == 1:
         t = np.linspace(float(excerpt.time[0]), float(excerpt.time[-1]), 50)

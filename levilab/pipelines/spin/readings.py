@@ -51,7 +51,7 @@ class Records:
         return float(zlib.crc32(os.fsencode(self.origin.resolve())))
 
     def same_as(self, other: Records) -> bool:
-        """Whether it is the same input: nothing is averaged, so a copy by another name does no harm."""
+        """Return whether it is the same input: nothing is averaged, so a copy by another name does no harm."""
         return self.origin.resolve() == other.origin.resolve()
 
     @property

@@ -27,7 +27,7 @@ MOST_POINTS = 300
 
 
 def spin_part(analysis: SpinAnalysis) -> ReportPart:
-    """Frequencies, pulses, and frequency against time."""
+    """Return frequencies, pulses, and frequency against time."""
     return ReportPart(
         subject="spin frequency",
         heading="Spin frequency of a top",
@@ -83,7 +83,7 @@ def _in_words(source: Source[Records], run: SpinRun, *_: object) -> tuple[str, .
 
 
 def _series(source: Source[Records], run: SpinRun, *_: object) -> tuple[Block, ...]:
-    """Frequency against time, where there is more than one value."""
+    """Return frequency against time, where there is more than one value."""
     if len(run.series) <= 1:
         return ()
     return (Listing("spin-series", series_table(source, run, MOST_VALUES)),)

@@ -23,7 +23,7 @@ MOST_VALUES = 12
 
 
 def spin_tables(analysis: SpinAnalysis) -> tuple[Table, ...]:
-    """Frequency, slope and time of each input; how its pulses are; of one input its series."""
+    """Return frequency, slope and time of each input; the quality of its pulses; of one input its series."""
     tables = [frequency_table(analysis), pulse_table(analysis)]
     if len(analysis.runs) == 1 and len(analysis.runs[0].series) > 1:
         tables.append(series_table(analysis.sources[0], analysis.runs[0], MOST_VALUES))
@@ -51,7 +51,7 @@ def frequency_table(analysis: SpinAnalysis) -> Table:
 
 
 def pulse_table(analysis: SpinAnalysis) -> Table:
-    """How good the pulses are."""
+    """Return a table of the quality of the pulses."""
     several = any(run.which for run in analysis.runs)
     rows = [
         (
@@ -71,7 +71,7 @@ def pulse_table(analysis: SpinAnalysis) -> Table:
 
 
 def series_table(source: Source[Records], run: SpinRun, most: int) -> Table:
-    """Frequency against time, thinned out evenly."""
+    """Return frequency against time, thinned out evenly."""
     series = run.series
     step = max(-(-len(series) // most), 1)
     heads, clocks = with_clock(source.time_zero, series.time.tolist(), ("time [s]", "spin [Hz]", "u [mHz]"))

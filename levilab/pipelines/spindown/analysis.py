@@ -49,7 +49,7 @@ class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
         return verdict_of_all(self.combined, self.runs)
 
     def about_all(self) -> Iterable[str]:
-        """What to know of the means, and of the laws that are not excluded."""
+        """Return remarks on the means, and on the laws that are not excluded."""
         return (*map(remark, self.combined.remarks), *self._left_out(), *self._of_laws(self.combined.fits))
 
     def _left_out(self) -> Iterable[str]:
@@ -59,7 +59,7 @@ class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
             yield f"the means leave out {', '.join(names)}, whose unit is in doubt: say it, or remove the file"
 
     def about_run(self, run: SpinDown) -> Iterable[str]:
-        """What to know of one run."""
+        """Return remarks on one run."""
         return (*map(remark, run.remarks), *self._of_laws(run.fits))
 
     def _of_laws(self, fits: Iterable[LawFit | CombinedLaw]) -> Iterable[str]:

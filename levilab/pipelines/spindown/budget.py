@@ -41,7 +41,7 @@ _TO_HALVE = 4
 
 
 def budget_of_run(source: Source[Readings], run: SpinDown, options: SpinDownOptions) -> tuple[Budget, ...]:
-    """Of the parameters of the best law, of constants of others as good with no more of them, of the exponent."""
+    """Return the budgets of the best law, of laws that fit as well with no more constants, and of the exponent."""
     return tuple(
         Budget(name, estimate.value, estimate.u, estimate.unit, tuple(_rows(source, run, fit, name, options)), fit.name)
         for fit, name in _wanted(run)
@@ -58,7 +58,7 @@ def _wanted(run: SpinDown) -> list[tuple[LawFit, str]]:
 
 
 def _as_good(verdict: Verdict, fits: Sequence[LawFit | CombinedLaw]) -> list[str]:
-    """The laws with constants of their own that fit as well as the best one and have no more of them."""
+    """Return the laws with constants of their own that fit as well as the best one and have no more of them."""
     count = {fit.name: len(LAWS[fit.name].constants) for fit in fits}
     tied = [name for name in verdict.indistinguishable if name not in {verdict.best, _POWER}]
     return [name for name in tied if count[name] <= count[verdict.best]]
@@ -99,7 +99,7 @@ def _rows(
 def _of_readings(
     source: Source[Readings], run: SpinDown, fit: LawFit, name: str, options: SpinDownOptions
 ) -> Iterator[Component]:
-    """What the readings scatter, the digits in which they are read, and what comes on top of that."""
+    """Yield the parts by the readings: their scatter, their digits, and the correlation of neighbours."""
     parts, unit, stated = fit.parts[name], fit.parameters[name].unit, run.u is not None
     if run.u is not None:
         each = float(np.sqrt(np.mean(run.u**2)))
@@ -135,7 +135,7 @@ def _of_readings(
 
 
 def _of_model(parts: Parts, estimate: Estimate) -> Iterator[Component]:
-    """What is not known of the tilt of the top's moment and of its nutation."""
+    """Yield the parts by the unknown tilt of the top's moment and by its nutation."""
     if parts.tilt > 0:
         note = "what was known of them beforehand, and the readings do not tell"
         remedy = "less noise in the readings, readings until the top falls, and the top's file for --device"
@@ -143,7 +143,7 @@ def _of_model(parts: Parts, estimate: Estimate) -> Iterator[Component]:
 
 
 def _by_clocks(fit: LawFit, name: str) -> tuple[float, float]:
-    """Relative change of a parameter with the rates of the counter's clock and of that of the times.
+    """Return the relative change of a parameter with the rates of the counter's clock and of that of the times.
 
     Where all frequencies are multiplied by 1 + ε and all times by 1 + η, C of ω̇ = −Cωⁿ is by (1 + ε)^(1 − n)/(1 + η).
     """
@@ -158,7 +158,7 @@ def _by_clocks(fit: LawFit, name: str) -> tuple[float, float]:
 
 
 def _better_readings(source: Source[Readings]) -> str:
-    """What would make the readings better, as the end of a sentence."""
+    """Return advice for better readings, as the end of a sentence."""
     gate, interval = gate_of(source, EXPERIMENT), setting_of(source, EXPERIMENT, "interval_s")
     if gate is None or not interval:
         return "more readings in the same time, or a longer gate"
@@ -172,7 +172,7 @@ def _better_readings(source: Source[Readings]) -> str:
 
 
 def budget_of_all(analysis: SpinDownAnalysis) -> tuple[Budget, ...]:
-    """Of the means over several runs, from the budgets of each."""
+    """Return the budgets of the means over several runs, from the budgets of each."""
     combined = analysis.combined
     best = combined.fit(combined.best)
     laws = [best, *(combined.fit(name) for name in _as_good(combined.verdict, combined.fits))]
@@ -185,7 +185,7 @@ def budget_of_all(analysis: SpinDownAnalysis) -> tuple[Budget, ...]:
 
 
 def _budget_of_mean(analysis: SpinDownAnalysis, law: str, name: str, mean: Mean) -> Budget | None:
-    """U of a mean: what the runs scatter, or no less than their own uncertainties leave; and what they share."""
+    """Return u of a mean: the scatter between runs, or what their own u imply if that is more; and what they share."""
     fits = [run.fit(law) for run in analysis.runs]
     n = mean.degrees_of_freedom + 1
     if mean.value is None or not mean.u or mean.scatter is None or n != len(fits):
@@ -220,7 +220,7 @@ def _budget_of_mean(analysis: SpinDownAnalysis, law: str, name: str, mean: Mean)
 
 
 def _systematic(analysis: SpinDownAnalysis, law: str, name: str, mean: Mean) -> Iterator[Component]:
-    """What is common to all runs and in no u."""
+    """Yield the effects that are common to all runs and in no u."""
     source, fit = analysis.sources[0], analysis.runs[0].fit(law)
     of_runs = [_row(origin.budget or (), law, name, "gate") for origin in analysis.origins]
     gates = [one for one in of_runs if one and one.u]

@@ -72,7 +72,7 @@ class _Unit:
 
 
 def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
-    """Readings with the best law; what the others differ from it; residuals of each; the lines one draws on paper."""
+    """Draw readings and best law, the other laws less the best one, residuals of each, and the straight lines."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, _HEIGHT))
         headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
@@ -89,7 +89,7 @@ def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
 
 
 def _finding(analysis: SpinDownAnalysis) -> str:
-    """The verdict in one sentence."""
+    """Return the verdict in one sentence."""
     verdict, best = analysis.combined.verdict, analysis.combined.best
     together = f" of {len(analysis.runs)} runs" if len(analysis.runs) > 1 else ""
     equation = in_mathtext(LAWS[best].equation)
@@ -120,7 +120,7 @@ def _unit(analysis: SpinDownAnalysis) -> _Unit:
 
 
 def _draw_spin(axes: Axes, analysis: SpinDownAnalysis) -> None:
-    """The readings of all runs, and the best law through each."""
+    """Draw the readings of all runs, and the best law through each."""
     span = _set_range(axes, analysis)
     best, several = analysis.combined.best, len(analysis.runs)
     for k, run in enumerate(analysis.runs):
@@ -140,7 +140,7 @@ def _draw_spin(axes: Axes, analysis: SpinDownAnalysis) -> None:
 
 
 def _set_range(axes: Axes, analysis: SpinDownAnalysis) -> float:
-    """What the readings used need, and no more, with room for the legend above: an outlier squeezes nothing."""
+    """Set the axis to the readings used, with room for the legend above: an outlier squeezes nothing."""
     low = min(float(run.frequency.min()) for run in analysis.runs)
     high = max(float(run.frequency.max()) for run in analysis.runs)
     margin = 0.06 * (high - low) or 0.06 * high
@@ -149,7 +149,7 @@ def _set_range(axes: Axes, analysis: SpinDownAnalysis) -> float:
 
 
 def _run_label(analysis: SpinDownAnalysis, k: int) -> str | None:
-    """A name for each of a few runs, a number for many."""
+    """Return a name for each of a few runs, a number for many."""
     if len(analysis.runs) == 1:
         return "readings" + (" ± u" if analysis.runs[0].u is not None else "")
     if len(analysis.runs) <= len(MARKERS):
@@ -158,7 +158,7 @@ def _run_label(analysis: SpinDownAnalysis, k: int) -> str | None:
 
 
 def _drawable(name: str) -> str:
-    """A name as a legend shows it: no formula, no hidden label, and no character that the font lacks."""
+    """Return a name for a legend: no formula, no hidden label, and no character that the font lacks."""
     font = get_font(findfont("DejaVu Sans"))
     text = "".join(c if c.isprintable() and font.get_char_index(ord(c)) else "□" for c in name)
     text = text if len(text) <= 24 else text[:23] + "…"
@@ -166,7 +166,7 @@ def _drawable(name: str) -> str:
 
 
 def _draw_outliers(axes: Axes, analysis: SpinDownAnalysis, k: int) -> None:
-    """A cross where it lies; an arrow at the edge, with its value, where it lies beyond."""
+    """Draw a cross at the outlier, or an arrow at the edge with its value where it lies beyond."""
     readings, outliers = analysis.sources[k].readings, np.array(analysis.runs[k].outliers, dtype=np.intp)
     t, nu = readings.time[outliers], readings.frequency[outliers]
     low, high = axes.get_ylim()
@@ -192,7 +192,7 @@ def _draw_outliers(axes: Axes, analysis: SpinDownAnalysis, k: int) -> None:
 
 
 def _draw_weights(axes: Axes, analysis: SpinDownAnalysis) -> None:
-    """How the criterion weighs the laws: a bar each, with its number and the verdict."""
+    """Draw the weight of each law by the criterion: a bar each, with its number and the verdict."""
     laws = laws_of(analysis)
     for place, name in enumerate(laws):
         weight = analysis.combined.fit(name).statistics.weight
@@ -210,7 +210,7 @@ def _draw_weights(axes: Axes, analysis: SpinDownAnalysis) -> None:
 
 
 def _note(analysis: SpinDownAnalysis, name: str, *, short: bool = False) -> str:
-    """The verdict on a law in a word or two, or if `short` in the least that says it."""
+    """Return the verdict on a law in a word or two, or if `short` in the fewest letters."""
     verdict, best = analysis.combined.verdict, name == analysis.combined.best
     if name in verdict.excluded:
         return "excluded"
@@ -224,7 +224,7 @@ def _note(analysis: SpinDownAnalysis, name: str, *, short: bool = False) -> str:
 
 
 def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
-    """The best law's constant in each run with its u, their mean and their scatter: does it drift, is one apart?"""
+    """Draw the best law's constant in each run with its u, their mean and their scatter."""
     best = analysis.combined.fit(analysis.combined.best)
     name, mean = next(iter(best.constants.items()))
     found = [run.fit(best.name).parameters[name] for run in analysis.runs]
@@ -250,7 +250,7 @@ def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
 
 
 def _power_of_ten(values: Array) -> int:
-    """The power of ten for an axis's label: written above the axis, it would push the title out of the figure."""
+    """Return the power of ten for an axis's label: above the axis it would push the title out of the figure."""
     largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
     return math.floor(math.log10(largest)) if largest > 0 and not 0.01 <= largest < 1e4 else 0
 
@@ -259,7 +259,7 @@ def _power_of_ten(values: Array) -> int:
 
 
 def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> None:
-    """Readings and every law less the best one, which is the line at zero, with the band of its u."""
+    """Draw readings and every law less the best one, which is the line at zero, with the band of its u."""
     best, several = analysis.combined.best, len(analysis.runs)
     excluded = analysis.combined.verdict.excluded
     found: list[float] = []
@@ -292,13 +292,13 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
 
 
 def _signed(difference: Array) -> str:
-    """The value farthest from zero, in two digits."""
+    """Return the value farthest from zero, in two digits."""
     farthest = float(difference[np.argmax(np.abs(difference))])
     return f"{'−' if farthest < 0 else '+'}{digits(abs(farthest))}"
 
 
 def _name_laws(axes: Axes, ends: list[tuple[float, str, str]]) -> None:
-    """A piece of each law's line beside the panel, in the order of the lines' ends: (end, law, what is said of it)."""
+    """Draw a piece of each law's line beside the panel, in the order of the lines' ends: (end, law, text)."""
     order = sorted(ends, key=lambda end: -end[0])
     handles = [Line2D([], [], linewidth=1.3, **LOOKS[law].as_line) for _, law, _ in order]
     axes.legend(
@@ -311,7 +311,7 @@ def _name_laws(axes: Axes, ends: list[tuple[float, str, str]]) -> None:
 
 
 def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit: _Unit) -> None:
-    """What each law leaves over, in units of a reading's u: noise within the bands, without a shape, if it holds."""
+    """Draw the residuals of each law in units of a reading's u: noise within the bands if the law holds."""
     text = f"Residuals, reading − law, in units of {unit.words}; shaded ±1, ±2"
     text += "; black: means" if _many(analysis) else ""
     write(figure, 0.08, top - 0.42, text, fontsize=9)
@@ -360,7 +360,7 @@ def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit
 
 
 def _draw_tilt(axes: Axes, analysis: SpinDownAnalysis, k: int, name: str, limit: float) -> None:
-    """What tilt and wobble add to the count of run k, by one law, brought to the panel's scale of ±limit."""
+    """Draw the share of tilt and wobble in the count of run k, by one law, at the panel's scale of ±limit."""
     run = analysis.runs[k]
     fit = run.fit(name)
     if fit.has_tilt:
@@ -371,7 +371,7 @@ def _draw_tilt(axes: Axes, analysis: SpinDownAnalysis, k: int, name: str, limit:
 
 
 def _tilt_in_words(analysis: SpinDownAnalysis) -> str:
-    """What the dotted curves are; empty where no run shows a tilt."""
+    """Return an explanation of the dotted curves; empty where no run shows a tilt."""
     fits = [run.fit(analysis.combined.best) for run in analysis.runs]
     most = [float(np.abs(tilt_part(fit, run.time)).max()) for fit, run in zip(fits, analysis.runs, strict=True)]
     return f"dotted: what the tilt adds to the count, up to {digits(max(most))} Hz, not to scale" if max(most) else ""
@@ -381,7 +381,7 @@ def _tilt_in_words(analysis: SpinDownAnalysis) -> str:
 
 
 def _draw_straight_lines(figure: Figure, top: float, analysis: SpinDownAnalysis) -> None:
-    """Where a law holds, its points lie on the line, and the strip below shows noise about zero."""
+    """Draw the straight lines: where a law holds, points lie on its line, and the strip below shows noise about 0."""
     write(
         figure, 0.08, top - 0.3, "Straight lines as drawn on paper, and below each how far the points lie from it",
         fontsize=9,
@@ -434,7 +434,7 @@ def _share(panels: int, gap: float) -> tuple[float, float]:
 
 
 def _many(analysis: SpinDownAnalysis) -> bool:
-    """Whether only means show what shape the noise hides."""
+    """Return whether only means show what shape the noise hides."""
     return len(analysis.runs) == 1 and len(analysis.runs[0].time) > MOST_BARS
 
 
@@ -461,7 +461,7 @@ def _draw_readings(
     label: str | None = None,
     gid: str | None = None,
 ) -> None:
-    """One number for each reading of run k: points, with bars of u where they are seen in a `span`.
+    """Draw one number for each reading of run k: points, with bars of u where they are seen in a `span`.
 
     Args:
         axes: where.

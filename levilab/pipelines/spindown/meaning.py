@@ -35,7 +35,7 @@ _SCATTERS = 1.5
 
 
 def meaning(analysis: SpinDownAnalysis) -> tuple[str, ...]:
-    """The sentences, of all runs together."""
+    """Return the sentences, of all runs together."""
     return tuple(text for part in _PARTS for text in part(analysis))
 
 
@@ -56,7 +56,7 @@ def _torque(law: str) -> str:
 
 
 def _loss(analysis: SpinDownAnalysis) -> Iterator[str]:
-    """How fast the top gets slower, which needs no law."""
+    """Yield how fast the top gets slower, which needs no law."""
     combined = analysis.combined
     if not combined.verdict.describes:
         return
@@ -75,7 +75,7 @@ def _loss(analysis: SpinDownAnalysis) -> Iterator[str]:
 
 
 def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
-    """What the constant of a law of one power says."""
+    """Yield the meaning of the constant of a law of one power."""
     combined = analysis.combined
     if not combined.verdict.describes or combined.best not in _POWERS:
         return
@@ -100,7 +100,7 @@ def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
 
 
 def _exponent(analysis: SpinDownAnalysis) -> Iterator[str]:
-    """How far the exponent lies from those of the laws of one power."""
+    """Yield the distance of the exponent from those of the laws of one power."""
     combined = analysis.combined
     power = next((fit for fit in combined.fits if fit.name == "power"), None)
     if power is None or not combined.verdict.describes:
@@ -127,7 +127,7 @@ def _tilt(analysis: SpinDownAnalysis) -> Iterator[str]:
 
 
 def _runs(analysis: SpinDownAnalysis) -> Iterator[str]:
-    """What the scatter between runs says."""
+    """Yield the meaning of the scatter between runs."""
     if len(analysis.runs) == 1:
         yield (
             "This is one run. Another one of the same top may differ by more than this u: draught, temperature and "
@@ -157,7 +157,7 @@ def _runs(analysis: SpinDownAnalysis) -> Iterator[str]:
 
 
 def _constants(analysis: SpinDownAnalysis) -> Mapping[str, Estimate]:
-    """The constants of the best law: of one run its own, of several their means."""
+    """Return the constants of the best law: of one run its own, of several their means."""
     combined = analysis.combined
     if len(analysis.runs) > 1:
         return combined.fit(combined.best).constants

@@ -61,7 +61,7 @@ class Readings:
         return float(np.abs(self.frequency).max())
 
     def same_as(self, other: "Readings") -> bool:
-        """Whether time and frequency are the same, but for the rounding of another unit in the file."""
+        """Return whether time and frequency are the same, but for the rounding of another unit in the file."""
         pairs = ((self.time, other.time), (self.frequency, other.frequency))
         return len(self) == len(other) and all(
             abs(a[0] - b[0]) <= SAME * abs(b[0]) and bool(np.allclose(a, b, rtol=SAME, atol=0)) for a, b in pairs
@@ -73,12 +73,12 @@ SAME = 1e-9
 
 
 def read_run_readings(run: "Run", _: "InputOptions") -> Readings:
-    """The readings of a run of the experiment `spin`, which drives the top up."""
+    """Return the readings of a run of the experiment `spin`, which drives the top up."""
     return replace(spin_readings(run.readings()), driven=True, upright=run.record.world == "spin")
 
 
 def read_spin_file(path: "Path", options: "InputOptions") -> Readings:
-    """The readings in a data file: a table of them, or a long record of a signal or of pulse times.
+    """Return the readings in a data file: a table of them, or a long record of a signal or of pulse times.
 
     Raises:
         DoesNotSuit: it holds neither.
@@ -103,7 +103,7 @@ def read_spin_file(path: "Path", options: "InputOptions") -> Readings:
 
 
 def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") -> Readings:
-    """The frequency in each window of a long record, while the top coasts.
+    """Return the frequency in each window of a long record, while the top coasts.
 
     Raises:
         DoesNotSuit: it is too short for a spin-down, or the spin does not fall.
@@ -140,14 +140,14 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
 
 
 def _coasting(track: "Track") -> tuple[int, int]:
-    """The windows of the longest phase in which the top coasts, from the first to behind the last; all without one."""
+    """Return the windows [first, end) of the longest phase in which the top coasts; all without one."""
     coasting = [phase.windows for phase in phases(track) if phase.kind == "coasting"]
     first, last = max(coasting, key=lambda ends: ends[1] - ends[0], default=(0, len(track.time)))
     return (first, last) if last - first >= FEWEST else (0, len(track.time))
 
 
 def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
-    """The readings of a spin-down: time, spin frequency and, if the table has it, its standard uncertainty.
+    """Return the readings of a spin-down: time, spin frequency and, if the table has it, its standard uncertainty.
 
     Args:
         table: with `time_s` and `spin_frequency_hz`.
@@ -223,7 +223,7 @@ def _must_be_ordinary(table: Table, time: "NDArray[np.float64]", frequency: "NDA
 
 
 def _in_the_file(table: Table, error: AnalysisError) -> TableError:
-    """What is wrong with the readings, with its line in the file and what to do about it there."""
+    """Return the error of the readings, with its line in the file and the way to mend it there."""
     if isinstance(error, TimesNotIncreasing):
         before, after = (int(line) for line in table.lines[error.index - 1 : error.index + 1])
         what = "is repeated" if error.before == error.after else "comes"
@@ -246,7 +246,7 @@ _ABOVE_0 = {
 
 
 def _must_be_possible(table: Table, u: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> None:
-    """An uncertainty below the rounding of the number itself is a mistake; one that is not above 0 is another."""
+    """Refuse an uncertainty below the rounding of the number itself, or one that is not above 0."""
     above_0 = (u > 0) & (frequency > 0)
     wrong = np.flatnonzero(above_0 & ((u < 1e-15 * frequency) | (u > 1e15 * frequency)))
     if wrong.size:

@@ -58,7 +58,7 @@ MOST_FALLS = 8
 
 
 def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
-    """Verdict, laws, what they mean, how well they fit, the constants run by run, and the readings."""
+    """Return verdict, laws, their meaning, how well they fit, the constants run by run, and the readings."""
     combined = analysis.combined
     n = combined.fit(combined.best).statistics.n
     return ReportPart(
@@ -91,12 +91,12 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
 
 
 def _meaning(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:
-    """What takes the spin by the best law, how fast, and what the constants say."""
+    """Return what takes the spin by the best law, how fast, and the meaning of the constants."""
     return (Paragraph(" ".join(meaning(analysis)), "What it means."),)
 
 
 def _falls(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:
-    """What was seen of the falls; of many their range."""
+    """Return the facts of the falls; of many their range."""
     falls = [
         (short_name(source.name), fall)
         for source, run in zip(analysis.sources, analysis.runs, strict=True)
@@ -112,7 +112,7 @@ def _falls(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:
 
 
 def _laws(analysis: SpinDownAnalysis) -> tuple[Tabular, Tabular]:
-    """The constants of all laws, and how well they fit."""
+    """Return the constants of all laws, and how well they fit."""
     several = len(analysis.runs) > 1
     n = analysis.combined.fit(analysis.combined.best).statistics.n
     low, high = max(2 - 4 / math.sqrt(n), 0), min(2 + 4 / math.sqrt(n), 4)
@@ -134,7 +134,7 @@ def _laws(analysis: SpinDownAnalysis) -> tuple[Tabular, Tabular]:
 
 
 def _count(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
-    """What the count holds beside the spin."""
+    """Return tilt, wobble and correlation in the count beside the spin."""
     found = count_table(analysis)
     if found is None:
         return (Note("The top is taken to turn upright: what a tilt of its moment would change is in no uncertainty."),)
@@ -151,7 +151,7 @@ def _count(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
 
 
 def _run_by_run(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
-    """Straight lines and the best law's fit, a row for each run."""
+    """Return straight lines and the best law's fit, a row for each run."""
     combined = analysis.combined
     best = combined.best + " law" + (", the best" if combined.verdict.decided else "")
     paper = (
@@ -216,7 +216,7 @@ def _by_run_table(analysis: SpinDownAnalysis) -> Table:
 
 
 def _columns(analysis: SpinDownAnalysis) -> list[_Column]:
-    """The straight lines' constants and those of the best law's fit."""
+    """Return the straight lines' constants and those of the best law's fit."""
     combined = analysis.combined
     columns = [_Column(one.head, one.show_all(analysis.runs)) for one in OF_RUN]
     for law in combined.fits:
@@ -240,7 +240,7 @@ def _head(of: str, name: str, unit: str) -> str:
 
 
 def scatter(mean: Mean) -> Estimate | None:
-    """Standard deviation between the runs; its own u is s/√(2·dof) (GUM E.4.3)."""
+    """Return the standard deviation between the runs; its own u is s/√(2·dof) (GUM E.4.3)."""
     if mean.scatter is None:
         return None
     return Estimate(mean.scatter, mean.scatter / math.sqrt(2 * mean.degrees_of_freedom), mean.unit)
@@ -260,21 +260,21 @@ def _in_words(source: Source[Readings], fit: SpinDown, options: SpinDownOptions)
 
 
 def _uncertainty(source: Source[Readings], fit: SpinDown, options: SpinDownOptions) -> str:
-    """How large u of a reading is, and where it comes from."""
+    """Return how large u of a reading is, and where it comes from."""
     if fit.u is None:
         return "u of a reading: not known, taken from the scatter about each law"
     return f"u of a reading: {size_of_u(fit.u)}, {origin_of_u(source, 'spin_frequency_u_hz', options)}"
 
 
 def _residuals(source: Source[Readings], fit: SpinDown, law: str) -> dict[int, float]:
-    """Number of a reading → what the law leaves over [Hz]; of those that were fitted."""
+    """Return number of a reading → its residual from the law [Hz]; of those that were fitted."""
     out = frozenset(fit.outliers)
     used = [i for i in range(len(source.readings)) if i not in out or len(fit.time) == len(source.readings)]
     return dict(zip(used, fit.fit(law).residuals.tolist(), strict=True))
 
 
 def _readings(source: Source[Readings], fit: SpinDown, options: SpinDownOptions, best: str) -> Listing:
-    """The first readings; rows of clock time, if it is known, time [s], spin [Hz], u and residual [Hz]."""
+    """Return the first readings; rows of clock time, if it is known, time [s], spin [Hz], u and residual [Hz]."""
     readings, given_u = source.readings, options.reading_u
     shown = min(len(readings), MOST_READINGS)
     u = [given_u] * shown if readings.u is None or given_u is not None else readings.u[:shown].tolist()
@@ -293,7 +293,7 @@ def _readings(source: Source[Readings], fit: SpinDown, options: SpinDownOptions,
 
 
 def _points(analysis: SpinDownAnalysis) -> tuple[Points, ...]:
-    """What each reading of the figure answers: of run k, its readings, and what every law leaves over."""
+    """Return what each point of the figure answers: of run k, its readings, and the residuals from every law."""
     return tuple(
         points
         for k, (name, run) in enumerate(zip(labels_of(analysis.sources), analysis.runs, strict=True))
@@ -318,7 +318,7 @@ def _points_of_run(k: int, name: str, run: SpinDown, analysis: SpinDownAnalysis)
 
 
 def _fall(source: Source[Readings], fit: SpinDown) -> str:
-    """What was seen of the fall."""
+    """Return the facts of the fall."""
     events = source.run.events() if source.run else []
     text = next((str(event["text"]) for event in reversed(events) if event["kind"] == RunEvent.FELL), None)
     if text is None:
@@ -327,7 +327,7 @@ def _fall(source: Source[Readings], fit: SpinDown) -> str:
 
 
 def _falls_in_short(analysis: SpinDownAnalysis, seen: int) -> str:
-    """Between which spins the tops fell."""
+    """Return between which spins the tops fell."""
     last = sorted(float(run.frequency[-1]) for run in analysis.runs)
     span = f"{last[0]:.2f} Hz to {last[-1]:.2f} Hz, {last[len(last) // 2]:.2f} Hz in the middle"
     return f"Seen in {seen} of {len(last)} runs. The last reading that was fitted is {span}"

@@ -45,7 +45,7 @@ _WITH_TENTHS = 100.0
 
 
 def spindown_tables(analysis: SpinDownAnalysis) -> tuple[Table, ...]:
-    """The runs, the laws, how well they fit, the straight lines.  Each fits a terminal of 80 columns."""
+    """Return the runs, the laws, how well they fit, the straight lines.  Each fits a terminal of 80 columns."""
     quality = quality_table(analysis, QUALITY)
     count = count_table(analysis, symbols=True)
     return _runs_table(analysis), _laws_table(analysis), quality, *([count] if count else []), _lines_table(analysis)
@@ -86,13 +86,13 @@ def laws_of(analysis: SpinDownAnalysis) -> list[str]:
 
 
 def is_best(analysis: SpinDownAnalysis, law: str) -> bool:
-    """Whether the readings single a law out."""
+    """Return whether the readings single a law out."""
     verdict = analysis.combined.verdict
     return verdict.decided and law == verdict.best
 
 
 def law_constants(analysis: SpinDownAnalysis, name: str) -> Mapping[str, Estimate]:
-    """A law's constants: means over the runs, or with its start those of the only one; no wobble by an excluded law."""
+    """Return a law's constants: means over the runs, or with its start those of the only one."""
     if len(analysis.runs) > 1:
         return analysis.combined.fit(name).constants
     found = analysis.runs[0].fit(name).parameters
@@ -101,7 +101,7 @@ def law_constants(analysis: SpinDownAnalysis, name: str) -> Mapping[str, Estimat
 
 
 def quality_table(analysis: SpinDownAnalysis, heads: Sequence[str]) -> Table:
-    """How well the laws fit."""
+    """Return how well the laws fit."""
     rows = [
         Row((fit.name, *_quality(fit.statistics, len(analysis.runs))), "best" if is_best(analysis, fit.name) else "")
         for fit in analysis.combined.fits
@@ -128,7 +128,7 @@ _NUTATION = "; K, with the laws: nutation"
 
 
 def count_table(analysis: SpinDownAnalysis, *, symbols: bool = False) -> Table | None:
-    """What the count holds beside the spin, and as how many readings correlated ones count; None: neither is seen."""
+    """Return tilt, wobble and correlation in the count, and the effective number of readings; None: none is seen."""
     if not any(run.has_tilt or run.is_correlated for run in analysis.runs):
         return None
     heads = ("run", "δ [rad]", "ν_r [Hz]", "adds at the end [Hz]", "correlation", "count as")
@@ -159,7 +159,7 @@ def count_table(analysis: SpinDownAnalysis, *, symbols: bool = False) -> Table |
 
 
 def tilt_part(fit: LawFit, time: Array) -> Array:
-    """What tilt and wobble add to the count at some times [Hz], shape (n,); zeros for a fit without them."""
+    """Return the share of tilt and wobble in the count at some times [Hz], shape (n,); zeros without them."""
     p = len(fit.law.parameters)
     tau = (time - fit.start_time) / fit.reference[1]
     spin: Array = fit.reference[0] * counted(fit.law, tau, fit.solution[:p], fit.top)
@@ -167,7 +167,7 @@ def tilt_part(fit: LawFit, time: Array) -> Array:
 
 
 def _lines_table(analysis: SpinDownAnalysis) -> Table:
-    """The thesis's straight lines, run by run, beside the fit of the favoured law."""
+    """Return the thesis's straight lines, run by run, beside the fit of the favoured law."""
     best = analysis.combined.fit(analysis.combined.best)
     lines = [fit for fit in analysis.combined.fits if fit.linearised]
     heads = [f"{STRAIGHT_LINES[fit.name].quantity}\n{_head(fit.linearised or {})}" for fit in lines]

@@ -62,7 +62,7 @@ class Writer:
         return f"{self.prefix}{plain}" if count == 1 else f"{self.prefix}{plain}-{count}"
 
     def blocks(self, blocks: Iterable[Block], level: int) -> Html:
-        """Blocks below each other; level: of the headings among them."""
+        """Return blocks below each other; level: of the headings among them."""
         return join((_RENDERERS[type(block)](self, block, level), "\n") for block in blocks)
 
 
@@ -143,7 +143,7 @@ def _moved_sideways(drawn: Html, name: str, kind: str = "scroll") -> Html:
 
 
 def _classes(table: Table, wraps: Iterable[str] = (), *, names: bool = False) -> tuple[str | None, ...]:
-    """Of each column: numbers, sentences, names, or none of these."""
+    """Return the class of each column: numbers, sentences, names, or none of these."""
     folded = set(wraps)
     return tuple(
         "n" if k in table.numbers else "words" if head in folded else "name" if names and k == 0 else None
@@ -200,7 +200,7 @@ def _picture(writer: Writer, block: Picture, _: int) -> Html:
 
 
 def _count_marks(svg: str, group: str) -> int:
-    """Points drawn in the only group of that name: a figure may thin them out, and then none of them answers."""
+    """Count the points drawn in the only group of that name: a figure may thin them out, and then none answers."""
     _, *after = svg.split(f'<g id="{group}">')
     return after[0].partition("<g id=")[0].count("<use ") if len(after) == 1 else 0
 

@@ -53,7 +53,7 @@ def _attribute(key: str, value: str | bool | None) -> str:  # noqa: FBT001 - an 
 
 
 def join(children: Iterable[Child]) -> Html:
-    """Elements and texts one after the other."""
+    """Return elements and texts one after the other."""
     return Html("".join(_markup(child) for child in children))
 
 

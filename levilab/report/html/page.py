@@ -44,7 +44,7 @@ def page_of(document: Document) -> str:
 
 
 def fragment_of(blocks: Iterable[Block], prefix: str = "") -> str:
-    """Blocks as a part of a page that is not ours, such as a notebook: without script, and with a style of its own.
+    """Return blocks as a part of another page, such as a notebook: without script, with a style of its own.
 
     Args:
         blocks: in their order.
@@ -62,7 +62,7 @@ def _head(document: Document, writer: Writer) -> list[Html]:
 
 
 def _contents(document: Document) -> Html:
-    """Links to the sections of the first depth."""
+    """Return links to the sections of the first depth."""
     sections = [block for block in document.blocks if isinstance(block, Section) and block.anchor]
     if not document.contents or not sections:
         return join([])
@@ -79,7 +79,7 @@ def _island(writer: Writer) -> Html:
 
 @cache
 def _policy() -> str:
-    """Nothing is loaded, and no script runs but our own, by its hash."""
+    """Return a policy by which nothing is loaded, and no script runs but our own, by its hash."""
     hashes = [base64.b64encode(sha256(text.encode()).digest()).decode() for text in (script(), style())]
     return (
         f"default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; script-src 'sha256-{hashes[0]}'; "

@@ -122,7 +122,7 @@ def with_places(files: dict[str, bytes]) -> dict[str, bytes]:
 
 
 def fonts() -> list[Path]:
-    """Folders of fonts beside typst's own: those in matplotlib have what these lack."""
+    """Return folders of fonts beside typst's own: those in matplotlib have what these lack."""
     from levilab.present.style import font_folder  # with matplotlib
 
     return [font_folder()]
@@ -148,7 +148,7 @@ class _Drawing:
     files: dict[str, bytes] = field(default_factory=dict)
 
     def blocks(self, blocks: Iterable[Block]) -> list[Drawn]:
-        """Blocks as data; what is not printed is left out."""
+        """Return blocks as data, without those that are not printed."""
         return [drawn for block in blocks if (drawn := _BLOCKS[type(block)](block, self)) is not None]
 
     def figure(self, picture: Picture, *, floats: bool = True) -> Drawn:
@@ -196,7 +196,7 @@ def _content(document: Document, drawing: _Drawing) -> Drawn:
 
 
 def _outline_depth(document: Document) -> int:
-    """How deep the outline goes; 0: none is asked for.  The template leaves it out of a document of few pages."""
+    """Return the depth of the outline; 0 for none.  The template leaves it out of a document of few pages."""
     sections = [block for block in document.blocks if isinstance(block, Section)]
     if not document.contents:
         return 0
@@ -205,7 +205,7 @@ def _outline_depth(document: Document) -> int:
 
 
 def _in_short(blocks: Iterable[Block]) -> Iterator[Drawn]:
-    """Each chapter for the first page of a report of several with a verdict: that, and how many warnings it has."""
+    """Return each chapter of a report of several for the first page: its verdict and the number of warnings."""
     chapters = [(block, [*_all_in(block)]) for block in blocks if isinstance(block, Section)]
     verdicts = [next((one.text for one in inner if isinstance(one, Verdict)), "") for _, inner in chapters]
     several = sum(map(bool, verdicts)) > 1

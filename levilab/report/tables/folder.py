@@ -87,7 +87,7 @@ def _latex_files(document: Document) -> Iterator[tuple[str, tuple[str, str]]]:
 
 
 def _tables_in(blocks: Sequence[Block], mark: str) -> Iterator[tuple[Tabular, str]]:
-    """Every table of results with its mark: that of the section, or of the document."""
+    """Yield every table of results with its mark: that of the section, or of the document."""
     mark = next((block.lead for block in blocks if isinstance(block, Banner)), mark)
     for block in blocks:
         if isinstance(block, Tabular) and block.name not in _NO_RESULTS:

@@ -69,7 +69,7 @@ def _harmless(cell: Cell) -> str:
 
 
 def of_analysis(analysis: Analysis[Any], found: Any, folder: Path) -> Iterator[Values]:
-    """Its tables: a row for each input, and a row for each quantity, of inputs and of all together.
+    """Return the tables of an analysis: a row for each input, and a row for each quantity.
 
     Args:
         analysis: the row of the catalogue.
@@ -132,7 +132,7 @@ def _of_part(
 
 
 def _values_in(part: Mapping[str, Any], residuals: str) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
-    """Model, name and value of each quantity; values without a model come first."""
+    """Yield model, name and value of each quantity; values without a model come first."""
     for name, value in part["values"].items():
         yield "", name, value
     for model in part.get("models") or ():

@@ -49,7 +49,7 @@ _MEAN_DECAY: tuple[float, ...] = tuple((-1) ** k / math.factorial(k + 1) for k i
 
 @part
 def _polynomial_12(c: tuple[float, ...], x: float) -> float:
-    """A polynomial of twelve terms, in pairs that do not wait for each other."""
+    """Evaluate a polynomial of twelve terms, in pairs that do not wait for each other."""
     x2 = x * x
     x4 = x2 * x2
     low = c[0] + x * c[1] + x2 * (c[2] + x * c[3])
@@ -170,7 +170,7 @@ def _flowing(drag: Any, body: Any, s: Any, torque: Any, k: Any) -> Any:
 
 @part
 def _washers_after_friction(drag: Any, total: Any, loose: Any, k: Any) -> Any:
-    """The washers' momentum after friction on the core alone has acted: the slip decays, the total stays."""
+    """Return the washers' momentum after friction on the core alone has acted: the slip decays, the total stays."""
     # slip Δ = ω_w − ω_c; J_w = (total/I_c + Δ)/(1/I_w + 1/I_c)
     both = drag.inverse_washers + drag.inverse_core
     slip = loose * drag.inverse_washers - (total - loose) * drag.inverse_core

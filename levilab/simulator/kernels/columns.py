@@ -15,12 +15,12 @@ LANES = 16
 
 
 def of_lane(model: Any, numbers: Any, j: Any) -> Any:
-    """The model of lane j: like the given one, with its numbers from column j of a flat block."""
+    """Return the model of lane j: like the given one, with its numbers from column j of a flat block."""
     raise NotImplementedError("it exists inside of kernels only")
 
 
 def _expression(kind: Any, path: str, names: dict[str, Any], count: list[int]) -> str:
-    """How a model of this type is put together, as an expression of Python."""
+    """Return the construction of a model of this type, as an expression of Python."""
     if isinstance(kind, types.Float | types.Integer):
         count[0] += 1
         return f"numbers[{(count[0] - 1) * LANES} + j]"

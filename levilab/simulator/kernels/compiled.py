@@ -48,14 +48,14 @@ class _PauseOfGarbageCollection(Listener):
         self._depth, self._was_on = 0, False
 
     def on_start(self, _event: Event) -> None:
-        """Parts are compiled within a kernel's compilation, and all within numba's lock."""
+        """Count the depth: parts are compiled within a kernel's compilation, and all within numba's lock."""
         if self._depth == 0:
             self._was_on = gc.isenabled()
             gc.disable()
         self._depth += 1
 
     def on_end(self, _event: Event) -> None:
-        """The outermost one switches it on again."""
+        """Switch garbage collection on again at the end of the outermost compilation."""
         self._depth -= 1
         if self._depth == 0 and self._was_on:
             gc.enable()
@@ -65,7 +65,7 @@ register("numba:compile", _PauseOfGarbageCollection())  # type: ignore[no-untype
 
 
 def cache_key(sources: Path) -> str:
-    """What compiled code depends on: the files of this folder and no others, numba's version and Python's.
+    """Return the dependences of compiled code: the files of this folder alone, numba's version and Python's.
 
     And whether numba has Intel's vector library, without which code that calls it does not run.  The processor is not
     in it: numba asks for the one that code was compiled for.
@@ -81,11 +81,11 @@ class InOneFolder(UserProvidedCacheLocator):
     """Where numba looks for compiled code: in the folder itself, and not in one named by the path of the source."""
 
     def get_cache_path(self) -> str:
-        """The folder."""
+        """Return the folder."""
         return os.path.dirname(self._cache_path)  # noqa: PTH120 - a text, as numba has it
 
     def get_source_stamp(self) -> str:
-        """The same for all: the folder's name says of which source it is, and a file's time is that of one copy."""
+        """Return one stamp for all: the folder's name says of which source it is, a file's time only which copy."""
         return ""
 
 
@@ -103,7 +103,7 @@ class FilesOfTheirOwn(IndexDataCacheFile):
 
 @cache
 def _folder() -> Path | None:
-    """Where compiled code is kept, or None if nothing can be: then it is compiled for each process.
+    """Return the folder of compiled code, or None if nothing can be kept: each process then compiles.
 
     Numba would look for another place, beside its source, where it takes notice of one file's changes only.
     """
@@ -136,12 +136,12 @@ class _InsideOfKernels(CPUDispatcher):
 
 
 def part(function: F) -> F:
-    """A small function that kernels are made of; it is compiled into them, and Python cannot call it."""
+    """Compile a small function into the kernels that call it; Python cannot call it."""
     return _inside_of_kernels(function, PART_OPTIONS)
 
 
 def aside(function: F) -> F:
-    """A part that kernels call seldom: it is compiled beside them, and not once for each place that calls it."""
+    """Compile a part that kernels call seldom beside them, and not once for each place that calls it."""
     return _inside_of_kernels(function, PART_OPTIONS | {"forceinline": False})
 
 
@@ -154,7 +154,7 @@ def _inside_of_kernels(function: F, options: Any) -> F:
 
 
 def kernel(function: F) -> F:
-    """An entry point: compiled once for each kind of scene, kept on disk, run without the interpreter's lock."""
+    """Compile an entry point once for each kind of scene, keep it on disk, run it without the interpreter's lock."""
     config: Any = numba.core.config
     before, locators, folder = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES, _folder()
     if folder and not before:  # read by numba here, when the function is decorated
@@ -170,13 +170,13 @@ def kernel(function: F) -> F:
 
 
 def kind(numba_type: Any) -> type:
-    """The class of a tuple with names, or NoneType, from its type at compile time."""
+    """Return the class of a tuple with names, or NoneType, from its type at compile time."""
     found: type = getattr(numba_type, "instance_class", type(None))
     return found
 
 
 def by_type(choices: Mapping[type, Callable[..., Any]]) -> Callable[..., Any]:
-    """A function inside kernels that is another one for every class of its first argument.
+    """Return a function inside kernels that is another one for every class of its first argument.
 
     choices: class → implementation, all with the same parameters; NoneType stands for None.  The choice is made
     when a kernel is compiled: nothing is left of it in the machine code.

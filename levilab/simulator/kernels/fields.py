@@ -42,7 +42,7 @@ field_functions = by_type(
 
 @kernel
 def evaluate(field: Any, numbers: Array, positions: Array, values: Array) -> None:
-    """The five functions at places of shape (n, 3) [m], written into values of shape (n, 5).
+    """Evaluate the five functions at places of shape (n, 3) [m] into values of shape (n, 5).
 
     numbers: of the field, shape (n, k) or (1, k).  They go through a column of memory, which keeps the compiler from
     computing several places at once: rounding might then depend on how many there are.

@@ -79,7 +79,7 @@ def _idle(at: Any, j: Any, block: Any) -> None:
 
 @part
 def _waiting_lanes(block: Any) -> Any:
-    """Lanes that stand still, and have halted: they wait for jobs."""
+    """Return lanes that stand still, and have halted: they wait for jobs."""
     at = Lanes(
         np.empty(LANES, dtype=np.int64), np.empty(LANES, dtype=np.int64),
         np.empty(LANES, dtype=np.bool_), np.empty(LANES, dtype=np.bool_),

@@ -111,7 +111,7 @@ with_force = by_type(
 def dipole_load(
     field: Any, drive: Any, r: Vector, moment: Vector, at: Any, v: Vector, push: float
 ) -> tuple[Vector, Vector]:
-    """The vector v with push times the force [N] on a dipole added, and the torque [N m], of base and drive."""
+    """Return the vector v with push times the force [N] on a dipole added, and the torque [N m], of base and drive."""
     x, y, z = r
     five = field_functions(field, z, x * x + y * y)
     b = with_drive(drive, (five[0] * x, five[0] * y, five[2]), at)
@@ -125,7 +125,7 @@ def _aligned_load(magnet: Any, field: Any, drive: Any, s: Any, at: Any, v: Any, 
 
 @part
 def moment_of(magnet: Any, n: Vector, arm: Vector) -> Vector:
-    """The direction of a tilted moment; its length is that of the fractions."""
+    """Return the direction of a tilted moment; its length is that of the fractions."""
     a, t = magnet.axial, magnet.transverse
     return (a * n[0] + t * arm[0], a * n[1] + t * arm[1], a * n[2] + t * arm[2])
 

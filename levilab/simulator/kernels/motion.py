@@ -139,7 +139,7 @@ def drift(model: Model, s: State, d: float) -> State:
 
 @part
 def kick(model: Model, s: State, k: float, level: float, slope: float) -> State:
-    """Forces and torques for the time k [s] at a fixed place and attitude, exact.
+    """Apply forces and torques for the time k [s] at a fixed place and attitude, exactly.
 
     level, slope: of the drive, whose field is (level + slope·t) × amplitude × its carrier.
     """

@@ -73,7 +73,7 @@ def _ring_to_second_power(strength: Any, radius2: Any, z: Any, z2: Any, half: An
 
 
 def to_second_power(field: Any, z: Any, r2: Any) -> Any:
-    """The commonest field, written out: φ₁ = 2πρ R² (R² + z²)^(−3/2) and its derivatives, of each ring."""
+    """Return the commonest field, written out: φ₁ = 2πρ R² (R² + z²)^(−3/2) and its derivatives, of each ring."""
     height = z - field.origin
     z2, half = height * height, 0.5 * r2
     u, a1, a2, a3, a4 = _ring_to_second_power(field.strength, field.inner2, height, z2, half)
@@ -89,7 +89,7 @@ def _next(n: Any, height: Any, inverse: Any, now: Any, before: Any) -> Any:
 
 @part
 def _summed(coefficients: Any, r2: Any, even: Any, odd: Any, sums: Any, n: Any, power: Any) -> Any:
-    """The five sums with the terms of n added: φ₂ₙ, φ₂ₙ₊₁ and φ₂ₙ₊₂ are even[0], odd and even[1]."""
+    """Return the five sums with the terms of n added: φ₂ₙ, φ₂ₙ₊₁ and φ₂ₙ₊₂ are even[0], odd and even[1]."""
     p, q, bz, s, g = sums
     c = coefficients
     p1, p2 = power  # r^(2n − 2), r^(2n − 4); 0 where n is too small for them
@@ -104,7 +104,7 @@ def _summed(coefficients: Any, r2: Any, even: Any, odd: Any, sums: Any, n: Any, 
 
 @part
 def to_any_power(field: Any, z: Any, r2: Any) -> Any:
-    """The series of a sheet, term by term."""
+    """Return the series of a sheet, term by term."""
     height = z - field.origin
     a2, b2, k = field.inner2, field.outer2, field.strength
     qa, qb = 1 / (a2 + height * height), 1 / (b2 + height * height)
@@ -127,7 +127,7 @@ def to_any_power(field: Any, z: Any, r2: Any) -> Any:
 
 
 def of_thick_base(field: Any, z: Any, r2: Any) -> Any:
-    """The series of a thick base: φₙ is the difference of the sheet's φₙ₋₁ at its two faces, over the thickness."""
+    """Return the series of a thick base: φₙ is the sheet's φₙ₋₁ at one face less the other, over the thickness."""
     top, bottom = z - field.origin - field.thickness / 2, z - field.origin + field.thickness / 2
     a2, b2, k = field.inner2, field.outer2, field.strength / field.thickness
     qa, qb = 1 / (a2 + bottom * bottom), 1 / (b2 + bottom * bottom)

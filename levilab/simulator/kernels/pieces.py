@@ -52,7 +52,7 @@ def _steps(length: float, step: float) -> float:
 
 @part
 def _drive_at(run: Any, t: float) -> tuple[float, float]:
-    """Level and slope of the drive in the piece that holds this time [s]."""
+    """Return level and slope of the drive in the piece that holds this time [s]."""
     if t >= run[OFF]:
         return 0.0, 0.0
     if run[RATE] == 0:
@@ -67,7 +67,7 @@ def _drive_at(run: Any, t: float) -> tuple[float, float]:
 
 @aside
 def next_piece(run: Any, start: float, begin: float, samples: int, sample_rate: float) -> Piece:
-    """The piece of a run that begins at this time.
+    """Return the piece of a run that begins at this time.
 
     run: the columns of a job; start: of the run [s]; begin: of the piece [s]; samples: taken before, the start counts;
     sample_rate: samples a second from the start on [1/s], 0 for none.

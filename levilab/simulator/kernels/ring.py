@@ -44,7 +44,7 @@ class Thick(NamedTuple):
 
 @part
 def elliptic(complement: float) -> tuple[float, float]:
-    """K and E of the modulus k from 1 − k², by the arithmetic–geometric mean (Abramowitz & Stegun 17.6)."""
+    """Return K and E of the modulus k from 1 − k², by the arithmetic–geometric mean (Abramowitz & Stegun 17.6)."""
     a, g = 1.0, math.sqrt(complement)
     total, power = 0.5 * (1 - complement), 0.5
     for _ in range(_STEPS):
@@ -77,7 +77,7 @@ def _loop(radius2: Any, z: Any, r2: Any) -> Any:
 
 @part
 def of_sheet(field: Any, z: Any, r2: Any) -> Any:
-    """The exact field of a sheet: the closed form, or the series about the axis where that is the better one."""
+    """Return the exact field of a sheet: the closed form, or the series about the axis where that is the better one."""
     height = z - field.origin
     close = r2 < _NEAR_AXIS * (field.inner2 + height * height)
     away = _NEAR_AXIS * field.inner2 if close else r2  # computed in either case: lanes take no branches
@@ -97,7 +97,7 @@ def of_sheet(field: Any, z: Any, r2: Any) -> Any:
 
 
 def of_thick_ring(field: Any, z: Any, r2: Any) -> Any:
-    """The mean of sheets over the thickness.
+    """Return the mean of sheets over the thickness.
 
     It is right to 1e-10 from a quarter of the thickness off the edges on.  Nearer by, the sheets begin to be seen: with
     20 mm the gradient is right to 2e-8 at 1 mm and to 2 % at 0.1 mm (against mpmath); a top does not come that near.

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 @part
 def load_state(block: Array, stride: int, j: int) -> State:
-    """The state of lane j from a block of rows, flat, row after row."""
+    """Return the state of lane j from a block of rows, flat, row after row."""
     s = stride
     return State(
         (block[j], block[s + j], block[2 * s + j]),
@@ -43,7 +43,7 @@ def store_state(block: Array, stride: int, j: int, state: State) -> None:
 
 @part
 def renormalize(s: State, t: float) -> State:
-    """The axis at length 1 again, which rounding takes away by 1e-16 a step, and the time [s] as it should be.
+    """Return the axis at length 1 again, which rounding takes away by 1e-16 a step, and the time [s] as due.
 
     A time added up from a million drifts is off by 1e-8 s, and with it the drive's phase.
     """

@@ -11,19 +11,19 @@ Vector = tuple[float, float, float]
 
 @part
 def cross(a: Vector, b: Vector) -> Vector:
-    """The product a×b."""
+    """Return the product a×b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @part
 def dot(a: Vector, b: Vector) -> float:
-    """The product a·b."""
+    """Return the product a·b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @part
 def plus(a: Vector, k: float, b: Vector) -> Vector:
-    """The sum a + k b."""
+    """Return the sum a + k b."""
     return (a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2])
 
 
@@ -48,7 +48,7 @@ def rotation(square: float) -> tuple[float, float]:
 
 @part
 def rotate(a: Vector, axis: Vector, sine: float, cosine: float) -> Vector:
-    """The vector a turned about an axis w by the angle |w| (Rodrigues): a + sine w×a + cosine w×(w×a)."""
+    """Return the vector a turned about an axis w by the angle |w| (Rodrigues): a + sine w×a + cosine w×(w×a)."""
     once = cross(axis, a)
     return plus(plus(a, sine, once), cosine, cross(axis, once))
 
