@@ -54,7 +54,7 @@ class Model(Generic[I_co]):
         driver: the class that drives it.
         twin: makes its virtual twin; takes the bench's clock, and by name what the instruments of its kind are
             connected to.  Its identity holds the word VIRTUAL, by which a run with it is known as synthetic.
-        address: an address as one of it may have.
+        address: an address as one of it may have; one without a host, as ``sound://``, is complete for any of them.
         answers_as: the model field of ``*IDN?``, whole (regular expression), where it does not hold the name.
     """
 
@@ -63,6 +63,11 @@ class Model(Generic[I_co]):
     twin: Callable[..., VirtualInstrument]
     address: str
     answers_as: str = ""
+
+    @property
+    def scheme(self) -> str:
+        """The scheme of its addresses, where the link to it is neither a port nor PyVISA's; else empty."""
+        return self.address.partition("://")[0] if "://" in self.address else ""
 
 
 # The first model of each kind is the one of the virtual bench, and of a new bench.toml, unless another is asked for.

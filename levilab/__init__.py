@@ -37,6 +37,8 @@ def acquire(
     *,
     mock: bool = False,
     bench: str | PathLike[str] | None = None,
+    counter: str | None = None,
+    scope: str | None = None,
     out: str | PathLike[str] = "runs",
     seed: int | None = None,
     scene: str | PathLike[str] | None = None,
@@ -56,6 +58,9 @@ def acquire(
         experiment: its name.
         mock: on the virtual bench, which needs no hardware.
         bench: file that describes the bench, by default bench.toml; with `mock` only its settings count.
+        counter: model or address of a counter that takes the place of the bench's: "phyphox" with `mock`, or
+            "phyphox://HOST:8080".
+        scope: the same of an oscilloscope.
         out: folder in which the run folder is made.
         seed: makes a virtual run repeatable.
         scene: with `mock`, a top in full motion: the name of a scene, such as "spindown", or its TOML file.
@@ -83,6 +88,8 @@ def acquire(
     options = AcquisitionOptions(
         mock=mock,
         bench=as_path(bench),
+        counter=counter,
+        scope=scope,
         out=Path(out),
         seed=seed,
         scene=None if scene is None else str(scene),

@@ -1,4 +1,4 @@
-"""The link to an address: pyserial's where it is a port, else PyVISA's."""
+"""The link to an address: one of its scheme's where it has one, pyserial's where it is a port, else PyVISA's."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from instruments.links.serial_port import SerialTransport
 from instruments.links.visa import VisaTransport
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from instruments.clock import Clock
     from instruments.links.transport import TrafficLog, Transport
+
+#: Scheme of an address → the link to it, with the arguments of `open_link` but for `line`.
+LINKS: dict[str, Callable[..., Transport]] = {}
 
 
 def open_link(
@@ -23,10 +26,11 @@ def open_link(
     clock: Clock | None = None,
     log: TrafficLog | None = None,
 ) -> Transport:
-    """Open a link: pyserial's where the address is a port or its URL, else PyVISA's.
+    """Open a link: the one of the address's scheme in LINKS, pyserial's for a port or its URL, else PyVISA's.
 
     Args:
-        address: a port (``COM3``), a URL (``socket://host:port``) or the name of a VISA resource.
+        address: a port (``COM3``), a URL (``phyphox://host:8080``, ``socket://host:port``) or the name of a VISA
+            resource.
         line: settings of a serial line, and the pause that the instrument needs between messages.
         library: PyVISA's, by its name or itself.
         timeout: of one answer [s].
@@ -36,6 +40,8 @@ def open_link(
     Raises:
         NotConnected: nothing could be opened there.
     """
+    if link := LINKS.get(address.partition("://")[0].lower()):
+        return link(address, library=library, timeout=timeout, clock=clock, log=log)
     options = dict(line)
     serial_name = address.upper().startswith("ASRL") and library == "@py"
     if "::" not in address or serial_name:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -25,7 +25,7 @@ from levilab.runs.writer import RunWriter
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from levilab.acquisition.experiment import Experiment
     from levilab.acquisition.onlooker import Watch
@@ -52,6 +52,7 @@ class AcquisitionRequest:
         note: kept with the run.
         wire_log: whether all bytes on the wire are kept.
         resume: the run to go on with.
+        named: kind → model or address of the instruments that a person named in place of the bench's.
     """
 
     experiment: str
@@ -65,6 +66,7 @@ class AcquisitionRequest:
     note: str = ""
     wire_log: bool = False
     resume: Run | None = None
+    named: Mapping[str, str] = field(default_factory=dict)
 
 
 def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishing) -> Run:
@@ -201,7 +203,9 @@ def _record(request: AcquisitionRequest) -> RunRecord:
         started_utc=utc_now(),
         command_line=sys.argv,
         channels=[vars(channel) for channel in experiment.channels(settings)],
-        configuration=request.config.model_dump(mode="json") | ({"scene": request.scene} if request.scene else {}),
+        configuration=request.config.model_dump(mode="json")
+        | ({"scene": request.scene} if request.scene else {})
+        | ({"named": dict(request.named)} if request.named else {}),
         software=software_versions(),
         seed=request.seed,
         note=request.note,

@@ -15,6 +15,7 @@ from levilab.acquisition.keys import refusal, refuse_unknown
 from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
 from levilab.bench.config import BenchConfig, ConfigError, read_bench
+from levilab.bench.kinds import KINDS
 from levilab.bench.person import ask_no_person
 from levilab.bench.wiring import described_wiring
 from levilab.errors import DataError, LevilabError, UsageError
@@ -22,12 +23,13 @@ from levilab.runs.run import Run, find_run, runs_named
 from levilab.settings import in_one_line
 from levilab.simulator.keys import parse_setting
 from levilab.simulator.scene import SceneError, read_scene, scene_of
-from levilab.world.bench import VIRTUAL, scene_world, virtual_wiring
+from levilab.world.bench import VIRTUAL, scene_world, virtual_instruments, virtual_settings, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from levilab.bench.config import InstrumentSettings
     from levilab.bench.person import Person
     from levilab.bench.wiring import Wiring
     from levilab.simulator.scene import Scene
@@ -46,6 +48,10 @@ _BASE = (
 _IN_MOTION = "the top that of the scene {name}, simulated in full motion"
 
 
+#: Kind of instrument → the option that names another one than the bench's.
+NAMING = {"counter": "counter", "oscilloscope": "scope"}
+
+
 class CannotResume(LevilabError):
     """This run cannot be gone on with."""
 
@@ -57,6 +63,7 @@ class AcquisitionOptions:
     Attributes:
         mock: on the virtual bench.
         bench: the bench file; by default bench.toml; with mock only its settings count.
+        counter, scope: the model or the address of an instrument that takes the place of the bench's.
         out: the folder in which the run folder is made.
         seed: makes a virtual run repeatable.
         scene: with mock, the name or file of a scene in full motion; by default the top only spins.
@@ -71,6 +78,8 @@ class AcquisitionOptions:
 
     mock: bool = False
     bench: Path | None = None
+    counter: str | None = None
+    scope: str | None = None
     out: Path = Path("runs")
     seed: int | None = None
     scene: str | None = None
@@ -88,7 +97,8 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     run = _resumable(_run_folder(options.resume, options.out), experiment) if options.resume else None
     virtual = options.mock or bool(run and run.record.seed is not None)
     _check_options(options, run, virtual=virtual)
-    without = _configuration(options, run, virtual=virtual)
+    named = _named_instruments(options, run)
+    without = _with_named_instruments(_configuration(options, run, named, virtual=virtual), named, virtual=virtual)
     config = _with_given_settings(without, experiment, options.settings)
     _check_given(config, without, experiment)
     request = AcquisitionRequest(
@@ -99,6 +109,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
         note=options.note,
         wire_log=options.wire_log,
         resume=run,
+        named=named,
     )
     if virtual:
         request = _on_the_virtual_bench(request, options, without)
@@ -115,7 +126,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
 
 def chosen_settings(experiment: str, options: AcquisitionOptions) -> BenchConfig:
     """Return the configuration with the typed values at some of the experiment's keys.  Raises UsageError."""
-    return _with_given_settings(_configuration(options, None, virtual=True), experiment, options.settings)
+    return _with_given_settings(_configuration(options, None, {}, virtual=True), experiment, options.settings)
 
 
 def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> None:
@@ -128,18 +139,47 @@ def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: boo
         raise UsageError("realtime", "goes with `mock`: a real bench always keeps to the wall clock")
 
 
-def _configuration(options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> BenchConfig:
+def _configuration(
+    options: AcquisitionOptions, run: Run | None, named: Mapping[str, str], *, virtual: bool
+) -> BenchConfig:
     """Return the bench file's configuration; a resumed run keeps its own, but for the places of instruments.
 
-    The settings of `options` are not in it.
+    The settings of `options` are not in it.  Where instruments are named, bench.toml may be missing.
     """
     config = _original_configuration(run) if run else Configuration()
-    if options.bench or not virtual:
+    file = options.bench or Path("bench.toml")
+    if options.bench or not (virtual or (named and not file.exists())):
         instead = "" if virtual else ", or try `mock`"
-        described = read_bench(options.bench or Path("bench.toml"), Configuration, instead=instead)
+        described = read_bench(file, Configuration, instead=instead)
         places = {kind: getattr(described, kind) for kind in ("visa_library", "limits", *VIRTUAL)}
         config = config.model_copy(update=places) if run else described
     return config
+
+
+def _named_instruments(options: AcquisitionOptions, run: Run | None) -> dict[str, str]:
+    """Return kind → model or address of the instruments that take the place of the bench's.
+
+    A resumed run keeps its own.  Raises DataError where its record has something else.
+    """
+    begun = run.record.configuration.get("named", {}) if run else {}
+    if run and not (isinstance(begun, dict) and all(kind in NAMING and isinstance(begun[kind], str) for kind in begun)):
+        raise DataError(f"{run.folder}/run.json: configuration.named: kind and model or address are expected")
+    given = {kind: getattr(options, option) for kind, option in NAMING.items()}
+    return {**begun, **{kind: text for kind, text in given.items() if text is not None}}
+
+
+def _with_named_instruments(config: BenchConfig, named: Mapping[str, str], *, virtual: bool) -> BenchConfig:
+    """Return the configuration with the named instruments.  Raises UsageError."""
+    changes: dict[str, InstrumentSettings] = {}
+    for kind, text in named.items():
+        if virtual and ":" in text:
+            raise UsageError(NAMING[kind], "is an address; with `mock` a model is expected", value=text)
+        try:
+            described = getattr(config, kind)
+            changes[kind] = virtual_settings(kind, text) if virtual else KINDS[kind].named(text, described)
+        except ConfigError as error:
+            raise UsageError(NAMING[kind], str(error), value=text) from error
+    return config.model_copy(update=changes)
 
 
 def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequence[str]) -> BenchConfig:
@@ -214,7 +254,7 @@ def _refusal(config: BenchConfig, experiment: str) -> ConfigError | None:
 
 def _original_configuration(run: Run) -> BenchConfig:
     """Return the configuration that a run was begun with."""
-    bench = {key: value for key, value in run.record.configuration.items() if key != "scene"}
+    bench = {key: value for key, value in run.record.configuration.items() if key not in {"scene", "named"}}
     try:
         return Configuration.model_validate(bench)
     except ValidationError as error:
@@ -291,7 +331,8 @@ def _on_the_virtual_bench(
     run = request.resume
     seed = run.record.seed if run else options.seed
     seed = secrets.randbelow(1 << 31) if seed is None else seed
-    config = request.config.model_copy(update={"visa_library": "@levilab", **VIRTUAL})
+    places = virtual_instruments(request.named)
+    config = request.config.model_copy(update={"visa_library": "@levilab", **places})
     request = replace(request, seed=seed, config=config)
     scene = _scene(options.scene or EXPERIMENTS[request.experiment].mock_scene, run)
 
@@ -306,7 +347,7 @@ def _on_the_virtual_bench(
     return replace(
         request,
         config=config,
-        wiring=lambda: virtual_wiring(scene_world(scene, clock, options.tell, seed=seed), config.limits),
+        wiring=lambda: virtual_wiring(scene_world(scene, clock, options.tell, seed=seed), config.limits, request.named),
         synthetic_how=HOW.format(what=_IN_MOTION.format(name=scene.name)),
         scene=scene.as_table(),
     )
@@ -359,7 +400,7 @@ def _with_a_spinning_top(
     return replace(
         request,
         config=config,
-        wiring=lambda: virtual_wiring(SpinWorld(scene, clock()), config.limits),
+        wiring=lambda: virtual_wiring(SpinWorld(scene, clock()), config.limits, request.named),
         synthetic_how=HOW.format(what=_describe_world(scene, request.experiment)),
         world="spin",
     )

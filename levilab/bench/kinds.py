@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from instruments.catalogue import COUNTERS, GENERATORS, MAGNETOMETERS, OSCILLOSCOPES, Model
 from instruments.drivers import Instrument
 from instruments.links.opening import open_link
-from levilab.bench.config import ConfigError
+from levilab.bench.config import ConfigError, InstrumentSettings
 
 if TYPE_CHECKING:
     from instruments.clock import Clock
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from instruments.drivers.magnetometer import Magnetometer
     from instruments.drivers.oscilloscope import Oscilloscope
     from instruments.links.transport import TrafficLog, Transport
-    from levilab.bench.config import InstrumentSettings
 
 I_co = TypeVar("I_co", bound=Instrument, covariant=True)
 
@@ -38,6 +38,41 @@ class Kind(Generic[I_co]):
         known = ", ".join(model.name for model in self.models)
         raise ConfigError(f"{self.name}.model = {name!r} is unknown, known are {known}")
 
+    def named(self, text: str, described: InstrumentSettings | None) -> InstrumentSettings:
+        """Return the settings of an instrument that a person names.
+
+        Args:
+            text: its model, or its address: the scheme of an address gives the model, any other is of the model that is
+                described.
+            described: the instrument of this kind in the bench file, if there is one.
+
+        Raises:
+            ConfigError: there is no such model, or its model or its address is not known.
+        """
+        scheme = text.partition("://")[0].upper() if "://" in text else None
+        found = [row for row in self.models if text.upper() == row.name.upper() or scheme == row.scheme.upper()]
+        if found and scheme:
+            return InstrumentSettings(model=found[0].name, address=text)
+        if found and described and described.model.upper() == text.upper():
+            return described
+        if found and found[0].address.endswith("://"):
+            return InstrumentSettings(model=found[0].name, address=found[0].address)
+        if found:
+            how = "give its address" if found[0].scheme else "describe it in the bench file, or give its address"
+            raise ConfigError(f"where the {found[0].name} is was not said: {how}, such as {found[0].address}")
+        if not _ADDRESS.search(text):
+            known = ", ".join(row.name for row in self.models)
+            raise ConfigError(f"{text!r} is neither a model nor an address: the models are {known}")
+        if described is None:
+            raise ConfigError(
+                f"the bench file describes no {self.name}, so the model at {text} is not known: add a table "
+                f"[{self.name}] with model and address"
+            )
+        return described.model_copy(update={"address": text})
+
+
+#: What a VISA resource, a URL or a port has in it.
+_ADDRESS = re.compile(r"::|://|^/dev/|^COM\d", re.IGNORECASE)
 
 COUNTER: Kind[Counter] = Kind("counter", "counts the light pulses", COUNTERS)
 GENERATOR: Kind[Generator] = Kind("generator", "drives the coil", GENERATORS)

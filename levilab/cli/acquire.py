@@ -42,6 +42,17 @@ def acquire_experiment(
             metavar="FILE", help="Describes the bench; with --mock only its settings count.", show_default="bench.toml"
         ),
     ] = None,
+    counter: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MODEL|ADDRESS",
+            help="Count with this one instead of the bench's, as phyphox or phyphox://HOST:8080.",
+        ),
+    ] = None,
+    scope: Annotated[
+        str | None,
+        typer.Option(metavar="MODEL|ADDRESS", help="Record with this oscilloscope instead of the bench's."),
+    ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the run folder is made.")] = Path("runs"),
     scene: Annotated[
         str | None,
@@ -85,6 +96,8 @@ def acquire_experiment(
     options = AcquisitionOptions(
         mock=mock,
         bench=bench,
+        counter=counter,
+        scope=scope,
         out=out,
         seed=seed,
         scene=scene,

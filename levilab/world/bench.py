@@ -25,14 +25,25 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.world.spin_world import Array, World
 
+
+def virtual_settings(kind: str, name: str) -> InstrumentSettings:
+    """Return model and address of a virtual instrument.  Raises ConfigError: there is no such kind or model."""
+    if kind not in CATALOGUE:
+        raise ConfigError(f"there is no virtual {kind!r}: known are {', '.join(CATALOGUE)}")
+    model = next((model for model in CATALOGUE[kind] if model.name.upper() == name.upper()), None)
+    if model is None:
+        known = ", ".join(model.name for model in CATALOGUE[kind])
+        raise ConfigError(f"there is no virtual {kind} {name!r}: known are {known}")
+    address = f"TCPIP0::{kind}.levilab::inst0::INSTR"
+    if model.scheme:
+        address = f"{model.scheme}://{kind}.levilab"
+    elif model.driver.SERIAL:
+        address = f"ASRL{kind}.levilab::INSTR"
+    return InstrumentSettings(model=model.name, address=address)
+
+
 #: Address and default model of the virtual instrument of each kind.
-VIRTUAL = {
-    kind: InstrumentSettings(
-        model=models[0].name,
-        address=f"ASRL{kind}.levilab::INSTR" if models[0].driver.SERIAL else f"TCPIP0::{kind}.levilab::inst0::INSTR",
-    )
-    for kind, models in CATALOGUE.items()
-}
+VIRTUAL = {kind: virtual_settings(kind, models[0].name) for kind, models in CATALOGUE.items()}
 
 #: Field of the virtual bench's coil at the top, per volt of the generator [T/V]: 10 Vpp make 0.4 mT.
 COIL_T_PER_V = 0.4e-3 / 5.0
@@ -111,21 +122,29 @@ def virtual_bus(world: World | None = None, models: Mapping[str, str] | None = N
         ConfigError: there is no such kind or model.
     """
     world = world or practice_world()
-    chosen = {kind: settings.model for kind, settings in VIRTUAL.items()} | dict(models or {})
-    instruments = {kind: _maker(kind, model)(world) for kind, model in chosen.items()}
-    return VirtualBench({VIRTUAL[kind].address: instrument for kind, instrument in instruments.items()})
+    chosen = virtual_instruments(models)
+    return VirtualBench({one.address: VIRTUAL_MODELS[kind][one.model](world) for kind, one in chosen.items()})
 
 
-def virtual_wiring(world: World, limits: Limits | None = None) -> Wiring:
+def virtual_instruments(models: Mapping[str, str] | None = None) -> dict[str, InstrumentSettings]:
+    """Return model and address of each virtual instrument; models, Raises: as of `virtual_bus`."""
+    return VIRTUAL | {kind: virtual_settings(kind, model) for kind, model in (models or {}).items()}
+
+
+def virtual_wiring(world: World, limits: Limits | None = None, models: Mapping[str, str] | None = None) -> Wiring:
     """Return the wiring of a virtual bench.
 
     Args:
         world: that its instruments measure.
         limits: by default those of a bench file without a table of limits.
+        models: kind → model, where it differs from VIRTUAL.
+
+    Raises:
+        ConfigError: there is no such kind or model.
     """
-    return Wiring(
-        VIRTUAL, limits or Limits(), library_for(virtual_bus(world)), world.clock, VirtualPerson(world), world.poses
-    )
+    library = library_for(virtual_bus(world, models))
+    instruments = virtual_instruments(models)
+    return Wiring(instruments, limits or Limits(), library, world.clock, VirtualPerson(world), world.poses)
 
 
 def plug_in_serial(bus: VirtualBench | None = None) -> VirtualBench:
@@ -182,12 +201,3 @@ def scene_world(
     with announce_compilation(tell):
         prepare(scene)
     return MotionWorld(scene, clock(), put_back_after_s=put_back_after_s, seed=seed)
-
-
-def _maker(kind: str, model: str) -> Callable[[World], VirtualInstrument]:
-    if kind not in VIRTUAL_MODELS:
-        raise ConfigError(f"there is no virtual {kind!r}: known are {', '.join(VIRTUAL_MODELS)}")
-    models = {name.upper(): maker for name, maker in VIRTUAL_MODELS[kind].items()}
-    if model.upper() not in models:
-        raise ConfigError(f"there is no virtual {kind} {model!r}: known are {', '.join(VIRTUAL_MODELS[kind])}")
-    return models[model.upper()]

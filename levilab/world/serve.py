@@ -14,7 +14,14 @@ from instruments.virtual.servers.clients import first_of
 from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, ListenAt, serve_bench
 from levilab.errors import LevilabError, UsageError
 from levilab.interruption import watching_for_end
-from levilab.world.bench import PUT_BACK_AFTER_S, VIRTUAL, VIRTUAL_MODELS, practice_world, scene_world, virtual_bus
+from levilab.world.bench import (
+    PUT_BACK_AFTER_S,
+    VIRTUAL_MODELS,
+    practice_world,
+    scene_world,
+    virtual_bus,
+    virtual_instruments,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -205,8 +212,9 @@ def _place(service: Service, instruments: int) -> ListenAt:
 
 
 def _served(service: Service, offer: Endpoints) -> Served:
-    kind = next(kind for kind, settings in VIRTUAL.items() if settings.address == offer.address)
-    return Served(kind, service.models.get(kind, VIRTUAL[kind].model), offer.resources)
+    instruments = virtual_instruments(service.models).items()
+    kind, model = next((kind, one.model) for kind, one in instruments if one.address == offer.address)
+    return Served(kind, model, offer.resources)
 
 
 async def _wait_for(end: End) -> None:
