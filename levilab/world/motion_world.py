@@ -19,6 +19,7 @@ from levilab.simulator.model import base_field
 from levilab.world.coil import Coil
 from levilab.world.flight import Flight
 from levilab.world.light import Laser, Tape
+from levilab.world.magnetic_field import field_beside, moment_of
 from levilab.world.pose import poses_of
 from levilab.world.spin_world import KEPT_S
 
@@ -88,6 +89,7 @@ class MotionWorld:
     ) -> None:
         self.clock = clock
         self._tape, self._laser, self._seed = tape or Tape(), laser or Laser(), seed
+        self._scene = scene
         self._coil, self._flight = Coil(), Flight(scene, put_back_after_s, stem_height_m=self._laser.height_m)
         self._tape_place = float(np.random.default_rng(seed).uniform()) if seed else 0.0
         self._last_change = 0.0  # the time of the last change of the drive [s]
@@ -186,6 +188,14 @@ class MotionWorld:
         """Return the top's place and attitude; see World."""
         times = start + step * np.arange(n, dtype=np.float64)
         return poses_of(*self._flight.attitude(times), start=start, step=step)
+
+    def magnetic_field(self, times: Array, place: Array) -> Array:
+        """Return the field of base and top, as the top moves; see World."""
+        position, axis, arm, up = self._flight.attitude(times)
+        top = self._scene.top
+        arm = np.where(up[:, None], arm, 1.0)  # of any length above 0
+        moment = moment_of(axis, arm, top.moment_a_m2, top.moment_tilt)
+        return field_beside(place, self._scene.base, position, moment, up)
 
     def place_probe(self, height_m: float | None) -> None:
         """Put the probe at a height, exactly; see World."""

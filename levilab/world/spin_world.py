@@ -19,6 +19,7 @@ from levilab.simulator.spin import DECAYS
 from levilab.world.base import Base, Stand, random_base
 from levilab.world.coil import Coil
 from levilab.world.light import Laser, Tape
+from levilab.world.magnetic_field import MOMENT_A_M2, MOMENT_TILT, field_beside, moment_of
 from levilab.world.pose import FLOATS_M, poses_of
 from levilab.world.timeline import Timeline
 
@@ -85,6 +86,17 @@ class World(Protocol):
 
     def place_probe(self, height_m: float | None) -> None:
         """Put the magnetometer's probe on the axis, at a height above the base [m]; None: into its chamber."""
+
+    def magnetic_field(self, times: Array, place: Array) -> Array:
+        """Return the field beside the bench, of base and top, along the bench's axes.
+
+        Args:
+            times: shape (n,) [s].
+            place: of the sensor, shape (3,) [m above the middle of the base].
+
+        Returns:
+            Shape (n, 3) [T].
+        """
 
     def poses(self, start: float, step: float, n: int) -> Poses:
         """Return the top's place and attitude at start + step·k, for a view."""
@@ -379,12 +391,21 @@ class SpinWorld:
 
     def poses(self, start: float, step: float, n: int) -> Poses:
         """Return a top upright and at rest, which turns; see :class:`World`."""
-        times = start + step * np.arange(n, dtype=np.float64)
-        spin, angle = self.motion(times)
-        up, zero = spin > 0, np.zeros_like(times)
-        upright = np.stack([zero, zero, zero + 1], axis=1)
-        arm = np.stack([np.cos(angle), np.sin(angle), zero], axis=1)
+        upright, arm, up = self._upright(start + step * np.arange(n, dtype=np.float64))
         return poses_of(FLOATS_M * upright, upright, arm, up, start=start, step=step)
+
+    def magnetic_field(self, times: Array, place: Array) -> Array:
+        """Return the field of base and top; the moment's transverse part points to the tape.  See :class:`World`."""
+        upright, arm, up = self._upright(times)
+        moment = moment_of(upright, arm, MOMENT_A_M2, MOMENT_TILT)
+        return field_beside(place, self.scene.base, FLOATS_M * upright, moment, up)
+
+    def _upright(self, times: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return axis and arm of the top, shape (n, 3) each, and whether it is up, shape (n,)."""
+        spin, angle = self.motion(times)
+        zero = np.zeros_like(times)
+        arm = np.stack([np.cos(angle), np.sin(angle), zero], axis=1)
+        return np.stack([zero, zero, zero + 1], axis=1), arm, spin > 0
 
     def place_probe(self, height_m: float | None) -> None:
         """Put the probe at a height; see :class:`World`."""
