@@ -193,17 +193,18 @@ class FreeTop(Generic[S]):
         return Missed.MULTIPLE
 
     def _count(self) -> Row | None:
-        """Return one count; its time is the middle of the gate."""
+        """Return one count; its time is the middle of the gate, or as the counter estimates it."""
         session = self.session
         spin = session.bench.counter.frequency()
         session.saw("spin_frequency_hz", spin)
         if spin is None:
             return None
-        end = session.now()
-        row = {"time_s": (gate_began(end, session.settings.gate_s, spin) + end) / 2, "spin_frequency_hz": spin}
+        end, found, u = session.now(), session.bench.counter.last, session.settings.reading_u_hz
+        time = (gate_began(end, session.settings.gate_s, spin) + end) / 2
+        if found is not None:
+            time, u = found.time - (session.zero or 0.0), found.u
         session.check_settings("counter")
-        u = session.settings.reading_u_hz
-        return row | ({"spin_frequency_u_hz": u} if u else {})
+        return {"time_s": time, "spin_frequency_hz": spin} | ({"spin_frequency_u_hz": u} if u else {})
 
     def _is_plausible(self, reading: Row) -> bool:
         """Return whether a reading is the first, or plausible after the last one."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar
 from pydantic import Field, PositiveFloat, model_validator
 from pydantic_core import PydanticCustomError
 
+from levilab.runs.channel import Channel
 from levilab.settings import Settings
 
 if TYPE_CHECKING:
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
 
     from levilab.acquisition.session import Session
     from levilab.bench.config import Limits
-    from levilab.runs.channel import Channel
     from levilab.simulator.scene import Scene
 
 
@@ -100,6 +100,21 @@ class Experiment(Generic[S]):
     mock_scene: str | None = None
     also_needs: Callable[[S], tuple[str, ...]] = lambda _: ()
     called: str = "reading"
+
+    def columns(self, settings: S, *, estimated: bool) -> tuple[Channel, ...]:
+        """Return the columns of the readings.
+
+        Args:
+            settings: of the experiment.
+            estimated: whether the bench's counter estimates a u with each count, which then has a column behind it.
+        """
+        found = self.channels(settings)
+        names = [channel.name for channel in found]
+        if not estimated or "spin_frequency_hz" not in names or "spin_frequency_u_hz" in names:
+            return found
+        after = names.index("spin_frequency_hz") + 1
+        u = Channel("spin_frequency_u_hz", "Hz", "standard uncertainty of a reading, from the scatter of its samples")
+        return (*found[:after], u, *found[after:])
 
     def kinds(self, settings: S) -> tuple[str, ...]:
         """Return the kinds of instrument that it needs with these settings."""

@@ -16,6 +16,7 @@ from levilab.acquisition.onlooker import publishing
 from levilab.acquisition.session import Earlier, Session
 from levilab.acquisition.table import EXPERIMENTS, settings_of
 from levilab.bench.bench import open_bench
+from levilab.bench.kinds import estimates_u
 from levilab.errors import LevilabError, unquoted
 from levilab.files import CannotWrite
 from levilab.interruption import Interrupted, watching_for_interruption
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from levilab.bench.wiring import Wiring
     from levilab.interruption import Stop
     from levilab.present.progress import Display
+    from levilab.runs.channel import Channel
     from levilab.runs.run import Status
 
 
@@ -67,6 +69,12 @@ class AcquisitionRequest:
     wire_log: bool = False
     resume: Run | None = None
     named: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def columns(self) -> tuple[Channel, ...]:
+        """The columns of the readings."""
+        experiment = EXPERIMENTS[self.experiment]
+        return experiment.columns(settings_of(self.config, experiment.name), estimated=estimates_u(self.config.counter))
 
 
 def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishing) -> Run:
@@ -133,7 +141,7 @@ def _at_the_bench(
         session: Session[Any] = Session(
             bench,
             settings,
-            experiment.channels(settings),
+            request.columns,
             writer,
             show,
             stop,
@@ -196,13 +204,12 @@ def _note_instruments(session: Session[Any], moment: str) -> None:
 
 def _record(request: AcquisitionRequest) -> RunRecord:
     experiment = EXPERIMENTS[request.experiment]
-    settings = settings_of(request.config, experiment.name)
     return RunRecord(
         experiment=experiment.name,
         status="running",
         started_utc=utc_now(),
         command_line=sys.argv,
-        channels=[vars(channel) for channel in experiment.channels(settings)],
+        channels=[vars(channel) for channel in request.columns],
         configuration=request.config.model_dump(mode="json")
         | ({"scene": request.scene} if request.scene else {})
         | ({"named": dict(request.named)} if request.named else {}),

@@ -297,7 +297,7 @@ def _check_readings(run: Run, request: AcquisitionRequest) -> None:
     """Raise CannotResume for readings after which the experiment cannot go on."""
     experiment = EXPERIMENTS[request.experiment]
     settings = settings_of(request.config, experiment.name)
-    channels = experiment.channels(settings)
+    channels = request.columns
     names = [channel.name for channel in channels]
     if [channel.get("name") for channel in run.record.channels] != names:
         raise CannotResume(f"{run.folder}/run.json: channels: {', '.join(names)} are expected here; {_ADVICE}")

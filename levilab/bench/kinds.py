@@ -83,6 +83,11 @@ MAGNETOMETER: Kind[Magnetometer] = Kind("magnetometer", "measures the base's fie
 KINDS: dict[str, Kind[Instrument]] = {kind.name: kind for kind in (COUNTER, GENERATOR, OSCILLOSCOPE, MAGNETOMETER)}
 
 
+def estimates_u(counter: InstrumentSettings | None) -> bool:
+    """Return whether a bench's counter estimates its frequency from samples, with a u of each count."""
+    return counter is not None and COUNTER.model(counter.model).driver.ESTIMATES
+
+
 def transport_to(
     driver: type[Instrument],
     settings: InstrumentSettings,

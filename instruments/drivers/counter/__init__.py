@@ -5,7 +5,8 @@ Facts and their sources stand with each driver, and in docs/instruments/counter.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from instruments.drivers import Instrument
 
@@ -14,8 +15,30 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+@dataclass(frozen=True)
+class Count:
+    """A count of an instrument that estimates the frequency from samples.
+
+    Attributes:
+        frequency: [Hz].
+        u: its standard uncertainty, without that of the clock [Hz].
+        time: the moment at which it holds, on the clock of the bench [s].
+    """
+
+    frequency: float
+    u: float | None
+    time: float
+
+
 class Counter(Instrument, Protocol):
-    """What every counter offers."""
+    """What every counter offers.
+
+    ESTIMATES: whether it estimates from samples, so that each count has a u and a time; last: the last such count, None
+    where there was none.
+    """
+
+    ESTIMATES: ClassVar[bool]
+    last: Count | None
 
     def prepare(self, *, gate_s: float, trigger_level_v: float, channel: int = 1) -> None:
         """Measure frequency over a gate [s], rising edges, at a fixed trigger level [V].

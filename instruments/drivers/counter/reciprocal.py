@@ -13,6 +13,8 @@ from instruments.errors import BadAnswer, InstrumentError, NoAnswer, OutOfRange
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from instruments.drivers.counter import Count
+
 #: Readings that are fetched with one question: an answer of 25 kB, seconds apart at most.
 READINGS_AT_ONCE = 1000
 #: Readings that are waited for with one question: so long, at most [s].  VISA waits for 49 days and no longer.
@@ -32,6 +34,8 @@ class ReciprocalCounter(ScpiInstrument):
     MOST: ClassVar[int] = 1_000_000
     EMPTY_IS_NONE: ClassVar[bool] = False
     ANSWERS_JOINED = True
+    ESTIMATES: ClassVar[bool] = False
+    last: Count | None = None
 
     #: The input in use, which prepare() chooses.
     channel = 1

@@ -200,7 +200,8 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_sinc
         )
     times, spins = (np.array([row[name] for row in seen]) for name in ("time_s", "spin_frequency_hz"))
     between = (float(times[-1]) + settings.gate_s / 2, missed_since + settings.gate_s)
-    limit = spin_at_fall(times, spins, settings.reading_u_hz, between)
+    u = [row["spin_frequency_u_hz"] for row in seen if "spin_frequency_u_hz" in row]
+    limit = spin_at_fall(times, spins, float(np.sqrt(np.mean(np.square(u)))) if u else None, between)
     assert limit.value is not None
     assert limit.u is not None
     lowest = float(spins.min())

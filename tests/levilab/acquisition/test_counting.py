@@ -12,6 +12,8 @@ from levilab.acquisition.counting import AnotherTop, FreeTop, Missed
 class Bench:
     """A counter that counts these spins [Hz], one each 10 s, and what was said of them."""
 
+    last = None
+
     def __init__(self, *spins):
         self.spins, self.time = iter(spins), 90.0
         self.events: list[tuple[str, str]] = []
