@@ -55,10 +55,11 @@ class Clean:
     lines: Lines
 
 
-def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
+def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, times: Array | None = None) -> Clean:
     """Remove hum and a wandering baseline; a trace without them is returned unchanged.
 
-    samples: shape (n,); rate: of them [1/s]; bins: means of n // len(bins) samples; bad: which samples are no numbers.
+    samples: shape (n,); rate: of them [1/s]; bins: means of n // len(bins) samples; bad: which samples are no numbers;
+    times: of the samples since the first one [s], where they are uneven.
     """
     factor = samples.size // bins.size
     bin_rate = rate / factor
@@ -87,7 +88,7 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None) -> Clean:
     if lines:
         names = " and ".join(f"{digits(amplitude)} at {frequency:.5g} Hz" for frequency, amplitude in lines)
         notes.append(Finding("hum", f"hum of amplitude {names} was taken off"))
-        samples, bins = _without_hum(samples, rate, bins, counted, [frequency for frequency, _ in lines])
+        samples, bins = _without_hum(samples, rate, bins, counted, [frequency for frequency, _ in lines], times=times)
     steps = _baseline(bins, bin_rate, counted)
     if steps is not None:
         times, values = steps
@@ -246,47 +247,51 @@ def _peak(amplitude: Array, peak: int) -> float:
 
 
 def _without_hum(
-    samples: Array, rate: float, bins: Array, counted: Mask, frequencies: list[float]
+    samples: Array, rate: float, bins: Array, counted: Mask, frequencies: list[float], *, times: Array | None
 ) -> tuple[Array, Array]:
     """Return samples and bins less the hum, whose amplitude and phase may change along the record."""
     factor = samples.size // bins.size
     bin_rate = rate / factor
-    count = max(int(2 * bins.size / bin_rate / PIECE), 3)
-    half = bins.size // count
-    pieces = [(i * half, (i + 2) * half if i < count - 2 else bins.size) for i in range(count - 1)]
+    place = (np.arange(samples.size, dtype=np.float64) if times is None else times * rate) + 0.5
+    place = place / factor - 0.5
+    of_bins = np.arange(bins.size, dtype=np.float64) if times is None else shorten(place, factor)
+    length = bins.size if times is None else int(of_bins[-1]) + 1
+    count = max(int(2 * length / bin_rate / PIECE), 3)
+    half = length // count
+    ends = np.searchsorted(of_bins, np.arange(count) * half)  # of halves, the last of which goes on to the end
+    pieces = list(zip(ends[:-1], [*ends[2:], bins.size], strict=True))
     rest = bins - np.median(bins[counted])
     use = counted
     for _ in range(3):  # pulses are no part of the baseline that the hum rides on
-        fits = [_hum_of(bins[a:b], use[a:b], a, half, [f / bin_rate for f in frequencies]) for a, b in pieces]
-        rest = bins - _blend(
-            fits, np.arange(bins.size, dtype=np.float64), half, [(f / bin_rate, 1.0) for f in frequencies]
-        )
+        fits = [
+            _hum_of(bins[a:b][use[a:b]], of_bins[a:b][use[a:b]], k * half, half, [f / bin_rate for f in frequencies])
+            for k, (a, b) in enumerate(pieces)
+        ]
+        rest = bins - _blend(fits, of_bins, half, [(f / bin_rate, 1.0) for f in frequencies])
         middle = float(np.median(rest[counted]))
         spread = 1.4826 * float(np.median(np.abs(rest[counted] - middle)))
         use = counted & (np.abs(rest - middle) < 2.5 * spread)
     # the mean over a bin left this much of it
     waves = [(f / bin_rate, float(np.sinc(f / bin_rate) / np.sinc(f / rate))) for f in frequencies]
-    place = (np.arange(samples.size, dtype=np.float64) + 0.5) / factor - 0.5
     return samples - _blend(fits, place, half, waves), rest
 
 
-def _hum_of(bins: Array, use: Mask, first: int, half: int, frequencies: list[float]) -> Array:
-    """Return complex amplitude and its slope of each line in a piece, shape (lines, 2), by least squares over `use`.
+def _hum_of(bins: Array, place: Array, first: int, half: int, frequencies: list[float]) -> Array:
+    """Return complex amplitude and its slope of each line in a piece, shape (lines, 2), by least squares.
 
-    first: place of the piece [bins]; half: half the length of pieces; frequencies [1/bin].
+    place: of the bins; first: of the piece [bins]; half: half the length of pieces; frequencies [1/bin].
     """
-    place = np.arange(bins.size)[use]
     if place.size < 8 * len(frequencies) + 8:
         return np.zeros((len(frequencies), 2), dtype=complex)
-    u = place / half - 1
+    u = (place - first) / half - 1
     rows = [np.ones(place.size), u, u**2]
     for frequency in frequencies:
-        angle = 2 * np.pi * frequency * (place + first)
+        angle = 2 * np.pi * frequency * place
         c, s = np.cos(angle), np.sin(angle)
         rows += [c, s, c * u, s * u]
     design = np.array(rows)
     normal = design @ design.T
-    found = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(len(rows)), design @ bins[use])[3:].reshape(-1, 4)
+    found = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(len(rows)), design @ bins)[3:].reshape(-1, 4)
     return np.asarray(found[:, ::2] - 1j * found[:, 1::2])
 
 

@@ -25,11 +25,14 @@ CAP = 30.0
 SHORT, COHERENT = 0.25, (1, 2, 4, 8)
 
 
-def search(bins: Array, rate: float) -> Fit | None:
+def search(bins: Array, rate: float, middles: Array | None = None) -> Fit | None:
     """Return the phase of greatest likelihood, about right; None: the record is shorter than four of the slowest turns.
 
-    bins: shape (n,), without what is no pulse; rate: bins per second.
+    bins: shape (n,), without what is no pulse; rate: bins per second; middles: times of the bins [s], where they are
+    uneven: the first search takes them for even.
     """
+    if middles is not None:
+        rate = (bins.size - 1) / float(middles[-1] - middles[0])
     duration = bins.size / rate
     lowest = max(LOWEST, 4 / duration)
     highest = min(HIGHEST, rate / 8)
@@ -40,7 +43,8 @@ def search(bins: Array, rate: float) -> Fit | None:
     low, high = (middle + 2 * (float(ordered[round(p * (ordered.size - 1))]) - middle) for p in (0.005, 0.995))
     y = np.clip(bins, low, high) - middle
     frequency, slope = _search_pieces(y, rate, lowest, highest)
-    time = (np.arange(y.size, dtype=np.float64) + 0.5) / rate - 0.5 * duration
+    time = (np.arange(y.size, dtype=np.float64) + 0.5) / rate if middles is None else middles
+    time = time - 0.5 * duration
     frequency, slope = _refine_with_phases(y, rate, time, frequency, slope)
     half = 0.5 * duration
     return Fit(

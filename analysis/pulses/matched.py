@@ -144,6 +144,7 @@ def match(
     *,
     bad: NDArray[np.bool_] | None = None,
     degree: int | None = None,
+    clock: Array | None = None,
 ) -> Match | None:
     """Improve a phase.
 
@@ -154,13 +155,14 @@ def match(
         window: where in the turn the pulse is.
         bad: samples that are no numbers, shape (n,).
         degree: of the phase, as of `fit_turns`.
+        clock: times of the samples from the first one on, shape (n,), where they are uneven [s].
 
     Returns:
         None where there are fewer than four turns, or no pulses.
     """
     result = None
     for _ in range(ROUNDS):
-        found = _improve(samples, rate, fit, window, degree=degree, bad=bad)
+        found = _improve(samples, rate, fit, window, degree=degree, bad=bad, clock=clock)
         if found is None:
             return result
         edge = np.array([-1.0, -0.5, 0.0, 0.5, 1.0]) * found.fit.half + found.fit.centre
@@ -176,12 +178,21 @@ def match(
 
 
 def _improve(
-    samples: Array, rate: float, fit: Fit, window: Window, *, degree: int | None, bad: NDArray[np.bool_] | None
+    samples: Array,
+    rate: float,
+    fit: Fit,
+    window: Window,
+    *,
+    degree: int | None,
+    bad: NDArray[np.bool_] | None,
+    clock: Array | None,
 ) -> Match | None:
-    times, numbers, frequency = turn_times(fit, window.middle, samples.size / rate)
+    duration = samples.size / rate if clock is None else float(clock[-1])
+    times, numbers, frequency = turn_times(fit, window.middle, duration)
     if times.size < 4 or frequency.min() <= 0:
         return None
-    middle = np.rint(times * rate).astype(np.intp)
+    even = times * rate if clock is None else np.interp(times, clock, np.arange(clock.size))
+    middle = np.rint(even).astype(np.intp)
     reach = int(np.ceil(window.half * rate / frequency.min()))
     if reach < FEWEST_SAMPLES // 2:
         return None
@@ -193,9 +204,12 @@ def _improve(
     index = middle[:, None] + offsets
     x = samples[index]
     per_sample = frequency / rate
-    place = (offsets * per_sample[:, None] + ((middle - times * rate) * per_sample)[:, None]) / (2 * window.half) + 0.5
+    late = offsets * per_sample[:, None] + ((middle - times * rate) * per_sample)[:, None]
+    if clock is not None:
+        late = (clock[index] - times[:, None]) * frequency[:, None]
+    place = late / (2 * window.half) + 0.5
     valid = None
-    if window.half < 0.5 or bad is not None:
+    if window.half < 0.5 or bad is not None or clock is not None:
         outside = (place < 0) | (place >= 1)
         if bad is not None:
             outside |= bad[index]

@@ -99,8 +99,8 @@ def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None) -> SpinF
     )
 
 
-def check_times(pulse_times: ArrayLike) -> Array:
-    """Return the times as an array of floats.  Raises an error for faulty ones."""
+def check_times(pulse_times: ArrayLike, *, increasing: bool = True) -> Array:
+    """Return the times as an array of floats.  Raises an error for faulty ones; increasing: two may not be equal."""
     times = np.asarray(pulse_times, dtype=np.float64)
     if times.ndim != 1:
         raise ShapesDiffer(quantity="pulse times", seen=times.shape, expected=(times.size,))
@@ -108,7 +108,8 @@ def check_times(pulse_times: ArrayLike) -> Array:
         raise NotFinite(quantity="pulse time", index=int(wrong[0]), value=float(times[wrong[0]]))
     if times.size < FEWEST:
         raise TooFewPulses(seen=times.size, needed=FEWEST, duration=float(np.ptp(times)) if times.size else 0.0)
-    if (wrong := np.flatnonzero(np.diff(times) <= 0)).size:
+    apart = np.diff(times)
+    if (wrong := np.flatnonzero(apart <= 0 if increasing else apart < 0)).size:
         i = int(wrong[0])
         raise TimesNotIncreasing(index=i + 1, before=float(times[i]), after=float(times[i + 1]))
     return times

@@ -20,7 +20,7 @@ from analysis.pulses.matched import Match, match, window_of
 from analysis.pulses.regression import Grid, fit_turns, median, student
 from analysis.pulses.result import Finding, Method, SpinFrequency
 from analysis.pulses.search import Events, find_events, shorten
-from analysis.pulses.times import FEWEST, Train, findings_of_fit, fit_train
+from analysis.pulses.times import FEWEST, Train, check_times, findings_of_fit, fit_train
 
 if TYPE_CHECKING:
     from analysis.pulses.regression import Fit
@@ -66,8 +66,9 @@ def spin_of_trace(
     start: float = 0.0,
     method: Choice = "auto",
     degree: int | None = None,
+    times: ArrayLike | None = None,
 ) -> SpinFrequency:
-    """Return frequency and chirp of a top from evenly sampled light pulses.
+    """Return frequency and chirp of a top from sampled light pulses.
 
     Args:
         samples: shape (n,), any unit; NaN where there is none.
@@ -76,11 +77,13 @@ def spin_of_trace(
         method: "edges" is the fastest; "matched" the most precise where pulses stand out; "likelihood" for weak or hard
             traces; "auto" is matched, and likelihood where that does not do: a note says so.
         degree: of the phase in time, as of `spin_of_times`.
+        times: of the samples, shape (n,), not decreasing [s], where they are uneven; the rate is then the usual one,
+            and `start` does not count.
 
     Raises:
         TooFewPulses: fewer than four pulses were found, or none that return regularly.
         OnlyHum: that, and the trace holds hum of the mains.
-        ShapesDiffer, NotPositive.
+        ShapesDiffer, NotPositive, NotFinite, TimesNotIncreasing.
 
     >>> turns = (25 - 0.05 * np.arange(10000) / 5000) * np.arange(10000) / 5000
     >>> found = spin_of_trace(np.exp(-3000 * (turns % 1 - 0.5) ** 2), 5000)
@@ -91,9 +94,15 @@ def spin_of_trace(
     # the bins are a pass over an eighth of the samples; where they move, so do the samples
     if _constant(bins) and _constant(x):
         raise TooFewPulses(seen=0, needed=FEWEST, duration=x.size / rate)
-    cleaned = clean(x, rate, bins, bad)
+    since = None
+    if times is not None:
+        t = check_times(times, increasing=False)
+        if t.shape != x.shape:
+            raise ShapesDiffer(quantity="times of samples", seen=t.shape, expected=x.shape)
+        start, since = float(t[0]), t - t[0]
+    cleaned = clean(x, rate, bins, bad, since)
     try:
-        found = _find_pulses(Trace(cleaned, rate, degree), method)
+        found = _find_pulses(Trace(cleaned, rate, degree, since), method)
     except TooFewPulses as error:
         if cleaned.lines:
             raise OnlyHum(seen=error.seen, needed=error.needed, duration=error.duration) from None
@@ -102,9 +111,13 @@ def spin_of_trace(
 
 
 class Trace:
-    """A trace that was cleaned, the rates of its samples and bins [1/s], and the degree of the phase."""
+    """A trace that was cleaned, the rates of its samples and bins [1/s], and the degree of the phase.
 
-    def __init__(self, cleaned: Clean, rate: float, degree: int | None = None) -> None:
+    times: of the samples since the first one [s], where they are uneven.
+    """
+
+    def __init__(self, cleaned: Clean, rate: float, degree: int | None = None, times: Array | None = None) -> None:
+        self.times = times
         self.samples, self.bins, self.bad = cleaned.samples, cleaned.bins, cleaned.bad
         self.notes, self.degree = cleaned.notes, degree
         self.rate, self.bin_rate = rate, rate / (self.samples.size // self.bins.size)
@@ -119,17 +132,31 @@ class Trace:
 
     @cached_property
     def train(self) -> Train:
-        """The events, numbered and fitted.  Raises TooFewPulses."""  # the centre of a bin is that of its samples
-        return fit_train(self.events.times - 0.5 / self.rate, degree=self.degree, step=1 / self.rate)
+        """The events, numbered and fitted.  Raises TooFewPulses."""
+        return fit_train(self.places, degree=self.degree, step=1 / self.rate)
+
+    @property
+    def places(self) -> Array:
+        """Times of the events since the first sample [s]: the centre of a bin is that of its samples."""
+        even = self.events.times - 0.5 / self.rate
+        return even if self.times is None else np.interp(even * self.rate, np.arange(self.times.size), self.times)
 
     @property
     def duration(self) -> float:
         """[s]."""
-        return self.samples.size / self.rate
+        return self.samples.size / self.rate if self.times is None else float(self.times[-1])
+
+    @property
+    def bin_width(self) -> float:
+        """Length of a bin [s]; of uneven times that which one bin in a hundred exceeds."""
+        apart = 1 / self.rate if self.times is None else float(np.quantile(np.diff(self.times), 0.99))
+        return apart * (self.samples.size // self.bins.size)
 
     @property
     def middles(self) -> Array:
         """Times of the middles of the bins [s]."""
+        if self.times is not None:
+            return shorten(self.times, self.samples.size // self.bins.size)
         return (np.arange(self.bins.size, dtype=np.float64) + 0.5) / self.bin_rate - 0.5 / self.rate
 
     def too_few(self, seen: int) -> TooFewPulses:
@@ -141,7 +168,7 @@ class Trace:
         window = window_of(self.bins, fit.phase(self.middles))
         if window is None:
             return None
-        return match(self.samples, self.rate, fit, window, bad=self.bad, degree=self.degree)
+        return match(self.samples, self.rate, fit, window, bad=self.bad, degree=self.degree, clock=self.times)
 
 
 @dataclass(frozen=True)
@@ -204,7 +231,7 @@ def _scattered_train(trace: Trace, left: float) -> Train | None:
         events, train = trace.events, trace.train
     except TooFewPulses:
         return None
-    width, bin_width = events.width * train.fit.middle_frequency, train.fit.middle_frequency / trace.bin_rate  # [turns]
+    width, bin_width = (seconds * train.fit.middle_frequency for seconds in (events.width, trace.bin_width))  # [turns]
     odd = train.missing + train.doubled
     scatter = _scatter(train)
     if odd > MOST_ODD * train.used.size or scatter < max(BY_NOISE / events.contrast * width, BY_BINS * bin_width):
@@ -232,8 +259,8 @@ def _same_turns(one: Fit, other: Fit) -> bool:
 def _by_edges(trace: Trace) -> tuple[Edges, int]:
     """Return the edges, and the number of pulses beside the turns' own.  Raises TooFewPulses."""
     events, train = trace.events, trace.train
-    if events.width * train.fit.middle_frequency > WIDE:
-        times = events.times[train.used] - 0.5 / trace.rate
+    if events.width * train.fit.middle_frequency > WIDE or trace.times is not None:
+        times = trace.places[train.used]
         grid = Grid(1 / trace.rate, 1.0)
         fit = fit_turns(times, train.turns.astype(np.float64), degree=trace.degree, jump=train.fit.jump, grid=grid)
         return Edges(fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0), train.doubled
@@ -275,7 +302,7 @@ def _by_pulse(trace: Trace, method: Choice) -> tuple[Match, int, Method, tuple[F
 
 def _match_by_likelihood(trace: Trace, found: Match | None) -> Match | None:
     """Return the match at the frequency of greatest likelihood, or the one that was found, if that is likelier."""
-    fit = search(trace.bins, trace.bin_rate)
+    fit = search(trace.bins, trace.bin_rate, None if trace.times is None else trace.middles)
     other = None if fit is None else trace.match(fit)
     return max((each for each in (other, found) if each), key=lambda each: each.evidence, default=None)
 

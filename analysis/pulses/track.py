@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import NotPositive, TooFewPulses
+from analysis.pulses.regression import median
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.times import FEWEST, check_times, spin_of_times
 from analysis.pulses.trace import Choice, spin_of_trace
@@ -103,6 +104,44 @@ def track_of_times(pulse_times: ArrayLike, *, window: float = WINDOW) -> Track:
                 yield float(ends[i]), float(ends[i + 1])
 
     return _connect(spins(), times.size, float(times[-1] - times[0]))
+
+
+def track_of_samples(samples: ArrayLike, times: ArrayLike, *, window: float = WINDOW, method: Choice = "auto") -> Track:
+    """Follow the frequency through a long trace whose samples are uneven.
+
+    Args:
+        samples: shape (n,).
+        times: of them, shape (n,), not decreasing [s].
+        window: length of a window [s].
+        method: as of `spin_of_trace`.
+
+    Raises:
+        TooFewPulses: no window has enough of them.
+        NotFinite, TimesNotIncreasing, ShapesDiffer, NotPositive.
+    """
+    x, t = np.asarray(samples, dtype=np.float64), check_times(times, increasing=False)
+    _check_window(window)
+    count = max(round((t[-1] - t[0]) / window), 1)
+    ends = np.linspace(t[0], t[-1], count + 1)
+    cuts = np.searchsorted(t, ends)
+    cuts[-1] = t.size
+
+    def spins() -> Iterator[SpinFrequency | tuple[float, float]]:
+        for i in range(count):
+            inside = slice(cuts[i], cuts[i + 1])
+            try:
+                yield spin_of_trace(x[inside], usual_rate(t[inside]), times=t[inside], method=method)
+            except (TooFewPulses, NotPositive):  # hardly any samples
+                yield float(ends[i]), float(ends[i + 1])
+
+    return _connect(spins(), 0, float(t[-1] - t[0]))
+
+
+def usual_rate(times: Array) -> float:
+    """Return samples per second of uneven times, shape (n,) [1/s]; 0 where there are none."""
+    apart = np.diff(times)
+    usual = median(apart) or float(apart.mean()) if apart.size else 0.0
+    return 1 / usual if usual else 0.0
 
 
 def track_of_blocks(

@@ -94,12 +94,16 @@ class _Clock:
 
 @dataclass(frozen=True)
 class _Times:
-    """Start, step and its standard uncertainty where rounded times give it [s], and what to know of them."""
+    """Start, step and its standard uncertainty where rounded times give it [s], and what to know of them.
+
+    times: of all samples [s], where they are uneven.
+    """
 
     start: float
     step: float
     warnings: tuple[str, ...] = ()
     step_u: float = 0.0
+    times: Array | None = None
 
 
 @dataclass
@@ -128,7 +132,7 @@ def read_samples(head: Head, dialect: Dialect, *, columns: Mapping[str, str], ra
     certain = header.certain or rate is not None
     try:
         survey = _look_over(head, header)
-        times = _times(path, header, survey, rate)
+        times = _times(head, header, survey, rate)
         check_step(path, times.step, "the sampling interval")
         check_count(path, survey.count)
     except TableError as error:
@@ -149,7 +153,10 @@ def read_samples(head: Head, dialect: Dialect, *, columns: Mapping[str, str], ra
                 yield values * column.factor if column.factor != 1 else values
 
     signals = tuple(Signal(column.name, column.unit) for column in header.columns)
-    return Waveform(path, header.format, times.start, times.step, survey.count, signals, read, warnings, times.step_u)
+    return Waveform(
+        path, header.format, times.start, times.step, survey.count, signals, read, warnings, times.step_u,
+        times=times.times,
+    )  # fmt: skip
 
 
 def _about_count(path: Path, header: Header, survey: _Survey) -> Iterator[str]:
@@ -172,10 +179,11 @@ def _look_over(head: Head, header: Header) -> _Survey:
     return survey
 
 
-def _times(path: Path, header: Header, survey: _Survey, rate: float | None) -> _Times:
+def _times(head: Head, header: Header, survey: _Survey, rate: float | None) -> _Times:
     """Start and step [s], and what to know of them."""
+    path = head.path
     if header.time is not None:
-        return _printed_times(path, header, survey, rate)
+        return _printed_times(head, header, survey, rate)
     if header.sequence is not None:
         _check_numbers(path, survey.clock)
     known = header.step.value if header.step else None
@@ -197,8 +205,8 @@ def _check_numbers(path: Path, clock: _Clock) -> None:
             )
 
 
-def _printed_times(path: Path, header: Header, survey: _Survey, rate: float | None) -> _Times:
-    clock, n = survey.clock, survey.count
+def _printed_times(head: Head, header: Header, survey: _Survey, rate: float | None) -> _Times:
+    path, clock, n = head.path, survey.clock, survey.count
     if clock.first is None or n < 2:
         check_count(path, n)
     unit = header.time_factor
@@ -212,7 +220,8 @@ def _printed_times(path: Path, header: Header, survey: _Survey, rate: float | No
         )
     largest = max(abs(first), abs(last))
     allowed = max(1.01 * clock.resolution * unit, min(SINGLE * largest, mean / 4)) + 1e-9 * mean
-    _check_even(path, clock, unit, mean, allowed)
+    if max(clock.longest[0] * unit - mean, mean - clock.shortest[0] * unit) > allowed:
+        return _uneven_times(head, header, survey)
     if header.step is None:
         return _fit_step(path, clock, unit, first=first, mean=mean, allowed=allowed)
     step, u = header.step.value, 0.505 * header.step.resolution
@@ -240,15 +249,27 @@ def _fit_step(path: Path, clock: _Clock, unit: float, *, first: float, mean: flo
     return _Times(first, step, (known,), u)
 
 
-def _check_even(path: Path, clock: _Clock, unit: float, mean: float, allowed: float) -> None:
-    for difference, line in (clock.shortest, clock.longest):
-        if abs(difference * unit - mean) > allowed:
-            raise TableError(
-                path,
-                f"{difference * unit:g} s lie between this sample and the one before, {mean:g} s between the others: "
-                "export the whole record, evenly spaced, or say its `rate`",
-                line=line,
-            )
+#: Most uneven times, which are held in memory.
+MOST_UNEVEN = 50_000_000
+
+
+def _uneven_times(head: Head, header: Header, survey: _Survey) -> _Times:
+    """Return the times as they are printed, where the samples are not evenly spaced.
+
+    Raises:
+        TableError: they go back, or there are too many for memory.
+    """
+    path, unit, (shortest, line) = head.path, header.time_factor, survey.clock.shortest
+    if shortest < 0:
+        raise TableError(path, f"its time goes back by {-shortest * unit:g} s: sort the rows, or say `rate`", line=line)
+    if survey.count > MOST_UNEVEN:
+        raise TableError(path, f"holds {survey.count} samples with uneven times: say `rate`, or cut the file")
+    blocks = read_blocks(path, head.encoding, header.dialect, header.first_line, header.used)
+    times = np.concatenate([block.numbers[:, 0] for block in blocks])[: survey.count] * unit
+    apart = np.diff(times)
+    step, (longest, line) = float(np.median(apart)) or float(apart.mean()), survey.clock.longest
+    text = f"its times are {shortest * unit:.4g} to {longest * unit:.4g} s apart (line {line}), mostly {step:.4g} s"
+    return _Times(float(times[0]), step, (f"{path.name}: {text}: they are used as printed",), times=times)
 
 
 def _times_by_header(path: Path, header: Header, first: float, mean: float) -> _Times:

@@ -46,18 +46,20 @@ class Signal:
 
 @dataclass(frozen=True, eq=False)
 class Waveform:
-    """Evenly spaced samples of one or more channels.
+    """Samples of one or more channels.
 
     Attributes:
         path: the file.
         format: name of the program or instrument that wrote it.
         start: time of the first sample [s].
-        step: from one sample to the next [s]; step_u: its standard uncertainty [s], where it comes from rounded times.
+        step: from one sample to the next [s], of uneven ones the median; step_u: its standard uncertainty [s], where it
+            comes from rounded times.
         count: samples of each channel.
         signals: the channels.
         read: from the index of a channel to its samples in order, in blocks, each of shape (m,), in the channel's unit.
         warnings: what to know before using it.
         start_u: standard uncertainty of the start [s], where it comes from the clock of a run.
+        times: of the samples, shape (count,), not decreasing [s], where they are uneven; None: start and step say them.
     """
 
     path: Path
@@ -70,6 +72,7 @@ class Waveform:
     warnings: tuple[str, ...] = ()
     step_u: float = 0.0
     start_u: float = 0.0
+    times: Array | None = None
 
     @property
     def rate(self) -> float:
@@ -79,7 +82,21 @@ class Waveform:
     @property
     def duration(self) -> float:
         """From the first sample to the last [s]."""
-        return (self.count - 1) * self.step
+        return (self.count - 1) * self.step if self.times is None else float(self.times[-1] - self.times[0])
+
+    def times_of(self, first: int, last: int) -> Array:
+        """Return the times of the samples from one number to before another, shape (last - first,) [s]."""
+        if self.times is not None:
+            return self.times[first:last]
+        return self.start + np.arange(first, last, dtype=np.float64) * self.step
+
+    def numbers_at(self, start: float, end: float) -> tuple[int, int]:
+        """Return the numbers of the samples between two times [s]: of the first one, and of that behind the last."""
+        if self.times is not None:
+            first, last = np.searchsorted(self.times, (start, end)).tolist()
+            return first, last
+        first = max(int((start - self.start) * self.rate), 0)
+        return first, min(first + int((end - start) * self.rate), self.count)
 
     def signal(self, wanted: str | None = None) -> int:
         """Return the index of a channel by its name, in any case, or its 1-based number; the first without a name.
@@ -113,7 +130,7 @@ class Waveform:
         if rate is None:
             return self
         warnings = (*self.warnings, *about_rate(self.path, self.step, rate))
-        return replace(self, step=1 / rate, step_u=0.0, warnings=warnings)
+        return replace(self, step=1 / rate, step_u=0.0, times=None, warnings=warnings)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,6 @@ from analysis.pulses import (
     phases,
     spin_of_times,
     spin_of_trace,
-    track_of_blocks,
     track_of_times,
 )
 from analysis.uncertainty import Estimate
@@ -26,7 +25,7 @@ from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.options import SpinOptions
 from levilab.pipelines.sources import Needs
-from levilab.pipelines.spin.readings import Records, read_spin_file, read_spin_run
+from levilab.pipelines.spin.readings import Records, read_spin_file, read_spin_run, track_of_record
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.traces import INDEX
 from levilab.runs.waveforms import has_traces
@@ -208,13 +207,10 @@ def _of_times(times: Array) -> SpinRun:
 def _of_waveform(waveform: Waveform, channel: str, options: SpinOptions) -> SpinRun:
     if waveform.duration <= LONGEST_WHOLE_S:
         samples = waveform.samples(channel)
-        spin = spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method)
+        spin = spin_of_trace(samples, waveform.rate, start=waveform.start, method=options.method, times=waveform.times)
         found = _with_rate(spin, waveform)
         return replace(_of_one(found), parts=parts_of(spin, found), code=_code(samples, found))
-    blocks = waveform.blocks(channel)
-    return _of_track(
-        track_of_blocks(blocks, waveform.rate, start=waveform.start, window=WINDOW_S, method=options.method)
-    )
+    return _of_track(track_of_record(waveform, channel, WINDOW_S, options.method))
 
 
 def _with_rate(spin: SpinFrequency, waveform: Waveform) -> SpinFrequency:

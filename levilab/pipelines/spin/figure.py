@@ -131,13 +131,13 @@ def _excerpt(records: Records, spin: SpinFrequency) -> _Excerpt:
         late = (turns - np.rint(turns)) / (spin.frequency.value or 1.0)
         return _Excerpt(times, np.zeros(len(times)), turns, "", times, late)
     waveform = min(records.waveforms, key=lambda w: abs(w.start + w.duration / 2 - spin.reference_time))
-    first = 0
+    first, count = 0, waveform.count
     if waveform.duration > LONGEST_FOLDED_S:
-        first = max(int((spin.reference_time - 1.0 - waveform.start) * waveform.rate), 0)
-    count = waveform.count if waveform.duration <= LONGEST_FOLDED_S else int(2.0 * waveform.rate)
+        first, last = waveform.numbers_at(spin.reference_time - 1.0, spin.reference_time + 1.0)
+        count = last - first
     channel = records.channel if len(records.waveforms) == 1 else None
     signal = _part(waveform, channel, first, count)
-    time = waveform.start + (first + np.arange(len(signal), dtype=np.float64)) * waveform.step
+    time = waveform.times_of(first, first + len(signal))
     turns = turns_of(spin, time)
     unit = waveform.signals[waveform.signal(channel)].unit
     at, residuals = _arrivals(time, signal, turns, spin)

@@ -6,8 +6,9 @@ import os
 import zlib
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
+from analysis.pulses import track_of_blocks, track_of_samples
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
@@ -17,6 +18,7 @@ from levilab.runs.waveforms import run_waveforms
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from analysis.pulses import Track
     from levilab.pipelines.options import InputOptions
     from levilab.runs.run import Run
 
@@ -62,6 +64,18 @@ class Records:
         if len(self.waveforms) > 1:
             return f"{len(self.waveforms)} records of an oscilloscope"
         return self.waveforms[0].format
+
+
+def track_of_record(
+    record: Waveform, channel: str | None, window: float, method: Literal["auto", "edges", "matched", "likelihood"]
+) -> Track:
+    """Return the frequency in windows of a long record [s]; samples at even times are read in blocks.
+
+    Raises AnalysisError.
+    """
+    if record.times is not None:
+        return track_of_samples(record.samples(channel), record.times, window=window, method=method)
+    return track_of_blocks(record.blocks(channel), record.rate, start=record.start, window=window, method=method)
 
 
 def read_spin_file(path: Path, options: InputOptions) -> Records:

@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.errors import AnalysisError, NotPositive, TimesNotIncreasing
 from analysis.numbers import digits
-from analysis.pulses import phases, track_of_blocks, track_of_times
+from analysis.pulses import phases, track_of_times
 from analysis.spindown.readings import checked
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
@@ -16,6 +16,7 @@ from levilab.formats.titles import unit_factor
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes
+from levilab.pipelines.spin.readings import track_of_record
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -119,8 +120,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
         if isinstance(record, PulseTimes):
             track = track_of_times(record.times, window=WINDOW_S)
         else:
-            blocks = record.blocks(options.channel)
-            track = track_of_blocks(blocks, record.rate, start=record.start, window=WINDOW_S)
+            track = track_of_record(record, options.channel, WINDOW_S, "auto")
     except AnalysisError as error:
         raise (DataError if options.guess else DoesNotSuit)(f"{path}: {error}") from error
     first, last = _coasting(track)

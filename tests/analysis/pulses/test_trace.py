@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.errors import NotPositive, OnlyHum, ShapesDiffer, TooFewPulses
+from analysis.errors import NotPositive, OnlyHum, ShapesDiffer, TimesNotIncreasing, TooFewPulses
 from analysis.pulses import spin_of_trace
 from analysis.pulses.clean import clean
 from analysis.pulses.regression import fit_turns
@@ -300,3 +300,34 @@ def test_hum_that_was_cut_off_with_the_pulses_is_not_the_top(seed, number):
     found = spin_of_trace(trace.samples, RATE, degree=2)
     assert abs(found.frequency.value - trace.truth(found.reference_time)) < 5 * found.frequency.u
     assert found.frequency.u < 5e-5
+
+
+@pytest.mark.parametrize(
+    ("rate", "hum", "gap", "method"),
+    [(1000, 0.0, 0.0, "auto"), (1000, 0.0, 0.0, "edges"), (2000, 0.4, 0.2, "auto"), (20_000, 0.0, 0.1, "auto")],
+)
+def test_samples_at_uneven_times_are_taken_at_the_times_given(rate, hum, gap, method):
+    pulls, even = [], []
+    for seed in range(12):
+        random = np.random.default_rng([11, seed])
+        time = (np.arange(5 * rate) + random.uniform(-0.4, 0.4, 5 * rate)) / rate
+        time = 100 + np.delete(time, slice(2 * rate, int((2 + 5 * gap) * rate)))
+        turns = 30 * (time - 102.5) - 0.05 * (time - 102.5) ** 2 + random.uniform()
+        away = turns - np.rint(turns)
+        samples = np.exp(-0.5 * (away / (2 * SIGMA)) ** 2) + hum * np.sin(2 * np.pi * 50 * time)
+        samples += 0.05 * random.standard_normal(time.size)
+        found = spin_of_trace(samples, rate, times=time, method=method, degree=2)
+        pulls.append((found.at(102.5).value - 30) / found.frequency.u)
+        even.append(spin_of_trace(samples, rate, start=100, degree=2, method=method).at(102.5).value - 30)
+        assert not {"jump", "fell-back"} & names(found)
+    assert np.std(pulls) == pytest.approx(1, abs=0.65)  # 3 standard errors of a standard deviation from 12 are 0.61
+    assert np.abs(np.mean(pulls)) < 1.0  # 3 of 0.29, and the hum's removal
+    if gap:  # the gap taken for nothing puts the turns at wrong times
+        assert np.abs(even).min() > 0.01
+
+
+def test_times_of_samples_are_as_many_as_they_and_do_not_go_back():
+    with pytest.raises(ShapesDiffer):
+        spin_of_trace(light(PHASE), RATE, times=TIME[1:])
+    with pytest.raises(TimesNotIncreasing):
+        spin_of_trace(light(PHASE), RATE, times=TIME[::-1])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.errors import NotPositive, TooFewPulses
-from analysis.pulses import phases, track_of_blocks, track_of_times
+from analysis.pulses import phases, track_of_blocks, track_of_samples, track_of_times
 
 RATE = 5000.0
 TIME = np.arange(round(70 * RATE)) / RATE
@@ -42,6 +42,19 @@ def test_frequencies_of_windows_hold_their_uncertainties(track):
     pulls = (track.frequency - np.interp(track.time, TIME, FREQUENCY))[steady] / track.u[steady]
     assert np.std(pulls) == pytest.approx(1, abs=0.45)  # 3 standard errors from 24
     assert track.u.max() < 2e-3
+
+
+def test_a_record_with_uneven_times_is_followed_across_its_gaps():
+    random = np.random.default_rng(5)
+    times = np.sort(random.choice(TIME[TIME < 60], 120_000, replace=False))
+    times = times[(times < 40.3) | (times > 45.1)]
+    turns = np.interp(times, TIME, PHASE)
+    light = np.exp(-0.5 * ((turns - np.floor(turns) - 0.5) / SIGMA) ** 2) + 0.05 * random.standard_normal(times.size)
+    found = track_of_samples(light, times)
+    assert [(round(start), round(end)) for start, end in found.empty] == [(42, 44)]
+    steady = (found.time < 20) | (found.time > 33)
+    pulls = (found.frequency - np.interp(found.time, TIME, FREQUENCY))[steady] / found.u[steady]
+    assert 0.45 < np.std(pulls) < 1.45  # 3 standard errors from 24; u of flanks between samples is for even ones: 0.64
 
 
 def test_a_record_is_cut_into_its_phases(track):

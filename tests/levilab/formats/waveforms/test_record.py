@@ -146,6 +146,19 @@ def test_the_step_comes_from_the_header_where_times_lost_digits(write):
     assert record.warnings == ()
 
 
+def test_uneven_times_are_taken_as_they_are_printed(write):
+    text = "ms;V\n" + "".join(f"{k + k % 3 / 10};{k % 5}\n" for k in range(30) if k != 12)
+    record = waveform(write(text), columns={"t": "ms"})
+    assert record.warnings == (
+        "data.csv: its times are 0.0008 to 0.0019 s apart (line 14), mostly 0.0011 s: they are used as printed",
+    )
+    assert record.times == pytest.approx([(k + k % 3 / 10) / 1000 for k in range(30) if k != 12])
+    assert (record.step, record.duration) == (pytest.approx(0.0011), pytest.approx(0.0292))
+    assert record.numbers_at(0.0105, 0.0141) == (11, 13)
+    assert record.times_of(11, 13) == pytest.approx([0.0112, 0.0131])
+    assert waveform(write(text), columns={"t": "ms"}, rate=1000.0).times is None
+
+
 def test_times_in_microseconds_below_a_header_in_seconds_are_warned_of(write):
     record = waveform(write(siglent("2e-6", 2.0, unit="us")))
     assert record.step == 2e-6
@@ -198,7 +211,7 @@ def test_a_torn_last_line_is_left_out_with_a_warning(write):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (PLAIN.replace("0,0100;1000\n", ""), "line 12: 0.002 s lie between this sample and the one before"),
+        (PLAIN.replace("0,0100;1000", "0,0070;1000"), "line 12: its time goes back by 0.002 s"),
         (PLAIN.replace("0,0100;1000", "0,010;9,91E37"), "line 12: '9,91E37' is a missing sample"),
         (PLAIN.replace("0,0100;1000", "0,010;high"), "line 12: 'high' is no number with decimal comma"),
         ("X,CH1,Start,Increment\nSequence,Volt,x,y\n" + rows(), "no numbers below Start and Increment"),
