@@ -1,5 +1,6 @@
 """The live view.  Heavy imports happen inside the command."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -22,6 +23,10 @@ def live(
     port: Annotated[
         int, typer.Option(metavar="N", min=0, max=65535, help="Of the loopback address; 0: any that is free.")
     ] = 8765,
+    share: Annotated[
+        bool,
+        typer.Option("--share", help="Let phones in the same network look on, by a second address with a QR code."),
+    ] = False,
     no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser: print the address only.")] = False,
 ) -> None:
     """Serve the view until Ctrl-C."""
@@ -32,8 +37,10 @@ def live(
         from levilab.interruption import watching_for_end
         from levilab.live.serve import LiveOptions, serve_live
 
-    def announce(address: str) -> None:
+    def announce(address: str, shared: str) -> None:
         result(address)
+        if shared:
+            _show_code(shared)
         bench = " and the bench for practice, whose time stands still while no page is open"
         message("Ctrl-C ends the view" + (bench if mock else "; a run goes on without it"))
         if not no_open:
@@ -42,6 +49,16 @@ def live(
             webbrowser.open(address)
 
     with watching_for_end() as end:  # up to the last word
-        serve_live(LiveOptions(run, out, mock, port), end, announce, message)
+        serve_live(LiveOptions(run, out, mock, port, share=share), end, announce, message)
         message("levilab: the view is closed")
     raise typer.Exit(exit_codes.INTERRUPTED)
+
+
+def _show_code(address: str) -> None:
+    """Print the address for guests, who they are, and on a terminal its QR code, light on dark in any colours."""
+    from levilab.live.share import code_of, who_may_look
+
+    message(f"for phones: {address}\n{who_may_look(address)}")
+    if sys.stderr.isatty() and "utf" in sys.stderr.encoding.casefold():
+        for line in code_of(address):
+            typer.echo(f"\N{ESCAPE}[97;40m{line}\N{ESCAPE}[0m", err=True)

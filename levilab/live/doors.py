@@ -1,9 +1,12 @@
-"""Who may come in: pages that this server sent, opened at the loopback address, and nothing else.
+"""Who may come in: pages that this server sent, opened at the loopback address, and guests where the view is shared.
 
 A page of another origin that a browser has open could otherwise read a run (DNS rebinding: its name is made to point to
 127.0.0.1) or give commands to the bench for practice.  So the head of each request must name this server as its host,
 a socket must be opened by a page of this server, and a command must carry the token that stands in the address which
 the terminal shows.
+
+A guest comes by another socket, at the machine's address in its network, to an application that knows no command; each
+of its requests carries a token as the first part of its path.
 """
 
 from __future__ import annotations
@@ -39,21 +42,23 @@ _ALWAYS = {
 
 @dataclass(frozen=True)
 class Doors:
-    """Where this server is, and the token of its commands.
+    """Where this server is, and the token of its commands, or of its guests.
 
     Attributes:
-        port: at the loopback address.
-        token: of commands.
+        port: at these addresses.
+        token: of commands; of a view for guests, the first part of each path.
+        names: of this machine; the first is the address of the socket.
     """
 
     port: int
     token: str = field(default_factory=lambda: secrets.token_urlsafe(18))
+    names: tuple[str, ...] = HERE
 
     @property
     def hosts(self) -> frozenset[str]:
         """What the head of a request may name as its host."""
-        named = {f"{host}:{self.port}" for host in HERE}
-        return frozenset(named | set(HERE) if self.port == 80 else named)
+        named = {f"{host}:{self.port}" for host in self.names}
+        return frozenset(named | {*self.names} if self.port == 80 else named)
 
     def lets_in(self, headers: Iterable[tuple[bytes, bytes]], *, is_socket: bool) -> bool:
         """Return whether a request comes from where it should.  A program that is no browser sends no origin."""
@@ -73,17 +78,36 @@ class Doors:
         return _ALWAYS | {"content-security-policy": policy.replace("{sockets}", sockets)}
 
 
-class Guard:
-    """ASGI: turns away what may not come in, before anything else sees it."""
+def doors_for_guests(address: str, port: int) -> Doors:
+    """Return the doors of a shared view: 12 characters of a token, which a code on a terminal can hold."""
+    return Doors(port, secrets.token_urlsafe(9), (address,))
 
-    def __init__(self, app: Any, doors: Doors) -> None:
-        self.app, self.doors = app, doors
+
+class Guard:
+    """ASGI: turns away what may not come in, before anything else sees it.
+
+    Args:
+        app: of the person at this machine.
+        doors: its doors.
+        shared: the application for guests and its doors, where the view is shared.
+    """
+
+    def __init__(self, app: Any, doors: Doors, shared: tuple[Any, Doors] | None = None) -> None:
+        self.app, self.doors, self.shared = app, doors, shared
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         """Pass a request on, or turn it away."""
-        kind = scope["type"]
-        if kind not in {"http", "websocket"} or self.doors.lets_in(scope["headers"], is_socket=kind == "websocket"):
-            await self.app(scope, receive, send)
+        kind, app, doors = scope["type"], self.app, self.doors
+        if kind not in {"http", "websocket"}:
+            await app(scope, receive, send)
+            return
+        is_in = True
+        if self.shared and (*scope["server"],) == (self.shared[1].names[0], self.shared[1].port):
+            app, doors = self.shared
+            given, _, path = scope["path"].removeprefix("/").partition("/")
+            is_in, scope = doors.knows(given), {**scope, "path": f"/{path}"}
+        if is_in and doors.lets_in(scope["headers"], is_socket=kind == "websocket"):
+            await app(scope, receive, send)
         elif kind == "websocket":
             await receive()
             await send({"type": "websocket.close", "code": 1008})

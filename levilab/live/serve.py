@@ -14,9 +14,10 @@ import uvicorn
 
 from levilab.errors import DataError, LevilabError, UsageError
 from levilab.live.desk import Desk
-from levilab.live.doors import Doors
+from levilab.live.doors import Doors, doors_for_guests
 from levilab.live.practice.bench import PracticeBench
 from levilab.live.server import Hall, application
+from levilab.live.share import address_in_network
 from levilab.runs.run import RECORD, find_run
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
     from levilab.interruption import End
 
-#: Only programs of this machine reach it.
+#: Only programs of this machine reach it; a shared view has a second socket, for guests.
 HOST = "127.0.0.1"
 #: Pages that are open are given so long to close [s].
 _GOODBYE_S = 1
@@ -44,6 +45,7 @@ class LiveOptions:
         mock: a bench for practice, which records into `out`.
         port: of the loopback address; 0: any that is free.
         seed: of the light's noise on the bench for practice.
+        share: whether phones in the network may look, too.
     """
 
     run: Path | None = None
@@ -51,6 +53,7 @@ class LiveOptions:
     mock: bool = False
     port: int = 8765
     seed: int = 0
+    share: bool = False
 
 
 class ViewServer(uvicorn.Server):
@@ -82,7 +85,9 @@ class ViewServer(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def serve_live(options: LiveOptions, end: End, announce: Callable[[str], None], say: Callable[[str], None]) -> None:
+def serve_live(
+    options: LiveOptions, end: End, announce: Callable[[str, str], None], say: Callable[[str], None]
+) -> None:
     """Serve until a signal asks for the end.
 
     The signals are taken until this has returned, so that none keeps the bench from being switched off.
@@ -90,7 +95,7 @@ def serve_live(options: LiveOptions, end: End, announce: Callable[[str], None], 
     Args:
         options: what to show, and where.
         end: of `watching_for_end`, whose context outlasts this call.
-        announce: is called with the address, once pages can be opened.
+        announce: is called with the address, and with that for guests, empty without any, once pages can be opened.
         say: is called with a line for the person at the terminal.
 
     Raises:
@@ -98,20 +103,26 @@ def serve_live(options: LiveOptions, end: End, announce: Callable[[str], None], 
         MissingThree: the extra is not installed.
         DataError: there is no such run.
         CannotShow: the port is taken.
+        NoNetwork: the view is to be shared, and this machine is in no network.
     """
     root, shown = _where(options)
-    with contextlib.closing(_listening(options.port)) as listening, contextlib.ExitStack() as at_end:
-        doors = Doors(listening.getsockname()[1])
+    with contextlib.ExitStack() as at_end:
+        hosts = [HOST, address_in_network()] if options.share else [HOST]
+        sockets = [at_end.enter_context(contextlib.closing(_listening(host, options.port))) for host in hosts]
+        ports = [opened.getsockname()[1] for opened in sockets]
+        doors, guests = Doors(ports[0]), doors_for_guests(hosts[1], ports[1]) if options.share else None
         bench = at_end.enter_context(PracticeBench(root, seed=options.seed)) if options.mock else None
-        hall = Hall(root, shown, doors, Desk(bench) if bench else None)
+        hall = Hall(root, shown, doors, Desk(bench) if bench else None, guests)
         config = configuration(hall)
         at_end.callback(hall.analyses.end)
         server = ViewServer(config, lambda: farewell(bench, hall.analyses.running), say)
         end.wake = server.leave
         if end.by:  # before there was a server to wake
             return
-        with _announcing(server, doors, announce, commands=options.mock):
-            server.run(sockets=[listening])
+        own = f"http://{HOST}:{doors.port}/" + (f"#{doors.token}" if options.mock else "")
+        shared = f"http://{hosts[1]}:{guests.port}/{guests.token}/" if guests else ""
+        with _announcing(server, lambda: announce(own, shared)):
+            server.run(sockets=sockets)
 
 
 def configuration(hall: Hall) -> uvicorn.Config:
@@ -160,15 +171,15 @@ def _where(options: LiveOptions) -> tuple[Path, str]:
     return run.parent, run.name
 
 
-def _listening(port: int) -> socket.socket:
-    """Return a socket at the port.  Raises CannotShow."""
+def _listening(host: str, port: int) -> socket.socket:
+    """Return a socket at an address of this machine.  Raises CannotShow."""
     opened = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
         if hasattr(socket, "SO_EXCLUSIVEADDRUSE"):  # Windows: else two servers could share a port
             opened.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
         else:
             opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        opened.bind((HOST, port))
+        opened.bind((host, port))
         opened.listen(128)
     except OSError as error:
         opened.close()
@@ -179,15 +190,15 @@ def _listening(port: int) -> socket.socket:
 
 
 @contextlib.contextmanager
-def _announcing(server: ViewServer, doors: Doors, announce: Callable[[str], None], *, commands: bool) -> Iterator[None]:
-    """Say the address once the server has started; a thread waits for that, since the server takes the main one."""
+def _announcing(server: ViewServer, announce: Callable[[], None]) -> Iterator[None]:
+    """Say the addresses once the server has started; a thread waits for that, since the server takes the main one."""
     over = threading.Event()
 
     def wait() -> None:
         while not server.started and not over.wait(0.02):
             pass
         if server.started and not server.should_exit:
-            announce(f"http://{HOST}:{doors.port}/" + (f"#{doors.token}" if commands else ""))
+            announce()
 
     waiting = threading.Thread(target=wait, daemon=True)
     waiting.start()

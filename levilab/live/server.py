@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Iterator
 
     from starlette.requests import Request
+    from starlette.routing import BaseRoute
     from starlette.websockets import WebSocket
 
     from levilab.live.desk import Desk
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
 
 #: Frames a second at most, so that 20 come to the page; and the longest wait of a page without news [s].
 FRAMES_PER_S, PATIENCE_S = 22, 1.0
+#: Of a guest at most; and guests at most, two classes of pupils: who measures is not to notice them.
+GUEST_FRAMES_PER_S, MOST_GUESTS = 10, 60
 #: Time between two looks for runs of other programs [s].
 _OTHERS_EVERY_S = 2.0
 #: What a page asks for that keeps to the bench for practice and its runs, whatever others record; no run has this name.
@@ -61,12 +64,14 @@ class Hall:
         shown: name of the run that a page shows at first; empty: the newest.
         doors: who may come in.
         desk: the bench for practice; None where runs are only looked at.
+        guests: who may come in from the network; None where the view is not shared.
     """
 
     root: Path
     shown: str
     doors: Doors
     desk: Desk | None = None
+    guests: Doors | None = None
     watches: dict[str, Watch] = field(default_factory=dict)
     pages: dict[str, int] = field(default_factory=dict)  # name of a run → how many look at it
     new: asyncio.Event = field(default_factory=asyncio.Event)
@@ -197,10 +202,13 @@ class Pages:
 
     Args:
         hall: what the server knows.
+        doors: of those whom these pages are for.
     """
 
-    def __init__(self, hall: Hall) -> None:
-        self.hall = hall
+    def __init__(self, hall: Hall, doors: Doors) -> None:
+        self.hall, self.doors = hall, doors
+        self.for_guests = doors is hall.guests
+        self.sockets = 0
         top = Path(__file__).parents[1] / "animation" / "top.js"
         self.files = {path.name: path for path in PAGE.iterdir()} | {
             "three.js": three_js("the live view"),
@@ -208,12 +216,10 @@ class Pages:
         }
 
     def _file(self, path: Path, policy: str = PAGE_POLICY) -> Response:
-        return FileResponse(
-            path, media_type=_TYPES.get(path.suffix, "text/plain"), headers=self.hall.doors.headers(policy)
-        )
+        return FileResponse(path, media_type=_TYPES.get(path.suffix, "text/plain"), headers=self.doors.headers(policy))
 
     def _json(self, document: Any, status: int = 200) -> Response:
-        return JSONResponse(document, status, headers=self.hall.doors.headers())
+        return JSONResponse(document, status, headers=self.doors.headers())
 
     async def page(self, _: Request) -> Response:
         """Return the page."""
@@ -229,7 +235,7 @@ class Pages:
         hall = self.hall
         found = await asyncio.to_thread(choices, hall.root)
         first = hall.shown or newest(found) or ""
-        practice = hall.desk.about if hall.desk else None
+        practice = hall.desk.about | {"guest": self.for_guests} if hall.desk else None
         return self._json({"runs": [asdict(one) for one in found], "first": first, "practice": practice})
 
     async def parts(self, request: Request) -> Response:
@@ -269,23 +275,35 @@ class Pages:
         if not (name in {"", OWN_BENCH if hall.desk else ""} or hall.is_run(name)):
             await socket.close(4404)
             return
-        with hall.watching(name) as watch, contextlib.suppress(WebSocketDisconnect, RuntimeError):
+        if self.for_guests and self.sockets >= MOST_GUESTS:
+            await socket.close(1013)
+            return
+        frames_per_s = GUEST_FRAMES_PER_S if self.for_guests else FRAMES_PER_S
+        with self._counted(), hall.watching(name) as watch, contextlib.suppress(WebSocketDisconnect, RuntimeError):
             with watch.failing_alone():
                 watch.step()
             again = 0.0
             while (text := (await socket.receive()).get("text")) is not None and len(text) <= _LONGEST_ASK:
                 ask = _table(text)
                 await asyncio.sleep(max(0.0, again - time.monotonic()))
-                again = time.monotonic() + 1 / FRAMES_PER_S
+                again = time.monotonic() + 1 / frames_per_s
                 await hall.wait_for_news(watch, ask.get("tick"))
                 said = hall.desk.events_after(ask.get("said")) if hall.desk else []
                 await socket.send_bytes(watch.frame(ask, said))
             await socket.close(1003 if text is None else 1009)
 
+    @contextlib.contextmanager
+    def _counted(self) -> Iterator[None]:
+        self.sockets += 1
+        try:
+            yield
+        finally:
+            self.sockets -= 1
+
 
 def application(hall: Hall) -> Guard:
     """Return the ASGI application.  Raises MissingThree."""
-    pages = Pages(hall)
+    pages = Pages(hall, hall.doors)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -296,17 +314,24 @@ def application(hall: Hall) -> Guard:
             for task in tasks:
                 task.cancel()
 
-    routes = [
+    own = [
+        Route("/do", pages.do, methods=["POST"]),
+        Route("/run/{run}/analysis", pages.analysis),
+        Route("/run/{run}/{name}", pages.of_run),
+    ]
+    shared = (Starlette(routes=_views(Pages(hall, hall.guests))), hall.guests) if hall.guests else None
+    return Guard(Starlette(routes=[*_views(pages), *own], lifespan=lifespan), hall.doors, shared)
+
+
+def _views(pages: Pages) -> list[BaseRoute]:
+    """Return the routes of those who only look: guests have no other."""
+    return [
         Route("/", pages.page),
         Route("/runs", pages.runs),
         Route("/parts", pages.parts),
-        Route("/do", pages.do, methods=["POST"]),
         Route("/page/{name}", pages.part),
-        Route("/run/{run}/analysis", pages.analysis),
-        Route("/run/{run}/{name}", pages.of_run),
         WebSocketRoute("/frames", pages.frames),
     ]
-    return Guard(Starlette(routes=routes, lifespan=lifespan), hall.doors)
 
 
 def _nothing() -> Response:

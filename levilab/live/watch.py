@@ -243,7 +243,8 @@ class Watch:
     def _about_bench(self) -> dict[str, Any] | None:
         if self.state is None:
             return None
-        return asdict(self.state) | {"silent": self._silent}
+        about = asdict(self.state) | {"silent": self._silent}
+        return about | {"folder": Path(self.state.folder).name}  # where it lies is no concern of a page
 
     def _about_fit(self) -> dict[str, Any]:
         fit = self.fit

@@ -10,7 +10,7 @@ import threading
 import time
 from typing import TYPE_CHECKING, Any
 
-from levilab.live.doors import Doors
+from levilab.live.doors import Doors, doors_for_guests
 from levilab.live.serve import configuration
 from levilab.live.server import Hall
 
@@ -31,13 +31,14 @@ CHANNELS = (("time_s", "s"), ("spin_frequency_hz", "Hz"), ("spin_frequency_u_hz"
 
 @contextlib.contextmanager
 def serving(root: Path, shown: str = "", desk: Desk | None = None) -> Iterator[Hall]:
-    """A server of the runs in a folder, at a free port, in a thread of its own."""
+    """A server of the runs in a folder, at two free ports, one for guests, in a thread of its own."""
     import uvicorn
 
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-        hall = Hall(root, shown, Doors(listening.getsockname()[1]), desk)
+    with socket.create_server(("127.0.0.1", 0)) as listening, socket.create_server(("127.0.0.1", 0)) as shared:
+        guests = doors_for_guests("127.0.0.1", shared.getsockname()[1])
+        hall = Hall(root, shown, Doors(listening.getsockname()[1]), desk, guests)
         server = uvicorn.Server(configuration(hall))
-        thread = threading.Thread(target=lambda: asyncio.run(server.serve(sockets=[listening])), daemon=True)
+        thread = threading.Thread(target=lambda: asyncio.run(server.serve(sockets=[listening, shared])), daemon=True)
         thread.start()
         try:
             yield hall
@@ -50,6 +51,12 @@ def serving(root: Path, shown: str = "", desk: Desk | None = None) -> Iterator[H
 def address(hall: Hall, run: str = "", *, token: bool = False) -> str:
     """Where a page of the server is."""
     return f"http://127.0.0.1:{hall.doors.port}/" + (f"?run={run}" if run else "") + (f"#{hall.doors.token}" * token)
+
+
+def address_for_guests(hall: Hall) -> str:
+    """Where a guest's page of the server is."""
+    assert hall.guests
+    return f"http://127.0.0.1:{hall.guests.port}/{hall.guests.token}/"
 
 
 def until(page: Page, expression: str) -> Any:

@@ -30,7 +30,7 @@ export function connect({run, ask, show, changed}) {
 
   function open() {
     if (closed) return;
-    socket = new WebSocket(`ws://${location.host}/frames?run=${encodeURIComponent(run)}`);
+    socket = new WebSocket(`ws://${location.host}${location.pathname}frames?run=${encodeURIComponent(run)}`);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
       pause = 250;

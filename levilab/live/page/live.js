@@ -2,7 +2,7 @@
 
 import {command, connect, read} from "./connection.js";
 import {drawReadings, drawRecords, saidOf, sheet} from "./plot.js";
-import {openPractice} from "./practice.js";
+import {openPractice, watchPractice} from "./practice.js";
 import {between, by, fixed, lapse, make, short, typeset, write} from "./words.js";
 
 /** Least time between spoken news [ms]. */
@@ -211,7 +211,7 @@ function show() {
   const lost = bench?.lost?.length ? `the ${bench.lost.join(" and the ")} does not answer` : "";
   const running = about?.status === "running" || practice;
   const down = Boolean(practice) && data.up === false && Boolean(bench) && !bench.silent && !bench.folder;
-  const advice = !down ? "" : data.count ? "the top is down: “Analyze” the run, or “Top back”" : "the top is down: “Top back” floats it again";
+  const advice = !down ? "" : practice.guest ? "the top is down" : data.count ? "the top is down: “Analyze” the run, or “Top back”" : "the top is down: “Top back” floats it again";
   write("state-text", lost || LONGER[state] || advice || about?.problem || ended(about) || (running && !bench?.silent && bench?.text) || "");
   by("synthetic").hidden = !(about?.synthetic || (!about && bench?.virtual));
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
@@ -228,7 +228,7 @@ function show() {
   write("count", data.count ? `${data.count.toLocaleString("en").replaceAll(",", "\u202f")}${data.readings?.single === false ? ", each stroke from the lowest to the highest of many" : ""}` : "");
   by("fit-head").hidden = by("fit-lines").hidden = !data.count;
   by("empty").hidden = data.count > 0;
-  write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: "No run yet: the guide says how to record one.", setup: "The bench is being set up."}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
+  write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: practice?.guest ? "No run yet: it appears here once one is recorded." : "No run yet: the guide says how to record one.", setup: "The bench is being set up."}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
   document.title = `${state === "running" && data.count ? `${data.count} readings · ` : ""}levilab live`;
   practice?.show(bench, about, data.count, down);
   by("own").hidden = !practice || wanted === OWN_BENCH || !seen.run || (isOwn(seen.run) ?? !wanted);  // a run that begins is listed in a moment
@@ -529,10 +529,9 @@ async function begin() {
   document.body.classList.add("no-top");
   if (bench) {
     document.body.classList.remove("no-top");
-    practice = openPractice(bench, (wanted) => paused && wanted.do !== "analyze" ? PAUSED : command(wanted, token), () => seen.run, isOwn, Boolean(token));
+    practice = bench.guest ? watchPractice() : openPractice(bench, (wanted) => paused && wanted.do !== "analyze" ? PAUSED : command(wanted, token), () => seen.run, isOwn, Boolean(token));
   }
-  by("keys").classList.toggle("for-practice", Boolean(bench));
-  for (const row of document.querySelectorAll(".practice-key")) row.hidden = !bench;
+  for (const row of document.querySelectorAll(".practice-key")) row.hidden = !bench || bench.guest;
   wanted = bench ? "" : asked || first;
   if (wanted) by("run").value = wanted;
   open(wanted);

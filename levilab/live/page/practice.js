@@ -6,6 +6,11 @@ import {by, make, numberIn, write} from "./words.js";
 /** Least time between two messages of a slider [ms]. */
 const SENDS_EVERY_MS = 120;
 
+/** The bench for practice as guests see it: its controls stay hidden, and keys do nothing. */
+export function watchPractice() {
+  return {guest: true, ended: false, show() {}, step() {}, act() {}, hear({kind}) { this.ended ||= kind === "ended"; }};
+}
+
 /**
  * @param about what the server says of the bench: experiments, limits.
  * @param {(wanted: object) => Promise<string>} command sends one; what is wrong with it, or "".

@@ -1,0 +1,167 @@
+"""Guests from the network look on, and can do nothing else."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import socket
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from levilab.live.desk import Desk
+from levilab.live.practice.bench import PracticeBench
+from levilab.live.share import NoNetwork, address_in_network, code_of, who_may_look
+from support.browser import PHONE
+from support.live_pages import PATIENCE_S, GrowingRun, address_for_guests, serving, spin_down, until
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from playwright.sync_api import Page
+
+    from levilab.live.server import Hall
+
+COMMANDS = [{"do": "pause", "on": True}, {"do": "analyze", "run": "one"}, {"do": "switch the drive", "on": True}]
+
+
+@pytest.fixture(scope="module")
+def hall(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
+    root = tmp_path_factory.mktemp("runs")
+    run = GrowingRun(root, "one")
+    run.readings(spin_down(19))
+    (run.folder / "report.html").write_text("secret", encoding="utf-8")
+    (run.folder / "spindown.png").write_text("secret", encoding="utf-8")
+    with PracticeBench(root) as bench, serving(root, desk=Desk(bench)) as hall:
+        yield hall
+
+
+def request(
+    hall: Hall, path: str, *, method: str = "GET", body: object = None, headers: dict[str, str] | None = None
+) -> tuple[int, str]:
+    """The answer at a guest's address."""
+    there = urlsplit(address_for_guests(hall))
+    connection = http.client.HTTPConnection(there.netloc, timeout=60)
+    try:
+        connection.request(method, path, json.dumps(body), headers or {})
+        answer = connection.getresponse()
+        return answer.status, answer.read().decode("utf-8", "replace")
+    finally:
+        connection.close()
+
+
+def inside(hall: Hall, path: str) -> str:
+    return urlsplit(address_for_guests(hall)).path + path
+
+
+@pytest.mark.parametrize("path", ["", "runs", "parts", "page/live.js"])
+def test_a_guest_sees_what_the_view_shows(hall: Hall, path: str) -> None:
+    assert request(hall, inside(hall, path))[0] == 200
+    for wrong in ("", "guess/", f"{hall.doors.token}/"):
+        assert request(hall, f"/{wrong}{path}")[0] == 421
+    assert request(hall, inside(hall, path), headers={"Host": "evil.example"})[0] == 421
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["do", "run/one/analysis", "run/one/report.html", "run/one/spindown.png", "run/one/run.json", "file", "files",
+     "page/..%2fserver.py", "page/..%2f..%2f..%2fpyproject.toml", "..%2fdo", "%2e%2e/do"],
+)  # fmt: skip
+@pytest.mark.parametrize("method", ["GET", "POST", "PUT", "DELETE"])
+def test_nothing_else_is_there_for_a_guest(hall: Hall, path: str, method: str) -> None:
+    for token in (hall.doors.token, urlsplit(address_for_guests(hall)).path.strip("/")):
+        headers = {"X-Levilab-Token": token}
+        status, text = request(hall, inside(hall, path), method=method, body=COMMANDS[0], headers=headers)
+        assert status == 404
+        assert "secret" not in text
+
+
+def test_a_guest_without_the_token_gets_no_frames(hall: Hall) -> None:
+    there = address_for_guests(hall).replace("http", "ws")
+    for wrong in (there.rsplit("/", 2)[0] + "/frames", there + "do"):
+        with pytest.raises(InvalidStatus) as refused, connect(wrong):
+            pass
+        assert refused.value.response.status_code == 403
+    with pytest.raises(InvalidStatus), connect(there + "frames", origin="http://evil.example"):  # type: ignore[arg-type]
+        pass
+
+
+def test_what_a_guest_says_commands_nothing(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+    commands: list[object] = []
+    monkeypatch.setattr(Desk, "carry_out", lambda _, wanted: commands.append(wanted))
+    monkeypatch.setattr(type(hall.analyses), "begin", lambda _, wanted: commands.append(wanted))
+    with connect(address_for_guests(hall).replace("http", "ws") + "frames?run=one") as guest:
+        for wanted in COMMANDS:
+            guest.send(json.dumps(wanted | {"token": hall.doors.token, "tick": -1}))
+            assert isinstance(guest.recv(timeout=PATIENCE_S), bytes)
+    assert commands == []
+
+
+def test_more_guests_than_are_let_in_wait(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("levilab.live.server.MOST_GUESTS", 1)
+    there = address_for_guests(hall).replace("http", "ws") + "frames?run=one"
+    with connect(there) as first, connect(there) as second:
+        first.send("{}")
+        assert first.recv(timeout=PATIENCE_S)
+        with pytest.raises(ConnectionClosed) as closed:
+            second.recv(timeout=PATIENCE_S)
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 1013
+
+
+def test_a_phone_sees_the_practice_bench_without_its_controls(hall: Hall, watched: Callable[..., Page]) -> None:
+    page = watched(viewport=PHONE, color_scheme="dark")
+    page.goto(address_for_guests(hall))
+    until(page, "levilab.data.bench && Number(document.getElementById('spin-value').textContent) > 20")
+    drawn = (
+        "[...document.querySelectorAll('button, input, select')].filter((one) => one.offsetParent).map((one) => one.id)"
+    )
+    assert page.evaluate(drawn) == ["run", "pause", "latest", "motion"]
+    for key in "dfbpr.":
+        page.keyboard.press(key)
+    assert page.evaluate("document.getElementById('practice').hidden")
+    assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+    assert hall.desk
+    assert hall.desk.bench.may_record is False
+
+
+def test_the_code_is_a_square_with_its_three_marks() -> None:
+    lines = code_of("http://192.168.1.7:8765/token-of-12/")
+    rows = [[c not in light for c in line] for line in lines for light in ("█▀", "█▄")]  # two modules a character
+    edge = [[True] * 7, *[[True, False, *[k in (2, 3, 4)] * 3, False, True] for k in range(1, 6)], [True] * 7]
+    size = len(rows[0]) - 8
+    for top, left in ((4, 4), (4, size - 3), (size - 3, 4)):
+        assert [row[left : left + 7] for row in rows[top : top + 7]] == edge
+
+
+def test_without_a_network_nothing_is_shared(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unreachable(*_: object) -> None:
+        raise OSError(101, "Network is unreachable")
+
+    monkeypatch.setattr(socket.socket, "connect", unreachable)
+    with pytest.raises(NoNetwork, match="is in no network"):
+        address_in_network()
+
+
+def test_a_public_address_is_said_to_be_one() -> None:
+    assert "the address is public" in who_may_look("http://8.8.8.8:8765/token/")
+
+
+def test_nothing_is_shared_unless_it_is_asked_for(tmp_path: Path) -> None:
+    from levilab.interruption import End
+    from levilab.live.serve import LiveOptions, serve_live
+
+    end, said = End(), []
+
+    def announce(own: str, shared: str) -> None:
+        said.append((own, shared))
+        assert end.wake
+        end.wake()
+
+    serve_live(LiveOptions(out=tmp_path, port=0), end, announce, pytest.fail)
+    [(own, shared)] = said
+    assert (own.startswith("http://127.0.0.1:"), shared) == (True, "")
