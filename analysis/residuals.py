@@ -98,7 +98,7 @@ def durbin_watson(*series: Array) -> float | None:
     return steps / squares if squares > 0 else None
 
 
-def studentised(residuals: Array, leverage: Array, n_parameters: int, floor: float) -> Array:
+def studentise(residuals: Array, leverage: Array, n_parameters: int, floor: float) -> Array:
     """Return each residual in units of the scatter of the others, with its own leverage allowed for.
 
     Args:

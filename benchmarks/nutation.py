@@ -22,8 +22,8 @@ import numpy as np
 
 from instruments.clock import VirtualClock
 from levilab.acquisition.table import settings_of, with_settings
-from levilab.crosscheck.subject import acquired
-from levilab.crosscheck.subjects.motion import drawn_scene
+from levilab.crosscheck.subject import acquire_mock
+from levilab.crosscheck.subjects.motion import draw_scene
 from levilab.simulator.kernels.motion import R
 from levilab.simulator.start import start_of, steady_rates
 from levilab.world.bench import scene_world, virtual_wiring
@@ -62,7 +62,7 @@ def main() -> None:
 
 def nutation_of(seed: int) -> dict[str, float]:
     """Return the angle of a top's nutation [rad], its spin [Hz] and K/ν."""
-    scene = drawn_scene(seed)
+    scene = draw_scene(seed)
     world = scene_world(scene, VirtualClock, lambda _: None, seed=seed)
 
     def in_world(request: AcquisitionRequest) -> AcquisitionRequest:
@@ -71,7 +71,7 @@ def nutation_of(seed: int) -> dict[str, float]:
         return replace(request, config=config, wiring=lambda: virtual_wiring(world, config.limits))
 
     with tempfile.TemporaryDirectory() as folder:
-        spin = float(acquired("spin", seed, Path(folder), in_world).readings().column("spin_frequency_hz")[-1])
+        spin = float(acquire_mock("spin", seed, Path(folder), in_world).readings().column("spin_frequency_hz")[-1])
     slow, fast = steady_rates(scene, 2 * math.pi * spin, start_of(scene)[R])
     angle = angle_at(fast / (2 * math.pi), world)
     counted = angle**2 / 2 * fast / (2 * math.pi)

@@ -17,7 +17,7 @@ class LevilabError(Exception):
 _QUANTITY = re.compile(r"`([a-z]\w*)`")
 
 
-def unquoted(text: str) -> str:
+def unquote(text: str) -> str:
     """Return a message without its backquotes, for a file: its reader may not use the command line.
 
     >>> unquoted('f.csv: say `columns` = "t=1,f=2"; `levilab analyze` reads it then')

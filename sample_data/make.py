@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from analysis.locked import slip_of
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
-from levilab.present.numbers import signed
+from levilab.present.numbers import with_sign
 from levilab.present.progress import Display
 from levilab.reproduce.synthetic import NOISE_HZ, READINGS, solve
 from levilab.simulator import preset
@@ -106,7 +106,7 @@ def upper_limits(name: str, scene: str, seed: int, *, loose: bool) -> None:
         for drive, seconds in ((HELD_HZ, time - (missed - HELD_HZ) / CREEP_HZ_S), (held - BELOW_HZ, time)):
             counts = drive - slip_hz(drive) * loose + random.normal(0, COUNT_SCATTER_HZ, COUNTS)
             slip = slip_of(counts.round(3).tolist(), drive)
-            beside = f"{signed(slip.difference, 3)} Hz beside the drive"
+            beside = f"{with_sign(slip.difference, 3)} Hz beside the drive"
             text = f"held at {drive:.2f} Hz: counted {slip.spin:.3f} Hz, {beside}"
             events.append({"time_s": round(seconds, 1), "kind": "held", "text": text})
             if slip.warning:

@@ -29,7 +29,7 @@ from analysis.errors import (
 from analysis.field.ring import Ring, on_axis, reversal, slopes
 from analysis.least_squares import solve
 from analysis.numbers import digits
-from analysis.residuals import durbin_watson, gross_errors, runs_test_p, studentised
+from analysis.residuals import durbin_watson, gross_errors, runs_test_p, studentise
 from analysis.uncertainty import Estimate, curvature
 
 Array = NDArray[np.float64]
@@ -579,9 +579,7 @@ def _outliers(scan: FieldScan, leverage: Array) -> list[str]:
     if scan.statistics.n - scan.statistics.n_parameters < 3:
         return []
     scaled = scan.residuals / scan.u
-    found = gross_errors(
-        studentised(scaled, leverage, scan.statistics.n_parameters, 1e-9), scan.statistics.n_parameters
-    )
+    found = gross_errors(studentise(scaled, leverage, scan.statistics.n_parameters, 1e-9), scan.statistics.n_parameters)
     return [
         f"the reading at {1e3 * scan.height[i]:.4g} mm lies {abs(scaled[i]):.1f} u off the others: "
         "measure that height again"

@@ -100,7 +100,7 @@ def combine(runs: Sequence[SpinDown]) -> Combined:
         raise NothingToCombine(runs=len(runs))
     weighed, criterion = weigh({name: _statistics(runs, name) for name in names})
     correlation, tilt = _correlation(runs), _tilt(runs, next(iter(weighed)))
-    fits = tuple(_combined(name, [run.fit(name) for run in runs], weighed[name]) for name in names)
+    fits = tuple(_combine_law(name, [run.fit(name) for run in runs], weighed[name]) for name in names)
     changes = tuple(1.0 if run.verdict.change is None else run.verdict.change.p for run in runs)
     decision = runs[0].verdict if len(runs) == 1 else verdict(weighed, criterion, changes=changes)
     mixed = 0 < sum(run.u is None for run in runs) < len(runs)
@@ -193,7 +193,7 @@ def _cochran(values: Array, u: Array) -> float:
     return float((((values - weights @ values / weights.sum()) / u) ** 2).sum())
 
 
-def _combined(name: str, fits: Sequence[LawFit], stats: Statistics) -> CombinedLaw:
+def _combine_law(name: str, fits: Sequence[LawFit], stats: Statistics) -> CombinedLaw:
     constants = {
         constant: mean([fit.parameters[constant] for fit in fits], [fit.shared_u.get(constant, 0.0) for fit in fits])
         for constant in LAWS[name].constants

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import UnknownName
-from analysis.residuals import Change, gross_errors, gross_limit, largest_change, studentised
+from analysis.residuals import Change, gross_errors, gross_limit, largest_change, studentise
 from analysis.spindown.drag import LAWS
 from analysis.spindown.lawfit import LawFit, Solution, fit_law, solution
 from analysis.spindown.posterior import INDEPENDENT, RHO
-from analysis.spindown.readings import Readings, checked
+from analysis.spindown.readings import Readings, check_readings
 from analysis.spindown.remarks import Remark
 from analysis.spindown.selection import NO_FIT, Statistics, weigh
 from analysis.spindown.tilt import CALM, DRIVEN, THESIS_TOP, Nutation, Top
@@ -126,8 +126,8 @@ def fit_spin_down(
     >>> run.verdict.excluded
     ('newton', 'stokes')
     """
-    chosen = _known("drag law", laws, LAWS)
-    given = checked(time, spin_frequency, u)
+    chosen = _check_names("drag law", laws, LAWS)
+    given = check_readings(time, spin_frequency, u)
     model = _Model(tilt, top, DRIVEN if driven else CALM)
     outliers = _search_outliers(given, model)
     while True:
@@ -187,7 +187,7 @@ def _change(found: Solution, power: Solution | None) -> Change | None:
     return change and replace(change, size=change.size * found.readings.reference_hz / float(np.median(weight)))
 
 
-def _known(kind: str, names: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:
+def _check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:
     table, seen = tuple(known), tuple(dict.fromkeys(names))
     for name in seen or ("",):
         if name not in table:
@@ -212,7 +212,7 @@ def _search_outliers(readings: Readings, model: _Model) -> NDArray[np.intp]:
         most, worst = min(allowed - len(left_out), max(1, n // 100)), kept[:0]
         if found.degrees_of_freedom > 1 and found.posterior is not None:
             floor = 1.0 if readings.sigma_known else ROUNDING  # a stated uncertainty is a scatter to be expected
-            t = studentised(found.residuals, found.leverage, len(found.law.parameters), floor)
+            t = studentise(found.residuals, found.leverage, len(found.law.parameters), floor)
             worst = gross_errors(t, len(found.law.parameters))[:most]
         if not len(worst):
             return np.sort(left_out)

@@ -15,7 +15,7 @@ from analysis.spindown.posterior import RHO, Posterior, posterior
 from analysis.spindown.readings import Readings
 from analysis.spindown.remarks import Remark
 from analysis.spindown.selection import Statistics, statistics
-from analysis.spindown.tilt import CALM, MORE, THESIS_TOP, CountedLaw, Nutation, Top, counted
+from analysis.spindown.tilt import CALM, MORE, THESIS_TOP, CountedLaw, Nutation, Top, count_of
 from analysis.uncertainty import ROUNDING, Estimate, propagate
 
 Array = NDArray[np.float64]
@@ -97,7 +97,7 @@ class LawFit:
         """Return the fitted curve [Hz] at times [s] on the clock of the readings, shape (n,)."""
         frequency, duration = self.reference
         tau = (np.asarray(time, dtype=float) - self.start_time) / duration
-        return frequency * counted(self.law, tau, self.solution, self.top)
+        return frequency * count_of(self.law, tau, self.solution, self.top)
 
     def forecast(self, time: ArrayLike, last: float) -> Array:
         """Return the spin [Hz] of a top that the law alone slows, from the fitted curve at the last reading on.
@@ -125,8 +125,8 @@ class LawFit:
         tau = (np.asarray(time, dtype=float) - self.start_time) / duration
         steps = 1e-5 * np.maximum(np.abs(self.solution), 1e-3)
         slopes = np.array([
-            (counted(self.law, tau, self.solution + step, self.top)
-            - counted(self.law, tau, self.solution - step, self.top)) / (2 * size)
+            (count_of(self.law, tau, self.solution + step, self.top)
+            - count_of(self.law, tau, self.solution - step, self.top)) / (2 * size)
             for step, size in zip(np.diag(steps), steps, strict=True)
         ])  # fmt: skip
         try:
@@ -335,13 +335,13 @@ def fit_law(found: Solution, gate: float | None = None) -> LawFit:
         covariance=covariance if representable.all() else None,
         statistics=found.statistics,
         residuals=readings.reference_hz * (readings.x - form.spin(readings.tau, found.q)),
-        linearised=linearised(found.law, readings) if len(found.law.orders) == 1 else None,
+        linearised=linearise(found.law, readings) if len(found.law.orders) == 1 else None,
         remarks=tuple(_remarks(found, parameters, known=covariance is not None)),
         start_time=readings.start_time,
         solution=found.counted.solution(found.q) if found.counted else found.q,
         reference=(readings.reference_hz, readings.duration),
         top=found.counted.top if found.counted else THESIS_TOP,
-        shared_u=_shared(found, slopes) if known and found.counted else {},
+        shared_u=_shared_u(found, slopes) if known and found.counted else {},
         parts=_parts(found, slopes, u, gate) if known else {},
         rho=None if after is None or not known else Estimate(after.rho, after.rho_u, "1"),
     )
@@ -354,7 +354,7 @@ def _of_priors(found: Solution, slopes: Array) -> Array:
         return np.asarray(found.posterior.beforehand @ slopes.T)
 
 
-def _shared(found: Solution, slopes: Array) -> dict[str, float]:
+def _shared_u(found: Solution, slopes: Array) -> dict[str, float]:
     """Return the part of each u that all runs of one top share: by A, a, κ and β, not by the nutation."""
     rows = np.delete(_of_priors(found, slopes), MORE - 1, axis=0)
     shared = np.linalg.norm(rows, axis=0)
@@ -423,16 +423,16 @@ def straight_line(x: Array, y: Array, weight: Array | None = None) -> tuple[floa
     return height - slope * centre, slope, float(np.sqrt(w @ rest**2 / free / spread)) if free > 0 else None
 
 
-def _straightened(x: Array, m: float) -> Array:
+def _linear_quantity(x: Array, m: float) -> Array:
     """Return the quantity that is linear in time, with slope κ, under a power law of order m."""
     return -np.log(x) if m == 0 else x**-m / m
 
 
-def linearised(law: DragLaw, readings: Readings) -> dict[str, Estimate]:
+def linearise(law: DragLaw, readings: Readings) -> dict[str, Estimate]:
     """Fit the thesis's straight line through ln ω, 1/ω or ω^(−1/2), unweighted, so that noise weighs unevenly."""
     (m,) = law.orders
     omega = 2 * np.pi * readings.frequency
-    _, slope, u = straight_line(readings.time - readings.start_time, _straightened(omega, m))
+    _, slope, u = straight_line(readings.time - readings.start_time, _linear_quantity(omega, m))
     return {law.constants[0]: Estimate(slope, u, law.units[0])}
 
 
@@ -440,7 +440,7 @@ def _start(law: DragLaw, readings: Readings) -> Array:
     """Return parameters to start from: the same straight line, weighted; the disc's for laws with two constants."""
     m = law.orders[0] if len(law.orders) == 1 else 0.5
     weight = (readings.x ** (m + 1) * readings.weight) ** 2
-    intercept, kappa, _ = straight_line(readings.tau, _straightened(readings.x, m), weight)
+    intercept, kappa, _ = straight_line(readings.tau, _linear_quantity(readings.x, m), weight)
     if m == 0:
         x0 = float(np.exp(-intercept))
     else:

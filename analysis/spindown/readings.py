@@ -88,7 +88,7 @@ class Readings:
         )
 
 
-def checked(time: ArrayLike, frequency: ArrayLike, u: ArrayLike | None) -> Readings:
+def check_readings(time: ArrayLike, frequency: ArrayLike, u: ArrayLike | None) -> Readings:
     """Return readings that a spin-down can be fitted to.
 
     Raises:

@@ -189,7 +189,7 @@ class CountedLaw:
         return np.array([*q[:n], *self.shape(q[n:])])
 
 
-def counted(law: DragLaw, tau: Array, solution: Array, top: Top = THESIS_TOP) -> Array:
+def count_of(law: DragLaw, tau: Array, solution: Array, top: Top = THESIS_TOP) -> Array:
     """Return the curve of a solution, with the tilt where it has one (δ², ν_r/ν_ref, K/ν_ref at its end)."""
     p = len(law.parameters)
     if len(solution) == p:

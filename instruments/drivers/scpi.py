@@ -121,7 +121,7 @@ class ScpiInstrument:
     def __setattr__(self, name: str, value: object) -> None:
         """Set an attribute.  Raises AttributeError for an unknown name, as a misspelt setting would have no effect."""
         if not name.startswith("_") and name not in _attributes(cast("Any", type(self))):
-            near = difflib.get_close_matches(name, sorted(row.name for row in self.declared()), n=1)
+            near = difflib.get_close_matches(name, sorted(row.name for row in self.declared_settings()), n=1)
             hint = f": did you mean {near[0]!r}?" if near else ""
             raise AttributeError(f"{type(self).__name__} has no setting {name!r}{hint}", name=name, obj=self)
         super().__setattr__(name, value)
@@ -221,7 +221,7 @@ class ScpiInstrument:
         Where it joins answers, all are asked for in one message: one exchange instead of a dozen.  An instrument that
         gives another number of answers is asked one by one, then and from then on.
         """
-        rows = self.declared()
+        rows = self.declared_settings()
         questions = [row.question(self) for row in rows]
         if self.ANSWERS_JOINED and self._joins is not False and (answers := self._ask_joined(questions)):
             self._joins = True
@@ -275,7 +275,7 @@ class ScpiInstrument:
             now = now or self.settings()
             return {name: (then, now[name]) for name, then in since.items() if now[name] != then}
         found: dict[str, tuple[object, object]] = {}
-        rows = {row.name_with_unit: row for row in self.declared()}
+        rows = {row.name_with_unit: row for row in self.declared_settings()}
         for name, asked in self.last_set.items():
             row = rows[name]
             stands = getattr(self, row.name) if now is None else now[name]
@@ -288,7 +288,7 @@ class ScpiInstrument:
         return 0.0
 
     @classmethod
-    def declared(cls) -> list[Setting[Any]]:
+    def declared_settings(cls) -> list[Setting[Any]]:
         """Return the declared settings, those of a base first."""
         rows = (row for owner in reversed(cls.__mro__) for row in vars(owner).values())
         return [row for row in rows if isinstance(row, Setting)]

@@ -21,7 +21,7 @@ from levilab.acquisition.grip import COUNTS, GRIP_GATE_S, Grip
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.bench.person import FloatTop
-from levilab.present.numbers import signed
+from levilab.present.numbers import with_sign
 from levilab.present.panel import clock
 from levilab.runs.events import RunEvent
 
@@ -325,7 +325,8 @@ def has_drifted(counts: Sequence[float]) -> bool:
 
 def compare_with_drive(session: Session[D], slip: Slip) -> None:
     """Record the difference of a held top's counted spin from its drive; warn of a tape that slips."""
-    text = f"held at {slip.drive:.2f} Hz: counted {slip.spin:.3f} Hz, {signed(slip.difference, 3)} Hz beside the drive"
+    difference = with_sign(slip.difference, 3)
+    text = f"held at {slip.drive:.2f} Hz: counted {slip.spin:.3f} Hz, {difference} Hz beside the drive"
     session.event(RunEvent.HELD, text, spin_frequency_hz=slip.spin, drive_frequency_hz=slip.drive, u_hz=slip.u)
     if slip.warning:
         session.warn(slip.warning)
@@ -360,7 +361,7 @@ def have_a_top(session: Session[D], text: str, number: int, *, within_s: float) 
 def is_over(session: Session[D]) -> bool:
     """Return whether the time of the run is over, and record it."""
     longest = session.settings.longest_s
-    if session.spent() <= longest:
+    if session.time_spent() <= longest:
         return False
     session.event(RunEvent.LONGEST, f"{longest:g} s are over ({session.writer.record.experiment}.longest_s)")
     return True

@@ -17,7 +17,7 @@ from levilab.acquisition.session import Earlier, Session
 from levilab.acquisition.table import EXPERIMENTS, settings_of
 from levilab.bench.bench import open_bench
 from levilab.bench.kinds import estimates_u
-from levilab.errors import LevilabError, unquoted
+from levilab.errors import LevilabError, unquote
 from levilab.files import CannotWrite
 from levilab.interruption import Interrupted, watching_for_interruption
 from levilab.runs.events import RunEvent
@@ -114,7 +114,7 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
 def _reason_of(error: Exception) -> str:
     """Return the reason that ended a run: the text of a known failure, with the class of an unexpected one."""
     known = isinstance(error, LevilabError | InstrumentError)
-    return unquoted(str(error) if known else f"{type(error).__name__}: {error}")
+    return unquote(str(error) if known else f"{type(error).__name__}: {error}")
 
 
 def _writer(request: AcquisitionRequest, show: Display) -> RunWriter:

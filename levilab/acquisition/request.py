@@ -116,7 +116,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     else:
         wiring = described_wiring(config)
         for kind in EXPERIMENTS[experiment].kinds(settings_of(config, experiment)):
-            wiring.described(kind)
+            wiring.describe(kind)
     if run:
         _check_readings(run, request)
     if run and not virtual:

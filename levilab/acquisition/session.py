@@ -135,7 +135,7 @@ class Session(Generic[S]):
         """Return the seconds since time zero."""
         return self.bench.clock.now() - (self.zero or 0.0)
 
-    def spent(self) -> float:
+    def time_spent(self) -> float:
         """Return the seconds since this session began to measure."""
         return self.now() - self.began
 

@@ -142,7 +142,7 @@ def open_bench(
 
 def connect_driver(kind: Kind[I], wiring: Wiring, *, log: TrafficLog | None = None) -> I:
     """Return a driver on an open link.  Raises ConfigError for an unknown model, InstrumentError."""
-    settings = wiring.described(kind.name)
+    settings = wiring.describe(kind.name)
     driver = kind.model(settings.model).driver
     transport = transport_to(driver, settings, library=wiring.library, clock=wiring.clock, log=log)
     return driver(transport, clock=wiring.clock)

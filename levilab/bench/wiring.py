@@ -33,7 +33,7 @@ class Wiring:
     person: Person = ask_no_person
     poses: Callable[[float, float, int], Poses] | None = None
 
-    def described(self, kind: str) -> InstrumentSettings:
+    def describe(self, kind: str) -> InstrumentSettings:
         """Return the settings of an instrument.  Raises ConfigError: it is not described, or has no driver."""
         if kind not in self.instruments:
             raise ConfigError(f"the bench file describes no {kind}: add a table [{kind}] with model and address")

@@ -36,9 +36,9 @@ def reproduce(
 
     All of them take about a minute, the first time half a minute more.
     """
-    from levilab.reproduce.run import chosen
+    from levilab.reproduce.run import choose
 
-    wanted = chosen(only)  # a wrong name is refused before anything is computed
+    wanted = choose(only)  # a wrong name is refused before anything is computed
 
     from levilab.present.progress import ShareBar
     from levilab.reproduce.report import format_of, write

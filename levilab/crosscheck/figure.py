@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from levilab.crosscheck.study import Verdict
 from levilab.present.drawing import SMALL, headline, panel, write
 from levilab.present.looks import BLUE, VERMILION
-from levilab.present.numbers import signed
+from levilab.present.numbers import with_sign
 from levilab.present.style import STYLE, WIDE
 
 if TYPE_CHECKING:
@@ -69,6 +69,6 @@ def _draw(axis: Axes, name: str, spread: Spread) -> None:
     width = edges[1] - edges[0]
     axis.plot(x, spread.n * width * np.exp(-(x**2) / 2) / math.sqrt(2 * math.pi), color="black", lw=1)
     axis.axvline(0, color="black", lw=0.6)
-    numbers = f"mean {signed(spread.mean, 2)}, s {spread.deviation:.2f}, {100 * spread.coverage:.0f} % in ±u"
+    numbers = f"mean {with_sign(spread.mean, 2)}, s {spread.deviation:.2f}, {100 * spread.coverage:.0f} % in ±u"
     lines = [*textwrap.wrap(f"{name}: {spread.quantity}", 34, max_lines=2), numbers]
     axis.set_title("\n".join(lines), fontsize=SMALL)

@@ -73,7 +73,7 @@ class Subject:
     trials: int = 40
 
 
-def acquired(
+def acquire_mock(
     experiment: str, seed: int, folder: Path, change: Callable[[AcquisitionRequest], AcquisitionRequest]
 ) -> Run:
     """Return a finished run of a mock experiment.  change: puts it into a world of known numbers.

@@ -10,7 +10,7 @@ from levilab.crosscheck.own.model import OF_ONE_RUN
 from levilab.crosscheck.own.study import ENOUGH, TRIALS
 from levilab.crosscheck.study import LONG_TAILS, Spread, Verdict
 from levilab.present.document.blocks import Note, Paragraph, Tabular
-from levilab.present.numbers import enumeration, signed
+from levilab.present.numbers import enumeration, with_sign
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def _rows(studies: Sequence[Study], symbols: Mapping[str, str]) -> Iterator[Row]
                 study.name if k == 0 else "",
                 _name(one.quantity, symbols),
                 str(one.n),
-                f"{signed(one.mean, 2)} ± {one.u_mean:.2f}",
+                f"{with_sign(one.mean, 2)} ± {one.u_mean:.2f}",
                 _deviation(one),
                 f"{100 * one.coverage:.0f} ± {100 * one.u_coverage:.0f} % ({100 * one.wanted_coverage:.0f} %)",
                 "–" if one.relative_u is None else _percent(one.relative_u),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levilab.errors import unquoted
+from levilab.errors import unquote
 from levilab.files import finite
 from levilab.motion.lines import LONGEST_S, AxisLines, lines_of, rate_for
 from levilab.motion.lock import is_locked
@@ -240,6 +240,6 @@ def as_document(summary: Summary) -> dict[str, Any]:
         "steps": accuracy.steps,
         "computing_time_s": summary.computing,
         "times_real_time": summary.speed,
-        "notes": [unquoted(note) for note in summary.notes],
+        "notes": [unquote(note) for note in summary.notes],
     }
     return {key: finite(value) for key, value in document.items()}

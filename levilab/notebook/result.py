@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from analysis.uncertainty import Estimate
-from levilab.errors import UsageError, unquoted
+from levilab.errors import UsageError, unquote
 from levilab.files import CannotWrite, replace_atomically
 from levilab.pipelines.catalogue import print_analysis
 from levilab.pipelines.result import Place
@@ -90,7 +90,7 @@ class AnalysisResult:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about the numbers."""
-        return tuple(unquoted(text) for text in self.found.all_warnings)
+        return tuple(unquote(text) for text in self.found.all_warnings)
 
     @cached_property
     def document(self) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic
 
-from levilab.errors import unquoted
+from levilab.errors import unquote
 from levilab.pipelines.analyzed import A
 from levilab.pipelines.budget import budgets_of_result
 from levilab.pipelines.field.document import DOCUMENT as FIELD
@@ -162,7 +162,7 @@ ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 
 
 def print_analysis(
-    analysis: Analysis[A], found: A, in_words: Callable[[str], str] = unquoted, console: Console | None = None
+    analysis: Analysis[A], found: A, in_words: Callable[[str], str] = unquote, console: Console | None = None
 ) -> None:
     """Print the tables, what the data say, and the warnings.
 

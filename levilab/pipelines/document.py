@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Generic, Self, TypeVar
 
 from pydantic import BeforeValidator, PlainSerializer
 
-from levilab.errors import DataError, unquoted
+from levilab.errors import DataError, unquote
 from levilab.files import finite
 from levilab.pipelines.analyzed import FOR_THIS_PAGE, A, Method, Opt, Origin, R, S
 from levilab.pipelines.result import AGAIN, SCHEMA, Archive, Earlier, Part, Result, relative
@@ -89,7 +89,7 @@ class Document(Generic[S, R, Opt, A, D]):
                 {
                     "path": relative(source.path, place.folder),
                     "synthetic": source.synthetic,
-                    "warnings": [unquoted(text) for text in (*source.warnings, *found.about_run(run))],
+                    "warnings": [unquote(text) for text in (*source.warnings, *found.about_run(run))],
                     "models": [],
                     "result": run,
                 }
@@ -97,7 +97,7 @@ class Document(Generic[S, R, Opt, A, D]):
                 | self.run_entries(run)
                 for source, run, origin in zip(found.sources, found.runs, found.origins, strict=True)
             ],
-            "warnings": [unquoted(text) for text in found.all_warnings],
+            "warnings": [unquote(text) for text in found.all_warnings],
             "combined": found.combined,
         }
         return self.result.model_validate(finite(document | _budget(found.budget) | self.entries(found)))
@@ -115,7 +115,7 @@ class Document(Generic[S, R, Opt, A, D]):
 
     def reading(self, archive: Archive[D], options: Opt) -> Callable[[Path], Opt]:
         """Return how an input is read: with the given options, else those of its earlier result."""
-        given = _given(options)
+        given = _given_options(options)
 
         def reading(path: Path) -> Opt:
             earlier = archive.earlier(path, path)
@@ -138,7 +138,7 @@ class Document(Generic[S, R, Opt, A, D]):
 
     def recall_found(self, paths: Sequence[Path], found: Found[S], archive: Archive[D], options: Opt) -> A:
         """Do the same for inputs that were found already."""
-        given = _given(options)
+        given = _given_options(options)
         whole = archive.whole(found.sources)
         if whole and not any(self._problem(whole.of(source), given, source) for source in found.sources):
             numbers = [whole.of(source).number for source in found.sources]
@@ -161,11 +161,11 @@ class Document(Generic[S, R, Opt, A, D]):
         if earlier.sha256 != source.sha256:
             return f"the readings are others than in {earlier.file}"
         made_with = self._options(earlier)
-        if self.settings(replace(made_with, **self._own(given, source))) != self.settings(made_with):
+        if self.settings(replace(made_with, **self._own_values(given, source))) != self.settings(made_with):
             return f"other options than those of {earlier.file}"
         return self.outdated(earlier.part.result)
 
-    def _own(self, given: Mapping[str, Any], source: Source[S]) -> dict[str, Any]:
+    def _own_values(self, given: Mapping[str, Any], source: Source[S]) -> dict[str, Any]:
         """Return those of the given options that matter to an input."""
         left_out = self.method.of_files if source.run else frozenset[str]()
         return {name: value for name, value in given.items() if name not in left_out}
@@ -174,7 +174,7 @@ class Document(Generic[S, R, Opt, A, D]):
         self, source: Source[S], archive: Archive[D], given: Mapping[str, Any]
     ) -> tuple[Source[S], R, Origin[Opt]]:
         """Read the result of one input, or analyze it."""
-        earlier, own = archive.earlier(source.path, source.data, source.sha256), self._own(given, source)
+        earlier, own = archive.earlier(source.path, source.data, source.sha256), self._own_values(given, source)
         if earlier is None:
             options, why = self.method.options(**own), "there was no result yet"
         elif why := self._problem(earlier, given, source):
@@ -194,7 +194,7 @@ class Document(Generic[S, R, Opt, A, D]):
         return source, part.result, Origin(self._options(earlier), earlier.text, part.budget)
 
 
-def _given(options: Any) -> dict[str, Any]:
+def _given_options(options: Any) -> dict[str, Any]:
     """Return the options that are not at their defaults."""
     return {one.name: value for one in fields(options) if (value := getattr(options, one.name)) != one.default}
 

@@ -46,9 +46,9 @@ def for_encoding(text: str, encoding: str | None) -> str:
     """
     if not encoding or _carries(encoding, text):
         return text
-    plain = _POWER_OF_TEN.sub(lambda found: "e" + _lowered(found[1]), text).replace("χ²", "chi2")
-    plain = _EXPONENT.sub(lambda found: found[0] if _carries(encoding, found[0]) else "^" + _lowered(found[0]), plain)
-    return "".join(one if _carries(encoding, one) else _spelled(one) for one in plain)
+    plain = _POWER_OF_TEN.sub(lambda found: "e" + _lower(found[1]), text).replace("χ²", "chi2")
+    plain = _EXPONENT.sub(lambda found: found[0] if _carries(encoding, found[0]) else "^" + _lower(found[0]), plain)
+    return "".join(one if _carries(encoding, one) else _spell(one) for one in plain)
 
 
 def never_fail_to_encode(error: UnicodeError) -> tuple[str, int]:
@@ -74,11 +74,11 @@ def _carries(encoding: str, text: str) -> bool:
     return True
 
 
-def _lowered(raised: str) -> str:
+def _lower(raised: str) -> str:
     return "".join(_RAISED[one] for one in raised).removeprefix("+")
 
 
-def _spelled(one: str) -> str:
+def _spell(one: str) -> str:
     """Return one character in ASCII; a question mark where there is no way."""
     if one in _SPELLED:
         return _SPELLED[one]

@@ -122,7 +122,7 @@ def with_decimals(value: float, decimals: int) -> str:
     return with_minus(f"{round(float(value), decimals) + 0.0:.{decimals}f}")
 
 
-def signed(value: float, decimals: int) -> str:
+def with_sign(value: float, decimals: int) -> str:
     """Return a number with its sign, and none where it rounds to zero.
 
     >>> signed(0.471, 2), signed(-0.002, 2), signed(-1.614, 2)
@@ -151,7 +151,7 @@ def off(value: float, u: float | None) -> str:
     >>> off(0.02149, 0.03), off(-1e-9, 0.03)
     ('+0.021', '0.000')
     """
-    return signed(value, decimals_of(u))
+    return with_sign(value, decimals_of(u))
 
 
 def reading(value: float, u: float | None, residual: float | None) -> tuple[str, str, str]:
@@ -163,7 +163,7 @@ def reading(value: float, u: float | None, residual: float | None) -> tuple[str,
     ('0.000', '0.030', '—')
     """
     places = decimals_of(u)
-    left = "—" if residual is None else signed(residual, places)
+    left = "—" if residual is None else with_sign(residual, places)
     return with_decimals(value, places), "—" if u is None else f"{u:.{places}f}", left
 
 

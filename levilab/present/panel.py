@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from levilab.present.characters import printable
-from levilab.present.numbers import signed, with_decimals
+from levilab.present.numbers import with_decimals, with_sign
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -110,12 +110,12 @@ def bench_lines(state: State, trend: Trend, width: int, *, plain: bool) -> list[
         width: of the terminal [columns].
         plain: without characters beyond ASCII, beside those that are spelled out.
     """
-    measured = [*_flow([*_measured(state, trend, plain=plain)], width)]
+    measured = [*_flow([*_readings(state, trend, plain=plain)], width)]
     instruments = [*_flow([*_instruments(state)], width)]
     return [*measured, *instruments, _bar(state, width, plain=plain)]
 
 
-def _measured(state: State, trend: Trend, *, plain: bool) -> Iterator[Piece]:
+def _readings(state: State, trend: Trend, *, plain: bool) -> Iterator[Piece]:
     shown = [(name, *_SHOWN[name]) for name in _SHOWN if name in state.last]
     if not shown:
         yield Piece("nothing counted yet" if state.share is not None else "no light, no value", "off")
@@ -125,7 +125,7 @@ def _measured(state: State, trend: Trend, *, plain: bool) -> Iterator[Piece]:
         if name == trend.channel and (age := state.time_s - trend.changed_s) > _FRESH_S:
             yield Piece(f"{clock(age)} ago", "off")
         if name == trend.channel and trend.rate is not None:
-            yield Piece(f"{_signed(trend.rate * factor)} {unit}/s")
+            yield Piece(f"{_rate(trend.rate * factor)} {unit}/s")
             if not plain:
                 yield Piece(trend.spark)
     if state.readings:
@@ -209,16 +209,16 @@ def _flow(pieces: Sequence[Piece], width: int) -> Iterator[Line]:
         yield tuple(line)
 
 
-def _signed(value: float) -> str:
+def _rate(value: float) -> str:
     """Return a rate with two digits and a sign.
 
-    >>> [_signed(value) for value in (-0.0934, 0.051, 12.0, 0.0, -1e-9)]
+    >>> [_rate(value) for value in (-0.0934, 0.051, 12.0, 0.0, -1e-9)]
     ['−0.093', '+0.051', '+12', '0', '0.000000']
     """
     if not value:
         return "0"
     decimals = min(max(1 - math.floor(math.log10(abs(value))), 0), 6)
-    return signed(value, decimals)
+    return with_sign(value, decimals)
 
 
 def clock(seconds: float) -> str:

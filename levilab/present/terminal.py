@@ -42,9 +42,9 @@ class Terminal(Console):
 
     def render_str(self, text: str, **options: Any) -> Text:
         """Replace characters in all texts: those printed, a table's cells, its title and its caption."""
-        return super().render_str(self.spelled(text), **options)
+        return super().render_str(self.spell(text), **options)
 
-    def spelled(self, text: str) -> str:
+    def spell(self, text: str) -> str:
         """Return a text in the characters of this terminal."""
         return for_encoding(printable(text), self.encoding)
 
@@ -138,7 +138,7 @@ def print_rows(console: Terminal, heads: Sequence[str], rows: Sequence[Sequence[
     numbers: the heads of columns that are aligned to the right.
     """
     table = new_table(None, *heads, numbers=numbers)
-    texts = [[console.spelled(cell) for cell in row] for row in rows]
+    texts = [[console.spell(cell) for cell in row] for row in rows]
     widths = [max(map(cell_len, column)) for column in zip(heads, *texts, strict=True)]
     to_be_folded = sum(widths) + 2 * len(widths) > console.width
     if len(rows) < _MANY_ROWS or to_be_folded:

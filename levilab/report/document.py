@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import unquoted
+from levilab.errors import unquote
 from levilab.pipelines.sources import mark_of
 from levilab.present.document.blocks import (
     Banner,
@@ -67,7 +67,7 @@ def document_of(
         blocks += own if alone else [_of_one_analysis(found, part, own, first=not blocks)]
     blocks += others
     if results:
-        blocks += [_measured(results, parts), reproduction(results, asked)]
+        blocks += [_measurements(results, parts), reproduction(results, asked)]
     counts = count_inputs(sources)
     subjects = ", ".join([*(part.subject for part in parts), *(one.title.lower() for one in others)])
     return Document(
@@ -101,7 +101,7 @@ def blocks_of_part(
     def section(title: str, anchor: str, *blocks: Block) -> Section:
         return Section(title, blocks, anchor=f"{analysis.name}-{anchor}" if deeper else anchor)
 
-    groups = tuple(tuple(map(unquoted, alike)) for alike in found.grouped_warnings)
+    groups = tuple(tuple(map(unquote, alike)) for alike in found.grouped_warnings)
     count = sum(map(len, groups))
     warnings = [section(f"{count} warning{'s' * (count > 1)}", "warnings", Warnings(groups))] if groups else []
     more = (block for supplement in supplements for block in supplement(analysis, found))
@@ -165,7 +165,7 @@ def _lead(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
     return f"{count_inputs(found.sources)}, {part.lead}{warnings}"
 
 
-def _measured(results: Results, parts: Sequence[ReportPart]) -> Section:
+def _measurements(results: Results, parts: Sequence[ReportPart]) -> Section:
     """Return each input: when, under which conditions, with which instruments; what happened; its readings."""
     abouts: dict[Path, list[About]] = {}
     for (_, found), part in zip(results, parts, strict=True):

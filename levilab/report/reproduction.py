@@ -43,7 +43,7 @@ class Asked:
 
     def command(self, sources: Sequence[Source[Any]]) -> str:
         """Return the command that makes the report again."""
-        paths = [shlex.quote(str(path)) for path in self.paths] or named_in_commands(sources)
+        paths = [shlex.quote(str(path)) for path in self.paths] or paths_in_commands(sources)
         options = [word for name in OF_REPORT for word in _option(name, self.given.get(name))]
         no_crosscheck = [] if self.crosscheck else ["--no-crosscheck"]
         return " ".join(["levilab", "report", *paths, *options, *no_crosscheck, "-o", f"report{self.ending}"])
@@ -54,7 +54,7 @@ def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked | No
     asked = asked or Asked()
     sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
     many = len(sources) > _MOST_NAMED
-    data = (_data(sources), *_recorded(sources))
+    data = (_data(sources), *_recording(sources))
     inputs: tuple[Block, ...] = (Details("The data", data, more=f"{len(sources)} inputs"),) if many else data
     return Section(
         "How to reproduce this",
@@ -80,10 +80,10 @@ def _commands(results: Sequence[tuple[Analysis[Any], Any]], typed: Sequence[Path
             of = [
                 s for s, origin in zip(found.sources, found.origins, strict=True) if _options(origin.options) == given
             ]
-            yield " ".join(["levilab", "analyze", analysis.name, *named_in_commands(of, typed), *given])
+            yield " ".join(["levilab", "analyze", analysis.name, *paths_in_commands(of, typed), *given])
 
 
-def named_in_commands(sources: Sequence[Source[Any]], typed: Sequence[Path] = ()) -> list[str]:
+def paths_in_commands(sources: Sequence[Source[Any]], typed: Sequence[Path] = ()) -> list[str]:
     """Return the paths as one types them; of many those typed that hold them, or else their folders."""
     paths = [source.path for source in sources]
     if len(paths) > _MOST_NAMED:
@@ -138,11 +138,11 @@ def _columns(names: Mapping[str, str]) -> str:
 def _others(results: Sequence[tuple[Analysis[Any], Any]]) -> tuple[Note, ...]:
     """Return the names of options that are no plain words, such as a file of the top's sizes."""
     options = [origin.options for _, found in results for origin in found.origins]
-    names = sorted({_flag(name) for one in options for name in _given(one)})
+    names = sorted({_flag(name) for one in options for name in _given_options(one)})
     return (Note(f"Besides, these options were given: {', '.join(names)}."),) if names else ()
 
 
-def _given(options: Any) -> Iterator[str]:
+def _given_options(options: Any) -> Iterator[str]:
     """Yield the names of options that are not at their defaults and do not stand in the commands."""
     usual = type(options)()
     for name in options_of(type(options)):
@@ -166,13 +166,13 @@ def _data(sources: Sequence[Source[Any]]) -> Tabular:
     return Tabular("data", table("", heads, rows, numbers=("seed",)), first_column_wraps=True, wraps=("sha256",))
 
 
-def _recorded(sources: Sequence[Source[Any]]) -> tuple[Block, ...]:
+def _recording(sources: Sequence[Source[Any]]) -> tuple[Block, ...]:
     """Return the commands and versions by which the runs were recorded, once if they are the same."""
     facts: list[Fact] = []
     for source in sources:
         record = source.run.record if source.run else None
         texts = [
-            *([_typed(record.command_line)] if record and record.command_line else []),
+            *([_as_typed(record.command_line)] if record and record.command_line else []),
             *([_versions(record.software)] if record and record.software else []),
         ]
         if texts:
@@ -182,7 +182,7 @@ def _recorded(sources: Sequence[Source[Any]]) -> tuple[Block, ...]:
     return (Section("Recorded by", (Facts(tuple(facts)),)),) if facts else ()
 
 
-def _typed(words: Sequence[str]) -> str:
+def _as_typed(words: Sequence[str]) -> str:
     """Return a recorded command as one types it.
 
     >>> _typed(["/usr/lib/levilab/__main__.py", "acquire", "spin", "--note", "a b"])

@@ -8,7 +8,7 @@ from levilab.crosscheck.own.study import OWN, quick_study
 from levilab.crosscheck.stored import read_study
 from levilab.crosscheck.table import blocks_of
 from levilab.present.document.blocks import Code, Paragraph, Section
-from levilab.report.reproduction import named_in_commands
+from levilab.report.reproduction import paths_in_commands
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,7 +40,7 @@ def trials(analysis: Analysis[Any], found: Any) -> tuple[Block, ...]:
     made = quick_study(analysis.name, found, analysis.settings_of(found))
     if made is not None:
         return (_section(*blocks_of(made, analysis.symbols)),)
-    named = " ".join(named_in_commands(found.sources))
+    named = " ".join(paths_in_commands(found.sources))
     advice = Code(f"levilab crosscheck {analysis.name} --like {named}")
     return (_section(Paragraph("Not made: it takes longer than a report. This makes and keeps it:"), advice),)
 

@@ -15,11 +15,11 @@ from analysis.stability import wobble_resonance
 from levilab.motion.lines import lines_of, rate_for
 from levilab.motion.lock import body_angle
 from levilab.present.document.blocks import Note, Picture
-from levilab.present.numbers import enumeration, signed
+from levilab.present.numbers import enumeration, with_sign
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Because, check, statement
 from levilab.reproduce.figure import counter_figure, window_figure
-from levilab.reproduce.tops import DURATION_S, MASS_KG, THESIS, Array, many, started
+from levilab.reproduce.tops import DURATION_S, MASS_KG, THESIS, Array, many, preset_at
 from levilab.simulator.equilibrium import modes_at, stability_of, windows_over
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
@@ -57,7 +57,7 @@ class Counted:
     tilt: Array
 
 
-def counted() -> Counted:
+def count_fall() -> Counted:
     """Simulate a spin-down from 40 Hz in full motion, up to the fall, and count it."""
     scene = preset("spindown").changed({"start.spin_hz": 40.0})
     samples = 200.0
@@ -66,21 +66,21 @@ def counted() -> Counted:
     n = round(GATE_S * samples)
     starts = np.arange(0, len(turns) - n - round(samples), round(EVERY_S * samples))
 
-    def averaged(values: Array) -> Array:
+    def gate_mean(values: Array) -> Array:
         return np.array([values[k : k + n].mean() for k in starts])
 
     return Counted(
         motion.time[starts] + GATE_S / 2,
-        averaged(motion.spin_hz),
+        gate_mean(motion.spin_hz),
         np.array([(turns[k + n] - turns[k]) / GATE_S for k in starts]),
-        averaged(motion.spin_hz / np.cos(motion.tilt)),
-        np.sqrt(averaged(motion.tilt**2)),
+        gate_mean(motion.spin_hz / np.cos(motion.tilt)),
+        np.sqrt(gate_mean(motion.tilt**2)),
     )
 
 
 def about_window() -> list[Finding]:
     """Compare the edges of the exact window with the thesis's limits, at the mass of its simulations."""
-    found = stability_of(started(ABOVE))
+    found = stability_of(preset_at(ABOVE))
     assert found.floating is not None
     low, high = found.floating.spins[0]
     lower, upper = (np.array(limits) for limits in zip(*SIMULATED_HZ.values(), strict=True))
@@ -109,7 +109,7 @@ def about_window() -> list[Finding]:
 
 def _why_above(edge: float) -> str:
     """Return why a start has a limit above the edge [Hz] of the window; empty where that is not what is found."""
-    scene, limit = started(ABOVE), SIMULATED_HZ[ABOVE][1]
+    scene, limit = preset_at(ABOVE), SIMULATED_HZ[ABOVE][1]
     height = stability_of(scene).equilibria[-1].height
     rate = 2 * math.pi * float(np.abs(modes_at(scene, height, BEYOND_HZ).imag).max())
     tops = many(scene, {"start.spin_hz": [BEYOND_HZ, limit]})
@@ -145,8 +145,8 @@ def about_counter(seen: Counted) -> list[Finding]:
             "what a mark on the rim counts",
             "chapter on the spin counter",
             "",
-            f"turns about the vertical, ω₃/cos θ: {signed(1e3 * high[0], 0)} mHz at {seen.spin[0]:.0f} Hz, "
-            f"{signed(1e3 * high[-1], 0)} mHz at {seen.spin[-1]:.1f} Hz; 1/cos θ explains all but "
+            f"turns about the vertical, ω₃/cos θ: {with_sign(1e3 * high[0], 0)} mHz at {seen.spin[0]:.0f} Hz, "
+            f"{with_sign(1e3 * high[-1], 0)} mHz at {seen.spin[-1]:.1f} Hz; 1/cos θ explains all but "
             f"{1e3 * np.sqrt(np.mean(rest**2)):.0f} mHz (rms)",
             holds=bool(high[-1] > 0.02 and np.sqrt(np.mean(rest**2)) < 0.3 * high.max()),
         ),
@@ -194,7 +194,7 @@ def about_lock() -> list[Finding]:
 
 def make() -> Found:
     """Make the chapter."""
-    seen = counted()
+    seen = count_fall()
     masses = np.linspace(0.02475, 0.02548, 60)
     over = windows_over(preset("undriven"), masses)
     pictures = (

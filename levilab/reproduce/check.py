@@ -176,7 +176,7 @@ def check(
         Kind.NUMBER,
         name,
         published.place,
-        _with_unit(_raised(published.text), published.unit),
+        _with_unit(_with_power(published.text), published.unit),
         _with_unit(_like(ours.value or 0.0, published), ours.unit) if in_print else with_uncertainty(ours),
         verdict,
         Comparison.RECOMPUTED if published.recomputed else how,
@@ -303,10 +303,10 @@ def _like(value: float, published: Printed) -> str:
     decimals = max(len(mantissa.partition(".")[2]) + 1, 2)
     if not power:
         return f"{value:.{decimals}f}"
-    return _raised(f"{value / 10.0 ** int(power):.{decimals}f}e{int(power)}")
+    return _with_power(f"{value / 10.0 ** int(power):.{decimals}f}e{int(power)}")
 
 
-def _raised(text: str) -> str:
+def _with_power(text: str) -> str:
     """Return a number's text with its power of ten as people write it."""
     mantissa, _, power = text.lower().partition("e")
     return f"{mantissa}×10{power.translate(_HIGH)}" if power else text

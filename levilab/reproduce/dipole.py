@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.present.document.blocks import Picture
-from levilab.present.numbers import signed
+from levilab.present.numbers import with_sign
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import check, statement
 from levilab.reproduce.figure import dipole_figure
@@ -91,9 +91,9 @@ def make() -> Found:
             "energy, disc less point, 6.5 cm < z < 8 cm, 0 ≤ θ ≤ π/2",
             "dipole approximation",
             "less than 1 %",
-            f"{signed(over[0].min(), 2)} to {signed(over[0].max(), 2)} % of |μ|B; of the energy itself, which is 0 at "
-            f"π/2, {signed(over[1].min(), 2)} to {signed(over[1].max(), 2)} %; at 7.3 cm, upright, {signed(energy, 2)} "
-            f"%, of which ½B″(h²/12 − R²/4) is {signed(leading, 2)} %",
+            f"{with_sign(over[0].min(), 2)} to {with_sign(over[0].max(), 2)} % of |μ|B; of the energy itself, "
+            f"which is 0 at π/2, {with_sign(over[1].min(), 2)} to {with_sign(over[1].max(), 2)} %; at 7.3 cm, upright, "
+            f"{with_sign(energy, 2)} %, of which ½B″(h²/12 − R²/4) is {with_sign(leading, 2)} %",
             holds=bool(np.abs(over[0]).max() < 1.0),
         ),
         check("force at 7.3 cm, disc over point", THESIS["dipole.force"], force),

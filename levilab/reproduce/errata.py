@@ -12,7 +12,7 @@ from analysis.field.ring import on_axis as ring_on_axis
 from levilab.present.document.blocks import Note
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import erratum
-from levilab.reproduce.tops import ESTIMATE_KG, MASS_KG, THESIS, estimate_hz, many, scan, started
+from levilab.reproduce.tops import ESTIMATE_KG, MASS_KG, THESIS, estimate_hz, many, preset_at, scan
 from levilab.simulator.energy import magnetic_energy
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.field import field_of, flux_density, on_axis
@@ -73,7 +73,7 @@ def centre_of_mass() -> Finding:
 
 def rotation() -> Finding:
     """Compare the kinetic energy that is gained with the potential energy that is lost."""
-    scene = started("IC1")
+    scene = preset_at("IC1")
     top = scene.top
     motion = simulate(scene, 0.3, tolerance=1e-10, rate=10.0)
     ends = motion.states[[0, -1]]
@@ -286,7 +286,7 @@ def several_mean(name: str) -> float:
 
 def tilting() -> Finding:
     """Compute the equation of θ at the start, on the axis, in the thesis's units."""
-    scene = started("IC1").changed({**ON_AXIS, "start.tilt_rad": 0.1})
+    scene = preset_at("IC1").changed({**ON_AXIS, "start.tilt_rad": 0.1})
     top, spin, theta = scene.top, 2 * math.pi * scene.start.spin_hz, scene.start.tilt_rad
     sin, cos = math.sin(theta), math.cos(theta)
     phi = spin / (1 + cos)
@@ -308,7 +308,7 @@ def tilting() -> Finding:
 
 def force() -> Finding:
     """Compute the force on a top below the height at which it floats."""
-    scene = started("IC1").changed({**ON_AXIS, "start.position_m": [0.0, 0.0, 0.071], "start.tilt_rad": 0.0})
+    scene = preset_at("IC1").changed({**ON_AXIS, "start.position_m": [0.0, 0.0, 0.071], "start.tilt_rad": 0.0})
     top = scene.top
     upward = top.moment_a_m2 * float(on_axis(base_field(scene), np.array([0.071]))[1, 0]) / top.mass_kg
     return erratum(
@@ -383,7 +383,7 @@ def third_start() -> Finding:
     printed, step = THESIS["limits.lower.IC3"], 0.05
     spins = scan(21.8, 25.3, step)
     aside = np.array([0.005, 0.003])
-    up = many(started("IC3"), {"start.spin_hz": spins[None, :], "start.position_m.0": aside[:, None]}).survived
+    up = many(preset_at("IC3"), {"start.spin_hz": spins[None, :], "start.position_m.0": aside[:, None]}).survived
     wrong, right = (lower_limit(spins, row) for row in up)
     return erratum(
         "Table 4.1, third column",

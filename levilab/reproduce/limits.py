@@ -12,7 +12,7 @@ from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Among, Because, Comparison, Within, check, statement
 from levilab.reproduce.figure import Scans, limits_figure
-from levilab.reproduce.tops import DURATION_S, FALL_M, MASS_KG, THESIS, Array, Flags, many, scan, started, survivors
+from levilab.reproduce.tops import DURATION_S, FALL_M, MASS_KG, THESIS, Array, Flags, many, preset_at, scan, survivors
 from levilab.simulator.equilibrium import stability_of
 from levilab.stability.scan import all_up_until, last_up, lower_limit, upper_edges
 from levilab.stability.thesis import SIMULATED_HZ, STARTS
@@ -57,7 +57,7 @@ def lower_over_masses(name: str) -> Array:
     """Return the lower limit from a start for each mass, shape (n,) [Hz]; NaN outside of the scan."""
     printed = SIMULATED_HZ[name][0]
     spins = scan(printed - AROUND_HZ, printed + AROUND_HZ, STEP_HZ)
-    up = many(started(name), {"start.spin_hz": spins[None, :], "top.mass_kg": MASSES_KG[:, None]}).survived
+    up = many(preset_at(name), {"start.spin_hz": spins[None, :], "top.mass_kg": MASSES_KG[:, None]}).survived
     return np.array([lower_limit(spins, row) if not row[0] else np.nan for row in up])
 
 
@@ -70,14 +70,14 @@ def best_mass(lower: dict[str, Array]) -> tuple[float, Array]:
 
 def upper_scan(name: str, spins: Array) -> Upper:
     """Scan for the upper limit from a start."""
-    up = survivors(started(name), spins)
-    lasts = float(many(started(name), {"start.spin_hz": [SIMULATED_HZ[name][1]]}).time[0])
+    up = survivors(preset_at(name), spins)
+    lasts = float(many(preset_at(name), {"start.spin_hz": [SIMULATED_HZ[name][1]]}).time[0])
     return Upper(all_up_until(spins, up), last_up(spins, up), upper_edges(spins, up), up, lasts)
 
 
 def falls(name: str, *settings: str) -> Array:
     """Return the spins at which tops with the thesis's drag come down to 6 cm, from starts alike, shape (n,) [Hz]."""
-    scene = started(name, "friction", f"escape.height_m={FALL_M}", *settings)
+    scene = preset_at(name, "friction", f"escape.height_m={FALL_M}", *settings)
     return many(scene, {"start.spin_hz": DRAG_STARTS_HZ}, DRAG_S).spin_hz
 
 
@@ -90,7 +90,7 @@ def lower_checks(lower: dict[str, Array], mass: float) -> list[Finding]:
             "Table 3.1 and Table 4.2",
             "",
             f"{1e3 * mass:.3f} g, in steps of 0.005 g; Table 3.1 has 25.5 g, which cannot float",
-            holds=abs(mass - MASS_KG) < 1e-6 and mass < stability_of(started("IC1")).lifted[-1].heavy,
+            holds=abs(mass - MASS_KG) < 1e-6 and mass < stability_of(preset_at("IC1")).lifted[-1].heavy,
         )
     ]
     for name in STARTS:
@@ -110,7 +110,7 @@ def lower_checks(lower: dict[str, Array], mass: float) -> list[Finding]:
 
 def upper_checks(uppers: dict[str, Upper]) -> list[Finding]:
     """Compare the upper limits: a single number only where no island is."""
-    edge = stability_of(started("IC1")).floating
+    edge = stability_of(preset_at("IC1")).floating
     assert edge is not None
     found: list[Finding] = []
     for name, one in uppers.items():
@@ -166,7 +166,7 @@ def misprint(with_030: Array) -> tuple[list[Finding], Array]:
     """
     printed = THESIS["limits.lower.IC3"]
     spins = scan(21.7, 25.3, COARSE_HZ)
-    scene = started("IC3")
+    scene = preset_at("IC3")
     up = many(scene, {"start.spin_hz": spins[None, :], "start.position_m.0": ASIDE_M[:, None]}).survived
     lower = np.array([lower_limit(spins, row) for row in up])
     aside = float(np.interp(printed.value, lower[:-1], ASIDE_M[:-1])) if np.all(np.diff(lower[:-1]) > 0) else np.nan

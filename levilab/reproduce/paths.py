@@ -15,7 +15,7 @@ from levilab.present.document.blocks import Picture
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Because, Within, check, statement
 from levilab.reproduce.figure import fall_figure, paths_figure, tilted_figure
-from levilab.reproduce.tops import DURATION_S, FALL_M, THESIS, many, started
+from levilab.reproduce.tops import DURATION_S, FALL_M, THESIS, many, preset_at
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
@@ -38,7 +38,7 @@ NEAR = 0.06
 
 def paths() -> tuple[list[Finding], dict[str, Trajectory]]:
     """Simulate the four paths, and compare their constants of motion, and their lines with theory."""
-    shown = {name: simulate(started(name), PATH_S, tolerance=1e-8, rate=PATH_HZ) for name in STARTS}
+    shown = {name: simulate(preset_at(name), PATH_S, tolerance=1e-8, rate=PATH_HZ) for name in STARTS}
     found: list[Finding] = []
     for name, motion in shown.items():
         drift = float(np.abs(motion.energies / motion.energies[0] - 1).max())
@@ -59,7 +59,7 @@ def paths() -> tuple[list[Finding], dict[str, Trajectory]]:
 
 def modes() -> list[Finding]:
     """Compare the lines of the calm start IC2 with the roots of the quartic."""
-    scene = started("IC2")
+    scene = preset_at("IC2")
     found = stability_of(scene)
     motion = simulate(scene, DURATION_S, tolerance=1e-8, rate=float(math.ceil(rate_for(scene))))
     lines = {line.name: line.frequency for line in lines_of(motion).lines if line.name and not line.sideband}
@@ -98,7 +98,7 @@ def compare_sleeping_limits(scene: Scene) -> tuple[float, str, bool]:
 
 def fall() -> tuple[Finding, Trajectory]:
     """Simulate a top with drag from 30 Hz: how its tilt grows at the end."""
-    scene = started("IC1", "friction", f"escape.height_m={FALL_M}")
+    scene = preset_at("IC1", "friction", f"escape.height_m={FALL_M}")
     motion = simulate(scene, FALL_S, tolerance=1e-6, rate=FALL_HZ)
     early = motion.time < motion.time[-1] - SHOWN_S
     before, last = float(motion.tilt[early].max()), float(motion.tilt[-1])
@@ -125,7 +125,7 @@ def sudden_fall() -> Finding:
     spins = limit - 0.01 * np.arange(1, 4)
     times = []
     for spin in spins.tolist():
-        motion = simulate(started("IC1").changed({"start.spin_hz": spin}), DURATION_S, tolerance=1e-7, rate=200.0)
+        motion = simulate(preset_at("IC1").changed({"start.spin_hz": spin}), DURATION_S, tolerance=1e-7, rate=200.0)
         times.append(float(motion.time[np.argmax(motion.tilt > LARGE_RAD)]))
     return check(
         f"IC1 without drag, {limit - spins[0]:.2f} Hz below its lower limit: the tilt exceeds {LARGE_RAD:g} rad after",
@@ -139,7 +139,7 @@ def sudden_fall() -> Finding:
 
 def shorter_run() -> Finding:
     """Compute how much earlier a top with a tilted moment falls, with drag: of starts alike, for several masses."""
-    aligned = started("IC1", "friction", f"escape.height_m={FALL_M}")
+    aligned = preset_at("IC1", "friction", f"escape.height_m={FALL_M}")
     leaning = aligned.changed({"top.moment_tilt": list(preset("tilted").top.moment_tilt)})
     spins = 30.0 + 0.001 * np.arange(24)
     lasts = float(np.median(many(aligned, {"start.spin_hz": spins}, FALL_S).time))
@@ -161,7 +161,7 @@ def shorter_run() -> Finding:
     )
 
 
-def tilted() -> tuple[list[Finding], tuple[Trajectory, Trajectory]]:
+def compare_tilted() -> tuple[list[Finding], tuple[Trajectory, Trajectory]]:
     """Simulate a moment tilted in the top beside one that is as strong along the axis, but aligned."""
     scene = preset("tilted")
     across, along = scene.top.moment_tilt
@@ -202,7 +202,7 @@ def make() -> Found:
     """Make the chapter."""
     about_paths, shown = paths()
     about_fall, falling = fall()
-    about_tilt, both = tilted()
+    about_tilt, both = compare_tilted()
     pictures = (
         Picture(
             "paths",

@@ -55,7 +55,7 @@ class Reproduction:
         return not self.unexpected
 
 
-def chosen(only: str | None) -> list[Chapter]:
+def choose(only: str | None) -> list[Chapter]:
     """Return the chapters of a list with commas, in the order of the report; all for None.
 
     Raises:

@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.stability import SymmetricTop, sleeping_limit, spin_windows
 from levilab.present.document.blocks import Note, Picture
-from levilab.present.numbers import signed
+from levilab.present.numbers import with_sign
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import Among, Because, check, statement
 from levilab.reproduce.figure import simon_figure
@@ -189,8 +189,8 @@ def make() -> Found:
             f"{SIMON['abstract.upper_simulated'].text} rpm = {rpm['upper_simulated']:.0f} rad/s simulated, "
             f"{SIMON['abstract.upper_measured'].text} rpm = {rpm['upper_measured']:.0f} rad/s measured",
             f"the quartic ends at {three.window[1]:.0f} rad/s: "
-            f"{signed(100 * (three.window[1] / rpm['upper_simulated'] - 1), 0)} % of the simulated, "
-            f"{signed(100 * (three.window[1] / rpm['upper_measured'] - 1), 0)} % of the measured one",
+            f"{with_sign(100 * (three.window[1] / rpm['upper_simulated'] - 1), 0)} % of the simulated, "
+            f"{with_sign(100 * (three.window[1] / rpm['upper_measured'] - 1), 0)} % of the measured one",
             holds=abs(three.window[1] / rpm["upper_simulated"] - 1) < 0.05,
         )
     )

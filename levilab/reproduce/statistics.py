@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.limits import Sample, compare, summarize
 from levilab.present.document.blocks import Picture
-from levilab.present.numbers import signed
+from levilab.present.numbers import with_sign
 from levilab.reproduce.chapter import Found
 from levilab.reproduce.check import check, statement
 from levilab.reproduce.figure import statistics_figure
@@ -79,8 +79,8 @@ def make() -> Found:
             THESIS["measured.limits.0"].place,
             "",
             f"Shapiro and Wilk: W = {w:.3f}, p = {p:.2f}; no outlier; {_trend(found.trend_p)} "
-            f"({signed(1e3 * found.trend.value, 0)} mHz a top, p = {found.trend_p:.3f}); ten values leave the scatter "
-            f"± {found.scatter.u:.2f} Hz",
+            f"({with_sign(1e3 * found.trend.value, 0)} mHz a top, p = {found.trend_p:.3f}); ten values leave the "
+            f"scatter ± {found.scatter.u:.2f} Hz",
             holds=p > 0.05 and not found.outliers,
         ),
         statement(
@@ -88,7 +88,7 @@ def make() -> Found:
             THESIS["measured.mean"].place,
             "21.86 Hz measured; 14.005 Hz by its own estimate",
             f"scatter {found.scatter.value:.2f} Hz, standard error {found.mean.u:.2f} Hz; "
-            f"{signed(edge.difference.value, 2)} Hz above the edge at {edge.expected:.2f} Hz (p = {edge.p:.2f}), "
+            f"{with_sign(edge.difference.value, 2)} Hz above the edge at {edge.expected:.2f} Hz (p = {edge.p:.2f}), "
             f"{found.mean.value - THESIS['stability.estimate'].value:.1f} Hz above the estimate",
             holds=0 < edge.difference.value < 0.5,
         ),

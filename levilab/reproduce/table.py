@@ -40,10 +40,10 @@ def findings_table(title: str, findings: Sequence[Finding]) -> Table:
 
 def _cells(one: Finding) -> tuple[str, ...]:
     agreement = f"{WORDS[one.verdict]}: {one.why}" if one.why else WORDS[one.verdict]
-    return f"{one.name}\n{one.place}", _compared_with(one), one.ours_text, agreement
+    return f"{one.name}\n{one.place}", _comparison(one), one.ours_text, agreement
 
 
-def _compared_with(one: Finding) -> str:
+def _comparison(one: Finding) -> str:
     """Return the value to compare with, and below it the kind of comparison."""
     if one.comparison is None:
         return one.published_text

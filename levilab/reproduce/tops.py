@@ -34,7 +34,7 @@ ESTIMATE_KG = 0.0253
 FALL_M = 0.06
 
 
-def started(name: str, scene: str = "undriven", *settings: str) -> Scene:
+def preset_at(name: str, scene: str = "undriven", *settings: str) -> Scene:
     """Return a preset from a start of the thesis, with the mass of its simulations.
 
     >>> started("IC3").start.position_m, started("IC4").top.mass_kg

@@ -147,7 +147,7 @@ def forget_arriving(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
-def arrived(folder: Path) -> StoredTrace | None:
+def partial_record(folder: Path) -> StoredTrace | None:
     """Return the part of the record that was on its way when a process was killed; None where there is none.
 
     Raises:
@@ -222,7 +222,7 @@ def described_times(folder: Path) -> list[float]:
 def undescribed_codes(folder: Path) -> list[str]:
     """Return the paths of the codes in a run folder that its index does not describe.  Raises DataError."""
     described = {_line(folder / INDEX, line).path for line in _lines(folder)}
-    if found := arrived(folder):
+    if found := partial_record(folder):
         described.add(_path(found.number))
     there = sorted(path.relative_to(folder).as_posix() for path in (folder / FOLDER).glob("*.npy"))
     return [path for path in there if path not in described]
@@ -236,7 +236,7 @@ def load_traces(folder: Path) -> list[StoredTrace]:
     its way has left what had come: it is the last one, and shorter than announced.  Raises DataError for codes that are
     missing or are not those that were written.
     """
-    cut_short = arrived(folder)  # first, so that a record which is kept meanwhile is among the others
+    cut_short = partial_record(folder)  # first, so that a record which is kept meanwhile is among the others
     whole = [_load(folder, _line(folder / INDEX, line)) for line in _lines(folder)]
     if cut_short is None or any(one.number == cut_short.number for one in whole):
         return whole

@@ -273,7 +273,7 @@ class RunWriter:
     def keep_what_arrived(self) -> str | None:
         """Keep the part of a record that was broken off, and return its description.  Raises CannotWrite."""
         try:
-            found = traces.arrived(self.folder)
+            found = traces.partial_record(self.folder)
         except DataError:  # the analysis says so
             return None
         self._arriving = None

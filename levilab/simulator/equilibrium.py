@@ -127,7 +127,7 @@ def axial_field(scene: Scene) -> stability.AxialField:
     nodes = _nodes(scene, angles=1)  # on the axis all angles are the same
     step = 1e-4  # for B″: differences of the gradient, good to 1e-9 of it over a field's length of some cm
 
-    def averaged(z: Array) -> Array:
+    def disc_mean(z: Array) -> Array:
         heights = np.atleast_1d(z)
         places = nodes[None, :, :3] + heights[:, None, None] * np.array([0.0, 0.0, 1.0])
 
@@ -138,7 +138,7 @@ def axial_field(scene: Scene) -> stability.AxialField:
         slopes = [mean(flux_gradient(field, places + k * up)[..., 2, 2]) for k in (-1, 0, 1)]
         return np.array([mean(flux_density(field, places)[..., 2]), slopes[1], (slopes[2] - slopes[0]) / (2 * step)])
 
-    return averaged
+    return disc_mean
 
 
 def modes_at(scene: Scene, height: float, spin_hz: float) -> NDArray[np.complex128]:

@@ -56,7 +56,7 @@ def _nystrom(name: str, order: int, drifts: list[float], kicks: list[float]) -> 
     )
 
 
-def _composed(name: str, order: int, weights: list[float]) -> Scheme:
+def _compose(name: str, order: int, weights: list[float]) -> Scheme:
     """Strang steps of the given lengths one after the other; the middle one makes the sum 1."""
     middle = 1.0 - 2 * sum(weights)  # no whole number: kernels would be compiled for those anew
     b = np.array([*weights, middle, *weights[::-1]])
@@ -69,14 +69,14 @@ _SUZUKI = 1 / (4 - 4 ** (1 / 3))
 SCHEMES: dict[str, Scheme] = {
     scheme.name: scheme
     for scheme in (
-        _composed("strang", 2, []),
-        _composed("suzuki-4", 4, [_SUZUKI, _SUZUKI]),
-        _composed(
+        _compose("strang", 2, []),
+        _compose("suzuki-4", 4, [_SUZUKI, _SUZUKI]),
+        _compose(
             "kahan-li-6",
             6,
             [0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935981, 0.082213596293550800230],
         ),
-        _composed(
+        _compose(
             "kahan-li-8",
             8,
             [

@@ -115,7 +115,7 @@ def batches(scene: Scene, over: Mapping[str, ArrayLike]) -> list[Batch]:
         SimulationError: the values do not fit together.
     """
     values = broadcast(over)
-    varied = _varied(values)
+    varied = _varied_keys(values)
     for key in varied:
         _check(scene, key, np.asarray(over[key]))
     found: dict[Any, list[Batch]] = {}
@@ -136,7 +136,7 @@ def for_each(scene: Scene, values: Values, formula: Callable[[Scene, Indices], T
     Yields:
         Their places in the flat map, shape (n,), and what the formula gives.
     """
-    for group, view in _views(scene, values, _varied(values)):
+    for group, view in _views(scene, values, _varied_keys(values)):
 
         def of_some(
             which: Indices, group: Indices = group, view: Callable[[Indices], Scene] = view
@@ -146,7 +146,7 @@ def for_each(scene: Scene, values: Values, formula: Callable[[Scene, Indices], T
         yield from (found for _, found in split(np.arange(group.size), of_some))
 
 
-def _varied(values: Values) -> list[str]:
+def _varied_keys(values: Values) -> list[str]:
     """Return the keys whose values can be checked, and put into formulas, as arrays of numbers."""
     return [key for key, column in values.items() if column.dtype.kind in "iuf" and _checker(key) is not None]
 

@@ -271,7 +271,7 @@ def _columns_of_samples(ends: Ensemble, names: set[str]) -> dict[str, Any]:
         spread = np.maximum(heights.max(axis=1), last) - np.minimum(heights.min(axis=1), last)
         columns["height_spread_m"] = np.where(ends.survived.ravel(), spread, np.nan)
     if "locked" in names:
-        columns["locked"] = _locked(ends)
+        columns["locked"] = _are_locked(ends)
     if names & set(GROUPS["lines"]):
         motions = [_motion_of(ends, i) for i in range(ends.survived.size)]
         rows = [_line_columns(lines) for lines in lines_of_many(motions)]
@@ -279,7 +279,7 @@ def _columns_of_samples(ends: Ensemble, names: set[str]) -> dict[str, Any]:
     return columns
 
 
-def _locked(ends: Ensemble) -> NDArray[np.bool_]:
+def _are_locked(ends: Ensemble) -> NDArray[np.bool_]:
     """Return whether each top is up and locked, in the order of the flat map."""
     locked = np.zeros(ends.survived.size, dtype=np.bool_)
     samples, states = ends.samples.reshape(-1, *ends.samples.shape[-2:]), ends.states.reshape(-1, STATE_SIZE)

@@ -101,13 +101,13 @@ def _figures(store: Store, notes: Sequence[str]) -> Iterator[Block]:
     for column in columns[:MOST_FIGURES]:
         title = f"{column.name} over {axes}, SYNTHETIC."
         alt = f"Map of {column.name} over {axes}"
-        draw = partial(_drawn, found, column.name, tuple(notes))
+        draw = partial(_draw, found, column.name, tuple(notes))
         yield Picture(f"sweep-{column.name.replace('_', '-')}", title, column.meaning, alt, draw)
     if len(columns) > MOST_FIGURES:
         yield Note(f"{len(columns) - MOST_FIGURES} more columns are not drawn here; levilab sweep draws all of them.")
 
 
-def _drawn(found: Map, column: str, notes: Sequence[str]) -> Figure:
+def _draw(found: Map, column: str, notes: Sequence[str]) -> Figure:
     from levilab.sweeps.figure import map_figure  # with matplotlib
 
     return map_figure(found, column, notes)

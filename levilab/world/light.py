@@ -213,7 +213,7 @@ class Laser:
 
     def voltage_at_rest(self, times: Array, seed: int) -> Array:
         """Return the voltage behind a stem at rest on the axis [V], shape (n,)."""
-        return self._amplified(np.broadcast_to(self.light(np.zeros(1)), times.shape), times, seed, moving=False)
+        return self._amplify(np.broadcast_to(self.light(np.zeros(1)), times.shape), times, seed, moving=False)
 
     def voltage(self, times: Array, stem: Callable[[Array], tuple[Array, NDArray[np.bool_]]], seed: int) -> Array:
         """Return the amplifier's voltage at evenly spaced times [s], shape (n,) [V].
@@ -235,9 +235,9 @@ class Laser:
         light = low_pass(passing, GRID_S, self.bandwidth_hz)
         if self.coupling_hz:
             light -= low_pass(light, GRID_S, self.coupling_hz)
-        return self._amplified(np.interp(times, grid, light), times, seed, moving=True)
+        return self._amplify(np.interp(times, grid, light), times, seed, moving=True)
 
-    def _amplified(self, light: Array, times: Array, seed: int, *, moving: bool) -> Array:
+    def _amplify(self, light: Array, times: Array, seed: int, *, moving: bool) -> Array:
         rest = (self.dark + self.bright) / 2 if self.coupling_hz else self.dark
         signal = light if moving or not self.coupling_hz else 0.0 * light
         return np.clip(rest + self.gain * signal, self.dark, self.bright) + self.noise * noise(times, (seed, 2))

@@ -149,7 +149,7 @@ async def _serve(service: Service, world: World, ready: Callable[[tuple[Served, 
             offers = await opened.enter_async_context(serve_bench(bus, place))
         except OSError as error:
             raise _cannot_serve(service, error) from error
-        ready(tuple(_served(service, offer) for offer in offers))
+        ready(tuple(_endpoints(service, offer) for offer in offers))
         await first_of(_wait_for(end), _keep_up(bus, world))
 
 
@@ -211,7 +211,7 @@ def _place(service: Service, instruments: int) -> ListenAt:
     return ListenAt(service.host, service.port_base, service.port_mapper)
 
 
-def _served(service: Service, offer: Endpoints) -> Served:
+def _endpoints(service: Service, offer: Endpoints) -> Served:
     instruments = virtual_instruments(service.models).items()
     kind, model = next((kind, one.model) for kind, one in instruments if one.address == offer.address)
     return Served(kind, model, offer.resources)

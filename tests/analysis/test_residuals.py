@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from analysis.residuals import durbin_watson, gross_errors, runs_test_p, studentised
+from analysis.residuals import durbin_watson, gross_errors, runs_test_p, studentise
 from analysis.uncertainty import curvature
 
 
@@ -66,7 +66,7 @@ def test_studentised_residuals_are_those_of_a_fit_without_the_reading():
 
     everything = np.ones(9, dtype=bool)
     residuals = y - line(everything) @ slopes
-    t = studentised(residuals, curvature(slopes).leverage, 2, floor=0.0)
+    t = studentise(residuals, curvature(slopes).leverage, 2, floor=0.0)
     for i in range(9):
         others = everything.copy()
         others[i] = False

@@ -212,7 +212,7 @@ class Scope(ScpiInstrument):
 
     # --- comparing ---
 
-    def lost(self) -> dict[str, tuple[object, object]]:
+    def lost_settings(self) -> dict[str, tuple[object, object]]:
         """Return the settings that differ from the values set: name → (as set, now).
 
         Those of the prepared inputs as ``channel1_…``; what acquire() changes by itself is none of them.
@@ -236,7 +236,7 @@ class Scope(ScpiInstrument):
         Raises OutOfRange for a voltage or a time that it set otherwise, without a word; SettingsLost if more than these
         differ, as after a reset.
         """
-        differing = self.lost()
+        differing = self.lost_settings()
         if not differing:
             return
         if all(name.endswith(("_v", "_s")) for name in differing):
@@ -246,7 +246,7 @@ class Scope(ScpiInstrument):
 
     def _check_kept(self) -> None:
         """Raise SettingsLost, and hand nothing out, if the scope is no longer as it was prepared."""
-        if differing := self.lost():
+        if differing := self.lost_settings():
             self._acquired = False
             raise SettingsLost(self.transport.address, differing)
 
@@ -260,7 +260,7 @@ class Scope(ScpiInstrument):
         except InstrumentError as error:
             differing: dict[str, tuple[object, object]] = {}
             with contextlib.suppress(InstrumentError):  # if it does not answer at all, the first error is raised
-                differing = self.lost()
+                differing = self.lost_settings()
             if not differing:
                 raise
             self._acquired = False

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from instruments.virtual.core.line import LineSettings, received_as
+from instruments.virtual.core.line import LineSettings, receive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -52,7 +52,7 @@ class SerialLine:
         """Send bytes, and return when the last one has left.  end: ignored, as a serial line has no marks."""
         self.session.device.clock.sleep(self.settings.duration(len(data)))
         # assumed: the instrument does not check parity; if it did, a wrong one would mean silence without a hint
-        self.session.write(received_as(data, self.settings, self._far_end(), checked=False))
+        self.session.write(receive(data, self.settings, self._far_end(), checked=False))
 
     def receive(self, count: int, timeout: float, *, until: bytes = b"") -> bytes:
         """Wait for bytes.
@@ -87,7 +87,7 @@ class SerialLine:
         far_end = self._far_end()
         data, _ = self.session.take(_ALL)
         self.session.device.clock.sleep(far_end.duration(len(data)))
-        self._received += received_as(data, far_end, self.settings)
+        self._received += receive(data, far_end, self.settings)
 
     def read(self, count: int, timeout: float, *, until: bytes = b"") -> tuple[bytes, bool] | None:
         """Wait for bytes, as Session.read; fewer than `count`, without `until`, are a time-out (None), and are lost."""

@@ -27,7 +27,7 @@ class LineSettings:
         return count * self.bits / self.baud_rate
 
 
-def received_as(data: bytes, sender: LineSettings, receiver: LineSettings, *, checked: bool = True) -> bytes:
+def receive(data: bytes, sender: LineSettings, receiver: LineSettings, *, checked: bool = True) -> bytes:
     r"""Return the bytes that a receiver gets of those sent one after the other, on a line that was idle before.
 
     A missing stop bit stops no byte.

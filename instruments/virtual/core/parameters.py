@@ -33,13 +33,13 @@ def parameter(parameters: list[str]) -> str:
     return only
 
 
-def quoted(parameters: list[str]) -> str:
+def read_quoted(parameters: list[str]) -> str:
     """Return the text of the only parameter, a string in quotes (IEEE 488.2, 7.7.5).
 
     Raises:
         ScpiError: it is no string, or something follows the string.
 
-    >>> quoted(["'it''s'"])
+    >>> read_quoted(["'it''s'"])
     "it's"
     """
     given = parameter(parameters)

@@ -23,7 +23,7 @@ from instruments.virtual.core.parameters import (
     one_of,
     optional_parameter,
     parameter,
-    quoted,
+    read_quoted,
 )
 from instruments.virtual.core.parser import Row, ScpiError, Value
 
@@ -128,9 +128,9 @@ class Number(Row):
             value = limit(asked, low=low, high=high, default=self.factor * self.default)
         else:
             value = self.factor * float(device.settings[self.name])
-        return device.reply(self.header, self.printed(device, value), self.unit)
+        return device.reply(self.header, self.format_value(device, value), self.unit)
 
-    def printed(self, device: Device, value: float) -> str:
+    def format_value(self, device: Device, value: float) -> str:
         """Return the number as the answer has it, without header and unit."""
         return (self.spell or device.spell)(value)
 
@@ -227,7 +227,7 @@ class Text(Row):
 
     def set(self, device: Device, parameters: list[str]) -> None:
         """See the base."""
-        _put(device, self.name, quoted(parameters).translate(_NOT_IN_TEXTS)[: self.longest].upper())
+        _put(device, self.name, read_quoted(parameters).translate(_NOT_IN_TEXTS)[: self.longest].upper())
 
     def ask(self, device: Device, parameters: list[str]) -> str:
         """See the base."""

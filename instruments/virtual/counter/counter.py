@@ -72,7 +72,7 @@ class Count(Number):
         """See the base."""
         return INFINITY if self.endless and text.upper() in {"INF", "INFINITY"} else super().read(device, text)
 
-    def printed(self, device: Any, value: float) -> str:
+    def format_value(self, device: Any, value: float) -> str:
         """See the base."""
         return str(device.spell_whole(value))
 

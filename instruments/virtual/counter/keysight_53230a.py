@@ -110,7 +110,7 @@ _CALCULATION: tuple[Row, ...] = (
     Switch("CALCulate[1][:STATe]", "mathematics"),
     Switch("CALCulate[1]:AVERage[:STATe]", "averaging"),
     Ask("CALCulate[1]:AVERage:ALL", lambda d: d.statistic("mean", "sdev", "min", "max")),
-    Ask("CALCulate[1]:AVERage:COUNt[:CURRent]", lambda d: f"{d.counted():+d}"),
+    Ask("CALCulate[1]:AVERage:COUNt[:CURRent]", lambda d: f"{d.number_in_statistics():+d}"),
     Do("CALCulate[1]:AVERage:CLEar[:IMMediate]", lambda d: d.clear_statistics()),
     *(Ask("CALCulate[1]:AVERage:" + word, lambda d, s=name: d.statistic(s)) for word, name in _STATISTICS.items()),
 )
@@ -384,7 +384,7 @@ class Virtual53230A(VirtualCounter):
         found = self.statistics()
         return ",".join(self.spell(found[name]) for name in names)
 
-    def counted(self) -> int:
+    def number_in_statistics(self) -> int:
         """Return the number of readings in the statistics."""
         return self.available() - self._counted_from
 

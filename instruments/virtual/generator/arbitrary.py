@@ -34,7 +34,7 @@ class DeviceError(ScpiError):
         Exception.__init__(self, self.entry)
 
 
-def built_in() -> dict[str, Samples]:
+def built_in_waveforms() -> dict[str, Samples]:
     """Return the waveforms in the instrument's own memory, each from −1 to 1, shape (250,)."""
     x = np.linspace(0.0, 1.0, _BUILT_IN_POINTS)
     centred = 12 * (x - 0.5)

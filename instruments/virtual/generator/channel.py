@@ -16,7 +16,7 @@ import numpy as np
 
 from instruments.virtual.core.parameters import limit, number
 from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.generator.arbitrary import Memory, built_in
+from instruments.virtual.generator.arbitrary import Memory, built_in_waveforms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, MutableMapping
@@ -119,7 +119,7 @@ class Channel:
         self._settings, self._report = settings, report
         self.prefix = f"{index}:"
         self.memory = Memory(family.room)
-        self.library = {name: values for name, values in built_in().items() if name in family.library}
+        self.library = {name: values for name, values in built_in_waveforms().items() if name in family.library}
         self._now = now
         #: Begin and end of the last triggered burst or sweep [s].
         self.under_way = (-math.inf, -math.inf)

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.core.device import VirtualInstrument
-from instruments.virtual.core.parameters import choice, limit, nr3, optional_parameter, parameter, quoted
+from instruments.virtual.core.parameters import choice, limit, nr3, optional_parameter, parameter, read_quoted
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.generator.arbitrary import DeviceError, attribute, plain_name, samples
 from instruments.virtual.generator.channel import INFINITE, Channel, Output, quantity_of
@@ -114,7 +114,7 @@ class VirtualGenerator(VirtualInstrument):
 
     def set_text(self, parameters: list[str]) -> None:
         """DISPlay:TEXT: a string in quotes.  Raises ScpiError."""
-        self._text = quoted(parameters)[:_LONGEST_TEXT]
+        self._text = read_quoted(parameters)[:_LONGEST_TEXT]
 
     def text(self) -> str:
         """DISPlay:TEXT?: in quotes."""
@@ -194,7 +194,7 @@ class VirtualGenerator(VirtualInstrument):
         channel["output"] = True
         self.on_change(channel.prefix + "output")
 
-    def applied(self, n: int) -> str:
+    def ask_apply(self, n: int) -> str:
         """APPLy?: waveform, frequency, amplitude, offset."""
         channel = self.channel(n)
         shown = channel.from_vpp(channel.number("amplitude_vpp"), str(channel["voltage_unit"]))

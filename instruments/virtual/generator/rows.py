@@ -224,7 +224,7 @@ CHANNEL: tuple[Row, ...] = (
     Quantity("[SOURce[n]:]FSKey:FREQuency", "{n}:fsk_frequency", 100.0, (1e-6, 30e6), "HZ"),
     Quantity("[SOURce[n]:]FSKey:INTernal:RATE", "{n}:fsk_rate", 10.0, (1e-6, 1e6), "HZ"),
     # a signal in one command, and what a waveform in the memory is like
-    Ask("[SOURce[n]:]APPLy", lambda s, n: s.applied(n)),
+    Ask("[SOURce[n]:]APPLy", lambda s, n: s.ask_apply(n)),
     Both("[SOURce[n]:]DATA:ATTRibute:AVERage", None, lambda s, n, p: s.attribute(n, "AVER", p)),
     Both("[SOURce[n]:]DATA:ATTRibute:CFACtor", None, lambda s, n, p: s.attribute(n, "CFAC", p)),
     Both("[SOURce[n]:]DATA:ATTRibute:POINts", None, lambda s, n, p: s.attribute(n, "POIN", p)),

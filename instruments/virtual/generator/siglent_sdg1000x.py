@@ -90,7 +90,7 @@ _CHANNEL: tuple[Row, ...] = (
         for short, long in (("MDWV", "MODULATEWAVE"), ("SWWV", "SWEEPWAVE"), ("BTWV", "BURSTWAVE"))
     ),
     Switch("C{n}:SYNC", "{n}:sync", words=("OFF", "ON")),
-    Own("C{n}:(INVT|INVERT)", lambda s, n, p: s.invert(n, p), lambda s, n: s.inverted(n)),
+    Own("C{n}:(INVT|INVERT)", lambda s, n, p: s.invert(n, p), lambda s, n: s.ask_invert(n)),
 )
 
 
@@ -277,7 +277,7 @@ class VirtualSDG1000X(VirtualInstrument):
         self.settings[_key(n, "polarity")] = _POLARITIES[boolean(parameter(parameters))]
         self.on_change(_key(n, "output"))
 
-    def inverted(self, n: int) -> str:
+    def ask_invert(self, n: int) -> str:
         """INVT?: whether the output is inverted."""
         return f"C{n}:INVT {'ON' if self.settings[_key(n, 'polarity')] == 'INVT' else 'OFF'}"
 

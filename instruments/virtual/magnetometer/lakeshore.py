@@ -126,8 +126,8 @@ FAMILY: tuple[Row, ...] = (
     Fields("UNIT", (Field("unit", 1, 4, 1),)),
     Own("AUTO", lambda d, p: d.set_auto(p), lambda d: f"{d.value('auto'):.0f}", ("auto", 1.0)),
     Own("RANGE", lambda d, p: d.set_range(p), lambda d: f"{d.range_index() + 1}", ("range", 1.0)),
-    Ask("RDGFIELD", lambda d: d.answer(d.shown)),
-    Ask("RDGREL", lambda d: d.answer(lambda: d.shown() - d.relative_to)),
+    Ask("RDGFIELD", lambda d: d.answer(d.displayed_field)),
+    Ask("RDGREL", lambda d: d.answer(lambda: d.displayed_field() - d.relative_to)),
     Ask("RDGMNMX", lambda d: d.extremes()),
     Ask("OPST", lambda d: f"{d.operational_status():03d}"),
     Ask("TYPE", lambda d: f"{_PROBE_TYPES.get(d.probe or '', 0):02d}"),
@@ -230,7 +230,7 @@ class VirtualGaussmeter(VirtualInstrument):
         ranges = self._ranges()
         index = min(int(self.value("range")), len(ranges)) - 1
         if self.value("auto") and self.probe:
-            size = abs(self.measured())
+            size = abs(self.field())
             while index < len(ranges) - 1 and size > ranges[index]:
                 index += 1
             while index > 0 and size <= 0.9 * ranges[index - 1]:
@@ -267,7 +267,7 @@ class VirtualGaussmeter(VirtualInstrument):
         """Return the mode: 1 steady, 2 RMS, 3 peak."""
         return int(self.value("mode"))
 
-    def measured(self) -> float:
+    def field(self) -> float:
         """Return the reading in the present mode before it is rounded [T]."""
         reading = self.reading()
         if self._mode() == 2:
@@ -280,17 +280,17 @@ class VirtualGaussmeter(VirtualInstrument):
         """Return the peak on display [T]."""
         return reading.highest + self._hall.zero_error
 
-    def shown(self) -> float:
+    def displayed_field(self) -> float:
         """Return the reading as the instrument rounds it [T]."""
         resolution = self._ranges()[self.range_index()] / self._counts()
         reading = self.reading()
-        shown = round((self.measured() + _NOISE * reading.noise * resolution) / resolution) * resolution
+        shown = round((self.field() + _NOISE * reading.noise * resolution) / resolution) * resolution
         self._answered = reading.instant
         self._lowest, self._highest = min(self._lowest, shown), max(self._highest, shown)
         return shown
 
     def _is_overloaded(self) -> bool:
-        return self.probe is not None and abs(self.measured()) > self._ranges()[self.range_index()]
+        return self.probe is not None and abs(self.field()) > self._ranges()[self.range_index()]
 
     def answer(self, value: Callable[[], float]) -> str:
         """Return a field [T] in the present unit, or why there is none."""
@@ -300,7 +300,7 @@ class VirtualGaussmeter(VirtualInstrument):
 
     def extremes(self) -> str:
         """RDGMNMX?: both, or on the 425 zero and the greatest."""
-        self.answer(self.shown)
+        self.answer(self.displayed_field)
         seen = [value if math.isfinite(value) else 0.0 for value in (self._lowest, self._highest)]
         return ",".join(map(self.in_unit, seen))
 
@@ -319,7 +319,7 @@ class VirtualGaussmeter(VirtualInstrument):
         """Return whether the low and the high alarm are on."""
         if not self.value("alarm") or self.probe is None:
             return False, False
-        size = self.measured() / self._unit()
+        size = self.field() / self._unit()
         if self.value("alarm_mode") == 1:
             size = abs(size)
         low, high = self.value("alarm_low"), self.value("alarm_high")

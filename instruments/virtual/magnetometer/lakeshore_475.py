@@ -45,7 +45,7 @@ _OWN: tuple[Row, ...] = (
     Ask("RDGPEAK", lambda d: d.peaks()),
     Ask("RDGFRQ", lambda d: field_text(d.reading().frequency)),
     Ask("RDGTEMP", lambda d: field_text(23.0 if d.value("temperature_unit") == 1 else 296.15)),
-    Ask("RDGOHM", lambda d: field_text(d.measured())),
+    Ask("RDGOHM", lambda d: field_text(d.field())),
     Fields("REL", (Field("relative", 0, 1, 0), Field("relative_source", 1, 2, 1))),
     Fields("TUNIT", (Field("temperature_unit", 1, 2, 1),)),
     Fields("BAUD", (Field("baud", 0, 3, 0),)),
@@ -85,7 +85,7 @@ class Virtual475(VirtualGaussmeter):
     def on_change(self, name: str) -> None:
         """REL with source 2 takes the present field; BAUD sets this end of the line."""
         if name == "relative" and self.value("relative_source") == 2 and self.probe:
-            self.relative_to = self.shown()
+            self.relative_to = self.displayed_field()
         elif name == "baud":
             self.serial_settings = replace(self.serial_settings, baud_rate=self._BAUD_RATES[int(self.value("baud"))])
         elif name in {"event_enable", "request_enable"}:

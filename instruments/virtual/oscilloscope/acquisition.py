@@ -103,7 +103,7 @@ class Acquisition:
         self.follow(now)
         if self.armed is not None and self.latest is None and self._plan.automatic:
             trigger = max(now - self._plan.length, 0.0) - self._plan.record.origin
-            self.latest = self._plan.record.taken(trigger, forced=True)
+            self.latest = self._plan.record.trigger_at(trigger, forced=True)
         self.armed = None
 
     def force(self, now: float) -> None:
@@ -135,8 +135,8 @@ class Acquisition:
         automatic = min(automatic, self._forced)
         edge = self._edge.until(min(until, automatic)) if self._edge else None
         if edge is not None:
-            return self._plan.record.taken(edge, forced=False)
-        return self._plan.record.taken(automatic, forced=True) if automatic <= until else None
+            return self._plan.record.trigger_at(edge, forced=False)
+        return self._plan.record.trigger_at(automatic, forced=True) if automatic <= until else None
 
     def follow(self, now: float) -> None:
         """Let what has happened up to now have happened."""

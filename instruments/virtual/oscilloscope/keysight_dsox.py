@@ -310,7 +310,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
     def full_scale(self) -> tuple[float, int]:
         """Return rate and points of a record that fills the screen and nothing else."""
         length = 10 * self.value("time_scale")
-        rate = min(_FASTEST / (1 if len(self.shown()) <= 1 else 2), self._memory / length)
+        rate = min(_FASTEST / (1 if len(self.visible_channels()) <= 1 else 2), self._memory / length)
         return rate, max(2, round(rate * length))
 
     def screen(self) -> tuple[float, float]:
@@ -430,7 +430,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         return self._value(name, self._where(parameters))
 
     def _value(self, name: str, channel: int) -> str:
-        value = self.measured(name, channel)
+        value = self.measure(name, channel)
         return self.spell(100 * value if name in _PERCENT and value < self.no_measurement else value)
 
     def all_results(self) -> str:

@@ -79,7 +79,7 @@ class Record:
         """When the last sample was taken [s]."""
         return self.trigger + self.origin + self.points / self.rate
 
-    def taken(self, trigger: float, *, forced: bool) -> Record:
+    def trigger_at(self, trigger: float, *, forced: bool) -> Record:
         """Return the same record, triggered at this time [s]."""
         return replace(self, trigger=trigger, forced=forced, _kept={})
 

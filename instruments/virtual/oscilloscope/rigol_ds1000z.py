@@ -280,7 +280,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
 
     def _share(self) -> int:
         """Return the number of channels that share converter and memory: 1, 2 or 4."""
-        return {0: 1, 1: 1, 2: 2}.get(len(self.shown()), 4)
+        return {0: 1, 1: 1, 2: 2}.get(len(self.visible_channels()), 4)
 
     # --- scaling ---
 
@@ -370,7 +370,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
         if not parameters:
             raise ScpiError(-109)
         name, channel = _name_of_item(parameters[0]), self._where(parameters[1:])
-        return self.spell(self.measured(name, channel))
+        return self.spell(self.measure(name, channel))
 
     def statistic(self, parameters: list[str]) -> str:
         """Return a statistic of a measurement: every value but the deviation is the present one."""

@@ -131,7 +131,7 @@ class VirtualOscilloscope(VirtualInstrument):
         """Return the factor by which the voltage at the probe's tip exceeds that at the input."""
         return self.value(f"chan{channel}_probe")
 
-    def shown(self) -> list[int]:
+    def visible_channels(self) -> list[int]:
         """Return the channels that are on."""
         return [n for n in self.channels if self.settings[f"chan{n}_display"]]
 
@@ -344,7 +344,7 @@ class VirtualOscilloscope(VirtualInstrument):
         scale = record.inputs[channel]
         return Measured((codes.astype(np.float64) - scale.zero) * scale.volts_per_code, step, start)
 
-    def measured(self, name: str, channel: int) -> float:
+    def measure(self, name: str, channel: int) -> float:
         """Return a measurement on the screen, or the number for none."""
         value = measure(name, self.on_screen(channel))
         return self.no_measurement if value is None else value
@@ -354,7 +354,7 @@ class VirtualOscilloscope(VirtualInstrument):
         record = self.record()
         heights: dict[int, NDArray[np.float64]] = {}
         start, length = record.screen
-        for n in self.shown():
+        for n in self.visible_channels():
             codes = record.codes(n, 0, 800, of=800, start=start, step=length / 800)
             middle, span = self.codes_on_screen(n)
             heights[n] = 0.5 + (codes.astype(np.float64) - middle) / span

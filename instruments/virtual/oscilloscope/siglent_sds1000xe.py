@@ -229,7 +229,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
 
     def _is_halved(self) -> bool:
         """Return whether a pair of channels, 1 and 2 or 3 and 4, shares its converter and memory."""
-        shown = self.shown()
+        shown = self.visible_channels()
         return {1, 2} <= set(shown) or {3, 4} <= set(shown)
 
     def set_depth(self, parameters: list[str]) -> None:
@@ -331,7 +331,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         """PAVA? PKPK: name and value, stars where the trace does not show it."""
         word = choice(parameter(parameters), tuple(_MEASUREMENTS))
         name, unit = _MEASUREMENTS[word]
-        value = self.measured(name, n)
+        value = self.measure(name, n)
         shown = "****" if value >= self.no_measurement or math.isnan(value) else self.spell(value)
         return self.reply(f"C{n}:PAVA", f"{word},{shown}", unit)
 

@@ -108,7 +108,7 @@ class _Keeper:
     def __call__(self, row: Row) -> None:
         session = self.session
         done = len(session.rows) + 1
-        session.keep(row, (session.settings.repetitions - done) * session.spent() / (done - self.before))
+        session.keep(row, (session.settings.repetitions - done) * session.time_spent() / (done - self.before))
 
 
 def _with_a_top(
@@ -157,7 +157,7 @@ def _coast_down(session: Session[LimitSettings]) -> None:
     settings = session.settings
     session.event(RunEvent.COASTS, "the top is still up and comes down by itself")
     while (spin := spin_now(session)) is not None and spin > settings.drive_frequency_hz:
-        if session.spent() > settings.longest_s:
+        if session.time_spent() > settings.longest_s:
             return
         session.progress(f"coasts down, {spin:.2f} Hz", 1.0)
         session.wait(settings.interval_s)

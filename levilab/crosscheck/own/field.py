@@ -22,7 +22,7 @@ _COST_S = 0.016
 _COMPARED = ("strength", "origin", "thickness", "background")
 
 
-def own(found: FieldAnalysis) -> Own:
+def trials_of(found: FieldAnalysis) -> Own:
     """Return the trials of the first scan."""
     scan, source, options = found.runs[0].scan, found.sources[0], found.options
     order = np.argsort(source.readings.height, kind="stable")
@@ -33,7 +33,7 @@ def own(found: FieldAnalysis) -> Own:
     noise = np.sqrt(np.maximum(scan.u**2 - by_height**2, 0.0))
 
     def trial(random: np.random.Generator) -> Trial:
-        known = _known(random, scan)
+        known = _known_dimensions(random, scan)
         gain = 1 + scan.known.gain_u * random.standard_normal()
         true_height = scan.height + u_z * random.standard_normal(len(u_z))
         b = gain * (scan.model(true_height) - scan.values[3]) + scan.values[3]
@@ -55,7 +55,7 @@ def own(found: FieldAnalysis) -> Own:
     )
 
 
-def _known(random: np.random.Generator, scan: FieldScan) -> Known:
+def _known_dimensions(random: np.random.Generator, scan: FieldScan) -> Known:
     """Return the dimensions that calliper and data sheet would give of the fitted base."""
     said: dict[str, Any] = {
         name: Prior(float(scan.values[k]) + prior.u * random.standard_normal(), prior.u)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _COST_S = 0.0005
 
 
-def own(found: LimitAnalysis) -> Own:
+def trials_of(found: LimitAnalysis) -> Own:
     """Return the trials of limits: each group of runs under the same conditions."""
     groups = [group for group in found.groups if group.statistics.scatter]
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _COST_S = 0.003
 
 
-def own(found: PrecessionAnalysis) -> Own:
+def trials_of(found: PrecessionAnalysis) -> Own:
     """Return the trials of sweeps: the line through the points of all of them."""
     fit, options = found.combined, found.options
     line = fit.line

@@ -26,7 +26,7 @@ _COST_S, _COST_OF_SAMPLE_S = 0.004, 8e-8
 _NARROWEST, _WIDEST = 0.002, 0.12
 
 
-def own(found: SpinAnalysis) -> Own:
+def trials_of(found: SpinAnalysis) -> Own:
     """Return the trials of the first input; of a long record or of several, of the window or record in the middle."""
     run, source, options = found.runs[0], found.sources[0], found.options
     spin = run.spin
@@ -69,7 +69,7 @@ def _pulse_times(spin: SpinFrequency) -> Array:
     return np.asarray(times)
 
 
-def _compared(found: SpinFrequency, spin: SpinFrequency) -> Trial:
+def _compare(found: SpinFrequency, spin: SpinFrequency) -> Trial:
     """Return the pulls of a fit, against the truth at its own reference time."""
     frequency, chirp, bend = _motion(spin)
     at = found.reference_time
@@ -87,7 +87,7 @@ def _of_times(random: np.random.Generator, spin: SpinFrequency) -> Trial:
     kept = np.ones(times.size, dtype=bool)
     kept[random.choice(times.size, min(spin.missing, times.size // 4), replace=False)] = False
     times = np.sort(times + spin.scatter * random.standard_normal(times.size))[kept]
-    return _compared(spin_of_times(times), spin)
+    return _compare(spin_of_times(times), spin)
 
 
 def _of_trace(
@@ -114,4 +114,4 @@ def _of_trace(
     if code > 0:
         volts = np.round(volts / (code * noise)) * code * noise
     found = spin_of_trace(volts, rate, start=float(times[0]), method=method)  # type: ignore[arg-type]
-    return _compared(found, spin)
+    return _compare(found, spin)

@@ -11,7 +11,7 @@ from analysis.budget import gate_bias, printed_step
 from analysis.spindown.combine import combine
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import fit_spin_down
-from analysis.spindown.tilt import counted
+from analysis.spindown.tilt import count_of
 from levilab.crosscheck.own.model import OF_ONE_RUN, Own
 from levilab.crosscheck.subject import Trial, pull_of
 from levilab.pipelines.budget import gate_of
@@ -61,7 +61,7 @@ class _Run:
 
     def readings(self, random: np.random.Generator, factors: Sequence[float]) -> Array:
         """Made-up readings, the constants multiplied by factors, shape (n,) [Hz]."""
-        return _rounded(self.curve(factors) + self.noise * _noise(random, len(self.time), self.rho), self.step)
+        return _round(self.curve(factors) + self.noise * _noise(random, len(self.time), self.rho), self.step)
 
     @property
     def cost_s(self) -> float:
@@ -80,13 +80,13 @@ class _Run:
         middle = np.clip(tau, half, 1 - half)
 
         def at(times: Array) -> Array:
-            return np.asarray(counted(LAWS[self.fit.name], times, solution, self.fit.top))
+            return np.asarray(count_of(LAWS[self.fit.name], times, solution, self.fit.top))
 
         bias = gate_bias(at(middle - half), at(middle), at(middle + half)) if half else 0.0
         return np.asarray(frequency * (at(tau) + bias))
 
 
-def own(found: SpinDownAnalysis) -> Own:
+def trials_of(found: SpinDownAnalysis) -> Own:
     """Return the trials of spin-downs: each simulates all runs again."""
     law = found.combined.best
     runs = [_run(found, k, run.fit(law), run) for k, run in enumerate(found.runs)]
@@ -207,5 +207,5 @@ def _noise(random: np.random.Generator, n: int, rho: float) -> Array:
     return noise
 
 
-def _rounded(values: Array, step: float) -> Array:
+def _round(values: Array, step: float) -> Array:
     return np.asarray(np.round(values / step) * step) if step else values

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 #: Analysis → its result as a subject of trials.
 OWN: Mapping[str, Callable[[Any], Own]] = MappingProxyType({
-    "spindown": spindown.own, "precession": precession.own, "spin": spin.own, "field": field.own, "limit": limit.own,
+    "spindown": spindown.trials_of, "precession": precession.trials_of, "spin": spin.trials_of,
+    "field": field.trials_of, "limit": limit.trials_of,
 })  # fmt: skip
 #: Number of trials where none is asked for.
 TRIALS = 200

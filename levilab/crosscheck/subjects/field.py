@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquire_mock, pull_of
 from levilab.formats.device import Device
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import FieldOptions
@@ -29,7 +29,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
 
     The truths of heights, masses, and spins are the simulator's, whose field is another formula.
     """
-    run = acquired("field", seed, folder, lambda request: request)
+    run = acquire_mock("field", seed, folder, lambda request: request)
     base, by = random_base(seed), np.random.default_rng((seed, 4)).standard_normal(3)
     scene = Scene().changed(
         {

@@ -11,7 +11,7 @@ import numpy as np
 from analysis.spindown.tilt import DRIVEN
 from instruments.clock import VirtualClock
 from levilab.acquisition.table import settings_of, with_settings
-from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquire_mock, pull_of
 from levilab.crosscheck.subjects.spindown import spindown_of
 from levilab.simulator.kernels.motion import R
 from levilab.simulator.scene import Scene, preset
@@ -37,7 +37,7 @@ LONGEST_S = 400.0
 _LEAST_HZ = 1e-6
 
 
-def drawn_scene(seed: int) -> Scene:
+def draw_scene(seed: int) -> Scene:
     """Return a top of this seed: mass, tilt of the moment, drag and first spin."""
     random = np.random.default_rng((seed, 3))
     tilt = float(random.uniform(0.022, 0.034))
@@ -55,9 +55,9 @@ def drawn_scene(seed: int) -> Scene:
 
 def trial(seed: int, folder: Path) -> list[Pull]:
     """Try one spin-down of a drawn top."""
-    scene = drawn_scene(seed)
+    scene = draw_scene(seed)
     coefficient: Any = scene.drag.coefficient
-    run = acquired("spin", seed, folder, lambda request: _in_world(request, scene, seed))
+    run = acquire_mock("spin", seed, folder, lambda request: _in_world(request, scene, seed))
     found = spindown_of(run.folder)
     return [
         pull_of("disc c32", found.fit("disc").parameters["c32"], coefficient),

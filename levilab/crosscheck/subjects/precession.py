@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from levilab.crosscheck.subject import Pull, Subject, acquired, pull_of
+from levilab.crosscheck.subject import Pull, Subject, acquire_mock, pull_of
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.precession.analysis import intercept_of, slope_of
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def trial(seed: int, folder: Path) -> list[Pull]:
     """Try one sweep of a top in full motion; the seed draws the phase at which the drive takes hold, and the noise."""
-    run = acquired("precession", seed, folder, lambda request: request)
+    run = acquire_mock("precession", seed, folder, lambda request: request)
     analysis = ANALYSES["precession"]
     (found,) = analysis.analyze([run.folder], analysis.options_from({})).runs
     return [pull_of("slope", slope_of(found.fit), 1.0), pull_of("intercept", intercept_of(found.fit), 0.0)]

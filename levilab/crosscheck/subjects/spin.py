@@ -10,7 +10,7 @@ import numpy as np
 
 from instruments.clock import VirtualClock
 from levilab.acquisition.table import settings_of, with_settings
-from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquire_mock, pull_of
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.runs.waveforms import run_waveforms
 from levilab.simulator.laws import LAWS
@@ -55,7 +55,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     )
     world = _Watched(scene)
     duration = float(random.uniform(1.0, 4.0))
-    run = acquired("trace", seed, folder, lambda request: _in_world(request, world, duration))
+    run = acquire_mock("trace", seed, folder, lambda request: _in_world(request, world, duration))
     (record,) = run_waveforms(run)
     start = world.looks.get(record.count)
     if start is None:

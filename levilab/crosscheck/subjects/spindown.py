@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from instruments.clock import VirtualClock
-from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquire_mock, pull_of
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.simulator.laws import LAWS
 from levilab.simulator.scene import Scene
@@ -43,7 +43,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
         jitter=SpinScene.jitter * float(random.uniform(0.5, 2.0)),
         seed=seed,
     )
-    run = acquired("spin", seed, folder, lambda request: _in_world(request, scene))
+    run = acquire_mock("spin", seed, folder, lambda request: _in_world(request, scene))
     found = spindown_of(run.folder, tilt="none")  # a count of this world is the spin
     pulls = [
         pull_of(f"{law} {name}", found.fit(law).parameters[name], truth)

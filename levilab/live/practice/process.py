@@ -24,7 +24,7 @@ from levilab.acquisition.request import AcquisitionOptions, request_at
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.bench import open_bench
 from levilab.bench.config import Limits
-from levilab.errors import LevilabError, unquoted
+from levilab.errors import LevilabError, unquote
 from levilab.interruption import watching_for_end
 from levilab.live.practice.commands import (
     CommandRefused,
@@ -187,7 +187,7 @@ def work(options: PracticeOptions, pipe: Connection) -> None:
             with Publisher() as publisher:
                 PracticeProcess(options, scene, world, pipe, publisher=publisher, end=end).run()
         except (LevilabError, InstrumentError) as error:
-            report(PracticeEvent("ended", unquoted(str(error))))
+            report(PracticeEvent("ended", unquote(str(error))))
         except Exception as error:
             report(PracticeEvent("ended", f"{type(error).__name__}: {error}"))
             raise
@@ -392,7 +392,7 @@ class PracticeProcess:
             number, command = from_bytes(data)
             text = self._carry_out(command)
         except (LevilabError, InstrumentError) as error:
-            self._report(PracticeEvent("refused", unquoted(str(error)), number))
+            self._report(PracticeEvent("refused", unquote(str(error)), number))
         else:
             if command is self._wanted:
                 self._number = number
@@ -675,7 +675,7 @@ class PracticeProcess:
         try:
             run = acquire(self._request(command), LinesToReport(self._report), self._watching)
         except (LevilabError, InstrumentError) as error:
-            text, status, folder = unquoted(str(error)), "failed", self._folder
+            text, status, folder = unquote(str(error)), "failed", self._folder
         else:
             text, status, folder = f"{run.status}: {run.count()} readings", run.status, str(run.folder)
         self._report(PracticeEvent("recorded", text, self._number, status=status, folder=folder))

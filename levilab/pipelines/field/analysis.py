@@ -90,7 +90,7 @@ class FieldAnalysis(Analyzed[FieldReadings, FieldRun, None, FieldOptions]):
             return self.runs[0].text
         strength = self.values["strength"]
         agree = _scatter_in_words(strength)
-        return f"{len(self.runs)} scans: {_shown('strength', strength)} in the mean; {agree}. {_advice(self.values)}"
+        return f"{len(self.runs)} scans: {_format('strength', strength)} in the mean; {agree}. {_advice(self.values)}"
 
     def about_run(self, run: FieldRun) -> Iterable[str]:
         """Return what to know of one scan."""
@@ -154,7 +154,7 @@ def means(runs: Sequence[Mapping[str, Estimate]]) -> dict[str, Mean]:
 # --- in words ------------------------------------------------------------------------------------------
 
 
-def _shown(name: str, estimate: Estimate) -> str:
+def _format(name: str, estimate: Estimate) -> str:
     return with_uncertainty(QUANTITIES[name].show(estimate))
 
 
@@ -166,8 +166,8 @@ def _scatter_in_words(strength: Estimate) -> str:
 
 def _in_words(scan: FieldScan, floating: Floating | None) -> str:
     base = (
-        f"The base has ρ = {_shown('strength', scan.parameters['strength'])}, its middle at "
-        f"{_shown('origin', scan.parameters['origin'])}; its field points {_pole(scan)} above it."
+        f"The base has ρ = {_format('strength', scan.parameters['strength'])}, its middle at "
+        f"{_format('origin', scan.parameters['origin'])}; its field points {_pole(scan)} above it."
     )
     parts = [base, _learned_in_words(scan)]
     parts.append(_advice(floating.values) if floating else "No top floats above it.")
@@ -210,7 +210,7 @@ def _advice(values: Mapping[str, Estimate]) -> str:
     """Return the mass to set, and what to mind."""
     if "mass_to_set" not in values:
         return ""
-    shown = {name: _shown(name, value) for name, value in values.items() if name in QUANTITIES}
+    shown = {name: _format(name, value) for name, value in values.items() if name in QUANTITIES}
     per_mass = QUANTITIES["height_per_mass"].show(values["height_per_mass"]).value or 0.0  # mm/g
     mass = values["mass_to_set"].value or 0.0
     per_kelvin = 2 * FERRITE_PER_K * mass * 1e3

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from levilab.errors import unquoted
+from levilab.errors import unquote
 from levilab.formats.device import Device  # noqa: TC001 - pydantic reads it
 from levilab.pipelines.document import Document, Settings, statistics_of, value_of, values_of
 from levilab.pipelines.dump import Dump
@@ -64,7 +64,7 @@ def _model(run: FieldRun) -> dict[str, Any]:
         "parameters": values_of(run.scan.parameters),
         "covariance": run.scan.covariance.tolist(),
         "statistics": statistics_of(run.scan.statistics),
-        "warnings": [unquoted(text) for text in run.scan.warnings],
+        "warnings": [unquote(text) for text in run.scan.warnings],
     }
 
 

@@ -10,7 +10,7 @@ from levilab.pipelines.field.meaning import meaning
 from levilab.pipelines.field.table import base_table, by_run_table, follows_table, scans_table
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, first_of, input_parts, labels_of
 from levilab.present.document.blocks import Listing, Note, Paragraph, Points, Section, Tabular
-from levilab.present.numbers import off, signed, with_decimals, with_uncertainty
+from levilab.present.numbers import off, with_decimals, with_sign, with_uncertainty
 from levilab.present.tables import table
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def _readings(_: Source[FieldReadings], run: FieldRun, *__: object) -> tuple[Lis
     shown = min(len(scan.height), MOST_READINGS)
     scaled = scan.residuals / scan.u
     rows = [
-        (with_decimals(1e2 * z, 3), with_decimals(1e3 * b, 4), signed(float(r), 1))
+        (with_decimals(1e2 * z, 3), with_decimals(1e3 * b, 4), with_sign(float(r), 1))
         for z, b, r in zip(scan.height[:shown], scan.flux_density[:shown], scaled[:shown], strict=True)
     ]
     heads = ("z [cm]", "B [mT]", "residual [u]")

@@ -67,11 +67,11 @@ def base_table(scan: FieldScan) -> Table:
         prior = scan.known.prior(name)
         known = [] if prior is None else [replace(estimate, value=prior.value, u=prior.u)]
         found, *before = (with_uncertainty(QUANTITIES[name].show(one)) for one in (estimate, *known))
-        rows.append((QUANTITIES[name].shown_symbol, found, "".join(before), _learned(scan, name)))
+        rows.append((QUANTITIES[name].shown_symbol, found, "".join(before), _gain(scan, name)))
     return table("The base", ("", "found", "known before", "what the scan adds"), rows)
 
 
-def _learned(scan: FieldScan, name: str) -> str:
+def _gain(scan: FieldScan, name: str) -> str:
     """Return what the scan adds to what was known."""
     left = scan.learned(name)
     if name not in scan.fitted:

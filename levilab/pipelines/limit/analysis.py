@@ -66,7 +66,7 @@ class Device:
     linear_upper_hz: float
     resonance_hz: float | None
 
-    def expected(self, which: Which) -> dict[str, float]:
+    def expected_spins(self, which: Which) -> dict[str, float]:
         """Name → spin [Hz] that a limit is compared with."""
         if which == "upper":
             return {UPPER_EDGE: self.linear_upper_hz}
@@ -226,7 +226,7 @@ def together(
     return tell_apart(
         replace(runs[numbers[0]], runs=tuple(numbers))
         if len(numbers) == 1
-        else _combined(tuple(numbers), sources, runs, options)
+        else _combine(tuple(numbers), sources, runs, options)
         for numbers in groups.values()
     )
 
@@ -249,7 +249,7 @@ def synthetic_runs(runs: Iterable[Limits]) -> bool | None:
     return kinds.pop() if len(kinds) == 1 else None
 
 
-def _combined(
+def _combine(
     numbers: tuple[int, ...],
     sources: Sequence[Source[LimitReadings]],
     runs: Sequence[Limits],
@@ -303,7 +303,7 @@ def _number(value: object) -> float | None:
 
 
 def _comparisons(statistics: Statistics, device: Device, which: Which) -> tuple[Comparison, ...]:
-    return tuple(compare(statistics, name, spin) for name, spin in device.expected(which).items())
+    return tuple(compare(statistics, name, spin) for name, spin in device.expected_spins(which).items())
 
 
 def _which(source: Source[LimitReadings], device: Device) -> Which:
@@ -388,14 +388,14 @@ def _sentences(limits: Limits) -> Iterable[str]:
     if limits.ends:
         yield "The top " + ", ".join(f"{ENDS[kind]} {_times(n)}" for kind, n in limits.ends.items()) + "."
     for one in limits.comparisons:
-        yield _compared(one)
+        yield _compare(one)
 
 
 def _times(n: int) -> str:
     return {1: "once", 2: "twice"}.get(n, f"{n} times")
 
 
-def _compared(one: Comparison) -> str:
+def _compare(one: Comparison) -> str:
     off = one.difference.value or 0.0
     where = f"{abs(off):.2f} Hz {'above' if off > 0 else 'below'} the {one.name}, {one.expected:.2f} Hz"
     if one.p is None:

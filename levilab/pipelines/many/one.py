@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import DataError, DoesNotSuit, unquoted
+from levilab.errors import DataError, DoesNotSuit, unquote
 from levilab.files import CannotWrite
 from levilab.formats.waveforms.header import NoRate
 from levilab.pipelines.catalogue import ANALYSES, Analysis
@@ -115,7 +115,7 @@ def analyze_one(task: Task) -> Row | PassedOver:
         part = _analyze(task, analysis, about)
     except DoesNotSuit as error:
         if task.searched and not task.is_run:
-            return PassedOver(unquoted(str(error)) if isinstance(error, NoRate) else "")
+            return PassedOver(unquote(str(error)) if isinstance(error, NoRate) else "")
         about["problem"] = str(error)
     except (DataError, CannotWrite, OSError) as error:
         about["problem"] = str(error)
@@ -129,7 +129,7 @@ def analyze_one(task: Task) -> Row | PassedOver:
 def row(analysis: Analysis[Any], about: dict[str, Any], part: dict[str, Any] | None) -> Row:
     """Return the row from facts about the input, and from its part of result.json; None where there is no result."""
     if problem := about.get("problem", ""):
-        about["problem"] = problem = " ".join(unquoted(problem).split())
+        about["problem"] = problem = " ".join(unquote(problem).split())
     path, *others = HEAD
     cells = (
         path.read(about),  # as it is: two names may differ in their spaces

@@ -10,7 +10,7 @@ import numpy as np
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import title_of
 from levilab.pipelines.precession.analysis import at_most, intercept_of, slope_of
-from levilab.present.numbers import column, plain, short_name, signed, with_decimals, without_unit
+from levilab.present.numbers import column, plain, short_name, with_decimals, with_sign, without_unit
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def _point_cells(fit: SweepFit, point: Point, departure: str) -> tuple[str, ...]
         "—" if point.spin is None else without_unit(Estimate(point.spin, point.u_spin, "Hz")),
         departure,
         plain(point.leverage, 2) if point.used else "left out",
-        "—" if change is None else signed(change, 2),
+        "—" if change is None else with_sign(change, 2),
     )
 
 

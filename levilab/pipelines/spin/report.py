@@ -31,7 +31,7 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
     return ReportPart(
         subject="spin frequency",
         heading="Spin frequency of a top",
-        lead=_used(analysis),
+        lead=_count_pulses(analysis),
         verdict=analysis.text,
         result=(
             Paragraph(" ".join(meaning(analysis)), "What it means."),
@@ -52,7 +52,7 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
     )
 
 
-def _used(analysis: SpinAnalysis) -> str:
+def _count_pulses(analysis: SpinAnalysis) -> str:
     """Return the number of pulses of single records, and of records or windows, of which each has its pulses."""
     pulses = sum(run.spin.pulses for run in analysis.runs if not run.which)
     counts = {"pulse": pulses} if pulses else {}

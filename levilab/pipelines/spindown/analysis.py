@@ -108,7 +108,7 @@ def top_of_device(device: Device | None) -> Top:
     )
 
 
-def _undoubted(sources: Sequence[Source[Readings]], runs: Sequence[SpinDown]) -> Sequence[SpinDown]:
+def _without_doubtful(sources: Sequence[Source[Readings]], runs: Sequence[SpinDown]) -> Sequence[SpinDown]:
     """Return the runs whose unit is not in doubt; all of them where every unit is."""
     return [run for source, run in zip(sources, runs, strict=True) if not source.readings.doubtful] or runs
 
@@ -118,7 +118,7 @@ METHOD = Method(
     kind=SpinDownAnalysis,
     options=SpinDownOptions,
     fit=fit_source,
-    combine=lambda sources, runs, _: combine(_undoubted(sources, runs)),
+    combine=lambda sources, runs, _: combine(_without_doubtful(sources, runs)),
     mixed="a mean over both says nothing about a real top",
 )
 

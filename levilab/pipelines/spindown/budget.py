@@ -44,12 +44,12 @@ def budget_of_run(source: Source[Readings], run: SpinDown, options: SpinDownOpti
     """Return the budgets of the best law, of laws that fit as well with no more constants, and of the exponent."""
     return tuple(
         Budget(name, estimate.value, estimate.u, estimate.unit, tuple(_rows(source, run, fit, name, options)), fit.name)
-        for fit, name in _wanted(run)
+        for fit, name in _parameters(run)
         if (estimate := fit.parameters[name]).value is not None and estimate.u and name in fit.parts
     )
 
 
-def _wanted(run: SpinDown) -> list[tuple[LawFit, str]]:
+def _parameters(run: SpinDown) -> list[tuple[LawFit, str]]:
     best = run.fit(run.best)
     wanted = [(best, name) for name in best.parameters if _is_determined(best, name)]
     as_good = [(run.fit(law), name) for law in _as_good(run.verdict, run.fits) for name in LAWS[law].constants]

@@ -136,7 +136,7 @@ def _check(run: SpinDown) -> None:
             raise ValueError(f"the curve of {fit.name} is not one of its readings")
 
 
-def _outdated(run: SpinDown) -> str:
+def _check_models(run: SpinDown) -> str:
     unknown = [fit.name for fit in run.fits if fit.name not in LAWS]
     return f"its result has a drag law that this version lacks, {unknown[0]}" if unknown else ""
 
@@ -147,5 +147,5 @@ DOCUMENT = Document(
     entries=_entries,
     run_entries=_run_entries,
     check=_check,
-    outdated=_outdated,
+    outdated=_check_models,
 )

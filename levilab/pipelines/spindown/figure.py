@@ -153,11 +153,11 @@ def _run_label(analysis: SpinDownAnalysis, k: int) -> str | None:
     if len(analysis.runs) == 1:
         return "readings" + (" ± u" if analysis.runs[0].u is not None else "")
     if len(analysis.runs) <= len(MARKERS):
-        return _drawable(short_name(analysis.sources[k].name))
+        return _legend_text(short_name(analysis.sources[k].name))
     return f"readings of {len(analysis.runs)} runs" if k == 0 else None
 
 
-def _drawable(name: str) -> str:
+def _legend_text(name: str) -> str:
     """Return a name for a legend: no formula, no hidden label, and no character that the font lacks."""
     font = get_font(findfont("DejaVu Sans"))
     text = "".join(c if c.isprintable() and font.get_char_index(ord(c)) else "□" for c in name)
@@ -282,7 +282,7 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
     ends = []
     for name, difference in curves.items():
         axes.plot(t, difference, linewidth=1.3, zorder=2.6, **LOOKS[name].as_line)
-        where = "" if np.abs(difference).max() <= most else f", to {_signed(difference)} Hz"
+        where = "" if np.abs(difference).max() <= most else f", to {_with_sign(difference)} Hz"
         shaded = ", 2 u shaded" if name == best and u is not None else ""
         said = _note(analysis, name) or "not excluded"
         ends.append((float(difference[-1]), name, f"{name}: {said}{shaded}{where}"))
@@ -291,7 +291,7 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
     axes.set_title(f"Readings and laws less the best law{of}", pad=3)
 
 
-def _signed(difference: Array) -> str:
+def _with_sign(difference: Array) -> str:
     """Return the value farthest from zero, in two digits."""
     farthest = float(difference[np.argmax(np.abs(difference))])
     return f"{'−' if farthest < 0 else '+'}{digits(abs(farthest))}"

@@ -8,7 +8,7 @@ import numpy as np
 from analysis.errors import AnalysisError, NotPositive, TimesNotIncreasing
 from analysis.numbers import digits
 from analysis.pulses import phases, track_of_times
-from analysis.spindown.readings import checked
+from analysis.spindown.readings import check_readings
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, Table, read_table
@@ -166,7 +166,7 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
     if u is not None:
         _must_be_possible(table, u, frequency)
     try:  # as the fit does; here, too, since one run under the drive spoils no search of a folder
-        checked(time, frequency, u)
+        check_readings(time, frequency, u)
     except AnalysisError as error:
         raise _in_the_file(table, error) from error
     doubts = _doubts(table, time, frequency)

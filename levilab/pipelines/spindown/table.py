@@ -9,7 +9,7 @@ import numpy as np
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
-from analysis.spindown.tilt import counted
+from analysis.spindown.tilt import count_of
 from levilab.pipelines.part import title_of
 from levilab.pipelines.row import cells_of
 from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
@@ -162,7 +162,7 @@ def tilt_part(fit: LawFit, time: Array) -> Array:
     """Return the share of tilt and wobble in the count at some times [Hz], shape (n,); zeros without them."""
     p = len(fit.law.parameters)
     tau = (time - fit.start_time) / fit.reference[1]
-    spin: Array = fit.reference[0] * counted(fit.law, tau, fit.solution[:p], fit.top)
+    spin: Array = fit.reference[0] * count_of(fit.law, tau, fit.solution[:p], fit.top)
     return fit.spin_frequency(time) - spin
 
 

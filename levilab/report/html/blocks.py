@@ -125,7 +125,7 @@ def _tabular(_: Writer, block: Tabular, __: int) -> Html:
     classes = _classes(block.table, block.wraps, names=block.first_column_wraps)
     drawn = _table(block.table, block.table.rows, classes, block.narrow)
     named = block.table.title or block.name.replace("-", " ")
-    return element("div", _moved_sideways(drawn, named), _small_print(block.note), class_="table")
+    return element("div", _scroll_sideways(drawn, named), _small_print(block.note), class_="table")
 
 
 def _listing(_: Writer, block: Listing, __: int) -> Html:
@@ -133,11 +133,11 @@ def _listing(_: Writer, block: Listing, __: int) -> Html:
     whole = replace(block.table, title="")
     pieces = [_table(whole, rows[k : k + size], classes) for k in range(0, len(rows), size)]
     title = element("strong", words(block.table.title)) if block.table.title else ""
-    shown = _moved_sideways(join(pieces), block.table.title or block.name.replace("-", " "), "scroll pieces")
+    shown = _scroll_sideways(join(pieces), block.table.title or block.name.replace("-", " "), "scroll pieces")
     return element("div", title, shown, _small_print(block.note), class_="listing")
 
 
-def _moved_sideways(drawn: Html, name: str, kind: str = "scroll") -> Html:
+def _scroll_sideways(drawn: Html, name: str, kind: str = "scroll") -> Html:
     """Return what is too wide is moved sideways, also from the keyboard."""
     return element("div", drawn, class_=kind, tabindex="0", role="region", aria_label=name)
 

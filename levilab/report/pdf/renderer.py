@@ -285,7 +285,7 @@ def _lines(text: str) -> list[Text]:
     return [_text(line) for line in text.split("\n")]
 
 
-def _fixed(text: str) -> Text:
+def _monospace(text: str) -> Text:
     """Return a line in letters of one width, divided anywhere; nothing is typeset."""
     parts = _divisible(_plain(text))
     return parts[0] if len(parts) == 1 else parts
@@ -344,7 +344,7 @@ def _facts(block: Facts, _: _Drawing) -> Drawn:
 
 
 def _fact(fact: Fact) -> Drawn:
-    put = _fixed if fact.code else _text
+    put = _monospace if fact.code else _text
     return {"name": _text(fact.name), "texts": [put(text) for text in fact.texts], "code": fact.code}
 
 
@@ -391,7 +391,7 @@ _BLOCKS: Mapping[type, Callable[[Any, _Drawing], Drawn | None]] = MappingProxyTy
         Banner: _banner,
         Warnings: _warnings,
         Bullets: lambda it, _: {"kind": "bullets", "texts": [_text(text) for text in it.texts]},
-        Code: lambda it, _: {"kind": "code", "lines": [_fixed(line) for line in it.text.split("\n")]},
+        Code: lambda it, _: {"kind": "code", "lines": [_monospace(line) for line in it.text.split("\n")]},
         Facts: _facts,
         Tabular: _tabular,
         Listing: _listing,

@@ -79,7 +79,7 @@ class Disc(NamedTuple):
     nodes: Array
 
 
-def _pushed(field: Any, v: Any, five: Any, x: Any, y: Any, moment: Any) -> Any:
+def _push(field: Any, v: Any, five: Any, x: Any, y: Any, moment: Any) -> Any:
     p, q, _, s, g = five
     m = moment
     across = x * m[0] + y * m[1]
@@ -90,7 +90,7 @@ def _pushed(field: Any, v: Any, five: Any, x: Any, y: Any, moment: Any) -> Any:
     )
 
 
-def _pushed_without_q(field: Any, v: Any, five: Any, x: Any, y: Any, moment: Any) -> Any:
+def _push_without_q(field: Any, v: Any, five: Any, x: Any, y: Any, moment: Any) -> Any:
     p, _, _, s, g = five
     m = moment
     return (
@@ -102,9 +102,7 @@ def _pushed_without_q(field: Any, v: Any, five: Any, x: Any, y: Any, moment: Any
 
 #: A vector v with ∇(M·B) added to it: (field, v, its five functions, x, y, moment).  The field is known last, so all
 #: else is multiplied before.
-with_force = by_type(
-    {Paraxial2: _pushed_without_q, Paraxial: _pushed, ParaxialThick: _pushed, Sheet: _pushed, Thick: _pushed}
-)
+with_force = by_type({Paraxial2: _push_without_q, Paraxial: _push, ParaxialThick: _push, Sheet: _push, Thick: _push})
 
 
 @part

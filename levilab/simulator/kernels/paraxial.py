@@ -88,7 +88,7 @@ def _next(n: Any, height: Any, inverse: Any, now: Any, before: Any) -> Any:
 
 
 @part
-def _summed(coefficients: Any, r2: Any, even: Any, odd: Any, sums: Any, n: Any, power: Any) -> Any:
+def _add_terms(coefficients: Any, r2: Any, even: Any, odd: Any, sums: Any, n: Any, power: Any) -> Any:
     """Return the five sums with the terms of n added: φ₂ₙ, φ₂ₙ₊₁ and φ₂ₙ₊₂ are even[0], odd and even[1]."""
     p, q, bz, s, g = sums
     c = coefficients
@@ -118,7 +118,7 @@ def to_any_power(field: Any, z: Any, r2: Any) -> Any:
         ga, la = _next(2 * n, height, qa, ga, la), ga
         gb, lb = _next(2 * n, height, qb, gb, lb), gb
         following = k * (a2 * ga - b2 * gb)
-        sums = _summed(field.weights[n], r2, (even, following), odd, sums, n, (p1, p2))
+        sums = _add_terms(field.weights[n], r2, (even, following), odd, sums, n, (p1, p2))
         ga, la = _next(2 * n + 1, height, qa, ga, la), ga
         gb, lb = _next(2 * n + 1, height, qb, gb, lb), gb
         even = following
@@ -141,7 +141,7 @@ def of_thick_base(field: Any, z: Any, r2: Any) -> Any:
     p1, p2 = 0.0, 0.0
     for n in range(len(field.weights)):
         following = k * (a2 * (ga - ha) - b2 * (gb - hb))
-        sums = _summed(field.weights[n], r2, (even, following), odd, sums, n, (p1, p2))
+        sums = _add_terms(field.weights[n], r2, (even, following), odd, sums, n, (p1, p2))
         for i in range(2):
             ga, la = _next(2 * n + i, bottom, qa, ga, la), ga
             gb, lb = _next(2 * n + i, bottom, qb, gb, lb), gb

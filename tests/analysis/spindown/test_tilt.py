@@ -12,7 +12,7 @@ from analysis.residuals import largest_change
 from analysis.spindown.combine import combine
 from analysis.spindown.drag import LAWS, spin
 from analysis.spindown.fit import fit_spin_down
-from analysis.spindown.tilt import LAST_GAP, LAST_GAP_U, LAST_TILT2, LAST_TILT2_U, THESIS_TOP, Top, counted
+from analysis.spindown.tilt import LAST_GAP, LAST_GAP_U, LAST_TILT2, LAST_TILT2_U, THESIS_TOP, Top, count_of
 
 T = np.arange(0, 160, 10.0)
 TURN, DELTA, RESONANCE = 2 * np.pi, 0.03, 21.6
@@ -61,7 +61,7 @@ def ar1(rho, n, rng):
 
 def test_the_count_solves_the_balances_of_torque_and_momentum():
     q = LAWS["disc"].dimensionless([40.0, 2.34e-4], 29.0, T[-1])
-    found = 29.0 * counted(LAWS["disc"], T / T[-1], np.array([*q, np.tan(DELTA) ** 2, RESONANCE / 29.0, 0.0]))
+    found = 29.0 * count_of(LAWS["disc"], T / T[-1], np.array([*q, np.tan(DELTA) ** 2, RESONANCE / 29.0, 0.0]))
     # δ for tan δ: 3e-4 of the tilt's 0.2 Hz; near the fall that is stretched by some times
     assert found == pytest.approx(COUNTS, abs=5e-4)
     assert COUNTS[-1] - spin("disc", T, 40.0, 2.34e-4)[-1] > 0.1
@@ -71,7 +71,7 @@ def test_the_count_solves_the_balances_of_torque_and_momentum():
 def test_a_moment_along_the_axis_leaves_the_closed_form(law, q):
     tau = np.linspace(0, 1, 9)
     # 1e-7: cubics between 120 points
-    assert counted(LAWS[law], tau, np.array([*q, 0.0, 0.6, 0.0])) == pytest.approx(
+    assert count_of(LAWS[law], tau, np.array([*q, 0.0, 0.6, 0.0])) == pytest.approx(
         LAWS[law].spin(tau, np.array(q)), rel=1e-7
     )
 
@@ -277,7 +277,7 @@ def test_a_wave_about_a_law_is_no_noise():
 def test_a_search_that_whole_steps_lead_astray_is_begun_again(seed):
     """Readings by the disc law every 2 s until 0.3 Hz above the resonance: mixed follows them as well."""
     q = np.array([1.2158, 0.3843, 5.4e-4, 0.757, 1.22e-3])  # of a driven top on the virtual bench
-    f = 27.95 * counted(LAWS["disc"], np.linspace(0, 1, 62), q, THESIS_TOP)
+    f = 27.95 * count_of(LAWS["disc"], np.linspace(0, 1, 62), q, THESIS_TOP)
     f += np.random.default_rng(seed).normal(0, 0.0077, 62)
     found = fit_spin_down(np.linspace(0, 122, 62), f, laws=("disc", "mixed"), driven=True)
     assert not [remark for fit in found.fits for remark in fit.remarks if remark.kind == "not converged"]
@@ -292,7 +292,7 @@ def test_a_reading_left_out_does_not_agree_with_the_fit_of_the_others():
         last = 2 / constant * ((2 * np.pi * end) ** -0.5 - (2 * np.pi * 34.0) ** -0.5)
         time, q = np.linspace(0, last, 62), LAWS["disc"].dimensionless([34.0, constant], 29.0, last)
         shape = (np.tan(delta) ** 2, RESONANCE / 29.0, 0.0)
-        counts = 29.0 * counted(LAWS["disc"], time / last, np.array([*q, *shape])) + rng.normal(0, 7.7e-3, 62)
+        counts = 29.0 * count_of(LAWS["disc"], time / last, np.array([*q, *shape])) + rng.normal(0, 7.7e-3, 62)
         run = fit_spin_down(time, counts)
         away = [remark.values[3] for remark in run.remarks if remark.kind == "outlier"]
         assert all(ratio > 4 for ratio in away)  # of 62 readings noise makes one of 4.3 in a thousand runs

@@ -45,7 +45,7 @@ SETTINGS = [
         id=f"{name}.{setting.name}",
     )
     for name, make, head, driver in PARTS
-    for setting in driver.declared()
+    for setting in driver.declared_settings()
 ]
 
 
@@ -130,7 +130,7 @@ FEW_VALUES = [
 def test_a_setting_of_few_values_is_read_in_any_form(make, head, header, answers):
     for answer, value in answers.items():
         with conversation(make, (f"{head}{header}?", answer)) as part:
-            name = next(setting.name for setting in part.declared() if setting.header.endswith(header))
+            name = next(setting.name for setting in part.declared_settings() if setting.header.endswith(header))
             assert getattr(part, name) == value
 
 

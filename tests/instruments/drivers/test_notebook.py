@@ -105,6 +105,9 @@ def test_the_only_values_that_an_input_has_are_taken(bench):
 @pytest.mark.parametrize("name", ROWS)
 def test_every_setting_of_every_driver_has_help(name):
     driver = ROWS[name].driver
-    for row in (*driver.declared(), *(driver.CHANNEL.declared() if hasattr(driver, "CHANNEL") else ())):
+    for row in (
+        *driver.declared_settings(),
+        *(driver.CHANNEL.declared_settings() if hasattr(driver, "CHANNEL") else ()),
+    ):
         assert row.header in row.__doc__
         assert row.unit in row.__doc__

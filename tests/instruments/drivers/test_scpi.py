@@ -289,7 +289,7 @@ def test_a_gate_that_another_program_changed_is_named():
     lines = [*accepted("SENS:FREQ:GATE:TIME 0.001")]
     with conversation(Keysight53230A, *lines) as counter:
         counter.gate = 1e-3
-        now = {row.name_with_unit: 0.0 for row in counter.declared()} | {"gate_s": 5e-3}
+        now = {row.name_with_unit: 0.0 for row in counter.declared_settings()} | {"gate_s": 5e-3}
         assert counter.changed_settings(now) == {"gate_s": (1e-3, 5e-3)}
 
 

@@ -21,7 +21,7 @@ from instruments.links.serial_port import SerialTransport, port_name
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.core.device import VirtualInstrument
-from instruments.virtual.core.line import LineSettings, received_as
+from instruments.virtual.core.line import LineSettings, receive
 from instruments.virtual.core.rows import Ask
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from support.waiting import HANG_GUARD_S as AT_MOST
@@ -232,7 +232,7 @@ LINES = st.builds(
 @given(st.binary(max_size=64), LINES)
 def test_between_ends_set_alike_bytes_arrive_as_they_were_sent(data, line):
     mask = (1 << line.data_bits) - 1
-    assert received_as(data, line, line) == bytes(byte & mask for byte in data)
+    assert receive(data, line, line) == bytes(byte & mask for byte in data)
 
 
 @given(st.binary(max_size=64), LINES)
@@ -240,16 +240,16 @@ def test_more_stop_bits_than_needed_change_nothing(data, line):
     # the samples of a receiver at twice the rate would fall elsewhere: this goes through the bits
     twice = LineSettings(line.baud_rate, line.data_bits, line.parity, 2.0)
     other = "O" if line.parity == "E" else "E"
-    assert received_as(data, twice, line) == received_as(data, line, line)
+    assert receive(data, twice, line) == receive(data, line, line)
     if line.parity != "N":
         unchecked = LineSettings(line.baud_rate, line.data_bits, other, 1.0)
-        assert received_as(data, line, unchecked, checked=False) == received_as(data, line, line)
+        assert receive(data, line, unchecked, checked=False) == receive(data, line, line)
 
 
 @given(st.binary(max_size=64), LINES, LINES)
 def test_garbage_is_the_same_each_time_and_no_longer_than_time_allows(data, sender, receiver):
-    heard = received_as(data, sender, receiver)
-    assert heard == received_as(data, sender, receiver)
+    heard = receive(data, sender, receiver)
+    assert heard == receive(data, sender, receiver)
     shortest = (1 + receiver.data_bits + (receiver.parity != "N") + 0.5) / receiver.baud_rate
     assert len(heard) <= sender.duration(len(data)) / shortest + 1
     assert all(byte < 1 << receiver.data_bits for byte in heard)
@@ -257,7 +257,7 @@ def test_garbage_is_the_same_each_time_and_no_longer_than_time_allows(data, send
 
 def test_what_a_program_set_to_8n1_hears_of_a_425():
     # as seen by many who forgot the parity: every other letter has its highest bit set
-    heard = received_as(b"LSCI,MODEL425", LineSettings(57600, 7, "O"), LineSettings(57600, 8, "N"))
+    heard = receive(b"LSCI,MODEL425", LineSettings(57600, 7, "O"), LineSettings(57600, 8, "N"))
     assert heard == b"L\xd3CI,\xcdO\xc4EL42\xb5"
 
 

@@ -113,7 +113,7 @@ def rows(kind):
     """The settings that a driver declares, those of a scope's input included, each with the part that has it."""
     driver = kind.driver(None)
     parts = [driver, *([driver.CHANNEL(driver, 1)] if hasattr(driver, "CHANNEL") else ())]
-    return [(row, part) for part in parts for row in part.declared()]
+    return [(row, part) for part in parts for row in part.declared_settings()]
 
 
 def excuse(pair):

@@ -14,7 +14,7 @@ from analysis.uncertainty import Estimate
 from levilab.crosscheck.catalogue import SUBJECTS
 from levilab.crosscheck.figure import crosscheck_figure
 from levilab.crosscheck.study import study_world
-from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquired, pull_of
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquire_mock, pull_of
 from levilab.crosscheck.subjects.motion import nutation
 from levilab.crosscheck.table import crosscheck_table, failures_as_text
 from levilab.present.style import as_png
@@ -100,7 +100,7 @@ def test_ctrl_c_in_a_trial_ends_the_cross_check():
             signal.raise_signal(signal.SIGINT)
             return request.wiring()
 
-        acquired("field", seed, folder, lambda request: replace(request, wiring=lambda: interrupted(request)))
+        acquire_mock("field", seed, folder, lambda request: replace(request, wiring=lambda: interrupted(request)))
         return [Pull("five", 5.0, 0.1, 5.0)]
 
     with pytest.raises(KeyboardInterrupt):

@@ -9,7 +9,7 @@ import pytest
 
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fall import FALLS_BETWEEN_HZ
-from analysis.spindown.tilt import counted
+from analysis.spindown.tilt import count_of
 from analysis.uncertainty import Estimate
 from levilab import analyze
 from levilab.live.envelope import Groups
@@ -26,7 +26,7 @@ C32, START_HZ, RESONANCE_HZ, TILT_RAD = 2.3e-4, 34.0, 21.4, 0.025
 def test_the_forecast_is_of_the_law_and_does_not_run_into_the_resonance() -> None:
     time = np.arange(0.5, 116.0, 2.0)
     q = LAWS["disc"].dimensionless([START_HZ, C32], START_HZ, time[-1])
-    spin = START_HZ * counted(LAWS["disc"], time / time[-1], np.array([*q, TILT_RAD**2, RESONANCE_HZ / START_HZ, 0.0]))
+    spin = START_HZ * count_of(LAWS["disc"], time / time[-1], np.array([*q, TILT_RAD**2, RESONANCE_HZ / START_HZ, 0.0]))
     noise = np.random.default_rng(2).normal(0, 0.005, time.size)
     found = spin_down({"time_s": time, "spin_frequency_hz": spin + noise}, 1)
     curve, last = found.curve, float(time[-1])

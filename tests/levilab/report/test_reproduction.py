@@ -12,7 +12,7 @@ from typing import Any
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import read_options
 from levilab.present.document.blocks import Code, Facts, Note, Tabular
-from levilab.report.reproduction import Asked, named_in_commands, reproduction
+from levilab.report.reproduction import Asked, paths_in_commands, reproduction
 from support.paths import SAMPLE_DATA
 
 
@@ -33,8 +33,8 @@ def test_of_many_inputs_the_paths_are_named_that_were_typed() -> None:
     # their folders would be "many" and ".", which holds more
     sources: Any = [SimpleNamespace(path=Path("many") / f"{k}.csv") for k in range(14)]
     sources.append(SimpleNamespace(path=Path("r.csv")))
-    assert named_in_commands(sources, [Path("many"), Path("r.csv"), Path("traces")]) == ["many", "r.csv"]
-    assert named_in_commands(sources[:14]) == ["many"]
+    assert paths_in_commands(sources, [Path("many"), Path("r.csv"), Path("traces")]) == ["many", "r.csv"]
+    assert paths_in_commands(sources[:14]) == ["many"]
 
 
 def test_options_that_no_command_can_hold_are_named_as_they_are_typed() -> None:

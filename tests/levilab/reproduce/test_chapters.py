@@ -14,7 +14,7 @@ from levilab.present.style import as_svg
 from levilab.reproduce import beyond, dipole, driven, errata, gans, limits, paths, simon, spindown, statistics, windows
 from levilab.reproduce.check import Because, Comparison, Kind, Verdict, check, counts
 from levilab.reproduce.table import numbers
-from levilab.reproduce.tops import THESIS, scan, started, survivors
+from levilab.reproduce.tops import THESIS, preset_at, scan, survivors
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset
 from levilab.stability.scan import all_up_until, last_up, lower_limit, upper_edges
@@ -118,12 +118,12 @@ def test_the_least_spin_is_one_number_or_has_the_mass_that_changes_it_beside_it(
     assert slip.values["true"] == pytest.approx(stability_of(preset("undriven")).sleeping, rel=1e-9)
     assert "25.26 g at 7.30 cm" in slip.name
     assert "the printed 14.005 Hz are its own equation's for 25.30 g at 7.3 cm" in slip.why
-    limit, words, explained = paths.compare_sleeping_limits(started("IC1", "friction"))
+    limit, words, explained = paths.compare_sleeping_limits(preset_at("IC1", "friction"))
     assert limit == pytest.approx(21.729, abs=0.001)
     assert "21.73 Hz for its 25.285 g, which float at 7.28 cm" in words
     assert "25.26 g float at 7.30 cm, in a weaker field: 21.69 Hz" in words
     assert explained
-    _, _, explained = paths.compare_sleeping_limits(started("IC1", "friction", "top.inertia_axial_kg_m2=1.8e-6"))
+    _, _, explained = paths.compare_sleeping_limits(preset_at("IC1", "friction", "top.inertia_axial_kg_m2=1.8e-6"))
     assert not explained
 
 
@@ -169,9 +169,9 @@ def test_the_edges_over_a_ring_of_dipoles_are_zeros_of_polynomials():
 
 def test_the_third_start_gives_its_limit_from_three_millimetres_and_not_from_five():
     spins = scan(22.0, 22.6, 0.05)
-    three = lower_limit(spins, survivors(started("IC3"), spins))
+    three = lower_limit(spins, survivors(preset_at("IC3"), spins))
     assert three == pytest.approx(THESIS["limits.lower.IC3"].value, abs=0.05)
-    five = survivors(started("IC3", "undriven", "start.position_m=[0.005,0,0.0725]"), spins)
+    five = survivors(preset_at("IC3", "undriven", "start.position_m=[0.005,0,0.0725]"), spins)
     assert not five.any()
 
 

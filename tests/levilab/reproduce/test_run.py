@@ -23,13 +23,13 @@ def chapter(name: str, *, holds: bool) -> Chapter:
 
 
 def test_chapters_come_in_their_order_and_a_wrong_name_is_refused(tmp_path):
-    assert [one.name for one in run.chosen(None)] == list(catalogue.CHAPTERS)
-    assert [one.name for one in run.chosen("gans,limits")] == ["limits", "gans"]
+    assert [one.name for one in run.choose(None)] == list(catalogue.CHAPTERS)
+    assert [one.name for one in run.choose("gans,limits")] == ["limits", "gans"]
     ended = command("reproduce", "--only", "limit", cwd=tmp_path)
     assert ended.status == 2
     assert "--only limit: chapters are stability, limits" in ended.err
     with pytest.raises(UsageError, match="chapters are stability, limits"):  # and not everything, which takes a minute
-        run.chosen("")
+        run.choose("")
 
 
 def test_a_report_has_its_verdicts_and_is_the_same_each_time_and_never_markup():
@@ -92,7 +92,7 @@ def test_a_name_of_another_format_is_refused_before_anything_is_computed(tmp_pat
 
 @pytest.mark.slow
 def test_no_chapter_has_anything_unexpected_and_the_page_has_all_counts():
-    found = run.reproduce(run.chosen(None))
+    found = run.reproduce(run.choose(None))
     assert found.unexpected == ()
     page = (ROOT / "docs/reproduce.md").read_text(encoding="utf-8").splitlines()
     for chapter, of_chapter in found.chapters:
