@@ -20,7 +20,7 @@ _QUANTITY = re.compile(r"`([a-z]\w*)`")
 def unquote(text: str) -> str:
     """Return a message without its backquotes, for a file: its reader may not use the command line.
 
-    >>> unquoted('f.csv: say `columns` = "t=1,f=2"; `levilab analyze` reads it then')
+    >>> unquote('f.csv: say `columns` = "t=1,f=2"; `levilab analyze` reads it then')
     'f.csv: say columns = "t=1,f=2"; `levilab analyze` reads it then'
     """
     return _QUANTITY.sub(r"\1", text)

@@ -125,7 +125,7 @@ def with_decimals(value: float, decimals: int) -> str:
 def with_sign(value: float, decimals: int) -> str:
     """Return a number with its sign, and none where it rounds to zero.
 
-    >>> signed(0.471, 2), signed(-0.002, 2), signed(-1.614, 2)
+    >>> with_sign(0.471, 2), with_sign(-0.002, 2), with_sign(-1.614, 2)
     ('+0.47', '0.00', '−1.61')
     """
     text = f"{value:+.{decimals}f}"

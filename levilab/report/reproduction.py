@@ -185,7 +185,7 @@ def _recording(sources: Sequence[Source[Any]]) -> tuple[Block, ...]:
 def _as_typed(words: Sequence[str]) -> str:
     """Return a recorded command as one types it.
 
-    >>> _typed(["/usr/lib/levilab/__main__.py", "acquire", "spin", "--note", "a b"])
+    >>> _as_typed(["/usr/lib/levilab/__main__.py", "acquire", "spin", "--note", "a b"])
     "levilab acquire spin --note 'a b'"
     """
     name, *arguments = words

@@ -61,7 +61,7 @@ def choose(only: str | None) -> list[Chapter]:
     Raises:
         UsageError: there is no such chapter, or the list is empty.
 
-    >>> [chapter.name for chapter in chosen("errata, limits")]
+    >>> [chapter.name for chapter in choose("errata, limits")]
     ['limits', 'errata']
     """
     if only is None:

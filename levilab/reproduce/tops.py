@@ -37,7 +37,7 @@ FALL_M = 0.06
 def preset_at(name: str, scene: str = "undriven", *settings: str) -> Scene:
     """Return a preset from a start of the thesis, with the mass of its simulations.
 
-    >>> started("IC3").start.position_m, started("IC4").top.mass_kg
+    >>> preset_at("IC3").start.position_m, preset_at("IC4").top.mass_kg
     ((0.003, 0.0, 0.0725), 0.025285)
     """
     return with_settings(preset(scene), [f"top.mass_kg={MASS_KG}", *STARTS[name], *settings])

@@ -39,9 +39,9 @@ def receive(data: bytes, sender: LineSettings, receiver: LineSettings, *, checke
         checked: whether a byte with a wrong parity bit becomes a NUL, as in VISA (VPP-4.3, VI_ATTR_ASRL_REPLACE_CHAR).
 
     >>> line = LineSettings(57600, 7, "O")
-    >>> received_as(b"LSCI", line, line)
+    >>> receive(b"LSCI", line, line)
     b'LSCI'
-    >>> received_as(b"LSCI", line, LineSettings(57600, 8, "N"))
+    >>> receive(b"LSCI", line, LineSettings(57600, 8, "N"))
     b'L\xd3CI'
     """
     if (sender.baud_rate, sender.data_bits, sender.parity) == (
