@@ -42,6 +42,23 @@ class OnlyHum(TooFewPulses):
         self.args = (text + "shield the detector from lamps, and look at the trace",)
 
 
+class NoLine(AnalysisError):
+    """No line stands out of a magnetometer's noise.
+
+    Attributes:
+        lowest, highest: where it was searched [Hz].
+        duration: of the record [s].
+        gain: of the strongest one, as natural logarithm of a likelihood.
+    """
+
+    def __init__(self, *, lowest: float, highest: float, duration: float, gain: float) -> None:
+        self.lowest, self.highest, self.duration, self.gain = lowest, highest, duration, gain
+        super().__init__(
+            f"in {digits(duration, 3)} s no line from {digits(lowest, 3)} to {digits(highest, 3)} Hz stands out of the "
+            "noise: bring the sensor nearer to the top, or record longer"
+        )
+
+
 class ShapesDiffer(AnalysisError):
     """Two columns of one table that do not have the same length, or are no columns at all."""
 

@@ -1,0 +1,6 @@
+"""Spin frequency of a top from the magnetic field that its tilted moment turns past a magnetometer."""
+
+from analysis.rotation.result import FieldSpin, Fold
+from analysis.rotation.spin import spin_of_field
+
+__all__ = ["FieldSpin", "Fold", "spin_of_field"]

@@ -1,0 +1,173 @@
+"""A record of a magnetometer, and what is in it beside the line of the spin.
+
+Offset, drift and slow swings are a cubic spline; mains and the two strongest other lines (precession, nutation) have
+amplitudes that change as a parabola, so that their frequencies need not be known exactly.  All of these are linear:
+they are eliminated from the normal equations, each with a wide prior, so that equal columns do no harm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewReadings
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Array = NDArray[np.float64]
+
+#: Samples and seconds below which nothing is told.
+FEWEST, SHORTEST_S = 60, 0.5
+#: Distance of the spline's knots [s]: it follows what is slower than about 2 Hz, as the top's swings at 0.5 to 1.2 Hz.
+KNOTS_S = 0.25
+#: Frequencies of the mains [Hz], wherever they appear at the sampling rate.
+MAINS_HZ = (50.0, 60.0)
+#: Weight of the prior of the amplitudes: they are below ten times the standard deviation of a sample, noise included.
+PRIOR = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A line beside that of the spin: frequency at the middle [Hz] and slope [Hz/s]."""
+
+    frequency: float
+    chirp: float = 0.0
+
+
+class Record:
+    """Samples of one window, scaled.
+
+    Attributes:
+        late: times from their mean on, shape (n,) [s].
+        half: half the duration [s].
+        middle: mean of the times [s].
+        rate: samples per second.
+        field: without its median, over `unit`, shape (n, k).
+        unit: standard deviation of the differences of neighbours over √2, the greatest of the axes [T].
+        left_out: samples that are no numbers.
+    """
+
+    def __init__(self, times: Array, field: Array, left_out: int = 0) -> None:
+        from scipy.sparse import csr_array
+
+        self.middle = float(times.mean())
+        self.late = times - self.middle
+        self.half = 0.5 * float(times[-1] - times[0])
+        self.rate = (times.size - 1) / (2 * self.half)
+        self.left_out = left_out
+        offset = np.median(field, axis=0)
+        self.unit = max(float(np.diff(field, axis=0).std(axis=0).max()) / np.sqrt(2), 1e-300)
+        self.field = (field - offset) / self.unit
+        self.late_of_half = self.late / self.half
+        count = max(round(2 * self.half / KNOTS_S), 1)
+        place = (self.late - self.late[0]) / (2 * self.half) * count
+        first = np.minimum(place.astype(np.int64), count - 1)
+        x = place - first
+        values = np.stack(
+            [(1 - x) ** 3, 3 * x**3 - 6 * x**2 + 4, -3 * x**3 + 3 * x**2 + 3 * x + 1, x**3], axis=1
+        ) / 6  # fmt: skip
+        columns = first[:, None] + np.arange(4)
+        starts = np.arange(0, 4 * x.size + 1, 4)
+        self._spline = csr_array((values.ravel(), columns.ravel(), starts), shape=(x.size, count + 3))
+        self._transposed = self._spline.T.tocsr()
+        self._factor = self._band(values, first, count + 3)
+        self.others: tuple[Line, ...] = tuple(Line(mains) for mains in MAINS_HZ)
+        self._eliminate()
+
+    def at(self, times: Array) -> Record:
+        """Return the same samples at other times."""
+        other = Record(times, self.field * self.unit, self.left_out)
+        other.add_lines(self.others[len(MAINS_HZ) :])
+        return other
+
+    def _band(self, values: Array, first: NDArray[np.int64], size: int) -> Array:
+        """Return the Cholesky factor of the spline's normal matrix, in banded form."""
+        from scipy.linalg import cholesky_banded
+
+        band = np.zeros((4, size))
+        for i in range(4):
+            for j in range(i, 4):
+                band[j - i] += np.bincount(first + i, values[:, i] * values[:, j], minlength=size)
+        band[0] += 1e-9 * values.shape[0]  # a gap leaves splines without a sample
+        return np.asarray(cholesky_banded(band, lower=True))
+
+    def add_lines(self, lines: Sequence[Line]) -> None:
+        """Add lines beside those of the mains."""
+        self.others = (*self.others[: len(MAINS_HZ)], *lines)
+        self._eliminate()
+
+    def _eliminate(self) -> None:
+        """Prepare the elimination of all that is beside the line of the spin."""
+        x = self.late_of_half
+        degrees = np.stack([np.ones_like(x), x, x * x], axis=1)
+        turns = np.stack([line.frequency * self.late + 0.5 * line.chirp * self.late**2 for line in self.others], axis=1)
+        wave = np.exp(2j * np.pi * turns)[:, :, None] * degrees[:, None, :]
+        wave = wave.reshape(x.size, -1)
+        self._lines = np.concatenate([wave.real, wave.imag], axis=1)
+        self._fixed = np.concatenate([self._lines, self.field], axis=1)
+        self._on_fixed, self._by_fixed = self._on_spline(self._fixed)
+        gram = self._fixed.T @ self._fixed - self._on_fixed.T @ self._by_fixed
+        q = self._lines.shape[1]
+        normal = gram[:q, :q] + PRIOR * np.eye(q)
+        self._normal = np.linalg.inv(normal)
+        self._of_field = gram[:q, q:]
+        self.squares = gram[q:, q:] - self._of_field.T @ self._normal @ self._of_field
+        self.parameters = q + self._spline.shape[1]
+
+    def _on_spline(self, columns: Array) -> tuple[Array, Array]:
+        from scipy.linalg import cho_solve_banded
+
+        on = np.asarray(self._transposed @ columns)
+        return on, np.asarray(cho_solve_banded((self._factor, True), on, check_finite=False))
+
+    def project(self, columns: Array) -> tuple[Array, Array]:
+        """Return the normal matrix of columns, shape (p, p), and their products with the field, shape (p, k).
+
+        Both with all else eliminated.
+        """
+        on, by = self._on_spline(columns)
+        cross = self._fixed.T @ columns - self._on_fixed.T @ by
+        q = self._lines.shape[1]
+        of_lines = cross[:q]
+        solved = self._normal @ of_lines
+        normal = columns.T @ columns - on.T @ by - of_lines.T @ solved
+        return normal, (cross[q:] - self._of_field.T @ solved).T
+
+    def rest(self, line: Array | float = 0.0) -> Array:
+        """Return the field without all that is beside the line, and without the line itself, shape (n, k) [unit]."""
+        field = self.field - line
+        on, by = self._on_spline(np.concatenate([self._lines, field], axis=1))
+        q = self._lines.shape[1]
+        of_field = self._lines.T @ field - on[:, :q].T @ by[:, q:]
+        lines = self._normal @ of_field
+        return np.asarray(field - self._lines @ lines - self._spline @ (by[:, q:] - by[:, :q] @ lines))
+
+
+def read_samples(times: Any, field: Any) -> Record:
+    """Return the samples as a record.
+
+    Raises:
+        ShapesDiffer, NotFinite, TimesNotIncreasing, TooFewReadings.
+    """
+    t = np.asarray(times, dtype=np.float64)
+    b = np.asarray(field, dtype=np.float64)
+    b = b[:, None] if b.ndim == 1 else b
+    if t.ndim != 1 or b.ndim != 2 or b.shape[0] != t.size or not 1 <= b.shape[1] <= 3:
+        raise ShapesDiffer(quantity="the field", seen=b.shape, expected=(t.size, min(max(b.shape[-1], 1), 3)))
+    if not np.isfinite(t).all():
+        k = int(np.flatnonzero(~np.isfinite(t))[0])
+        raise NotFinite(quantity="time", index=k, value=float(t[k]))
+    good = np.isfinite(b).all(axis=1)
+    t, b, left_out = t[good], b[good], int(np.count_nonzero(~good))
+    back = np.flatnonzero(np.diff(t) < 0)
+    if back.size:
+        k = int(back[0])
+        raise TimesNotIncreasing(index=k + 1, before=float(t[k]), after=float(t[k + 1]))
+    needed = FEWEST if t.size < 2 or t[-1] <= t[0] else max(FEWEST, round(SHORTEST_S * t.size / float(t[-1] - t[0])))
+    if t.size < needed or t[-1] <= t[0]:
+        raise TooFewReadings(seen=t.size, needed=needed)
+    return Record(t, b, left_out)

@@ -1,0 +1,74 @@
+"""The result of a magnetometer's record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+#: "folded": above half the sampling rate, as the times or the slope tell; "fold-doubt": `folds` cannot be
+#: distinguished; "fold-by-slope": they are distinguished by the slope alone, of a spin that falls; "regular": the
+#: samples lie more evenly than their times say; "weak": the line hardly stands out; "mains": it lies on a mains line.
+Kind = Literal["folded", "fold-doubt", "fold-by-slope", "regular", "weak", "mains"]
+
+
+@dataclass(frozen=True)
+class Fold:
+    """A frequency that has the same samples, but for the jitter of their times.
+
+    Attributes:
+        frequency: at the reference time [Hz].
+        chirp: [Hz/s].
+        likelihood: natural logarithm, relative to the greatest.
+        probability: of this one among all, with the slope's sense.
+    """
+
+    frequency: float
+    chirp: float
+    likelihood: float
+    probability: float
+
+
+@dataclass(frozen=True)
+class FieldSpin:
+    """The spin frequency of a top at one time, and its slope.
+
+    Attributes:
+        frequency: at the reference time [Hz].
+        u_frequency: its standard uncertainty [Hz].
+        chirp: its slope there [Hz/s].
+        u_chirp: its standard uncertainty [Hz/s].
+        reference_time: the mean of the times [s].
+        amplitude: of the line in each axis, shape (k,) [T].
+        u_amplitude: their standard uncertainties, shape (k,) [T].
+        noise: standard deviation of a sample in each axis, shape (k,) [T].
+        sense: +1: the field turns from the sensor's x to y; −1: from y to x; 0: the axes do not tell.
+        bound: Cramér–Rao bound of the frequency in white noise [Hz].
+        snr_db: 20 log₁₀ of amplitude over noise of a sample, in the axis where it is greatest.
+        rate: samples per second.
+        samples: number of those used.
+        left_out: samples that are no numbers.
+        folds: frequencies that could be it, the most probable first, which is this one.
+        kinds: of warnings.
+    """
+
+    frequency: float
+    u_frequency: float
+    chirp: float
+    u_chirp: float
+    reference_time: float
+    amplitude: tuple[float, ...]
+    u_amplitude: tuple[float, ...]
+    noise: tuple[float, ...]
+    sense: int
+    bound: float
+    snr_db: float
+    rate: float
+    samples: int
+    left_out: int
+    folds: tuple[Fold, ...]
+    kinds: tuple[Kind, ...] = ()
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether another of the folds may be the spin."""
+        return "fold-doubt" in self.kinds

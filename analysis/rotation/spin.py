@@ -1,0 +1,121 @@
+"""Estimate the spin from a record of 1 to 3 components of the magnetic field."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.errors import NoLine
+from analysis.rotation.folds import CERTAIN, Weighed, weigh_folds
+from analysis.rotation.line import LineFit, fit_line
+from analysis.rotation.record import MAINS_HZ, Line, Record, read_samples
+from analysis.rotation.result import FieldSpin, Kind
+from analysis.rotation.search import HIGHEST, LOWEST, STEEPEST, other_lines, search
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import ArrayLike
+
+#: Lines beside mains and spin: precession and nutation.
+_OTHERS = 2
+#: A line that is named may lie this part of the given frequency beside it.
+NEAR = 0.1
+#: Gain of the logarithm of the likelihood by a line that noise has with probability 1e-3 anywhere in the search, about:
+#: the χ²/2 of six numbers among 10⁵ independent places.
+LEAST_GAIN = 26.0
+#: A line below this gain [natural logarithm] is called weak: near there the search takes noise for it now and then.
+WEAK_GAIN = 40.0
+
+
+def spin_of_field(times: ArrayLike, field: ArrayLike, *, near: float | None = None) -> FieldSpin:
+    """Estimate spin and slope of a top from samples of the field beside it.
+
+    The line has its own amplitude and phase in each axis; offset, drift, slow swings, mains and two more lines are
+    nuisances.  It is searched from 15 to 85 Hz, above half the sampling rate, too: times that jitter tell a line from
+    its folds, and so does a slope, since a free spin falls.
+
+    Args:
+        times: shape (n,), not decreasing [s]; up to about 12 s, in which the slope changes little.
+        field: shape (n, k) or (n,), k = 1 to 3 axes [T]; samples with a NaN are left out.
+        near: about where the spin is, to 10 % [Hz].
+
+    Raises:
+        TooFewReadings, ShapesDiffer, NotFinite, TimesNotIncreasing: see `analysis.errors`.
+        NoLine: nothing stands out of the noise.
+    """
+    record = read_samples(times, field)
+    low, high = (LOWEST, HIGHEST) if near is None else ((1 - NEAR) * near, (1 + NEAR) * near)
+    fit = strongest(record, low, high)
+    return result_of(record, weigh_folds(record, fit, low, high))
+
+
+def strongest(record: Record, low: float, high: float, chirps: tuple[float, float] = (-STEEPEST, STEEPEST)) -> LineFit:
+    """Return the strongest line in a range of frequencies [Hz] and slopes [Hz/s].  Raises NoLine."""
+    start = search(record, low, high, chirps)
+    first = fit_line(record, start.frequency, start.chirp)
+    rest = record.rest(first.columns @ first.amplitudes)
+    record.add_lines(other_lines(record, rest, Line(first.frequency, first.chirp), _OTHERS))
+    fit = fit_line(record, first.frequency, first.chirp)
+    if not (fit.gain > LEAST_GAIN and math.isfinite(fit.gain)):
+        raise NoLine(lowest=low, highest=high, duration=2 * record.half, gain=fit.gain)
+    return fit
+
+
+def result_of(record: Record, weighed: Weighed) -> FieldSpin:
+    """Return the result of a fit."""
+    fit = weighed.fits[0]
+    cosine, sine = fit.amplitudes
+    amplitude = np.hypot(cosine, sine)
+    noise = np.sqrt(fit.variance)
+    u_frequency, u_chirp = np.sqrt(np.diagonal(fit.covariance))
+    # Fisher's information of the phase, without what is beside the line
+    snr = 0.5 * float(np.sum(amplitude**2 / fit.variance))
+    bound = 1 / (2 * math.pi * math.sqrt(snr * float(record.late @ record.late)))
+    return FieldSpin(
+        frequency=fit.frequency,
+        u_frequency=float(u_frequency),
+        chirp=fit.chirp,
+        u_chirp=float(u_chirp),
+        reference_time=record.middle,
+        amplitude=tuple((record.unit * amplitude).tolist()),
+        u_amplitude=tuple((record.unit * fit.amplitude_u).tolist()),
+        noise=tuple((record.unit * noise).tolist()),
+        sense=_sense_of_rotation(fit),
+        bound=bound,
+        snr_db=20 * math.log10(max(float(np.max(amplitude / noise)), 1e-9)),
+        rate=record.rate,
+        samples=record.late.size,
+        left_out=record.left_out,
+        folds=weighed.folds,
+        kinds=tuple(_kinds(record, weighed)),
+    )
+
+
+def _sense_of_rotation(fit: LineFit) -> int:
+    """Return the sense in the plane of the first two axes, where it is 3 u away from a line to and fro."""
+    if fit.amplitudes.shape[1] < 2:
+        return 0
+    (a, c), (b, d) = fit.amplitudes[:, :2]  # x = a cos + b sin, y = c cos + d sin
+    area = a * d - b * c
+    u = math.hypot(math.hypot(c, d) * fit.amplitude_u[0], math.hypot(a, b) * fit.amplitude_u[1])
+    return 0 if abs(area) < 3 * u else int(math.copysign(1, area))
+
+
+def _kinds(record: Record, weighed: Weighed) -> Iterator[Kind]:
+    fit, folds = weighed.fits[0], weighed.folds
+    if folds[0].probability < CERTAIN:
+        yield "fold-doubt"
+    elif len(folds) > 1:
+        if fit.frequency > record.rate / 2:
+            yield "folded"
+        if not weighed.by_times:
+            yield "fold-by-slope"
+    if weighed.regular:
+        yield "regular"
+    if fit.gain < WEAK_GAIN:
+        yield "weak"
+    if any(abs(fit.frequency - mains) < 0.5 / record.half for mains in MAINS_HZ):
+        yield "mains"

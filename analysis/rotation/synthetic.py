@@ -1,0 +1,57 @@
+"""Synthetic records of a phone's magnetometer, for tests and studies: no physics of a bench, numbers alone."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from analysis.rotation.record import Array
+
+
+def synthetic_field(
+    random: np.random.Generator,
+    *,
+    frequency: float = 31.0,
+    chirp: float = -0.1,
+    duration: float = 10.0,
+    rate: float = 100.0,
+    jitter: float = 3e-4,
+    snr_db: float = 6.0,
+    noise: float = 0.5e-6,
+    bend: float = 1.5,
+    disturbed: bool = True,
+) -> tuple[Array, Array]:
+    """Return times, shape (n,) [s], and a field in three axes, shape (n, 3) [T].
+
+    Args:
+        random: for the noise and all that is not said.
+        frequency: at the mean time [Hz].
+        chirp: its slope there [Hz/s].
+        duration: [s].
+        rate: samples per second.
+        jitter: of each time, 1σ [s].
+        snr_db: 20 log₁₀ of the greatest axis's amplitude over the noise.
+        noise: of a sample, 1σ [T].
+        bend: n of the slope's change n chirp²/frequency.
+        disturbed: with offset, drift, mains at 50 Hz, slow swings and precession.
+    """
+    n = round(duration * rate)
+    times = np.sort(np.arange(n) / rate + random.normal(0, jitter, n))
+    late = times - times.mean()
+    size = noise * 10 ** (snr_db / 20) * np.array([1.0, 0.5, 0.3])
+    turns = frequency * late + chirp * late**2 / 2 + bend * chirp**2 / frequency * late**3 / 6
+    shifts = random.uniform() + np.array([0.0, -0.25, 0.07])
+    field = size * np.cos(2 * np.pi * (turns[:, None] + shifts)) + random.normal(0, noise, (n, 3))
+    if disturbed:
+        x = late[:, None] / duration
+        field += [1.05e-3, 2e-5, -6.2e-4] + 3e-6 * random.normal(size=3) * x + 1e-6 * random.normal(size=3) * x**2
+        precession = 7.5 * 30 / frequency  # as slow as the spin is fast
+        lines = [(50 + random.normal(0, 0.02), 0.0, 0.4e-6), (precession, -precession * chirp / frequency, 0.3e-6)]
+        lines += [(swing, 0.0, 0.3e-6) for swing in (0.59, 0.77, 1.19)]
+        for where, slope, amplitude in lines:
+            turns = where * late + slope * late**2 / 2
+            axes = amplitude * random.uniform(-1, 1, 3), random.uniform(size=3)
+            field += axes[0] * np.cos(2 * np.pi * (turns[:, None] + axes[1]))
+    return times, field
