@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Samples and seconds below which nothing is told.
+#: Least number of samples, and least duration [s].
 FEWEST, SHORTEST_S = 60, 0.5
 #: Distance of the spline's knots [s]: it follows what is slower than about 2 Hz, as the top's swings at 0.5 to 1.2 Hz.
 KNOTS_S = 0.25
