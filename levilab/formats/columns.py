@@ -4,6 +4,7 @@ import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.titles import (
@@ -21,6 +22,9 @@ from levilab.formats.titles import (
     unit_factor,
     without_runs_of_blanks,
 )
+
+if TYPE_CHECKING:
+    from levilab.formats.kinds import Kind
 
 SHORTHANDS = {
     "t": "time_s",
@@ -41,7 +45,11 @@ class TableError(DataError):
 
 
 class NoTable(TableError, DoesNotSuit):
-    """A file that holds no table of text."""
+    """A file that holds no table of text.  `kind`: of file, where its first bytes show it."""
+
+    def __init__(self, path: Path, message: str, *, line: int | None = None, kind: "Kind | None" = None) -> None:
+        self.kind = kind
+        super().__init__(path, message, line=line)
 
 
 class NoSuchColumn(TableError, DoesNotSuit):

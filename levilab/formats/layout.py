@@ -17,6 +17,7 @@ from levilab.formats.dialect import (
     find_dialect,
     most_common,
 )
+from levilab.formats.kinds import OTHER, kind_of_bytes
 from levilab.formats.titles import is_unit, known_titles
 
 HEAD = 65536  # bytes that the guess rests upon
@@ -26,12 +27,6 @@ SAMPLE = 100  # lines, the last of the head: those are rows even below a long pr
 BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"), (codecs.BOM_UTF8, "utf-8-sig"),
-)  # fmt: skip
-OTHER_SIGNATURES = (
-    (b"\x89PNG", "a PNG picture"), (b"PK\x03\x04", "a ZIP or Excel file"), (b"\xd0\xcf\x11\xe0", "an old Excel file"),
-    (b"%PDF", "a PDF document"), (b"\x1f\x8b", "a gzip archive"), (b"RIFF", "a WAV recording"),
-    (b"{", "a JSON file (of a run, name the folder instead)"), (b"<", "an HTML or XML page"),
-    (b"\x93NUMPY", "a NumPy array"), (b"\x89HDF", "an HDF5 file"), (b"\xff\xd8\xff", "a JPEG picture"),
 )  # fmt: skip
 CONTROL = re.compile("[\x00-\x08\x0e-\x19]")  # DOS may end a text with 0x1a
 EXPORT = "a table of text is expected: export it as CSV"
@@ -66,9 +61,7 @@ def sniff(path: Path) -> Layout:
     with path.open("rb") as stream:
         head = stream.read(HEAD)
         whole = not stream.read(1)
-    for mark, what in OTHER_SIGNATURES:
-        if head.startswith(mark):
-            raise NoTable(path, f"is {what}; {EXPORT}")
+    refuse_other_kinds(path, head)
     encoding = _encoding(head)
     text = codecs.getincrementaldecoder(encoding)(errors="replace").decode(head, final=whole)
     if CONTROL.search(text):
@@ -87,6 +80,13 @@ def sniff(path: Path) -> Layout:
         seen = f"'{shorten(line.strip())}' begins no table of at least two columns"
         raise NoTable(path, f"{seen}; {EXPORT}{alone}", line=at)
     return lay_out(lines, encoding, dialect, head)
+
+
+def refuse_other_kinds(path: Path, head: bytes) -> None:
+    """Raise NoTable for a file that is no text by its first bytes, with what to do."""
+    kind = kind_of_bytes(head)
+    if kind is not OTHER:
+        raise NoTable(path, f"is {kind.name}: {kind.advice}", kind=kind)
 
 
 def _of_words(lines: list[str], encoding: str, head: bytes) -> Layout | None:

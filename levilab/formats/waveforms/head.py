@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from levilab.formats.columns import NoTable, TableError
-from levilab.formats.layout import BYTE_ORDER_MARKS, EXPORT, HEAD, OTHER_SIGNATURES
+from levilab.formats.layout import BYTE_ORDER_MARKS, EXPORT, HEAD, refuse_other_kinds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -49,9 +49,7 @@ def read_head(path: Path) -> Head:
     with path.open("rb") as stream:
         head = stream.read(HEAD)
         whole = not stream.read(1)
-    for mark, what in OTHER_SIGNATURES:
-        if head.startswith(mark):
-            raise NoTable(path, f"is {what}; {EXPORT}")
+    refuse_other_kinds(path, head)
     encoding = _encoding(head)
     text = codecs.getincrementaldecoder(encoding)(errors="replace").decode(head, final=whole).replace("\0", "")
     if _CONTROL.search(text):

@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from levilab.errors import UsageError
+from levilab.formats.kinds import AUDIO, kind_of_bytes
 from levilab.formats.table import file_errors
+from levilab.formats.waveforms.audio import read_audio
 from levilab.formats.waveforms.head import read_head
 from levilab.formats.waveforms.header import NoWaveform, dialect_of
 from levilab.formats.waveforms.npy import read_npy
@@ -22,13 +24,13 @@ if TYPE_CHECKING:
 
 #: How names of files end that may hold samples, readings or pulse times, where a folder is searched.
 TEXTS = frozenset({".csv", ".txt", ".dat", ".tsv"})
-SEARCHED = TEXTS | SUFFIXES | {".wav", ".npy"}
+SEARCHED = TEXTS | SUFFIXES | {".wav", ".npy", *AUDIO.suffixes}
 
 
 def read_record(
     path: Path, *, columns: Mapping[str, str] | None = None, rate: float | None = None, guess: bool = True
 ) -> Waveform | PulseTimes:
-    """Read samples or pulse times: WAV, NumPy, a scope's CSV or binary file, CSV with times, a column of times.
+    """Read samples or pulse times: sound, NumPy, a scope's CSV or binary file, CSV with times, a column of times.
 
     Args:
         path: the file.
@@ -45,11 +47,13 @@ def read_record(
         raise UsageError("rate", "samples per second are expected, a number above 0 [Hz]", value=rate)
     with file_errors(path):
         with path.open("rb") as stream:
-            magic = stream.read(12)
-        if magic[:4] in {b"RIFF", b"RIFX", b"RF64"} and magic[8:] == b"WAVE":
+            magic = stream.read(64)
+        if magic[:4] in {b"RIFF", b"RIFX", b"RF64"} and magic[8:12] == b"WAVE":
             return read_wav(path).at_rate(rate)
         if magic.startswith(b"\x93NUMPY"):
             return read_npy(path, rate)
+        if kind_of_bytes(magic) is AUDIO:
+            return read_audio(path).at_rate(rate)
         if path.suffix.casefold() in SUFFIXES:
             return read_scope_binary(path).at_rate(rate)
         head = read_head(path)

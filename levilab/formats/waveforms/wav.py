@@ -75,10 +75,11 @@ def _waveform(path: Path, rate: int, data: NDArray[Any]) -> Waveform:
                 )
             yield block
 
-    return Waveform(path, "WAV", 0.0, 1 / rate, len(data), _signals(columns.shape[1]), read)
+    return Waveform(path, "WAV", 0.0, 1 / rate, len(data), signals_of(columns.shape[1]), read)
 
 
-def _signals(channels: int) -> tuple[Signal, ...]:
+def signals_of(channels: int) -> tuple[Signal, ...]:
+    """Return the channels of a sound, by their number."""
     names = {1: ("mono",), 2: ("left", "right")}.get(channels, tuple(f"CH{k + 1}" for k in range(channels)))
     return tuple(Signal(name, UNIT) for name in names)
 
@@ -115,4 +116,4 @@ def _read_three_bytes(path: Path) -> Waveform:
                 value = three[:, 0] | three[:, 1] << 8 | three[:, 2] << 16
                 yield (value - ((value & 0x800000) << 1)) / 8388608.0
 
-    return Waveform(path, "WAV", 0.0, 1 / rate, count, _signals(channels), read)
+    return Waveform(path, "WAV", 0.0, 1 / rate, count, signals_of(channels), read)

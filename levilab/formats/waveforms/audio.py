@@ -1,0 +1,127 @@
+"""Sound of phones and recorders, m4a, mp3, ogg, flac and the sound track of a film, through FFmpeg, an extra."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import tempfile
+from dataclasses import replace
+from importlib import util
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.formats.columns import NoTable, TableError, shorten
+from levilab.formats.kinds import AUDIO
+from levilab.formats.waveforms.wav import signals_of
+from levilab.formats.waveforms.waveform import BLOCK, Waveform, check_count
+from levilab.software import how_to_install
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+    from typing import IO
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+#: What a file may be, in FFmpeg's names: no list of other files, no address, no script.
+_FORMATS = "mov,mp4,m4a,3gp,3g2,mj2,mp3,ogg,flac,aac,amr,aiff,caf,matroska,webm,asf,avi"
+#: Sun's .au begins with marks, place of the samples, their bytes, kind, rate and channels, each of four bytes: a head
+#: that needs no length, so that it goes through a pipe.
+_AU_HEAD = 24
+#: Bytes of a sample.
+_FLOAT = 4
+
+
+def read_audio(path: Path) -> Waveform:
+    """Read a sound file in parts of full scale, each channel by itself, at its own rate.
+
+    It is decoded once for its length, and again for the samples of a channel, in memory that does not grow with it.
+
+    Raises:
+        NoTable: the extra is not installed.
+        TableError: it has no sound, or is damaged.
+    """
+    if util.find_spec("imageio_ffmpeg") is None:
+        kind = replace(AUDIO, advice=how_to_read())
+        raise NoTable(path, f"is {kind.name}: {kind.advice}", kind=kind)
+    errors: list[str] = []
+    count, rate = 0, 0
+    with _decoded(path, errors) as stream:
+        head = _read_whole(stream, _AU_HEAD)
+        if head[:4] == b".snd":
+            offset, rate, channels = (int.from_bytes(head[k : k + 4], "big") for k in (4, 16, 20))
+            size = _FLOAT * channels
+            count = (sum(map(len, iter(lambda: stream.read(BLOCK), b""))) - (offset - _AU_HEAD)) // size
+    if not rate:
+        raise TableError(path, "holds no sound: is it an empty recording, or a film without a sound track?")
+    check_count(path, count)
+
+    def read(signal: int) -> Iterator[Array]:
+        with _decoded(path, []) as stream:
+            _read_whole(stream, offset)
+            while block := _read_whole(stream, BLOCK * size):
+                whole = np.frombuffer(block[: len(block) // size * size], ">f4").reshape(-1, channels)
+                yield whole[:, signal].astype(np.float64)
+
+    damage = [
+        f"{path.name}: FFmpeg found damage ({text}): if a piece is missing, frequencies are wrong" for text in errors
+    ]
+    return Waveform(path, "sound file", 0.0, 1 / rate, count, signals_of(channels), read, tuple(damage))
+
+
+def how_to_read() -> str:
+    """Return what to do with a sound file without the extra."""
+    extra = f"the extra video (imageio-ffmpeg, which is not installed) reads it: {how_to_install('video')}"
+    return f"{extra}; or make it a WAV with Audacity (File, Export Audio) or by ffmpeg -i sound.m4a sound.wav"
+
+
+def _read_whole(stream: IO[bytes], size: int) -> bytes:
+    """Return so many bytes of a pipe, fewer at its end alone."""
+    parts, left = [], size
+    while left and (part := stream.read(left)):
+        parts.append(part)
+        left -= len(part)
+    return b"".join(parts)
+
+
+@contextlib.contextmanager
+def _decoded(path: Path, errors: list[str]) -> Iterator[IO[bytes]]:
+    """Give the first sound track as .au of 32-bit floats.
+
+    Args:
+        path: the file.
+        errors: where the first error in a file that was read to its end goes.
+
+    Raises:
+        TableError: it is damaged, or FFmpeg cannot be started.
+    """
+    import imageio_ffmpeg
+
+    before = f"-nostdin -v error -protocol_whitelist file,pipe -format_whitelist {_FORMATS} -i"
+    after = "-map 0:a:0 -vn -sn -dn -c:a pcm_f32be -f au pipe:1"
+    with tempfile.TemporaryFile() as said:  # a pipe that fills up would stop FFmpeg
+        try:
+            command = [imageio_ffmpeg.get_ffmpeg_exe(), *before.split(), f"file:{os.fspath(path)}", *after.split()]
+            decoder = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=said)  # noqa: S603
+        except (OSError, RuntimeError) as error:
+            raise TableError(path, f"needs FFmpeg, which does not start ({error}): convert it to WAV") from error
+        assert decoder.stdout
+        whole = False
+        try:
+            yield decoder.stdout
+            whole = not decoder.stdout.read(1)
+        finally:
+            decoder.stdout.close()
+            if not whole:  # the reader has enough, or failed
+                decoder.kill()
+            decoder.wait()
+        said.seek(0)
+        lines = said.read(2000).decode(errors="replace").strip().splitlines()
+    if whole and decoder.returncode:
+        why = shorten(lines[-1] if lines else f"it ended with {decoder.returncode}", 100)
+        raise TableError(path, f"holds no sound that FFmpeg reads ({why}): convert it to WAV with Audacity")
+    errors += [shorten(line, 100) for line in lines[:1]] if whole else []
