@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from levilab.errors import DataError
-from levilab.pipelines.options import InputOptions
+from levilab.pipelines.options import OF_FILES, InputOptions
 from levilab.pipelines.result import Place, place_of
 from levilab.pipelines.sources import Needs, Readings, Remark, Skipped, Source, collect
 from levilab.runs.run import find_run
@@ -159,7 +159,7 @@ class Method(Generic[S, R, Opt, A]):
     fit: Callable[[Source[S], Opt], R]
     combine: Callable[[Sequence[Source[S]], Sequence[R], Opt], Any] = lambda *_: None
     mixed: str = ""
-    of_files: frozenset[str] = frozenset({"columns", "channel", "rate"})
+    of_files: frozenset[str] = frozenset(OF_FILES)
     skips: bool = False
     budget_of_run: Callable[[Source[S], R, Opt], tuple[Budget, ...]] = lambda *_: ()
     budget_of_all: Callable[[A], tuple[Budget, ...]] = lambda _: ()
@@ -171,9 +171,12 @@ class Method(Generic[S, R, Opt, A]):
 
     def analyze_found(self, paths: Sequence[Path], found: Found[S], options: Opt) -> A:
         """Do the same for inputs that were found already."""
-        return self.gather(
-            paths, found, options, lambda source: (source, self.fit(source, options), Origin(options, NOW))
-        )
+
+        def one(source: Source[S]) -> tuple[Source[S], R, Origin[Opt]]:
+            own = replace(options, **source.kept)
+            return source, self.fit(source, own), Origin(own, NOW)
+
+        return self.gather(paths, found, options, one)
 
     def gather(
         self,

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, PlainSerializer
 from levilab.errors import DataError, unquote
 from levilab.files import finite
 from levilab.pipelines.analyzed import FOR_THIS_PAGE, A, Method, Opt, Origin, R, S
+from levilab.pipelines.correction import read_correction
 from levilab.pipelines.result import AGAIN, SCHEMA, Archive, Earlier, Part, Result, relative
 from levilab.pipelines.sources import collect
 from levilab.runs.run import find_run
@@ -114,12 +115,12 @@ class Document(Generic[S, R, Opt, A, D]):
         return Archive(paths, self.result, results)
 
     def reading(self, archive: Archive[D], options: Opt) -> Callable[[Path], Opt]:
-        """Return how an input is read: with the given options, else those of its earlier result."""
+        """Return how an input is read: with the given options, those kept beside it, those of its earlier result."""
         given = _given_options(options)
 
         def reading(path: Path) -> Opt:
             earlier = archive.earlier(path, path)
-            return replace(self._options(earlier), **given) if earlier else options
+            return replace(self._options(earlier), **{**read_correction(path), **given}) if earlier else options
 
         return reading
 
@@ -166,9 +167,9 @@ class Document(Generic[S, R, Opt, A, D]):
         return self.outdated(earlier.part.result)
 
     def _own_values(self, given: Mapping[str, Any], source: Source[S]) -> dict[str, Any]:
-        """Return those of the given options that matter to an input."""
+        """Return those of the given and kept options that matter to an input."""
         left_out = self.method.of_files if source.run else frozenset[str]()
-        return {name: value for name, value in given.items() if name not in left_out}
+        return {**source.kept, **{name: value for name, value in given.items() if name not in left_out}}
 
     def _recall_one(
         self, source: Source[S], archive: Archive[D], given: Mapping[str, Any]

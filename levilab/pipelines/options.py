@@ -216,8 +216,10 @@ KINDS: Mapping[str, type[InputOptions]] = MappingProxyType({
 OPTIONS: Mapping[str, Option] = MappingProxyType(
     {name: one for kind in KINDS.values() for name, one in options_of(kind).items()}
 )
+#: Those that say how a data file is read.
+OF_FILES = ("columns", "channel", "rate")
 #: Those that `levilab report` has, too.
-OF_REPORT = ("columns", "channel", "rate", "reading_u", "keep_outliers")
+OF_REPORT = (*OF_FILES, "reading_u", "keep_outliers")
 
 
 def typed_name(name: str) -> str:

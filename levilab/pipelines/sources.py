@@ -8,19 +8,20 @@ import math
 import os
 from collections import Counter
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
 from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.record import SEARCHED
+from levilab.pipelines.correction import describe, place_of_correction, read_correction
 from levilab.present.clock import local
 from levilab.present.numbers import list_in_words
 from levilab.runs.run import READINGS, RECORD, Run, find_runs
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from datetime import datetime
 
     from levilab.pipelines.options import InputOptions
@@ -91,6 +92,7 @@ class Source(Generic[R]):
         run: None for a data file.
         name: for people, as short as distinguishes it from the others.
         warnings: about the input.
+        kept: options out of the correction beside a data file with which it was read.
     """
 
     path: Path
@@ -100,6 +102,7 @@ class Source(Generic[R]):
     readings: R
     name: str
     warnings: tuple[str, ...] = ()
+    kept: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def synthetic(self) -> bool:
@@ -254,8 +257,11 @@ def _one(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
 
 
 def _of_file(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
-    readings = needs.read_file(path, options)
-    return Source(path, path, sha256_of(path), None, readings, path.name, readings.warnings)
+    """Read a data file.  Options that are given go before those of the correction beside it."""
+    kept = {key: value for key, value in read_correction(path).items() if getattr(options, key) in (None, value)}
+    readings = needs.read_file(path, replace(options, **kept))
+    note = [f"{path.name}: is read as {place_of_correction(path).name} says: {describe(kept)}"] if kept else []
+    return Source(path, path, sha256_of(path), None, readings, path.name, (*readings.warnings, *note), kept)
 
 
 def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
@@ -301,9 +307,8 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
             broken.append(Skipped(str(error)))
     files = data_files(root)
     for file in files:
-        chosen = replace(options(file), guess=False)
         with _skipping(broken, remarks):
-            found.append(_of_file(file, needs, chosen))
+            found.append(_of_file(file, needs, replace(options(file), guess=False)))
     kinds = [SkippedRuns(kind, count) for kind, count in sorted(others.items())]
     if not found:
         text = f"{root}: {_nothing_found(needs, kinds, broken, [file.name for file in files])}"

@@ -1,0 +1,110 @@
+"""How a data file is read, kept beside it in FILE.levilab.toml: `levilab open` writes it, every analysis reads it."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import DataError, UsageError
+from levilab.files import parse_toml, replace_atomically, writing
+from levilab.formats.columns import SHORTHANDS
+from levilab.formats.titles import CANONICAL
+from levilab.pipelines.options import OF_FILES, read_options
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+ENDING = ".levilab.toml"
+_HEAD = "# How levilab reads {name}; options on the command line go before.  levilab open --help\n"
+#: The values of each key, as text.
+_EXPECTED = {
+    "columns": '{t = "Zeit", f = "Drehzahl [rpm]"}, each a title or a number',
+    "channel": "a name or a number of a channel",
+    "rate": "samples per second",
+}
+
+
+class CorrectionError(DataError):
+    """A FILE.levilab.toml that cannot be used."""
+
+
+def place_of_correction(file: Path) -> Path:
+    """Return where the correction of a data file lies.
+
+    >>> from pathlib import Path
+    >>> place_of_correction(Path("a/my.csv")).name
+    'my.csv.levilab.toml'
+    """
+    return file.with_name(file.name + ENDING)
+
+
+def read_correction(file: Path) -> dict[str, Any]:
+    """Return the options kept beside a data file, by the names of their fields; empty without any.
+
+    Raises CorrectionError, which names the file and the key.
+    """
+    path = place_of_correction(file)
+    try:
+        table = parse_toml(path.read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError):
+        return {}
+    except OSError as error:
+        raise CorrectionError(f"{path}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise CorrectionError(f"{path}: is no TOML ({error}): correct it, or delete it") from error
+    for key, value in table.items():
+        if key not in OF_FILES:
+            near = difflib.get_close_matches(key, OF_FILES, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(OF_FILES)}"
+            raise CorrectionError(f"{path}: {key} is no key known here: {hint}")
+        if not _is_of_kind(key, value):
+            raise CorrectionError(f"{path}: {key} = {str(value)[:60]!r}: {_EXPECTED[key]} is expected")
+    try:
+        return read_options({key: str(value) if key == "channel" else value for key, value in table.items()})
+    except UsageError as error:
+        raise CorrectionError(f"{path}: {error}") from error
+
+
+def _is_of_kind(key: str, value: object) -> bool:
+    if key == "rate":
+        return isinstance(value, float | int) and not isinstance(value, bool)
+    if key == "channel" or isinstance(value, str):
+        return type(value) in {str, int}
+    named = value if isinstance(value, dict) else {"": ""}
+    return {*named} <= {*SHORTHANDS, *CANONICAL} and all(type(to) in {str, int} for to in named.values())
+
+
+def write_correction(file: Path, options: Mapping[str, Any]) -> Path:
+    """Keep how a data file is read, in place of an earlier correction.  Returns the file.
+
+    Raises:
+        UsageError: there is nothing to keep.
+        CannotWrite: of the file.
+    """
+    lines = [f"{key} = {_as_toml(options[key])}\n" for key in OF_FILES if options.get(key) is not None]
+    if not lines:
+        raise UsageError("keep", "goes with `columns`, `channel` or `rate`: without one the file is read as it is")
+    path = place_of_correction(file)
+    with writing(f"{path}: could not be written", "copy the data file to a folder of yours"):
+        replace_atomically(path, _HEAD.format(name=file.name) + "".join(lines))
+    return path
+
+
+def _as_toml(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {_as_toml(to)}" for key, to in value.items()) + "}"
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def describe(options: Mapping[str, Any]) -> str:
+    """Return options that say how a file is read, as text.
+
+    >>> describe({"columns": {"t": "1", "f": "2 [rpm]"}, "rate": 100.0})
+    'columns t=1,f=2 [rpm]; rate 100.0'
+    """
+    return "; ".join(
+        f"{key} {','.join(f'{name}={to}' for name, to in value.items()) if isinstance(value, dict) else value}"
+        for key, value in options.items()
+    )

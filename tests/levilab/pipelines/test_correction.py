@@ -1,0 +1,126 @@
+"""FILE.levilab.toml beside a data file: read by every analysis, below the options that are given."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import levilab
+from levilab.errors import UsageError
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.correction import CorrectionError, place_of_correction, read_correction, write_correction
+from levilab.pipelines.many.table import write_table
+from support.commands import command
+from support.spin_downs import spin_down_csv
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+#: A frequency in the first column and the time in the second, in turns a minute: not what a reader would guess.
+READ = {"columns": {"t": "2", "f": "1 [rpm]"}}
+
+
+@pytest.fixture
+def swapped(tmp_path: Path) -> Path:
+    """A spin-down whose columns have no titles and stand the other way around."""
+    spin_down_csv(file := tmp_path / "my.csv")
+    rows = [line.split(",")[:2] for line in file.read_text("utf-8").splitlines()[1:]]
+    file.write_text("".join(f"{60 * float(f):.9g},{t}\n" for t, f in rows), encoding="utf-8")
+    return file
+
+
+def first(found: Any, number: int = 0) -> float:
+    """The first spin frequency of an input [Hz]."""
+    return float(found.sources[number].readings.frequency[0])
+
+
+def kept(file: Path, text: str) -> Path:
+    path = place_of_correction(file)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_what_was_written_is_read_again(tmp_path: Path) -> None:
+    options = {"columns": {"t": 'Zeit "t", s', "f": "Drehzahl [1/min] \x7fé\\"}, "channel": "CH2", "rate": 44100.0}
+    path = write_correction(tmp_path / "my.csv", options)
+    assert path.name == "my.csv.levilab.toml"
+    assert read_correction(tmp_path / "my.csv") == options
+
+
+def test_the_correction_is_used_named_and_recorded(swapped: Path) -> None:
+    with pytest.raises(levilab.errors.DataError):
+        levilab.analyze(swapped, "spindown")
+    write_correction(swapped, READ)
+    result = levilab.analyze(swapped, "spindown")
+    assert first(result.found) == pytest.approx(40, rel=0.01)
+    assert any("is read as my.csv.levilab.toml says: columns t=2,f=1 [rpm]" in text for text in result.warnings)
+    ended = command("analyze", "spindown", "my.csv", cwd=swapped.parent)
+    assert ended.status == 0
+    written = json.loads((swapped.parent / "my.csv.result.json").read_text("utf-8"))
+    assert written["settings"]["columns"] == READ["columns"]
+
+
+def test_options_that_are_given_go_before_it(swapped: Path) -> None:
+    kept(swapped, 'columns = "t=1,f=2"\n')
+    result = levilab.analyze(swapped, "spindown", columns=READ["columns"])
+    assert result.found.options.columns == READ["columns"]
+    assert not any("levilab.toml" in text for text in result.warnings)
+
+
+def test_each_file_of_a_folder_has_its_own(swapped: Path) -> None:
+    write_correction(swapped, READ)
+    spin_down_csv(swapped.parent / "other.csv", seed=2)
+    found = ANALYSES["spindown"].analyze([swapped.parent], ANALYSES["spindown"].options_from({}))
+    assert first(found, 0) == pytest.approx(first(found, 1), rel=1e-3)
+    table = swapped.parent / "all.csv"
+    assert write_table(ANALYSES["spindown"], [swapped], {}, table, cores=1).failed == 0
+
+
+def test_a_report_follows_a_changed_correction(swapped: Path) -> None:
+    analysis = ANALYSES["spindown"]
+    write_correction(swapped, {"columns": {"t": "2", "f": "1"}})
+    assert command("analyze", "spindown", "my.csv", cwd=swapped.parent).status == 0
+    as_written = analysis.recall([swapped], analysis.options_from({}))
+    assert as_written.origins[0].text.startswith("as levilab analyze found it")
+    write_correction(swapped, READ)
+    again = analysis.recall([swapped], analysis.options_from({}))
+    assert math.isclose(first(as_written), 60 * first(again), rel_tol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ("columns = 3", "columns"),
+        ('colums = "t=1"', "colums is no key known here: did you mean columns?"),
+        ("rate = -5", "rate"),
+        ('rate = "fast"', "rate"),
+        ('columns = {speed = "2"}', "columns"),
+        ('columns = "t"', "columns"),
+        ("columns = {t = 1", "is no TOML"),
+        ("\xff", "is no TOML"),
+    ],
+)
+def test_a_broken_correction_is_refused_with_path_and_key(swapped: Path, text: str, key: str) -> None:
+    path = place_of_correction(swapped)
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(CorrectionError) as refused:
+        levilab.analyze(swapped, "spindown")
+    assert str(refused.value).startswith(f"{path}: ")
+    assert key in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_broken_correction_leaves_out_its_file_alone(swapped: Path) -> None:
+    path = kept(swapped, "rate = -5")
+    spin_down_csv(swapped.parent / "other.csv", seed=2)
+    result = levilab.analyze(swapped.parent, "spindown")
+    assert [source.name for source in result.found.sources] == ["other.csv"]
+    assert any(str(path) in text for text in result.warnings)
+
+
+def test_nothing_is_kept_without_an_option(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="keep"):
+        write_correction(tmp_path / "my.csv", {"columns": None})
