@@ -12,10 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.errors import ImpossibleCylinder
+from analysis.errors import AnalysisError
 from analysis.uncertainty import Estimate
 
 Array = NDArray[np.float64]
+
+
+class ImpossibleCylinder(AnalysisError):
+    """A part of a top with a value that no cylinder has."""
+
+    def __init__(self, *, part: str, quantity: str, seen: float, expected: str) -> None:
+        self.part, self.quantity, self.seen, self.expected = part, quantity, seen, expected
+        super().__init__(f"part {part}: {quantity} = {seen:g}, {expected} is expected: correct it")
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ Each error says what was seen, what was expected and what to do, and carries the
 
 
 class InstrumentError(Exception):
-    """Anything that an instrument, or the way to it, did wrong.  address: the resource name."""
+    """Anything that an instrument, or the way to it, did wrong.  address: the resource name; reason: all but that."""
 
-    def __init__(self, address: str, message: str) -> None:
-        self.address = address
-        super().__init__(f"{address}: {message}")
+    def __init__(self, address: str, reason: str) -> None:
+        self.address, self.reason = address, reason
+        super().__init__(f"{address}: {reason}")
 
 
 class NotConnected(InstrumentError):
@@ -27,20 +27,17 @@ class Occupied(NotConnected):
 class NoAnswer(InstrumentError):
     """The instrument stayed silent.  question: what was asked; timeout: how long was waited [s]."""
 
+    ADVICE = "is it switched on, and free of other programs?"
+
     def __init__(self, address: str, question: str, timeout: float) -> None:
         self.question, self.timeout = question, timeout
-        super().__init__(
-            address,
-            f"no answer to {question!r} within {timeout:g} s: is it switched on, and free of other programs?",
-        )
+        super().__init__(address, f"no answer to {question!r} within {timeout:g} s: {self.ADVICE}")
 
 
 class SilentLine(NoAnswer):
-    """No answer on a serial line: what can be tried there stands in the message too."""
+    """No answer on a serial line."""
 
-    def __init__(self, address: str, question: str, timeout: float) -> None:
-        super().__init__(address, question, timeout)
-        self.args = (f"{self} Are baud rate, data bits and parity those of the instrument?",)
+    ADVICE = f"{NoAnswer.ADVICE} Are baud rate, data bits and parity those of the instrument?"
 
 
 #: What to try after a bad answer, and how much of one stands in the message.

@@ -15,17 +15,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.errors import (
-    FieldStandsStill,
-    FieldTurnsOver,
-    ImpossibleRing,
-    NoField,
-    NotFinite,
-    NotFitted,
-    NotPositive,
-    ShapesDiffer,
-    TooFewHeights,
-)
+from analysis.errors import NotFinite, NotPositive, ShapesDiffer
+from analysis.field.errors import FieldStandsStill, FieldTurnsOver, ImpossibleRing, NoField, NotFitted, TooFewHeights
 from analysis.field.ring import Ring, on_axis, reversal, slopes
 from analysis.least_squares import solve
 from analysis.numbers import digits

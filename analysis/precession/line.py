@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.errors import NoRange, TooFewReadings
+from analysis.errors import AnalysisError, TooFewReadings
 
 Array = NDArray[np.float64]
 
@@ -31,6 +31,16 @@ CONFIDENCE = 0.95
 _CLOSE, _MOST_ROUNDS = 1e-14, 100
 #: A scatter below this share of the values is rounding.
 _ROUNDING = 1e-13
+
+
+class NoRange(AnalysisError):
+    """Points that all lie at one drive frequency [Hz]."""
+
+    def __init__(self, *, at: float, seen: int) -> None:
+        self.at, self.seen = at, seen
+        super().__init__(
+            f"all {seen} points are at a drive frequency of {at:g} Hz, a line needs several: sweep the drive"
+        )
 
 
 @dataclass(frozen=True)

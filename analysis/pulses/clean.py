@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.errors import TooFewPulses
-from analysis.numbers import digits
+from analysis.pulses.errors import TooFewPulses
 from analysis.pulses.regression import Fit, median
 from analysis.pulses.result import Finding
 from analysis.pulses.search import WIDE, find_events, noise_of, shorten
@@ -70,12 +69,10 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, times: Arr
         share = shorten(bad.astype(np.float64), factor)
         whole = share == 0
         counted = whole  # the others hold a value that was put in
-        notes.append(Finding("not-finite", f"{np.count_nonzero(bad)} samples are no finite numbers and do not count"))
+        notes.append(Finding("not-finite", values=(int(np.count_nonzero(bad)),)))
     dead = _dead_bins(bins, bin_rate, whole)
     if dead.any():
-        notes.append(
-            Finding("gap", f"the signal is constant for {digits(np.count_nonzero(dead) / bin_rate, 3)} s in all")
-        )
+        notes.append(Finding("gap", values=(np.count_nonzero(dead) / bin_rate,)))
         counted = counted & ~dead
         long = np.zeros(samples.size, dtype=bool)
         long[: bins.size * factor] = np.repeat(dead, factor)
@@ -86,13 +83,12 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, times: Arr
         bins = np.interp(np.arange(bins.size), np.flatnonzero(counted), bins[counted])
     lines = _without_pulse_lines(mains_lines(bins, bin_rate), bins, bin_rate)
     if lines:
-        names = " and ".join(f"{digits(amplitude)} at {frequency:.5g} Hz" for frequency, amplitude in lines)
-        notes.append(Finding("hum", f"hum of amplitude {names} was taken off"))
+        notes.append(Finding("hum", values=tuple(value for line in lines for value in line)))
         samples, bins = _without_hum(samples, rate, bins, counted, [frequency for frequency, _ in lines], times=times)
     steps = _baseline(bins, bin_rate, counted)
     if steps is not None:
         times, values = steps
-        notes.append(Finding("wander", f"the baseline wanders by {digits(float(np.ptp(values)))} and was taken off"))
+        notes.append(Finding("wander", values=(float(np.ptp(values)),)))
         samples = samples - np.interp(np.arange(samples.size) / rate, times, values)
         bins = bins - np.interp((np.arange(bins.size) + 0.5) / bin_rate, times, values)
     if not counted.all():

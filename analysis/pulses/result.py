@@ -14,14 +14,20 @@ Method = Literal["edges", "matched", "likelihood"]
 
 @dataclass(frozen=True)
 class Finding:
-    """A remark for the user: a short name, the same in all versions, and a sentence.
+    """What to know of a trace before using its frequency, without words.
 
-    Names: fell-back, missing, doubled, wrong, jump, half, double, mains, hum, clipped, gap, not-finite, wander,
-    correlated, scattered, coarse; unlike of a track, no-pulses of a run with several records.
+    Attributes:
+        name: a short name, the same in all versions: a row of `levilab.pipelines.spin.words`, which lists `values`.
+        of: which of the cases of that name; empty where there is one.
+        values: what was seen.
+        where: number of the first window or record of several with this finding, from 1 on; how many have it; how many
+            there are.  Empty: of the only one.
     """
 
     name: str
-    text: str
+    of: str = ""
+    values: tuple[float, ...] = ()
+    where: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewPulses
-from analysis.numbers import digits
+from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing
+from analysis.pulses.errors import TooFewPulses
 from analysis.pulses.jump import Jump
 from analysis.pulses.regression import Fit, fit_turns, median, student
 from analysis.pulses.result import Finding, SpinFrequency
@@ -243,23 +243,17 @@ def findings_of(train: Train) -> tuple[Finding, ...]:
     """Return the findings about a train."""
     notes = []
     if train.missing:
-        rare = ", more than have one: is the spin a part of this?" if train.missing > train.used.size else ""
-        notes.append(
-            Finding("missing", f"{train.missing} turn{'s have' if train.missing > 1 else ' has'} no pulse{rare}")
-        )
+        notes.append(Finding("missing", values=(train.missing, train.used.size)))
     if train.doubled:
-        notes.append(Finding("doubled", f"{train.doubled} pulses lie beside the turns' own and were left out"))
+        notes.append(Finding("doubled", values=(train.doubled,)))
     return (*notes, *findings_of_fit(train.fit, "pulses"))
 
 
-def findings_of_fit(fit: Fit, what: str, start: float = 0.0) -> tuple[Finding, ...]:
-    """Return the findings about a fit to turns or pulses."""
+def findings_of_fit(fit: Fit, of: str, start: float = 0.0) -> tuple[Finding, ...]:
+    """Return the findings about a fit to "turns" or "pulses"."""
     notes = []
     if (jump := fit.jump) is not None:
-        size = f"{digits(abs(1e3 * jump.lost), 3)} ms, or that and whole turns,"
-        did = "misses" if jump.lost > 0 else "repeats"
-        notes.append(Finding("jump", f"the record {did} {size} at {start + jump.at:.5g} s: allowed for"))
+        notes.append(Finding("jump", values=(jump.lost, start + jump.at)))
     if fit.scatter.correlated_p < SELDOM:
-        alike = "resemble each other" if fit.scatter.inflation > 1 else "differ from each other, which averages out"
-        notes.append(Finding("correlated", f"neighbouring {what} {alike}: variance x {digits(fit.scatter.inflation)}"))
+        notes.append(Finding("correlated", of, (fit.scatter.inflation,)))
     return tuple(notes)

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.errors import NotPositive, OnlyHum, ShapesDiffer, TooFewPulses
-from analysis.numbers import digits
+from analysis.errors import NotPositive, ShapesDiffer
 from analysis.pulses import traps
 from analysis.pulses.clean import Clean, clean
 from analysis.pulses.edges import Edges, place_edges
+from analysis.pulses.errors import OnlyHum, TooFewPulses
 from analysis.pulses.likelihood import search
 from analysis.pulses.matched import Match, match, window_of
 from analysis.pulses.regression import Grid, fit_turns, median, student
@@ -202,22 +202,15 @@ def _find_pulses(trace: Trace, method: Choice) -> Found:
     notes = (*why, *trap, *trace.notes)
     if train is None or not _same_turns(found.fit, train.fit):
         return Found(found, doubled, used, found.origin, notes)
-    notes = (
-        _scatter_finding(train, "a mean pulse does not show it, so their own places are in the uncertainty"),
-        *notes,
-    )
+    notes = (Finding("scattered", "in u", (_scatter(train),)), *notes)
     return Found(found, doubled, used, found.origin, notes, train.fit)
 
 
 def _from_train(trace: Trace, train: Train) -> Found:
     """Return the result by pulses that were placed one by one."""
     edges = Edges(train.fit, train.used.size, math.nan, math.nan, math.nan, train.missing, 0)
-    notes = (_scatter_finding(train, "each was timed by itself, without a mean pulse"), *trace.notes)
+    notes = (Finding("scattered", "one by one", (_scatter(train),)), *trace.notes)
     return Found(edges, train.doubled, "edges", 0.0, notes)
-
-
-def _scatter_finding(train: Train, text: str) -> Finding:
-    return Finding("scattered", f"the pulses come early or late by {digits(_scatter(train), 2)} turns (rms): {text}")
 
 
 def _scattered_train(trace: Trace, left: float) -> Train | None:
@@ -271,11 +264,12 @@ def _by_edges(trace: Trace) -> tuple[Edges, int]:
 
 
 def _by_pulse(trace: Trace, method: Choice) -> tuple[Match, int, Method, tuple[Finding, ...]]:
-    """Return the match, the number of pulses beside the turns' own, the method, and why it is not the other one.
+    """Return the match, the number of pulses beside the turns' own, the method, and a finding if it is not "matched".
 
     Raises TooFewPulses.
     """
-    found, doubled, seen, astray, why = None, 0, 0, False, "no pulses stand out that return regularly"
+    found, doubled, seen, astray = None, 0, 0, False
+    why: Finding | None = Finding("fell-back", "no pulses")
     try:
         train = trace.train
         doubled, seen = train.doubled, train.used.size
@@ -288,16 +282,13 @@ def _by_pulse(trace: Trace, method: Choice) -> tuple[Match, int, Method, tuple[F
             raise trace.too_few(seen)
         return found, doubled, "matched", ()
     if found is not None and method == "auto":
-        why = "more pulses lie beside the turns than at them" if astray else _doubt(found)
-        if not why:
+        why = Finding("fell-back", "astray") if astray else _doubt(found)
+        if why is None:
             return found, doubled, "matched", ()
     other = _match_by_likelihood(trace, found)
     if other is None or _sweep(other) > MOST_SWEPT:
         raise trace.too_few(seen)
-    notes = (
-        () if method == "likelihood" else (Finding("fell-back", f"{why}: the greatest likelihood was searched for"),)
-    )
-    return other, doubled, "likelihood", notes
+    return other, doubled, "likelihood", () if why is None or method == "likelihood" else (why,)
 
 
 def _match_by_likelihood(trace: Trace, found: Match | None) -> Match | None:
@@ -313,16 +304,16 @@ def _sweep(found: Match) -> float:
     return abs(slope) * 2 * found.fit.half / found.fit.middle_frequency
 
 
-def _doubt(found: Match) -> str:
-    """Return the reason to distrust a match; empty where there is none."""
+def _doubt(found: Match) -> Finding | None:
+    """Return the reason to distrust a match; None where there is none."""
     turns, sweep = found.heights.size, _sweep(found)
     if sweep > MOST_SWEPT:
-        return f"the frequency would change by {digits(sweep * found.fit.middle_frequency, 3)} Hz"
+        return Finding("fell-back", "sweep", (sweep * found.fit.middle_frequency,))
     if found.missing > MOST_MISSING * turns:
-        return f"{found.missing} of {turns} turns have no pulse"
+        return Finding("fell-back", "missing", (found.missing, turns))
     if found.wrong > MOST_WRONG * turns:
-        return f"{found.wrong} of {turns} pulses are not at their place"
-    return ""
+        return Finding("fell-back", "wrong", (found.wrong, turns))
+    return None
 
 
 def _without_trap(trace: Trace, found: Match) -> tuple[Match, tuple[Finding, ...]]:
@@ -335,15 +326,13 @@ def _without_trap(trace: Trace, found: Match) -> tuple[Match, tuple[Finding, ...
         if twice is None or traps.alternates(twice):
             break
         found = twice  # which may be half of it in turn: a quarter of the frequency fits, too
-        notes = (Finding("half", "two equal pulses a turn: half the frequency fitted too, and was not taken"),)
+        notes = (Finding("half"),)
     if notes:
         return found, notes
     if why := traps.alternates(found) or traps.displaces(trace.bins, found.fit.phase(trace.middles)):
         half = trace.match(found.fit.times(0.5))
         if half is not None:
-            return half, (
-                Finding("double", f"every second pulse {why}: two marks a turn, twice the frequency was not taken"),
-            )
+            return half, (Finding("double", why),)
     return found, ()
 
 
@@ -387,14 +376,13 @@ def _result(pulses: Found, start: float, rate: float, degree: int | None) -> Spi
     assert frequency.value is not None
     more = [*pulses.notes, *traps.mains(frequency, chirp)]
     if isinstance(found, Match) and found.flat:
-        more.append(Finding("clipped", "the tops of the pulses are flat: the detector or the converter is saturated"))
+        more.append(Finding("clipped"))
     if (each := rate / frequency.value) < COARSE:
-        more.append(Finding("coarse", f"a turn has {digits(each, 2)} samples only: a faster top may look the same"))
+        more.append(Finding("coarse", values=(each,)))
     if found.missing:
-        have = "s have" if found.missing > 1 else " has"
-        more.append(Finding("missing", f"{found.missing} turn{have} no pulse"))
+        more.append(Finding("missing", values=(found.missing, found.turns)))
     if found.wrong:
-        more.append(Finding("wrong", f"{found.wrong} pulses are not at their place and were left out"))
+        more.append(Finding("wrong", values=(found.wrong,)))
     more += findings_of_fit(fit, "turns", start)
     return SpinFrequency(
         frequency=frequency,

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.errors import NotPositive, TooFewPulses
+from analysis.errors import NotPositive
+from analysis.pulses.errors import TooFewPulses
 from analysis.pulses.regression import median
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.times import FEWEST, check_times, spin_of_times
 from analysis.pulses.trace import Choice, spin_of_trace
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Mapping
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,22 @@ WINDOW = 2.0
 CERTAIN = 0.1
 #: Natural logarithm of the ratio of neighbouring frequencies that no drag and no drive of 2 s makes: 20 %.
 UNLIKE = 0.18
+
+
+def collect_findings(of_each: Mapping[int, Iterable[Finding]], number: int) -> tuple[Finding, ...]:
+    """Return the findings of windows or records, each name once, with the first one that has it.
+
+    of_each: number of the window or record, from 1 on → its findings; number: of them in all.
+    """
+    first: dict[str, Finding] = {}
+    having: dict[str, list[int]] = {}
+    for k, findings in of_each.items():
+        for one in findings:
+            first.setdefault(one.name, one)
+            having.setdefault(one.name, []).append(k)
+    if number == 1:
+        return tuple(first.values())
+    return tuple(replace(one, where=(having[name][0], len(having[name]), number)) for name, one in first.items())
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,21 +77,13 @@ class Track:
 
     @property
     def notes(self) -> tuple[Finding, ...]:
-        """Findings of the windows, each name once, with the number of windows."""
-        windows: dict[str, list[str]] = {}
-        for spin in self.spins:
-            for note in spin.notes:
-                windows.setdefault(note.name, []).append(note.text)
-        findings = [
-            Finding(name, f"{texts[0]}" + (f" (and in {len(texts) - 1} more windows)" if len(texts) > 1 else ""))
-            for name, texts in windows.items()
-        ]
+        """Findings of the windows, each name once."""
+        findings = collect_findings({k: spin.notes for k, spin in enumerate(self.spins, 1)}, len(self.spins))
         ratio = self.frequency[1:] / self.frequency[:-1]
         if (unlike := np.flatnonzero(np.abs(np.log(ratio)) > UNLIKE)).size:
-            one, other = (f"{self.frequency[i]:.4g} Hz at {self.time[i]:.4g} s" for i in (unlike[0], unlike[0] + 1))
-            text = f"neighbouring windows have {one} and {other}: pulses are missing or doubled in a pattern"
-            findings.append(Finding("unlike", f"{text} ({unlike.size} times)" if unlike.size > 1 else text))
-        return tuple(findings)
+            seen = (value for i in (unlike[0], unlike[0] + 1) for value in (self.frequency[i], self.time[i]))
+            findings = (*findings, Finding("unlike", values=(*map(float, seen), unlike.size)))
+        return findings
 
 
 def track_of_times(pulse_times: ArrayLike, *, window: float = WINDOW) -> Track:

@@ -44,14 +44,14 @@ def repeats(found: Match) -> bool:
 
 
 def alternates(found: Match) -> str:
-    """Return how every second pulse differs from the others; empty if it does not.
+    """Return by what every second pulse differs from the others, "height" or "place"; empty if it does not.
 
     Turns of 167½ samples have flanks that lie on either side of a sample by turns: that is no second mark.
     """
     odd = found.numbers % 2 == 1
     for values, least, what in (
-        (found.heights, HIGHER, "has another height"),
-        (found.shifts, max(ASIDE, found.grid), "is not half-way between its neighbours"),
+        (found.heights, HIGHER, "height"),
+        (found.shifts, max(ASIDE, found.grid), "place"),
     ):
         a, b = values[odd & found.used], values[~odd & found.used]
         if min(a.size, b.size) < 8:
@@ -64,7 +64,7 @@ def alternates(found: Match) -> str:
 
 
 def displaces(bins: Array, phase: Array) -> str:
-    """Return how every second pulse lies at another place, too far for `alternates`; empty if it does not.
+    """Return "place" if every second pulse lies at another one, too far for `alternates`; else nothing.
 
     bins: of the trace, and their phases [turns], shape (n,).
     """
@@ -78,7 +78,7 @@ def displaces(bins: Array, phase: Array) -> str:
     around = np.pad(both.ravel(), BLUR // 2, mode="wrap")
     even, odd = np.lib.stride_tricks.sliding_window_view(around, BLUR).sum(axis=1).reshape(2, COARSE)
     alike = float(even @ odd) / float(np.sqrt((even @ even) * (odd @ odd)) + 1e-300)
-    return "is not half-way between its neighbours" if alike < ALIKE else ""
+    return "place" if alike < ALIKE else ""
 
 
 def mains(frequency: Estimate, chirp: Estimate) -> tuple[Finding, ...]:
@@ -88,8 +88,5 @@ def mains(frequency: Estimate, chirp: Estimate) -> tuple[Finding, ...]:
     for nominal in [multiple * line for line in MAINS for multiple in (0.5, 1, 2)]:
         steady = abs(chirp.value) + (chirp.u or 0.0) < STEADY * nominal
         if steady and abs(frequency.value / nominal - 1) < NEAR:
-            text = (
-                f"the frequency is {nominal:g} Hz and stays: is it the mains (a lamp, hum), or a drive locked to them?"
-            )
-            return (Finding("mains", text),)
+            return (Finding("mains", values=(nominal,)),)
     return ()

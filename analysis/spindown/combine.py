@@ -11,7 +11,7 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.errors import NothingToCombine
+from analysis.errors import AnalysisError
 from analysis.residuals import durbin_watson, runs_test_p
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown, comparison_remarks, correlation_remarks
@@ -22,6 +22,17 @@ from analysis.spindown.verdict import Verdict, verdict
 from analysis.uncertainty import Estimate
 
 Array = NDArray[np.float64]
+
+
+class NothingToCombine(AnalysisError):
+    """No run, or no drag law that was fitted to every run."""
+
+    def __init__(self, *, runs: int) -> None:
+        self.runs = runs
+        super().__init__(
+            f"{runs} runs have no drag law in common, at least one run and one law were expected: "
+            "fit the same laws to each run"
+        )
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.errors import UnknownName
+from analysis.errors import AnalysisError
 from analysis.residuals import Change, gross_errors, gross_limit, largest_change, studentise
 from analysis.spindown.drag import LAWS
 from analysis.spindown.lawfit import LawFit, Solution, fit_law, solution
@@ -23,6 +23,14 @@ __all__ = ["Estimate", "LawFit", "SpinDown", "Statistics", "Verdict", "fit_spin_
 Array = NDArray[np.float64]
 
 FEWEST_FOR_OUTLIERS = 7  # with three parameters and one reading doubted, three are left to judge it by
+
+
+class UnknownName(AnalysisError):
+    """A name that is in no table of this analysis."""
+
+    def __init__(self, *, kind: str, seen: str, known: Iterable[str]) -> None:
+        self.kind, self.seen, self.known = kind, seen, tuple(known)
+        super().__init__(f"no {kind} is called {seen!r}: choose from {', '.join(self.known)}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,11 +5,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.errors import NoSpinDown, NotFinite, NotPositive, ShapesDiffer, TimesNotIncreasing, TooFewReadings
+from analysis.errors import AnalysisError, NotFinite, NotPositive, ShapesDiffer, TimesNotIncreasing, TooFewReadings
 
 Array = NDArray[np.float64]
 
 FEWEST = 3
+
+
+class NoSpinDown(AnalysisError):
+    """A spin that does not fall: first and last are medians of the first and last third [Hz]."""
+
+    def __init__(self, *, first: float, last: float) -> None:
+        self.first, self.last = first, last
+        super().__init__(
+            f"the spin goes from {first:.6g} Hz to {last:.6g} Hz, a falling spin was expected: is the drive still on?"
+        )
 
 
 @dataclass(frozen=True, eq=False)

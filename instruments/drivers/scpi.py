@@ -179,28 +179,6 @@ class ScpiInstrument:
         if entries:
             raise CommandRefused(self.transport.address, after, tuple(entries))
 
-    def read_number(self, question: str, *, patience: float = 0.0) -> float | None:
-        """Ask for a measured number.
-
-        It reads the error queue first: after an earlier error no number can be trusted.
-
-        Args:
-            question: to send.
-            patience: how long the measurement takes [s].
-
-        Returns:
-            The number, None where there was nothing to measure.
-
-        Raises:
-            CommandRefused: the error queue was not empty.
-            NoAnswer: nothing came in time.
-            BadAnswer: the answer is no number of the instrument's form.
-        """
-        self.raise_errors(question)
-        answer = self.transport.query(question, patience=patience)
-        with self.clearing_on_bad_answer():
-            return parse_reading(self.transport.address, question, answer, self.NUMBER)
-
     def reject(self, question: str, answer: str, expected: str) -> NoReturn:
         """Raise BadAnswer, and clear the link: the answer may have been another question's."""
         with self.clearing_on_bad_answer():

@@ -116,8 +116,10 @@ def _check(kind: str, wiring: Wiring, light: Light) -> Checked:
         with open_bench(wiring, (kind,)) as bench:
             seen = _identity(bench.instruments[kind].identity())
             reading, value, unit = READINGS[kind](bench, light)
-    except (InstrumentError, ConfigError) as error:
-        return Checked(kind, address, **seen, trouble=str(error).removeprefix(f"{address}: "))
+    except InstrumentError as error:
+        return Checked(kind, address, **seen, trouble=error.reason)
+    except ConfigError as error:
+        return Checked(kind, address, **seen, trouble=str(error))
     return Checked(kind, address, **seen, reading=reading, value=_finite(value), unit=unit)
 
 

@@ -59,13 +59,13 @@ def identify(address: str, library: str) -> Found:
         try:
             transport = transport_to(driver, settings, library=library)
         except InstrumentError as error:
-            return Found(address, trouble=str(error))
+            return Found(address, trouble=error.reason)
         except Exception as error:  # noqa: BLE001 - a port that is no port: others are still to be asked
-            return Found(address, trouble=f"{address}: cannot be asked ({one_line(error)})")
+            return Found(address, trouble=f"cannot be asked ({one_line(error)})")
         try:
             identity = _printable(transport.query("*IDN?"))
         except InstrumentError as error:
-            trouble = str(error)
+            trouble = error.reason
         else:
             kind_of_it, model_of_it = driver_for_identity(identity) or (None, None)
             return Found(address, identity, kind_of_it, model_of_it, line)

@@ -69,7 +69,7 @@ def _print_found(found: "list[Found]") -> None:
             what = f"{one.kind} {one.model}" if one.kind else "levilab has no driver for it"
             result(f"{one.address}\n  {one.identity}: {what}")
         else:
-            result(f"{one.address}\n  {one.trouble.removeprefix(one.address + ': ')}")
+            result(f"{one.address}\n  {one.trouble}")
 
 
 @bench_app.command("check", epilog="Example: levilab bench check --bench lab2.toml")

@@ -36,10 +36,10 @@ SHORTHANDS = {
 
 
 class TableError(DataError):
-    """A table that cannot be used.  `path` is the file, `line` its 1-based line, where there is one."""
+    """A table that cannot be used.  path: of the file; line: its 1-based line, or None; message: all but these."""
 
     def __init__(self, path: Path, message: str, *, line: int | None = None) -> None:
-        self.path, self.line = path, line
+        self.path, self.line, self.message = path, line, message
         place = f"{shorten(str(path), 200)}, line {line}" if line is not None else shorten(str(path), 200)
         super().__init__(f"{place}: {message}")
 

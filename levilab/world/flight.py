@@ -179,20 +179,6 @@ class Flight:
         """Drop the pieces that ended before this time [s]."""
         self._pieces.forget(before)
 
-    def turns(self, times: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Return turns of the tape past a fixed spot beside the rim, and whether a top is up; shape (n,) each.
-
-        Whole turns are not continued from one piece to the next.
-
-        Args:
-            times: shape (n,) [s].
-        """
-        turns, up = np.zeros_like(times), np.zeros(times.shape, dtype=np.bool_)
-        for piece, part in self._flying_pieces(times):
-            samples = self._samples_of(piece)
-            turns[part], up[part] = np.interp(times[part], samples.times, samples.turns), True
-        return turns, up
-
     def tape(self, times: Array) -> tuple[Array, Array, Array]:
         """Return what the light of the tape depends on, shape (n,) each.
 

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.errors import ImpossibleCylinder
-from analysis.top import Cylinder, top_of
+from analysis.top import Cylinder, ImpossibleCylinder, top_of
 
 RING = Cylinder("ring", 0.010, 0.014, 0.004, 0.006, 0.001, 1e-5, 5e-5, 5e-5, 5e-5, 1e-4)
 STEM = Cylinder("stem", 0.002, 0.002, 0.0, 0.030, 0.012, 1e-5, 2e-5, 0.0, 1e-4, 3e-4)

@@ -180,8 +180,7 @@ def _prepare_scope(session: Session[TraceSettings], sweep: str = "normal") -> No
             sweep=sweep,
         )
     except CommandRefused as refused:
-        address = session.bench.address("oscilloscope")
-        raise InstrumentError(address, f"{str(refused).removeprefix(address + ': ')}: {_OFFSETS}") from refused
+        raise InstrumentError(refused.address, f"{refused.reason}: {_OFFSETS}") from refused
 
 
 def _drive(session: Session[TraceSettings]) -> None:

@@ -138,7 +138,7 @@ def read_samples(head: Head, dialect: Dialect, *, columns: Mapping[str, str], ra
     except TableError as error:
         if certain:
             raise
-        raise NoWaveform(path, str(error).partition(": ")[2], line=error.line) from error
+        raise NoWaveform(path, error.message, line=error.line) from error
     if not certain and times.step > LONGEST_DOUBTFUL_STEP_S:
         text = f"its rows are {times.step:g} s apart, which is no sampling of a top that spins: say `rate` if it is"
         raise NoWaveform(path, text)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.errors import TooFewHeights
+from analysis.field.errors import TooFewHeights
 from analysis.field.fit import FEWEST_HEIGHTS, SAME_HEIGHT_M
 from analysis.numbers import digits
 from levilab.formats.columns import TableError

@@ -15,17 +15,20 @@ from analysis.errors import AnalysisError
 from analysis.pulses import (
     Finding,
     SpinFrequency,
+    collect_findings,
     phases,
     spin_of_times,
     spin_of_trace,
     track_of_times,
 )
+from analysis.pulses.errors import OnlyHum
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.options import SpinOptions
 from levilab.pipelines.sources import Needs
 from levilab.pipelines.spin.readings import Records, read_spin_file, read_spin_run, track_of_record
+from levilab.pipelines.spin.words import finding_text
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.traces import INDEX
 from levilab.runs.waveforms import has_traces
@@ -165,7 +168,7 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
 
     def about_run(self, run: SpinRun) -> Iterable[str]:
         """Return what to know of one input."""
-        return (f"{note.text} ({note.name})" for note in run.notes)
+        return (f"{finding_text(note, run.series.of)} ({note.name})" for note in run.notes)
 
 
 #: Number of samples that show the steps of a converter; closer numbers than this part of their range are rounding.
@@ -241,11 +244,10 @@ def _of_several(records: Records, options: SpinOptions) -> SpinRun:
         raise missed
     series = _with_start(Series(*_columns(spins), of="record"), records.waveforms[0].start_u)
     all_of_them = len(records.waveforms)
-    notes = _by_record(dict(zip(numbers, spins, strict=True)), all_of_them)
+    notes = collect_findings({number: spin.notes for number, spin in zip(numbers, spins, strict=True)}, all_of_them)
     if missed:
         left_out = all_of_them - len(spins)
-        text = f"{left_out} of {all_of_them} records are left out, the last of them for this: {missed}"
-        notes = (*notes, Finding("no-pulses", text))
+        notes = (*notes, Finding("no-pulses", "hum" * isinstance(missed, OnlyHum), (left_out, all_of_them)))
     return SpinRun(spins[len(spins) // 2], series, notes, *parts[len(spins) // 2])
 
 
@@ -274,26 +276,6 @@ def _with_start(series: Series, u_s: float) -> Series:
     if u_s == 0 or len(series) < 2:
         return series
     return replace(series, u=np.hypot(series.u, u_s * np.gradient(series.frequency, series.time)))
-
-
-def _by_record(spins: Mapping[int, SpinFrequency], all_of_them: int) -> tuple[Finding, ...]:
-    """Return each finding once, with its records: the table shows the record in the middle, which may lack it.
-
-    spins: the number of a record, from 1 → its spin.
-    """
-    found: dict[str, dict[int, str]] = {}
-    for number, spin in spins.items():
-        for note in spin.notes:
-            found.setdefault(note.name, {}).setdefault(number, note.text)
-    notes = []
-    for name, texts in found.items():
-        first, text = next(iter(texts.items()))
-        where = f"record {first}"
-        if len(texts) > 1:
-            which = f"all {all_of_them}" if len(texts) == all_of_them else f"{len(texts)} of {all_of_them}"
-            where = f"in {which} records, as in record {first}"
-        notes.append(Finding(name, text if all_of_them == 1 else f"{where}: {text}"))
-    return tuple(notes)
 
 
 def _of_one(spin: SpinFrequency) -> SpinRun:

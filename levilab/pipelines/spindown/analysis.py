@@ -21,7 +21,6 @@ from levilab.pipelines.spindown.words import remark, verdict_of_all
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
-    from pathlib import Path
 
     from analysis.spindown.combine import CombinedLaw
     from analysis.spindown.lawfit import LawFit
@@ -121,11 +120,3 @@ METHOD = Method(
     combine=lambda sources, runs, _: combine(_without_doubtful(sources, runs)),
     mixed="a mean over both says nothing about a real top",
 )
-
-
-def analyze_spindowns(paths: Sequence[Path], options: SpinDownOptions) -> SpinDownAnalysis:
-    """Fit the drag laws to every spin-down found at the paths.
-
-    Raises DataError for what cannot be used; the text names the file.
-    """
-    return METHOD.analyze(paths, options)

@@ -17,6 +17,7 @@ from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes
 from levilab.pipelines.spin.readings import track_of_record
+from levilab.pipelines.spin.words import finding_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -129,7 +130,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
         seen = f"the spin in it goes from {start:.6g} Hz to {end:.6g} Hz in {last - first} windows of {WINDOW_S:g} s"
         expected = "a falling spin is expected: is the drive still on?"
         raise DoesNotSuit(f"{path}: {seen}, {expected}")
-    notes = [f"{path.name}: {note.text}" for note in track.notes]
+    notes = [f"{path.name}: {finding_text(note)}" for note in track.notes]
     what = f"{path.name}: a {'list of pulse times' if times is not None else 'record'} of {digits(duration, 3)} s: "
     how_read = [f"{what}each reading is the frequency in a window of {WINDOW_S:g} s"]
     if last - first < len(track.time):

@@ -5,16 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.errors import (
-    FieldStandsStill,
-    FieldTurnsOver,
-    ImpossibleRing,
-    NoField,
-    NotFinite,
-    NotPositive,
-    ShapesDiffer,
-    TooFewHeights,
-)
+from analysis.errors import NotFinite, NotPositive, ShapesDiffer
+from analysis.field.errors import FieldStandsStill, FieldTurnsOver, ImpossibleRing, NoField, TooFewHeights
 from analysis.field.fit import PARAMETERS, Known, Prior, fit_scan
 from analysis.field.ring import Ring, on_axis
 

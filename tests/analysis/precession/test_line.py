@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.errors import NoRange, TooFewReadings
-from analysis.precession.line import fit_line, fit_orthogonal, influence
+from analysis.errors import TooFewReadings
+from analysis.precession.line import NoRange, fit_line, fit_orthogonal, influence
 
 RANDOM = np.random.default_rng(7)
 X = np.array([26.0, 28.0, 30.0, 31.0, 34.0, 36.0, 38.0, 40.0])

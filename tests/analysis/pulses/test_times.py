@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from analysis.errors import NotFinite, TimesNotIncreasing, TooFewPulses
+from analysis.errors import NotFinite, TimesNotIncreasing
 from analysis.pulses import spin_of_times
+from analysis.pulses.errors import TooFewPulses
 from analysis.pulses.synthetic import HARD, make
 
 

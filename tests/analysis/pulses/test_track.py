@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from analysis.errors import NotPositive, TooFewPulses
+from analysis.errors import NotPositive
 from analysis.pulses import phases, track_of_blocks, track_of_samples, track_of_times
+from analysis.pulses.errors import TooFewPulses
 
 RATE = 5000.0
 TIME = np.arange(round(70 * RATE)) / RATE

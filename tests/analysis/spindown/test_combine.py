@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.errors import NothingToCombine
 from analysis.residuals import durbin_watson, runs_test_p
-from analysis.spindown.combine import combine, mean
+from analysis.spindown.combine import NothingToCombine, combine, mean
 from analysis.spindown.drag import LAWS, spin
 from analysis.spindown.fit import Estimate, fit_spin_down
 

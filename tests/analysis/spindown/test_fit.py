@@ -10,18 +10,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2, linregress
 
-from analysis.errors import (
-    AnalysisError,
-    NoSpinDown,
-    NotFinite,
-    NotPositive,
-    ShapesDiffer,
-    TimesNotIncreasing,
-    TooFewReadings,
-    UnknownName,
-)
+from analysis.errors import AnalysisError, NotFinite, NotPositive, ShapesDiffer, TimesNotIncreasing, TooFewReadings
 from analysis.spindown import fit as spin_down_fit
 from analysis.spindown.drag import LAWS, spin
+from analysis.spindown.fit import UnknownName
+from analysis.spindown.readings import NoSpinDown
 
 fit_spin_down = functools.partial(
     spin_down_fit.fit_spin_down, tilt=False

@@ -6,7 +6,7 @@ import pytest
 import pyvisa_py.protocols.rpc
 
 from instruments.clock import VirtualClock
-from instruments.drivers.scpi import ScpiInstrument
+from instruments.drivers.scpi import ScpiInstrument, parse_reading
 from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, NotConnected
 from instruments.links.visa import VisaTransport
@@ -42,7 +42,10 @@ class Box(ScpiInstrument):
     level = Setting("LEV", float, unit="V", low=-5.0, high=5.0)
 
     def reading(self):
-        return self.read_number("READ?")
+        self.raise_errors("READ?")
+        answer = self.transport.query("READ?")
+        with self.clearing_on_bad_answer():
+            return parse_reading(self.transport.address, "READ?", answer, self.NUMBER)
 
     def data(self):
         return self.transport.query_block("DATA?")

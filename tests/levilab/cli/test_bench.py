@@ -119,7 +119,7 @@ def test_the_commands_find_write_and_check(levilab, tmp_path):
 
 
 def test_where_no_instrument_answers_only_force_writes_a_file(monkeypatch, tmp_path, capsys):
-    silent = [Found("A::1", trouble="A::1: no answer")]
+    silent = [Found("A::1", trouble="no answer")]
     monkeypatch.setattr("levilab.bench.discover.search", lambda *_: silent)
     path = tmp_path / "bench.toml"
     with pytest.raises(NoInstrument, match="`addresses`"):

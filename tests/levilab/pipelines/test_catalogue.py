@@ -15,7 +15,7 @@ from levilab.pipelines import catalogue
 from levilab.pipelines.catalogue import ANALYSES, Analysis
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Archive
-from levilab.pipelines.spindown.analysis import analyze_spindowns
+from levilab.pipelines.spindown.analysis import METHOD
 from levilab.pipelines.spindown.document import SpinDownResult
 from levilab.pipelines.suits import analyze_suiting, recall_suiting, suiting
 from levilab.pipelines.suits import save as save_found
@@ -118,11 +118,11 @@ def test_each_analysis_finds_its_own_result_again(tmp_path: Path, runs: Path, na
 
 def test_result_json_belongs_to_the_first_row_for_the_experiment(monkeypatch: pytest.MonkeyPatch, runs: Path) -> None:
     use(monkeypatch, ANALYSES["field"], second_row("spin"), SPINDOWN)
-    found = analyze_spindowns([runs / "run-1"], SpinDownOptions())
+    found = METHOD.analyze([runs / "run-1"], SpinDownOptions())
     rows = catalogue.ANALYSES
     assert save_found(rows["second"], found)[0].name == "result.json"
     assert save_found(rows["spindown"], found)[0].name == "result.spindown.json"
-    together = analyze_spindowns([runs], SpinDownOptions())
+    together = METHOD.analyze([runs], SpinDownOptions())
     assert save_found(rows["second"], together)[0].name == "result.second.json"
 
 
@@ -130,7 +130,7 @@ def test_several_inputs_leave_the_result_of_the_present_run_alone(runs: Path, mo
     monkeypatch.chdir(runs / "run-1")
     paths = [Path(), Path("../run-2")]
     monkeypatch.setattr(Analysis, "png", lambda *_: b"")
-    written = save_found(SPINDOWN, analyze_spindowns(paths, SpinDownOptions()))[0]
+    written = save_found(SPINDOWN, METHOD.analyze(paths, SpinDownOptions()))[0]
     assert written.resolve() == runs / "result.json"
     assert SPINDOWN.recall(paths, SpinDownOptions()).origins[1].text.endswith(str(written))
 

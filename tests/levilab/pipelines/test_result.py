@@ -17,14 +17,14 @@ from levilab.files import replace_atomically
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Place, beside, read_result, save
-from levilab.pipelines.spindown.analysis import analyze_spindowns
+from levilab.pipelines.spindown.analysis import METHOD
 from levilab.pipelines.spindown.document import DOCUMENT, SpinDownResult
 from levilab.pipelines.suits import save as save_found
 from support.spin_downs import spin_down_csv
 
 
 def saved(*paths: Path) -> list[str]:
-    return [file.name for file in save_found(ANALYSES["spindown"], analyze_spindowns(paths, SpinDownOptions()))]
+    return [file.name for file in save_found(ANALYSES["spindown"], METHOD.analyze(paths, SpinDownOptions()))]
 
 
 #: Names that come near one another: with dots, without an ending, like results themselves.
@@ -77,12 +77,12 @@ def test_the_result_of_a_run_folder_is_result_json_in_it(
     assert saved(run) == ["result.json", "spindown.png"]
     assert written == ["spindown.png", "result.json"]  # who sees the new result sees no old figure
     assert (run / "result.json").is_file()
-    assert analyze_spindowns([run / "readings.csv"], SpinDownOptions()).place.result() == run / "result.json"
+    assert METHOD.analyze([run / "readings.csv"], SpinDownOptions()).place.result() == run / "result.json"
 
 
 def write_result(tmp_path: Path) -> Path:
     """The result of a data file, without its figure."""
-    analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())
+    analysis = METHOD.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())
     return save(DOCUMENT.of(analysis, analysis.place), analysis.place, picture=b"")[0]
 
 

@@ -14,7 +14,7 @@ from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.sources import Skipped, SkippedRuns, collect, sha256_of
-from levilab.pipelines.spindown.analysis import NEEDS, analyze_spindowns
+from levilab.pipelines.spindown.analysis import METHOD, NEEDS
 from levilab.pipelines.spindown.readings import Readings
 from support.spin_downs import spin_down_csv
 
@@ -53,7 +53,7 @@ def test_the_same_readings_in_another_file_format_count_once(tmp_path: Path, rew
     first = spin_down_csv(tmp_path / "first.csv")
     second = tmp_path / "second.csv"
     second.write_bytes(rewritten(first.read_text(encoding="utf-8")).encode())
-    analysis = analyze_spindowns([first, second], SpinDownOptions())
+    analysis = METHOD.analyze([first, second], SpinDownOptions())
     assert [source.name for source in analysis.sources] == ["first.csv"]
     assert analysis.warnings == (f"{second}: holds the same readings as {first}, counted once",)
 
@@ -62,7 +62,7 @@ def test_an_export_beside_the_run_counts_once(tmp_path: Path, sample_data: Path)
     run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
     export = tmp_path / "export.csv"
     export.write_text(with_decimal_commas((run / "readings.csv").read_text(encoding="utf-8")), encoding="utf-8")
-    assert len(analyze_spindowns([run, export], SpinDownOptions()).sources) == 1
+    assert len(METHOD.analyze([run, export], SpinDownOptions()).sources) == 1
 
 
 def test_runs_that_differ_in_one_reading_are_two_runs(tmp_path: Path) -> None:
@@ -71,7 +71,7 @@ def test_runs_that_differ_in_one_reading_are_two_runs(tmp_path: Path) -> None:
     time, frequency, u = lines[7].split(",")
     lines[7] = f"{time},{float(frequency) * (1 + 1e-6)!r},{u}"
     (tmp_path / "second.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
-    assert len(analyze_spindowns([first, tmp_path / "second.csv"], SpinDownOptions()).sources) == 2
+    assert len(METHOD.analyze([first, tmp_path / "second.csv"], SpinDownOptions()).sources) == 2
 
 
 def test_a_run_that_goes_on_in_another_folder_counts_once(tmp_path: Path, sample_data: Path) -> None:
@@ -81,13 +81,13 @@ def test_a_run_that_goes_on_in_another_folder_counts_once(tmp_path: Path, sample
     (tmp_path / "run" / "run.json").write_text(json.dumps(record | {"continued_in": "run-rescued"}), encoding="utf-8")
     lines = (tmp_path / "run" / "readings.csv").read_text(encoding="utf-8").splitlines(keepends=True)
     (tmp_path / "run" / "readings.csv").write_text("".join(lines[:-2]), encoding="utf-8")
-    analysis = analyze_spindowns([tmp_path], SpinDownOptions())
+    analysis = METHOD.analyze([tmp_path], SpinDownOptions())
     assert [source.name for source in analysis.sources] == ["run-rescued"]
     assert analysis.remarks == (Skipped(f"{tmp_path / 'run'}, which was broken off: its run goes on in run-rescued"),)
 
 
 def test_runs_of_another_experiment_are_a_remark_and_no_warning(sample_data: Path) -> None:
-    analysis = analyze_spindowns([sample_data], SpinDownOptions())
+    analysis = METHOD.analyze([sample_data], SpinDownOptions())
     assert SkippedRuns("limit", 3) in analysis.remarks
     assert not any("skipped" in warning for warning in analysis.all_warnings)
 

@@ -17,7 +17,7 @@ import pytest
 from levilab.errors import DataError, LevilabError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.suits import save
 from levilab.present.document.blocks import Tabular
@@ -40,7 +40,7 @@ def render(found: SpinDownAnalysis) -> str:
 
 @pytest.fixture(scope="module")
 def found() -> SpinDownAnalysis:
-    return analyze_spindowns([SAMPLE_DATA], SpinDownOptions())
+    return METHOD.analyze([SAMPLE_DATA], SpinDownOptions())
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,7 @@ def changed(run: Path, **entries: object) -> Path:
 
 def text_of(*paths: Path, options: SpinDownOptions | None = None) -> str:
     with without_figures():
-        return Page(render(analyze_spindowns(paths, options or SpinDownOptions()))).text
+        return Page(render(METHOD.analyze(paths, options or SpinDownOptions()))).text
 
 
 @pytest.fixture
@@ -145,7 +145,7 @@ def test_what_a_user_typed_is_escaped_wherever_it_stands(tmp_path: Path, run: Pa
     event = json.dumps({"time_s": 1.0, "kind": "fell", "text": evil}) + "\n"
     (tmp_path / "run <b>bold" / "events.jsonl").write_text(event, encoding="utf-8")
     file = spin_down_csv(tmp_path / "<i>my.csv")
-    parsed = Page(render(analyze_spindowns([tmp_path / "run <b>bold", file], SpinDownOptions(tilt="none"))))
+    parsed = Page(render(METHOD.analyze([tmp_path / "run <b>bold", file], SpinDownOptions(tilt="none"))))
     assert parsed.text.count(evil) >= 14
     assert "run <b>bold" in parsed.text
     assert "<i>my.csv" in parsed.text
@@ -214,7 +214,7 @@ def test_a_mixture_of_real_and_synthetic_runs_is_no_measurement_and_says_so(tmp_
 @pytest.mark.usefixtures("undrawn_figures")
 @pytest.mark.parametrize("readings", [3, 20])
 def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, readings: int) -> None:
-    analysis = analyze_spindowns([spin_down_csv(tmp_path / "a.csv", n=readings)], SpinDownOptions(tilt="none"))
+    analysis = METHOD.analyze([spin_down_csv(tmp_path / "a.csv", n=readings)], SpinDownOptions(tilt="none"))
     parsed = Page(render(analysis))
     marked = [attributes for tag, attributes in parsed.tags if tag == "tr" and attributes.get("class") == "best"]
     assert bool(marked) == analysis.combined.verdict.decided
@@ -229,7 +229,7 @@ def reported(*paths: Path, output: Path, tell: Any = None, **options: Any) -> st
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_the_report_shows_what_analyze_found(run: Path, tmp_path: Path) -> None:
-    analysis = analyze_spindowns([run], SpinDownOptions(tilt="none"))
+    analysis = METHOD.analyze([run], SpinDownOptions(tilt="none"))
     save(ANALYSES["spindown"], analysis)
     text = reported(run, output=tmp_path / "report.html")
     assert with_uncertainty(analysis.runs[0].fit("disc").parameters["c32"]).split()[0] in text
@@ -238,7 +238,7 @@ def test_the_report_shows_what_analyze_found(run: Path, tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_the_report_does_not_fit_what_has_a_result(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    analysis = analyze_spindowns([run], SpinDownOptions(tilt="none"))
+    analysis = METHOD.analyze([run], SpinDownOptions(tilt="none"))
     save(ANALYSES["spindown"], analysis)
     monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", pytest.fail)
     recalled = render(ANALYSES["spindown"].recall([run], SpinDownOptions(tilt="none")))
@@ -252,7 +252,7 @@ def test_the_report_says_what_it_had_to_analyze(run: Path, tmp_path: Path) -> No
     before = sorted(run.rglob("*"))
     assert "analyzed for this page: there was no result yet" in reported(run, output=tmp_path / "report.html")
     assert sorted(run.rglob("*")) == before
-    save(ANALYSES["spindown"], analyze_spindowns([run], SpinDownOptions()))
+    save(ANALYSES["spindown"], METHOD.analyze([run], SpinDownOptions()))
     text = reported(run, output=tmp_path / "report.html", reading_u=0.05)
     assert f"analyzed for this page: other options than those of {run / 'result.json'}" in text
     assert "u of a reading: 0.05 Hz, as given to the analysis" in text
@@ -271,7 +271,7 @@ def test_the_page_needs_nothing_of_the_terminal() -> None:
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_a_report_of_a_data_file_knows_no_instrument_and_says_so(tmp_path: Path) -> None:
-    parsed = Page(render(analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))))
+    parsed = Page(render(METHOD.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))))
     assert "my.csv" in parsed.text
     assert "no instruments recorded" in parsed.text
     assert "SYNTHETIC" not in parsed.text
@@ -284,7 +284,7 @@ def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path: 
     nu = 40 * (1 + 2.34e-4 * np.sqrt(2 * np.pi * 40) * t / 2) ** -2 + np.random.default_rng(0).normal(0, 0.03, t.size)
     path = tmp_path / "long.csv"
     np.savetxt(path, np.c_[t, nu], delimiter=",", header="time_s,spin_frequency_hz", comments="")
-    html = render(analyze_spindowns([path], SpinDownOptions(reading_u=0.03)))
+    html = render(METHOD.analyze([path], SpinDownOptions(reading_u=0.03)))
     assert "The first 200 of 20000" in Page(html).text
     assert len(html) < 3e6
 
@@ -330,7 +330,7 @@ def test_a_run_that_has_two_results_is_described_once(tmp_path: Path, sample_dat
 def test_a_result_that_lies_elsewhere_is_found_by_its_own_path(tmp_path: Path, run: Path) -> None:
     elsewhere = tmp_path / "elsewhere"
     spindown = ANALYSES["spindown"]
-    save(spindown, analyze_spindowns([run], SpinDownOptions(reading_u=0.07)), elsewhere)
+    save(spindown, METHOD.analyze([run], SpinDownOptions(reading_u=0.07)), elsewhere)
     messages: list[str] = []
     text = reported(run, output=tmp_path / "page.html", tell=messages.append)
     assert "as levilab analyze found it" not in text

@@ -20,7 +20,7 @@ from levilab.bench.config import ConfigError
 from levilab.errors import UsageError
 from levilab.pipelines.limit.analysis import METHOD
 from levilab.pipelines.options import LimitOptions, SpinDownOptions
-from levilab.pipelines.spindown.analysis import analyze_spindowns
+from levilab.pipelines.spindown.analysis import METHOD as SPINDOWN
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 from support.acquisitions import Impatient, Silent, in_world
 
@@ -340,4 +340,4 @@ def test_loose_washers_are_warned_of_in_the_run_and_in_its_result(tmp_path):
     (warning,) = [event["text"] for event in run.events() if event["kind"] == "warning"]
     assert "LOOSE WASHERS, the tape slips by 0.1" in warning
     assert warning in show.messages
-    assert warning in json.loads(json.dumps(analyze_spindowns([run.folder], SpinDownOptions()).all_warnings))
+    assert warning in json.loads(json.dumps(SPINDOWN.analyze([run.folder], SpinDownOptions()).all_warnings))

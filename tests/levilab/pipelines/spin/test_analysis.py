@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -15,12 +16,13 @@ from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions, SpinOptions
+from levilab.pipelines.spin import words
 from levilab.pipelines.spin.analysis import METHOD, Series
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spin.meaning import meaning
 from levilab.pipelines.spin.report import spin_part
 from levilab.pipelines.spin.table import spin_tables
-from levilab.pipelines.spindown.analysis import analyze_spindowns
+from levilab.pipelines.spindown.analysis import METHOD as SPINDOWN
 from levilab.pipelines.suits import analyze_suiting
 from levilab.pipelines.suits import save as save_found
 from levilab.runs.run import Run, RunRecord, utc_now
@@ -28,6 +30,7 @@ from levilab.runs.waveforms import run_waveforms
 from levilab.runs.writer import RunWriter
 from support.detector import C32, RELEASE_HZ, coasting_turns, coasting_wav, pulses, write_wav
 from support.figures import faults
+from support.paths import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -82,7 +85,7 @@ def test_a_long_record_is_followed_and_feeds_the_drag_laws(tmp_path: Path) -> No
     pulls = (run.series.frequency - omega / (2 * np.pi)) / run.series.u
     assert np.abs(pulls).max() < 4.5
     assert [kind for kind, _, _ in run.series.phases] == ["coasting"]
-    down = analyze_spindowns([path], SpinDownOptions())
+    down = SPINDOWN.analyze([path], SpinDownOptions())
     disc = down.runs[0].fit("disc").parameters["c32"]
     assert disc.value == pytest.approx(C32, abs=4 * disc.u)
     assert disc.u < 2e-3 * C32
@@ -95,7 +98,7 @@ def test_a_top_that_is_held_has_a_spin_and_no_spin_down(tmp_path: Path) -> None:
     assert row.name == "spin"
     assert found.runs[0].spin.frequency.value == pytest.approx(30, abs=1e-3)
     with pytest.raises(DoesNotSuit, match="is the drive still on"):
-        analyze_spindowns([held], SpinDownOptions())
+        SPINDOWN.analyze([held], SpinDownOptions())
 
 
 def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path: Path) -> None:
@@ -103,14 +106,14 @@ def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path: Path) -> None:
     times = np.interp(np.arange(1, int(coasting_turns(t)[-1])), coasting_turns(t), t)
     path = tmp_path / "pulses.csv"
     path.write_text("pulse time [s]\n" + "".join(f"{x:.7f}\n" for x in times), encoding="utf-8")
-    disc = analyze_spindowns([path], SpinDownOptions()).runs[0].fit("disc").parameters["c32"]
+    disc = SPINDOWN.analyze([path], SpinDownOptions()).runs[0].fit("disc").parameters["c32"]
     assert disc.value == pytest.approx(C32, rel=1e-3)
     assert len(METHOD.analyze([path], SpinOptions()).runs[0].series) == 15
 
 
 def test_a_record_that_is_too_short_is_no_spin_down(sample_data: Path) -> None:
     with pytest.raises(DoesNotSuit, match=r"lasts 0\.5 s, a spin-down needs 3 windows of 2 s"):
-        analyze_spindowns([sample_data / "scope-files" / "recording.wav"], SpinDownOptions())
+        SPINDOWN.analyze([sample_data / "scope-files" / "recording.wav"], SpinDownOptions())
 
 
 def run_of(runs: Path, records: Iterable[Trace]) -> Path:
@@ -168,7 +171,7 @@ def test_records_of_a_run_that_are_left_out_are_counted_in_a_note(traced: Path) 
     analysis = METHOD.analyze([run_of(traced.parent, [dark, *others])], SpinOptions())
     assert len(analysis.runs[0].series) == 2
     (note,) = [text for text in analysis.all_warnings if text.endswith("(no-pulses)")]
-    assert "1 of 3 records are left out, the last of them for this: 0 pulses" in note
+    assert "1 of 3 records are left out: no pulses" in note
 
 
 def test_a_finding_in_some_records_of_a_run_names_them(traced: Path) -> None:
@@ -313,10 +316,8 @@ def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_
     line = np.polynomial.Polynomial.fit(found.series.time, straight, 1, w=weight)
     squares = float((((straight - line(found.series.time)) * weight) ** 2).sum())
     assert squares == pytest.approx(48 * 1.16, abs=2 * 14)
-    (note,) = [note.text for note in found.notes if note.name == "scattered"]
-    assert note.startswith(
-        "in all 50 records, as in record 1: the pulses come early or late by 0.0"
-    )  # a mean pulse was fitted to two, of which one was 6 u off
+    (note,) = [note for note in found.notes if note.name == "scattered"]
+    assert note.where == (1, 50, 50)  # a mean pulse was fitted to two, of which one was 6 u off
 
 
 def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data: Path) -> None:
@@ -332,7 +333,15 @@ def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data: Pat
     part = spin_part(found)
     assert part.lead == "5 records used"
     assert "It loses 0.313(6) % of its spin a second" in part.result[0].text
-    assert found.runs[0].notes[0].text.startswith("in all 5 records, as in record 1: the pulses come early or late")
+    assert next(iter(found.about_run(run))).startswith(
+        "in all 5 records, as in record 1: the pulses come early or late"
+    )
+
+
+def test_each_finding_about_pulses_has_a_sentence() -> None:
+    source = "".join(file.read_text(encoding="utf-8") for file in (ROOT / "analysis/pulses").glob("*.py"))
+    made = set(re.findall(r'Finding\("([\w-]+)"', source)) | {"no-pulses"}
+    assert made == {name for name, _ in words._SENTENCES}
 
 
 def test_of_a_single_record_the_slope_is_its_own(sample_data: Path) -> None:

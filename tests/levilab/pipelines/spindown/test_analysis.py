@@ -15,7 +15,7 @@ from levilab.errors import DataError, LevilabError
 from levilab.files import CannotWrite
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.spindown.analysis import analyze_spindowns
+from levilab.pipelines.spindown.analysis import METHOD
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
 from levilab.pipelines.suits import save
@@ -33,7 +33,7 @@ PUBLISHED = (
 
 
 def test_the_straight_lines_give_the_published_constants_to_every_printed_digit(sample_data: Path) -> None:
-    analysis = analyze_spindowns([sample_data], SpinDownOptions())
+    analysis = METHOD.analyze([sample_data], SpinDownOptions())
     constants = [
         (run.fit("stokes").linearised["c1"].value, run.fit("newton").linearised["c2"].value)  # type: ignore[index]
         for run in analysis.runs
@@ -71,7 +71,7 @@ def test_the_sample_traces_are_small_and_labelled_synthetic(sample_data: Path) -
 
 
 def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data: Path) -> None:
-    analysis = analyze_spindowns([sample_data], SpinDownOptions())
+    analysis = METHOD.analyze([sample_data], SpinDownOptions())
     combined = analysis.combined
     lines = spindown_tables(analysis)[-1]
     assert [row.kind for row in lines.rows] == ["", "", "", "", "together"]
@@ -89,7 +89,7 @@ def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data
 
 
 def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path: Path) -> None:
-    save(ANALYSES["spindown"], analyze_spindowns([sample_data], SpinDownOptions()), tmp_path)
+    save(ANALYSES["spindown"], METHOD.analyze([sample_data], SpinDownOptions()), tmp_path)
     text = (tmp_path / "result.json").read_text(encoding="utf-8")
     result = json.loads(text, parse_constant=pytest.fail)
     assert list(result) == sorted(result)
@@ -111,7 +111,7 @@ def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path
 
 
 def test_one_run_has_its_start_and_covariance_at_the_top(sample_data: Path) -> None:
-    analysis = analyze_spindowns([sample_data / "spin-down-1"], SpinDownOptions())
+    analysis = METHOD.analyze([sample_data / "spin-down-1"], SpinDownOptions())
     result = ANALYSES["spindown"].document(analysis, analysis.output_folder)
     disc = next(model for model in result["models"] if model["name"] == "disc")
     assert set(disc["parameters"]) == {"start_frequency", "c32"}
@@ -121,7 +121,7 @@ def test_one_run_has_its_start_and_covariance_at_the_top(sample_data: Path) -> N
 
 
 def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path: Path) -> None:
-    analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))
+    analysis = METHOD.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))
     result = ANALYSES["spindown"].document(analysis, analysis.output_folder)
     assert analysis.output_folder == tmp_path
     assert (result["synthetic"], result["best_model"]) == (False, "disc")
@@ -129,26 +129,26 @@ def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path: Path) 
 
 
 def test_the_same_run_given_twice_counts_once(sample_data: Path, tmp_path: Path) -> None:
-    analysis = analyze_spindowns([sample_data, sample_data / "spin-down-1"], SpinDownOptions())
+    analysis = METHOD.analyze([sample_data, sample_data / "spin-down-1"], SpinDownOptions())
     assert len(analysis.sources) == 4
     shutil.copytree(sample_data / "spin-down-1", tmp_path / "copy")
-    analysis = analyze_spindowns([sample_data / "spin-down-1", tmp_path / "copy"], SpinDownOptions())
+    analysis = METHOD.analyze([sample_data / "spin-down-1", tmp_path / "copy"], SpinDownOptions())
     assert len(analysis.sources) == 1
     assert "counted once" in analysis.warnings[0]
 
 
 def test_the_readings_of_a_run_are_that_run_and_as_synthetic(sample_data: Path, tmp_path: Path) -> None:
-    (source,) = analyze_spindowns([sample_data / "spin-down-1" / "readings.csv"], SpinDownOptions()).sources
+    (source,) = METHOD.analyze([sample_data / "spin-down-1" / "readings.csv"], SpinDownOptions()).sources
     assert source.synthetic
     shutil.copytree(sample_data / "spin-down-1", tmp_path / "broken")
     (tmp_path / "broken" / "run.json").write_text("{", encoding="utf-8")
-    (source,) = analyze_spindowns([tmp_path / "broken" / "readings.csv"], SpinDownOptions()).sources
+    (source,) = METHOD.analyze([tmp_path / "broken" / "readings.csv"], SpinDownOptions()).sources
     assert any("whether it is SYNTHETIC is not known" in warning for warning in source.warnings)
 
 
 def test_real_and_synthetic_inputs_together_are_warned_of(sample_data: Path, tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv")
-    analysis = analyze_spindowns([path, sample_data / "spin-down-1"], SpinDownOptions())
+    analysis = METHOD.analyze([path, sample_data / "spin-down-1"], SpinDownOptions())
     assert "1 of 2 inputs are SYNTHETIC" in analysis.warnings[0]
     assert analysis.output_folder == Path()
 
@@ -158,12 +158,12 @@ def test_inputs_of_the_same_name_are_told_apart(tmp_path: Path) -> None:
         (tmp_path / folder).mkdir()
         spin_down_csv(tmp_path / folder / "run.csv", seed=k)
     paths = [tmp_path / "monday" / "run.csv", Path(os.path.relpath(tmp_path / "tuesday" / "run.csv"))]
-    analysis = analyze_spindowns(paths, SpinDownOptions())
+    analysis = METHOD.analyze(paths, SpinDownOptions())
     assert [source.name for source in analysis.sources] == ["monday/run.csv", "tuesday/run.csv"]
 
 
 def test_the_hash_in_the_result_is_that_of_the_file(sample_data: Path, tmp_path: Path) -> None:
-    result = ANALYSES["spindown"].document(analyze_spindowns([sample_data], SpinDownOptions()), tmp_path)
+    result = ANALYSES["spindown"].document(METHOD.analyze([sample_data], SpinDownOptions()), tmp_path)
     for given in result["inputs"]:
         assert hashlib.sha256((tmp_path / given["path"]).read_bytes()).hexdigest() == given["sha256"]
 
@@ -173,10 +173,10 @@ def test_another_unit_taken_for_hertz_is_doubted(tmp_path: Path, unit: str, fact
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
     np.savetxt(path, np.c_[t, factor * nu], delimiter=",", header="t,f", comments="")
-    (source,) = analyze_spindowns([path], SpinDownOptions()).sources
+    (source,) = METHOD.analyze([path], SpinDownOptions()).sources
     assert source.readings.doubtful
     assert f"f=NAME [{unit}]" in source.warnings[0]
-    stated = analyze_spindowns([path], SpinDownOptions(columns={"t": "t", "f": f"f [{unit}]"}))
+    stated = METHOD.analyze([path], SpinDownOptions(columns={"t": "t", "f": f"f [{unit}]"}))
     assert stated.runs[0].frequency[0] == pytest.approx(40, abs=0.1)
     assert not stated.sources[0].readings.doubtful
 
@@ -185,10 +185,10 @@ def test_hertz_taken_for_another_unit_are_doubted(tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     path.write_text(path.read_text("utf-8").replace(path.read_text("utf-8").split("\n", 1)[0], "time,speed"), "utf-8")
     for unit in ("rpm", "rad/s", "°/s"):
-        (source,) = analyze_spindowns([path], SpinDownOptions(columns={"f": f"speed [{unit}]"})).sources
+        (source,) = METHOD.analyze([path], SpinDownOptions(columns={"f": f"speed [{unit}]"})).sources
         assert source.readings.doubtful
         assert "f=NAME [Hz]" in source.warnings[0]
-    (right,) = analyze_spindowns([path], SpinDownOptions(columns={"f": "speed [Hz]"})).sources
+    (right,) = METHOD.analyze([path], SpinDownOptions(columns={"f": "speed [Hz]"})).sources
     assert not right.warnings
 
 
@@ -196,8 +196,8 @@ def test_a_run_whose_unit_is_in_doubt_stays_out_of_the_means(sample_data: Path, 
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
     np.savetxt(path, np.c_[t, 360 * nu], delimiter=",", header="t,f", comments="")
-    alone = analyze_spindowns([sample_data], SpinDownOptions())
-    both = analyze_spindowns([sample_data, path], SpinDownOptions())
+    alone = METHOD.analyze([sample_data], SpinDownOptions())
+    both = METHOD.analyze([sample_data, path], SpinDownOptions())
     assert both.combined.fit("disc").constants == alone.combined.fit("disc").constants
     assert len(both.runs) == len(alone.runs) + 1
     assert any("my" in warning for warning in both.about_all())
@@ -207,13 +207,13 @@ def test_a_speed_without_unit_may_be_in_hertz_or_turns_per_minute(tmp_path: Path
     path = tmp_path / "speed.csv"
     path.write_text("time,speed\n0,39.9\n10,38\n20,36\n30,34\n", "utf-8")
     with pytest.raises(DataError, match=r'"f=speed \[Hz\]" or "f=speed \[rpm\]"'):
-        analyze_spindowns([path], SpinDownOptions())
+        METHOD.analyze([path], SpinDownOptions())
 
 
 def test_a_stated_reading_uncertainty_takes_the_place_of_the_scatter(tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv", u=False)
-    without = analyze_spindowns([path], SpinDownOptions(tilt="none")).runs[0].fit("disc")
-    with_u = analyze_spindowns([path], SpinDownOptions(reading_u=0.03, tilt="none")).runs[0].fit("disc")
+    without = METHOD.analyze([path], SpinDownOptions(tilt="none")).runs[0].fit("disc")
+    with_u = METHOD.analyze([path], SpinDownOptions(reading_u=0.03, tilt="none")).runs[0].fit("disc")
     assert without.statistics.reduced_chi_square is None
     assert with_u.statistics.reduced_chi_square == pytest.approx(1, abs=1)
     ratio = without.parameters["c32"].u / with_u.parameters["c32"].u  # type: ignore[operator]
@@ -226,28 +226,28 @@ def test_in_a_searched_folder_what_is_broken_is_passed_over_and_told(sample_data
     for name in ("spin-down-1", "spin-down-2", "lower-limits"):
         shutil.copytree(sample_data / name, tmp_path / name)
     (tmp_path / "spin-down-2" / "run.json").write_text("{", encoding="utf-8")
-    analysis = analyze_spindowns([tmp_path], SpinDownOptions())
+    analysis = METHOD.analyze([tmp_path], SpinDownOptions())
     assert [source.name for source in analysis.sources] == ["spin-down-1"]
     assert any("spin-down-2" in warning for warning in analysis.warnings)
 
 
 def test_a_run_of_another_experiment_is_refused_by_name(sample_data: Path) -> None:
     with pytest.raises(DataError, match="holds a limit run, spindown needs a spin run"):
-        analyze_spindowns([sample_data / "lower-limits"], SpinDownOptions())
+        METHOD.analyze([sample_data / "lower-limits"], SpinDownOptions())
 
 
 def test_a_folder_without_runs_says_what_it_found(sample_data: Path, tmp_path: Path) -> None:
     with pytest.raises(DataError, match="holds no run and no data file"):
-        analyze_spindowns([tmp_path], SpinDownOptions())
+        METHOD.analyze([tmp_path], SpinDownOptions())
     shutil.copytree(sample_data / "lower-limits", tmp_path / "limits")
     with pytest.raises(DataError, match="found only 1 limit"):
-        analyze_spindowns([tmp_path], SpinDownOptions())
+        METHOD.analyze([tmp_path], SpinDownOptions())
 
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_a_folder_that_cannot_be_written_is_reported_in_one_line(sample_data: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
-    analysis = analyze_spindowns([sample_data], SpinDownOptions())
+    analysis = METHOD.analyze([sample_data], SpinDownOptions())
     with pytest.raises(CannotWrite, match="`out`") as caught:
         save(ANALYSES["spindown"], analysis, tmp_path / "file" / "below")
     assert isinstance(caught.value, LevilabError)
@@ -256,6 +256,6 @@ def test_a_folder_that_cannot_be_written_is_reported_in_one_line(sample_data: Pa
 
 @pytest.mark.parametrize("n", [3, 4, 5, 7])
 def test_few_readings_give_a_result_without_nan_that_says_what_it_cannot_tell(tmp_path: Path, n: int) -> None:
-    analysis = analyze_spindowns([spin_down_csv(tmp_path / "my.csv", n=n)], SpinDownOptions())
+    analysis = METHOD.analyze([spin_down_csv(tmp_path / "my.csv", n=n)], SpinDownOptions())
     text = json.dumps(ANALYSES["spindown"].document(analysis, tmp_path), allow_nan=False)
     assert json.loads(text)["warnings"]

@@ -16,7 +16,7 @@ from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import save
-from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
 from levilab.pipelines.spindown.document import DOCUMENT
 from support.equal import differences
 from support.spin_downs import spin_down_csv
@@ -53,7 +53,7 @@ def runs(tmp_path: Path, sample_data: Path) -> Path:
 
 def analyzed(*paths: Path, **options: Any) -> SpinDownAnalysis:
     """The analysis, and its result.json; the figure takes longer than all the rest."""
-    analysis = analyze_spindowns(paths, SpinDownOptions(**options))
+    analysis = METHOD.analyze(paths, SpinDownOptions(**options))
     save(DOCUMENT.of(analysis, analysis.place), analysis.place, picture=b"")
     return analysis
 
@@ -102,7 +102,7 @@ def test_a_run_that_changed_is_analyzed_and_no_other(runs: Path, fitted: list[st
     after = recall_spindowns([runs], SpinDownOptions())
     assert fitted == ["run-2"]
     assert differences(after.runs[0], before.runs[0]) == []
-    assert differences(after.combined.fits, analyze_spindowns([runs], SpinDownOptions(tilt="none")).combined.fits) == []
+    assert differences(after.combined.fits, METHOD.analyze([runs], SpinDownOptions(tilt="none")).combined.fits) == []
     assert not after.runs[1].has_tilt  # with the options of the result that held before
     assert "the readings are others than in" in after.origins[1].text
     assert after.origins[0].text.startswith("as levilab analyze found it")
@@ -123,14 +123,14 @@ def test_runs_analyzed_one_by_one_are_combined_without_a_new_fit(runs: Path, fit
         analyzed(run)
     after = recall_spindowns([runs], SpinDownOptions())
     assert fitted == []
-    assert differences(after.combined, analyze_spindowns([runs], SpinDownOptions()).combined) == []
+    assert differences(after.combined, METHOD.analyze([runs], SpinDownOptions()).combined) == []
 
 
 def test_a_run_is_recalled_from_the_result_of_its_folder(runs: Path, fitted: list[str]) -> None:
     analyzed(runs)
     after = recall_spindowns([runs / "run-3"], SpinDownOptions())
     assert fitted == []
-    assert differences(after.runs[0], analyze_spindowns([runs / "run-3"], SpinDownOptions()).runs[0]) == []
+    assert differences(after.runs[0], METHOD.analyze([runs / "run-3"], SpinDownOptions()).runs[0]) == []
 
 
 @pytest.mark.parametrize("given", [{"reading_u": 0.05}, {"keep_outliers": True}])

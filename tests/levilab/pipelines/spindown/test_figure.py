@@ -11,7 +11,7 @@ from matplotlib.colors import to_hex
 
 from analysis.spindown.drag import LAWS
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.spindown.analysis import SpinDownAnalysis, analyze_spindowns
+from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
 from levilab.pipelines.spindown.figure import MOST_POINTS, spindown_figure
 from levilab.present.looks import LOOKS
 from levilab.present.style import as_svg
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def analysis_of(*paths: Path, u: float | None = None) -> SpinDownAnalysis:
-    return analyze_spindowns(paths, SpinDownOptions(reading_u=u, tilt="none"))
+    return METHOD.analyze(paths, SpinDownOptions(reading_u=u, tilt="none"))
 
 
 @pytest.fixture(scope="module")

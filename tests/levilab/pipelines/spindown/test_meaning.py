@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.spindown.drag import LAWS
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.spindown.analysis import analyze_spindowns
+from levilab.pipelines.spindown.analysis import METHOD
 from levilab.pipelines.spindown.laws import SYMBOLS
 from levilab.pipelines.spindown.meaning import meaning
 
@@ -20,7 +20,7 @@ def test_runs_whose_drag_differs_are_not_said_to_agree(tmp_path: Path) -> None:
         f = (250**-0.5 + c * t / 2) ** -2 / (2 * np.pi) + random.normal(0, U, t.size)
         rows = "\n".join(f"{time},{spin},{U}" for time, spin in zip(t, f, strict=True))
         (tmp_path / f"{c}.csv").write_text(f"t,f,u\n{rows}\n", encoding="utf-8")
-    analysis = analyze_spindowns(sorted(tmp_path.glob("*.csv")), SpinDownOptions())
+    analysis = METHOD.analyze(sorted(tmp_path.glob("*.csv")), SpinDownOptions())
     assert len(LAWS[analysis.combined.best].constants) > 1
     scatter = meaning(analysis)[-1]
     assert SYMBOLS["c32"] in scatter
