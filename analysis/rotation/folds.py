@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.rotation.line import LineFit, fit_line
-from analysis.rotation.result import Fold
 
 if TYPE_CHECKING:
     from analysis.rotation.record import Array, Record
@@ -28,54 +27,104 @@ EVEN = 5.0
 _MOST_JITTER = 0.3
 
 
+@dataclass(frozen=True)
+class Image:
+    """A frequency m·rate + sign·f, whose samples at even times are those of f; its slope has the same sign."""
+
+    m: int
+    sign: int
+
+    def of(self, frequency: float, rate: float) -> float:
+        """Return the image of a frequency [Hz]."""
+        return self.m * rate + self.sign * frequency
+
+
 @dataclass(frozen=True, eq=False)
-class Weighed:
-    """The folds of a line, the most probable first.
+class Evidence:
+    """What one window says of a line and its images.
 
     Attributes:
-        fits: of each.
-        folds: the same with their probabilities.
+        fits: the line itself, then its images.
+        log: natural logarithms of the likelihoods at the times given, shape (h,).
+        even: that at even times, where all are alike; −∞: the times have no one distance.
+    """
+
+    fits: tuple[LineFit, ...]
+    log: Array
+    even: float
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """The folds of a line.
+
+    Attributes:
+        shares: probability of each, shape (h,).
+        order: their numbers, the most probable first.
         by_times: whether the times alone tell them from each other.
         regular: whether the samples lie more evenly than their times say.
     """
 
-    fits: tuple[LineFit, ...]
-    folds: tuple[Fold, ...]
+    shares: Array
+    order: tuple[int, ...]
     by_times: bool
     regular: bool
 
-
-def images(record: Record, fit: LineFit, low: float, high: float) -> list[tuple[float, float]]:
-    """Return other frequencies [Hz] and slopes [Hz/s] with the same samples, if their times were even."""
-    most = math.ceil(high / record.rate) + 1
-    places = [
-        (m * record.rate + sign * fit.frequency, sign * fit.chirp) for m in range(-most, most + 1) for sign in (1, -1)
-    ]
-    return [one for one in places if low <= one[0] <= high and abs(one[0] - fit.frequency) > 1 / record.half]
+    @property
+    def certain(self) -> bool:
+        """Whether one is far more probable than the others."""
+        return float(self.shares.max()) > CERTAIN
 
 
-def weigh_folds(record: Record, fit: LineFit, low: float, high: float) -> Weighed:
-    """Return the folds of a line between two frequencies [Hz] with their probabilities.
+def images_between(frequencies: tuple[float, float], rate: float, low: float, high: float) -> list[Image]:
+    """Return the line itself and its images that lie between two frequencies [Hz].
 
-    A phone may write times that jitter more than its samples do.  So each fold has the likelihood of its samples at the
-    times given, or at even times, where all folds are alike; and each has that of its slope's sense.
+    Args:
+        frequencies: least and greatest of the line [Hz].
+        rate: samples per second.
+        low: the least of an image [Hz].
+        high: the greatest [Hz].
     """
-    fits = [fit, *(fit_line(record, *place) for place in images(record, fit, low, high))]
+    most = math.ceil(high / rate) + 1
+    found = [Image(m, sign) for m in range(-most, most + 1) for sign in (1, -1)]
+    own = Image(0, 1)
+    return [own, *(one for one in found if one != own and all(low <= one.of(f, rate) <= high for f in frequencies))]
+
+
+def evidence_of(record: Record, fit: LineFit, images: list[Image], rate: float) -> Evidence:
+    """Return the likelihoods of a line and of its images.
+
+    A phone may write times that jitter more than its samples do: so there is a likelihood at even times, too.
+    """
+    fits = [fit, *(fit_line(record, one.of(fit.frequency, rate), one.sign * fit.chirp) for one in images[1:])]
     log = np.array([one.likelihood for one in fits])
-    even = _even_times(record)
-    at_even = -np.inf
-    if even is not None:
-        at_even = fit_line(record.at(even + record.middle), fit.frequency, fit.chirp).likelihood
-    by_times = np.logaddexp(log, at_even)
-    posterior = by_times + np.log([_sense(one) for one in fits])
-    shares = np.exp(posterior - np.logaddexp.reduce(posterior))
+    times = _even_times(record) if len(fits) > 1 else None
+    even = -math.inf
+    if times is not None:
+        even = fit_line(record.at(times + record.middle), fit.frequency, fit.chirp).likelihood
+    return Evidence(tuple(fits), log, even)
+
+
+def weigh(seen: list[Evidence], signs: list[int], slope: float, u: float) -> Weighed:
+    """Return the probabilities of a line and its images.
+
+    Args:
+        seen: by windows.
+        signs: of the images.
+        slope: of the line itself [Hz/s].
+        u: its standard uncertainty [Hz/s].
+    """
+    log = np.sum([one.log for one in seen], axis=0)
+    even = sum(one.even for one in seen)
+    by_times = np.logaddexp(log, even)
+    posterior = by_times + np.log([_sense(sign * slope / u) for sign in signs])
     order = np.argsort(-posterior, kind="stable")
-    first = order[0]
+    first = int(order[0])
     return Weighed(
-        fits=tuple(fits[k] for k in order),
-        folds=tuple(Fold(fits[k].frequency, fits[k].chirp, float(log[k] - log.max()), float(shares[k])) for k in order),
+        shares=np.exp(posterior - np.logaddexp.reduce(posterior)),
+        order=tuple(map(int, order)),
         by_times=bool(np.exp(by_times[first] - np.logaddexp.reduce(by_times)) > CERTAIN),
-        regular=bool(at_even > log[first] + EVEN),
+        regular=bool(even > log[first] + EVEN),
     )
 
 
@@ -91,9 +140,9 @@ def _even_times(record: Record) -> Array | None:
     return even if float(np.std(even - record.late)) < _MOST_JITTER * usual else None
 
 
-def _sense(fit: LineFit) -> float:
-    """Return the prior probability of a slope's sense: that of a spin that falls is 1."""
+def _sense(slope: float) -> float:
+    """Return the prior probability of a slope over its u: that of a spin that falls is 1."""
     from scipy.special import ndtr
 
-    falls = float(ndtr(-fit.chirp / float(fit.covariance[1, 1]) ** 0.5))
+    falls = float(ndtr(-slope))
     return falls + RISING * (1 - falls)

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 #: A drag in proportion to the n-th power of the spin changes its slope by n slope²/frequency a second.  n is evenly
 #: distributed from 1 to 2: its standard deviation is 1/√12.
 UNDER_DRAG, UNDER_DRAG_U = 1.5, 0.29
-#: Steps of Gauss and Newton, and what part of u the last one is at most.
-_STEPS, _NEAR = 12, 1e-3
+#: Steps of Gauss and Newton at most, and the part of u that the last one is: one more would be 1 % of that.
+_STEPS, _NEAR = 12, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +55,7 @@ def fit_line(record: Record, frequency: float, chirp: float) -> LineFit:
     """Return the line of greatest likelihood near a frequency [Hz] and a slope [Hz/s] at the record's middle."""
     x, half = record.late_of_half, record.half
     n = x.size
+    powers = record.powers[:, :, None]
     freedom = max(n - record.parameters - 2.0, 1.0)
     for _ in range(_STEPS):
         bend_unit = chirp * abs(chirp) / frequency if chirp < 0 else 0.0  # of an even drive there is none
@@ -62,7 +63,7 @@ def fit_line(record: Record, frequency: float, chirp: float) -> LineFit:
         turns = half * x * (frequency + half * x * (chirp / 2 + half * x * bend / 6))
         angle = 2 * np.pi * turns
         wave = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        columns = (wave[:, None, :] * np.stack([np.ones(n), x, x * x, x**3], axis=1)[:, :, None]).reshape(n, 8)
+        columns = (powers * wave[:, None, :]).reshape(n, 8)
         normal, product = record.project(columns)
         own = normal[:2, :2] + PRIOR * np.eye(2)
         inverse = np.linalg.inv(own)
@@ -70,22 +71,18 @@ def fit_line(record: Record, frequency: float, chirp: float) -> LineFit:
         explained = np.einsum("ik,ik->k", product[:2], amplitudes)
         squares = np.maximum(np.diagonal(record.squares) - explained, 1e-12 * n)
         variance = squares / freedom
-        # the phase's derivatives by frequency, slope and bend, in units of the edge's phase
+        # derivatives by frequency, slope and bend are scale·τ, scale·τ² and scale·τ³ times the line a quarter turn on;
+        # the line's own amplitudes are eliminated
         scale = np.pi * np.array([2 * half, half**2, half**3 / 3])
-        information, gradient = np.zeros((3, 3)), np.zeros(3)
-        for k in range(variance.size):
-            a, b = amplitudes[:, k]
-            slopes = np.zeros((8, 3))
-            for j in range(3):
-                slopes[2 + 2 * j : 4 + 2 * j, j] = scale[j] * np.array([b, -a])
-            left = product[:, k] - normal[:, :2] @ amplitudes[:, k]
-            across = normal[:2] @ slopes
-            information += (slopes.T @ normal @ slopes - across.T @ inverse @ across) / variance[k]
-            gradient += slopes.T @ left / variance[k]
+        across = inverse @ normal[:2, 2:]
+        beside = (normal[2:, 2:] - normal[2:, :2] @ across).reshape(3, 2, 3, 2)
+        left = (product[2:] - normal[2:, :2] @ amplitudes).reshape(3, 2, -1)
+        ahead = np.stack([amplitudes[1], -amplitudes[0]])
+        information = np.einsum("ipjq,pq->ij", beside, (ahead / variance) @ ahead.T) * np.outer(scale, scale)
+        gradient = scale * np.einsum("ipk,pk->i", left, ahead / variance)
         # the bend's prior: known but for the law of the drag
         information[2, 2] += 1 / max((UNDER_DRAG_U * abs(bend_unit)) ** 2, 1e-24)
-        information[0, 0] += 1e-12  # no line at all leaves nothing to divide by
-        information[1, 1] += 1e-12
+        information[[0, 1], [0, 1]] += 1e-12  # no line at all leaves nothing to divide by
         covariance = np.linalg.inv(information)
         step = covariance @ gradient
         u = np.sqrt(np.diagonal(covariance)[:2])

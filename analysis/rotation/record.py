@@ -32,10 +32,14 @@ PRIOR = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A line beside that of the spin: frequency at the middle [Hz] and slope [Hz/s]."""
+    """A line: frequency at a record's middle [Hz] and slope [Hz/s]."""
 
     frequency: float
     chirp: float = 0.0
+
+    def at(self, later: float) -> Line:
+        """Return the same line at a middle that is later [s]."""
+        return Line(self.frequency + later * self.chirp, self.chirp)
 
 
 class Record:
@@ -48,41 +52,43 @@ class Record:
         rate: samples per second.
         field: without its median, over `unit`, shape (n, k).
         unit: standard deviation of the differences of neighbours over √2, the greatest of the axes [T].
-        left_out: samples that are no numbers.
+        late_of_half: `late` over `half`, shape (n,); `powers` its powers 0 to 3, shape (n, 4).
+        others: lines beside that of the spin.
     """
 
-    def __init__(self, times: Array, field: Array, left_out: int = 0) -> None:
+    def __init__(self, times: Array, field: Array, others: Sequence[Line] = ()) -> None:
         from scipy.sparse import csr_array
 
         self.middle = float(times.mean())
         self.late = times - self.middle
         self.half = 0.5 * float(times[-1] - times[0])
         self.rate = (times.size - 1) / (2 * self.half)
-        self.left_out = left_out
         offset = np.median(field, axis=0)
         self.unit = max(float(np.diff(field, axis=0).std(axis=0).max()) / np.sqrt(2), 1e-300)
         self.field = (field - offset) / self.unit
-        self.late_of_half = self.late / self.half
+        self.late_of_half = x = self.late / self.half
+        self.powers = np.stack([np.ones_like(x), x, x * x, x * x * x], axis=1)
         count = max(round(2 * self.half / KNOTS_S), 1)
         place = (self.late - self.late[0]) / (2 * self.half) * count
         first = np.minimum(place.astype(np.int64), count - 1)
         x = place - first
-        values = np.stack(
-            [(1 - x) ** 3, 3 * x**3 - 6 * x**2 + 4, -3 * x**3 + 3 * x**2 + 3 * x + 1, x**3], axis=1
-        ) / 6  # fmt: skip
+        y = 1 - x
+        x2, y2 = x * x, y * y
+        values = np.stack([y2 * y, 4 - 3 * x2 * (1 + y), 4 - 3 * y2 * (1 + x), x2 * x], axis=1) / 6
         columns = first[:, None] + np.arange(4)
         starts = np.arange(0, 4 * x.size + 1, 4)
         self._spline = csr_array((values.ravel(), columns.ravel(), starts), shape=(x.size, count + 3))
-        self._transposed = self._spline.T.tocsr()
+        self._transposed = self._spline.T
         self._factor = self._band(values, first, count + 3)
-        self.others: tuple[Line, ...] = tuple(Line(mains) for mains in MAINS_HZ)
-        self._eliminate()
+        self.add_lines(others)
 
     def at(self, times: Array) -> Record:
         """Return the same samples at other times."""
-        other = Record(times, self.field * self.unit, self.left_out)
-        other.add_lines(self.others[len(MAINS_HZ) :])
-        return other
+        return Record(times, self.field * self.unit, self.others_at(0.0))
+
+    def others_at(self, later: float) -> list[Line]:
+        """Return the lines beside spin and mains at a middle that is later [s]."""
+        return [one.at(later) for one in self.others[len(MAINS_HZ) :]]
 
     def _band(self, values: Array, first: NDArray[np.int64], size: int) -> Array:
         """Return the Cholesky factor of the spline's normal matrix, in banded form."""
@@ -97,17 +103,11 @@ class Record:
 
     def add_lines(self, lines: Sequence[Line]) -> None:
         """Add lines beside those of the mains."""
-        self.others = (*self.others[: len(MAINS_HZ)], *lines)
-        self._eliminate()
-
-    def _eliminate(self) -> None:
-        """Prepare the elimination of all that is beside the line of the spin."""
-        x = self.late_of_half
-        degrees = np.stack([np.ones_like(x), x, x * x], axis=1)
-        turns = np.stack([line.frequency * self.late + 0.5 * line.chirp * self.late**2 for line in self.others], axis=1)
-        wave = np.exp(2j * np.pi * turns)[:, :, None] * degrees[:, None, :]
-        wave = wave.reshape(x.size, -1)
-        self._lines = np.concatenate([wave.real, wave.imag], axis=1)
+        self.others: tuple[Line, ...] = (*map(Line, MAINS_HZ), *lines)
+        frequency, chirp = np.array([(line.frequency, line.chirp) for line in self.others]).T
+        angle = 2 * np.pi * self.late[:, None] * (frequency + 0.5 * chirp * self.late[:, None])
+        wave = np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
+        self._lines = (wave[:, :, None] * self.powers[:, None, :3]).reshape(self.late.size, -1)
         self._fixed = np.concatenate([self._lines, self.field], axis=1)
         self._on_fixed, self._by_fixed = self._on_spline(self._fixed)
         gram = self._fixed.T @ self._fixed - self._on_fixed.T @ self._by_fixed
@@ -147,8 +147,8 @@ class Record:
         return np.asarray(field - self._lines @ lines - self._spline @ (by[:, q:] - by[:, :q] @ lines))
 
 
-def read_samples(times: Any, field: Any) -> Record:
-    """Return the samples as a record.
+def read_samples(times: Any, field: Any) -> tuple[Array, Array]:
+    """Return times, shape (n,) [s], and field, shape (n, k) [T], without samples that are no numbers.
 
     Raises:
         ShapesDiffer, NotFinite, TimesNotIncreasing, TooFewReadings.
@@ -162,7 +162,7 @@ def read_samples(times: Any, field: Any) -> Record:
         k = int(np.flatnonzero(~np.isfinite(t))[0])
         raise NotFinite(quantity="time", index=k, value=float(t[k]))
     good = np.isfinite(b).all(axis=1)
-    t, b, left_out = t[good], b[good], int(np.count_nonzero(~good))
+    t, b = t[good], b[good]
     back = np.flatnonzero(np.diff(t) < 0)
     if back.size:
         k = int(back[0])
@@ -170,4 +170,4 @@ def read_samples(times: Any, field: Any) -> Record:
     needed = FEWEST if t.size < 2 or t[-1] <= t[0] else max(FEWEST, round(SHORTEST_S * t.size / float(t[-1] - t[0])))
     if t.size < needed or t[-1] <= t[0]:
         raise TooFewReadings(seen=t.size, needed=needed)
-    return Record(t, b, left_out)
+    return t, b

@@ -46,7 +46,6 @@ class FieldSpin:
         snr_db: 20 log₁₀ of amplitude over noise of a sample, in the axis where it is greatest.
         rate: samples per second.
         samples: number of those used.
-        left_out: samples that are no numbers.
         folds: frequencies that could be it, the most probable first, which is this one.
         kinds: of warnings.
     """
@@ -64,7 +63,6 @@ class FieldSpin:
     snr_db: float
     rate: float
     samples: int
-    left_out: int
     folds: tuple[Fold, ...]
     kinds: tuple[Kind, ...] = ()
 

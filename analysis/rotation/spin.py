@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.errors import NoLine
-from analysis.rotation.folds import CERTAIN, Weighed, weigh_folds
+from analysis.rotation.folds import evidence_of, images_between, weigh
 from analysis.rotation.line import LineFit, fit_line
 from analysis.rotation.record import MAINS_HZ, Line, Record, read_samples
-from analysis.rotation.result import FieldSpin, Kind
-from analysis.rotation.search import HIGHEST, LOWEST, STEEPEST, other_lines, search
+from analysis.rotation.result import FieldSpin, Fold, Kind
+from analysis.rotation.search import HIGHEST, LOWEST, other_lines, search
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import ArrayLike
 
-#: Lines beside mains and spin: precession and nutation.
-_OTHERS = 2
+    from analysis.rotation.folds import Evidence, Weighed
+
 #: A line that is named may lie this part of the given frequency beside it.
 NEAR = 0.1
 #: Gain of the logarithm of the likelihood by a line that noise has with probability 1e-3 anywhere in the search, about:
@@ -46,27 +46,42 @@ def spin_of_field(times: ArrayLike, field: ArrayLike, *, near: float | None = No
         TooFewReadings, ShapesDiffer, NotFinite, TimesNotIncreasing: see `analysis.errors`.
         NoLine: nothing stands out of the noise.
     """
-    record = read_samples(times, field)
-    low, high = (LOWEST, HIGHEST) if near is None else ((1 - NEAR) * near, (1 + NEAR) * near)
+    record = Record(*read_samples(times, field))
+    low, high = limits_near(near)
     fit = strongest(record, low, high)
-    return result_of(record, weigh_folds(record, fit, low, high))
+    images = images_between((fit.frequency, fit.frequency), record.rate, low, high)
+    apart = 1 / record.half  # nearer to half the rate a line and its image are one
+    images = [one for one in images if one.m == 0 or abs(one.of(fit.frequency, record.rate) - fit.frequency) > apart]
+    seen = evidence_of(record, fit, images, record.rate)
+    u = float(fit.covariance[1, 1]) ** 0.5
+    return result_of(record, seen, weigh([seen], [one.sign for one in images], fit.chirp, u))
 
 
-def strongest(record: Record, low: float, high: float, chirps: tuple[float, float] = (-STEEPEST, STEEPEST)) -> LineFit:
-    """Return the strongest line in a range of frequencies [Hz] and slopes [Hz/s].  Raises NoLine."""
-    start = search(record, low, high, chirps)
+def strongest(record: Record, low: float, high: float) -> LineFit:
+    """Return the strongest line between two frequencies [Hz].  Raises NoLine."""
+    start = search(record, low, high)
     first = fit_line(record, start.frequency, start.chirp)
     rest = record.rest(first.columns @ first.amplitudes)
-    record.add_lines(other_lines(record, rest, Line(first.frequency, first.chirp), _OTHERS))
+    record.add_lines(other_lines(record, rest, Line(first.frequency, first.chirp)))
     fit = fit_line(record, first.frequency, first.chirp)
     if not (fit.gain > LEAST_GAIN and math.isfinite(fit.gain)):
         raise NoLine(lowest=low, highest=high, duration=2 * record.half, gain=fit.gain)
     return fit
 
 
-def result_of(record: Record, weighed: Weighed) -> FieldSpin:
-    """Return the result of a fit."""
-    fit = weighed.fits[0]
+def limits_near(near: float | None) -> tuple[float, float]:
+    """Return least and greatest frequency of the search [Hz]."""
+    return (LOWEST, HIGHEST) if near is None else ((1 - NEAR) * near, (1 + NEAR) * near)
+
+
+def result_of(record: Record, seen: Evidence, weighed: Weighed) -> FieldSpin:
+    """Return the result of the most probable of the folds."""
+    fit = seen.fits[weighed.order[0]]
+    folds = tuple(
+        Fold(one.frequency, one.chirp, float(one.likelihood - seen.log.max()), float(weighed.shares[k]))
+        for k in weighed.order
+        for one in [seen.fits[k]]
+    )
     cosine, sine = fit.amplitudes
     amplitude = np.hypot(cosine, sine)
     noise = np.sqrt(fit.variance)
@@ -88,9 +103,8 @@ def result_of(record: Record, weighed: Weighed) -> FieldSpin:
         snr_db=20 * math.log10(max(float(np.max(amplitude / noise)), 1e-9)),
         rate=record.rate,
         samples=record.late.size,
-        left_out=record.left_out,
-        folds=weighed.folds,
-        kinds=tuple(_kinds(record, weighed)),
+        folds=folds,
+        kinds=tuple(_kinds(record, fit, weighed)),
     )
 
 
@@ -104,11 +118,10 @@ def _sense_of_rotation(fit: LineFit) -> int:
     return 0 if abs(area) < 3 * u else int(math.copysign(1, area))
 
 
-def _kinds(record: Record, weighed: Weighed) -> Iterator[Kind]:
-    fit, folds = weighed.fits[0], weighed.folds
-    if folds[0].probability < CERTAIN:
+def _kinds(record: Record, fit: LineFit, weighed: Weighed) -> Iterator[Kind]:
+    if not weighed.certain:
         yield "fold-doubt"
-    elif len(folds) > 1:
+    elif len(weighed.order) > 1:
         if fit.frequency > record.rate / 2:
             yield "folded"
         if not weighed.by_times:

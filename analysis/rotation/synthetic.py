@@ -55,3 +55,42 @@ def synthetic_field(
             axes = amplitude * random.uniform(-1, 1, 3), random.uniform(size=3)
             field += axes[0] * np.cos(2 * np.pi * (turns[:, None] + axes[1]))
     return times, field
+
+
+def synthetic_flight(
+    random: np.random.Generator,
+    *,
+    duration: float = 120.0,
+    up: tuple[float, float] = (0.0, 1e9),
+    start_hz: float = 38.0,
+    loss: float = 3.2e-3,
+    rate: float = 100.0,
+    jitter: float = 3e-4,
+    amplitude: float = 0.3e-6,
+    noise: float = 0.5e-6,
+) -> tuple[Array, Array, Array]:
+    """Return times [s], a field in three axes [T] and the spin [Hz] of a top that coasts, shapes (n,), (n, 3), (n,).
+
+    Args:
+        random: for the noise and all that is not said.
+        duration: of the record [s].
+        up: from when and until when the top is up [s].
+        start_hz: the spin at time 0.
+        loss: part of the spin that is lost in a second, always the same [1/s].
+        rate: samples per second.
+        jitter: of each time, 1σ [s].
+        amplitude: of the line [T].
+        noise: of a sample, 1σ [T].
+    """
+    n = round(duration * rate)
+    times = np.sort(np.arange(n) / rate + random.normal(0, jitter, n))
+    spin = start_hz * np.exp(-loss * times)
+    turns = -start_hz * np.expm1(-loss * times) / loss
+    is_up = (times >= up[0]) & (times < up[1])
+    line = np.where(is_up, 1.0, 0.0)[:, None] * np.cos(2 * np.pi * (turns[:, None] + np.array([0.1, -0.15, 0.17])))
+    field = amplitude * np.array([1.0, 0.5, 0.3]) * line + random.normal(0, noise, (n, 3))
+    jolt = np.where(is_up, 1.0, 0.0)[:, None] * np.array(
+        [4e-6, 1e-6, -9e-6]
+    )  # the top's own field, which falls with it
+    swing = 1e-6 * np.sin(2 * np.pi * 0.77 * times)[:, None] * random.normal(size=3)
+    return times, field + np.array([1.05e-3, 2e-5, -6.2e-4]) + jolt + swing, spin

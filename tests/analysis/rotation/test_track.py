@@ -1,0 +1,67 @@
+"""A long record of a magnetometer: frequency against time, where the top is put and falls, and folds."""
+
+import numpy as np
+import pytest
+
+from analysis.errors import NoLine, NotPositive
+from analysis.rotation import FieldTrack, track_of_field
+from analysis.rotation.synthetic import synthetic_flight
+
+
+@pytest.fixture
+def fresh() -> np.random.Generator:
+    """Random numbers that no constant was chosen with."""
+    return np.random.default_rng(20261125)
+
+
+def follow(random: np.random.Generator, **how: object) -> tuple[FieldTrack, np.ndarray]:
+    """Return a track and the deviations from the truth over u."""
+    times, field, spin = synthetic_flight(random, **how)
+    track = track_of_field(times, field)
+    return track, (track.frequency - np.interp(track.time, times, spin)) / track.u
+
+
+def test_windows_are_as_exact_and_independent_as_their_u_say(fresh):
+    pulls = np.concatenate([follow(fresh, duration=100.0)[1] for _ in range(6)])
+    assert pulls.size == 60
+    assert pulls.std() == pytest.approx(1, abs=4 / np.sqrt(2 * 60))  # 4 standard errors
+    assert abs(np.mean(pulls[1:] * pulls[:-1])) < 4 / np.sqrt(60)
+
+
+def test_a_top_is_followed_from_where_it_is_put_to_where_it_falls(fresh):
+    track, pulls = follow(fresh, up=(22.0, 94.3))
+    (flight,) = track.flights
+    assert (flight.start, flight.end) == pytest.approx((22.0, 94.3), abs=1.6)  # three pieces of half a second
+    assert flight.began
+    assert flight.ended
+    assert np.abs(pulls).max() < 4
+    assert [end for _, end in track.empty] == pytest.approx([22.0, 120.0], abs=1.6)
+
+
+def test_a_line_that_runs_through_half_the_rate_is_followed_there(fresh):
+    track, pulls = follow(fresh, start_hz=57.0)
+    assert np.abs(pulls).max() < 4
+    assert track.kinds == ("folded",)
+
+
+def test_at_even_times_the_fall_of_the_spin_tells_the_folds_of_a_slow_phone(fresh):
+    track, pulls = follow(fresh, rate=50.0, jitter=0.0)
+    assert np.abs(pulls).max() < 4
+    assert set(track.kinds) == {"folded", "fold-by-slope"}
+
+
+def test_two_tops_are_two_flights(fresh):
+    first, second = (synthetic_flight(fresh, duration=60.0, up=(0, 48.0), start_hz=hz) for hz in (28.0, 36.0))
+    times = np.concatenate([first[0], first[0][-1] + 0.01 + second[0] - second[0][0]])
+    track = track_of_field(times, np.concatenate([first[1], second[1]]))
+    assert [flight.ended for flight in track.flights] == [True, True]
+    starts = [track.frequency[flight.first] for flight in track.flights]
+    assert starts == pytest.approx([27.5, 35.4], abs=0.3)
+
+
+def test_a_record_without_a_top_is_refused(fresh):
+    times, field, _ = synthetic_flight(fresh, duration=30.0, amplitude=0.0)
+    with pytest.raises(NoLine):
+        track_of_field(times, field)
+    with pytest.raises(NotPositive):
+        track_of_field(times, field, window=0)
