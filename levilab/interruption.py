@@ -14,6 +14,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import stat
 import sys
 import threading
 from typing import TYPE_CHECKING
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
 
 #: Signals that ask a program to end: Ctrl-C, kill, a closed terminal, and on Windows Ctrl-Break.
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
+
+
+#: A pipe that ends within this time had ended before [s].
+_ENDED_BEFORE_S = 0.05
 
 
 class Interrupted(BaseException):
@@ -103,7 +108,7 @@ class End:
     """Whether a signal asked for the end.
 
     Attributes:
-        by: the name of the first signal; None: there was none.
+        by: the name of the first signal, or EOF for the end of the standard input; None: there was none.
         wake: called by the signal's handler, unless it is None.
     """
 
@@ -124,6 +129,35 @@ def watching_for_end() -> Iterator[End]:
     end = End()
     with _handle_signals_by(end):
         yield end
+
+
+def end_with_standard_input(end: End) -> None:
+    """Let the end of the standard input ask for the end, where it is a pipe of the program that started this one.
+
+    A pipe ends with the program that holds its other end, however that dies, on every system.  A terminal, a file and
+    /dev/null (``nohup``, ``&``, a service) are no pipe, and a pipe that has ended already was given by nobody on
+    purpose (cron): those are not watched.
+    """
+    with contextlib.suppress(OSError):  # there may be no standard input
+        if stat.S_ISFIFO(os.fstat(0).st_mode):
+            reader = threading.Thread(target=_read_to_the_end, daemon=True)
+            reader.start()
+            reader.join(_ENDED_BEFORE_S)
+            if reader.is_alive():
+                threading.Thread(target=_end_after, args=(reader, end), daemon=True).start()
+
+
+def _read_to_the_end() -> None:
+    with contextlib.suppress(OSError):
+        while os.read(0, 4096):
+            pass
+
+
+def _end_after(reader: threading.Thread, end: End) -> None:
+    reader.join()
+    end.by = end.by or "EOF"
+    if end.wake:
+        end.wake()
 
 
 @contextlib.contextmanager

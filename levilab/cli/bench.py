@@ -149,7 +149,8 @@ def bench_serve(
 ) -> None:
     """Offer the virtual bench to other programs: TCP, HiSLIP, VXI-11, serial.  Prints the resource names to copy.
 
-    Ctrl-C or SIGTERM ends it.  There is no password: at another host than 127.0.0.1 any program can use it.
+    Ctrl-C or SIGTERM ends it, and the end of a pipe that is its standard input.  There is no password: at another host
+    than 127.0.0.1 any program can use it.
     """
     from instruments.virtual.servers.port_mapper import PORT
     from levilab.world.serve import Service, chosen_models, serve

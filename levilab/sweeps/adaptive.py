@@ -22,7 +22,7 @@ from levilab.sweeps.observables import OBSERVABLES, columns_of
 from levilab.sweeps.quantities import step_in_words
 from levilab.sweeps.refinement import AUDIT, CONFIDENCE, STRIDE, Points, Refined, refine, run_refinement
 from levilab.sweeps.run import Task, compute
-from levilab.sweeps.store import COMPUTED, DONE, FILLED, STATUS
+from levilab.sweeps.store import COMPUTED, DONE, FILLED, STATUS, as_text
 from levilab.workers import results_of
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def begin_adaptive(store: Store, observable: str = "survived", *, stride: int = 
                 "meaning": f"{COMPUTED}: computed; {FILLED}: filled in from points around; 0: neither",
             },
         )
-        store.group.attrs[ASKED] = {"observable": observable, "stride": stride, "audit": audit}
+        store.group.attrs[ASKED] = as_text({"observable": observable, "stride": stride, "audit": audit})
 
 
 def is_adaptive(store: Store) -> bool:
@@ -98,7 +98,7 @@ def run_adaptive(store: Store, executor: Workers, progress: Callable[[float], No
         CannotWrite: the store cannot be written.
         WorkersLost, SimulationError: points could not be computed.
     """
-    asked, plan = store.group.attrs[ASKED], store.plan
+    asked, plan = store.attribute(ASKED), store.plan
     refinement = refine(plan.shape, stride=asked["stride"], audit=asked["audit"], seed=plan.seed)
     run, feed = _Run.of(store, progress), _Feed()
     with contextlib.closing(results_of(compute, feed, executor)) as results:
@@ -215,12 +215,12 @@ class _Run:
     def finish(self, found: Refined) -> dict[str, Any]:
         """Fill in what was not computed, and write the report."""
         store, report = self.store, report_of(found)
-        self.columns[store.group.attrs[ASKED]["observable"]][~found.computed] = found.values[~found.computed]
+        self.columns[store.attribute(ASKED)["observable"]][~found.computed] = found.values[~found.computed]
         self.status[~found.computed] = FILLED
         self.unwritten = [np.arange(found.values.size)]
         self.write()
         with _writing(store):
-            store.group.attrs[FOUND] = report
+            store.group.attrs[FOUND] = as_text(report)
             store.array(DONE)[...] = 1
         store.marks[...] = 1
         return report
@@ -276,5 +276,5 @@ def in_words(report: dict[str, Any], plan: Plan) -> list[str]:
 
 def report_in(store: Store) -> dict[str, Any] | None:
     """Return the report of an adaptive store that is complete; None of any other."""
-    found: dict[str, Any] | None = store.group.attrs.get(FOUND)
+    found: dict[str, Any] | None = store.attribute(FOUND)
     return found

@@ -130,16 +130,15 @@ def _facts(store: Store) -> Iterator[Fact]:
 
 
 def _reproduction(store: Store) -> Iterator[Block]:
-    attributes = dict(store.group.attrs)
-    words = attributes.get("command_line")
+    words = store.attribute("command_line")
     if isinstance(words, list) and words:
         yield Code(command_text([str(word) for word in words]))
-    software, processor = attributes.get("software"), attributes.get("processor")
+    software, processor = store.attribute("software"), store.attribute("processor")
     facts = []
     if isinstance(software, dict):
         facts.append(Fact("Software", (", ".join(f"{name} {version}" for name, version in software.items()),)))
     if isinstance(processor, dict) and "name" in processor:
         facts.append(Fact("Processor", (str(processor["name"]),)))
-    facts.append(Fact("When", (f"begun {str(attributes.get('created_utc', '—'))[:19].replace('T', ' ')} UTC",)))
+    facts.append(Fact("When", (f"begun {str(store.group.attrs.get('created_utc', '—'))[:19].replace('T', ' ')} UTC",)))
     yield Facts(tuple(facts))
     yield Note("On a processor of the same kind the same command gives the same numbers to the last digit.")

@@ -8,6 +8,7 @@ without a mark are lost.
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import shutil
 import sys
@@ -37,6 +38,16 @@ DONE = "done"
 STATUS, COMPUTED, FILLED = "status", 1, 2
 #: Number of marks in one file.
 MARKS = 4096
+
+
+def as_text(value: Any) -> str:
+    """Return an attribute that has parts as JSON: netCDF, which others export a store to, knows numbers and texts."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def as_value(attribute: Any) -> Any:
+    """Return the value of such an attribute; an older store has it as it is."""
+    return json.loads(attribute) if isinstance(attribute, str) else attribute
 
 
 @dataclass(frozen=True)
@@ -116,13 +127,13 @@ class Store:
             place,
             attributes={
                 "schema": SCHEMA,
-                "plan": plan.as_table(),
+                "plan": as_text(plan.as_table()),
                 "scene_toml": plan.scene.as_toml(),
-                "synthetic": True,
-                "software": software_versions(),
-                "processor": processor(),
+                "synthetic": "true",
+                "software": as_text(software_versions()),
+                "processor": as_text(processor()),
                 "created_utc": utc_now(),
-                "command_line": sys.argv,
+                "command_line": as_text(sys.argv),
             },
         )
         for axis in plan.axes:
@@ -172,7 +183,7 @@ class Store:
         """Return the store of a group.  Raises DataError where it is another group, or not whole."""
         if group.attrs.get("schema") != SCHEMA:
             raise DataError(f"{path}: its schema is {group.attrs.get('schema')!r}, and {SCHEMA!r} is expected")
-        table: Any = group.attrs["plan"]
+        table: Any = as_value(group.attrs["plan"])
         plan = Plan.from_table(table, {axis["key"]: _coordinate(group, axis["key"]) for axis in table["axes"]})
         for column in columns_of(plan.observables):
             if group[column.name].shape != plan.shape or group[column.name].chunks != plan.chunk:
@@ -191,13 +202,17 @@ class Store:
         ):
             yield
 
+    def attribute(self, name: str) -> Any:
+        """Return an attribute that has parts, such as the processor; None where the store does not have it."""
+        return as_value(self.group.attrs.get(name))
+
     def notes(self) -> list[str]:
         """Return the differences in software and processor since the store was begun that may change the last bits."""
-        begun, software = dict(self.group.attrs), software_versions()
-        versions = [(name, begun["software"].get(name), software[name]) for name in ("levilab", "numpy", "numba")]
+        begun, there, software = self.attribute("software"), self.attribute("processor"), software_versions()
+        versions = [(name, begun.get(name), software[name]) for name in ("levilab", "numpy", "numba")]
         other = [f"{name} {now} instead of {then}" for name, then, now in versions if now != then]
-        if begun["processor"] != processor():
-            other.append(f"the processor {processor()['name']} instead of {begun['processor']['name']}")
+        if there != processor():
+            other.append(f"the processor {processor()['name']} instead of {there['name']}")
         if not other:
             return []
         return [f"the sweep was begun elsewhere, here is {', '.join(other)}: chunks may differ in their last bits"]

@@ -13,7 +13,7 @@ from instruments.clock import WallClock
 from instruments.virtual.servers.clients import first_of
 from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, ListenAt, serve_bench
 from levilab.errors import LevilabError, UsageError
-from levilab.interruption import watching_for_end
+from levilab.interruption import end_with_standard_input, watching_for_end
 from levilab.world.bench import (
     PUT_BACK_AFTER_S,
     VIRTUAL_MODELS,
@@ -115,7 +115,7 @@ def chosen_models(words: list[str]) -> dict[str, str]:
 def serve(
     service: Service, ready: Callable[[tuple[Served, ...]], None], tell: Callable[[str], None] = lambda _: None
 ) -> str:
-    """Offer the bench until a signal ends it.
+    """Offer the bench until a signal ends it, or the program that started it with a pipe as standard input is gone.
 
     Args:
         service: how to offer it.
@@ -123,7 +123,7 @@ def serve(
         tell: called with a message before anything that takes long.
 
     Returns:
-        The name of the signal.
+        The name of the signal, or EOF.
 
     Raises:
         CannotServe: the address or a port is not free.
@@ -131,6 +131,7 @@ def serve(
         SceneError: the scene has no motion.
     """
     with watching_for_end() as end:
+        end_with_standard_input(end)
         world = _world(service, tell)
         if not end.by:
             asyncio.run(_serve(service, world, ready, end))
@@ -218,7 +219,7 @@ def _endpoints(service: Service, offer: Endpoints) -> Served:
 
 
 async def _wait_for(end: End) -> None:
-    """Wait until a signal asks for the end."""
+    """Wait until something asks for the end."""
     event, loop = asyncio.Event(), asyncio.get_running_loop()
     end.wake = lambda: loop.call_soon_threadsafe(event.set)
     if end.by is None:

@@ -119,7 +119,8 @@ class SiglentSDG1000X(DriveGenerator):
         self.ask_back(setting, value)
 
     def forget_errors(self) -> None:
-        """Do nothing: there is no error queue."""
+        """Ask for answers with headers; there is no error queue."""
+        self.transport.write("CHDR SHORT")
 
     def raise_errors(self, after: str) -> None:
         """Do nothing: there is no error queue."""

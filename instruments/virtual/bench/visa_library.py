@@ -221,6 +221,28 @@ class LevilabVisaLibrary(VisaLibraryBase):
             link.settings = _line_settings(attributes)
         return self.handle_return_value(session, StatusCode.success)
 
+    # --- events: there are none, and a program that asks for one is told so as by any VISA ---
+
+    def enable_event(self, session: VISASession, event_type: Any, mechanism: Any, context: None = None) -> StatusCode:
+        """ViEnableEvent."""
+        return self.handle_return_value(session, StatusCode.error_invalid_event)
+
+    def wait_on_event(self, session: VISASession, in_event_type: Any, timeout: int) -> tuple[Any, Any, StatusCode]:
+        """ViWaitOnEvent."""
+        return in_event_type, None, self.handle_return_value(session, StatusCode.error_invalid_event)
+
+    def install_handler(
+        self, session: VISASession, event_type: Any, handler: Any, user_handle: Any
+    ) -> tuple[Any, Any, Any, StatusCode]:
+        """ViInstallHandler."""
+        return handler, user_handle, handler, self.handle_return_value(session, StatusCode.error_invalid_event)
+
+    def uninstall_handler(
+        self, session: VISASession, event_type: Any, handler: Any, user_handle: Any = None
+    ) -> StatusCode:
+        """ViUninstallHandler."""
+        return self.handle_return_value(session, StatusCode.error_handler_not_installed)
+
     def disable_event(self, session: VISASession, event_type: Any, mechanism: Any) -> StatusCode:
         """ViDisableEvent: there are no events."""
         return self.handle_return_value(session, StatusCode.success)

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.core.device import VirtualInstrument
-from instruments.virtual.core.parameters import boolean, choice, number, parameter
+from instruments.virtual.core.parameters import boolean, choice, number, optional_parameter, parameter
 from instruments.virtual.core.parser import Row, ScpiError, Value
-from instruments.virtual.core.rows import Ask, Both, Own, Switch, short_header
+from instruments.virtual.core.rows import Ask, Both, Own, Switch, Word, short_header
 from instruments.virtual.generator.channel import INFINITE, OPEN_V, SOURCE_OHM, Output
 
 if TYPE_CHECKING:
@@ -86,12 +86,15 @@ _CHANNEL: tuple[Row, ...] = (
     Both("C{n}:(BSWV|BASIC_WAVE)", lambda s, n, p: s.set_wave(n, p), lambda s, n, p: s.wave(n, p)),
     Both("C{n}:(OUTP|OUTPUT)", lambda s, n, p: s.set_output(n, p), lambda s, n, p: s.output(n, p)),
     *(
-        Own(f"C{{n}}:({short}|{long})", lambda _s, _n, p: _only_off(p), lambda _s, n, w=short: f"C{n}:{w} STATE,OFF")
+        Own(f"C{{n}}:({short}|{long})", lambda _s, _n, p: _only_off(p), lambda s, n, w=short: s.off(f"C{n}:{w}"))
         for short, long in (("MDWV", "MODULATEWAVE"), ("SWWV", "SWEEPWAVE"), ("BTWV", "BURSTWAVE"))
     ),
     Switch("C{n}:SYNC", "{n}:sync", words=("OFF", "ON")),
     Own("C{n}:(INVT|INVERT)", lambda s, n, p: s.invert(n, p), lambda s, n: s.ask_invert(n)),
+    Ask("C{n}:(ARWV|ARBWAVE)", lambda s, n: s.reply(f"C{n}:ARWV", "INDEX,2,NAME,StairUp")),
 )
+#: The first of the arbitrary waveforms that it is made with, by their places (guide, ARWV): none is put out here.
+_BUILT_IN = (*("Sine", "Noise", "StairUp", "StairDn", "Stairud", "Ppulse", "Npulse", "Trapezia", "Upramp", "Dnramp"),)
 
 
 def _only_off(parameters: list[str]) -> None:
@@ -124,7 +127,8 @@ class VirtualSDG1000X(VirtualInstrument):
     CHANNEL_ROWS: ClassVar = _CHANNEL
     ROWS: ClassVar[tuple[Row, ...]] = (
         Switch("(BUZZ|BUZZER)", "buzzer", default=True, words=("OFF", "ON")),
-        Ask("(CHDR|COMM_HEADER)", lambda _s: "CHDR SHORT"),
+        Word("(CHDR|COMM_HEADER)", "header", "*SHORT LONG OFF"),
+        Both("(STL|STORELIST)", answer=lambda s, p: s.stored(p)),
     )
     DEFAULTS: ClassVar = {_key(n, name): value for n in numbered for name, value in _DEFAULTS.items()}
 
@@ -139,8 +143,18 @@ class VirtualSDG1000X(VirtualInstrument):
         return f"{value:.6g}"
 
     def reply(self, header: str, text: str, unit: str = "") -> str:
-        """See the base: with the header."""
-        return f"{short_header(header)} {text}"
+        """See the base: with the header, unless CHDR is OFF.  The long form is not modelled."""
+        return text if self.settings["header"] == "OFF" else f"{short_header(header)} {text}"
+
+    def off(self, header: str) -> str:
+        """Answer that a mode is off."""
+        return self.reply(header, "STATE,OFF")
+
+    def stored(self, parameters: list[str]) -> str:
+        """STL? [BUILDIN|USER]: places and names of the arbitrary waveforms; a user has none.  Raises ScpiError."""
+        asked = optional_parameter(parameters).upper() or "BUILDIN"
+        named = _BUILT_IN if choice(asked, ("BUILDIN", "USER")) == "BUILDIN" else ()
+        return self.reply("STL", ", ".join(f"M{place}, {name}" for place, name in enumerate(named)))
 
     def on_change(self, name: str) -> None:
         """Pass the voltage at the terminals of channel 1 to the listener."""
@@ -148,8 +162,8 @@ class VirtualSDG1000X(VirtualInstrument):
             self._listener(self.clock.now(), self.signal())
 
     def reset(self) -> None:
-        """Go to the state after ``*RST``: all outputs off."""
-        self.settings |= self.commands.defaults
+        """Go to the state after ``*RST``: all outputs off; the form of answers stays, as with this maker's scopes."""
+        self.settings |= self.commands.defaults | {"header": self.settings["header"]}
         self.on_change("1:output")
 
     def _number(self, n: int, name: str) -> float:
@@ -237,7 +251,7 @@ class VirtualSDG1000X(VirtualInstrument):
         }
         own = (field for field in _FIELDS.values() if kind in field.only)
         fields |= {field.key: self.spell(self._number(n, field.name)) for field in own}
-        return f"C{n}:BSWV " + ",".join(f"{key},{value}" for key, value in fields.items())
+        return self.reply(f"C{n}:BSWV", ",".join(f"{key},{value}" for key, value in fields.items()))
 
     # --- OUTP ---
 
@@ -270,7 +284,7 @@ class VirtualSDG1000X(VirtualInstrument):
         state = "ON" if self.settings[_key(n, "output")] else "OFF"
         shown = _OPEN if load >= INFINITE else self.spell(load)
         polarity = self.settings[_key(n, "polarity")]
-        return f"C{n}:OUTP {state},LOAD,{shown},PLRT,{polarity}"
+        return self.reply(f"C{n}:OUTP", f"{state},LOAD,{shown},PLRT,{polarity}")
 
     def invert(self, n: int, parameters: list[str]) -> None:
         """INVT ON or OFF: the polarity, as PLRT of OUTP sets it.  Raises ScpiError."""
@@ -279,7 +293,7 @@ class VirtualSDG1000X(VirtualInstrument):
 
     def ask_invert(self, n: int) -> str:
         """INVT?: whether the output is inverted."""
-        return f"C{n}:INVT {'ON' if self.settings[_key(n, 'polarity')] == 'INVT' else 'OFF'}"
+        return self.reply(f"C{n}:INVT", "ON" if self.settings[_key(n, "polarity")] == "INVT" else "OFF")
 
     # --- the terminals ---
 

@@ -294,11 +294,14 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         places = self._places(record)
         if not places:
             return b""
-        codes = record.codes(
-            n, places.start, places[-1] - places.start + 1, of=record.points, start=record.origin, step=1 / record.rate
-        )
+        sample = 1 / record.rate
+        if places.step == 1:
+            codes = record.codes(n, places.start, len(places), of=record.points, start=record.origin, step=sample)
+        else:  # the points that are sent, and not those between them
+            start = record.origin + places.start * sample
+            codes = record.codes(n, 0, len(places), of=len(places), start=start, step=places.step * sample)
         # code 0 is the middle of the screen on the wire, where it is a signed byte
-        return bytes((codes[:: places.step] ^ 0x80).tobytes())
+        return bytes((codes ^ 0x80).tobytes())
 
     def _descriptor(self, record: Record, n: int) -> bytes:
         """Return WAVEDESC, as far as its places are known."""

@@ -148,6 +148,25 @@ def test_what_a_generator_lacks_is_off(header):
     assert errors(device) == [-224]
 
 
+def test_the_waveforms_that_a_generator_is_made_with_are_listed():
+    # Programming Guide, STL? and ARWV?: places and names; the third is selected after a reset
+    device = VirtualSDG1000X(VirtualClock())
+    assert ask(device, "STL?").startswith("STL M0, Sine, M1, Noise, M2, StairUp, ")
+    assert ask(device, "STL? USER") == "STL "
+    assert ask(device, "C1:ARWV?") == "C1:ARWV INDEX,2,NAME,StairUp"
+
+
+def test_a_generator_answers_without_headers_where_a_program_wants_none():
+    device = VirtualSDG1000X(VirtualClock())
+    send(device, b"CHDR OFF\n")
+    assert ask(device, "C2:OUTP?") == "OFF,LOAD,HZ,PLRT,NOR"
+    assert ask(device, "C1:BSWV?") == AFTER_RESET.removeprefix("C1:BSWV ")
+    address = "TCPIP0::generator::inst0::INSTR"
+    driver = SiglentSDG1000X(VisaTransport(address, library=library_for(VirtualBench({address: device}))))
+    driver.off()  # it asks for headers again
+    assert driver.frequency == 1000.0
+
+
 def test_an_inverted_output_is_one_of_inverted_polarity():
     device = VirtualSDG1000X(VirtualClock())
     assert ask(device, "C1:INVT ON;C1:OUTP?").endswith("PLRT,INVT")
@@ -224,6 +243,27 @@ def test_a_block_behind_a_header_that_never_ends_is_no_block():
     for broken in (b"C1:WF DAT2,and so on without a block\n", b"C1:WF DAT2,#15abcde\n", b"\n#15abcde\n\n", b""):
         with pytest.raises(BrokenBlock):
             block_of(broken, form)
+
+
+def test_the_points_that_are_sent_are_sampled_and_no_others():
+    sampled = []
+
+    def counted(start, step, n):
+        sampled.append(n)
+        return pulses(start, step, n)
+
+    device = scope("C1:ATTN 1", "C1:TRLV 0.65V", "TDIV 10MS", "TRMD STOP", "MSIZ 140K", "ARM", signal=counted)
+    device.clock.sleep(3.0)
+    whole = ask_codes(device, "C1:WF? DAT2")
+    sampled.clear()
+    send(device, b"WFSU SP,1000,FP,5\n")
+    assert (ask_codes(device, "C1:WF? DAT2") == whole[5::1000]).all()
+    assert sum(sampled) == 140
+
+
+def ask_codes(device, question):
+    send(device, question.encode() + b"\n")
+    return np.frombuffer(block_of(received(device, 100.0), BlockForm(longest_head=16, ends=2)), np.int8)
 
 
 class KeepsItsMemory(VirtualSDS1000XE):

@@ -8,6 +8,7 @@ from instruments.virtual.core.rows import Number, Switch, Text, Word
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.generator.generator import VirtualGenerator
 from instruments.virtual.generator.rows import Quantity
+from instruments.virtual.generator.siglent_sdg1000x import VirtualSDG1000X
 from instruments.virtual.magnetometer.lakeshore import Fields
 from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
 from instruments.virtual.oscilloscope.siglent_sds1000xe import VirtualSDS1000XE
@@ -19,7 +20,7 @@ from support.wire import ask, errors, send
 NO_SETTING = ("*OPC", "CONFigure", "MEASure", "DISPlay:DATA", "C1:(BSWV", "C2:(BSWV", "(SCDP")
 #: What ``*RST`` leaves as it is, by twin; the time-out of a 53230A and the form of a Siglent's answers are in memory
 #: that keeps, masks of the status are none of its business (IEEE 488.2, 10.32).
-KEPT = {Virtual53230A: {"timeout"}, VirtualSDS1000XE: {"header"}}
+KEPT = {Virtual53230A: {"timeout"}, VirtualSDS1000XE: {"header"}, VirtualSDG1000X: {"header"}}
 MASKS = ("*ESE", "*SRE")
 #: Numbers that the instrument moves to the nearest that it can do, by twin; a sweep begins above 0 Hz.
 ADJUSTED = {VirtualDSOX1000: r"CHANnel\d:OFFSet", VirtualGenerator: r".*FREQuency:SPAN"}

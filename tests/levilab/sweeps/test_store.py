@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from typing import TYPE_CHECKING
@@ -68,7 +69,29 @@ def test_plain_zarr_reads_arrays_coordinates_and_units(tmp_path: Path) -> None:
     assert group["lifetime_s"].attrs["unit"] == "s"
     assert np.array_equal(group["top.mass_kg"][:], plan().axes[1].values)
     assert group["top.mass_kg"].attrs["units"] == "kg"
-    assert group.attrs["plan"]["scene"]["base"]["inner_radius_m"] == 0.03
+    assert json.loads(group.attrs["plan"])["scene"]["base"]["inner_radius_m"] == 0.03
+
+
+def test_every_attribute_is_one_that_netcdf_has(tmp_path: Path) -> None:
+    import zarr
+
+    run(Store.create(tmp_path / "map.zarr", plan()))
+    group = zarr.open_group(tmp_path / "map.zarr", mode="r")
+    attributes = [*group.attrs.items(), *(item for _, array in group.arrays() for item in array.attrs.items())]
+    assert [name for name, value in attributes if type(value) not in {str, int, float}] == []
+
+
+def test_a_store_of_an_earlier_version_is_read(tmp_path: Path) -> None:
+    import zarr
+
+    made = Store.create(tmp_path / "map.zarr", plan())
+    run(made)
+    group = zarr.open_group(tmp_path / "map.zarr", mode="r+")
+    nested = ("plan", "software", "processor", "command_line")
+    group.attrs.update({name: json.loads(group.attrs[name]) for name in nested} | {"synthetic": True})
+    again = Store.open(tmp_path / "map.zarr")
+    assert again.plan.as_table() == made.plan.as_table()
+    assert again.notes() == []
 
 
 def test_values_are_on_the_disk_before_their_mark(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

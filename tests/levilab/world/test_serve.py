@@ -25,10 +25,10 @@ from support.waiting import HANG_GUARD_S as AT_MOST
 
 
 @contextlib.contextmanager
-def serving(*words):
+def serving(*words, stdin=None):
     """The process and what it said when it was ready."""
     command = [sys.executable, "-m", "levilab", "bench", "serve", "--json", *words]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         line = process.stdout.readline()
         assert line, process.stderr.read()
@@ -36,6 +36,29 @@ def serving(*words):
     finally:
         process.kill()
         process.communicate()
+
+
+STARTER = """
+import subprocess, sys
+server = subprocess.Popen(sys.argv[1:], stdin=subprocess.PIPE)
+server.wait()
+"""
+
+
+def test_a_bench_ends_with_the_program_that_started_it_however_that_dies():
+    bench = [sys.executable, "-m", "levilab", "bench", "serve", "--json"]
+    starter = subprocess.Popen([sys.executable, "-c", STARTER, *bench], stdout=subprocess.PIPE, text=True)
+    assert json.loads(starter.stdout.readline())["ready"]
+    starter.kill()
+    # its standard output ends with the last process that has it: the bench
+    assert starter.communicate(timeout=AT_MOST) == ("", None)
+
+
+def test_a_pipe_that_had_ended_before_does_not_end_the_bench():
+    end, beginning = os.pipe()
+    os.close(beginning)
+    with os.fdopen(end) as nothing, serving("--speed", "100", stdin=nothing) as (_, said):
+        assert "53230A" in ask(said["instruments"]["counter"]["resources"]["hislip"], "*IDN?")
 
 
 def ended(process, number):

@@ -7,7 +7,7 @@ import time
 
 import pytest
 import pyvisa
-from pyvisa.constants import StatusCode
+from pyvisa.constants import EventMechanism, EventType, StatusCode
 
 from instruments.clock import VirtualClock
 from instruments.virtual.bench.bench import VirtualBench
@@ -57,6 +57,21 @@ def test_the_instruments_of_the_bench_are_listed(manager):
     assert manager.list_resources("GPIB?*::INSTR") == ()
     assert manager.list_resources("(GPIB|TCPIP)?*") == (COUNTER, GENERATOR, OSCILLOSCOPE)
     assert manager.list_resources("ASRL[a-m]?*") == (MAGNETOMETER,)
+
+
+def test_a_program_that_waits_for_an_event_hears_that_there_are_none(manager):
+    request, queue = EventType.service_request, EventMechanism.queue
+    with manager.open_resource(GENERATOR) as generator:
+        for act in (
+            lambda: generator.enable_event(request, queue),
+            lambda: generator.wait_on_event(request, 10),
+            lambda: generator.install_handler(request, lambda *_: None),
+        ):
+            with pytest.raises(pyvisa.VisaIOError) as refused:
+                act()
+            assert refused.value.error_code == StatusCode.error_invalid_event
+        generator.discard_events(request, queue)
+        generator.disable_event(request, queue)
 
 
 @pytest.mark.parametrize("address", [GENERATOR, GENERATOR.lower(), GENERATOR.upper()])
