@@ -135,8 +135,8 @@ def end_with_standard_input(end: End) -> None:
     """Let the end of the standard input ask for the end, where it is a pipe of the program that started this one.
 
     A pipe ends with the program that holds its other end, however that dies, on every system.  A terminal, a file and
-    /dev/null (``nohup``, ``&``, a service) are no pipe, and a pipe that has ended already was given by nobody on
-    purpose (cron): those are not watched.
+    /dev/null (``nohup``, ``&``, a service) are no pipe; a pipe that has ended already (cron) has no program behind it.
+    Those are not watched.
     """
     with contextlib.suppress(OSError):  # there may be no standard input
         if stat.S_ISFIFO(os.fstat(0).st_mode):

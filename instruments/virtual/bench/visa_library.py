@@ -221,7 +221,7 @@ class LevilabVisaLibrary(VisaLibraryBase):
             link.settings = _line_settings(attributes)
         return self.handle_return_value(session, StatusCode.success)
 
-    # --- events: there are none, and a program that asks for one is told so as by any VISA ---
+    # --- events: there are none, and a program that asks for one gets the error of any VISA without them ---
 
     def enable_event(self, session: VISASession, event_type: Any, mechanism: Any, context: None = None) -> StatusCode:
         """ViEnableEvent."""
