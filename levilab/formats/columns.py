@@ -10,6 +10,7 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.titles import (
     CANONICAL,
     COMPANIONS,
+    LISTED,
     UNITS,
     Title,
     as_a_period,
@@ -32,6 +33,7 @@ SHORTHANDS = {
     "u": "spin_frequency_u_hz",
     "z": "height_m",
     "b": "flux_density_t",
+    **{f"b{axis}": f"flux_density_{axis}_t" for axis in "xyz"},
 }
 
 
@@ -216,7 +218,7 @@ def _wanted_columns(
         if name not in CANONICAL:
             raise TableError(
                 path,
-                f"`columns` cannot set '{shorten(key)}'; it sets {', '.join(SHORTHANDS)} or {', '.join(CANONICAL)}",
+                f"`columns` cannot set '{shorten(key)}'; it sets {', '.join(SHORTHANDS)} or {', '.join(LISTED)}",
             )
         index = _find(header, title.strip())
         if index is None and (with_unit := re.fullmatch(r"(.+?)\s*\[([^\[\]]+)\]\s*", title)):

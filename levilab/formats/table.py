@@ -31,6 +31,7 @@ from levilab.formats.titles import (
     CANONICAL,
     COMPANIONS,
     EXAMPLES,
+    LISTED,
     QUANTITIES,
     companion,
     dimension,
@@ -116,7 +117,7 @@ def read_table(
         chosen, doubts = choose_columns(path, header, layout.units, wanted, quantities)
         if not chosen:
             examples = [EXAMPLES[name] for name in quantities if name in EXAMPLES]
-            known = ", ".join([*(name for name in quantities if name not in COMPANIONS), *examples])
+            known = ", ".join([*(name for name in quantities if name in LISTED and name not in COMPANIONS), *examples])
             wanted_names = needed or [name for name in SHORTHANDS.values() if name in quantities][:2]
             raise NoSuchColumn(
                 path,

@@ -36,6 +36,12 @@ ANGULAR = (
 #: Units in which the title says whether turns or radians are counted.
 _PER_SECOND = ("1/s", "s-1")
 
+#: Names of a component of the magnetic field; that of its absolute value, "Absolute field", is none.
+_COMPONENTS = (
+    "flux_density_{}", "magnetic_field_{}", "magnetfeld_{}", "magnetfält_{}", "champ_magnétique_{}",
+    "campo_magnético_{}", "magnetometer_{}", "mag_{}", "mag{}", "b_{}", "b{}",
+)  # fmt: skip
+
 # Canonical column: its dimension, and the names it goes by, in lower case, blanks and hyphens as "_".
 QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "time_s": ("time", (
@@ -52,6 +58,11 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "drive_amplitude_v": ("voltage", ("drive_amplitude", "amplitude", "drive_voltage", "amplitude_drive")),
     "height_m": ("length", ("height", "z", "h", "höhe", "hoehe")),
     "flux_density_t": ("flux density", ("flux_density", "b", "bz", "b_z", "field", "flussdichte")),
+    # along the axes of a phone; b_z alone is that of a Hall probe on the axis
+    **{
+        f"flux_density_{axis}_t": ("flux density", tuple(form.format(axis) for form in _COMPONENTS))
+        for axis in "xyz"
+    },
 }  # fmt: skip
 
 # Names that say their unit themselves; every other bare name is taken as SI.
@@ -134,10 +145,17 @@ EXAMPLES: Mapping[str, str] = {
 }
 COMPANIONS: Mapping[str, str] = {companion(column): column for column in QUANTITIES}
 CANONICAL = (*QUANTITIES, *COMPANIONS)
+#: Components of a field along a phone's axes.
+COMPONENTS = tuple(f"flux_density_{axis}_t" for axis in "xyz")
+#: Those that a message lists.
+LISTED = tuple(name for name in CANONICAL if COMPANIONS.get(name, name) not in COMPONENTS)
 
 
 def _all_names() -> dict[str, str]:
-    names = {name: column for column, (_, aliases) in QUANTITIES.items() for name in aliases}
+    names: dict[str, str] = {}
+    for column, (_, aliases) in QUANTITIES.items():
+        for name in aliases:
+            names.setdefault(name, column)
     for name, column in list(names.items()):
         for form in COMPANION_FORMS:
             names.setdefault(form.format(name), companion(column))
