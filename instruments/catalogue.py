@@ -22,6 +22,7 @@ from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
 from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
+from instruments.drivers.oscilloscope.sound import SoundCard
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 from instruments.virtual.generator.agilent_33220a import Virtual33220A
@@ -32,6 +33,7 @@ from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
 from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
 from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
 from instruments.virtual.oscilloscope.siglent_sds1000xe import VirtualSDS1000XE
+from instruments.virtual.oscilloscope.sound import VirtualSoundCard
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -126,6 +128,7 @@ OSCILLOSCOPES: tuple[Model[Oscilloscope], ...] = (
         answers_as=r"(DSO|MSO)-?X ?2\d{3}[A-Z]*",
     ),
     Model("SDS1000X-E", SiglentSDS1000XE, VirtualSDS1000XE, "TCPIP0::192.168.1.32::INSTR", r"SDS1\d{3}X-[EU]"),
+    Model("sound", SoundCard, VirtualSoundCard, "sound://"),
 )
 MAGNETOMETERS: tuple[Model[Magnetometer], ...] = (
     Model("425", LakeShore425, Virtual425, "COM3"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from instruments.links.serial_port import SerialTransport
+from instruments.links.sound import SoundLink
 from instruments.links.visa import VisaTransport
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from instruments.links.transport import TrafficLog, Transport
 
 #: Scheme of an address → the link to it, with the arguments of `open_link` but for `line`.
-LINKS: dict[str, Callable[..., Transport]] = {}
+LINKS: dict[str, Callable[..., Transport]] = {"sound": SoundLink}
 
 
 def open_link(

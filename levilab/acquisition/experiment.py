@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from levilab.acquisition.session import Session
-    from levilab.bench.config import Limits
+    from levilab.bench.config import BenchConfig, Limits
     from levilab.simulator.scene import Scene
 
 
@@ -33,6 +33,10 @@ class ExperimentSettings(Settings):
             table: the name of these settings in the bench file.
             limits: of the bench.
         """
+
+    def for_bench(self, config: BenchConfig) -> Self:
+        """Return these settings for a bench; defaults may change to suit its instruments."""
+        return self
 
     def for_scene(self, scene: Scene) -> Self:
         """Return these settings for a virtual bench whose top is a scene's; defaults may change to suit it."""

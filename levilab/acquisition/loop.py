@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -74,7 +74,7 @@ class AcquisitionRequest:
     def columns(self) -> tuple[Channel, ...]:
         """The columns of the readings."""
         experiment = EXPERIMENTS[self.experiment]
-        return experiment.columns(settings_of(self.config, experiment.name), estimated=estimates_u(self.config.counter))
+        return experiment.columns(settings_of(self.config, experiment.name), estimated=estimates_u(self.config))
 
 
 def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishing) -> Run:
@@ -136,7 +136,7 @@ def _at_the_bench(
     settings = settings_of(request.config, experiment.name)
     earlier = _earlier(request)
     log = writer.wire if request.wire_log else None
-    wiring = request.wiring()
+    wiring = replace(request.wiring(), count_with=request.config.count_with)
     with open_bench(wiring, experiment.kinds(settings), log=log, check=stop.check) as bench:
         session: Session[Any] = Session(
             bench,

@@ -15,7 +15,7 @@ from levilab.acquisition.keys import refusal, refuse_unknown
 from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
 from levilab.bench.config import BenchConfig, ConfigError, read_bench
-from levilab.bench.kinds import KINDS
+from levilab.bench.kinds import KINDS, estimates_u
 from levilab.bench.person import ask_no_person
 from levilab.bench.wiring import described_wiring
 from levilab.errors import DataError, LevilabError, UsageError
@@ -98,7 +98,9 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     virtual = options.mock or bool(run and run.record.seed is not None)
     _check_options(options, run, virtual=virtual)
     named = _named_instruments(options, run)
-    without = _with_named_instruments(_configuration(options, run, named, virtual=virtual), named, virtual=virtual)
+    without = _configuration(options, run, named, virtual=virtual)
+    without = _with_named_instruments(without, named, EXPERIMENTS[experiment].instruments, virtual=virtual)
+    without = with_settings(without, experiment, settings_of(without, experiment).for_bench(without))
     config = _with_given_settings(without, experiment, options.settings)
     _check_given(config, without, experiment)
     request = AcquisitionRequest(
@@ -168,9 +170,18 @@ def _named_instruments(options: AcquisitionOptions, run: Run | None) -> dict[str
     return {**begun, **{kind: text for kind, text in given.items() if text is not None}}
 
 
-def _with_named_instruments(config: BenchConfig, named: Mapping[str, str], *, virtual: bool) -> BenchConfig:
-    """Return the configuration with the named instruments.  Raises UsageError."""
-    changes: dict[str, InstrumentSettings] = {}
+def _with_named_instruments(
+    config: BenchConfig, named: Mapping[str, str], needed: Sequence[str], *, virtual: bool
+) -> BenchConfig:
+    """Return the configuration with the named instruments.
+
+    An oscilloscope that is named for an experiment with a counter and no oscilloscope counts.  Raises UsageError.
+    """
+    changes: dict[str, InstrumentSettings | str] = {}
+    if "counter" in named:
+        changes["count_with"] = "counter"
+    elif "oscilloscope" in named and "counter" in needed and "oscilloscope" not in needed:
+        changes["count_with"] = "oscilloscope"
     for kind, text in named.items():
         if virtual and ":" in text:
             raise UsageError(NAMING[kind], "is an address; with `mock` a model is expected", value=text)
@@ -395,7 +406,7 @@ def _with_a_spinning_top(
     """Return a world in which the top only spins; what one pulse scatters by is known there."""
     config = request.config
     settings: Any = settings_of(config, request.experiment)
-    if isinstance(settings, CounterSettings):
+    if isinstance(settings, CounterSettings) and not estimates_u(config):
         config = with_settings(config, request.experiment, settings.with_jitter(scene.jitter))
     return replace(
         request,

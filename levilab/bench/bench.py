@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 from instruments.drivers import Instrument
 from instruments.errors import InstrumentError, SettingsLost
 from levilab.bench.kinds import COUNTER, GENERATOR, MAGNETOMETER, OSCILLOSCOPE, transport_to
+from levilab.bench.sampled import SampledCounter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
@@ -104,10 +105,13 @@ def open_bench(
 ) -> Iterator[Bench]:
     """Open the bench with the instruments of these kinds; outputs are off at the beginning and at the end.
 
+    Where the wiring counts with the oscilloscope, a counter is made of it.
+
     check: called before each instrument, may raise to give up.  Raises ConfigError for an instrument that is not
     described or of an unknown model, InstrumentError when one does not answer as it should.
     """
     bench = Bench(wiring)
+    sampled = COUNTER.name in kinds and wiring.count_with == OSCILLOSCOPE.name
     with contextlib.ExitStack() as links:
 
         def connect(kind: Kind[I], *, alone: bool = True) -> I:
@@ -128,12 +132,14 @@ def open_bench(
                 bench.generator = connect(GENERATOR, alone=False)
                 bench.generator.limits = wiring.limits.of_the_drive()
                 bench.outputs_off()
-            if COUNTER.name in kinds:
+            if COUNTER.name in kinds and not sampled:
                 bench.counter = connect(COUNTER)
             if MAGNETOMETER.name in kinds:
                 bench.magnetometer = connect(MAGNETOMETER)
-            if OSCILLOSCOPE.name in kinds:
+            if OSCILLOSCOPE.name in kinds or sampled:
                 bench.oscilloscope = connect(OSCILLOSCOPE)
+            if sampled:
+                bench.counter = bench.instruments[COUNTER.name] = SampledCounter(bench.oscilloscope)
             check()
             yield bench
         finally:

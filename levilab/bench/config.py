@@ -64,9 +64,13 @@ class Limits(Settings):
 
 
 class BenchConfig(Settings):
-    """The bench: its instruments by kind, and what its coil stands."""
+    """The bench: its instruments by kind, and what its coil stands.
+
+    count_with: the kind of instrument that counts; an oscilloscope's records are counted by estimating their frequency.
+    """
 
     visa_library: str = "@py"
+    count_with: Literal["counter", "oscilloscope"] = "counter"
     counter: InstrumentSettings | None = None
     generator: InstrumentSettings | None = None
     oscilloscope: InstrumentSettings | None = None

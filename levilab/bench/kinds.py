@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from instruments.drivers.magnetometer import Magnetometer
     from instruments.drivers.oscilloscope import Oscilloscope
     from instruments.links.transport import TrafficLog, Transport
+    from levilab.bench.config import BenchConfig
 
 I_co = TypeVar("I_co", bound=Instrument, covariant=True)
 
@@ -83,9 +84,11 @@ MAGNETOMETER: Kind[Magnetometer] = Kind("magnetometer", "measures the base's fie
 KINDS: dict[str, Kind[Instrument]] = {kind.name: kind for kind in (COUNTER, GENERATOR, OSCILLOSCOPE, MAGNETOMETER)}
 
 
-def estimates_u(counter: InstrumentSettings | None) -> bool:
-    """Return whether a bench's counter estimates its frequency from samples, with a u of each count."""
-    return counter is not None and COUNTER.model(counter.model).driver.ESTIMATES
+def estimates_u(config: BenchConfig) -> bool:
+    """Return whether a bench counts by estimating the frequency of samples, with a u of each count."""
+    if config.count_with != COUNTER.name:
+        return True
+    return config.counter is not None and COUNTER.model(config.counter.model).driver.ESTIMATES
 
 
 def transport_to(

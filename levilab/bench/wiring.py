@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from instruments.clock import Clock, WallClock
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits
-from levilab.bench.kinds import KINDS
+from levilab.bench.kinds import COUNTER, KINDS
 from levilab.bench.person import Person, ask_no_person
 
 if TYPE_CHECKING:
@@ -22,21 +22,28 @@ class Wiring:
     """Where the instruments are and what leads to them.
 
     instruments: kind → model and address, for those that the bench has; limits: what the coil stands; library:
-    PyVISA's, or a virtual one; clock: of the bench; person: who stands at it; poses: of a virtual bench: first time
-    [s], step [s], number → where its top is, for a view.
+    PyVISA's, or a virtual one; clock: of the bench; count_with: the kind of instrument that counts; person: who stands
+    at it; poses: of a virtual bench: first time [s], step [s], number → where its top is, for a view.
     """
 
     instruments: Mapping[str, InstrumentSettings]
     limits: Limits
     library: Any
     clock: Clock
+    count_with: str = "counter"
     person: Person = ask_no_person
     poses: Callable[[float, float, int], Poses] | None = None
 
     def describe(self, kind: str) -> InstrumentSettings:
-        """Return the settings of an instrument.  Raises ConfigError: it is not described, or has no driver."""
+        """Return the settings of an instrument, of the one that counts for a counter.
+
+        Raises ConfigError: it is not described, or has no driver.
+        """
+        kind = self.count_with if kind == COUNTER.name else kind
         if kind not in self.instruments:
-            raise ConfigError(f"the bench file describes no {kind}: add a table [{kind}] with model and address")
+            instead = ', or count_with = "oscilloscope" at its top' if kind == COUNTER.name else ""
+            what = f"the bench file describes no {kind}: add a table [{kind}] with model and address"
+            raise ConfigError(what + instead)
         settings = self.instruments[kind]
         KINDS[kind].model(settings.model)
         return settings
@@ -46,4 +53,4 @@ def described_wiring(config: BenchConfig, person: Person = ask_no_person) -> Wir
     """Return the wiring of the bench that a bench file describes."""
     # a measurement waits by the wall clock, so a virtual bench that jumps from answer to answer would stand still
     library = "realtime@levilab" if config.visa_library == "@levilab" else config.visa_library
-    return Wiring(config.instruments(), config.limits, library, WallClock(), person)
+    return Wiring(config.instruments(), config.limits, library, WallClock(), config.count_with, person)

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from instruments.catalogue import CATALOGUE
 from instruments.clock import VirtualClock
 from instruments.virtual.bench.bench import VirtualBench
@@ -15,6 +17,7 @@ from instruments.virtual.core.device import VirtualInstrument
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits
 from levilab.bench.wiring import Wiring
 from levilab.world.person import VirtualPerson
+from levilab.world.pose import FLOATS_M
 from levilab.world.spin_world import SpinScene, SpinWorld
 
 if TYPE_CHECKING:
@@ -68,6 +71,29 @@ class Light:
         return self.world.crossings(start, stop, triggers)
 
 
+@dataclass(frozen=True)
+class PickupCoil:
+    """The voltage of a coil whose axis points to the floating top, behind an amplifier: N A dB/dt.
+
+    Attributes:
+        turns, area_m2: of the coil; thin and short, so that its field is that in its middle.
+        distance_m: from the top.
+        amplifier: its gain.
+    """
+
+    world: World
+    turns: int = 1000
+    area_m2: float = 1e-4
+    distance_m: float = 0.04
+    amplifier: float = 300.0
+
+    def __call__(self, start: float, step: float, n: int) -> Array:
+        """Return the voltage at start + step·k, shape (n,) [V]."""
+        times = start + step * (np.arange(n + 1, dtype=np.float64) - 0.5)
+        field = self.world.magnetic_field(times, np.array([self.distance_m, 0.0, FLOATS_M]))[:, 0]
+        return np.asarray(self.amplifier * self.turns * self.area_m2 * np.diff(field) / step)
+
+
 def connect_counter(model: Callable[..., VirtualInstrument]) -> Maker:
     """Connect a counter: input 1 to the phototransistor that sees the tape, input 2 to the laser's."""
     return lambda world: model(world.clock, signal=Light(world), second=world.laser)
@@ -93,21 +119,28 @@ def connect_oscilloscope(model: Callable[..., VirtualInstrument]) -> Maker:
     return lambda world: model(world.clock, signals=scope_signals(world))
 
 
+def connect_sound(model: Callable[..., VirtualInstrument]) -> Maker:
+    """Connect a sound card: left to the tape's phototransistor, right to a pickup coil beside the top."""
+    return lambda world: model(world.clock, signals={1: world.light, 2: PickupCoil(world)}, seed=world.seed)
+
+
 def connect_magnetometer(model: Callable[..., VirtualInstrument]) -> Maker:
     """Connect a gaussmeter: its probe is on the base's axis."""
     return lambda world: model(world.clock, flux_density=world.flux_density)
 
 
-#: Kind → what connects a virtual instrument to the world.
+#: Kind, or scheme of the address → what connects a virtual instrument to the world.
 _CONNECT: dict[str, Callable[[Callable[..., VirtualInstrument]], Maker]] = {
     "counter": connect_counter,
     "generator": connect_generator,
     "oscilloscope": connect_oscilloscope,
+    "sound": connect_sound,
     "magnetometer": connect_magnetometer,
 }
 #: Kind → model → what makes it.
 VIRTUAL_MODELS: dict[str, dict[str, Maker]] = {
-    kind: {model.name: _CONNECT[kind](model.twin) for model in models} for kind, models in CATALOGUE.items()
+    kind: {model.name: _CONNECT[model.scheme or kind](model.twin) for model in models}
+    for kind, models in CATALOGUE.items()
 }
 
 
@@ -144,7 +177,8 @@ def virtual_wiring(world: World, limits: Limits | None = None, models: Mapping[s
     """
     library = library_for(virtual_bus(world, models))
     instruments = virtual_instruments(models)
-    return Wiring(instruments, limits or Limits(), library, world.clock, VirtualPerson(world), world.poses)
+    person, poses = VirtualPerson(world), world.poses
+    return Wiring(instruments, limits or Limits(), library, world.clock, person=person, poses=poses)
 
 
 def plug_in_serial(bus: VirtualBench | None = None) -> VirtualBench:

@@ -88,7 +88,7 @@ class MotionWorld:
         seed: int = 0,
     ) -> None:
         self.clock = clock
-        self._tape, self._laser, self._seed = tape or Tape(), laser or Laser(), seed
+        self._tape, self._laser, self.seed = tape or Tape(), laser or Laser(), seed
         self._scene = scene
         self._coil, self._flight = Coil(), Flight(scene, put_back_after_s, stem_height_m=self._laser.height_m)
         self._tape_place = float(np.random.default_rng(seed).uniform()) if seed else 0.0
@@ -144,7 +144,7 @@ class MotionWorld:
         """Return the phototransistor's voltage; see World."""
         self._drop_history()
         times = start + step * np.arange(n, dtype=np.float64)
-        return self._mean_voltage(times) + self._tape.noise_at(times, self._seed)
+        return self._mean_voltage(times) + self._tape.noise_at(times, self.seed)
 
     def _mean_voltage(self, times: Array) -> Array:
         turns, rate, lift = self._flight.tape(times)
@@ -168,13 +168,13 @@ class MotionWorld:
         near = self._flight.passages(place, start - margin, stop + margin)
         if any(without_place):
             return None
-        found = self._tape.crossing_times(near, self._mean_voltage, triggers.fire, self._seed)
+        found = self._tape.crossing_times(near, self._mean_voltage, triggers.fire, self.seed)
         return np.asarray(found[(found >= start) & (found < stop)])
 
     def laser(self, start: float, step: float, n: int) -> Array:
         """Return the voltage of the laser's phototransistor; see World."""
         self._drop_history()
-        return self._laser.voltage(start + step * np.arange(n, dtype=np.float64), self._flight.stem, self._seed)
+        return self._laser.voltage(start + step * np.arange(n, dtype=np.float64), self._flight.stem, self.seed)
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """Return the coil's field; see World."""

@@ -44,9 +44,11 @@ class World(Protocol):
 
     Attributes:
         clock: the bench's.
+        seed: of what is drawn by chance.
     """
 
     clock: Clock
+    seed: int
 
     def catch_up(self) -> None:
         """Simulate up to the present time, and drop history older than KEPT_S."""
@@ -214,7 +216,7 @@ class SpinWorld:
     """
 
     def __init__(self, scene: SpinScene, clock: Clock) -> None:
-        self.scene, self.clock = scene, clock
+        self.scene, self.clock, self.seed = scene, clock, scene.seed
         self._decay = DECAYS[scene.drag]
         self._jitter = np.random.default_rng((scene.seed, 1)).standard_normal(1 << 16) * scene.jitter
         self._coil, self._stand, self._probe_t = Coil(), scene.stand, scene.stand.flux_density(scene.base)

@@ -26,6 +26,8 @@ LATEST = 1e38
 class Room:
     """A world that costs little: light at 30 Hz, a field at rest; it counts what is looked at and driven."""
 
+    seed = 0
+
     def __init__(self):
         self.clock = VirtualClock()
         self.looks = self.driven = 0

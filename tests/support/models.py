@@ -5,8 +5,8 @@ import pytest
 from instruments.catalogue import CATALOGUE
 from support import hostile
 
-#: Every model of the catalogue, and its kind.
-ROWS = {model.name: model for models in CATALOGUE.values() for model in models}
+#: Every model of the catalogue that takes messages over PyVISA or pyserial, and its kind.
+ROWS = {model.name: model for models in CATALOGUE.values() for model in models if not model.scheme}
 KIND_OF = {model.name: kind for kind, models in CATALOGUE.items() for model in models}
 #: One model of each table of rows, in the order of the catalogue: the one whose twin is a class, or the first.
 _OF_TABLE: dict = {}

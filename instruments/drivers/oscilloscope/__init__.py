@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
+
+    Codes = NDArray[np.uint8] | NDArray[np.uint16]
 
 #: No scope of these families has a longer record; a preamble that says so was misheard.
 _MOST_POINTS = 100_000_000
@@ -52,7 +54,7 @@ class Trace:
     lowest, highest: the codes that the signal may be beyond; none: the code that means "no sample".
     """
 
-    codes: NDArray[np.uint8] | NDArray[np.uint16]
+    codes: Codes
     dt_s: float
     t0_s: float
     volts_per_code: float
@@ -94,7 +96,17 @@ class Preamble:
 
 
 class Oscilloscope(Instrument, Protocol):
-    """What every oscilloscope offers."""
+    """What every oscilloscope offers.
+
+    INPUT_COUPLINGS: that its inputs have, the usual one first; ended: when the last record was complete, on the clock
+    of the bench [s].
+    """
+
+    INPUT_COUPLINGS: ClassVar[tuple[str, ...]]
+
+    @property
+    def ended(self) -> float:
+        """When the last record was complete [s]."""
 
     def prepare(
         self,
@@ -141,7 +153,7 @@ class Oscilloscope(Instrument, Protocol):
             SettingsLost: the scope is no longer as it was prepared; what arrived is of no use.
         """
 
-    def blocks(self, channel: int) -> Iterator[NDArray[np.uint8]]:
+    def blocks(self, channel: int) -> Iterator[Codes]:
         """Return the codes of the same record, piece by piece as they come: never more than one piece in memory.
 
         Raises NothingAcquired; SettingsLost, before the first or behind the last piece.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import math
 import re
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -59,6 +60,7 @@ class Scope(ScpiInstrument):
     """
 
     CHANNEL: ClassVar[type[Channel]]
+    INPUT_COUPLINGS: ClassVar[tuple[str, ...]] = ("DC", "AC")
     SOURCE: ClassVar[str] = "CHAN{}"
     STOP: ClassVar[str] = ":STOP"
     MAIN: ClassVar[Mapping[str, Value]] = {"time_mode": "MAIN"}
@@ -73,6 +75,8 @@ class Scope(ScpiInstrument):
 
     trigger_source: Setting[str]
     trigger_level: Setting[float]
+
+    ended: float = -math.inf
 
     def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
         """Drive the scope.  clock: the one its trigger is waited for with; by default the wall's."""
@@ -171,7 +175,7 @@ class Scope(ScpiInstrument):
         """Check the inputs before anything is sent, and return how many there are.  Raises OutOfRange."""
         self._check("sweep", setup.sweep, tuple(self.SWEEPS))
         self._check("trigger_slope", setup.trigger_slope, tuple(self.SLOPES))
-        self._check("coupling", setup.coupling, ("DC", "AC"))
+        self._check("coupling", setup.coupling, self.INPUT_COUPLINGS)
         if self._inputs is None:
             self.identity()
         inputs = self._inputs or 4
@@ -283,7 +287,7 @@ class Scope(ScpiInstrument):
             with contextlib.suppress(InstrumentError):  # the first error is raised
                 self.off()  # it may not trigger later, when no program waits for it
             raise
-        self._acquired = True
+        self._acquired, self.ended = True, self.clock.now()
 
     def _wait(self, timeout: float) -> None:
         """Wait until the record is complete.  Raises NeverTriggered, SettingsLost."""

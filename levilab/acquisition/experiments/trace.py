@@ -10,11 +10,13 @@ import numpy as np
 from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt
 
 from instruments.drivers.oscilloscope import NeverTriggered
+from instruments.drivers.oscilloscope.sound import SilentInput
 from instruments.errors import CommandRefused, InstrumentError, OutOfRange
 from levilab.acquisition.driving import HELD_WITHIN_HZ, check_drive
 from levilab.acquisition.experiment import Experiment, ExperimentSettings
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
+from levilab.bench.kinds import OSCILLOSCOPE
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.runs.traces import INDEX, described_times, undescribed_codes
@@ -22,7 +24,7 @@ from levilab.runs.traces import INDEX, described_times, undescribed_codes
 if TYPE_CHECKING:
     from instruments.drivers.oscilloscope import Trace
     from levilab.acquisition.session import Row, Session
-    from levilab.bench.config import Limits
+    from levilab.bench.config import BenchConfig, Limits
     from levilab.simulator.scene import Scene
 
 #: A signal that moves by fewer codes than this is none: nothing is plugged in, or it is far too small for the scale.
@@ -99,6 +101,17 @@ class TraceSettings(ExperimentSettings):
             )
         if self.drive_frequency_hz is not None:
             check_drive(table, limits, self.drive_amplitude_vpp, [("drive_frequency_hz", self.drive_frequency_hz)])
+
+    def for_bench(self, config: BenchConfig) -> Self:
+        """See the base: the whole range of an input that is AC coupled only, triggered where the signal passes 0."""
+        scope = config.oscilloscope
+        if scope is None or "DC" in OSCILLOSCOPE.model(scope.model).driver.INPUT_COUPLINGS:
+            return self
+        suited: dict[str, object] = {
+            "channels": (1,), "shows": (TAPE,), "volts_per_division": 0.25, "offset_v": 0.0, "coupling": "AC",
+            "trigger_level_v": 0.0,
+        }  # fmt: skip
+        return self.model_copy(update={key: suited[key] for key in suited.keys() - self.model_fields_set})
 
     def for_scene(self, scene: Scene) -> Self:
         """See the base: the laser beside the tape, and the scene's drive, where neither was set."""
@@ -269,6 +282,8 @@ def _take(session: Session[TraceSettings]) -> list[Trace]:
                 session.event(
                     RunEvent.LOOK_AT_THE_SCALE, f"record {number}: {problem}", record=number, channel=trace.channel
                 )
+    except SilentInput:
+        raise
     except NeverTriggered as never:
         raise ExperimentFailed(_why_no_trigger(session)) from never
     except OutOfRange:

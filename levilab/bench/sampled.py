@@ -1,0 +1,127 @@
+"""A counter made of an oscilloscope and an estimator: each count is the frequency of the pulses in a record."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from analysis.errors import AnalysisError
+from analysis.pulses import spin_of_trace
+from instruments.drivers.counter import Count
+from instruments.drivers.oscilloscope.sound import SamplesLost
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    from analysis.pulses import SpinFrequency
+    from instruments.drivers import Value
+    from instruments.drivers.oscilloscope import Oscilloscope
+    from instruments.links.transport import Transport
+
+    Array = NDArray[np.float64]
+
+#: Points of a record for each second, if the oscilloscope is fast enough; 12 000 place a pulse of 1 ms well.
+_POINTS_PER_S = 12_000
+#: The scale of a record about the trigger level, as of `levilab acquire trace` [V].
+_VOLTS_PER_DIVISION = 0.2
+#: A record that needs no trigger is waited for this much longer than it lasts [s].
+_PATIENCE_S = 5.0
+#: The standard uncertainty of the bench time of a record [s]: arrivals and polls scatter by some milliseconds.
+_TIME_U_S = 5e-3
+
+
+def spin_of_record(volts: Array, rate: float) -> SpinFrequency | None:
+    """Return the spin in a record of pulses; None where no pulses return regularly.
+
+    Args:
+        volts: shape (n,).
+        rate: samples per second [1/s].
+    """
+    try:
+        return spin_of_trace(volts, rate)
+    except AnalysisError:
+        return None
+
+
+class SampledCounter:
+    """A counter made of an oscilloscope; see :class:`instruments.drivers.counter.Counter`.
+
+    scope: the oscilloscope, whose identity, settings and link are the counter's.
+    """
+
+    MODELS: ClassVar[str] = ".*"
+    SERIAL: ClassVar[Mapping[str, Any]] = {}
+    ESTIMATES: ClassVar[bool] = True
+
+    def __init__(
+        self, scope: Oscilloscope, estimate: Callable[[Array, float], SpinFrequency | None] = spin_of_record
+    ) -> None:
+        self.scope, self._estimate = scope, estimate
+        self.transport: Transport = scope.transport
+        self.last_set: dict[str, Value] = {}
+        self.last: Count | None = None
+        self.channel = 1
+
+    def prepare(self, *, gate_s: float, trigger_level_v: float, channel: int = 1) -> None:
+        """Take records of the length of a gate from now on; a sound card has no trigger level.  Raises OutOfRange."""
+        level = trigger_level_v if "DC" in self.scope.INPUT_COUPLINGS else 0.0
+        self.scope.prepare(
+            channels=(channel,),
+            duration_s=gate_s,
+            points=math.ceil(_POINTS_PER_S * gate_s),
+            volts_per_division=_VOLTS_PER_DIVISION,
+            offset_v=level,
+            coupling=self.scope.INPUT_COUPLINGS[0],
+            trigger_level_v=level,
+            trigger_source=channel,
+            sweep="auto",
+        )
+        self.channel, self.last_set = channel, {"gate_s": gate_s, "trigger_level_v": level}
+
+    def frequency(self) -> float | None:
+        """Return the frequency of the pulses in the next record [Hz]; None where there are none."""
+        self.last = None
+        self.scope.acquire(timeout_s=_PATIENCE_S)
+        try:
+            trace = self.scope.trace(self.channel)
+        except SamplesLost as lost:
+            trace = lost.kept
+        found = self._estimate(trace.volts, 1 / trace.dt_s)
+        if found is None or found.frequency.value is None:
+            return None
+        time = self.scope.ended - trace.codes.size * trace.dt_s + found.reference_time
+        u = math.hypot(found.frequency.u or 0.0, (found.chirp.value or 0.0) * _TIME_U_S)
+        self.last = Count(found.frequency.value, u or None, time)
+        return found.frequency.value
+
+    def readings(self, count: int) -> Array:
+        """Return this number of counts; see :class:`instruments.drivers.counter.Counter`."""
+        return np.array([self.frequency() for _ in range(count)], dtype=np.float64)
+
+    # --- what every instrument offers, as the oscilloscope does ---
+
+    def identity(self) -> str:
+        """Return the identity of the oscilloscope."""
+        return self.scope.identity()
+
+    def settings(self) -> dict[str, Value]:
+        """Return the settings of the oscilloscope."""
+        return self.scope.settings()
+
+    def changed_settings(
+        self, now: Mapping[str, Value] | None = None, *, since: Mapping[str, Value] | None = None
+    ) -> dict[str, tuple[object, object]]:
+        """Return the settings of the oscilloscope that differ; see :class:`instruments.drivers.Instrument`."""
+        return self.scope.changed_settings(now, since=since)
+
+    def forget_errors(self) -> None:
+        """Empty the error queue of the oscilloscope."""
+        self.scope.forget_errors()
+
+    def close(self) -> None:
+        """Give the oscilloscope back."""
+        self.scope.close()
