@@ -1,16 +1,18 @@
 """The columns of a file that hold something we know, by their titles, their units and what the user says."""
 
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.titles import (
     CANONICAL,
     COMPANIONS,
     LISTED,
+    QUANTITIES,
     UNITS,
     Title,
     as_a_period,
@@ -55,7 +57,19 @@ class NoTable(TableError, DoesNotSuit):
 
 
 class NoSuchColumn(TableError, DoesNotSuit):
-    """A table without a quantity that is wanted."""
+    """A table without a quantity that is wanted.  `doubt` is the question whose answer would give it, else None."""
+
+    def __init__(self, path: Path, message: str, *, line: int | None = None, doubt: "Doubt | None" = None) -> None:
+        self.doubt = doubt
+        super().__init__(path, message, line=line)
+
+
+class Ambiguous(TableError):
+    """A table with several columns for one quantity.  `doubt` says which."""
+
+    def __init__(self, path: Path, message: str, doubt: "Doubt") -> None:
+        self.doubt = doubt
+        super().__init__(path, message)
 
 
 @dataclass(frozen=True)
@@ -68,6 +82,8 @@ class Column:
         label: in the file.
         factor: to SI.
         inverse: the file has the inverse of the quantity, a period [s] after the factor, or that one's uncertainty.
+        unit: of the numbers in the file, as it was understood.
+        written: whether the file or the user says that unit.
     """
 
     name: str
@@ -75,6 +91,38 @@ class Column:
     label: str
     factor: float
     inverse: bool = False
+    unit: str = ""
+    written: bool = False
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One answer to a question about a table.
+
+    Attributes:
+        text: for people: "rad/s (38 to 22 Hz)".
+        columns: what to add to `columns` for it: {"f": "2 [rad/s]"}.
+    """
+
+    text: str
+    columns: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A question about a table.
+
+    Attributes:
+        kind: "unit" (of a column), "column" (which one holds a quantity), "titles" (the table has none that is known).
+        text: for people, with the values that were seen.
+        column: 0-based index of the column that it is about; None where it is about several.
+        choices: the answers, the likeliest first.
+    """
+
+    kind: Literal["unit", "column", "titles"]
+    text: str
+    column: int | None
+    choices: tuple[Choice, ...]
 
 
 def shorten(text: str, most: int = 40) -> str:
@@ -95,6 +143,8 @@ def choose_columns(
     units: Sequence[str],
     wanted: Mapping[str, str],
     quantities: Collection[str] = CANONICAL,
+    *,
+    meant: Sequence[str] | None = None,
 ) -> tuple[tuple[Column, ...], tuple[str, ...]]:
     """Return the columns of a file with known quantities, and warnings about similar ones.
 
@@ -105,6 +155,7 @@ def choose_columns(
         wanted: {canonical name, or t, f, u: title or 1-based number}; goes before what the titles say.  A unit may
             follow in brackets where the file gives none: ``Drehzahl [rpm]``.
         quantities: canonical names looked for.
+        meant: the titles without what names a run; empty for columns that do not count.
 
     Returns:
         The columns, in the order of the canonical names, and the warnings.
@@ -112,27 +163,63 @@ def choose_columns(
     Raises:
         TableError: a wanted column does not exist, a quantity has two columns, or units contradict each other.
     """
-    titles = _with_periods(header)
+    meant = header if meant is None else meant
+    titles = _with_periods(meant)
     chosen, stated = _wanted_columns(path, header, wanted)
     offered, warnings = _offered_columns(path, header, titles, chosen, quantities)
+    offered |= _by_units(titles, units, {*chosen, *offered}, set(chosen.values()), quantities)
     chosen |= {name: _only_one(path, header, name, indices) for name, indices in offered.items()}
-    written = {name: _written_unit(path, name, index, header, units) for name, index in chosen.items()} | stated
+    written = {
+        name: _written_unit(path, name, (header[index], meant[index]), units[index : index + 1])
+        for name, index in chosen.items()
+    } | stated
     columns = []
     for name, index in chosen.items():
         quantity = COMPANIONS.get(name, name)
         period = titles[chosen.get(quantity, index)]
         if period.inverse and name not in stated and not written[name]:
             # an uncertainty without a unit has that of its period
-            unit = (titles[index] if _is_of_a_period(titles[index], titles) else period).unit
-            columns.append(Column(name, index, header[index], unit_factor(unit or "s", "time") or 1, inverse=True))
+            of_turn = (titles[index] if _is_of_a_period(titles[index], titles) else period).unit or "s"
+            factor = (unit_factor(of_turn, "time") or 1) / period.turns
+            columns.append(Column(name, index, header[index], factor, inverse=True, unit=of_turn, written=True))
             continue
         # An uncertainty without a unit has that of its quantity: "rpm,u" gives both in 1/min.
         unit = written[name] or written.get(quantity)
         if titles[index].counts_radians(unit) or period.counts_radians(unit):
             warnings += [_angular(path, header[index])] * (name == quantity)
             unit = "rad/s"
-        columns.append(Column(name, index, header[index], _factor(path, name, header[index], unit)))
+        factor = _factor(path, name, header[index], unit)
+        sure = bool(unit) and not (name not in stated and implied_unit(meant[index]))
+        columns.append(Column(name, index, header[index], factor, unit=unit or _SI[dimension(name)], written=sure))
     return tuple(sorted(columns, key=lambda c: CANONICAL.index(c.name))), tuple(warnings)
+
+
+#: Units that a number has where nothing says another one.
+_SI = {kind: next(iter(units)) for kind, units in UNITS.items()}
+
+
+#: Dimensions whose only column needs no known name; a voltage may be anything.
+_SAY_THE_QUANTITY = ("time", "frequency", "length", "flux density")
+
+
+def _by_units(
+    titles: Sequence[Title], units: Sequence[str], known: Collection[str], taken: Collection[int],
+    quantities: Collection[str],
+) -> dict[str, list[int]]:  # fmt: skip
+    """Return the column that is a quantity by its unit: no other column has such a unit, and no other quantity."""
+    kinds = Counter(dimension(name) for name in quantities if name in QUANTITIES)
+    offered: dict[str, list[int]] = {}
+    for name in (name for name in quantities if name in QUANTITIES and name not in known):
+        kind = dimension(name)
+        found = [
+            k
+            for k, title in enumerate(titles)
+            if title.column is None and k not in taken
+            and any(unit_factor(unit, kind) is not None for unit in (title.unit or "", *units[k : k + 1]))
+        ]  # fmt: skip
+        if len(found) == 1 and kinds[kind] == 1 and kind in _SAY_THE_QUANTITY:
+            offered[name] = found
+    return offered
 
 
 def _factor(path: Path, name: str, label: str, unit: str | None) -> float:
@@ -262,25 +349,27 @@ def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) 
     key = next((short for short, long in SHORTHANDS.items() if long == name), name)
     numbers = " or ".join(f"{key}={index + 1}" for index in indices)
     period = "; if T is the time of a turn say its unit, as T [ms]" if any(header[i] == "T" for i in indices) else ""
-    raise TableError(
-        path,
-        f"columns {quote_names(header[i] for i in indices)} could each be {name}; "
-        f"say which: `columns` = {numbers}{period}",
-    )
+    text = f"columns {quote_names(header[i] for i in indices)} could each be {name}"
+    choices = tuple(Choice(shorten(header[index]), {key: str(index + 1)}) for index in indices)
+    doubt = Doubt("column", f"{text}: which?", None, choices)
+    raise Ambiguous(path, f"{text}; say which: `columns` = {numbers}{period}", doubt)
 
 
-def _written_unit(path: Path, name: str, index: int, header: Sequence[str], units: Sequence[str]) -> str | None:
-    """Return the unit that the title or the row of units gives a column, if it is one of the quantity's."""
-    title = read_title(header[index])
+def _written_unit(path: Path, name: str, titles: tuple[str, str], units: Sequence[str]) -> str | None:
+    """Return the unit that the title or the row of units gives a column, if it is one of the quantity's.
+
+    titles: as it stands in the file, and without what names a run.
+    """
+    label, meant = titles
+    title = read_title(meant)
     kind = dimension(name)
     in_title = title.unit if title.unit and unit_factor(title.unit, kind) is not None else None
-    beneath = units[index] if index < len(units) and unit_factor(units[index], kind) is not None else None
-    implied = implied_unit(header[index]) is not None
+    beneath = next((unit for unit in units if unit_factor(unit, kind) is not None), None)
+    implied = implied_unit(meant) is not None
     if in_title and beneath and not implied and unit_factor(in_title, kind) != unit_factor(beneath, kind):
         raise TableError(
             path,
-            f"column '{shorten(header[index])}' has the unit '{shorten(beneath)}' in the row beneath; "
-            "correct one of them",
+            f"column '{shorten(label)}' has the unit '{shorten(beneath)}' in the row beneath; correct one of them",
         )
     return beneath or in_title
 

@@ -15,7 +15,7 @@ from functools import cached_property
 from itertools import takewhile
 from typing import Literal
 
-from levilab.formats.titles import known_titles
+from levilab.formats.titles import is_unit, known_titles
 
 COMMENTS = ("#", "%", "//")
 COMMENTS_UNLESS_SEMICOLON = (*COMMENTS, ";", "'")
@@ -28,8 +28,14 @@ MISSING = frozenset(("", *MISSING_WORDS))
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+,\d+")
 #: What a stopwatch or a clock shows: minutes and seconds, hours before them.
 CLOCK = re.compile(r"(?:(\d{1,3}):)?(\d{1,3}):(\d\d(?:[.,]\d+)?)")
-#: Date and time (ISO 8601).
-DATED = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
+#: Date and time: ISO 8601, or day, month and year with points.
+_GERMAN = re.compile(r"(\d\d?)\.(\d\d?)\.(\d{4}),?[T ]+(\d\d?)(:\d\d(?::\d\d(?:[.,]\d+)?)?)")
+DATED = re.compile(
+    r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?|" + _GERMAN.pattern.replace("(", "(?:")
+    .replace("(?:?:", "(?:")
+)  # fmt: skip
+#: A number and the unit behind it.
+_WITH_UNIT = re.compile(r"(?P<number>[+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,+/-].*)")
 Kind = Literal["number", "clock", "missing", "text"]
 
 
@@ -79,10 +85,25 @@ class Dialect:
         if text.casefold() in MISSING:
             return "missing"
         try:
-            self.number(text)
+            self.number(_without_unit(text))
         except ValueError:
             return "clock" if CLOCK.fullmatch(text) or DATED.fullmatch(text) else "text"
         return "number"
+
+
+def unit_behind(text: str) -> str:
+    """Return the unit behind a number; empty where there is none.
+
+    >>> unit_behind("38,01 Hz"), unit_behind("38 apples")
+    ('Hz', '')
+    """
+    found = _WITH_UNIT.fullmatch(text)
+    return found["unit"] if found and is_unit(found["unit"]) else ""
+
+
+def _without_unit(text: str) -> str:
+    found = _WITH_UNIT.fullmatch(text)
+    return found["number"] if found and is_unit(found["unit"]) else text
 
 
 def clock_time(text: str) -> float:
@@ -90,6 +111,8 @@ def clock_time(text: str) -> float:
 
     >>> clock_time("0:10"), clock_time("14:05:12.5")
     (10.0, 50712.5)
+    >>> clock_time("24.11.2026 9:05:12,5") - clock_time("2026-11-23 09:05:12")
+    86400.5
 
     Raises:
         ValueError: it is none of the three.
@@ -98,6 +121,9 @@ def clock_time(text: str) -> float:
         hours, minutes, seconds = int(found[1] or 0), int(found[2]), float(found[3].replace(",", "."))
         if seconds < 60 and (minutes < 60 or not found[1]):
             return 3600 * hours + 60 * minutes + seconds
+    if german := _GERMAN.fullmatch(text):
+        day, month, year, hour, rest = german.groups()
+        text = f"{year}-{month:0>2}-{day:0>2} {hour:0>2}{rest}"
     if DATED.fullmatch(text):
         moment = datetime.fromisoformat(text)
         return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()

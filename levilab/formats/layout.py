@@ -4,7 +4,7 @@ import codecs
 import io
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from levilab.formats.columns import NoTable, shorten
@@ -16,9 +16,11 @@ from levilab.formats.dialect import (
     filled_count,
     find_dialect,
     most_common,
+    unit_behind,
 )
 from levilab.formats.kinds import OTHER, kind_of_bytes
-from levilab.formats.titles import is_unit, known_titles
+from levilab.formats.texts import Text
+from levilab.formats.titles import is_unit, known_titles, read_title
 
 HEAD = 65536  # bytes that the guess rests upon
 SAMPLE = 100  # lines, the last of the head: those are rows even below a long preamble
@@ -38,7 +40,9 @@ class Layout:
 
     `header`, in line `header_line`, is empty if the file has none; `header_line` is then that of a text above the
     rows which could not be it, or 0. Rows may begin in line `first_line`, which lies `start` bytes into the file;
-    lines count from 1. `width` is the number of fields a row must have.
+    lines count from 1. `width` is the number of fields a row must have. `above` are the fields of the line above the
+    header; `aligned` is that of the text; `sample` are the fields of the first rows. Where no title has a unit, `units`
+    are those behind the first numbers, and s for clocks.
     """
 
     encoding: str
@@ -49,16 +53,20 @@ class Layout:
     first_line: int
     start: int
     width: int
+    above: tuple[str, ...] = ()
+    aligned: bool = False
+    sample: tuple[tuple[str, ...], ...] = ()
 
 
-def sniff(path: Path) -> Layout:
-    """Guess how a file writes its table.
+def sniff(source: Text) -> Layout:
+    """Guess how a text writes its table.
 
     Raises:
         NoTable: the file is empty or binary, or nothing in it looks like a table.
         OSError: the file cannot be read.
     """
-    with path.open("rb") as stream:
+    path = source.path
+    with source.open() as stream:
         head = stream.read(HEAD)
         whole = not stream.read(1)
     refuse_other_kinds(path, head)
@@ -79,7 +87,28 @@ def sniff(path: Path) -> Layout:
         alone = "; number the rows in a column of their own if there is but one"
         seen = f"'{shorten(line.strip())}' begins no table of at least two columns"
         raise NoTable(path, f"{seen}; {EXPORT}{alone}", line=at)
-    return lay_out(lines, encoding, dialect, head)
+    return _with_sample(source, lay_out(lines, encoding, dialect, head), lines)
+
+
+def _with_sample(source: Text, layout: Layout, lines: list[str]) -> Layout:
+    """Return the layout with the first rows, and the titles and the units that they have."""
+    if source.titles:
+        layout = replace(layout, header=source.titles, header_line=0, units=(), first_line=1, start=0)
+        layout = replace(layout, width=len(source.titles))
+    sample = tuple(line.fields for line in content_lines(lines[layout.first_line - 1 :][:SAMPLE], layout.dialect))
+    units = _with_units_of_numbers(layout, sample)
+    return replace(layout, aligned=source.aligned, sample=sample, units=units)
+
+
+def _with_units_of_numbers(layout: Layout, sample: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+    """Return the units of the columns: where no title and no row below has one, that of the first number."""
+    units = [*layout.units, *[""] * (layout.width - len(layout.units))]
+    for k in range(layout.width):
+        first = next((row[k] for row in sample if k < len(row) and layout.dialect.kind(row[k]) != "missing"), "")
+        if not units[k] and (k >= len(layout.header) or read_title(layout.header[k]).unit is None):
+            clock = layout.dialect.kind(first) == "clock"
+            units[k] = "s" if clock else unit_behind(first)
+    return tuple(units) if any(units) else ()
 
 
 def refuse_other_kinds(path: Path, head: bytes) -> None:
@@ -139,9 +168,9 @@ def lay_out(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> L
         units = _units(above[place + 1 : place + 2])
         first_line = above[place + bool(units)].number + 1
     header = header[: filled_count(header)]
-    return Layout(
-        encoding, dialect, header, header_line, units, first_line, _offset(head, first_line), len(header) or width
-    )
+    start = _offset(head, first_line)
+    named = above[place - 1].fields if place and above[place - 1].is_text else ()
+    return Layout(encoding, dialect, header, header_line, units, first_line, start, len(header) or width, named)
 
 
 def _above_rows(lines: Iterator[Line], width: int, numeric: Sequence[int]) -> tuple[list[Line], int]:
@@ -168,8 +197,10 @@ def _header(above: list[Line], width: int) -> int | None:
 
 def _units(below: Sequence[Line]) -> tuple[str, ...]:
     """Return the fields of the line below the header, if it is a row of units."""
-    if below and below[0].is_text and any(is_unit(field) for field in below[0].fields):
-        return below[0].fields
+    if below and below[0].is_text:
+        fields = tuple(re.sub(r"^(in|en|i)\s+", "", field) for field in below[0].fields)
+        if any(is_unit(field) for field in fields):
+            return fields
     return ()
 
 

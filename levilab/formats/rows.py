@@ -7,6 +7,7 @@ marks, blanks as separators, a damaged line) is read again line by line, so that
 
 import contextlib
 import csv
+import io
 import re
 import warnings
 from array import array
@@ -18,8 +19,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.formats.columns import Column, TableError, shorten
-from levilab.formats.dialect import DATED, MISSING, clock_time
+from levilab.formats.dialect import DATED, MISSING, clock_time, unit_behind
 from levilab.formats.layout import Layout
+from levilab.formats.texts import Text
+from levilab.formats.titles import dimension, unit_factor
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,7 +50,7 @@ class Rows:
     doubt: str | None = None
 
 
-def read_rows(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool = False) -> Rows:
+def read_rows(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool = False) -> Rows:
     """Read all rows of the chosen columns.
 
     A last line without line end is left out if it is no full row, or in any case if `drop_unended`.
@@ -56,23 +59,24 @@ def read_rows(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unen
         TableError: a line is damaged.
         OSError: the file cannot be read.
     """
-    few = path.stat().st_size < FEW
-    rows = None if few else _read_at_once(path, layout, chosen, drop_unended=drop_unended)
-    return rows or _read_lines(path, layout, chosen, drop_unended=drop_unended)
+    few = text.size < FEW
+    rows = None if few else _read_at_once(text, layout, chosen, drop_unended=drop_unended)
+    return rows or _read_lines(text, layout, chosen, drop_unended=drop_unended)
 
 
-def _read_at_once(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows | None:
+def _read_at_once(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows | None:
     """Read all rows by pandas; None if any line is not plain, or the file grows meanwhile."""
     import pandas as pd
 
     dialect, fields, used = layout.dialect, layout.width, [column.index for column in chosen]
-    count, rest = _plain_lines(path, layout) if _may_be_plain(layout, used) else (0, b"")
+    count, rest = _plain_lines(text, layout) if _may_be_plain(layout, used) else (0, b"")
     if count == 0:
         return None
     try:
         with warnings.catch_warnings(action="ignore"):
             frame = pd.read_csv(
-                path.absolute(), sep=dialect.separator, decimal=dialect.decimal, header=None, names=list(range(fields)),
+                text.path.absolute() if text.content is None else text.open(),
+                sep=dialect.separator, decimal=dialect.decimal, header=None, names=list(range(fields)),
                 usecols=None if len(used) == fields else sorted(used), skiprows=layout.first_line - 1, dtype="float64",
                 index_col=False, quoting=csv.QUOTE_NONE, na_values=SPELLINGS, keep_default_na=False, compression=None,
                 encoding_errors="replace",
@@ -85,24 +89,26 @@ def _read_at_once(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_
     # If all fields hold a number, the right sum of separators means the right number in each line. If not, one too
     # many in one line may hide one missing in another.
     certain = len(used) == fields and not any(np.isnan(column).any() for column in values)
-    if not certain and not _every_line_is_full(path, layout):
+    if not certain and not _every_line_is_full(text, layout):
         return None
     rows = Rows(values, np.arange(layout.first_line, layout.first_line + count))
-    return _with_last(path, layout, chosen, rows, rest.decode(layout.encoding, "replace"), drop_unended=drop_unended)
+    last = rest.decode(layout.encoding, "replace")
+    return _with_last(text.path, layout, chosen, rows, last, drop_unended=drop_unended)
 
 
 def _may_be_plain(layout: Layout, used: Sequence[int]) -> bool:
     """Return whether the fast way is safe; without the first field a comment with separators would pass for a row."""
     separator, decimal = layout.dialect.separator, layout.dialect.decimal
-    return layout.encoding in ONE_BYTE_ENCODINGS and separator not in (None, decimal) and 0 in used
+    first = 0 in used or layout.aligned
+    return layout.encoding in ONE_BYTE_ENCODINGS and separator not in (None, decimal) and first
 
 
-def _plain_lines(path: Path, layout: Layout) -> tuple[int, bytes]:
+def _plain_lines(text: Text, layout: Layout) -> tuple[int, bytes]:
     """Return the number of lines with rows, and the text after the last line end; none if separators do not add up."""
     separator = ord(layout.dialect.separator or " ")
     lines = separators = 0
     rest = b""
-    with path.open("rb") as stream:
+    with text.open() as stream:
         stream.seek(layout.start)
         while not rest and (block := stream.read(BLOCK) + stream.readline()):
             end = block.rfind(b"\n") + 1
@@ -117,11 +123,11 @@ def _plain_lines(path: Path, layout: Layout) -> tuple[int, bytes]:
     return (lines, rest) if separators == lines * (layout.width - 1) else (0, b"")
 
 
-def _every_line_is_full(path: Path, layout: Layout) -> bool:
+def _every_line_is_full(text: Text, layout: Layout) -> bool:
     """Return whether each line, without all other characters, is the separators of one row."""
     line = (layout.dialect.separator or " ").encode() * (layout.width - 1) + b"\n"
     others = bytes(set(range(256)) - set(line))
-    with path.open("rb") as stream:
+    with text.open() as stream:
         stream.seek(layout.start)
         while block := stream.read(BLOCK) + stream.readline():
             marks = block[: block.rfind(b"\n") + 1].translate(None, others)
@@ -152,11 +158,11 @@ def _with_last(
     return Rows(values, np.append(rows.lines, line))
 
 
-def _read_lines(path: Path, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows:
+def _read_lines(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows:
     """Read all rows line by line; some 2 µs a number."""
     lines, values, torn = array("q"), [array("d") for _ in chosen], None
-    time = ""
-    with path.open(encoding=layout.encoding, errors="replace", newline=None) as stream:
+    time, path = "", text.path
+    with io.TextIOWrapper(text.open(), layout.encoding, errors="replace", newline=None) as stream:
         for number, line in enumerate(stream, 1):
             if number < layout.first_line or _skips(layout, line):
                 continue
@@ -205,7 +211,7 @@ def _doubt_about(time: str) -> str | None:
 def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: str) -> list[float]:
     """Return the numbers of one row, NaN where a reading is missed."""
     fields = layout.dialect.split(text)
-    if len(fields) < layout.width or any(fields[layout.width :]):
+    if not layout.aligned and (len(fields) < layout.width or any(fields[layout.width :])):
         hint = "; if the comma is a decimal mark, separate by ; or tab" if layout.dialect.separator == "," else ""
         raise TableError(
             path,
@@ -213,6 +219,7 @@ def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: 
             f"expected: complete or remove the line{hint}",
             line=line,
         )
+    fields += [""] * (layout.width - len(fields))
     return [_number(path, layout, column, line, fields[column.index]) for column in chosen]
 
 
@@ -229,6 +236,8 @@ def _number(path: Path, layout: Layout, column: Column, line: int, text: str) ->
     except ValueError:
         if text.casefold() in MISSING:
             return float("nan")
+    if unit_behind(text):
+        return _number_with_unit(path, layout, column, line, text)
     if column.name == "time_s":
         with contextlib.suppress(ValueError):
             return clock_time(text) / column.factor
@@ -240,6 +249,21 @@ def _number(path: Path, layout: Layout, column: Column, line: int, text: str) ->
         f"'{shorten(text)}' stands in column '{shorten(column.label)}', a number with decimal {mark} is expected: {do}",
         line=line,
     )
+
+
+def _number_with_unit(path: Path, layout: Layout, column: Column, line: int, text: str) -> float:
+    """Return the number before a unit.  Raises TableError where the unit is not that of the column."""
+    unit = unit_behind(text)
+    kind = "time" if column.inverse else dimension(column.name)
+    if unit_factor(unit, kind) != unit_factor(column.unit, kind):
+        what = f"'{shorten(text)}' stands in column '{shorten(column.label)}', which is in {column.unit}"
+        raise TableError(path, f"{what}: write one unit in all rows", line=line)
+    try:
+        return layout.dialect.number(text[: -len(unit)].strip())
+    except ValueError:
+        mark = "comma" if layout.dialect.decimal == "," else "point"
+        what = f"'{shorten(text)}' has the other decimal mark, a number with decimal {mark} is expected"
+        raise TableError(path, f"{what}: correct it", line=line) from None
 
 
 def _torn(line: int, text: str) -> str:

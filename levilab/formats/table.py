@@ -1,12 +1,12 @@
 """Other people's files, and our own readings.csv, as one table in SI.
 
-A file is sniffed (`layout`), its titles are understood (`columns`), its rows read (`rows`).
+A file is opened (`texts`) and understood (`understanding`), and its rows are read (`rows`).
 """
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,30 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.errors import UsageError
-from levilab.formats.columns import (
-    SHORTHANDS,
-    Column,
-    NoSuchColumn,
-    TableError,
-    choose_columns,
-    how_else,
-    quote_names,
-    shorten,
-)
+from levilab.formats.columns import SHORTHANDS, Column, TableError, shorten
 from levilab.formats.dialect import MISSING_WORDS, Dialect
-from levilab.formats.layout import Layout, sniff
+from levilab.formats.layout import Layout
 from levilab.formats.rows import Rows, read_rows
-from levilab.formats.titles import (
-    CANONICAL,
-    COMPANIONS,
-    EXAMPLES,
-    LISTED,
-    QUANTITIES,
-    companion,
-    dimension,
-    nearly_a_frequency,
-    read_title,
-)
+from levilab.formats.texts import Text, locate
+from levilab.formats.titles import CANONICAL, COMPANIONS, QUANTITIES, companion
+from levilab.formats.understanding import Plan, Request, no_column, plan_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +29,6 @@ if TYPE_CHECKING:
 FEWEST = 3  # readings below which no analysis has anything to say
 NO_READING = 9.9e37  # SCPI-1999, 7.2.1.4: infinity is 9.9E37, "not a number" 9.91E37
 LONGEST_HEADER = 1 << 16  # bytes
-TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +65,7 @@ class Table:
             TableError: the file has no such column.
         """
         if name not in self.columns:
-            raise _no_column(self.path, name, self.header)
+            raise no_column(self.path, name, self.header)
         return self.columns[name]
 
 
@@ -95,10 +77,10 @@ def read_table(
     needed: Collection[str] = (),
     guess: bool = True,
 ) -> Table:
-    """Read a table of text: CSV of any kind, tabs or blanks, decimal point or comma, with or without units.
+    """Read a table: CSV of any kind, a spreadsheet, a zip, JSON; decimal point or comma, with or without units.
 
     Args:
-        path: the file.
+        path: the file; of several sheets or runs in it one, as if the file were a folder: ``mess.xlsx/Tabelle2``.
         columns: {canonical column, or t, f, u: title in the file or 1-based number}, where titles are not known.
         quantities: canonical columns that are wanted; others are not looked at.
         needed: canonical columns without which the table is of another kind, whatever stands in its rows.
@@ -109,27 +91,15 @@ def read_table(
         warning that lists what counts as missed.
 
     Raises:
+        SeveralRuns: the file holds several tables; its `paths` are theirs.
         TableError: there is no such table, or it cannot be understood without doubt.
     """
     with file_errors(path):
-        layout = sniff(path)
-        header, wanted, warnings = _titles(path, layout, columns or {}, guess=guess)
-        chosen, doubts = choose_columns(path, header, layout.units, wanted, quantities)
-        if not chosen:
-            examples = [EXAMPLES[name] for name in quantities if name in EXAMPLES]
-            known = ", ".join([*(name for name in quantities if name in LISTED and name not in COMPANIONS), *examples])
-            wanted_names = needed or [name for name in SHORTHANDS.values() if name in quantities][:2]
-            raise NoSuchColumn(
-                path,
-                f"no title is known ({known} …) among {quote_names(header)}: say `columns` = "
-                + _in_one_word(f"{_key(name)}=NAME" for name in wanted_names),
-                line=layout.header_line or layout.first_line,
-            )
-        for name in needed:
-            if name not in {column.name for column in chosen}:
-                raise _no_column(path, name, header)
-        rows = read_rows(path, layout, chosen)
-    table = _table(path, header, chosen, rows, (*warnings, *doubts))
+        plan = plan_of(path, Request(columns or {}, quantities, needed, guess))
+        layout = plan.layout
+        rows = read_rows(plan.text, layout, plan.columns)
+    table = _table(plan.path, plan.header, plan.columns, _of_run(rows, plan), plan.warnings)
+    path = plan.path
     if len(table) >= FEWEST:
         return table
     what = f"{len(table)} reading{'s' * (len(table) != 1)}" if rows.lines.size else "only a header"
@@ -172,7 +142,7 @@ def read_run_readings(path: Path, channels: Collection[str] = ()) -> Table:
             raise TableError(path, f"'{shorten(title.strip())}' is no header of a run, as time_s,… is", line=1)
         layout = Layout("utf-8-sig", Dialect(",", "."), header, 1, (), 2, len(first), len(header))
         nothing = Rows((), np.zeros(0, np.int64), f"line 1: '{shorten(title)}' was cut off" if title else None)
-        rows = read_rows(path, layout, chosen, drop_unended=True) if header else nothing
+        rows = read_rows(Text(path), layout, chosen, drop_unended=True) if header else nothing
     return _table(path, header, chosen, rows, ())
 
 
@@ -201,31 +171,8 @@ def parse_columns(text: str) -> dict[str, str]:
     return found
 
 
-def _in_one_word(columns: Iterable[str]) -> str:
-    """Return columns as any shell takes them: PowerShell would split them at a comma."""
-    text = ",".join(columns)
-    return f'"{text}"' if "," in text else text
-
-
-def _key(name: str) -> str:
-    """Return the key of a canonical column in the option `columns`."""
-    return next((short for short, long in SHORTHANDS.items() if long == name), name)
-
-
-def _no_column(path: Path, name: str, header: Sequence[str]) -> NoSuchColumn:
-    text = f"no column is known to be {name}; it has {quote_names(header)}: say `columns` = {_key(name)}=NAME"
-    nearly = next((title for title in header if nearly_a_frequency(title)), None) if "frequency" in name else None
-    foreign = next((title for title in header if read_title(title).column == name), None)
-    if foreign:
-        unit = shorten(read_title(foreign).unit or "")
-        what = f"column '{shorten(foreign)}' is in {unit}, which is no unit of {dimension(name)}"
-        text = f"{what}: {how_else(foreign, name)}"
-    elif nearly:
-        text = f"no column is known to be {name}; '{shorten(nearly)}' could become one: {how_else(nearly, name)}"
-    return NoSuchColumn(path, text)
-
-
 def _must_be_file(path: Path) -> None:
+    path = locate(path)[0]
     if path.is_dir():
         raise TableError(path, "is a folder; a data file is expected: name the file in it")
     if not path.exists():  # also for a name that no file can have
@@ -250,29 +197,13 @@ def file_errors(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _titles(
-    path: Path, layout: Layout, wanted: Mapping[str, str], *, guess: bool
-) -> tuple[tuple[str, ...], Mapping[str, str], list[str]]:
-    """Return the file's titles, or numbers in their place; what to take for what; a warning where that is a guess."""
-    if layout.header:
-        return layout.header, wanted, []
-    numbers = tuple(str(n + 1) for n in range(layout.width))
-    if wanted:
-        return numbers, wanted, []
-    if layout.header_line:
-        raise NoSuchColumn(
-            path,
-            f'is no header for the {layout.width} columns below: correct it, or say `columns` = "t=1,f=2"',
-            line=layout.header_line,
-        )
-    if layout.width > len(TITLES_WITHOUT_HEADER) or not guess:
-        raise NoSuchColumn(
-            path,
-            f'{layout.width} columns and no header; add one, or say `columns` = "t=1,f=2"',
-            line=layout.first_line,
-        )
-    taken = dict(zip(TITLES_WITHOUT_HEADER, numbers, strict=False))
-    return numbers, taken, [f"{shorten(str(path), 200)}: no header; the columns are taken as {', '.join(taken)}"]
+def _of_run(rows: Rows, plan: Plan) -> Rows:
+    """Return the rows of a run beside others: those below its last reading are of longer runs."""
+    own = [values for column, values in zip(plan.columns, rows.values, strict=True) if column.index in plan.own]
+    if not own or not rows.lines.size:
+        return rows
+    filled = np.logical_or.reduce([~np.isnan(values) for values in own])
+    return replace(rows, values=tuple(values[filled] for values in rows.values), lines=rows.lines[filled])
 
 
 def _table(

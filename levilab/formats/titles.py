@@ -12,15 +12,19 @@ PER_RADIAN = 1 / (2 * pi)
 # Factors to SI; spelled as `plain_unit` leaves them (no blanks, no ^ or ·, superscripts made plain).
 UNITS: Mapping[str, Mapping[str, float]] = {
     "time": {
-        "s": 1, "sec": 1, "second": 1, "seconds": 1, "sek": 1, "sekunde": 1, "sekunden": 1, "ms": 1e-3, "μs": 1e-6,
-        "us": 1e-6, "ns": 1e-9, "min": 60, "minute": 60, "minutes": 60, "minuten": 60, "h": 3600,
+        **dict.fromkeys((
+            "s", "sec", "second", "seconds", "sek", "sekunde", "sekunden", "seconde", "secondes", "segundo", "segundos",
+            "sekund", "sekunder",
+        ), 1),
+        "ms": 1e-3, "msec": 1e-3, "milliseconds": 1e-3, "millisekunden": 1e-3, "μs": 1e-6, "us": 1e-6, "ns": 1e-9,
+        **dict.fromkeys(("min", "minute", "minutes", "minuten", "minuto", "minutos", "minut", "minuter"), 60),
+        "h": 3600,
     },
     "frequency": {
-        "Hz": 1, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3, "μHz": 1e-6, "1/s": 1, "s-1": 1, "rps": 1, "U/s": 1,
+        "Hz": 1, "hertz": 1, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3, "μHz": 1e-6, "1/s": 1, "s-1": 1, "rps": 1, "U/s": 1,
         "rpm": PER_MINUTE, "1/min": PER_MINUTE, "min-1": PER_MINUTE, "/min": PER_MINUTE, "U/min": PER_MINUTE,
-        "tr/min": PER_MINUTE, "tr/s": 1,
         "rad/s": PER_RADIAN, "rads-1": PER_RADIAN, "rad_s": PER_RADIAN, "rad_per_s": PER_RADIAN,
-        "°/s": 1 / 360, "deg/s": 1 / 360, "deg_s": 1 / 360,
+        "°/s": 1 / 360, "°s-1": 1 / 360, "deg/s": 1 / 360, "deg_s": 1 / 360, "grad/s": 1 / 360,
     },
     "voltage": {"V": 1, "mV": 1e-3, "μV": 1e-6, "uV": 1e-6, "kV": 1e3},
     "length": {"m": 1, "cm": 1e-2, "mm": 1e-3, "μm": 1e-6, "um": 1e-6},
@@ -31,7 +35,12 @@ UNITS: Mapping[str, Mapping[str, float]] = {
 ANGULAR = (
     "omega", "ω", "omega3", "ω3", "omega_3", "ω_3", "angular_velocity", "angular_frequency", "angular_speed",
     "angular_rate", "winkelgeschwindigkeit", "winkelfrequenz", "kreisfrequenz", "vitesse_angulaire",
-    "velocidad_angular", "vinkelhastighet",
+    "velocidad_angular", "vinkelhastighet", "vinkelfrekvens", "pulsation",
+)  # fmt: skip
+# Names that could as well be in 1/s as in 1/min: known only with a unit.
+NEED_UNITS = (
+    "drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse", "vitesse_de_rotation", "varvtal",
+    "velocidad", "velocidad_de_giro", "velocidad_de_rotación", "n",
 )  # fmt: skip
 #: Units in which the title says whether turns or radians are counted.
 _PER_SECOND = ("1/s", "s-1")
@@ -46,11 +55,14 @@ _COMPONENTS = (
 QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "time_s": ("time", (
         "time", "t", "zeit", "elapsed", "elapsed_time", "timestamp", "seconds", "sekunden", "milliseconds", "minutes",
-        "ms", "x_value", "clock", "uhrzeit", "temps", "tiempo", "tempo")),
+        "ms", "x_value", "clock", "uhrzeit", "temps", "tiempo", "tempo", "tid", "laufzeit", "messzeit", "zeitpunkt",
+        "heure", "hora", "tidpunkt", "secondes", "segundos", "sekunder")),
     "spin_frequency_hz": ("frequency", (
         "spin_frequency", "f", "freq", "frequency", "frequenz", "nu", "ν", "nu3", "ν3", "f3", "ν_3", "nu_3", "f_3",
-        "spin", "spin_freq", "f_spin", "rotation_frequency", "rotation", "drehfrequenz", "hz", "rpm", "rad/s",
-        *ANGULAR, "drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse", "fréquence", "n")),
+        "spin", "spin_freq", "f_spin", "rotation_frequency", "rotation", "drehfrequenz", "hz", "hertz", "rpm", "rad/s",
+        *ANGULAR, *NEED_UNITS, "fréquence", "frekvens", "frecuencia", "umdrehungsfrequenz", "umlauffrequenz",
+        "rotationsfrequenz", "rotationsfrekvens", "fréquence_de_rotation", "frecuencia_de_giro",
+        "frecuencia_de_rotación", "spin_rate", "rotation_rate")),
     "precession_frequency_hz": ("frequency", (
         "precession_frequency", "precession", "f_precession", "f_p", "fp", "νp", "ν_p", "nu_p", "präzession",
         "präzessionsfrequenz")),
@@ -67,16 +79,23 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
 
 # Names that say their unit themselves; every other bare name is taken as SI.
 IMPLIED_UNITS = dict.fromkeys((*ANGULAR, "rad/s"), "rad/s") | {
-    "rpm": "rpm", "ms": "ms", "milliseconds": "ms", "minutes": "min",
+    "rpm": "rpm", "ms": "ms", "milliseconds": "ms", "minutes": "min", "hertz": "Hz",
 }  # fmt: skip
-# Names that could as well be in 1/s as in 1/min: known only with a unit.
-NEED_UNITS = ("drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse", "n")
 # The time of a turn, and turns in a time, are read where the title says their unit: T [ms], turns in 10 s.
 PERIODS = (
     "period", "periode", "periodendauer", "période", "rotation_period", "spin_period", "umlaufzeit",
-    "umlaufdauer", "drehperiode",
+    "umlaufdauer", "drehperiode", "période_de_rotation", "período", "período_de_rotación", "periodtid", "omloppstid",
 )  # fmt: skip
-TURNS = ("turns", "rotations", "revolutions", "revs", "rev", "umdrehungen", "umdr.", "umdr", "tours")
+TURNS = (
+    "turns", "rotations", "revolutions", "revs", "rev", "umdrehungen", "umdr.", "umdr", "umläufe", "rotationen",
+    "tours", "varv", "vueltas",
+)  # fmt: skip
+#: The time of N turns: 10 Umdrehungen, 10 T, time for 10 turns.
+_TIME_OF_TURNS = re.compile(
+    r"(?:(?:\w+_)?(?:for|of|für|von|pour|de|för|av|para)_)?(?P<number>[1-9]\d{0,3})_?(?:"
+    + "|".join(map(re.escape, (*TURNS, "t")))
+    + ")"
+)
 #: A symbol after its name says nothing more, as in Zeit t, Drehzahl n.
 SYMBOLS = ("t", "f", "n", "nu", "ν", "omega", "ω", "z", "h", "b")
 # Titles that begin so hold something from which a frequency is yet to be worked out.
@@ -112,12 +131,14 @@ class Title:
     Attributes:
         inverse: the field holds the time of a turn, of which the column is the inverse.
         angular: the name is that of an angular frequency, or of its uncertainty.
+        turns: how many turns that time is of.
     """
 
     column: str | None
     unit: str | None
     inverse: bool = False
     angular: bool = False
+    turns: int = 1
 
     def counts_radians(self, unit: str | None) -> bool:
         """Return whether a unit that says only "per second" means radians per second here."""
@@ -197,7 +218,7 @@ def is_unit(text: str) -> bool:
     return any(unit_factor(text, kind) is not None for kind in UNITS)
 
 
-def _plain_name(text: str) -> str:
+def plain_name(text: str) -> str:
     """Return a name as the tables spell it; of a name and its symbol, "Zeit t", the one that says more."""
     name = re.sub(r"[\s\-]+", "_", unicodedata.normalize("NFKC", text).strip().casefold())
     word, _, symbol = name.rpartition("_")
@@ -211,7 +232,7 @@ def _plain_name(text: str) -> str:
 
 
 _TURNS_IN = re.compile(
-    r"(1|U|umdr\.?|umdrehungen|turns?|rev|revolutions?|tr|tours?)?/(?P<number>\d+([.,]\d+)?)?(?P<unit>[a-zμ]+)",
+    r"(1|U|umdr\.?|umdrehungen|turns?|rev|revolutions?|rotations?|tr|tours?|r|varv|vueltas?)?/(?P<number>\d+([.,]\d+)?)?(?P<unit>[a-zμ]+)",
     re.IGNORECASE,
 )
 _UNIT_FORMS = tuple(
@@ -219,7 +240,7 @@ _UNIT_FORMS = tuple(
     for form in (
         r"(?P<name>.+?)\s*/?\s*[\[(](?P<unit>[^\[\]()]*)[\])]",  # f [Hz], f (Hz), f / (1/min)
         r"(?P<name>.+?)\s*/\s*(?P<unit>.+)",  # f/Hz
-        r"(?P<name>.+?)\s+(in|per|pro|par)\s+(?P<unit>.+)",  # f in Hz, turns per minute
+        r"(?P<name>.+?)\s+(in|en|i|per|pro|par|por)\s+(?P<unit>.+)",  # f in Hz, turns per minute
         r"(?P<name>[^,]+),\s*(?P<unit>.+)",  # f, Hz
     )
 )
@@ -238,16 +259,18 @@ def read_title(text: str) -> Title:
     """Read one header field.
 
     >>> read_title("zeit_ms")
-    Title(column='time_s', unit='ms', inverse=False, angular=False)
+    Title(column='time_s', unit='ms', inverse=False, angular=False, turns=1)
     >>> read_title("f / kHz").unit, read_title("turns in 10 s").unit
     ('kHz', '/10 s')
     >>> read_title("period [ms]").inverse, read_title("ω in 1/s").angular
     (True, True)
+    >>> read_title("10 Umdrehungen in s").turns, read_title("Laufzeit s").unit
+    (10, 's')
     """
     text = without_runs_of_blanks(text)
     if len(text) > LONGEST_TITLE:
         return Title(None, None)
-    name = _plain_name(text)
+    name = plain_name(text)
     if name in NAMES and name not in NEED_UNITS:
         return Title(NAMES[name], IMPLIED_UNITS.get(name), angular=name in _ANGULAR_NAMES)
     forms = (form.fullmatch(text) for form in _UNIT_FORMS)
@@ -259,12 +282,22 @@ def read_title(text: str) -> Title:
         title = _title_of_name(text[:place], text[place + 1 :])
         if title and (title.inverse or unit_factor(text[place + 1 :], dimension(title.column or "")) is not None):
             return title
-    return Title(None, found[0][1] if found else None)
+    bare = _BARE_UNIT.fullmatch(text)
+    if bare and not found:  # Laufzeit s, Frequenz Hz
+        return _title_of_name(bare["name"], bare["unit"]) or Title(None, bare["unit"])
+    return Title(None, next((unit for _, unit in found if is_unit(unit)), found[0][1] if found else None))
+
+
+#: A unit behind a name and a blank: those alone that are no symbol of a quantity.
+_BARE_UNIT = re.compile(r"(?P<name>.+)\s(?P<unit>s|sec|sek|ms|min|[kmμ]?Hz|rpm|(?:1|U|tr|r|rev|°|rad)/(?:s|min))")
 
 
 def _title_of_name(label: str, unit: str) -> Title | None:
     """Return the title that a name gives together with a possible unit; None for an unknown name."""
-    name = _plain_name(label)
+    name = plain_name(label)
+    of_turns = _TIME_OF_TURNS.fullmatch(name)
+    if of_turns and unit_factor(unit, "time"):
+        return Title("spin_frequency_hz", unit, inverse=True, turns=int(of_turns["number"]))
     if (name in TURNS or label == "U") and unit_factor(f"/{unit}", "frequency"):
         return Title("spin_frequency_hz", f"/{unit}")
     if name in PERIODS and unit_factor(unit, "time"):
@@ -283,7 +316,7 @@ def nearly_a_frequency(text: str) -> str | None:
     >>> nearly_a_frequency("Drehzahl")
     'say its unit in the title, or `columns` = "f=Drehzahl [Hz]" or "f=Drehzahl [rpm]", whichever it is in'
     """
-    name = _plain_name(text)
+    name = plain_name(text)
     if name in NEED_UNITS:
         title = text.strip()
         return f'say its unit in the title, or `columns` = "f={title} [Hz]" or "f={title} [rpm]", whichever it is in'
@@ -310,7 +343,7 @@ def foreign_unit(text: str, kind: str) -> str | None:
     text = without_runs_of_blanks(text)
     if len(text) > LONGEST_TITLE:
         return None
-    if _plain_name(text) in NAMES:  # u_t has no unit, though there is one called t
+    if plain_name(text) in NAMES:  # u_t has no unit, though there is one called t
         return None
     form = re.fullmatch(r".*?[\[(]([^\[\]()]*)[\])]", text)
     unit = form[1] if form else text.rpartition("_")[2] if "_" in text else ""
@@ -319,4 +352,4 @@ def foreign_unit(text: str, kind: str) -> str | None:
 
 def implied_unit(text: str) -> str | None:
     """Return the unit that a name says itself: rpm, omega."""
-    return IMPLIED_UNITS.get(_plain_name(text))
+    return IMPLIED_UNITS.get(plain_name(text))

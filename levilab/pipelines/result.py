@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from analysis.budget import Budget, Component
 from levilab.errors import DataError
 from levilab.files import parse_json, replace_atomically, writing
+from levilab.formats.texts import locate
 from levilab.pipelines.dump import Dump
 from levilab.runs.run import RECORD
 from levilab.settings import in_one_line
@@ -174,7 +175,9 @@ class Place:
 
 def beside(path: Path) -> Place:
     """Return the place of the result of a run folder, or of a data file: by its whole name, which is its alone."""
-    return Place(path) if path.is_dir() else Place(path.parent, path.name)
+    file, inside = locate(path)
+    name = ".".join(filter(None, (file.name, inside.replace("/", "."))))
+    return Place(path) if path.is_dir() else Place(file.parent, name)
 
 
 def place_of(paths: Sequence[Path], sources: Sequence[Source[Any]]) -> Place:
@@ -183,9 +186,12 @@ def place_of(paths: Sequence[Path], sources: Sequence[Source[Any]]) -> Place:
 
 
 def _together(paths: Sequence[Path]) -> Place:
-    """Return the folder that was searched for several inputs, else the present one, or the one above a present run."""
+    """Return the folder that was searched for several inputs, else the present one, or the one above a present run.
+
+    Of the runs in one file it is that of the file.
+    """
     if len(paths) == 1:
-        return Place(paths[0])
+        return beside(paths[0])
     return Place(Path("..") if Path(RECORD).exists() else Path())
 
 
@@ -289,7 +295,7 @@ def read_inputs(path: Path) -> Written:
         raise ResultError(f"{path}: {in_one_line(error)}; {_AGAIN_OR_AWAY}") from error
     inputs = tuple(path.parent / run.path for run in written.runs)
     for one in inputs:
-        if not one.exists():
+        if not locate(one)[0].exists():
             raise ResultError(f"{path}: is of {one}, which is not there: name the run or data file where it lies now")
     return Written(path, written.analysis, inputs)
 
@@ -365,7 +371,7 @@ class Archive(Generic[R]):
         self._analysis: str = model.model_fields["analysis"].default
         self._read: dict[Path, R | None] = {}
         self._known: dict[Path, dict[str | Path, int]] = {}
-        several = len(paths) > 1 or any(path.is_dir() and not (path / RECORD).exists() for path in paths)
+        several = len(paths) > 1 or not any((path / RECORD).exists() for path in paths)
         self._named = tuple(files)
         self._together = _together(paths).results(self._analysis) if several else ()
         if len(paths) > 1:

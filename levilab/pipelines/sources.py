@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
+from levilab.formats.texts import locate
+from levilab.formats.understanding import SeveralRuns
 from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.record import SEARCHED
 from levilab.pipelines.correction import describe, place_of_correction, read_correction
@@ -191,7 +193,7 @@ def find(path: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) -
     """Find the inputs at one path; see `collect`."""
     if path.is_dir() and not (path / RECORD).exists():
         return _search(path, needs, options)
-    return Found((_one(path, needs, options(path)),))
+    return Found(tuple(_at(path, needs, options)))
 
 
 def join(found: Sequence[Found[R]]) -> Found[R]:
@@ -241,8 +243,17 @@ def no_such_path(path: Path) -> DataError:
     return DataError(f"{path}: there is no such file or folder in {folder.resolve()}: {advice}")
 
 
+def _at(path: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) -> Iterator[Source[R]]:
+    """Yield the input at a path, or the runs in a file that holds several.  Raises DataError."""
+    try:
+        yield _one(path, needs, options(path))
+    except SeveralRuns as several:
+        for run in several.paths:
+            yield _of_file(run, needs, options(run))
+
+
 def _one(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
-    if not path.exists():
+    if not locate(path)[0].exists():
         raise no_such_path(path)
     if path.is_dir():
         return _of_run(Run.load(path), needs, options)
@@ -258,7 +269,9 @@ def _one(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
 
 def _of_file(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
     """Read a data file.  Options that are given go before those of the correction beside it."""
-    kept = {key: value for key, value in read_correction(path).items() if getattr(options, key) in (None, value)}
+    kept = {
+        key: value for key, value in read_correction(locate(path)[0]).items() if getattr(options, key) in (None, value)
+    }
     readings = needs.read_file(path, replace(options, **kept))
     note = [f"{path.name}: is read as {place_of_correction(path).name} says: {describe(kept)}"] if kept else []
     return Source(path, path, sha256_of(path), None, readings, path.name, (*readings.warnings, *note), kept)
@@ -277,12 +290,15 @@ def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
 
 
 def sha256_of(path: Path) -> str:
-    """Return the hash of a file.  Raises DataError."""
+    """Return the hash of a file; of a run in it, that of the file and the run's name.  Raises DataError."""
+    path, inside = locate(path)
     if path.exists() and not path.is_file():  # reading from a pipe would wait for ever
         raise DataError(f"{path}: is a folder, a pipe or a device; a file is expected")
     try:
         with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+            digest = hashlib.file_digest(file, "sha256")
+            digest.update(inside.encode())
+            return digest.hexdigest()
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror})") from error
 
@@ -308,7 +324,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
     files = data_files(root)
     for file in files:
         with _skipping(broken, remarks):
-            found.append(_of_file(file, needs, replace(options(file), guess=False)))
+            found += _at(file, needs, lambda path: replace(options(path), guess=False))
     kinds = [SkippedRuns(kind, count) for kind, count in sorted(others.items())]
     if not found:
         text = f"{root}: {_nothing_found(needs, kinds, broken, [file.name for file in files])}"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from levilab.errors import UsageError
 from levilab.formats.kinds import AUDIO, kind_of_bytes
 from levilab.formats.table import file_errors
+from levilab.formats.texts import SPREADSHEETS, TEXTS, locate, texts_of
 from levilab.formats.waveforms.audio import read_audio
 from levilab.formats.waveforms.head import read_head
 from levilab.formats.waveforms.header import NoWaveform, dialect_of
@@ -23,8 +24,7 @@ if TYPE_CHECKING:
     from levilab.formats.waveforms.waveform import PulseTimes, Waveform
 
 #: How names of files end that may hold samples, readings or pulse times, where a folder is searched.
-TEXTS = frozenset({".csv", ".txt", ".dat", ".tsv"})
-SEARCHED = TEXTS | SUFFIXES | {".wav", ".npy", *AUDIO.suffixes}
+SEARCHED = TEXTS | SPREADSHEETS | SUFFIXES | {".wav", ".npy", ".zip", *AUDIO.suffixes}
 
 
 def read_record(
@@ -46,6 +46,7 @@ def read_record(
     if rate is not None and not 0 < rate < 1e15:
         raise UsageError("rate", "samples per second are expected, a number above 0 [Hz]", value=rate)
     with file_errors(path):
+        _must_be_whole(path)
         with path.open("rb") as stream:
             magic = stream.read(64)
         if magic[:4] in {b"RIFF", b"RIFX", b"RF64"} and magic[8:12] == b"WAVE":
@@ -63,3 +64,10 @@ def read_record(
         if dialect.separator is None and all(len(dialect.split(line)) < 2 for line in head.lines[-20:]):
             return read_column(head, dialect, rate, guess=guess)
         return read_samples(head, dialect, columns=columns or {}, rate=rate)
+
+
+def _must_be_whole(path: Path) -> None:
+    """Raise NoWaveform for a table in a file of another form: a spreadsheet, a zip, JSON, a log with labels."""
+    file, inside = locate(path)
+    if inside or any(text.rewritten for text in texts_of(file)):
+        raise NoWaveform(path, "is a table of another program, or one in a file with several")

@@ -12,7 +12,7 @@ from analysis.spindown.readings import check_readings
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, Table, read_table
-from levilab.formats.titles import unit_factor
+from levilab.formats.understanding import FASTEST_SPIN_HZ, SLOWEST_SPIN_HZ, possible_spins
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes
@@ -101,7 +101,8 @@ def read_spin_file(path: "Path", options: "InputOptions") -> Readings:
         raise
     else:
         return record_readings(record, options)
-    return spin_readings(read_table(path, columns=options.columns, quantities=QUANTITIES, guess=options.guess))
+    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=QUANTITIES[:2], guess=options.guess)
+    return spin_readings(table)
 
 
 def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") -> Readings:
@@ -174,33 +175,20 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
     return Readings(time, frequency, u, (*table.warnings, *doubts), doubtful=bool(doubts))
 
 
-#: No such top floats far below or above these [Hz], linear theory says 21.65 to 80.6: the unit is in doubt there.
-#: 20 to 60 turns a second are 126 to 377 rad/s: taken for turns, they lie above.
-SLOWEST_SPIN_HZ, FASTEST_HZ = 10.0, 100.0
-#: Units in which the numbers of a file may be meant.
-_UNITS = ("Hz", "rpm", "rad/s", "°/s")
-
-
 def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[str]:
     """Return doubts about units: a spin that no such top has, readings closer than a turn."""
     middle, step = float(np.median(frequency)), float(np.median(np.diff(time)))
-    if not SLOWEST_SPIN_HZ <= middle <= FASTEST_HZ:
+    if not SLOWEST_SPIN_HZ <= middle <= FASTEST_SPIN_HZ:
         doubt = f"{table.path.name}: the spin is about {middle:.4g} Hz, a Levitron spins at 20 to 60 Hz"
         meant = [
             f"f=NAME [{unit}] ({digits(spin, 3)} Hz)"
-            for unit, spin in _other_spins(middle / table.factors.get("spin_frequency_hz", 1.0)).items()
+            for unit, spin in possible_spins(middle / table.factors.get("spin_frequency_hz", 1.0)).items()
         ]
         return [f"{doubt}; say the unit with the column: {' or '.join(meant)}" if meant else doubt]
     if step * middle < 1:  # nor does a counter give a reading in less
         doubt = f"{table.path.name}: the readings lie {1e3 * step:.3g} ms apart, the top needs {1e3 / middle:.3g} ms"
         return [f"{doubt} for a turn; if the times are in seconds, say so with their column, as t=NAME [s]"]
     return []
-
-
-def _other_spins(number: float) -> dict[str, float]:
-    """Return the spin [Hz] that a number of a file means in each unit in which a top can have it."""
-    spins = {unit: number * (unit_factor(unit, "frequency") or 1.0) for unit in _UNITS}
-    return {unit: spin for unit, spin in spins.items() if SLOWEST_SPIN_HZ <= spin <= FASTEST_HZ}
 
 
 #: Beyond these a number is no measurement, and its powers would leave the range of floating point.

@@ -1,0 +1,147 @@
+"""Tables in the dress of the program that wrote them: Markdown, Arduino's monitor and plotter, CASSY, LabVIEW.
+
+Each is rewritten line by line, so that the n-th line stays the n-th, with tabs between the fields.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+#: Lines that are looked at, and the part of them that has to be in a dress: a log may begin in the middle of a line.
+_LINES, _MOST = 100, 0.8
+#: No line in a dress is longer: the forms below look at each pair of its places.
+_LONGEST = 300
+
+
+@dataclass(frozen=True)
+class Dressed:
+    """A text without its dress.
+
+    Attributes:
+        titles: of the columns where each row had them.
+    """
+
+    content: bytes
+    titles: tuple[str, ...] = ()
+
+
+def undress(head: bytes, whole: Callable[[], bytes]) -> Dressed | None:
+    """Return a text as plain lines; None where it is plain already.
+
+    Args:
+        head: its beginning.
+        whole: reads all of it.
+    """
+    lines = head.decode("utf-8-sig", errors="replace").splitlines()[:-1][:_LINES]
+    filled = [line for line in lines if line.strip()]
+    if not filled or max(map(len, filled)) > _LONGEST:
+        return None
+    for rewrite, wears in _DRESSES:
+        if wears(filled):
+            return rewrite(_decode(whole()).splitlines())
+    return None
+
+
+def _decode(content: bytes) -> str:
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
+
+
+def _content(lines: Sequence[str]) -> bytes:
+    return "".join(f"{line}\n" for line in lines).encode()
+
+
+def _mostly(form: re.Pattern[str]) -> Callable[[Sequence[str]], bool]:
+    """Return whether nearly all of some lines have a form."""
+    return lambda lines: len(lines) > 1 and sum(bool(form.match(line)) for line in lines) >= _MOST * len(lines)
+
+
+# --- Markdown ------------------------------------------------------------------------------------------
+
+_RULE = re.compile(r"\s*\|?(\s*:?-+:?\s*\|)+(\s*:?-+:?\s*)?")
+
+
+def _markdown(lines: Sequence[str]) -> Dressed:
+    """| t | f |, with a line of dashes below."""
+    rows = ["" if _RULE.fullmatch(line) else line.strip() for line in lines]
+    cells = [[cell.strip() for cell in row.removeprefix("|").removesuffix("|").split("|")] for row in rows]
+    return Dressed(_content(["\t".join(row) if "|" in text else "" for row, text in zip(cells, rows, strict=True)]))
+
+
+# --- Arduino -------------------------------------------------------------------------------------------
+
+_STAMP = re.compile(r"\s*(\d\d?:\d\d:\d\d(?:[.,]\d+)?)\s*->\s*(.*)")
+_NAME, _VALUE = r"[^\W\d][^:;,\t]*?", r"[+-]?[\d.]+(?:[eE][+-]?\d+)?(?:\s?[^\d\s,;:][^\s,;:]*)?"
+_PAIR, _PAIR_PARTS = rf"{_NAME}\s*:\s*{_VALUE}", rf"({_NAME})\s*:\s*({_VALUE})"
+_PAIRS = re.compile(rf"\s*(?:\d\d?:\d\d:\d\d(?:[.,]\d+)?\s*->\s*)?{_PAIR}(?:[,;\t ]\s*{_PAIR})*[,;\s]*$")
+_EACH = re.compile(_PAIR_PARTS + r"(?:[,;\t ]\s*|$)")
+
+
+def _plotter(lines: Sequence[str]) -> Dressed:
+    """t:123, f:38.01 in each line: the labels become titles, and a unit stays behind its number."""
+    rows, titles = [], dict[str, None]()
+    for line in lines:
+        stamp = _STAMP.fullmatch(line)
+        values = dict(_EACH.findall(stamp[2] if stamp else line)) if _PAIRS.match(line) else {}
+        values |= {"time": stamp[1]} if stamp and values and not {"t", "time"} & {v.casefold() for v in values} else {}
+        titles |= dict.fromkeys(values)
+        rows.append(values)
+    text = ["\t".join(row.get(title, "") for title in titles) if row else "" for row in rows]
+    return Dressed(_content(text), tuple(titles))
+
+
+def _monitor(lines: Sequence[str]) -> Dressed:
+    """10:00:10.123 -> 38.2: the clock is the first column."""
+    found = [_STAMP.fullmatch(line) for line in lines]
+    rows = [[one[1], *re.split(r"[;\s]+|,(?=\s)|,(?=.*,)", one[2].strip())] if one else [] for one in found]
+    width = max(map(len, rows), default=0)
+    titles = () if width < 3 else ("clock", *(f"value {k}" for k in range(1, width)))
+    return Dressed(_content(["\t".join(row) for row in rows]), titles)
+
+
+# --- CASSY, LabVIEW ------------------------------------------------------------------------------------
+
+_DEFINITION = re.compile(r"\s*DEF\s*=")
+_OTHER_KEYS = re.compile(r"\s*(MIN|MAX|SCALE|DEC)\s*=")
+
+
+def _cassy(lines: Sequence[str]) -> Dressed:
+    """MIN=, MAX=, SCALE= … above DEF="t/s" and the other titles."""
+    plain = ["" if _OTHER_KEYS.match(line) else _DEFINITION.sub("", line, count=1) for line in lines]
+    return Dressed(_content(plain))
+
+
+_END = "***End_of_Header***"
+
+
+def _labview(lines: Sequence[str]) -> Dressed:
+    """Blocks of a header, the titles below the last, and a column of comments, most often empty."""
+    last = max(k for k, line in enumerate(lines) if line.startswith(_END))
+    comma = any(re.match(r"Separator\W+Comma", line) for line in lines[: last + 1])
+    separator = "," if comma else "\t"
+    header = [line.split(separator) for line in lines[: last + 1]]
+    units = next((line[1:] for line in header if line[0] == "Y_Unit_Label"), [])
+    names = next((line.split(separator) for line in lines[last + 1 :] if line.strip()), [])
+    names = [name.strip() for name in names]
+    if names and names[-1] == "Comment":
+        names.pop()
+    titles = [
+        f"{name} [{units[k - 1].strip()}]" if 1 <= k <= len(units) and units[k - 1].strip() else name
+        for k, name in enumerate(names)
+    ]
+    rows = ["\t".join(line.split(separator)[: len(names)]) for line in lines[last + 1 :]]
+    first = next((k for k, row in enumerate(rows) if row.strip()), 0)
+    rows[first : first + 1] = ["\t".join(titles)]
+    return Dressed(_content([*([""] * (last + 1)), *rows]))
+
+
+#: How a dress is taken off, and who wears it.
+_DRESSES: Sequence[tuple[Callable[[Sequence[str]], Dressed], Callable[[Sequence[str]], bool]]] = (
+    (_labview, lambda lines: any(line.startswith(_END) for line in lines)),
+    (_cassy, lambda lines: any(_DEFINITION.match(line) for line in lines)),
+    (_markdown, _mostly(re.compile(r"\s*\|.*\|\s*$"))),
+    (_plotter, _mostly(_PAIRS)),
+    (_monitor, _mostly(_STAMP)),
+)

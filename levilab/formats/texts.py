@@ -1,0 +1,384 @@
+"""The text of each table in a file: the file's own, the sheets of a spreadsheet, the files of a zip, JSON.
+
+All become lines of text, so that one reader understands them; nothing is written to the disk, no macro is run and no
+link to another file is followed.
+"""
+
+import codecs
+import io
+import json
+import re
+import zipfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass
+from datetime import date, datetime, time, timedelta
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import python_calamine
+
+from levilab.formats.columns import NoTable, TableError, shorten
+from levilab.formats.dress import undress
+
+#: Bytes that a workbook or an archive may unpack to: a spreadsheet of a million rows has some 100 MB, and a reader
+#: needs several times as much memory.
+MOST_UNPACKED = 1 << 29
+#: Cells of a sheet from its first to its last one, empty ones included: one filled cell far down makes billions.
+MOST_CELLS = 20_000_000
+#: Members of an archive: each costs a look.
+MOST_MEMBERS = 10_000
+#: Bytes of a text that is written in another form (JSON, log of an Arduino) and read as a whole.
+MOST_REWRITTEN = 1 << 26
+#: How the names of spreadsheets end, and those of texts in an archive.
+SPREADSHEETS = frozenset({".xlsx", ".xlsm", ".xls", ".ods"})
+TEXTS = frozenset({".csv", ".txt", ".tsv", ".dat", ".lvm", ".lab"})
+#: Of phyphox: when it was recorded, with what.
+_ABOUT = "meta"
+_JSON = frozenset({".json", ".jsonl"})
+_OLE, _ZIP = b"\xd0\xcf\x11\xe0", b"PK\x03\x04"
+_BLOCK = 1 << 18
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """A table as lines of text.
+
+    Attributes:
+        path: the file; behind it, as if it were a folder, the name of the sheet or of the file in the archive.
+        content: None where it is the file's own.
+        titles: of the columns, where each row of the file has them.
+        aligned: whether a field stands in its column whatever stands beside it, as in a spreadsheet.
+    """
+
+    path: Path
+    content: bytes | None = None
+    titles: tuple[str, ...] = ()
+    aligned: bool = False
+
+    @property
+    def rewritten(self) -> bool:
+        """Whether the lines are others than the file's."""
+        return self.content is not None
+
+    def open(self) -> BinaryIO:
+        """Return the stream of its bytes.  Raises OSError."""
+        return self.path.open("rb") if self.content is None else io.BytesIO(self.content)
+
+    @property
+    def size(self) -> int:
+        """Number of its bytes."""
+        return self.path.stat().st_size if self.content is None else len(self.content)
+
+
+def locate(path: Path) -> tuple[Path, str]:
+    """Return the file that a path leads to or into, and what it names in the file; the path itself if there is none.
+
+    >>> locate(Path("no/such.xlsx/Sheet1"))[1]
+    ''
+    """
+    for file in (path, *path.parents):
+        try:
+            if file.is_file():
+                return file, path.relative_to(file).as_posix() if file != path else ""
+            if file.exists():
+                break
+        except (OSError, ValueError):  # no name that a file can have
+            break
+    return path, ""
+
+
+def texts_of(file: Path) -> tuple[Text, ...]:
+    """Return the texts in a file, at least one.
+
+    Raises:
+        NoTable: it is of another kind.
+        TableError: it is damaged, locked, or too large when unpacked.
+        OSError: it cannot be read.
+    """
+    status = file.stat()
+    return _texts(file, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=8)  # each analysis looks at each file, and at each sheet of it
+def _texts(file: Path, _: int, size: int) -> tuple[Text, ...]:
+    with file.open("rb") as stream:
+        head = stream.read(1 << 16)
+    if head.startswith(_OLE):
+        return _sheets(file)
+    if head.startswith(_ZIP):
+        return _unpacked(file)
+    if head[:200].removeprefix(codecs.BOM_UTF8).lstrip()[:1] in {b"{", b"["} and file.suffix.casefold() != ".csv":
+        return (_of_json(file, size),)
+    dressed = undress(head, lambda: _read(file, size))
+    return (Text(file, dressed.content, dressed.titles) if dressed else Text(file),)
+
+
+def _read(file: Path, size: int) -> bytes:
+    if size > MOST_REWRITTEN:
+        raise TableError(file, f"has {size >> 20} MB, up to {MOST_REWRITTEN >> 20} MB are read in this form: use CSV")
+    return file.read_bytes()
+
+
+# --- archives ------------------------------------------------------------------------------------------
+
+
+#: A file in an archive, and what the archive is then.
+_OTHER_ARCHIVES: Mapping[str, str] = {
+    "word/document.xml": "a Word document: copy its table into a spreadsheet",
+    "ppt/presentation.xml": "a PowerPoint document: copy its table into a spreadsheet",
+    "Index/Document.iwa": "a Numbers spreadsheet: File > Export To > Excel or CSV",
+    "xl/workbook.bin": "a binary Excel file: save it as Excel workbook (.xlsx)",
+}
+
+
+def _unpacked(file: Path) -> tuple[Text, ...]:
+    """Return the texts of a spreadsheet or of an archive with tables, after a look at how large it gets."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            members = [member for member in archive.infolist() if not member.is_dir()]
+            names = {member.filename for member in members}
+            if what := next((what for name, what in _OTHER_ARCHIVES.items() if name in names), None):
+                raise NoTable(file, f"is {what}")
+            workbook = bool({"xl/workbook.xml", "content.xml"} & names)
+            taken = members if workbook else [member for member in members if _may_be_table(member.filename)]
+            seen = sum(member.file_size for member in taken)
+            if len(taken) > MOST_MEMBERS or seen > MOST_UNPACKED:
+                raise _too_large(file, f"{len(taken)} files of {seen / 2**30:.1f} GB")
+            found = _check(file, archive, taken) if workbook else list(_members(file, archive, taken))
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+        what = "is locked by a password" if "encrypted" in str(error) else f"is a damaged ZIP or Excel file ({error})"
+        raise TableError(file, f"{what}: open it with its own program and save it again, unlocked") from error
+    if workbook:
+        return _sheets(file)
+    if not found:
+        raise NoTable(file, "is a ZIP file without a table: CSV, TXT or a spreadsheet is expected in it: unpack it")
+    return tuple(found)
+
+
+def _may_be_table(name: str) -> bool:
+    parts = name.split("/")
+    hidden = any(part.startswith((".", "__")) or part == _ABOUT for part in parts)
+    return not hidden and Path(name).suffix.casefold() in TEXTS
+
+
+def _too_large(file: Path, what: str) -> TableError:
+    return TableError(
+        file, f"unpacks to {what}, up to {MOST_UNPACKED >> 20} MB and {MOST_CELLS:,} cells are read: export it as CSV"
+    )
+
+
+def _members(file: Path, archive: zipfile.ZipFile, members: Iterable[zipfile.ZipInfo]) -> Iterator[Text]:
+    left = MOST_UNPACKED
+    for member in members:
+        blocks = list(_blocks(file, archive, member, left))
+        content = b"".join(blocks)
+        left -= len(content)
+        dressed = undress(content[: 1 << 16], partial(bytes, content))
+        inside = file / member.filename
+        yield Text(inside, dressed.content, dressed.titles) if dressed else Text(inside, content)
+
+
+def _blocks(file: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, most: int) -> Iterator[bytes]:
+    """Yield what a member unpacks to, whatever length its entry says.  Raises TableError beyond `most` bytes."""
+    free = copy(member)
+    free.file_size = most + 1
+    with archive.open(free) as stream:
+        while block := stream.read(_BLOCK):
+            most -= len(block)
+            if most < 0:
+                raise _too_large(file, "more than its directory says")
+            yield block
+
+
+# --- spreadsheets --------------------------------------------------------------------------------------
+
+
+_ADDRESS = re.compile(rb'\br="([A-Z]{1,3})(\d{1,7})"')
+_OPENED = re.compile(rb"<table:(table|table-row|table-cell|covered-table-cell)\b([^<>]*)>")
+_REPEATED = re.compile(rb'number-(?:rows|columns)-repeated="(\d+)"')
+
+
+def _check(file: Path, archive: zipfile.ZipFile, members: Sequence[zipfile.ZipInfo]) -> list[Text]:
+    """Refuse a workbook that is too large: its bytes, its cells, its repeated texts.  Returns nothing to read."""
+    left, longest, texts = MOST_UNPACKED, 0, 0
+    for member in members:
+        name = member.filename
+        size = rows = columns = 0
+        shared = name.endswith("sharedStrings.xml")
+        rest = b""
+        ods = _OdsCells() if name == "content.xml" else None
+        for block in _blocks(file, archive, member, left):
+            size += len(block)
+            rest += block
+            if ods:
+                ods.feed(rest)
+            elif shared:
+                longest = max([longest, *map(len, rest.split(b"</si>"))])
+            elif name.startswith("xl/worksheets/"):
+                found = _ADDRESS.findall(rest)
+                rows = max([rows, *(int(row) for _, row in found)])
+                columns = max([columns, *(_column(letters) for letters in {letters for letters, _ in found})])
+                texts += rest.count(b't="s"')
+            end = rest.rfind(b"</si>") if shared else rest.rfind(b"<")
+            rest = rest[max(end, 0) :]
+        left -= size
+        rows, columns = (ods.rows, ods.columns) if ods else (rows, columns)
+        if rows * columns > MOST_CELLS:
+            raise _too_large(file, f"{rows:,} rows of {columns:,} columns")
+    if longest * texts > 4 * MOST_UNPACKED:
+        raise _too_large(file, f"{texts:,} cells with texts of up to {longest:,} letters")
+    return []
+
+
+def _column(letters: bytes) -> int:
+    number = 0
+    for letter in letters:
+        number = 26 * number + letter - 64
+    return number
+
+
+class _OdsCells:
+    """Last row and column of an OpenDocument sheet with something in them, as its elements come."""
+
+    def __init__(self) -> None:
+        self.rows = self.columns = 0
+        self._row = self._repeated = self._column = 0
+
+    def feed(self, text: bytes) -> None:
+        """Count the elements of a piece that ends before an element."""
+        for kind, attributes in _OPENED.findall(text):
+            repeated = int(found[1]) if (found := _REPEATED.search(attributes)) else 1
+            if kind == b"table":
+                self._row = self._repeated = 0
+            elif kind == b"table-row":
+                self._row += self._repeated
+                self._repeated, self._column = repeated, 0
+            else:
+                self._column += repeated
+                if b"value-type=" in attributes:
+                    self.rows = max(self.rows, self._row + self._repeated)
+                    self.columns = max(self.columns, self._column)
+
+
+def _sheets(file: Path) -> tuple[Text, ...]:
+    """Return the sheets of a spreadsheet that hold cells, in their order."""
+    try:
+        with python_calamine.load_workbook(file) as book:
+            sheets = [book.get_sheet_by_index(k) for k in range(len(book.sheet_names))]
+            _must_be_of_a_size(file, sheets)
+            found = [(sheet.name, sheet.to_python(skip_empty_area=False)) for sheet in sheets if sheet.height]
+    except python_calamine.PasswordError as error:
+        raise TableError(file, "is locked by a password: save it without one") from error
+    except (python_calamine.CalamineError, OSError, ValueError) as error:
+        said = shorten(" ".join(str(error).split()), 80)
+        what = f"cannot be read as a spreadsheet ({said}): open it and save it again as .xlsx"
+        raise TableError(file, what) from error
+    except BaseException as error:  # a defect of the library in a damaged file; it is written in Rust
+        if type(error).__name__ != "PanicException":
+            raise
+        raise TableError(file, "is a damaged spreadsheet: open it and save it again as .xlsx") from error
+    if not found:
+        raise NoTable(file, "is an empty spreadsheet")
+    return tuple(Text(file / name.replace("/", "-"), _lines(rows), aligned=True) for name, rows in found)
+
+
+def _must_be_of_a_size(file: Path, sheets: Sequence[Any]) -> None:
+    for sheet in sheets:
+        if sheet.total_height * sheet.total_width > MOST_CELLS:
+            raise _too_large(file, f"{sheet.total_height:,} rows of {sheet.total_width:,} columns")
+
+
+def _lines(rows: Sequence[Sequence[Any]]) -> bytes:
+    """Return a sheet as lines with tabs and decimal points, each number to its last bit."""
+    texts = {type(cell) for row in rows for cell in row}
+    if texts <= {float, int}:
+        return "".join(["\t".join(map(repr, row)) + "\n" for row in rows]).encode()
+    comma = not any(isinstance(cell, str) and _POINTED.fullmatch(cell) for row in rows for cell in row)
+    write = {**_CELLS, str: _with_points if comma else _plain}
+    return "".join(["\t".join([write[type(cell)](cell) for cell in row]) + "\n" for row in rows]).encode()
+
+
+#: Numbers typed as text, with a decimal point, with a decimal comma and perhaps a unit.
+_POINTED = re.compile(r"[+-]?\d*\.\d+\b.*", re.DOTALL)
+_COMMA = re.compile(r"([+-]?\d+),(\d+(?:[eE][+-]?\d+)?(?:\s*[^\d\s,].*)?)")
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.replace('"', "″").split())
+
+
+def _with_points(text: str) -> str:
+    return _COMMA.sub(r"\1.\2", _plain(text)) if _COMMA.fullmatch(text.strip()) else _plain(text)
+
+
+def _clock(cell: timedelta) -> str:
+    """Return a time that was passed as a stopwatch shows it."""
+    seconds = cell.total_seconds()
+    return f"{int(seconds // 3600)}:{int(seconds % 3600 // 60):02d}:{seconds % 60:09.6f}"
+
+
+_CELLS: Mapping[type, Callable[[Any], str]] = {
+    int: repr,
+    float: repr,
+    bool: str,
+    datetime: lambda cell: cell.isoformat(" "),
+    date: date.isoformat,
+    time: time.isoformat,
+    timedelta: _clock,
+}
+
+
+# --- JSON ----------------------------------------------------------------------------------------------
+
+
+def _of_json(file: Path, size: int) -> Text:
+    """Return a table in JSON: columns of values, a list of objects, a list of rows; as pandas and browsers write it."""
+    content = _read(file, size)
+    try:
+        data = json.loads(content)
+    except ValueError:
+        try:  # an object a line
+            data = [json.loads(line) for line in content.splitlines() if line.strip()]
+        except ValueError:
+            if file.suffix.casefold() not in _JSON:
+                return Text(file)
+            raise NoTable(file, "is cut off or no JSON: export it again, or as CSV") from None
+    except RecursionError:
+        raise NoTable(file, "is JSON in too many levels: export the table alone, or as CSV") from None
+    if isinstance(data, dict) and "schema" in data:
+        raise NoTable(file, "is a JSON file of a run or a result: name the folder of the run instead")
+    rows = _rows_of(data)
+    if rows is None:
+        expected = '{"t": [0, 1, …], "f": [38, 37.9, …]} or [{"t": 0, "f": 38}, …] is expected'
+        raise NoTable(file, f"is a JSON file without a table: {expected}")
+    lines = ["\t".join("" if cell is None else _plain(str(cell)) for cell in row) for row in rows]
+    return Text(file, "".join(f"{line}\n" for line in lines).encode(), aligned=True)
+
+
+def _rows_of(data: Any) -> list[Sequence[Any]] | None:
+    """Return the rows of the first table in parsed JSON, titles first."""
+    if isinstance(data, list) and data:
+        if all(isinstance(row, dict) for row in data):
+            names = list(dict.fromkeys(name for row in data for name in row))
+            return [names, *([row.get(name) for name in names] for row in data)]
+        if all(isinstance(row, list) for row in data):
+            return data
+    if isinstance(data, dict):
+        columns = {
+            name: list(column.values()) if isinstance(column, dict) else column
+            for name, column in data.items()
+            if isinstance(column, dict | list)
+        }
+        flat = {
+            name: column
+            for name, column in columns.items()
+            if not any(isinstance(cell, dict | list) for cell in column)
+        }
+        longest = max(map(len, flat.values()), default=0)
+        table = {name: column for name, column in flat.items() if len(column) == longest}
+        if len(table) > 1 and longest > 1:
+            return [list(table), *zip(*table.values(), strict=True)]
+        return next((rows for one in data.values() if (rows := _rows_of(one))), None)
+    return None

@@ -1,0 +1,477 @@
+"""How a file of readings is understood: its tables, what each column holds, and the questions that are left.
+
+`understand` shows it as data, and `levilab.formats.table.read_table` reads by the same plan: what is shown is what is
+analyzed.
+"""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from statistics import median
+
+from levilab.formats.beside import Part, parts_of
+from levilab.formats.columns import (
+    SHORTHANDS,
+    Ambiguous,
+    Choice,
+    Column,
+    Doubt,
+    NoSuchColumn,
+    NoTable,
+    TableError,
+    choose_columns,
+    how_else,
+    quote_names,
+    shorten,
+)
+from levilab.formats.dialect import unit_behind
+from levilab.formats.layout import Layout, sniff
+from levilab.formats.texts import Text, locate, texts_of
+from levilab.formats.titles import (
+    CANONICAL,
+    COMPANIONS,
+    EXAMPLES,
+    LISTED,
+    NEED_UNITS,
+    QUANTITIES,
+    dimension,
+    nearly_a_frequency,
+    plain_name,
+    read_title,
+    unit_factor,
+)
+
+TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
+#: No such top floats far below or above these [Hz], linear theory says 21.65 to 80.6: the unit is in doubt there.
+#: 20 to 60 turns a second are 126 to 377 rad/s: taken for turns, they lie above.
+SLOWEST_SPIN_HZ, FASTEST_SPIN_HZ = 10.0, 100.0
+#: Units in which the numbers of a file may be meant.
+_UNITS = ("Hz", "rpm", "rad/s", "°/s")
+#: Columns of a spin-down.
+SPIN = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
+_SPIN = "spin_frequency_hz"
+#: First values that are shown.
+_SHOWN = 5
+
+
+# --- what is shown -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class UnderstoodColumn:
+    """A column of a table.
+
+    Attributes:
+        index: in the file, from 0 on; `columns` counts from 1.
+        title: in the file; empty where it has none.
+        quantity: canonical name of what it is taken for; None: it is not used.
+        unit: of its numbers as they are taken; empty where it is not used.
+        factor: from those numbers to SI; of a period, to seconds a turn.
+        inverse: whether it holds a period, or its uncertainty.
+        values: its first fields, as they stand in the file.
+    """
+
+    index: int
+    title: str
+    quantity: str | None
+    unit: str
+    factor: float
+    inverse: bool
+    values: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class UnderstoodRun:
+    """A table of readings in a file: the whole file, a sheet, a file of a zip, or one of several runs side by side.
+
+    Attributes:
+        path: what analyses take for it: the file, or the file and behind it, as if it were a folder, the run's name.
+        name: of the run; empty where the file holds one alone.
+        header_line: line (row of a sheet) of the titles, 0 where there are none.
+        columns: all columns of the table but those of other runs.
+        doubts: questions; those without whose answers nothing is read have a `problem`, too.
+        warnings: what is read with a note.
+        problem: why it is not read; empty if it is.
+    """
+
+    path: Path
+    name: str
+    header_line: int
+    columns: tuple[UnderstoodColumn, ...]
+    doubts: tuple[Doubt, ...] = ()
+    warnings: tuple[str, ...] = ()
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class Understanding:
+    """How a file is understood.
+
+    Attributes:
+        path: as given.
+        runs: its tables, in their order, also those that are not read; none where `problem` says why.
+        problem: why nothing of it is read; empty if any run is.
+    """
+
+    path: Path
+    runs: tuple[UnderstoodRun, ...]
+    problem: str = ""
+
+
+def understand(
+    path: Path,
+    *,
+    columns: Mapping[str, str] | None = None,
+    quantities: Collection[str] = SPIN,
+    needed: Collection[str] = SPIN[:2],
+    guess: bool = True,
+) -> Understanding:
+    """Return how a file of readings is understood, without reading more than the first rows of its tables.
+
+    It looks at the file with the same functions as `read_table`. A correction is another `columns`: the chosen
+    answer's `Choice.columns`, or any {t, f, u, z, b or canonical name: title or 1-based number, a unit in brackets}.
+
+    Args:
+        path: the file, or a sheet or run in it: ``mess.xlsx/Tabelle2``.
+        columns: as `read_table` takes it, for all runs.
+        quantities: canonical columns that are wanted.
+        needed: those without which a table is of another kind.
+        guess: whether columns without titles or units are taken for what they look like.
+
+    Returns:
+        The understanding; a file that cannot be read has a `problem` and raises nothing.
+    """
+    try:
+        looks = list(_looks(path, Request(columns or {}, quantities, needed, guess)))
+    except (TableError, OSError) as error:
+        return Understanding(path, (), str(error))
+    runs = tuple(_shown(look, looks) for look in looks)
+    problem = "" if any(not run.problem for run in runs) else next(run.problem for run in runs)
+    return Understanding(path, runs, problem)
+
+
+def _shown(look: "_Look", looks: "Sequence[_Look]") -> UnderstoodRun:
+    """Return one look at a run as data."""
+    plan, error, layout = look.plan, look.error, look.layout
+    name = look.name if len(looks) > 1 else ""
+    if layout is None:
+        return UnderstoodRun(look.path, name, 0, (), problem=str(error))
+    used = {column.index: column for column in plan.columns} if plan else {}
+    seen = [
+        _column(k, layout, used.get(k))
+        for k in range(layout.width)
+        if look.part is None or look.part.titles[k : k + 1] != ("",) or not layout.header[k]
+    ]
+    doubts = [doubt for column in used.values() if (doubt := _unit_doubt(layout, column, used))]
+    doubts += [error.doubt] if isinstance(error, NoSuchColumn | Ambiguous) and error.doubt else []
+    problem = str(error) if error else ""
+    return UnderstoodRun(
+        look.path, name, layout.header_line, tuple(seen), tuple(doubts), plan.warnings if plan else (), problem
+    )
+
+
+def _column(k: int, layout: Layout, used: Column | None) -> UnderstoodColumn:
+    title = layout.header[k] if k < len(layout.header) else ""
+    values = tuple(row[k] if k < len(row) else "" for row in layout.sample[:_SHOWN])
+    if used is None:
+        return UnderstoodColumn(k, title, None, "", 1.0, inverse=False, values=values)
+    return UnderstoodColumn(k, title, used.name, used.unit, used.factor, inverse=used.inverse, values=values)
+
+
+# --- questions about units -----------------------------------------------------------------------------
+
+
+def possible_spins(number: float) -> dict[str, float]:
+    """Return the spin [Hz] that a number of a file means in each unit in which a top can have it.
+
+    >>> {unit: round(spin, 2) for unit, spin in possible_spins(238.97).items()}
+    {'rad/s': 38.03}
+    """
+    spins = {unit: number * (unit_factor(unit, "frequency") or 1.0) for unit in _UNITS}
+    return {unit: spin for unit, spin in spins.items() if SLOWEST_SPIN_HZ <= spin <= FASTEST_SPIN_HZ}
+
+
+def _numbers(layout: Layout, index: int) -> list[float]:
+    """Return the numbers among the first fields of a column."""
+    fields = [row[index] for row in layout.sample if index < len(row) and layout.dialect.kind(row[index]) == "number"]
+    return [layout.dialect.number(field.removesuffix(unit_behind(field)).strip()) for field in fields]
+
+
+def _question(
+    layout: Layout, index: int, time: Column | None, *, what: str = "no unit", always: bool = False
+) -> Doubt | None:
+    """Return the question in which unit a column is, None where it can be in none or, if not always, in Hz alone."""
+    numbers = _numbers(layout, index)
+    spins = possible_spins(median(numbers)) if numbers else {}
+    if not spins or (list(spins) == ["Hz"] and not always):
+        return None
+    first, last = numbers[0], numbers[-1]
+    at = {"t": str(time.index + 1)} if time else {}
+    choices = []
+    for unit in (*spins, *(unit for unit in ("rpm", "Hz") if unit not in spins)):
+        factor = unit_factor(unit, "frequency") or 1.0
+        text = f"{unit} ({first * factor:.3g} to {last * factor:.3g} Hz)" if unit in spins else unit
+        choices.append(Choice(text, {**at, "f": f"{index + 1} [{unit}]"}))
+    title = f" '{shorten(layout.header[index])}'" if index < len(layout.header) else ""
+    *others, end = (choice.text for choice in choices)
+    seen = f"column {index + 1}{title} has the values {first:.4g} to {last:.4g} and {what}"
+    return Doubt("unit", f"{seen}: {', '.join(others)} or {end}?", index, tuple(choices))
+
+
+def _unit_doubt(layout: Layout, column: Column, used: Mapping[int, Column]) -> Doubt | None:
+    """Return the question about a spin that is taken in a unit in which no top has it."""
+    if column.name != _SPIN or column.inverse:
+        return None
+    numbers = _numbers(layout, column.index)
+    if not numbers or SLOWEST_SPIN_HZ <= median(numbers) * column.factor <= FASTEST_SPIN_HZ:
+        return None
+    time = next((one for one in used.values() if one.name == "time_s"), None)
+    what = f"the unit {column.unit}" if column.written else f"no unit, and would be in {column.unit}"
+    return _question(layout, column.index, time, what=what)
+
+
+def _by_values(
+    path: Path, layout: Layout, meant: Sequence[str], chosen: Sequence[Column], quantities: Collection[str]
+) -> tuple[Column | None, str]:
+    """Return the only column left as the spin, where its values are those of a top in Hz, and a note.
+
+    Raises:
+        NoSuchColumn: with the question in which unit it is.
+    """
+    time = next((column for column in chosen if column.name == "time_s"), None)
+    kinds = [name for name in quantities if name in QUANTITIES and dimension(name) == "frequency"]
+    if kinds != [_SPIN] or time is None or any(column.name == _SPIN for column in chosen):
+        return None, ""
+    used = {column.index for column in chosen}
+    left = [k for k in range(len(meant)) if k not in used and _could_be_spin(layout, meant, k)]
+    if len(left) != 1:
+        return None, ""
+    (index,) = left
+    if doubt := _question(layout, index, time, always=_needs_unit(meant[index])):
+        example = ",".join(f"{key}={to}" for key, to in doubt.choices[0].columns.items())
+        raise NoSuchColumn(path, f'{doubt.text} say `columns` = "{example}"', doubt=doubt)
+    numbers = _numbers(layout, index)
+    if "Hz" not in possible_spins(median(numbers) if numbers else 0.0):
+        return None, ""
+    label = layout.header[index]
+    note = f"{shorten(str(path), 200)}: column '{shorten(label)}' has no unit and is taken as the spin in Hz"
+    return Column(_SPIN, index, label, 1.0, unit="Hz"), note
+
+
+def _needs_unit(title: str) -> bool:
+    """Return whether a name goes with turns a second as with turns a minute."""
+    return plain_name(title) in NEED_UNITS
+
+
+def _could_be_spin(layout: Layout, meant: Sequence[str], index: int) -> bool:
+    """Return whether a column of numbers has a title that says neither another quantity nor a unit."""
+    text = meant[index]
+    title = read_title(text)
+    nearly = nearly_a_frequency(text) is not None and not _needs_unit(text)
+    if not text or title.column is not None or title.unit is not None or nearly or any(layout.units[index : index + 1]):
+        return False
+    numbers = _numbers(layout, index)
+    counts = len(numbers) > 1 and all(b - a == 1 for a, b in pairwise(numbers))
+    return 2 * len(numbers) > len(layout.sample) and not counts
+
+
+# --- the plan by which a table is read -----------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is wanted of a table; see `understand`."""
+
+    columns: Mapping[str, str]
+    quantities: Collection[str]
+    needed: Collection[str] = ()
+    guess: bool = True
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How one table is read.
+
+    Attributes:
+        path: of the run, for messages and analyses.
+        text: the lines.
+        header: titles in the file, or numbers in their place.
+        columns: those that are read.
+        own: indices of the columns of this run alone; none where it stands by itself.
+        warnings: about guesses.
+    """
+
+    path: Path
+    text: Text
+    layout: Layout
+    header: tuple[str, ...]
+    columns: tuple[Column, ...]
+    own: frozenset[int]
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What was seen of one table: a plan, or an error."""
+
+    path: Path
+    name: str
+    layout: Layout | None = None
+    part: Part | None = None
+    plan: Plan | None = None
+    error: TableError | None = None
+
+
+class SeveralRuns(TableError):
+    """A file with several runs of which none is named.  `paths` are theirs."""
+
+    def __init__(self, path: Path, paths: tuple[Path, ...], names: Iterable[str]) -> None:
+        self.paths = paths
+        super().__init__(path, f"holds several runs ({quote_names(names)}): name one, as {paths[0]}")
+
+
+def plan_of(path: Path, request: Request) -> Plan:
+    """Return how the only table of a file, or the named one, is read.
+
+    Raises:
+        SeveralRuns: there are several.
+        TableError: there is none, or it cannot be understood without doubt.
+    """
+    looks = list(_looks(path, request))
+    plans = [look.plan for look in looks if look.plan]
+    if len(plans) > 1:
+        raise SeveralRuns(path, tuple(plan.path for plan in plans), (look.name for look in looks if look.plan))
+    errors = [look.error for look in looks if look.error]
+    if plans:
+        (plan,) = plans
+        notes = [str(error) for error in errors if not isinstance(error, NoTable | NoSuchColumn)]
+        return replace(plan, warnings=(*plan.warnings, *(f"not read: {note}" for note in notes)))
+    raise next((error for error in errors if not isinstance(error, NoTable)), errors[0])
+
+
+def _looks(path: Path, request: Request) -> Iterator[_Look]:
+    """Yield what is seen of each table at a path.  Raises TableError, OSError."""
+    file, inside = locate(path)
+    found = [look for text in texts_of(file) for look in _looks_at(file, text, request)]
+    taken = [look for look in found if _is_named(inside, look.name)]
+    if not taken:
+        names = quote_names(look.name for look in found if look.name) or "none"
+        raise TableError(file, f"has no sheet, file or run '{shorten(inside)}'; it has {names}")
+    yield from taken
+
+
+def _is_named(inside: str, name: str) -> bool:
+    """Return whether a name in a file, such as "Tabelle1/Messung 2", is that of a run: all or one end of it."""
+    return not inside or f"/{name}/".startswith(f"/{inside}/") or f"/{name}/".endswith(f"/{inside}/")
+
+
+def _looks_at(file: Path, text: Text, request: Request) -> Iterator[_Look]:
+    """Yield what is seen of each run in a text."""
+    name = text.path.relative_to(file).as_posix() if text.path != file else ""
+    try:
+        layout = sniff(text)
+    except TableError as error:
+        yield _Look(text.path, name, error=error)
+        return
+    one_alone = set(request.columns) - {"t", "time_s"} or not layout.header
+    parts = [Part("", layout.header)] if one_alone else parts_of(layout.header, layout.above, request.quantities)
+    for part in parts:
+        path = text.path / part.name if part.name else text.path
+        here = "/".join(filter(None, (name, part.name)))
+        try:
+            plan = _plan(path, text, layout, part, request)
+        except TableError as error:
+            yield _Look(path, here, layout, part, error=error)
+        else:
+            yield _Look(path, here, layout, part, plan)
+
+
+def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) -> Plan:
+    """Return how one run in a text is read.  Raises TableError."""
+    quantities, needed = request.quantities, request.needed
+    header, wanted, warnings = _titles(path, layout, request.columns, guess=request.guess)
+    meant = part.titles if layout.header else header
+    chosen, doubts = choose_columns(path, header, layout.units, wanted, quantities, meant=meant)
+    if request.guess and _SPIN in quantities:
+        spin, note = _by_values(path, layout, meant, chosen, quantities)
+        chosen, warnings = (*chosen, *([spin] if spin else [])), [*warnings, *([note] if note else [])]
+    if not chosen:
+        examples = [EXAMPLES[name] for name in quantities if name in EXAMPLES]
+        known = ", ".join([*(name for name in quantities if name in LISTED and name not in COMPANIONS), *examples])
+        wanted_names = needed or [name for name in SHORTHANDS.values() if name in quantities][:2]
+        raise NoSuchColumn(
+            path,
+            f"no title is known ({known} …) among {quote_names(header)}: say `columns` = "
+            + _in_one_word(f"{_key(name)}=NAME" for name in wanted_names),
+            line=layout.header_line or layout.first_line,
+            doubt=_which_columns(layout, wanted_names),
+        )
+    for name in needed:
+        if name not in {column.name for column in chosen}:
+            raise no_column(path, name, header, _which_columns(layout, [name]))
+    chosen = tuple(sorted(chosen, key=lambda column: CANONICAL.index(column.name)))
+    return Plan(path, text, layout, header, chosen, part.own, (*warnings, *doubts))
+
+
+def _which_columns(layout: Layout, names: Collection[str]) -> Doubt:
+    """Return the question which columns hold the quantities of these canonical names."""
+    numeric = [k for k in range(layout.width) if _numbers(layout, k)]
+    title = dict(enumerate(layout.header))
+    choices = tuple(
+        Choice(f"{_key(name)}: {shorten(title.get(k, f'column {k + 1}'))}", {_key(name): str(k + 1)})
+        for name in names
+        for k in numeric
+    )
+    return Doubt("titles", f"which column is {' and which '.join(names)}?", None, choices)
+
+
+def _in_one_word(columns: Iterable[str]) -> str:
+    """Return columns as any shell takes them: PowerShell would split them at a comma."""
+    text = ",".join(columns)
+    return f'"{text}"' if "," in text else text
+
+
+def _key(name: str) -> str:
+    """Return the key of a canonical column in the option `columns`."""
+    return next((short for short, long in SHORTHANDS.items() if long == name), name)
+
+
+def no_column(path: Path, name: str, header: Sequence[str], doubt: Doubt | None = None) -> NoSuchColumn:
+    """Return the error for a quantity that no column is known to hold."""
+    text = f"no column is known to be {name}; it has {quote_names(header)}: say `columns` = {_key(name)}=NAME"
+    nearly = next((title for title in header if nearly_a_frequency(title)), None) if "frequency" in name else None
+    foreign = next((title for title in header if read_title(title).column == name), None)
+    if foreign:
+        unit = shorten(read_title(foreign).unit or "")
+        what = f"column '{shorten(foreign)}' is in {unit}, which is no unit of {dimension(name)}"
+        text = f"{what}: {how_else(foreign, name)}"
+    elif nearly:
+        text = f"no column is known to be {name}; '{shorten(nearly)}' could become one: {how_else(nearly, name)}"
+    return NoSuchColumn(path, text, doubt=doubt)
+
+
+def _titles(
+    path: Path, layout: Layout, wanted: Mapping[str, str], *, guess: bool
+) -> tuple[tuple[str, ...], Mapping[str, str], list[str]]:
+    """Return the file's titles, or numbers in their place; what to take for what; a warning where that is a guess."""
+    if layout.header:
+        return layout.header, wanted, []
+    numbers = tuple(str(n + 1) for n in range(layout.width))
+    filled = [n for n in numbers if any(row[int(n) - 1 : int(n)] not in {(), ("",)} for row in layout.sample)]
+    if wanted:
+        return numbers, wanted, []
+    if layout.header_line:
+        raise NoSuchColumn(
+            path,
+            f'is no header for the {layout.width} columns below: correct it, or say `columns` = "t=1,f=2"',
+            line=layout.header_line,
+        )
+    if len(filled) > len(TITLES_WITHOUT_HEADER) or not guess:
+        raise NoSuchColumn(
+            path,
+            f'{layout.width} columns and no header; add one, or say `columns` = "t=1,f=2"',
+            line=layout.first_line,
+        )
+    taken = dict(zip(TITLES_WITHOUT_HEADER, filled, strict=False))
+    return numbers, taken, [f"{shorten(str(path), 200)}: no header; the columns are taken as {', '.join(taken)}"]
