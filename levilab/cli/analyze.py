@@ -185,7 +185,7 @@ def _analyze(
             analysis = ANALYSES[str(context.info_name)]
             results = [(analysis, _analyze_as(analysis, paths, given))]
     with interruptible("look which results are written: each one is whole"):
-        _write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
+        write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
 
 
 def _advise_on_many(paths: Sequence[Path]) -> None:
@@ -299,7 +299,7 @@ def _advice(paths: Sequence[Path], given: Mapping[str, Any]) -> str:
     return ""
 
 
-def _write_and_print(
+def write_and_print(
     context: typer.Context,
     results: list[tuple["Analysis[Any]", Any]],
     left_out: list[str],

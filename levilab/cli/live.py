@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -30,6 +30,19 @@ def live(
     no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser: print the address only.")] = False,
 ) -> None:
     """Serve the view until Ctrl-C."""
+    bench = " and the bench for practice, whose time stands still while no page is open"
+    said = f"Ctrl-C ends the view{bench if mock else '; a run goes on without it'}"
+    serve(said, opens=not no_open, run=run, out=out, mock=mock, port=port, share=share)
+
+
+def serve(said: str, *, opens: bool, **options: Any) -> NoReturn:
+    """Serve pages until Ctrl-C, and end the command.
+
+    Args:
+        said: how it ends, for the person at the terminal.
+        opens: whether a browser is opened.
+        options: of `levilab.live.serve.LiveOptions`.
+    """
     with importing():
         from levilab.animation.three import three_js
 
@@ -41,15 +54,14 @@ def live(
         result(address)
         if shared:
             _show_code(shared)
-        bench = " and the bench for practice, whose time stands still while no page is open"
-        message("Ctrl-C ends the view" + (bench if mock else "; a run goes on without it"))
-        if not no_open:
+        message(said)
+        if opens:
             import webbrowser
 
             webbrowser.open(address)
 
     with watching_for_end() as end:  # up to the last word
-        serve_live(LiveOptions(run, out, mock, port, share=share), end, announce, message)
+        serve_live(LiveOptions(**options), end, announce, message)
         message("levilab: the view is closed")
     raise typer.Exit(exit_codes.INTERRUPTED)
 

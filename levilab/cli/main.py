@@ -106,6 +106,18 @@ def report() -> Callable[..., None]:
     return report
 
 
+@app.command(name="open", cls=Later, epilog='Example: levilab open my.csv --columns "t=1,f=3 [rpm]" --keep -o my.html')
+def open_files() -> Callable[..., None]:
+    """Open data files: which columns hold what, in which units; correct that, keep it, analyze and report.
+
+    Shows the files in the browser, where a click corrects them, or in the terminal with the option for each answer.
+    What is understood is analyzed, as by levilab analyze; -o writes the report.
+    """
+    from levilab.cli.open import open_files
+
+    return open_files
+
+
 @app.command(cls=Later, epilog="Example: levilab runs runs/")
 def runs() -> Callable[..., None]:
     """List runs: when, what, status, length."""

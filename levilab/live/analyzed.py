@@ -1,8 +1,9 @@
-"""A run's analysis, as the command line makes it, in a process of its own: the server stays small, no frame waits."""
+"""The analysis of a run or a data file, as the command line makes it, in a process of its own: no frame waits."""
 
 from __future__ import annotations
 
 import contextlib
+import glob
 import json
 import math
 import re
@@ -13,16 +14,18 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.uncertainty import Estimate
 from levilab.files import stamp
+from levilab.pipelines.result import RESULT, beside
 from levilab.present.numbers import with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-#: Figures that stand beside a run, and its report.
+    from levilab.pipelines.result import Place
+
+#: Figures that stand beside an input, and its report.
 FIGURES = re.compile(r"[a-z][a-z-]{0,30}\.(png|svg)")
 REPORT = "report.html"
-RESULT = "result.json"
 #: An analysis that takes longer than this is given up [s].
 _LONGEST_S = 600.0
 #: An analysis that is given up ends at once; the longest wait for that [s].
@@ -38,50 +41,54 @@ _LONGEST_TEXT = 2000
 class Analyses:
     """The analyses that were asked for: a thread each, which waits for its process.
 
+    An input is a run folder, or a data file with the words that say on the command line how it is read.
+
     Attributes:
-        running: runs that are being analyzed.
-        failed: run → what the analysis said when it failed.
+        running: inputs that are being analyzed.
+        failed: input → what the analysis said when it failed.
     """
 
     def __init__(self) -> None:
-        self.running: set[str] = set()
-        self.failed: dict[str, str] = {}
+        self.running: set[Path] = set()
+        self.failed: dict[Path, str] = {}
         self._before: dict[Path, tuple[int, int, int] | None] = {}
         self._processes: set[subprocess.Popen[str]] = set()
         self._threads: set[threading.Thread] = set()
         self._is_over = False
         self._lock = threading.Lock()
 
-    def begin(self, folder: Path) -> None:
-        """Analyze a run and write its report, if that is not under way; earlier ones stay until then."""
-        if folder.name in self.running:
+    def begin(self, path: Path, options: Sequence[str] = ()) -> None:
+        """Analyze an input and write its report, if that is not under way; earlier ones stay until then."""
+        if path in self.running:
             return
-        self.running.add(folder.name)
-        self.failed.pop(folder.name, None)
-        self._before |= {path: stamp(path) for path in (folder / RESULT, folder / REPORT, *_figures(folder))}
+        self.running.add(path)
+        self.failed.pop(path, None)
+        place = beside(path)
+        files = (place.file(RESULT), place.file(REPORT), *(place.file(name) for name in _figures(place)))
+        self._before |= {file: stamp(file) for file in files}
         self._threads = {thread for thread in self._threads if thread.is_alive()}
-        thread = threading.Thread(target=self._carry_out, args=(folder,), daemon=True)
+        thread = threading.Thread(target=self._carry_out, args=(path, options), daemon=True)
         thread.start()
         self._threads.add(thread)
 
-    def _carry_out(self, folder: Path) -> None:
+    def _carry_out(self, path: Path, options: Sequence[str]) -> None:
         try:
             for words in (
-                ["analyze", str(folder)],
-                ["report", str(folder), "--output", str(folder / REPORT)],
+                ["analyze", str(path), *options],
+                ["report", str(path), *options, "--output", str(beside(path).file(REPORT))],
             ):
                 status, err = self._run(words)
                 if status:
-                    self.failed[folder.name] = err.strip()[-600:] or f"levilab {words[0]} failed"
+                    self.failed[path] = err.strip()[-600:] or f"levilab {words[0]} failed"
                     return
         except subprocess.TimeoutExpired:
-            self.failed[folder.name] = (
+            self.failed[path] = (
                 f"the analysis took longer than {_LONGEST_S / 60:g} min, and was given up; levilab analyze has no limit"
             )
         except (OSError, subprocess.SubprocessError) as error:
-            self.failed[folder.name] = str(error)
+            self.failed[path] = str(error)
         finally:
-            self.running.discard(folder.name)
+            self.running.discard(path)
 
     def _run(self, words: Sequence[str]) -> tuple[int, str]:
         """Run a command of this program.  Returns its exit status and its messages about failures."""
@@ -116,18 +123,19 @@ class Analyses:
         for thread in self._threads:
             thread.join(_PATIENCE_S)
 
-    def about(self, folder: Path) -> dict[str, Any]:
-        """Return the state of a run's analysis, names of figures, the verdict, and whether there is a report.
+    def about(self, path: Path) -> dict[str, Any]:
+        """Return the state of an input's analysis, names of figures, the verdict, and whether there is a report.
 
         Results of an earlier analysis are not shown for one that is under way or has failed.
         """
+        place = beside(path)
         return {
-            "running": folder.name in self.running,
-            "failed": self.failed.get(folder.name, ""),
-            "figures": [path.name for path in _figures(folder) if self._is_new(path)],
-            "report": REPORT if self._is_new(folder / REPORT) else "",
+            "running": path in self.running,
+            "failed": self.failed.get(path, ""),
+            "figures": [name for name in _figures(place) if self._is_new(place.file(name))],
+            "report": REPORT if self._is_new(place.file(REPORT)) else "",
             "analysis": "",
-        } | (_result(folder) if self._is_new(folder / RESULT) else {})
+        } | (_result(place.file(RESULT)) if self._is_new(place.file(RESULT)) else {})
 
     def _is_new(self, path: Path) -> bool:
         """Return whether a file is there, and was not before the analysis that was asked for last."""
@@ -135,16 +143,24 @@ class Analyses:
         return now is not None and now != self._before.get(path)
 
 
-def _figures(folder: Path) -> list[Path]:
-    """Return the figures beside a run, sorted by name."""
-    return sorted(path for path in folder.glob("*") if FIGURES.fullmatch(path.name))
+def is_shown(place: Place, name: str) -> bool:
+    """Return whether a name is that of a figure or the report of an input, and of a file that is no link."""
+    path = place.file(name)
+    return bool(name == REPORT or FIGURES.fullmatch(name)) and path.is_file() and not path.is_symlink()
 
 
-def _result(folder: Path) -> dict[str, Any]:
-    """Return the summary, as text, of the result.json beside a run."""
+def _figures(place: Place) -> list[str]:
+    """Return the names of the figures of an input, sorted."""
+    head = f"{place.name}." if place.name else ""
+    names = (path.name.removeprefix(head) for path in place.folder.glob(f"{glob.escape(head)}*"))
+    return sorted(name for name in names if FIGURES.fullmatch(name))
+
+
+def _result(path: Path) -> dict[str, Any]:
+    """Return the summary, as text, of a result.json."""
     found: Any = {}
     with contextlib.suppress(OSError, ValueError):
-        found = json.loads((folder / RESULT).read_text(encoding="utf-8"))
+        found = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(found, dict):
         return {}
     runs = found.get("runs")

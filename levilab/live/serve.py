@@ -8,7 +8,7 @@ import socket
 import threading
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import uvicorn
 
@@ -21,7 +21,7 @@ from levilab.live.share import address_in_network
 from levilab.runs.run import RECORD, find_run
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator
+    from collections.abc import Callable, Collection, Iterator, Mapping
 
     from levilab.interruption import End
 
@@ -46,6 +46,7 @@ class LiveOptions:
         port: of the loopback address; 0: any that is free.
         seed: of the light's noise on the bench for practice.
         share: whether phones in the network may look, too.
+        files: data files to open, with the options by which they are read; None: the view is of runs.
     """
 
     run: Path | None = None
@@ -54,6 +55,7 @@ class LiveOptions:
     port: int = 8765
     seed: int = 0
     share: bool = False
+    files: tuple[tuple[Path, Mapping[str, Any]], ...] | None = None
 
 
 class ViewServer(uvicorn.Server):
@@ -119,7 +121,9 @@ def serve_live(
         end.wake = server.leave
         if end.by:  # before there was a server to wake
             return
-        own = f"http://{HOST}:{doors.port}/" + (f"#{doors.token}" if options.mock else "")
+        for path, given in options.files or ():
+            hall.opened.add(path.absolute(), given)
+        own = f"http://{HOST}:{doors.port}/{'' if options.files is None else 'open'}#{doors.token}"
         shared = f"http://{hosts[1]}:{guests.port}/{guests.token}/" if guests else ""
         with _announcing(server, lambda: announce(own, shared)):
             server.run(sockets=sockets)
@@ -140,18 +144,20 @@ def configuration(hall: Hall) -> uvicorn.Config:
     )
 
 
-def farewell(bench: PracticeBench | None, analyzed: Collection[str] = ()) -> str:
+def farewell(bench: PracticeBench | None, analyzed: Collection[Path] = ()) -> str:
     """Return a message for the terminal when the view is to end; empty where it ends at once.
 
     Args:
         bench: the one for practice.
-        analyzed: names of the runs that are being analyzed.
+        analyzed: runs and data files that are being analyzed.
     """
     parts = []
     if bench and bench.may_record:
         parts.append("the run that is being recorded ends with the reading under way and is kept")
     if analyzed:
-        parts.append(f"the analysis of {', '.join(sorted(analyzed))} is given up; levilab analyze makes it")
+        parts.append(
+            f"the analysis of {', '.join(sorted(path.name for path in analyzed))} is given up; levilab analyze makes it"
+        )
     if bench:
         parts.append("the bench is switched off")
     return "; ".join(parts)

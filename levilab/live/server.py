@@ -13,6 +13,7 @@ import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
 
 from starlette.applications import Starlette
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
@@ -21,11 +22,14 @@ from starlette.websockets import WebSocketDisconnect
 
 from levilab.animation.three import three_js
 from levilab.errors import LevilabError
-from levilab.live.analyzed import FIGURES, REPORT, Analyses
+from levilab.live.analyzed import Analyses, is_shown
 from levilab.live.choice import choices, newest, running_run
 from levilab.live.desk import parts_for, scene_of_run
 from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
+from levilab.live.opened import Opened
 from levilab.live.watch import Watch
+from levilab.pipelines.look import QUANTITIES
+from levilab.pipelines.result import beside
 from levilab.runs.run import RECORD
 
 if TYPE_CHECKING:
@@ -51,6 +55,7 @@ OWN_BENCH = "."
 #: The longest question of a page [bytes].
 _LONGEST_ASK = 4096
 PAGE = Path(__file__).parent / "page"
+_ONLY_LOOK = "this page may only look: open the address that the terminal shows"
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".png": "image/png",
           ".svg": "image/svg+xml"}  # fmt: skip
 
@@ -65,6 +70,7 @@ class Hall:
         doors: who may come in.
         desk: the bench for practice; None where runs are only looked at.
         guests: who may come in from the network; None where the view is not shared.
+        opened: data files that were opened, and the folder for dropped ones, beside that with the runs.
     """
 
     root: Path
@@ -76,6 +82,11 @@ class Hall:
     pages: dict[str, int] = field(default_factory=dict)  # name of a run → how many look at it
     new: asyncio.Event = field(default_factory=asyncio.Event)
     analyses: Analyses = field(default_factory=Analyses)
+    opened: Opened = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Place dropped files beside the runs, which they are none of."""
+        self.opened = Opened(self.root.parent / "opened")
 
     def is_run(self, name: str) -> bool:
         """Return whether a run of this name lies in the folder; a name with a way to elsewhere does not."""
@@ -225,6 +236,10 @@ class Pages:
         """Return the page."""
         return self._file(self.files["live.html"])
 
+    async def open(self, _: Request) -> Response:
+        """Return the page on which data files are opened."""
+        return self._file(self.files["open.html"])
+
     async def part(self, request: Request) -> Response:
         """Return a module or the style sheet of the page."""
         found = self.files.get(request.path_params["name"])
@@ -236,7 +251,8 @@ class Pages:
         found = await asyncio.to_thread(choices, hall.root)
         first = hall.shown or newest(found) or ""
         practice = hall.desk.about | {"guest": self.for_guests} if hall.desk else None
-        return self._json({"runs": [asdict(one) for one in found], "first": first, "practice": practice})
+        about = {"runs": [asdict(one) for one in found], "first": first, "practice": practice}
+        return self._json(about | {"opens": not self.for_guests})
 
     async def parts(self, request: Request) -> Response:
         """Return the parts of the top to draw."""
@@ -245,16 +261,38 @@ class Pages:
 
     async def of_run(self, request: Request) -> Response:
         """Return a figure or the report of a run."""
-        name, wanted = request.path_params["run"], request.path_params["name"]
-        path = self.hall.root / name / wanted
-        known = self.hall.is_run(name) and (wanted == REPORT or FIGURES.fullmatch(wanted))
-        is_here = known and path.is_file() and not path.is_symlink()  # a link may lead to any file
-        return self._file(path, REPORT_POLICY) if is_here else _nothing()
+        name = request.path_params["run"]
+        return self._shown(self.hall.root / name if self.hall.is_run(name) else None, request.path_params["name"])
+
+    async def of_file(self, request: Request) -> Response:
+        """Return a figure or the report of a data file that is open."""
+        one = self.hall.opened.files.get(request.path_params["file"])
+        return self._shown(one.path if one else None, request.path_params["name"])
+
+    def _shown(self, path: Path | None, name: str) -> Response:
+        place = beside(path) if path else None
+        return self._file(place.file(name), REPORT_POLICY) if place and is_shown(place, name) else _nothing()
 
     async def analysis(self, request: Request) -> Response:
         """Return the progress of a run's analysis, and its answer."""
         name = request.path_params["run"]
         return self._json(self.hall.analyses.about(self.hall.root / name) if self.hall.is_run(name) else {})
+
+    async def analysis_of_file(self, request: Request) -> Response:
+        """Return the progress of the analysis of a data file that is open."""
+        one = self.hall.opened.files.get(request.path_params["file"])
+        return self._json(self.hall.analyses.about(one.path) if one else {})
+
+    async def take(self, request: Request) -> Response:
+        """Keep a file that is dropped into a page, and open it."""
+        if not self.doors.knows(request.headers.get("x-levilab-token")):
+            return self._json({"error": _ONLY_LOOK}, 403)
+        name = unquote(request.headers.get("x-levilab-name", ""))
+        try:
+            key = await self.hall.opened.receive(name, request.stream())
+        except LevilabError as error:
+            return self._json({"error": str(error)}, 400)
+        return self._json({"file": key})
 
     async def do(self, request: Request) -> Response:
         """Carry out a command."""
@@ -318,6 +356,10 @@ def application(hall: Hall) -> Guard:
         Route("/do", pages.do, methods=["POST"]),
         Route("/run/{run}/analysis", pages.analysis),
         Route("/run/{run}/{name}", pages.of_run),
+        Route("/open", pages.open),
+        Route("/file", pages.take, methods=["POST"]),
+        Route("/file/{file}/analysis", pages.analysis_of_file),
+        Route("/file/{file}/{name}", pages.of_file),
     ]
     shared = (Starlette(routes=_views(Pages(hall, hall.guests))), hall.guests) if hall.guests else None
     return Guard(Starlette(routes=[*_views(pages), *own], lifespan=lifespan), hall.doors, shared)
@@ -350,16 +392,22 @@ def _table(text: str) -> dict[str, Any]:
 async def _carry_out(hall: Hall, token: str | None, body: bytes) -> tuple[dict[str, Any], int]:
     """Carry out the command of a page with the token.  Return the answer and the status of the request."""
     if not hall.doors.knows(token):
-        return {"error": "this page may only look: open the address that the terminal shows"}, 403
-    if hall.desk is None:
-        return {"error": "there is no bench for practice: levilab live --mock brings one"}, 404
-    wanted = _table(body.decode("utf-8", "replace"))
+        return {"error": _ONLY_LOOK}, 403
     try:
-        if wanted.get("do") == "analyze":
-            return _analyze(hall, str(wanted.get("run")))
-        number = hall.desk.carry_out(wanted)
+        return await _do(hall, _table(body.decode("utf-8", "replace")))
     except LevilabError as error:
         return {"error": str(error)}, 400
+
+
+async def _do(hall: Hall, wanted: dict[str, Any]) -> tuple[dict[str, Any], int]:
+    """Carry out a command.  Raises LevilabError."""
+    if act := _FILE_COMMANDS.get(str(wanted.get("do"))):
+        return await asyncio.to_thread(act, hall, wanted), 200
+    if hall.desk is None:
+        return {"error": "there is no bench for practice: levilab live --mock brings one"}, 404
+    if wanted.get("do") == "analyze":
+        return _analyze(hall, str(wanted.get("run")))
+    number = hall.desk.carry_out(wanted)
     answer = await hall.wait_for_answer(hall.desk, number)
     if answer is not None and answer.kind == "refused":
         return {"error": answer.text}, 409
@@ -371,3 +419,35 @@ def _analyze(hall: Hall, name: str) -> tuple[dict[str, Any], int]:
         return {"error": "there is no such run"}, 404
     hall.analyses.begin(hall.root / name)
     return {}, 200
+
+
+# --- data files that are open ---
+
+
+def _list_files(hall: Hall, _: dict[str, Any]) -> dict[str, Any]:
+    files = [{"file": key, "name": one.path.name} for key, one in hall.opened.files.items()]
+    units = {name: {"words": words, "units": units} for name, (words, units) in QUANTITIES.items()}
+    return {"files": files, "folder": str(hall.opened.folder), "quantities": units}
+
+
+def _look_at_file(hall: Hall, wanted: dict[str, Any]) -> dict[str, Any]:
+    options = wanted.get("options")
+    return hall.opened.look(wanted.get("file", ""), options if isinstance(options, dict) else None)
+
+
+def _keep(hall: Hall, wanted: dict[str, Any]) -> dict[str, Any]:
+    return {"kept": hall.opened.keep(wanted.get("file", ""))}
+
+
+def _analyze_file(hall: Hall, wanted: dict[str, Any]) -> dict[str, Any]:
+    one = hall.opened.get(wanted.get("file"))
+    hall.analyses.begin(one.path, one.words)
+    return {}
+
+
+_FILE_COMMANDS = {
+    "list files": _list_files,
+    "look at a file": _look_at_file,
+    "keep": _keep,
+    "analyze a file": _analyze_file,
+}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import DataError, UsageError
 from levilab.files import parse_toml, replace_atomically, writing
 from levilab.formats.columns import SHORTHANDS
+from levilab.formats.texts import locate
 from levilab.formats.titles import CANONICAL
 from levilab.pipelines.options import OF_FILES, read_options
 
@@ -31,12 +32,13 @@ class CorrectionError(DataError):
 
 
 def place_of_correction(file: Path) -> Path:
-    """Return where the correction of a data file lies.
+    """Return where the correction of a data file lies, also of a sheet or run in it.
 
     >>> from pathlib import Path
     >>> place_of_correction(Path("a/my.csv")).name
     'my.csv.levilab.toml'
     """
+    file, _ = locate(file)
     return file.with_name(file.name + ENDING)
 
 
@@ -46,25 +48,36 @@ def read_correction(file: Path) -> dict[str, Any]:
     Raises CorrectionError, which names the file and the key.
     """
     path = place_of_correction(file)
+    if not path.is_file():
+        return {}
     try:
         table = parse_toml(path.read_text(encoding="utf-8"))
-    except (FileNotFoundError, NotADirectoryError):
-        return {}
     except OSError as error:
         raise CorrectionError(f"{path}: cannot be read ({error.strerror})") from error
     except ValueError as error:
         raise CorrectionError(f"{path}: is no TOML ({error}): correct it, or delete it") from error
+    try:
+        return read_file_options(table)
+    except UsageError as error:
+        raise CorrectionError(f"{path}: {error}") from error
+
+
+def read_file_options(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return options that say how a file is read, out of a table from elsewhere.  Raises UsageError."""
     for key, value in table.items():
         if key not in OF_FILES:
             near = difflib.get_close_matches(key, OF_FILES, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(OF_FILES)}"
-            raise CorrectionError(f"{path}: {key} is no key known here: {hint}")
+            raise UsageError(key, f"did you mean {near[0]}?" if near else f"known are {', '.join(OF_FILES)}")
         if not _is_of_kind(key, value):
-            raise CorrectionError(f"{path}: {key} = {str(value)[:60]!r}: {_EXPECTED[key]} is expected")
-    try:
-        return read_options({key: str(value) if key == "channel" else value for key, value in table.items()})
-    except UsageError as error:
-        raise CorrectionError(f"{path}: {error}") from error
+            raise UsageError(key, f"{_EXPECTED[key]} is expected", value=value)
+    found = read_options({key: str(value) if key == "channel" else value for key, value in table.items()})
+    if columns := found.get("columns"):
+        found["columns"] = {_SHORT.get(name, name): to for name, to in columns.items()}
+    return found
+
+
+#: Canonical names of columns → those that people type.
+_SHORT = {name: key for key, name in SHORTHANDS.items()}
 
 
 def _is_of_kind(key: str, value: object) -> bool:
@@ -88,7 +101,7 @@ def write_correction(file: Path, options: Mapping[str, Any]) -> Path:
         raise UsageError("keep", "goes with `columns`, `channel` or `rate`: without one the file is read as it is")
     path = place_of_correction(file)
     with writing(f"{path}: could not be written", "copy the data file to a folder of yours"):
-        replace_atomically(path, _HEAD.format(name=file.name) + "".join(lines))
+        replace_atomically(path, _HEAD.format(name=path.name.removesuffix(ENDING)) + "".join(lines))
     return path
 
 

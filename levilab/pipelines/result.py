@@ -159,7 +159,7 @@ class Place:
 
     def result(self, analysis: str = "") -> Path:
         """Return the file of the result: of the analysis that is first here, or of another one by its name."""
-        return self._file(f"result.{analysis}.json" if analysis else RESULT)
+        return self.file(f"result.{analysis}.json" if analysis else RESULT)
 
     def results(self, analysis: str) -> tuple[Path, Path]:
         """Return the files that may hold the result of an analysis."""
@@ -167,9 +167,10 @@ class Place:
 
     def figure(self, analysis: str) -> Path:
         """Return the file of the figure."""
-        return self._file(f"{analysis}.png")
+        return self.file(f"{analysis}.png")
 
-    def _file(self, name: str) -> Path:
+    def file(self, name: str) -> Path:
+        """Return the file of a name here."""
         return self.folder / (f"{self.name}.{name}" if self.name else name)
 
 

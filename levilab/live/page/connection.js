@@ -70,14 +70,37 @@ export async function read(path) {
   }
 }
 
-/** Send a command to the bench for practice. Returns what is wrong with it, or "". */
-export async function command(wanted, token) {
+/** Send something to the server, with the token. Returns its answer; {error} says what is wrong. */
+export async function send(path, body, headers) {
   try {
-    const answer = await fetch("do", {
-      method: "POST", body: JSON.stringify(wanted), headers: {"Content-Type": "application/json", "X-Levilab-Token": token},
-    });
-    return (await answer.json()).error || "";
+    return await (await fetch(path, {method: "POST", body, headers})).json();
   } catch {
-    return GONE;
+    return {error: GONE};
   }
+}
+
+/** Send a command. Returns the answer; {error} says what is wrong with it. */
+export const ask = (wanted, token) =>
+  send("do", JSON.stringify(wanted), {"Content-Type": "application/json", "X-Levilab-Token": token});
+
+/** Send a command to the bench for practice. Returns what is wrong with it, or "". */
+export const command = async (wanted, token) => (await ask(wanted, token)).error || "";
+
+/** The token of commands: what stands after # in the address, which never leaves the page, and stays for a reload. */
+export function takeToken() {
+  const given = tokenInAddress();
+  if (given) sessionStorage.setItem("token", given);
+  history.replaceState(null, "", location.pathname + location.search);
+  addEventListener("hashchange", () => {  // the address of the terminal in a page that is open
+    if (!tokenInAddress()) return;
+    takeToken();
+    location.reload();
+  });
+  return sessionStorage.getItem("token") || "";
+}
+
+/** What stands after #, but for the name of a part of the page, to which a link leads. */
+function tokenInAddress() {
+  const text = location.hash.slice(1);
+  return document.getElementById(text) ? "" : text;
 }

@@ -1,6 +1,7 @@
 // The live view: asks for frames and shows them. A view only: it may be closed and opened again at any time.
 
-import {command, connect, read} from "./connection.js";
+import {command, connect, read, takeToken} from "./connection.js";
+import {takeDrops} from "./drop.js";
 import {drawReadings, drawRecords, saidOf, sheet} from "./plot.js";
 import {openPractice, watchPractice} from "./practice.js";
 import {between, by, fixed, lapse, make, short, typeset, write} from "./words.js";
@@ -26,30 +27,13 @@ const CHANNELS = ["tape", "drive", "laser"];
 const PAUSED = "The view is paused, and shows nothing of what the bench would do: “Go on” first.";
 const SLIP_HZ = 0.05, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive; while it swings, or the drive moves
 
+const token = takeToken();
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, source: null, records: {}};
 const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
 let paused = false, drawn = null, pointed = -1, space = null, topOf = "", wanted = "", practice = null, reachable = true;
 let spoken = 0, close = null, dirty = {plot: true, trace: true};
 window.levilab = {frames: 0, drawn: 0, seen, data};  // what tests and benchmarks read
-
-// --- the address: a token after #, which never leaves the page, and stays for a reload ---
-
-const token = tokenInAddress() || sessionStorage.getItem("token") || "";
-if (token) sessionStorage.setItem("token", token);
-history.replaceState(null, "", location.pathname + location.search);
-
-/** What stands after #, but for the name of a part of the page, to which a link leads. */
-function tokenInAddress() {
-  const text = location.hash.slice(1);
-  return by(text) ? "" : text;
-}
-addEventListener("hashchange", () => {  // the address of the terminal in a page that is open
-  if (!tokenInAddress()) return;
-  sessionStorage.setItem("token", tokenInAddress());
-  history.replaceState(null, "", location.pathname + location.search);
-  location.reload();
-});
 
 // --- frames ---
 
@@ -525,7 +509,9 @@ by("run").addEventListener("focus", () => listRuns(by("run").value));
 
 async function begin() {
   const asked = new URLSearchParams(location.search).get("run");
-  const {practice: bench, first} = await listRuns(asked || "");
+  const {practice: bench, first, opens} = await listRuns(asked || "");
+  by("open").hidden = !(opens && token);
+  if (opens && token) takeDrops(token, (file) => { location.href = `open?file=${file}`; }, (wrong) => write("dropped", wrong));
   document.body.classList.add("no-top");
   if (bench) {
     document.body.classList.remove("no-top");

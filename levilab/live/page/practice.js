@@ -1,6 +1,6 @@
 // The bench for practice: controls that send commands, and the guide that shows how far one is.
 
-import {GONE, read} from "./connection.js";
+import {showResult} from "./result.js";
 import {by, make, numberIn, write} from "./words.js";
 
 /** Least time between two messages of a slider [ms]. */
@@ -163,39 +163,9 @@ export function openPractice(about, command, run, isOwn, allowed) {
 
   async function openResult(name) {
     if (!name) return;
-    by("verdict").replaceChildren(make("p", "Analyzing…"));
-    by("figures").replaceChildren();
-    by("report").hidden = true;
-    write("writing", "");
     by("result").showModal();
-    const wrong = await command({do: "analyze", run: name});
-    if (wrong) by("verdict").replaceChildren(make("p", wrong));
-    while (!wrong) {
-      await new Promise((go) => { setTimeout(go, 400); });
-      const found = await read(`run/${encodeURIComponent(name)}/analysis`);
-      if (!by("result").open) return;
-      if (!found) {
-        by("verdict").replaceChildren(make("p", GONE));
-        return;
-      }
-      if (found.running && !found.verdict?.length) continue;
-      now.analyzed = found.failed ? "" : name;
-      const texts = found.failed ? [found.failed] : found.verdict || [];
-      by("verdict").replaceChildren(
-        ...texts.map((text) => make("p", text)), ...(found.warnings || []).map((text) => make("p", `Note: ${text}`, "note")));
-      if (!by("figures").children.length) by("figures").replaceChildren(...found.figures.map((figure) => {
-        const image = make("img");
-        image.src = `run/${encodeURIComponent(name)}/${figure}?${Date.now()}`;
-        image.alt = `figure of the ${found.analysis} analysis`;
-        return image;
-      }));
-      if (found.report) {
-        by("report").href = `run/${encodeURIComponent(name)}/${found.report}`;
-        by("report").hidden = false;
-      }
-      write("writing", found.running && !found.report ? "The report is being written; its link appears here." : "");
-      if (!found.running) return;
-    }
+    await showResult(
+      () => command({do: "analyze", run: name}), `run/${encodeURIComponent(name)}`, () => by("result").open, () => { now.analyzed = name; });
   }
 
   return {

@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+from pathlib import Path
 from queue import Queue
 from typing import TYPE_CHECKING, Any, Self
 
@@ -22,8 +23,6 @@ from support.commands import command
 from support.live_pages import GrowingRun
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from levilab.live.practice.commands import PracticeEvent
 
 #: Long enough for a machine that is busy [s]; a test that passes waits less.
@@ -74,7 +73,7 @@ def test_ctrl_c_says_at_once_what_the_end_waits_for(tmp_path: Path, monkeypatch:
     assert farewell(None) == ""
     assert farewell(bench) == "the bench is switched off"
     monkeypatch.setattr(PracticeBench, "may_record", True)
-    assert farewell(bench, {"run-2", "run-1"}) == (
+    assert farewell(bench, {Path("run-2"), Path("run-1")}) == (
         "the run that is being recorded ends with the reading under way and is kept; "
         "the analysis of run-1, run-2 is given up; levilab analyze makes it; the bench is switched off"
     )
@@ -121,7 +120,7 @@ def test_an_analysis_ends_with_the_view(tmp_path: Path, started: Queue[subproces
     analyses.begin(tmp_path)
     analyses.end()
     assert started.empty()
-    assert analyses.failed == {tmp_path.name: "the live view was ended"}
+    assert analyses.failed == {tmp_path: "the live view was ended"}
     # what an earlier analysis has written stays on the disk, and is not shown for this one
     assert {path.name for path in tmp_path.iterdir()} == {"result.json", "report.html", "spindown.png"}
     about = analyses.about(tmp_path)
@@ -138,7 +137,7 @@ def test_an_analysis_that_takes_too_long_is_killed(
     status = started.get(timeout=PATIENCE_S).wait(PATIENCE_S)
     assert status == (1 if sys.platform == "win32" else -signal.SIGKILL)
     analyses.end()
-    assert "was given up" in analyses.failed[tmp_path.name]
+    assert "was given up" in analyses.failed[tmp_path]
 
 
 def test_a_second_analysis_replaces_the_result_that_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -94,7 +94,7 @@ def test_a_report_follows_a_changed_correction(swapped: Path) -> None:
     ("text", "key"),
     [
         ("columns = 3", "columns"),
-        ('colums = "t=1"', "colums is no key known here: did you mean columns?"),
+        ('colums = "t=1"', "colums: did you mean columns?"),
         ("rate = -5", "rate"),
         ('rate = "fast"', "rate"),
         ('columns = {speed = "2"}', "columns"),

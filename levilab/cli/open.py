@@ -1,0 +1,167 @@
+"""Open: how a data file is understood, corrected, kept, analyzed and reported.  Heavy imports happen inside."""
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from levilab.cli.analyze import takes_options, write_and_print
+from levilab.cli.options import Json
+from levilab.cli.output import interruptible, message, place_of_report, print_json
+from levilab.cli.quantities import with_options
+from levilab.errors import NoneUsable, UsageError
+from levilab.pipelines.options import OF_FILES, read_options
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from levilab.formats.understanding import UnderstoodRun
+    from levilab.pipelines.look import Look
+
+#: First values of a column that the terminal shows.
+_SHOWN = 3
+
+
+@takes_options(OF_FILES)
+def open_files(
+    context: typer.Context,
+    paths: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="FILE…", readable=False, help="Data files, or sheets and runs in them: FILE/SHEET."),
+    ] = None,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Keep the options in FILE.levilab.toml, which every analysis reads.")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write the report, .html or .pdf.")
+    ] = None,
+    browser: Annotated[
+        bool | None,
+        typer.Option(
+            "--browser/--no-browser",
+            help="Show the files in the browser, or in the terminal alone.",
+            show_default="a browser where there is one, but not with --keep, -o or --json",
+        ),
+    ] = None,
+    as_json: Json = False,
+    **given: Any,
+) -> None:
+    """Show how files are understood, and analyze them."""
+    from levilab.pipelines.correction import read_correction, write_correction
+    from levilab.pipelines.look import look_at
+
+    files, options = paths or [], read_options(given, typed=True)
+    shows = _has_browser() and not (keep or output or as_json) if browser is None else browser
+    if not files and not shows:
+        raise UsageError("paths", "name a data file: levilab open FILE", value="nothing")
+    looks = [look_at(path, {**read_correction(path), **options}, plots=False) for path in files]
+    _print_looks(looks, as_json=as_json)
+    readable = [look.path for look in looks if not look.problem]
+    for path in readable if keep else []:
+        message(f"kept in {write_correction(path, options)}")
+    if shows:
+        _serve([(path, options) for path in files])
+    if not readable:
+        raise _refusal(looks[0])
+    if not as_json:
+        _analyze(context, readable, options)
+    if output:
+        _report(context, readable, options, output)
+
+
+def _refusal(look: "Look") -> NoneUsable:
+    if any(run.doubts for run in look.runs):
+        return NoneUsable(f"{look.path}: is not read before the question is answered, by `columns`")
+    return NoneUsable(look.problem if str(look.path) in look.problem else f"{look.path}: {look.problem}")
+
+
+def _analyze(context: typer.Context, paths: "Sequence[Path]", options: "Mapping[str, Any]") -> None:
+    from levilab.pipelines.suits import analyze_suiting
+
+    left_out: list[str] = []
+    with interruptible("nothing is written"):
+        results = analyze_suiting(paths, options, left_out.append)
+    write_and_print(context, results, left_out, save=True, out=None, as_json=False)
+
+
+def _report(context: typer.Context, paths: "Sequence[Path]", options: "Mapping[str, Any]", output: Path) -> None:
+    from levilab.report.page import write_report
+
+    app, place = context.find_root().command, place_of_report(output)
+    with interruptible("no report is written"):
+        write_report(paths, output, options, lambda text: message(with_options(text, app)))
+    message(place)
+
+
+def _has_browser() -> bool:
+    """Return whether a person sits before this terminal, with a screen, and the page can be served."""
+    from importlib.util import find_spec
+
+    screen = sys.platform in {"win32", "darwin"} or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return bool(screen) and sys.stdout.isatty() and bool(find_spec("nicegui"))
+
+
+def _serve(files: "list[tuple[Path, Mapping[str, Any]]]") -> NoReturn:
+    """Show files in the browser until Ctrl-C."""
+    from levilab.cli.live import serve
+
+    serve("Ctrl-C ends the page", opens=True, port=0, files=tuple(files))
+
+
+def _print_looks(looks: "Sequence[Look]", *, as_json: bool) -> None:
+    if as_json:
+        print_json([look.as_dict() for look in looks])
+        return
+    for look in looks:
+        _print_look(look)
+        if look.problem and len(looks) > 1:
+            message(f"not read: {look.problem}")
+
+
+def _print_look(look: "Look") -> None:
+    """Print how a file is understood: its columns, and the questions that are left."""
+    from levilab.pipelines.look import QUANTITIES
+    from levilab.present.tables import table
+    from levilab.present.terminal import draw, terminal
+
+    console = terminal()
+    for run in look.runs:
+        name = f"{look.path.name}, {run.name}" if run.name else look.path.name
+        rows = [
+            (
+                str(column.index + 1),
+                column.title,
+                QUANTITIES.get(column.quantity or "", (column.quantity or "–",))[0],
+                f"{column.unit} a turn" if column.inverse else column.unit,
+                ", ".join(column.values[:_SHOWN]) + " …" * (len(column.values) > _SHOWN),
+            )
+            for column in run.columns
+        ]
+        heads = ("column", "title", "understood as", "unit", "first values")
+        if rows:
+            console.print(draw(table(f"{name} ({look.holds})" if look.holds else name, heads, rows)))
+        _print_doubts(look, run)
+
+
+def _print_doubts(look: "Look", run: "UnderstoodRun") -> None:
+    from rich.markup import escape
+
+    from levilab.present.terminal import terminal
+
+    console = terminal()
+    for text in run.warnings:
+        console.print(f"[yellow]note:[/yellow] {escape(text)}")
+    for doubt in run.doubts:
+        console.print(f"[yellow]question:[/yellow] {escape(doubt.text)}")
+        answers = [
+            (choice.text, ",".join(f"{key}={to}" for key, to in choice.columns.items())) for choice in doubt.choices
+        ]
+        if doubt.kind == "titles":  # each column could be each of them
+            keys = dict.fromkeys(key for choice in doubt.choices for key in choice.columns)
+            answers = [("by their numbers", ",".join(f"{key}=NUMBER" for key in keys))]
+        for text, columns in answers:
+            console.print(escape(f'  {text}: levilab open {look.path} --columns "{columns}"'))
+    if run.problem and not run.doubts and run.problem != look.problem:
+        console.print(f"[red]not read:[/red] {escape(run.problem)}")

@@ -1,0 +1,165 @@
+"""Data files that a person opens in the view: named on the command line, or dropped into a page."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import re
+import secrets
+import tempfile
+import unicodedata
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import LevilabError, UsageError
+from levilab.pipelines.correction import ENDING, CorrectionError, read_correction, read_file_options, write_correction
+from levilab.pipelines.look import look_at
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Mapping
+
+#: The largest file that is taken in [bytes]: an hour of sound, two million rows of an oscilloscope.
+MOST_BYTES = 400 << 20
+#: Files that are open at once, the oldest goes; and letters of a name.
+MOST_FILES, LONGEST_NAME = 64, 120
+#: What no system takes in the name of a file, and names that Windows keeps for devices.
+_REFUSED = re.compile(r'[<>:"/\\|?*\x00-\x1f\x7f]')
+_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+
+
+class CannotTake(LevilabError):
+    """A file that is not taken in."""
+
+
+def plain_name(name: str) -> str:
+    r"""Return a name that is safe in any folder, as near to the given one as that allows.
+
+    >>> plain_name("../../Übung 3/Messung 1.csv"), plain_name("C:\\runs\\a?b.wav"), plain_name("..")
+    ('Messung 1.csv', 'a_b.wav', 'file')
+    >>> plain_name("nul.csv"), plain_name(".bashrc")
+    ('_nul.csv', 'bashrc')
+    """
+    last = re.split(r"[/\\]", unicodedata.normalize("NFC", name))[-1]
+    plain = _REFUSED.sub("_", "".join(c for c in last if c.isprintable())).strip(" .")
+    stem, dot, suffix = plain.rpartition(".") if "." in plain[-12:] else (plain, "", "")
+    plain = f"{stem[: LONGEST_NAME - len(suffix) - 1]}{dot}{suffix}" or "file"
+    return f"_{plain}" if _DEVICES.fullmatch(plain) else plain
+
+
+@dataclass
+class OpenedFile:
+    """A data file that is open.
+
+    Attributes:
+        options: by which it is read, beside those that are kept with it.
+    """
+
+    path: Path
+    options: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def words(self) -> list[str]:
+        """The options on the command line."""
+        columns = ",".join(f"{key}={to}" for key, to in (self.options.get("columns") or {}).items())
+        given = {**self.options, "columns": columns or None}
+        return [word for key, value in given.items() if value is not None for word in (f"--{key}", str(value))]
+
+
+@dataclass
+class Opened:
+    """The data files that are open, by an id that no other program guesses.
+
+    Attributes:
+        folder: where dropped files are kept.
+    """
+
+    folder: Path
+    files: dict[str, OpenedFile] = field(default_factory=dict)
+
+    def add(self, path: Path, options: Mapping[str, Any] | None = None) -> str:
+        """Open a file of this machine.  Returns its id."""
+        found = next((key for key, one in self.files.items() if one.path == path), None)
+        key = found or secrets.token_urlsafe(12)
+        self.files[key] = OpenedFile(path, dict(options or {}))
+        while len(self.files) > MOST_FILES:
+            del self.files[next(iter(self.files))]
+        return key
+
+    async def receive(self, name: str, pieces: AsyncIterator[bytes]) -> str:
+        """Keep a file that is sent, under a free name, and open it.  Returns its id.
+
+        One of the same name and bytes is there already: that is opened.  Raises CannotTake.
+        """
+        name = plain_name(name)
+        if name.casefold().endswith(ENDING):
+            raise CannotTake(f"{name} says how a data file is read: drop the data file, and correct it here")
+        size, digest = 0, hashlib.sha256()
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile(dir=self.folder, prefix=".incoming-", delete=False) as file:
+                part = Path(file.name)
+                try:
+                    async for piece in pieces:
+                        size += len(piece)
+                        if size > MOST_BYTES:
+                            raise CannotTake(f"{name}: is larger than {MOST_BYTES >> 20} MB: levilab open reads it")
+                        digest.update(piece)
+                        file.write(piece)
+                    file.close()
+                    place = self._place(name, digest.hexdigest())
+                    if not place.exists():
+                        part.rename(place)
+                finally:
+                    part.unlink(missing_ok=True)
+        except OSError as error:
+            raise CannotTake(f"{name}: cannot be kept in {self.folder} ({error.strerror})") from error
+        return self.add(place)
+
+    def _place(self, name: str, sha256: str) -> Path:
+        """Return the first free path for a name, or that of a file with the same bytes."""
+        stem, suffix = Path(name).stem, Path(name).suffix
+        number = 1
+        while (place := self.folder / (name if number == 1 else f"{stem} ({number}){suffix}")).exists():
+            with contextlib.suppress(OSError), place.open("rb") as file:
+                if hashlib.file_digest(file, "sha256").hexdigest() == sha256:
+                    break
+            number += 1
+        return place
+
+    def look(self, key: str, options: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """Return how a file is understood, as data.
+
+        Args:
+            key: its id.
+            options: from now on, in place of those before; None: as before.
+
+        Raises:
+            UsageError: an option, or there is no such file.
+        """
+        one = self.get(key)
+        if options is not None:
+            one.options = read_file_options({name: value for name, value in options.items() if value is not None})
+        kept: dict[str, Any] = {}
+        problem = ""
+        try:
+            kept = read_correction(one.path)
+        except LevilabError as error:
+            problem = str(error)
+        used = {**kept, **one.options}
+        about = look_at(one.path, used).as_dict() | {"file": key, "options": used, "words": one.words}
+        return about | ({"problem": problem} if problem else {})
+
+    def keep(self, key: str) -> str:
+        """Write how a file is read beside it.  Returns the name of that file.  Raises UsageError, CannotWrite."""
+        one = self.get(key)
+        kept: dict[str, Any] = {}
+        with contextlib.suppress(CorrectionError):  # a broken one is replaced
+            kept = read_correction(one.path)
+        return write_correction(one.path, {**kept, **one.options}).name
+
+    def get(self, key: object) -> OpenedFile:
+        """Return an open file.  Raises UsageError."""
+        if not isinstance(key, str) or key not in self.files:
+            raise UsageError("file", "is not open any more: drop it again")
+        return self.files[key]

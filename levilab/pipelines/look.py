@@ -1,0 +1,191 @@
+"""How a data file is understood, whatever it holds, for a person to see and to correct."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+from itertools import islice
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from analysis.numbers import digits
+from levilab.errors import LevilabError
+from levilab.formats.table import read_table
+from levilab.formats.understanding import UnderstoodColumn, UnderstoodRun, understand
+from levilab.formats.waveforms.header import NoWaveform
+from levilab.formats.waveforms.record import read_record
+from levilab.formats.waveforms.waveform import PulseTimes
+from levilab.pipelines.field import readings as scan
+from levilab.pipelines.limit import readings as limit
+from levilab.pipelines.precession import readings as precession
+from levilab.pipelines.spindown import readings as spindown
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from levilab.formats.waveforms.waveform import Waveform
+
+#: What a column may hold, in words, and the units to choose from.
+QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType({
+    "time_s": ("time", ("s", "ms", "min", "h")),
+    "spin_frequency_hz": ("spin frequency", ("Hz", "rpm", "rad/s", "°/s", "kHz", "mHz")),
+    "spin_frequency_u_hz": ("u of the spin frequency", ("Hz", "rpm", "rad/s", "°/s", "kHz", "mHz")),
+    "drive_frequency_hz": ("drive frequency", ("Hz", "rpm", "rad/s")),
+    "precession_frequency_hz": ("precession frequency", ("Hz", "rpm", "rad/s")),
+    "height_m": ("height", ("m", "cm", "mm")),
+    "flux_density_t": ("flux density", ("T", "mT", "μT", "G")),
+})  # fmt: skip
+#: Tables by their columns: those that are wanted, and those without which it is another one; the first that fits.
+_TABLES = (
+    (scan.QUANTITIES, scan.NEEDED),
+    (precession.QUANTITIES, precession.NEEDED),
+    (spindown.QUANTITIES, spindown.QUANTITIES[:2]),
+    (limit.QUANTITIES, limit.QUANTITIES[:1]),
+)
+_SPIN_DOWN = _TABLES[2]
+#: Points of a small plot at most, the samples that it shows, and the largest table that is read for it [bytes].
+_POINTS, _SAMPLES, _LARGEST = 400, 4000, 30 << 20
+#: First values of a record.
+_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A small plot: one quantity against another.
+
+    Attributes:
+        x, y: values, equally many.
+        x_axis, y_axis: name and unit.
+    """
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    x_axis: tuple[str, str]
+    y_axis: tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a file is understood.
+
+    Attributes:
+        holds: the kind of content, in words.
+        runs: its tables; of a record one, whose columns are the channels.
+        problem: why nothing of it is read; empty if any run is.
+        channels: names of the channels of a record.
+        rate: samples per second of a record [Hz].
+        plots: of each run that is read, by its number.
+    """
+
+    path: Path
+    holds: str
+    runs: tuple[UnderstoodRun, ...]
+    problem: str = ""
+    channels: tuple[str, ...] = ()
+    rate: float | None = None
+    plots: Mapping[int, Plot] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON has it."""
+        runs = [{**asdict(run), "path": str(run.path)} for run in self.runs]
+        plots = {str(number): asdict(plot) for number, plot in self.plots.items()}
+        about = {"path": str(self.path), "name": self.path.name, "holds": self.holds, "problem": self.problem}
+        return about | {"channels": list(self.channels), "rate": self.rate, "runs": runs, "plots": plots}
+
+
+def look_at(path: Path, options: Mapping[str, Any], *, plots: bool = True) -> Look:
+    """Return how a file is understood; one that cannot be read has a `problem`.
+
+    Args:
+        path: the file, or a sheet or run in it.
+        options: columns, channel and rate by their names.
+        plots: whether small plots are made, for which a table is read.
+    """
+    columns = options.get("columns")
+    try:
+        record = read_record(path, columns=columns, rate=options.get("rate"))
+    except NoWaveform:
+        return _look_at_table(path, columns, plots=plots)
+    except LevilabError as error:
+        look = _look_at_table(path, columns, plots=plots)
+        return look if not look.problem else Look(path, "", look.runs, str(error))
+    try:
+        return _look_at_record(path, record, options.get("channel"))
+    except LevilabError as error:
+        return Look(path, record.format, (), str(error))
+
+
+def _look_at_table(path: Path, columns: Mapping[str, str] | None, *, plots: bool) -> Look:
+    seen = [(wanted, understand(path, columns=columns, quantities=wanted[0], needed=wanted[1])) for wanted in _TABLES]
+    wanted, found = next(((wanted, one) for wanted, one in seen if not one.problem), (_SPIN_DOWN, seen[2][1]))
+    if found.problem:
+        return Look(path, "a table", _with_known_columns(path, found.runs, columns), found.problem)
+    if not plots:
+        return Look(path, _count_tables(found.runs), found.runs)
+    drawn = {k: plot for k, run in enumerate(found.runs) if (plot := _plot_of_table(run, columns, wanted))}
+    return Look(path, _count_tables(found.runs), found.runs, plots=drawn)
+
+
+def _count_tables(runs: Sequence[UnderstoodRun]) -> str:
+    return "a table" if len(runs) == 1 else f"{len(runs)} tables"
+
+
+def _with_known_columns(
+    path: Path, runs: Sequence[UnderstoodRun], columns: Mapping[str, str] | None
+) -> tuple[UnderstoodRun, ...]:
+    """Return tables that are not read with those of their columns that are known."""
+    known = understand(path, columns=columns, quantities=_SPIN_DOWN[0], needed=(), guess=False).runs
+    found = {run.path: run.columns for run in known if not run.problem}
+    return tuple(replace(run, columns=found.get(run.path, run.columns)) for run in runs)
+
+
+def _plot_of_table(run: UnderstoodRun, columns: Mapping[str, str] | None, wanted: tuple[Any, Any]) -> Plot | None:
+    """Return the first two quantities of a table, one against the other; None where it is not read, or too large."""
+    if run.problem or _size_of(run.path) > _LARGEST:
+        return None
+    try:
+        table = read_table(run.path, columns=columns, quantities=wanted[0], needed=wanted[1])
+    except LevilabError:
+        return None
+    names = [name for name in wanted[0] if name in table.columns and name in QUANTITIES]
+    if "drive_frequency_hz" in wanted[1]:
+        names = list(wanted[1])
+    y = table.columns[names[1] if len(names) > 1 else names[0]]
+    x = table.columns[names[0]] if len(names) > 1 else np.arange(1.0, len(y) + 1)
+    step = max(1, -(-len(y) // _POINTS))
+    axes = [(QUANTITIES[name][0], QUANTITIES[name][1][0]) for name in names[:2]]
+    return Plot(tuple(x[::step].tolist()), tuple(y[::step].tolist()), *([("reading", ""), *axes][-2:]))
+
+
+def _size_of(path: Path) -> int:
+    return path.stat().st_size if path.is_file() else 0
+
+
+def _look_at_record(path: Path, record: Waveform | PulseTimes, channel: str | None) -> Look:
+    """Return how a record is understood.  Raises LevilabError."""
+    if isinstance(record, PulseTimes):
+        values = tuple(digits(time, 7) for time in record.times[:_SHOWN])
+        column = UnderstoodColumn(0, "", "pulse times", "s", 1.0, inverse=False, values=values)
+        run = UnderstoodRun(path, "", 0, (column,), warnings=record.warnings)
+        turns = np.diff(record.times[: _POINTS + 1])
+        plot = Plot(tuple(record.times[1 : len(turns) + 1].tolist()), tuple((1 / turns).tolist()),
+                    ("time", "s"), ("1 / time between pulses", "Hz"))  # fmt: skip
+        return Look(path, f"{len(record.times)} times of pulses ({record.format})", (run,), plots={0: plot})
+    chosen = record.signal(channel)
+    columns: list[UnderstoodColumn] = []
+    plots: dict[int, Plot] = {}
+    for k, signal in enumerate(record.signals):
+        first = next(islice(record.read(k), 1), np.zeros(0))[:_SAMPLES]
+        values = tuple(digits(value, 4) for value in first[:_SHOWN])
+        quantity = "signal" if k == chosen else None
+        columns.append(UnderstoodColumn(k, signal.name, quantity, signal.unit, 1.0, inverse=False, values=values))
+        if k == chosen:
+            times = record.times_of(0, len(first))
+            axes = (("time", "s"), (signal.name, signal.unit))
+            plots[0] = Plot(tuple(times.tolist()), tuple(first.tolist()), *axes)
+    run = UnderstoodRun(path, "", 0, tuple(columns), warnings=record.warnings)
+    holds = f"{record.format}: {digits(record.duration, 3)} s, {digits(record.rate, 6)} samples a second"
+    names = tuple(signal.name for signal in record.signals)
+    return Look(path, holds, (run,), channels=names, rate=record.rate, plots=plots)

@@ -1,0 +1,204 @@
+"""A data file in the browser: dropped, corrected, kept, analyzed; and what the server takes and refuses."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from levilab.live.opened import MOST_FILES, Opened, OpenedFile, plain_name
+from levilab.pipelines.correction import read_correction
+from support.browser import PHONE
+from support.live_pages import address, serving, until
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Callable, Iterator
+    from pathlib import Path
+
+    from playwright.sync_api import Page
+
+    from levilab.live.server import Hall
+
+TIME = 10.0 * np.arange(19)
+#: A spin-down by the disc law, from 38 Hz.
+SPIN = 38 * (1 + 2.34e-4 * np.sqrt(2 * np.pi * 38) * TIME / 2) ** -2
+#: Angular velocities under a title that says nothing.
+OMEGA = "Zeit;Wert\n" + "".join(
+    f"{t:g};{2 * math.pi * f:.3f}\n".replace(".", ",") for t, f in zip(TIME, SPIN, strict=True)
+)
+DROP = """([name, text]) => {
+    const carried = new DataTransfer();
+    carried.items.add(new File([text], name));
+    for (const kind of ["dragenter", "dragover", "drop"]) {
+        document.body.dispatchEvent(new DragEvent(kind, {dataTransfer: carried, bubbles: true, cancelable: true}));
+    }
+}"""
+
+
+@pytest.fixture(scope="module")
+def hall(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
+    with serving(tmp_path_factory.mktemp("lab") / "runs") as hall:
+        yield hall
+
+
+@pytest.mark.slow
+def test_a_file_is_dropped_corrected_kept_and_analyzed(hall: Hall, watched: Callable[..., Page]) -> None:
+    page = watched()
+    page.goto(address(hall, token=True))
+    until(page, "!document.getElementById('open').hidden")
+    page.evaluate(DROP, ["Müller's omega.csv", OMEGA])  # anywhere in the live view
+    page.wait_for_url("**/open?file=*")
+    until(page, "window.levilab?.look")
+    file = hall.root.parent / "opened" / "Müller's omega.csv"
+    assert file.read_text("utf-8") == OMEGA
+    assert page.get_by_role("button", name="Analyze").is_disabled()  # a question is open
+    assert "no unit" in page.get_by_role("group").first.inner_text()
+    page.get_by_role("button", name="rad/s (38").press("Enter")
+    until(page, "levilab.look.plots['0']")
+    assert page.evaluate("levilab.look.plots['0'].y[0]") == pytest.approx(38, abs=0.01)
+    assert page.get_by_label("unit of Wert").input_value() == "rad/s"
+    assert '--columns "t=1,f=2 [rad/s]"' in page.inner_text("#command")
+    page.get_by_role("button", name="Keep for the next time").press("Enter")
+    until(page, "document.getElementById('news').textContent.startsWith('kept in')")
+    assert read_correction(file)["columns"] == {"t": "1", "f": "2 [rad/s]"}
+    page.get_by_role("button", name="Analyze").press("Enter")
+    until(page, "!document.getElementById('report').hidden")
+    assert "disc law" in page.inner_text("#verdict")
+    until(page, "document.querySelector('#figures img')?.naturalWidth > 100")
+    with page.context.expect_page() as opened:
+        page.click("#report")
+    assert "spin-down" in opened.value.inner_text("body").lower()
+    found = json.loads((file.parent / f"{file.name}.result.json").read_text("utf-8"))
+    assert found["settings"]["columns"] == {"t": "1", "f": "2 [rad/s]"}
+
+
+def test_a_choice_in_the_table_changes_how_it_is_read(hall: Hall, watched: Callable[..., Page]) -> None:
+    page = watched(viewport=PHONE, color_scheme="dark")
+    file = hall.root.parent / "three.csv"
+    file.write_text(
+        "A,B,C\n" + "".join(f"{t},{60 * f:.3f},{k}\n" for k, (t, f) in enumerate(zip(TIME, SPIN, strict=True)))
+    )
+    key = hall.opened.add(file)
+    page.goto(f"{address(hall)}open?file={key}#{hall.doors.token}")
+    until(page, "window.levilab?.look")
+    page.get_by_label("what A is").select_option("time")
+    until(page, "levilab.look.options.columns?.t === '1'")
+    page.get_by_label("what B is").select_option("spin frequency")
+    until(page, "levilab.look.options.columns?.f === '2'")
+    page.get_by_label("unit of B").select_option("rpm")
+    until(page, "levilab.look.plots['0']?.y[0] < 40")
+    assert page.evaluate("levilab.look.plots['0'].y[0]") == pytest.approx(38, abs=0.01)
+    assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+    page.get_by_role("button", name="Undo corrections").click()
+    until(page, "levilab.look.problem")
+    nameless = """[...document.querySelectorAll("button, select, input, a[href], canvas, [tabindex='0']")]
+        .filter((one) => !(one.getAttribute("aria-label") || one.textContent.trim() || one.labels?.[0]))
+        .map((one) => one.outerHTML)"""
+    assert page.evaluate(nameless) == []
+
+
+def test_nothing_that_a_file_contains_becomes_markup(hall: Hall, watched: Callable[..., Page]) -> None:
+    page = watched()
+    hostile = '<img src=x onerror="window.hacked=1">'
+    file = hall.root.parent / "hostile.csv"
+    file.write_text(f"t;f [Hz];{hostile}\n" + "".join(f"{t};{f};{hostile}\n" for t, f in zip(TIME, SPIN, strict=True)))
+    page.goto(f"{address(hall)}open?file={hall.opened.add(file)}#{hall.doors.token}")
+    until(page, "window.levilab?.look")
+    assert hostile in page.inner_text("#runs")
+    assert page.evaluate("[window.hacked, document.images.length]") == [None, 0]
+
+
+def test_a_page_without_the_token_opens_nothing(hall: Hall, watched: Callable[..., Page]) -> None:
+    page = watched()
+    page.goto(f"{address(hall)}open")
+    until(page, "document.getElementById('said').textContent.startsWith('This page may only look')")
+
+
+# --- the server ---
+
+
+def request(hall: Hall, path: str, body: bytes, **headers: str) -> tuple[int, dict[str, Any]]:
+    import http.client
+
+    connection = http.client.HTTPConnection("127.0.0.1", hall.doors.port, timeout=60)
+    try:
+        connection.request("POST", path, body, {"X-Levilab-Token": hall.doors.token, **headers})
+        answer = connection.getresponse()
+        return answer.status, json.loads(answer.read())
+    finally:
+        connection.close()
+
+
+def test_a_file_needs_the_token(hall: Hall) -> None:
+    before = dict(hall.opened.files)
+    assert request(hall, "/file", b"t,f\n", **{"X-Levilab-Token": "guess", "X-Levilab-Name": "a.csv"})[0] == 403
+    assert hall.opened.files == before
+
+
+def test_a_file_that_is_too_large_leaves_nothing(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("levilab.live.opened.MOST_BYTES", 1000)
+    status, answer = request(hall, "/file", 1001 * b"x", **{"X-Levilab-Name": "large.csv"})
+    assert (status, "large.csv: is larger than" in answer["error"]) == (400, True)
+    assert [path.name for path in hall.opened.folder.glob("*large*")] == []
+    assert [path.name for path in hall.opened.folder.glob(".incoming*")] == []
+
+
+@pytest.mark.parametrize(
+    "wanted",
+    [{"do": "look at a file", "file": "none"}, {"do": "keep"}, {"do": "analyze a file", "file": ["x"]},
+     {"do": "look at a file", "file": "KEY", "options": {"device": "/etc/passwd"}},
+     {"do": "look at a file", "file": "KEY", "options": {"columns": {"x": "1"}}},
+     {"do": "look at a file", "file": "KEY", "options": {"rate": "1; rm"}},
+     {"do": "keep", "file": "KEY"}],
+)  # fmt: skip
+def test_what_is_no_command_for_a_file_is_refused_in_words(hall: Hall, tmp_path: Path, wanted: dict[str, Any]) -> None:
+    key = hall.opened.add(tmp_path / "my.csv")
+    given = {name: key if value == "KEY" else value for name, value in wanted.items()}
+    status, answer = request(hall, "/do", json.dumps(given).encode())
+    assert (status, bool(answer["error"])) == (400, True)
+
+
+async def _pieces(*pieces: bytes) -> AsyncIterator[bytes]:
+    for piece in pieces:
+        yield piece
+
+
+async def _keep(opened: Opened, name: str, content: bytes) -> str:
+    return opened.files[await opened.receive(name, _pieces(content))].path.name
+
+
+def test_a_dropped_file_replaces_no_other(tmp_path: Path) -> None:
+    import asyncio
+
+    opened = Opened(tmp_path)
+
+    async def drop() -> list[str]:
+        return [await _keep(opened, "my.csv", content) for content in (b"one", b"two", b"one", b"two")]
+
+    assert asyncio.run(drop()) == ["my.csv", "my (2).csv", "my.csv", "my (2).csv"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["my (2).csv", "my.csv"]
+    assert len(opened.files) == 2
+
+
+@pytest.mark.parametrize(
+    "name", ["../x.csv", "/etc/passwd", "..", "", "a\x00b.csv", "con", 500 * "ü" + ".csv", "x" * 300]
+)
+def test_a_dropped_file_stays_in_its_folder(tmp_path: Path, name: str) -> None:
+    plain = plain_name(name)
+    assert (tmp_path / plain).resolve().parent == tmp_path.resolve()
+    assert 0 < len(plain.encode()) < 255
+    assert plain_name(plain) == plain
+
+
+def test_the_oldest_file_is_closed_when_many_are_open(tmp_path: Path) -> None:
+    opened = Opened(tmp_path)
+    keys = [opened.add(tmp_path / f"{k}.csv") for k in range(MOST_FILES + 3)]
+    assert list(opened.files) == keys[3:]
+
+
+def test_the_words_of_a_file_are_options_of_the_command_line(tmp_path: Path) -> None:
+    one = OpenedFile(tmp_path, {"columns": {"t": "1", "f": "2 [rpm]"}, "rate": 100.0})
+    assert one.words == ["--columns", "t=1,f=2 [rpm]", "--rate", "100.0"]
