@@ -97,7 +97,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     run = _resumable(_run_folder(options.resume, options.out), experiment) if options.resume else None
     virtual = options.mock or bool(run and run.record.seed is not None)
     _check_options(options, run, virtual=virtual)
-    named = _named_instruments(options, run)
+    named = named_instruments(options, run)
     without = _configuration(options, run, named, virtual=virtual)
     without = _with_named_instruments(without, named, EXPERIMENTS[experiment].instruments, virtual=virtual)
     without = with_settings(without, experiment, settings_of(without, experiment).for_bench(without))
@@ -124,6 +124,13 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     if run and not virtual:
         run.elapsed()  # raises before the bench is touched
     return request
+
+
+def chosen_bench(options: AcquisitionOptions) -> BenchConfig:
+    """Return the configuration of the bench with the named instruments.  Raises ConfigError, UsageError."""
+    named = named_instruments(options)
+    config = _configuration(options, None, named, virtual=options.mock)
+    return _with_named_instruments(config, named, (), virtual=options.mock)
 
 
 def chosen_settings(experiment: str, options: AcquisitionOptions) -> BenchConfig:
@@ -158,7 +165,7 @@ def _configuration(
     return config
 
 
-def _named_instruments(options: AcquisitionOptions, run: Run | None) -> dict[str, str]:
+def named_instruments(options: AcquisitionOptions, run: Run | None = None) -> dict[str, str]:
     """Return kind → model or address of the instruments that take the place of the bench's.
 
     A resumed run keeps its own.  Raises DataError where its record has something else.

@@ -6,7 +6,9 @@ import contextlib
 from typing import TYPE_CHECKING, TypeVar
 
 from instruments.drivers import Instrument
+from instruments.drivers.oscilloscope.sound import SoundCard
 from instruments.errors import InstrumentError, SettingsLost
+from levilab.bench.config import ConfigError
 from levilab.bench.kinds import COUNTER, GENERATOR, MAGNETOMETER, OSCILLOSCOPE, transport_to
 from levilab.bench.sampled import SampledCounter
 
@@ -151,4 +153,9 @@ def connect_driver(kind: Kind[I], wiring: Wiring, *, log: TrafficLog | None = No
     settings = wiring.describe(kind.name)
     driver = kind.model(settings.model).driver
     transport = transport_to(driver, settings, library=wiring.library, clock=wiring.clock, log=log)
-    return driver(transport, clock=wiring.clock)
+    instrument = driver(transport, clock=wiring.clock)
+    if isinstance(instrument, SoundCard):
+        instrument.clock_error, instrument.clock_u = settings.clock_error or 0.0, settings.clock_u
+    elif settings.clock_error is not None:
+        raise ConfigError(f"{kind.name}.clock_error = {settings.clock_error:g} is for a sound card alone: remove it")
+    return instrument

@@ -6,9 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from instruments.drivers.oscilloscope.sound import SoundCard
 from instruments.errors import InstrumentError
 from levilab.bench.bench import Bench, open_bench
 from levilab.bench.config import ConfigError
+from levilab.bench.hearing import listen
 from levilab.bench.kinds import KINDS
 
 if TYPE_CHECKING:
@@ -65,6 +67,8 @@ def _check_generator(bench: Bench, _: Light) -> Reading:
 
 def _check_oscilloscope(bench: Bench, light: Light) -> Reading:
     scope = bench.oscilloscope
+    if isinstance(scope, SoundCard):
+        return *listen(scope), "dB"
     scope.prepare(
         duration_s=0.1,
         points=1000,

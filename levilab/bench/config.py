@@ -29,7 +29,8 @@ class InstrumentSettings(Settings):
     """Address and model of an instrument.
 
     timeout_s: of one answer; baud_rate, data_bits, parity, stop_bits: of a serial line, where they are not those that
-    the instrument leaves the factory with.
+    the instrument leaves the factory with; clock_error: relative error of a sound card's clock, above 0 where it is
+    fast, by which its times are corrected; clock_u: relative standard uncertainty of the instrument's clock.
     """
 
     model: str
@@ -39,6 +40,8 @@ class InstrumentSettings(Settings):
     data_bits: Literal[5, 6, 7, 8] | None = None
     parity: Literal["none", "odd", "even", "mark", "space"] | None = None
     stop_bits: float | None = Field(default=None, ge=1, le=2)
+    clock_error: float | None = Field(default=None, gt=-1e-3, lt=1e-3)
+    clock_u: PositiveFloat | None = None
 
     @property
     def line(self) -> dict[str, Any]:

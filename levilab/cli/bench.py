@@ -77,6 +77,11 @@ def bench_check(
     bench: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Describes the bench.", show_default="bench.toml")
     ] = None,
+    counter: Annotated[str | None, typer.Option(metavar="MODEL|ADDRESS", help="Check this one, too.")] = None,
+    scope: Annotated[
+        str | None,
+        typer.Option(metavar="MODEL|ADDRESS", help="Check this one, too; `sound` lists the inputs of the computer."),
+    ] = None,
     mock: Annotated[bool, typer.Option("--mock", help="Check the virtual bench.")] = False,
     as_json: Json = False,
 ) -> None:
@@ -84,16 +89,17 @@ def bench_check(
 
     The drive stays off.  The exit status is 3 if an instrument does not answer as it should.
     """
-    from levilab.acquisition.table import Configuration, counter_settings
+    from levilab.acquisition.request import AcquisitionOptions, chosen_bench, named_instruments
+    from levilab.acquisition.table import counter_settings
     from levilab.bench.check import Light, check
-    from levilab.bench.config import read_bench
     from levilab.bench.wiring import described_wiring
     from levilab.world.bench import practice_world, virtual_wiring
 
     if mock and bench:
         raise UsageError("bench", "does not go with `mock`, the virtual bench, which no file describes")
-    config = Configuration() if mock else read_bench(bench or Path("bench.toml"), Configuration)
-    wiring = virtual_wiring(practice_world()) if mock else described_wiring(config)
+    options = AcquisitionOptions(mock=mock, bench=bench, counter=counter, scope=scope)
+    config = chosen_bench(options)
+    wiring = virtual_wiring(practice_world(), models=named_instruments(options)) if mock else described_wiring(config)
     counting = counter_settings(config)
     checked = []
     for one in check(wiring, Light(counting.gate_s, counting.trigger_level_v)):
@@ -113,6 +119,70 @@ def _print_checked(one: "Checked") -> None:
     if one.model:
         result(f"  {one.maker} {one.model}, serial number {one.serial_number or '-'}, firmware {one.firmware or '-'}")
     result(f"  {'FAILED: ' + one.trouble if one.trouble else one.reading}")
+
+
+@bench_app.command("clock", epilog="Example: levilab bench clock --tone 1000 --u 0.001")
+def bench_clock(
+    scope: Annotated[str, typer.Option(metavar="MODEL|ADDRESS", help="The sound card.")] = "sound",
+    tone: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", min=20.0, max=20_000.0, help="Compare with a tone of this frequency at channel 1."),
+    ] = None,
+    u: Annotated[
+        float | None, typer.Option("--u", metavar="HZ", min=0.0, help="Standard uncertainty of the tone.")
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(metavar="S", min=1.0, max=86_400.0, help="How long.", show_default="600, with --tone 20"),
+    ] = None,
+    clock_u: Annotated[
+        float | None,
+        typer.Option(
+            metavar="U",
+            min=0.0,
+            help="Relative standard uncertainty of the computer's clock: 1e-6 for one that the network sets.",
+            show_default="1e-5",
+        ),
+    ] = None,
+    bench: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Keep the result there.", show_default="bench.toml")
+    ] = None,
+    mock: Annotated[bool, typer.Option("--mock", help="Use the virtual bench; nothing is kept.")] = False,
+    save: Annotated[bool, typer.Option("--save/--no-save", help="Keep the result in the bench file.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Measure how far a sound card's clock is off, by a known tone or else by the computer's clock over a while.
+
+    The result is kept in the bench file: from then on the times of records are corrected by it, and its uncertainty
+    stands in the budgets of analyses.
+    """
+    from levilab.acquisition.request import AcquisitionOptions, chosen_bench
+    from levilab.bench.clock import COMPUTER_U, Comparison, keep_clock, measure_clock
+    from levilab.bench.wiring import described_wiring
+    from levilab.present.progress import ShareBar
+    from levilab.world.bench import practice_world, virtual_wiring
+
+    if (tone is None) != (u is None):
+        raise UsageError("u", "goes with `tone`, and a tone with its standard uncertainty")
+    if tone is not None and clock_u is not None:
+        raise UsageError("clock_u", "is that of the computer's clock, which a tone replaces")
+    config = chosen_bench(AcquisitionOptions(mock=mock, bench=bench, scope=scope))
+    wiring = virtual_wiring(practice_world(), models={"oscilloscope": scope}) if mock else described_wiring(config)
+    how = Comparison(tone, u, duration or (600.0 if tone is None else 20.0), COMPUTER_U if clock_u is None else clock_u)
+    progress = ShareBar("listening")
+    try:
+        found = measure_clock(wiring, how, progress)
+    finally:
+        progress.close()
+    settings = wiring.describe("oscilloscope")
+    if as_json:
+        print_json({"address": settings.address, "clock_error": found.value, "clock_u": found.u, "rate_hz": found.rate})
+    else:
+        result(found.text)
+    if save and not mock:
+        file = bench or Path("bench.toml")
+        keep_clock(file, settings, found)
+        message(f"wrote clock_error and clock_u into {file}")
 
 
 @bench_app.command("serve", epilog="Example: levilab bench serve --speed 10 --port-base 15000")

@@ -31,6 +31,7 @@ _LONGEST_GATE_S = 1e4
 _TEN_PPM = 1e-5
 #: Shares of u² below this are shown as such.
 _LEAST_SHARE = 0.001
+_REFERENCE = "a reference of 10 MHz at the instrument's input, or a comparison with one"
 
 
 def time_base(source: Source[Any], kind: str, sensitivity: float, given: float | None, *, what: str = "") -> Component:
@@ -44,12 +45,19 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
         what: the row in words; empty: the time base of the instrument.
     """
     what = what or f"time base of the {kind}"
+    configuration = source.run.record.configuration if source.run else {}
+    if kind == "counter" and configuration.get("count_with"):
+        kind = str(configuration["count_with"])
     about = source.run.record.instruments.get(kind) if source.run else None
+    described = configuration.get(kind)
+    measured = described.get("clock_u") if isinstance(described, dict) else None
     driver = str((about or {}).get("driver", ""))[:40]
     known = TIME_BASES.get(driver)
-    remedy = "a reference of 10 MHz at the instrument's input, or a comparison with one"
+    remedy = known.remedy if known and known.remedy else _REFERENCE
     if given is not None:
         u, note = given, "as given to the analysis"
+    elif isinstance(measured, float) and measured > 0:
+        u, note = measured, f"{kind}.clock_u of the bench file"
     elif known:
         u = u_of_limit(known.limit)
         note = (

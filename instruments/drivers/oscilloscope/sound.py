@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from instruments.links.sound import Block, Samples
     from instruments.links.transport import Transport
 
+    Times = NDArray[np.float64]
+
 #: Codes from 0 to full scale.
 FULL_SCALE = 1 << 15
 #: After the input begins to sample it settles: the capacitors of an input are charged within this time [s].
@@ -49,16 +51,19 @@ class SamplesLost(InstrumentError):
 
     Attributes:
         at_s: where, from the beginning of the record [s].
-        kept: the longest part without a loss.
+        kept: the longest part without a loss; None where none was kept.
     """
 
-    def __init__(self, address: str, at_s: float, kept: Trace, whole_s: float) -> None:
+    def __init__(self, address: str, at_s: float, whole_s: float, kept: Trace | None = None) -> None:
         self.at_s, self.kept = at_s, kept
-        length = kept.codes.size * kept.dt_s
+        what = "nothing was kept"
+        if kept is not None:
+            length = kept.codes.size * kept.dt_s
+            what = f"{length:.3g} of its {whole_s:.3g} s are unbroken and were kept"
         super().__init__(
             address,
-            f"samples were lost {at_s:.3g} s after the beginning of a record: {length:.3g} of its {whole_s:.3g} s are "
-            "unbroken and were kept; end other programs, or take a lower rate (sound://?rate=44100)",
+            f"samples were lost {at_s:.3g} s after the beginning of a record: {what}; end other programs, or take a "
+            "lower rate (sound://?rate=44100)",
         )
 
 
@@ -265,6 +270,37 @@ class SoundCard:
         self._check_silence(came, request.samples / rate)
         return came.record(trigger - before, request.samples, trigger, rate)
 
+    def arrivals(self, duration_s: float, tell: Callable[[float], None]) -> tuple[NDArray[np.int64], Times]:
+        """Listen for a while without keeping the samples.
+
+        Args:
+            duration_s: how long [s].
+            tell: called with the share that is over.
+
+        Returns:
+            Number of samples after each block, and when the block came on the clock of the bench [s], shape (n,) each.
+
+        Raises:
+            SamplesLost: the flag of PortAudio says so.
+            NotConnected: no samples come any more.
+        """
+        rate, count = self._link.input.rate, 0
+        found: list[tuple[int, float]] = []
+        self._link.input.start()
+        try:
+            while count < duration_s * rate:
+                samples, arrived, lost = self._next()
+                if lost and found:
+                    raise SamplesLost(self.transport.address, count / rate, duration_s)
+                count += len(samples)
+                if count > _SETTLES_S * rate:
+                    found.append((count, arrived))
+                tell(min(count / rate / duration_s, 1.0))
+        finally:
+            self._link.input.stop()
+        counts, times = zip(*found, strict=True)
+        return np.array(counts, dtype=np.int64), np.array(times, dtype=np.float64)
+
     def _next(self) -> Block:
         """Return the next samples.  Raises NotConnected."""
         block = self._link.input.read(_GONE_S)
@@ -306,7 +342,7 @@ class SoundCard:
         if arrived:
             arrived(trace, record.whole)
         if record.lost_at:
-            raise SamplesLost(self.transport.address, record.lost_at[0] * dt, trace, record.whole * dt)
+            raise SamplesLost(self.transport.address, record.lost_at[0] * dt, record.whole * dt, trace)
         return trace
 
     def blocks(self, channel: int) -> Iterator[Codes]:
