@@ -22,6 +22,10 @@ class Part:
     titles: tuple[str, ...]
     own: frozenset[int] = frozenset()
 
+    def has(self, index: int, header: Sequence[str]) -> bool:
+        """Return whether a column is not that of another run."""
+        return self.titles[index : index + 1] != ("",) or not header[index]
+
 
 _RUN = (
     r"(?:run|lauf|durchlauf|messung|messreihe|versuch|data set|datensatz|mesure|essai|medida|medición|mätning|försök)"

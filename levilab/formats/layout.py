@@ -30,6 +30,7 @@ BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"), (codecs.BOM_UTF8, "utf-8-sig"),
 )  # fmt: skip
+ALIGNED = Dialect("\t", ".")  # of a text that was written from cells
 CONTROL = re.compile("[\x00-\x08\x0e-\x19]")  # DOS may end a text with 0x1a
 EXPORT = "a table of text is expected: export it as CSV"
 
@@ -79,7 +80,7 @@ def sniff(source: Text) -> Layout:
         lines.pop()
     if not any(line.strip() for line in lines):
         raise NoTable(path, f"is {'empty' if whole else 'one line without end'}; {EXPORT}")
-    dialect = find_dialect(lines[-SAMPLE:], lines[:SAMPLE])
+    dialect = ALIGNED if source.aligned else find_dialect(lines[-SAMPLE:], lines[:SAMPLE])
     if dialect is None and (words := _of_words(lines, encoding, head)):
         return words
     if dialect is None:

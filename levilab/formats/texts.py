@@ -183,7 +183,7 @@ def _members(file: Path, archive: zipfile.ZipFile, members: Iterable[zipfile.Zip
 def _blocks(file: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, most: int) -> Iterator[bytes]:
     """Yield what a member unpacks to, whatever length its entry says.  Raises TableError beyond `most` bytes."""
     free = copy(member)
-    free.file_size = most + 1
+    free.file_size = 1 << 60
     with archive.open(free) as stream:
         while block := stream.read(_BLOCK):
             most -= len(block)
@@ -196,7 +196,7 @@ def _blocks(file: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, most:
 
 
 _ADDRESS = re.compile(rb'\br="([A-Z]{1,3})(\d{1,7})"')
-_OPENED = re.compile(rb"<table:(table|table-row|table-cell|covered-table-cell)\b([^<>]*)>")
+_OPENED = re.compile(rb"<table:(table|table-row|table-cell|covered-table-cell)(?![\w-])([^<>]*)>")
 _REPEATED = re.compile(rb'number-(?:rows|columns)-repeated="(\d+)"')
 
 

@@ -142,33 +142,41 @@ def understand(
     Returns:
         The understanding; a file that cannot be read has a `problem` and raises nothing.
     """
+    request = Request(columns or {}, quantities, needed, guess)
     try:
-        looks = list(_looks(path, Request(columns or {}, quantities, needed, guess)))
+        looks = list(_looks(path, request))
     except (TableError, OSError) as error:
         return Understanding(path, (), str(error))
-    runs = tuple(_shown(look, looks) for look in looks)
+    runs = tuple(_shown(look, request, alone=len(looks) == 1) for look in looks)
     problem = "" if any(not run.problem for run in runs) else next(run.problem for run in runs)
     return Understanding(path, runs, problem)
 
 
-def _shown(look: "_Look", looks: "Sequence[_Look]") -> UnderstoodRun:
+def _shown(look: "_Look", request: "Request", *, alone: bool) -> UnderstoodRun:
     """Return one look at a run as data."""
-    plan, error, layout = look.plan, look.error, look.layout
-    name = look.name if len(looks) > 1 else ""
-    if layout is None:
+    plan, error, layout, part = look.plan, look.error, look.layout, look.part
+    name = "" if alone else look.name
+    if layout is None or part is None:
         return UnderstoodRun(look.path, name, 0, (), problem=str(error))
-    used = {column.index: column for column in plan.columns} if plan else {}
-    seen = [
-        _column(k, layout, used.get(k))
-        for k in range(layout.width)
-        if look.part is None or look.part.titles[k : k + 1] != ("",) or not layout.header[k]
-    ]
+    used = {column.index: column for column in _known(look, layout, part, request)}
+    seen = [_column(k, layout, used.get(k)) for k in range(layout.width) if part.has(k, layout.header)]
+    seen = [column for column in seen if column.title or any(column.values)]
     doubts = [doubt for column in used.values() if (doubt := _unit_doubt(layout, column, used))]
     doubts += [error.doubt] if isinstance(error, NoSuchColumn | Ambiguous) and error.doubt else []
     problem = str(error) if error else ""
     return UnderstoodRun(
         look.path, name, layout.header_line, tuple(seen), tuple(doubts), plan.warnings if plan else (), problem
     )
+
+
+def _known(look: "_Look", layout: Layout, part: Part, request: "Request") -> tuple[Column, ...]:
+    """Return the columns that are read, or of a table that is not read those that are known."""
+    if look.plan:
+        return look.plan.columns
+    try:
+        return _plan(look.path, Text(look.path), layout, part, replace(request, needed=(), guess=False)).columns
+    except TableError:
+        return ()
 
 
 def _column(k: int, layout: Layout, used: Column | None) -> UnderstoodColumn:

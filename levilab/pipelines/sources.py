@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from levilab.pipelines.options import InputOptions
 
 
+#: A file of this name keeps its folder out of searches of the folders above.
+SKIP = ".levilab-skip"
+
+
 class Readings(Protocol):
     """What an analysis reads from a run or a file."""
 
@@ -346,11 +350,14 @@ def _skipping(broken: list[Skipped], remarks: list[Remark]) -> Iterator[None]:
 
 
 def data_files(root: Path) -> list[Path]:
-    """Find the files at or below a folder that may hold data, by name; those of runs belong to their runs."""
+    """Find the files at or below a folder that may hold data, by name; those of runs belong to their runs.
+
+    A folder below with a file `SKIP` is left out, with all in it.
+    """
     found, seen = [], set()
     for folder, below, files in os.walk(root, followlinks=True):
         real = os.path.realpath(folder)
-        if real in seen or RECORD in files:
+        if real in seen or RECORD in files or (SKIP in files and Path(folder) != root):
             below.clear()
             continue
         seen.add(real)

@@ -1,0 +1,285 @@
+"""Files as students have them: each is read, gives the spin-down that it was made from, or asks."""
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from levilab.errors import DataError
+from levilab.formats import texts
+from levilab.formats.columns import NoSuchColumn, NoTable, TableError
+from levilab.formats.table import read_table
+from levilab.formats.understanding import SPIN, SeveralRuns, understand
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.sources import data_files
+from support.paths import ROOT
+
+FILES = ROOT / "sample_data" / "student-files"
+C32, SPIN_HZ = 2.34e-4, 38.0
+#: File → names of the runs in it, where there are several.
+RUNS = {
+    "capstone.csv": ["Durchlauf 1", "Durchlauf 2"],
+    "excel-sheets.xlsx": ["Run 1", "Run 2"],
+    "libreoffice.ods": ["Messung 1", "Messung 2"],
+    "logger-pro-runs.csv": ["Run 1", "Run 2"],
+    "runs-under-one-time.csv": ["Messung 1", "Messung 2", "Messung 3"],
+}
+#: File → what has to be said of it.
+OPTIONS = {"tracker.txt": {"columns": {"f": "ω [°/s]"}}}
+NAMES = sorted(path.name for path in FILES.iterdir() if path.name not in {"README.md", ".levilab-skip"})
+
+
+def spin_down(path, **options):
+    row = ANALYSES["spindown"]
+    return row.analyze([path], row.options_from({"tilt": "none", **options}))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_file_of_a_student_gives_the_spin_down_it_was_made_from(name):
+    found = spin_down(FILES / name, **OPTIONS.get(name, {}))
+    assert [source.name for source in found.sources] == RUNS.get(name, [name])
+    for run in found.runs:
+        parameters = run.fit("disc").parameters
+        for key, truth in (("c32", C32), ("start_frequency", SPIN_HZ)):
+            # 3.5 u: one of 90 numbers by chance in 20 such sets of files
+            assert abs(parameters[key].value - truth) < 3.5 * parameters[key].u, (key, parameters[key])
+
+
+def test_the_files_are_what_their_script_makes(tmp_path):
+    import importlib.util
+
+    spec = importlib.util.spec_from_file_location("student_files", ROOT / "sample_data" / "student_files.py")
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    script.main(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(path.name for path in FILES.iterdir())
+    for path in FILES.iterdir():
+        if path.suffix not in {".xlsx", ".ods", ".zip"}:
+            assert (tmp_path / path.name).read_bytes() == path.read_bytes(), path.name
+            continue
+        with zipfile.ZipFile(tmp_path / path.name) as made, zipfile.ZipFile(path) as kept:  # zlib's bytes may differ
+            assert {n: made.read(n) for n in made.namelist()} == {n: kept.read(n) for n in kept.namelist()}, path.name
+
+
+def test_a_folder_with_the_mark_is_left_out_of_a_search_above_it():
+    assert data_files(FILES)
+    assert not [path for path in data_files(FILES.parent) if FILES in path.parents]
+
+
+# --- several runs in a file ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("inside", "first"),
+    [("Messung 2", 37.9), ("Tabelle1/Messung 2", 37.9)],
+)
+def test_a_run_in_a_file_is_named_as_if_the_file_were_a_folder(inside, first):
+    table = read_table(FILES / "libreoffice.ods" / inside, quantities=SPIN)
+    assert table.column("spin_frequency_hz")[0] == pytest.approx(first, abs=0.15)  # 38 ± noise
+    assert table.column("time_s")[-1] == 180
+
+
+def test_a_file_with_several_runs_says_how_to_name_one():
+    with pytest.raises(
+        SeveralRuns, match=r"'Messung 1', 'Messung 2', 'Messung 3'\): name one, as .*/Messung 1"
+    ) as error:
+        read_table(FILES / "runs-under-one-time.csv", quantities=SPIN)
+    assert error.value.paths[2] == FILES / "runs-under-one-time.csv" / "Messung 3"
+    with pytest.raises(TableError, match=r"no sheet, file or run 'Lauf 9'; it has 'Messung 1'"):
+        read_table(FILES / "runs-under-one-time.csv" / "Lauf 9", quantities=SPIN)
+
+
+def test_a_shorter_run_beside_a_longer_one_misses_nothing():
+    table = read_table(FILES / "runs-under-one-time.csv" / "Messung 3", quantities=SPIN)
+    assert len(table) == 15
+    assert not table.warnings
+
+
+def test_what_was_found_of_runs_in_a_file_is_recalled(tmp_path):
+    file = tmp_path / "runs.csv"
+    file.write_bytes((FILES / "runs-under-one-time.csv").read_bytes())
+    row = ANALYSES["spindown"]
+    found = row.analyze([file], row.options_from({}))
+    from levilab.pipelines.suits import save
+
+    assert [path.name for path in save(row, found, with_figure=False)] == ["runs.csv.result.json"]
+    inputs = json.loads((tmp_path / "runs.csv.result.json").read_text(encoding="utf-8"))["inputs"]
+    assert [one["path"] for one in inputs] == ["runs.csv/Messung 1", "runs.csv/Messung 2", "runs.csv/Messung 3"]
+    assert len({one["sha256"] for one in inputs}) == 3
+    recalled = row.result.recall([file], row.options_from({}))
+    assert not any(origin.lacks_result for origin in recalled.origins)
+    constants = [[run.fit("disc").parameters["c32"] for run in of.runs] for of in (recalled, found)]
+    assert constants[0] == constants[1]
+
+
+# --- understanding ---------------------------------------------------------------------------------------------------
+
+
+def test_what_is_shown_of_a_file_is_what_is_read():
+    for name in NAMES:
+        understanding = understand(FILES / name)
+        assert not understanding.problem, name
+        for run in (run for run in understanding.runs if not run.problem):
+            table = read_table(run.path, quantities=SPIN)
+            used = {column.quantity: column for column in run.columns if column.quantity}
+            assert set(used) == set(table.columns), name
+            spin = used["spin_frequency_hz"]
+            if not spin.inverse:
+                assert table.factors["spin_frequency_hz"] == spin.factor
+
+
+def test_an_angular_velocity_of_tracker_is_a_question_with_its_choices():
+    (run,) = understand(FILES / "tracker.txt").runs
+    (doubt,) = run.doubts
+    assert (doubt.kind, doubt.column) == ("unit", 2)
+    assert "column 3 'ω' has the values 1.369e+04 to 7785 and no unit" in doubt.text
+    assert doubt.choices[0].text == "°/s (38 to 21.6 Hz)"
+    (source,) = spin_down(FILES / "tracker.txt").sources
+    assert source.readings.doubtful
+    (source,) = spin_down(FILES / "tracker.txt", columns=doubt.choices[0].columns).sources
+    assert not source.readings.doubtful
+
+
+def test_a_column_without_name_and_unit_is_asked_about(tmp_path):
+    file = tmp_path / "wert.csv"
+    file.write_text("Zeit;Wert\n0;239\n60;195\n120;162\n180;136\n", encoding="utf-8")
+    with pytest.raises(
+        NoSuchColumn, match=r"column 2 'Wert' has the values 239 to 136 and no unit: rad/s \(38 to"
+    ) as error:
+        read_table(file, quantities=SPIN)
+    table = read_table(file, quantities=SPIN, columns=error.value.doubt.choices[0].columns)
+    assert table.column("spin_frequency_hz")[0] == pytest.approx(239 / (2 * np.pi))
+    (run,) = understand(file).runs
+    assert run.doubts == (error.value.doubt,)
+    assert run.problem == str(error.value)
+    file.write_text("Zeit;Wert\n0;38\n60;31\n120;26\n180;22\n", encoding="utf-8")
+    table = read_table(file, quantities=SPIN)
+    assert table.column("spin_frequency_hz")[0] == 38
+    assert "'Wert' has no unit and is taken as the spin in Hz" in table.warnings[0]
+    with pytest.raises(NoSuchColumn):  # of a folder nothing is guessed
+        read_table(file, quantities=SPIN, needed=SPIN[:2], guess=False)
+
+
+def test_numbered_columns_beside_a_known_spin_are_no_runs(tmp_path):
+    file = tmp_path / "beside.csv"
+    file.write_text("t,f,x1,x2\n0,38,1,2\n1,37,1,2\n2,36,1,2\n", encoding="utf-8")
+    assert read_table(file, quantities=SPIN).column("spin_frequency_hz")[0] == 38
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("t;f\n0 s;38 Hz\n1 s;0.0379 kHz\n2 s;37 Hz\n", "line 3: '0.0379 kHz' stands in column 'f', which is in Hz"),
+        ("t;Lauf [Hz];Motor [Hz]\n0;38;1\n1;37;1\n2;36;1\n", "no column is known to be spin_frequency_hz"),
+        ("Datum;f\n31.02.2026 10:00:00;38\n01.03.2026 10:00:01;37\n01.03.2026 10:00:02;36\n", "'31.02.2026 10:00:00'"),
+    ],
+)
+def test_what_could_be_read_in_two_ways_is_refused(text, says, tmp_path):
+    file = tmp_path / "odd.csv"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(TableError) as error:
+        read_table(file, quantities=SPIN, needed=SPIN[:2])
+    assert says in str(error.value)
+
+
+# --- hostile and damaged spreadsheets --------------------------------------------------------------------------------
+
+
+MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+
+
+def workbook(path, sheet, **more):
+    with zipfile.ZipFile(FILES / "excel-sheets.xlsx") as kept, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as out:
+        for name in kept.namelist():
+            out.writestr(name, sheet if name == "xl/worksheets/sheet1.xml" else more.get(name, kept.read(name)))
+    return path
+
+
+def test_a_spreadsheet_or_zip_that_unpacks_to_gigabytes_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(texts, "MOST_UNPACKED", 1 << 20)
+    blank = b" " * (2 << 20)
+    bombs = {"bytes.xlsx": workbook(tmp_path / "bytes.xlsx", blank)}
+    with zipfile.ZipFile(tmp_path / "zip.zip", "w", zipfile.ZIP_DEFLATED) as out:
+        out.writestr("a.csv", blank)
+    bombs["zip.zip"] = tmp_path / "zip.zip"
+    lying = (tmp_path / "zip.zip").read_bytes()
+    size = (2 << 20).to_bytes(4, "little")
+    (tmp_path / "lying.zip").write_bytes(lying.replace(size, (100).to_bytes(4, "little")))  # what its directory says
+    bombs["lying.zip"] = tmp_path / "lying.zip"
+    for path in bombs.values():
+        with pytest.raises(TableError, match=r"unpacks to .*, up to 1 MB"):
+            read_table(path)
+
+
+def test_a_cell_far_away_and_repeated_cells_are_refused_before_they_are_unpacked(tmp_path):
+    far = (
+        '<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData><row r="1"><c r="A1">'
+    )
+    far += '<v>1</v></c></row><row r="1048576"><c r="XFD1048576"><v>1</v></c></row></sheetData></worksheet>'
+    with pytest.raises(TableError, match="1,048,576 rows of 16,384 columns"):
+        read_table(workbook(tmp_path / "far.xlsx", far))
+    with zipfile.ZipFile(FILES / "libreoffice.ods") as kept, zipfile.ZipFile(tmp_path / "many.ods", "w") as out:
+        for name in kept.namelist():
+            text = kept.read(name).replace(
+                b'<table:table-cell office:value-type="float"',
+                b'<table:table-cell table:number-columns-repeated="16000" office:value-type="float"',
+                1,
+            )
+            text = text.replace(b"<table:table-row>", b'<table:table-row table:number-rows-repeated="1000000">')
+            out.writestr(name, text)
+    with pytest.raises(TableError, match=r"unpacks to .* rows of 16,00. columns"):
+        read_table(tmp_path / "many.ods")
+
+
+def test_a_damaged_locked_or_foreign_file_says_what_to_do(tmp_path):
+    whole = (FILES / "excel.xlsx").read_bytes()
+    cases = {
+        "cut.xlsx": (whole[: len(whole) // 2], "damaged"),
+        "old.xls": (b"\xd0\xcf\x11\xe0" + b"\0" * 600, "save it again as .xlsx"),
+        "cut.json": (b'{"t": [0, 1', "is cut off or no JSON"),
+        "deep.json": (b"[" * 100_000, "JSON"),
+        "run.json": (b'{"schema": "levilab-run/1"}', "name the folder of the run"),
+        "words.json": (b'{"a": "b"}', "JSON file without a table"),
+    }
+    for name, (content, says) in cases.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(TableError, match=says):
+            read_table(tmp_path / name)
+    with zipfile.ZipFile(tmp_path / "pictures.zip", "w") as out:
+        out.writestr("a.png", b"x")
+    with pytest.raises(NoTable, match="ZIP file without a table"):
+        read_table(tmp_path / "pictures.zip")
+
+
+@pytest.mark.parametrize("name", ["excel.xlsx", "libreoffice.ods", "phyphox.zip"])
+def test_a_file_with_wrong_bytes_is_read_or_refused(name, tmp_path):
+    rng = np.random.default_rng(5)
+    whole = bytearray((FILES / name).read_bytes())
+    for _ in range(40):
+        damaged = bytearray(whole)
+        for place in rng.integers(0, len(whole), 3):
+            damaged[place] = int(rng.integers(256))
+        (tmp_path / name).write_bytes(damaged)
+        try:
+            understand(tmp_path / name)
+        except DataError as error:
+            pytest.fail(f"understand raised {error}")
+
+
+def test_a_number_in_a_cell_keeps_its_last_bit(tmp_path):
+    value = 37.224252878824654
+    cells = f'<c r="A{{0}}"><v>{{0}}</v></c><c r="B{{0}}"><v>{value!r}</v></c>'
+    rows = "".join(f'<row r="{k}">{cells.format(k)}</row>' for k in range(1, 5))
+    path = workbook(
+        tmp_path / "bits.xlsx",
+        f'<worksheet xmlns="{MAIN}"><sheetData>{rows}</sheetData></worksheet>',
+        **{"xl/worksheets/sheet2.xml": f'<worksheet xmlns="{MAIN}"><sheetData/></worksheet>'},
+    )
+    assert read_table(path, quantities=SPIN).column("spin_frequency_hz").tolist() == [value] * 4
+
+
+def test_a_path_into_no_file_stays_a_path():
+    assert texts.locate(Path("no/such/file.csv")) == (Path("no/such/file.csv"), "")
+    assert texts.locate(FILES / "excel.xlsx" / "Messung") == (FILES / "excel.xlsx", "Messung")
