@@ -11,7 +11,7 @@ from levilab.formats.columns import TableError, shorten
 from levilab.formats.titles import is_unit, plain_unit, read_title, unit_factor
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.rows import read_blocks
-from levilab.formats.waveforms.waveform import PulseTimes, Signal, Waveform, check_count, check_step
+from levilab.formats.waveforms.waveform import FEWEST_PULSES, PulseTimes, Signal, Waveform, check_count, check_step
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from levilab.formats.waveforms.head import Head
     from levilab.formats.waveforms.rows import Block
 
-#: Pulses below which there is no frequency.
-FEWEST_PULSES = 4
 #: Lines that may stand above the first number.
 _MOST_TITLES = 20
 

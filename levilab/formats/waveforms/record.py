@@ -15,6 +15,7 @@ from levilab.formats.waveforms.npy import read_npy
 from levilab.formats.waveforms.pulse_times import read_column
 from levilab.formats.waveforms.samples import read_samples
 from levilab.formats.waveforms.scope_binary import SUFFIXES, read_scope_binary
+from levilab.formats.waveforms.sigrok import is_sigrok, read_sigrok
 from levilab.formats.waveforms.wav import read_wav
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from levilab.formats.waveforms.waveform import PulseTimes, Waveform
 
 #: How names of files end that may hold samples, readings or pulse times, where a folder is searched.
-SEARCHED = TEXTS | SPREADSHEETS | SUFFIXES | {".wav", ".npy", ".zip", *AUDIO.suffixes}
+SEARCHED = TEXTS | SPREADSHEETS | SUFFIXES | {".wav", ".npy", ".zip", ".sr", *AUDIO.suffixes}
 
 
 def read_record(
@@ -46,17 +47,12 @@ def read_record(
     if rate is not None and not 0 < rate < 1e15:
         raise UsageError("rate", "samples per second are expected, a number above 0 [Hz]", value=rate)
     with file_errors(path):
-        _must_be_whole(path)
-        with path.open("rb") as stream:
-            magic = stream.read(64)
-        if magic[:4] in {b"RIFF", b"RIFX", b"RF64"} and magic[8:12] == b"WAVE":
-            return read_wav(path).at_rate(rate)
-        if magic.startswith(b"\x93NUMPY"):
-            return read_npy(path, rate)
-        if kind_of_bytes(magic) is AUDIO:
-            return read_audio(path).at_rate(rate)
-        if path.suffix.casefold() in SUFFIXES:
-            return read_scope_binary(path).at_rate(rate)
+        file, inside = locate(path)
+        record = None if inside else _read_binary(path, rate)
+        if record is not None:
+            return record
+        if inside or any(text.rewritten for text in texts_of(file)):
+            raise NoWaveform(path, "is a table of another program, or one in a file with several")
         head = read_head(path)
         if set(columns or ()) - {"t", "time_s"}:
             raise NoWaveform(path, "holds readings: its columns are named")
@@ -66,8 +62,20 @@ def read_record(
         return read_samples(head, dialect, columns=columns or {}, rate=rate)
 
 
-def _must_be_whole(path: Path) -> None:
-    """Raise NoWaveform for a table in a file of another form: a spreadsheet, a zip, JSON, a log with labels."""
-    file, inside = locate(path)
-    if inside or any(text.rewritten for text in texts_of(file)):
-        raise NoWaveform(path, "is a table of another program, or one in a file with several")
+def _read_binary(path: Path, rate: float | None) -> Waveform | PulseTimes | None:
+    """Read a file that is no text; None: it may be text."""
+    with path.open("rb") as stream:
+        magic = stream.read(64)
+    if magic.startswith(b"\x93NUMPY"):
+        return read_npy(path, rate)
+    if magic[:4] in {b"RIFF", b"RIFX", b"RF64"} and magic[8:12] == b"WAVE":
+        read = read_wav
+    elif kind_of_bytes(magic) is AUDIO:
+        read = read_audio
+    elif magic.startswith(b"PK") and is_sigrok(path):
+        read = read_sigrok
+    elif path.suffix.casefold() in SUFFIXES:
+        read = read_scope_binary
+    else:
+        return None
+    return read(path).at_rate(rate)

@@ -8,13 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.numbers import digits
-from levilab.formats.columns import TableError, shorten
+from levilab.formats.columns import TableError, quote_names, shorten
 from levilab.formats.waveforms.header import LONGEST_DOUBTFUL_STEP_S, Header, NoRate, NoWaveform, printed, read_header
 from levilab.formats.waveforms.rows import read_blocks
-from levilab.formats.waveforms.waveform import Signal, Waveform, about_rate, check_count, check_step
+from levilab.formats.waveforms.waveform import (
+    FEWEST_PULSES,
+    PulseTimes,
+    Signal,
+    Waveform,
+    about_rate,
+    check_count,
+    check_step,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -115,8 +123,12 @@ class _Survey:
     torn: str | None = None
 
 
-def read_samples(head: Head, dialect: Dialect, *, columns: Mapping[str, str], rate: float | None) -> Waveform:
+def read_samples(
+    head: Head, dialect: Dialect, *, columns: Mapping[str, str], rate: float | None
+) -> Waveform | PulseTimes:
     """Read a table of samples.  The file is read once for its length and its times, and again for each channel.
+
+    A logic analyser's table with a row for each change of a channel is read as the times of rising edges.
 
     Args:
         head: the beginning of the file.
@@ -139,10 +151,6 @@ def read_samples(head: Head, dialect: Dialect, *, columns: Mapping[str, str], ra
         if certain:
             raise
         raise NoWaveform(path, error.message, line=error.line) from error
-    if not certain and times.step > LONGEST_DOUBTFUL_STEP_S:
-        text = f"its rows are {times.step:g} s apart, which is no sampling of a top that spins: say `rate` if it is"
-        raise NoWaveform(path, text)
-    warnings = (*times.warnings, *_about_count(path, header, survey))
 
     def read(signal: int) -> Iterator[Array]:
         column, left = header.columns[signal], survey.count  # a last line may be torn in another column
@@ -152,11 +160,46 @@ def read_samples(head: Head, dialect: Dialect, *, columns: Mapping[str, str], ra
             if values.size:
                 yield values * column.factor if column.factor != 1 else values
 
+    if times.times is not None and (edges := _rising_edges(path, header, times.times, read)):
+        return edges
+    if not certain and times.step > LONGEST_DOUBTFUL_STEP_S:
+        text = f"its rows are {times.step:g} s apart, which is no sampling of a top that spins: say `rate` if it is"
+        raise NoWaveform(path, text)
+    warnings = (*times.warnings, *_about_count(path, header, survey))
     signals = tuple(Signal(column.name, column.unit) for column in header.columns)
     return Waveform(
         path, header.format, times.start, times.step, survey.count, signals, read, warnings, times.step_u,
         times=times.times,
     )  # fmt: skip
+
+
+def _rising_edges(
+    path: Path, header: Header, times: Array, read: Callable[[int], Iterator[Array]]
+) -> PulseTimes | None:
+    """Return the rising edges of the first channel that has some; None unless each row is a change from 0 to 1 or back.
+
+    read: from the index of a channel to its samples.
+    """
+    levels = np.zeros((len(header.columns), times.size), dtype=np.int8)
+    for k, row in enumerate(levels):
+        at = 0
+        for block in read(k):
+            if not np.isin(block, (0, 1)).all():
+                return None
+            row[at : at + block.size] = block
+            at += block.size
+    steps = np.diff(levels, axis=1)
+    if not steps[:, :-1].any(axis=0).all():  # the last row of a table may be its end alone
+        return None
+    counts = np.count_nonzero(steps > 0, axis=1)
+    chosen = int(np.argmax(counts >= FEWEST_PULSES))
+    edges = times[1:][steps[chosen] > 0]
+    if edges.size < FEWEST_PULSES:
+        raise NoWaveform(path, f"has {edges.size} rising edges, at least {FEWEST_PULSES} are needed")
+    others = [column.name for k, column in enumerate(header.columns) if counts[k] and k != chosen]
+    more = f"; {quote_names(others)} change, too: cut the other columns off for them" if others else ""
+    note = f"{path.name}: each row is a change: the rising edges of {header.columns[chosen].name} are the pulses{more}"
+    return PulseTimes(path, "changes of a logic signal", edges, (note,))
 
 
 def _about_count(path: Path, header: Header, survey: _Survey) -> Iterator[str]:

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 #: Samples that a block holds at most, where the format leaves the choice.
 BLOCK = 1 << 17
-#: Samples below which there is nothing to analyze.
-FEWEST_SAMPLES = 16
+#: Samples below which there is nothing to analyze, and pulses below which there is no frequency.
+FEWEST_SAMPLES, FEWEST_PULSES = 16, 4
 #: No sampling interval of a laboratory lies outside [s]; beyond, the numbers are no measurement.
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-15, 1e6
 #: Values beyond are no voltage of a laboratory: scopes write 9.9E37 where a sample is missing.
