@@ -12,10 +12,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from instruments.drivers import Instrument
+from instruments.drivers.counter.keysight_34461a import Agilent34401A, Keysight34461A
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.drivers.generator.agilent_33220a import Agilent33220A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
+from instruments.drivers.generator.rigol_dg1000z import RigolDG1000Z
 from instruments.drivers.generator.siglent_sdg1000x import SiglentSDG1000X
 from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
@@ -23,10 +25,13 @@ from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
 from instruments.drivers.oscilloscope.sound import SoundCard
+from instruments.drivers.oscilloscope.tektronix_tds2000 import TektronixTDS2000
+from instruments.virtual.counter.keysight_34461a import Virtual34461A
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 from instruments.virtual.generator.agilent_33220a import Virtual33220A
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
+from instruments.virtual.generator.rigol_dg1000z import DG832, VirtualDG1000Z
 from instruments.virtual.generator.siglent_sdg1000x import VirtualSDG1000X
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
@@ -34,6 +39,7 @@ from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
 from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
 from instruments.virtual.oscilloscope.siglent_sds1000xe import VirtualSDS1000XE
 from instruments.virtual.oscilloscope.sound import VirtualSoundCard
+from instruments.virtual.oscilloscope.tektronix_tds2000 import VirtualTDS2000
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -106,11 +112,36 @@ COUNTERS: tuple[Model[Counter], ...] = (
         partial(VirtualCNT91, identity="TEKTRONIX, FCA3100, VIRTUAL, V1.28 levilab"),
         "USB0::0x0699::0x3003::C010123::INSTR",
     ),
+    *(
+        Model(
+            name,
+            Keysight34461A,
+            partial(
+                Virtual34461A, lacks=("DETector",), identity=f"Keysight Technologies,{name},VIRTUAL,A.03.03-levilab"
+            ),
+            "TCPIP0::192.168.1.21::5025::SOCKET",
+        )
+        for name in ("34461A", "34460A", "34465A")
+    ),
+    Model(
+        "34401A",
+        Agilent34401A,
+        partial(Virtual34461A, lacks=("LOWer", "ABORt"), identity="HEWLETT-PACKARD,34401A,VIRTUAL,11-5-2"),
+        "GPIB0::22::INSTR",
+    ),
 )
 GENERATORS: tuple[Model[Generator], ...] = (
     Model("33500B", Keysight33500B, Virtual33500B, "USB0::0x0957::0x2807::MY52400001::INSTR"),
     Model("33220A", Agilent33220A, Virtual33220A, "USB0::0x0957::0x0407::MY44033103::INSTR"),
     Model("SDG1000X", SiglentSDG1000X, VirtualSDG1000X, "TCPIP0::192.168.1.24::INSTR", r"SDG1\d{3}X.*"),
+    Model("DG1000Z", RigolDG1000Z, VirtualDG1000Z, "USB0::0x1AB1::0x0642::DG1ZA170000001::INSTR", r"DG10\d2Z"),
+    Model(
+        "DG800",
+        RigolDG1000Z,
+        partial(VirtualDG1000Z, family=DG832, identity="Rigol Technologies,DG832,VIRTUAL,00.02.06"),
+        "USB0::0x1AB1::0x0643::DG8A230000001::INSTR",
+        r"DG8\d2|DG8\d1",
+    ),
 )
 OSCILLOSCOPES: tuple[Model[Oscilloscope], ...] = (
     Model("DS1000Z", RigolDS1000Z, VirtualDS1000Z, "TCPIP0::192.168.1.22::INSTR"),
@@ -126,6 +157,14 @@ OSCILLOSCOPES: tuple[Model[Oscilloscope], ...] = (
         ),
         "TCPIP0::192.168.1.31::hislip0::INSTR",
         answers_as=r"(DSO|MSO)-?X ?2\d{3}[A-Z]*",
+    ),
+    Model("TDS2000", TektronixTDS2000, VirtualTDS2000, "USB0::0x0699::0x036A::C100001::INSTR", r"TDS ?[12]0\d\d.*"),
+    Model(
+        "TBS1000",
+        TektronixTDS2000,
+        partial(VirtualTDS2000, channels=2, identity="TEKTRONIX,TBS 1052B,VIRTUAL,CF:91.1CT FV:v4.06"),
+        "USB0::0x0699::0x0368::C100001::INSTR",
+        r"TBS ?1\d{3}.*",
     ),
     Model("SDS1000X-E", SiglentSDS1000XE, VirtualSDS1000XE, "TCPIP0::192.168.1.32::INSTR", r"SDS1\d{3}X-[EU]"),
     Model("sound", SoundCard, VirtualSoundCard, "sound://"),

@@ -243,7 +243,7 @@ class Scope(ScpiInstrument):
         differing = self.lost_settings()
         if not differing:
             return
-        if all(name.endswith(("_v", "_s")) for name in differing):
+        if all(name.endswith(("_v", "_s", "_div")) for name in differing):
             name, (wanted, now) = next(iter(differing.items()))
             raise OutOfRange(self.transport.address, name, wanted, f"{now}, as the scope has set it")
         raise SettingsLost(self.transport.address, differing)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import choice, limit, nr3, optional_parameter, parameter, read_quoted
@@ -29,6 +29,7 @@ class VirtualGenerator(VirtualInstrument):
         clock: of the bench.
         listener: called at each change with its time [s] and the new Output of channel 1.  The end of a triggered burst
             is announced when the burst begins; a later change replaces what was announced for the time after it.
+        model: identity, numbered, lacks; see the base.
     """
 
     family: ClassVar[Family]
@@ -36,8 +37,8 @@ class VirtualGenerator(VirtualInstrument):
     #: Arbitrary waveforms that can be selected without being loaded first.
     BUILT_IN: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(self, clock: Clock, *, listener: Callable[[float, Output], None] | None = None) -> None:
-        super().__init__(clock)
+    def __init__(self, clock: Clock, *, listener: Callable[[float, Output], None] | None = None, **model: Any) -> None:
+        super().__init__(clock, **model)
         self._listener = listener
         self._text = ""
         self.channels = tuple(

@@ -32,11 +32,13 @@ if TYPE_CHECKING:
 
 #: Below the level by this part of a division the trigger is armed again.
 _HYSTERESIS = 0.3
-_CHANNEL = re.compile(r"C(?:HAN)?([1-8])")
+_CHANNEL = re.compile(r"C(?:H(?:AN)?)?([1-8])")
 #: How the words of the trigger slope are meant.
 _SLOPES: dict[str, tuple[float, ...]] = {
     "POS": (1.0,),
     "NEG": (-1.0,),
+    "RIS": (1.0,),
+    "FALL": (-1.0,),
     "RFAL": (1.0, -1.0),
     "EITH": (1.0, -1.0),
     "ALT": (1.0, -1.0),

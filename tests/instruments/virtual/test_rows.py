@@ -12,15 +12,17 @@ from instruments.virtual.generator.siglent_sdg1000x import VirtualSDG1000X
 from instruments.virtual.magnetometer.lakeshore import Fields
 from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
 from instruments.virtual.oscilloscope.siglent_sds1000xe import VirtualSDS1000XE
+from instruments.virtual.oscilloscope.tektronix_tds2000 import VirtualTDS2000
 from support import hostile
-from support.models import FAMILIES, KIND_OF, SERIAL
+from support.models import FAMILIES, KIND_OF, ROWS, SERIAL
 from support.wire import ask, errors, send
 
 #: Rows that are no settings: what they answer is no parameter, or changes by itself, or ends what goes on.
-NO_SETTING = ("*OPC", "CONFigure", "MEASure", "DISPlay:DATA", "C1:(BSWV", "C2:(BSWV", "(SCDP")
+NO_SETTING = ("*OPC", "CONFigure", "MEASure", "DISPlay:DATA", "C1:(BSWV", "C2:(BSWV", "(SCDP", "HEADer")
 #: What ``*RST`` leaves as it is, by twin; the time-out of a 53230A and the form of a Siglent's answers are in memory
 #: that keeps, masks of the status are none of its business (IEEE 488.2, 10.32).
 KEPT = {Virtual53230A: {"timeout"}, VirtualSDS1000XE: {"header"}, VirtualSDG1000X: {"header"}}
+KEPT |= {VirtualTDS2000: {"header", "verbose"}}
 MASKS = ("*ESE", "*SRE")
 #: Numbers that the instrument moves to the nearest that it can do, by twin; a sweep begins above 0 Hz.
 ADJUSTED = {VirtualDSOX1000: r"CHANnel\d:OFFSet", VirtualGenerator: r".*FREQuency:SPAN"}
@@ -37,12 +39,14 @@ def of_twin(rows, device, default):
 
 def reset(device):
     send(device, b"*RST\n")
+    if isinstance(device, VirtualTDS2000):
+        send(device, b"HEAD OFF\n")
     return device
 
 
 def prepared(name):
     """An instrument in which something was measured, so that there is something to ask for."""
-    device = hostile.instrument(name)
+    device = reset(hostile.instrument(name))
     device.clock.sleep(1.0)
     return stopped(device, name)
 
@@ -50,7 +54,7 @@ def prepared(name):
 def stopped(device, name):
     """An oscilloscope does not acquire: then its memory can be set."""
     if KIND_OF[name] == "oscilloscope":
-        send(device, b":STOP\n")
+        send(device, ROWS[name].driver.STOP.encode() + b"\n")
     return device
 
 

@@ -1,0 +1,56 @@
+"""The driver of Rigol's DG800 and DG1000Z generators."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from instruments.drivers.generator.agilent_33220a import Agilent33220A
+from instruments.drivers.generator.drive import (
+    LoadSetting,
+    OutputSwitch,
+    amplitude_setting,
+    frequency_setting,
+    offset_setting,
+)
+from instruments.drivers.setting import Setting
+from instruments.ieee488 import INFINITY, Form
+
+
+class RigolDG1000Z(Agilent33220A):
+    """Rigol DG800 and DG1000Z: DG811 to DG832, DG1022Z to DG1062Z; the first channel drives the coil.
+
+    Sources: DG800 Programming Guide, pages 2-43 (``:OUTPut``) and 2-72 (numbers with seven digits, ``1.000000E+02``),
+    DG1000Z Programming Guide; PyMeasure's DG800.  Headers are those of Agilent's 33220A, a triangle is a ramp of 50 %
+    here, too; a switch is answered with ON or OFF, and a model of one channel has no ``OUTP2``.
+    """
+
+    MODELS: ClassVar[str] = r"DG8[123][12]|DG10[236]2Z"
+    NUMBER: ClassVar[Form] = Form(r"-?\d\.\d{6}E[+-]\d{2}", "1.000000E+02")
+    OUTPUT: ClassVar[str] = "OUTP1"
+
+    waveform = Setting(
+        *("FUNC", str),
+        choices=("SINusoid", "SQUare", "RAMP"),
+        answers=("PULSe", "NOISe", "DC", "USER", "ARB", "HARMonic", "SEQ", "PRBS", "DUALtone"),
+    )
+    frequency = frequency_setting(60e6, digits=7)
+    amplitude = amplitude_setting(2e-3)
+    offset = offset_setting(digits=7)
+    load = LoadSetting("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
+    output = OutputSwitch("OUTP1", bool)
+
+    def field_of(self, answer: str, header: str, key: str) -> str:
+        """Return the answer, ON and OFF as 1 and 0."""
+        return {"ON": "1", "OFF": "0"}.get(answer, answer)
+
+    def outputs(self) -> tuple[str, ...]:
+        """Return the beginning of the headers of each output; `*IDN?` is sent first if it was not yet."""
+        if not self._fields:
+            self.identity()
+        return ("OUTP1", "OUTP2") if self._fields[1].rstrip("Z").endswith("2") else ("OUTP1",)
+
+    def _is_on(self, output: str) -> bool:
+        answer = self.field_of(self.transport.query(f"{output}?"), output, "")
+        if answer not in {"0", "1"}:
+            self.reject(f"{output}?", answer, "ON or OFF")
+        return answer == "1"
