@@ -12,7 +12,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from instruments.drivers import Instrument
-from instruments.drivers.counter.keysight_34461a import Agilent34401A, Keysight34461A
+from instruments.drivers.counter.keysight_34461a import Keysight34461A
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.drivers.generator.agilent_33220a import Agilent33220A
@@ -125,7 +125,7 @@ COUNTERS: tuple[Model[Counter], ...] = (
     ),
     Model(
         "34401A",
-        Agilent34401A,
+        Keysight34461A,
         partial(Virtual34461A, lacks=("LOWer", "ABORt"), identity="HEWLETT-PACKARD,34401A,VIRTUAL,11-5-2"),
         "GPIB0::22::INSTR",
     ),

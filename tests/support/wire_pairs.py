@@ -19,6 +19,7 @@ import instruments.virtual.servers.hislip
 from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
+from instruments.drivers.oscilloscope.tektronix_tds2000 import TektronixTDS2000
 from instruments.drivers.scpi import ScpiInstrument
 from instruments.errors import CommandRefused, InstrumentError, NotConnected
 from instruments.ieee488 import PLAIN_BLOCK, BlockForm, block_of
@@ -162,14 +163,14 @@ def _operations(driver, of_its_kind):
 
 
 #: The questions by which the counters of both makers give a series.
-_SERIES = r"(DATA:REM|FETC:ARR)\?.*"
+_SERIES = r"(DATA:REM|FETC:ARR)\?.*|READ\?"
 
 
 def _counter(driver):
     timed = {"timed readings": _readings(_SERIES, lambda driver: driver.timed_readings(3))}
     return {
         "prepare": Operation(PREPARE["counter"], _same_settings, remakes=True),
-        "set gate": _set("gate", 0.25),
+        "set gate": _set("gate", (driver.gate.values or (0.25,))[-1]),
         "reading": _reading(r"READ\?"),
         "readings": _readings(_SERIES, lambda driver: driver.readings(3)),
     } | (timed if hasattr(driver, "timed_readings") else {})
@@ -240,10 +241,18 @@ def _siglent_numbers(answer):
     return step, -count * step / 2, division / 25, -128 * (division / 25) - offset
 
 
+def _tektronix_numbers(answer):
+    """WFMPre?: step, first time, volts a code, volts at the code of 0 V and that code, by their places."""
+    fields = answer.decode().split(";")
+    step, first, per_code, zero, offset = (float(fields[place]) for place in (8, 10, 12, 13, 14))
+    return step, first, per_code, zero - (offset + 128) * per_code
+
+
 READINGS = {
     RigolDS1000Z: Reading(_rigol_numbers),
     KeysightDSOX: Reading(_keysight_numbers),
     SiglentSDS1000XE: Reading(_siglent_numbers, r"C1:WF\? DAT2", r"C1:WF\? DESC", _LECROY, 128),
+    TektronixTDS2000: Reading(_tektronix_numbers, r"CURV\?", r"WFMP\?", zero=128),
 }
 
 

@@ -1,8 +1,8 @@
-"""The drivers of Keysight's multimeters as counters: 34401A, and 34460A, 34461A, 34465A, 34470A (Truevolt)."""
+"""The driver of Keysight's multimeters as counters: 34401A, and 34460A, 34461A, 34465A, 34470A (Truevolt)."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -12,8 +12,6 @@ from instruments.errors import OutOfRange
 from instruments.ieee488 import Form
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
 
 #: Its gates [s]; the longest that may be asked for, as experiments vary theirs by a quarter; readings in one answer.
@@ -25,18 +23,21 @@ _RANGES = (0.1, 1.0, 10.0, 100.0, 750.0)
 
 
 class Keysight34461A(ReciprocalCounter):
-    """Keysight (Agilent) 34460A / 34461A / 34465A / 34470A multimeter as a counter.
+    """Keysight (Agilent, HP) 34401A / 34460A / 34461A / 34465A / 34470A multimeter as a counter.
 
-    Sources: Agilent Truevolt Series Operating and Service Guide, pages 168 and 198; public drivers.
+    Sources: Agilent Truevolt Series Operating and Service Guide, pages 168 and 198; 34401A User's Guide; PyMeasure's
+    HP34401A and its suite for a real one.
 
     - The input is a.c. coupled: it counts where the signal crosses its own mean.  So there is no trigger level; the one
       that :meth:`prepare` gets, about half of the pulses' height, chooses the range of the input.
     - There are three gates: of a length between them the shorter is taken, see :attr:`gate`.
     - Signals from 3 Hz on need the slow filter: after a reset it is the one from 20 Hz on.
     - Without a signal it answers 0.
+    - A 34401A has another header for the filter.  On its serial line it takes no command before ``SYSTem:REMote``, on
+      GPIB that command is an error; 9600 baud and two stop bits, parity and data bits as its menu says.
     """
 
-    MODELS: ClassVar[str] = r"344(6[015]|70)A"
+    MODELS: ClassVar[str] = r"344(01|6[015]|70)A"
     NUMBER: ClassVar[Form] = Form(r"[+-]\d\.\d{8}E[+-]\d{2}", "+1.00000000E-01")
 
     gate = Setting("FREQ:APER", float, unit="s", values=_GATES)
@@ -49,6 +50,10 @@ class Keysight34461A(ReciprocalCounter):
         """See the base: one input."""
         return (1,)
 
+    def header_in_use(self, header: str) -> str:
+        """See the base."""
+        return "DET:BAND" if header == "FREQ:RANG:LOW" and "34401A" in self._fields else header
+
     def prepare(self, *, gate_s: float, trigger_level_v: float, channel: int = 1) -> None:
         """Set the multimeter up; see :class:`Counter`.  Raises OutOfRange for a level beyond its ranges."""
         address = self.transport.address
@@ -60,6 +65,10 @@ class Keysight34461A(ReciprocalCounter):
         wide = next((limit for limit in _RANGES if limit >= abs(trigger_level_v)), None)
         if wide is None:
             raise OutOfRange(address, "trigger_level", trigger_level_v, f"up to {_RANGES[-1]:g} V")
+        if "::" not in address or address.upper().startswith("ASRL"):
+            self.transport.write("SYST:REM")
+        if not self._fields:
+            self.identity()
         self._unsent_end = ()
         self.command("CONF:FREQ")  # trigger and range as after a reset, then what this signal needs
         self.gate = gate
@@ -87,24 +96,3 @@ class Keysight34461A(ReciprocalCounter):
         """See the base: a device clear ends a measurement, a 34401A has no ABORt."""
         self.transport.clear()
         self.forget_errors()
-
-
-class Agilent34401A(Keysight34461A):
-    """Keysight (Agilent, HP) 34401A multimeter as a counter: an older dialect, GPIB or RS-232.
-
-    Sources: Agilent 34401A User's Guide; PyMeasure's HP34401A and its suite for a real one.  On a serial line it takes
-    no command before ``SYSTem:REMote``; on GPIB that command is an error.
-    """
-
-    MODELS: ClassVar[str] = "34401A"
-    #: As it leaves the factory; its menu also has 8 bits without parity.
-    SERIAL: ClassVar[Mapping[str, Any]] = {"baud_rate": 9600, "data_bits": 7, "parity": "even", "stop_bits": 2.0}
-
-    slowest = Setting("DET:BAND", float, unit="Hz", values=(3.0, 20.0, 200.0))
-
-    def prepare(self, *, gate_s: float, trigger_level_v: float, channel: int = 1) -> None:
-        """See the base."""
-        address = self.transport.address
-        if "::" not in address or address.upper().startswith("ASRL"):
-            self.transport.write("SYST:REM")
-        super().prepare(gate_s=gate_s, trigger_level_v=trigger_level_v, channel=channel)

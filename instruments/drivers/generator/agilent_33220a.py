@@ -27,6 +27,7 @@ class Agilent33220A(DriveGenerator):
     #: User's Guide, answers of APPLy? and FREQuency?.
     NUMBER: ClassVar[Form] = Form(r"[+-]\d\.\d{13}E[+-]\d{2}", "+1.0000000000000E+03")
     OUTPUT: ClassVar[str] = "OUTP"
+    TRIANGLE_IS_RAMP = True
 
     waveform = Setting("FUNC", str, choices=("SINusoid", "SQUare", "RAMP"), answers=("PULSe", "NOISe", "DC", "USER"))
     symmetry = Setting("FUNC:RAMP:SYMM", float, unit="percent", low=0.0, high=100.0)
@@ -35,9 +36,3 @@ class Agilent33220A(DriveGenerator):
     offset = offset_setting(digits=14)
     load = LoadSetting("OUTP:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
     output = OutputSwitch("OUTP", bool)
-
-    def _shape(self, waveform: str) -> None:
-        triangle = waveform.upper() == "TRI"
-        self.waveform = "RAMP" if triangle else waveform
-        if triangle:
-            self.symmetry = 50.0

@@ -93,15 +93,20 @@ def offset_setting(digits: int) -> LimitedSetting:
 
 
 class DriveGenerator(ScpiInstrument):
-    """What both families do with their settings.  OUTPUT: how the headers of the output begin."""
+    """What both families do with their settings.
+
+    OUTPUT: how the headers of the output begin; TRIANGLE_IS_RAMP: whether it has no triangle, but a symmetry of ramps.
+    """
 
     OUTPUT: ClassVar[str]
+    TRIANGLE_IS_RAMP: ClassVar[bool] = False
 
     waveform: Setting[str]
     frequency: Setting[float]
     amplitude: Setting[float]
     offset: Setting[float]
     output: Setting[bool]
+    symmetry: Setting[float]
     #: Whether the signal that is set is one of :meth:`prepare`, under the limits as they are.
     prepared_here: bool
 
@@ -165,7 +170,11 @@ class DriveGenerator(ScpiInstrument):
             self.offset = offset_v
 
     def _shape(self, waveform: str) -> None:
-        self.waveform = waveform
+        """Set the waveform; a triangle is a ramp of 50 % where the instrument has none."""
+        triangle = waveform.upper() == "TRI" and self.TRIANGLE_IS_RAMP
+        self.waveform = "RAMP" if triangle else waveform
+        if triangle:
+            self.symmetry = 50.0
 
     def outputs(self) -> tuple[str, ...]:
         """Return the beginning of the headers of each output."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from instruments.drivers.generator.agilent_33220a import Agilent33220A
 from instruments.drivers.generator.drive import (
+    DriveGenerator,
     LoadSetting,
     OutputSwitch,
     amplitude_setting,
@@ -16,7 +16,7 @@ from instruments.drivers.setting import Setting
 from instruments.ieee488 import INFINITY, Form
 
 
-class RigolDG1000Z(Agilent33220A):
+class RigolDG1000Z(DriveGenerator):
     """Rigol DG800 and DG1000Z: DG811 to DG832, DG1022Z to DG1062Z; the first channel drives the coil.
 
     Sources: DG800 Programming Guide, pages 2-43 (``:OUTPut``) and 2-72 (numbers with seven digits, ``1.000000E+02``),
@@ -27,12 +27,14 @@ class RigolDG1000Z(Agilent33220A):
     MODELS: ClassVar[str] = r"DG8[123][12]|DG10[236]2Z"
     NUMBER: ClassVar[Form] = Form(r"-?\d\.\d{6}E[+-]\d{2}", "1.000000E+02")
     OUTPUT: ClassVar[str] = "OUTP1"
+    TRIANGLE_IS_RAMP = True
 
     waveform = Setting(
         *("FUNC", str),
         choices=("SINusoid", "SQUare", "RAMP"),
         answers=("PULSe", "NOISe", "DC", "USER", "ARB", "HARMonic", "SEQ", "PRBS", "DUALtone"),
     )
+    symmetry = Setting("FUNC:RAMP:SYMM", float, unit="percent", low=0.0, high=100.0)
     frequency = frequency_setting(60e6, digits=7)
     amplitude = amplitude_setting(2e-3)
     offset = offset_setting(digits=7)

@@ -32,9 +32,8 @@ _WFID, _STEP, _START, _PER_CODE, _ZERO, _OFFSET, _FIELDS = 6, 8, 10, 12, 13, 14,
 
 
 def _value(answer: str) -> str:
-    """Return the value of an answer, without the header that there may be again after a reset; a switch as 0 or 1."""
-    value = answer.partition(" ")[2] if answer.startswith(":") else answer
-    return {"ON": "1", "OFF": "0"}.get(value, value)
+    """Return the value of an answer, without the header that there may be again after a reset."""
+    return answer.partition(" ")[2] if answer.startswith(":") else answer
 
 
 class _TektronixChannel(Channel):
@@ -60,8 +59,9 @@ class _TektronixChannel(Channel):
         return f"SEL:CH{self.number}" if header == "SEL" else super().header_in_use(header)
 
     def field_of(self, answer: str, header: str, key: str) -> str:
-        """See `_value`."""
-        return _value(answer)
+        """Return the value; that of a switch, which is ON or OFF, as 1 or 0."""
+        value = _value(answer)
+        return {"ON": "1", "OFF": "0"}.get(value, "") if header == "INV" else value
 
 
 class TektronixTDS2000(Scope):
@@ -134,7 +134,7 @@ class TektronixTDS2000(Scope):
     def _scaling(self, setup: Setup) -> dict[str, Value]:
         wanted = super()._scaling(setup)
         del wanted["offset"]
-        return wanted | {"position": -setup.offset_v / setup.volts_per_division}
+        return wanted | {"position": 0.0 - setup.offset_v / setup.volts_per_division}
 
     # --- acquiring ---
 

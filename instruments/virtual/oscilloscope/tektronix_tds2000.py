@@ -96,7 +96,7 @@ _CHANNEL: tuple[Row, ...] = (
 _ROWS: tuple[Row, ...] = (
     Switch("HEADer", "header", default=True),
     Switch("VERBose", "verbose", default=True),
-    LongWord("LOCk", "lock", "*NONe ALL"),
+    LongWord("LOCk", "lock", "*NONE ALL"),
     # acquisition and time
     Own("ACQuire:STATE", lambda s, p: s.set_state(p), lambda s: s.reply("ACQuire:STATE", str(int(s.running())))),
     LongWord("ACQuire:STOPAfter", "stop_after", "*RUNSTop SEQuence"),

@@ -38,9 +38,10 @@ _OF_ANY_LENGTH = {
     "475": r"\d{1,2}",
     "SDG1000X": _SIGLENT,
     "SDS1000X-E": r"0|[1-9]\d{0,4}",
+    "TDS2000": r"-?\d\.\d{1,9}E-?\d{1,2}|[+-]?\d+",
 }
 #: Those that print a sign where the number is negative, and no other.
-_MINUS_ALONE = {"DS1000Z"}
+_MINUS_ALONE = {"DS1000Z", "DG1000Z"}
 #: What instruments pass over before and behind a message (IEEE 488.2-1992, 7.4.1.2).
 WHITE_SPACE = "".join(map(chr, range(33)))
 _STATES = {"RUN", "WAIT", "TD", "AUTO", "STOP"}
