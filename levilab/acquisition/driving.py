@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
@@ -50,6 +50,8 @@ _DRIFTS_HZ, _DRIFTS_BY_U, _FEWEST_IN_HALF = 0.1, 3.0, 3
 _LOOK_EVERY_S, _TRIES_TO_HOLD = 10.0, 4
 #: Interval between looks for a top that a person was asked for [s].
 _LOOK_FOR_TOP_S = 2.0
+#: Time that a person has to spin the top of a spin-down without a drive [s].
+_BY_HAND_S = 600.0
 #: Tries of a point of a sweep, and failed points in succession that end the sweep.
 TRIES, MOST_FAILED = 2, 3
 
@@ -65,11 +67,20 @@ class DriveSettings(CounterSettings):
     drive_frequency_hz: PositiveFloat = Field(default=40.0, description="drive the top up to this,")
     ramp_hz_per_s: PositiveFloat = Field(default=0.05, description="no faster than it can follow")
     drive_amplitude_vpp: PositiveFloat = 10.0
-    drive_waveform: Literal["SIN", "SQU", "TRI"] = Field(default="SIN", description="SIN, SQU or TRI")
+    drive_waveform: Literal["SIN", "SQU", "TRI", "NONE"] = Field(
+        default="SIN", description="SIN, SQU or TRI; NONE: spun by hand"
+    )
     hold_s: NonNegativeFloat = Field(default=20.0, description="hold it there, and compare its spin with the drive")
+
+    #: Whether a top that is spun by hand will do.
+    by_hand: ClassVar[bool] = False
 
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for a drive that the bench does not allow."""
+        if self.drive_waveform == "NONE":
+            if not self.by_hand:
+                raise ConfigError(f"{table}.drive_waveform = NONE: this experiment needs a drive, SIN, SQU or TRI")
+            return
         check_drive(table, limits, self.drive_amplitude_vpp, [("drive_frequency_hz", self.drive_frequency_hz)])
         slowest = self.drive_frequency_hz / _LONGEST_RAMP_S
         if self.ramp_hz_per_s < slowest:
@@ -77,6 +88,11 @@ class DriveSettings(CounterSettings):
                 f"{table}.ramp_hz_per_s = {self.ramp_hz_per_s:g} would raise the top for hours to "
                 f"{table}.drive_frequency_hz = {self.drive_frequency_hz:g}: at least {slowest:.2g} is expected"
             )
+
+
+def drives(settings: DriveSettings) -> tuple[str, ...]:
+    """Return the generator, unless the top is spun by hand."""
+    return () if settings.drive_waveform == "NONE" else ("generator",)
 
 
 def check_drive(table: str, limits: Limits, amplitude_vpp: float, frequencies: Iterable[tuple[str, float]]) -> None:
@@ -149,7 +165,11 @@ def drive_until(session: Session[D], steps: Callable[[Session[D]], None]) -> Non
 
 
 def drive_up_and_let_go(session: Session[D]) -> None:
-    """Drive the top up, hold it while its motion settles, and let it go."""
+    """Drive the top up, hold it while its motion settles, and let it go; or see that one was spun by hand."""
+    if session.settings.drive_waveform == "NONE":
+        have_a_top(session, "Spin the top and let it float.", len(session.rows), within_s=_BY_HAND_S)
+        session.event(RunEvent.COASTS, "the top was spun by hand and spins down freely")
+        return
     drive_until(session, lambda _: None)
     session.event(RunEvent.DRIVE_OFF, "drive off, the top spins down freely")
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from instruments.clock import Clock, WallClock
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits
-from levilab.bench.kinds import COUNTER, KINDS
+from levilab.bench.kinds import COUNTER, GENERATOR, KINDS
 from levilab.bench.person import Person, ask_no_person
 
 if TYPE_CHECKING:
@@ -15,6 +15,12 @@ if TYPE_CHECKING:
 
     from levilab.bench.config import BenchConfig
     from levilab.telemetry.messages import Poses
+
+#: Kind of instrument → what can be done without one.
+_INSTEAD = {
+    COUNTER.name: ', or count_with = "oscilloscope" at its top',
+    GENERATOR.name: ", or spin the top by hand: --set drive_waveform=NONE, for spin-down and lower limit",
+}
 
 
 @dataclass(frozen=True)
@@ -41,7 +47,7 @@ class Wiring:
         """
         kind = self.count_with if kind == COUNTER.name else kind
         if kind not in self.instruments:
-            instead = ', or count_with = "oscilloscope" at its top' if kind == COUNTER.name else ""
+            instead = _INSTEAD.get(kind, "")
             what = f"the bench file describes no {kind}: add a table [{kind}] with model and address"
             raise ConfigError(what + instead)
         settings = self.instruments[kind]

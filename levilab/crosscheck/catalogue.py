@@ -10,6 +10,13 @@ from levilab.crosscheck.subjects import field, motion, precession, spin, spindow
 SUBJECTS = MappingProxyType(
     {
         subject.name: subject
-        for subject in (spin.SUBJECT, spindown.SUBJECT, motion.SUBJECT, precession.SUBJECT, field.SUBJECT)
+        for subject in (
+            spin.SUBJECT,
+            spindown.SUBJECT,
+            spindown.SOUND,
+            motion.SUBJECT,
+            precession.SUBJECT,
+            field.SUBJECT,
+        )
     }
 )

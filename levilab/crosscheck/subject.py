@@ -74,13 +74,18 @@ class Subject:
 
 
 def acquire_mock(
-    experiment: str, seed: int, folder: Path, change: Callable[[AcquisitionRequest], AcquisitionRequest]
+    experiment: str,
+    seed: int,
+    folder: Path,
+    change: Callable[[AcquisitionRequest], AcquisitionRequest],
+    *,
+    scope: str | None = None,
 ) -> Run:
-    """Return a finished run of a mock experiment.  change: puts it into a world of known numbers.
+    """Return a finished run of a mock experiment.  change: puts it into a world of known numbers; scope: that counts.
 
     Raises TrialFailed; KeyboardInterrupt where Ctrl-C ended the run: it is meant for the whole cross-check.
     """
-    request = request_for(experiment, AcquisitionOptions(mock=True, out=folder, seed=seed))
+    request = request_for(experiment, AcquisitionOptions(mock=True, out=folder, seed=seed, scope=scope))
     run = acquire(change(request), Display())
     if run.status == "interrupted":
         raise KeyboardInterrupt

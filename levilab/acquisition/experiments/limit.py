@@ -21,6 +21,7 @@ from levilab.acquisition.driving import (
     compare_with_drive,
     drive_until,
     drive_up_and_let_go,
+    drives,
     have_a_top,
     held_spin,
     is_over,
@@ -49,6 +50,7 @@ class LimitSettings(DriveSettings):
     """Drive up and hold, then let go (lower) or creep upwards (upper) until the top is lost; again and again."""
 
     one_top: ClassVar[bool] = False
+    by_hand: ClassVar[bool] = True
 
     which: Literal["lower", "upper"] = Field(default="lower", description="lower, or upper")
     repetitions: PositiveInt = Field(default=10, description="number of tops, one after another")
@@ -63,6 +65,8 @@ class LimitSettings(DriveSettings):
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for a drive that the bench does not allow."""
         super().check(table, limits)
+        if self.which == "upper" and self.drive_waveform == "NONE":
+            raise ConfigError(f"{table}.drive_waveform = NONE: the upper limit needs a drive, SIN, SQU or TRI")
         if self.which == "upper":
             check_drive(table, limits, self.drive_amplitude_vpp, [("highest_hz", self.highest_hz)])
         if self.which == "upper" and self.highest_hz <= self.drive_frequency_hz:
@@ -73,10 +77,10 @@ class LimitSettings(DriveSettings):
 
 
 def channels(settings: LimitSettings) -> tuple[Channel, ...]:
-    """Return the same for both limits."""
+    """Return the same for both limits, without those of the drive where there is none."""
     limit = "at which the free top fell" if settings.which == "lower" else "up to which the top followed the drive"
     seen = "the lowest one counted" if settings.which == "lower" else "the last one counted of the held top"
-    return (
+    columns = (
         Channel("time_s", "s", "bench clock, from the first top on, when it was lost"),
         Channel("spin_frequency_hz", "Hz", f"spin {limit}"),
         Channel("spin_frequency_u_hz", "Hz", "its standard uncertainty, from the counts and the moment"),
@@ -84,6 +88,7 @@ def channels(settings: LimitSettings) -> tuple[Channel, ...]:
         Channel("drive_frequency_hz", "Hz", "generator, the last setting at which the top was held"),
         Channel("drive_amplitude_v", "V", "generator, half of peak to peak"),
     )
+    return columns if drives(settings) else columns[:-2]
 
 
 def run(session: Session[LimitSettings]) -> None:
@@ -209,11 +214,15 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_sinc
     if lowest < limit.value:  # not the bound that it seems to be
         words += ", below the line by its scatter"
     session.event(RunEvent.FELL, f"{text}; {words}", spin_frequency_hz=limit.value)
-    return {
+    row: Row = {
         "time_s": session.now(),
         "spin_frequency_hz": limit.value,
         "spin_frequency_u_hz": limit.u,
         "spin_seen_hz": lowest,
+    }
+    if not drives(settings):
+        return row
+    return row | {
         "drive_frequency_hz": settings.drive_frequency_hz,
         "drive_amplitude_v": settings.drive_amplitude_vpp / 2,
     }
@@ -302,7 +311,8 @@ def _say_how_it_was_lost(
 EXPERIMENT = Experiment(
     name="limit",
     about="the lowest spin of a free top, or the highest that a drive can hold, top after top",
-    instruments=("counter", "generator"),
+    instruments=("counter",),
+    also_needs=drives,
     settings=LimitSettings,
     channels=channels,
     run=run,

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from levilab.acquisition.counting import FreeTop, prepare_counter
-from levilab.acquisition.driving import DriveSettings, drive_up_and_let_go
+from levilab.acquisition.driving import DriveSettings, drive_up_and_let_go, drives
 from levilab.acquisition.experiment import Experiment
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
@@ -33,6 +33,8 @@ _POWERS = (1.0, 2.0)
 
 class SpinSettings(DriveSettings):
     """Drive up to a frequency, switch off, read until the top falls."""
+
+    by_hand: ClassVar[bool] = True
 
 
 def channels(settings: SpinSettings) -> tuple[Channel, ...]:
@@ -140,7 +142,8 @@ def _power_integral(start: float, end: float, power: float) -> float:
 EXPERIMENT = Experiment(
     name="spin",
     about="drive the top up, switch the drive off, and count its spin until it falls",
-    instruments=("counter", "generator"),
+    instruments=("counter",),
+    also_needs=drives,
     settings=SpinSettings,
     channels=channels,
     run=run,

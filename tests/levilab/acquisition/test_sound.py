@@ -173,3 +173,20 @@ def test_any_oscilloscope_can_count(tmp_path):
     frequency, u = (run.readings().column(name) for name in ("spin_frequency_hz", "spin_frequency_u_hz"))
     assert frequency[0] == pytest.approx(35.0, abs=0.3)
     assert (u > 0).all()
+
+
+@pytest.mark.parametrize("experiment", ["spin", "limit"])
+def test_a_top_that_is_spun_by_hand_needs_no_generator(experiment, tmp_path):
+    more = ("limit.repetitions=2",) if experiment == "limit" else ()
+    run = acquire(request(experiment, tmp_path, f"{experiment}.drive_waveform=NONE", *more), Silent())
+    assert "generator" not in run.record.instruments
+    assert run.count() == 2 if more else run.count() > 5
+    analysis = ANALYSES["limit" if more else "spindown"]
+    assert analysis.analyze([run.folder], analysis.options_from({})).runs
+
+
+@pytest.mark.parametrize("settings", [("limit.which=upper",), ()])
+def test_what_needs_a_drive_is_refused_without_one(settings, tmp_path):
+    experiment = "limit" if settings else "precession"
+    with pytest.raises(UsageError, match=r"drive_waveform = NONE: th.* needs a drive"):
+        request(experiment, tmp_path, *settings, f"{experiment}.drive_waveform=NONE")

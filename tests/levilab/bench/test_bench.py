@@ -396,7 +396,7 @@ def test_an_empty_description_is_a_bench_without_instruments(tmp_path):
         ("[spin]\ngate_s = 'long'", "spin.gate_s = 'long'"),
         ("[spin]\ngate_s = -1", "spin.gate_s = '-1'"),
         ("[spin]\ngate_s = inf", "spin.gate_s = 'inf'"),
-        ("[spin]\ndrive_waveform = 'SAW'", "'SIN', 'SQU' or 'TRI'"),
+        ("[spin]\ndrive_waveform = 'SAW'", "'SIN', 'SQU', 'TRI' or 'NONE'"),
         ("[limits]\ndrive_amplitude_vpp = nan", "limits.drive_amplitude_vpp"),
         ("[counter]\nmodel = '53230A'", "counter.address: is missing"),
         ("counter = 3", "counter = '3'"),
