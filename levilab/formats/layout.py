@@ -88,7 +88,10 @@ def sniff(source: Text) -> Layout:
         alone = "; number the rows in a column of their own if there is but one"
         seen = f"'{shorten(line.strip())}' begins no table of at least two columns"
         raise NoTable(path, f"{seen}; {EXPORT}{alone}", line=at)
-    return _with_sample(source, lay_out(lines, encoding, dialect, head), lines)
+    layout = lay_out(lines, encoding, dialect, head)
+    if source.aligned and not layout.width:
+        raise NoTable(path, "holds no rows of numbers")
+    return _with_sample(source, layout, lines)
 
 
 def _with_sample(source: Text, layout: Layout, lines: list[str]) -> Layout:

@@ -116,9 +116,10 @@ def _plain_lines(text: Text, layout: Layout) -> tuple[int, bytes]:
             lines += int(np.count_nonzero(codes == ord("\n")))
             separators += int(np.count_nonzero(codes == separator))
             # pandas ends a field at the one, and a line at the other, wherever it stands
-            if b"\0" in block or block.count(b"\r") != block.count(b"\r\n"):
+            if b"\0" in block or (b"\r" in block and block.count(b"\r") != block.count(b"\r\n")):
                 return 0, b""
-            if any(word in block for word in TRUTHS):
+            # a single letter is found ten times as fast as a word
+            if any(letter in block for letter in (b"u", b"U", b"s", b"S")) and any(word in block for word in TRUTHS):
                 return 0, b""
     return (lines, rest) if separators == lines * (layout.width - 1) else (0, b"")
 

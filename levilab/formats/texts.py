@@ -26,7 +26,7 @@ from levilab.formats.dress import undress
 #: needs several times as much memory.
 MOST_UNPACKED = 1 << 29
 #: Cells of a sheet from its first to its last one, empty ones included: one filled cell far down makes billions.
-MOST_CELLS = 20_000_000
+MOST_CELLS = 30_000_000
 #: Members of an archive: each costs a look.
 MOST_MEMBERS = 10_000
 #: Bytes of a text that is written in another form (JSON, log of an Arduino) and read as a whole.
@@ -115,6 +115,11 @@ def _texts(file: Path, _: int, size: int) -> tuple[Text, ...]:
     return (Text(file, dressed.content, dressed.titles) if dressed else Text(file),)
 
 
+def forget() -> None:
+    """Forget the texts of the files that were opened."""
+    _texts.cache_clear()
+
+
 def _read(file: Path, size: int) -> bytes:
     if size > MOST_REWRITTEN:
         raise TableError(file, f"has {size >> 20} MB, up to {MOST_REWRITTEN >> 20} MB are read in this form: use CSV")
@@ -195,41 +200,47 @@ def _blocks(file: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, most:
 # --- spreadsheets --------------------------------------------------------------------------------------
 
 
-_ADDRESS = re.compile(rb'\br="([A-Z]{1,3})(\d{1,7})"')
+_ADDRESS = re.compile(rb"r=[\"']([A-Z]{1,3})(\d{1,7})")
+#: The address of a cell right of column Z or below row 999 999; without any such a sheet is of an allowed size.
+_FAR = re.compile(rb"r=[\"'](?:[A-Z]{2}|[A-Z]\d{7})")
 _OPENED = re.compile(rb"<table:(table|table-row|table-cell|covered-table-cell)(?![\w-])([^<>]*)>")
-_REPEATED = re.compile(rb'number-(?:rows|columns)-repeated="(\d+)"')
+_REPEATED = re.compile(rb"number-(?:rows|columns)-repeated=[\"'](\d+)")
 
 
 def _check(file: Path, archive: zipfile.ZipFile, members: Sequence[zipfile.ZipInfo]) -> list[Text]:
     """Refuse a workbook that is too large: its bytes, its cells, its repeated texts.  Returns nothing to read."""
     left, longest, texts = MOST_UNPACKED, 0, 0
     for member in members:
-        name = member.filename
-        size = rows = columns = 0
-        shared = name.endswith("sharedStrings.xml")
-        rest = b""
-        ods = _OdsCells() if name == "content.xml" else None
+        far, ods, rest = False, _OdsCells(), b""
         for block in _blocks(file, archive, member, left):
-            size += len(block)
+            left -= len(block)
             rest += block
-            if ods:
+            if member.filename == "content.xml":
                 ods.feed(rest)
-            elif shared:
-                longest = max([longest, *map(len, rest.split(b"</si>"))])
-            elif name.startswith("xl/worksheets/"):
-                found = _ADDRESS.findall(rest)
-                rows = max([rows, *(int(row) for _, row in found)])
-                columns = max([columns, *(_column(letters) for letters in {letters for letters, _ in found})])
-                texts += rest.count(b't="s"')
-            end = rest.rfind(b"</si>") if shared else rest.rfind(b"<")
-            rest = rest[max(end, 0) :]
-        left -= size
-        rows, columns = (ods.rows, ods.columns) if ods else (rows, columns)
+            if b"</si>" in rest:
+                longest = max(longest, *map(len, rest.split(b"</si>")))
+            far = far or _FAR.search(rest) is not None
+            texts += rest.count(b't="s"') + rest.count(b"t='s'")
+            rest = rest[max(rest.rfind(b"<"), 0) :]
+        rows, columns = (
+            _extent(_blocks(file, archive, member, MOST_UNPACKED)) if far else (ods.rows, ods.columns)
+        )  # fmt: skip
         if rows * columns > MOST_CELLS:
             raise _too_large(file, f"{rows:,} rows of {columns:,} columns")
     if longest * texts > 4 * MOST_UNPACKED:
         raise _too_large(file, f"{texts:,} cells with texts of up to {longest:,} letters")
     return []
+
+
+def _extent(blocks: Iterable[bytes]) -> tuple[int, int]:
+    """Return the last row and the last column of a sheet of Excel."""
+    rows, columns, rest = 0, 0, b""
+    for block in blocks:
+        found = _ADDRESS.findall(rest + block)
+        rows = max([rows, *(int(row) for _, row in found)])
+        columns = max([columns, *(_column(letters) for letters in {letters for letters, _ in found})])
+        rest = block[-20:]  # an address may lie across two blocks
+    return rows, columns
 
 
 def _column(letters: bytes) -> int:
@@ -292,12 +303,18 @@ def _must_be_of_a_size(file: Path, sheets: Sequence[Any]) -> None:
 
 def _lines(rows: Sequence[Sequence[Any]]) -> bytes:
     """Return a sheet as lines with tabs and decimal points, each number to its last bit."""
-    texts = {type(cell) for row in rows for cell in row}
-    if texts <= {float, int}:
-        return "".join(["\t".join(map(repr, row)) + "\n" for row in rows]).encode()
-    comma = not any(isinstance(cell, str) and _POINTED.fullmatch(cell) for row in rows for cell in row)
+    texts = [cell for row in rows for cell in row if cell.__class__ is str and cell]
+    comma = not any(map(_POINTED.fullmatch, texts))
     write = {**_CELLS, str: _with_points if comma else _plain}
-    return "".join(["\t".join([write[type(cell)](cell) for cell in row]) + "\n" for row in rows]).encode()
+
+    def line(row: Sequence[Any]) -> str:
+        plain = _NUMBERS.issuperset(map(type, row))
+        return "\t".join(map(repr, row) if plain else [write[type(cell)](cell) for cell in row])
+
+    return "".join([f"{line(row)}\n" for row in rows]).encode()
+
+
+_NUMBERS = frozenset({float, int})
 
 
 #: Numbers typed as text, with a decimal point, with a decimal comma and perhaps a unit.
