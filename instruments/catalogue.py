@@ -15,6 +15,7 @@ from instruments.drivers import Instrument
 from instruments.drivers.counter.keysight_34461a import Keysight34461A
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
+from instruments.drivers.counter.phyphox import Phyphox
 from instruments.drivers.generator.agilent_33220a import Agilent33220A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.drivers.generator.rigol_dg1000z import RigolDG1000Z
@@ -29,6 +30,7 @@ from instruments.drivers.oscilloscope.tektronix_tds2000 import TektronixTDS2000
 from instruments.virtual.counter.keysight_34461a import Virtual34461A
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
+from instruments.virtual.counter.phyphox import VirtualPhyphox
 from instruments.virtual.generator.agilent_33220a import Virtual33220A
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from instruments.virtual.generator.rigol_dg1000z import DG832, VirtualDG1000Z
@@ -129,6 +131,7 @@ COUNTERS: tuple[Model[Counter], ...] = (
         partial(Virtual34461A, lacks=("LOWer", "ABORt"), identity="HEWLETT-PACKARD,34401A,VIRTUAL,11-5-2"),
         "GPIB0::22::INSTR",
     ),
+    Model("phyphox", Phyphox, VirtualPhyphox, "phyphox://192.168.1.40:8080"),
 )
 GENERATORS: tuple[Model[Generator], ...] = (
     Model("33500B", Keysight33500B, Virtual33500B, "USB0::0x0957::0x2807::MY52400001::INSTR"),

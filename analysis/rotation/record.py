@@ -54,11 +54,20 @@ class Record:
         unit: standard deviation of the differences of neighbours over √2, the greatest of the axes [T].
         late_of_half: `late` over `half`, shape (n,); `powers` its powers 0 to 3, shape (n, 4).
         others: lines beside that of the spin.
+        mains_hz: frequencies of the mains, which are the first of those [Hz].
     """
 
-    def __init__(self, times: Array, field: Array, others: Sequence[Line] = ()) -> None:
+    def __init__(
+        self,
+        times: Array,
+        field: Array,
+        others: Sequence[Line] = (),
+        *,
+        mains_hz: tuple[float, ...] = MAINS_HZ,
+    ) -> None:
         from scipy.sparse import csr_array
 
+        self.mains_hz = mains_hz
         self.middle = float(times.mean())
         self.late = times - self.middle
         self.half = 0.5 * float(times[-1] - times[0])
@@ -84,11 +93,11 @@ class Record:
 
     def at(self, times: Array) -> Record:
         """Return the same samples at other times."""
-        return Record(times, self.field * self.unit, self.others_at(0.0))
+        return Record(times, self.field * self.unit, self.others_at(0.0), mains_hz=self.mains_hz)
 
     def others_at(self, later: float) -> list[Line]:
         """Return the lines beside spin and mains at a middle that is later [s]."""
-        return [one.at(later) for one in self.others[len(MAINS_HZ) :]]
+        return [one.at(later) for one in self.others[len(self.mains_hz) :]]
 
     def _band(self, values: Array, first: NDArray[np.int64], size: int) -> Array:
         """Return the Cholesky factor of the spline's normal matrix, in banded form."""
@@ -103,8 +112,8 @@ class Record:
 
     def add_lines(self, lines: Sequence[Line]) -> None:
         """Add lines beside those of the mains."""
-        self.others: tuple[Line, ...] = (*map(Line, MAINS_HZ), *lines)
-        frequency, chirp = np.array([(line.frequency, line.chirp) for line in self.others]).T
+        self.others: tuple[Line, ...] = (*map(Line, self.mains_hz), *lines)
+        frequency, chirp = np.array([(line.frequency, line.chirp) for line in self.others]).reshape(-1, 2).T
         angle = 2 * np.pi * self.late[:, None] * (frequency + 0.5 * chirp * self.late[:, None])
         wave = np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
         self._lines = (wave[:, :, None] * self.powers[:, None, :3]).reshape(self.late.size, -1)

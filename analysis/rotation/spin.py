@@ -30,7 +30,9 @@ LEAST_GAIN = 26.0
 WEAK_GAIN = 40.0
 
 
-def spin_of_field(times: ArrayLike, field: ArrayLike, *, near: float | None = None) -> FieldSpin:
+def spin_of_field(
+    times: ArrayLike, field: ArrayLike, *, near: float | None = None, mains_hz: tuple[float, ...] = MAINS_HZ
+) -> FieldSpin:
     """Estimate spin and slope of a top from samples of the field beside it.
 
     The line has its own amplitude and phase in each axis; offset, drift, slow swings, mains and two more lines are
@@ -41,12 +43,13 @@ def spin_of_field(times: ArrayLike, field: ArrayLike, *, near: float | None = No
         times: shape (n,), not decreasing [s]; up to about 12 s, in which the slope changes little.
         field: shape (n, k) or (n,), k = 1 to 3 axes [T]; samples with a NaN are left out.
         near: about where the spin is, to 10 % [Hz].
+        mains_hz: frequencies of the mains; a spin there, or where they are folded to, is not seen [Hz].
 
     Raises:
         TooFewReadings, ShapesDiffer, NotFinite, TimesNotIncreasing: see `analysis.errors`.
         NoLine: nothing stands out of the noise.
     """
-    record = Record(*read_samples(times, field))
+    record = Record(*read_samples(times, field), mains_hz=mains_hz)
     low, high = limits_near(near)
     fit = strongest(record, low, high)
     images = images_between((fit.frequency, fit.frequency), record.rate, low, high)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from instruments.links.http import HttpTransport
 from instruments.links.serial_port import SerialTransport
 from instruments.links.sound import SoundLink
 from instruments.links.visa import VisaTransport
@@ -15,7 +17,15 @@ if TYPE_CHECKING:
     from instruments.links.transport import TrafficLog, Transport
 
 #: Scheme of an address → the link to it, with the arguments of `open_link` but for `line`.
-LINKS: dict[str, Callable[..., Transport]] = {"sound": SoundLink}
+LINKS: dict[str, Callable[..., Transport]] = {
+    "phyphox": partial(
+        HttpTransport,
+        port=8080,  # 80 on an iPhone
+        advice="in phyphox open a magnetometer experiment, then menu ⋮ → Allow remote access; the address stands at "
+        "the bottom of the screen; phone and computer need the same Wi-Fi",
+    ),
+    "sound": SoundLink,
+}
 
 
 def open_link(

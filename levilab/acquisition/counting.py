@@ -34,7 +34,7 @@ _MOST_PERIODS = 1e9
 class Missed(StrEnum):
     """Why there is no reading."""
 
-    DARK = "no light pulses"
+    DARK = "nothing to count"
     LOST = "the instrument did not answer as it should"
     UNSTEADY = "no two counts that agree with each other or with the last reading"
     MULTIPLE = "twice or three times what a coasting top can have"
@@ -104,6 +104,7 @@ class FreeTop(Generic[S]):
     before: list[Row] = field(default_factory=list)
     missed: list[Missed] = field(default_factory=list)
     _warned: bool = False
+    _in_doubt: bool = False
     _faster: Row = field(default_factory=dict)
 
     @property
@@ -146,7 +147,8 @@ class FreeTop(Generic[S]):
         """
         last = self.last["time_s"] if self.last else 0.0
         if self.missed and self.missed[-1] is Missed.DARK:
-            return f"no light pulses any more: the top fell between {last:.1f} s and {asked:.1f} s"
+            signal = self.session.bench.counter.SIGNAL.name
+            return f"no {signal} any more: the top fell between {last:.1f} s and {asked:.1f} s"
         seen = [why for why in self.missed if why in NO_TOP]
         if len(seen) >= _MOST_MISSED:
             return f"no steady pulses at {len(seen)} times in a row: the top fell after {last:.1f} s"
@@ -203,6 +205,15 @@ class FreeTop(Generic[S]):
         time = (gate_began(end, session.settings.gate_s, spin) + end) / 2
         if found is not None:
             time, u = found.time - (session.zero or 0.0), found.u
+            if found.gaps:
+                text = f"the samples of this count have gaps of {', '.join(f'{gap:.2g}' for gap in found.gaps)} s"
+                session.event(RunEvent.GAPS, text, gaps_s=list(found.gaps))
+            if found.folds and not self._in_doubt:
+                self._in_doubt = True
+                others = " or ".join(f"{fold:.1f} Hz" for fold in found.folds)
+                session.warn(
+                    f"the spin of {spin:.2f} Hz may be {others}: samples at this rate cannot tell; a longer gate_s may"
+                )
         session.check_settings("counter")
         return {"time_s": time, "spin_frequency_hz": spin} | ({"spin_frequency_u_hz": u} if u else {})
 

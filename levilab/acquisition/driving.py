@@ -130,13 +130,13 @@ class NotHeld(Exception):
     """The top does not spin with the drive; what is seen instead.
 
     Attributes:
-        spin: [Hz]; None where no light pulses are seen.
+        spin: [Hz]; None where no top is seen.
         drive: [Hz].
     """
 
     def __init__(self, spin: float | None, drive: float) -> None:
         self.spin, self.drive = spin, drive
-        seen = "no light pulses" if spin is None else f"a spin of {spin:.2f} Hz"
+        seen = "no top seen" if spin is None else f"a spin of {spin:.2f} Hz"
         super().__init__(f"{seen} under a drive of {drive:.2f} Hz")
 
 
@@ -171,6 +171,8 @@ def drive_up_and_let_go(session: Session[D]) -> None:
         session.event(RunEvent.COASTS, "the top was spun by hand and spins down freely")
         return
     drive_until(session, lambda _: None)
+    if session.bench.counter.ESTIMATES:  # not from samples of the time under the drive
+        prepare_counter_again(session)
     session.event(RunEvent.DRIVE_OFF, "drive off, the top spins down freely")
 
 
@@ -253,11 +255,10 @@ def _free_spin(session: Session[D], target: float, before: str) -> float:
 
 
 def _no_light(session: Session[D]) -> NoLight:
-    name = session.writer.record.experiment
+    name, signal = session.writer.record.experiment, session.bench.counter.SIGNAL
     return NoLight(
-        f"the counter sees no light pulses at {session.settings.trigger_level_v:g} V",
-        "is the top floating and lit, and the trigger level between dark and bright "
-        f"({name}.trigger_level_v in the bench file)?",
+        f"the counter sees no {signal.name}" + f" at {session.settings.trigger_level_v:g} V" * signal.has_level,
+        signal.advice + f" ({name}.trigger_level_v in the bench file)" * signal.has_level + "?",
     )
 
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from analysis.errors import NoLine
+from analysis.rotation import spin_of_field
 from instruments.drivers import Instrument
+from instruments.drivers.counter.phyphox import FieldLine, Phyphox
 from instruments.drivers.oscilloscope.sound import SoundCard
 from instruments.errors import InstrumentError, SettingsLost
 from levilab.bench.config import ConfigError
@@ -17,6 +20,7 @@ if TYPE_CHECKING:
 
     from instruments.drivers import Value
     from instruments.drivers.counter import Counter
+    from instruments.drivers.counter.phyphox import Array
     from instruments.drivers.generator import Generator
     from instruments.drivers.magnetometer import Magnetometer
     from instruments.drivers.oscilloscope import Oscilloscope
@@ -153,9 +157,32 @@ def connect_driver(kind: Kind[I], wiring: Wiring, *, log: TrafficLog | None = No
     settings = wiring.describe(kind.name)
     driver = kind.model(settings.model).driver
     transport = transport_to(driver, settings, library=wiring.library, clock=wiring.clock, log=log)
-    instrument = driver(transport, clock=wiring.clock)
+    instrument = driver(transport, clock=wiring.clock, **ANALYSES.get(driver, {}))
     if isinstance(instrument, SoundCard):
         instrument.clock_error, instrument.clock_u = settings.clock_error or 0.0, settings.clock_u
     elif settings.clock_error is not None:
         raise ConfigError(f"{kind.name}.clock_error = {settings.clock_error:g} is for a sound card alone: remove it")
     return instrument
+
+
+def line_in_field(times: Array, field: Array, *, near: float | None) -> FieldLine | None:
+    """Find the line of a turning moment; see `instruments.drivers.counter.phyphox.Estimator`.
+
+    A top that was seen shortly before is seen on a line of the mains, too, where a spin would be taken for the mains:
+    at 40 Hz, for one, where 100 samples a second show a line of 60 Hz.
+    """
+    try:
+        try:
+            found = spin_of_field(times, field, near=near)
+        except NoLine:
+            if near is None:
+                raise
+            found = spin_of_field(times, field, near=near, mains_hz=())
+    except NoLine:
+        return None
+    folds = tuple(fold.frequency for fold in found.folds[1:]) if found.doubtful else ()
+    return FieldLine(found.frequency, found.u_frequency, found.reference_time, folds)
+
+
+#: Driver → the analyses that it is given.
+ANALYSES: dict[type[Instrument], dict[str, Any]] = {Phyphox: {"estimator": line_in_field}}

@@ -54,10 +54,11 @@ Reading = tuple[str, float | None, str]
 def _check_counter(bench: Bench, light: Light) -> Reading:
     bench.counter.prepare(gate_s=min(light.gate_s, 1.0), trigger_level_v=light.trigger_level_v)
     frequency = bench.counter.frequency()
-    level = f"{light.trigger_level_v:g} V"
+    signal = bench.counter.SIGNAL
+    level = f" at {light.trigger_level_v:g} V" if signal.has_level else ""
     if frequency is None:
-        return f"no pulses at {level}: a top that does not spin, or no light", None, "Hz"
-    return f"{frequency:.4f} Hz at {level}", frequency, "Hz"
+        return f"no {signal.name}{level}: {signal.advice}?", None, "Hz"
+    return f"{frequency:.4f} Hz{level}", frequency, "Hz"
 
 
 def _check_generator(bench: Bench, _: Light) -> Reading:

@@ -9,7 +9,7 @@ import numpy as np
 
 from analysis.errors import AnalysisError
 from analysis.pulses import spin_of_trace
-from instruments.drivers.counter import Count
+from instruments.drivers.counter import LIGHT, Count, Signal
 from instruments.drivers.oscilloscope.sound import SamplesLost
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ class SampledCounter:
 
     MODELS: ClassVar[str] = ".*"
     SERIAL: ClassVar[Mapping[str, Any]] = {}
+    SIGNAL: ClassVar[Signal] = LIGHT
     ESTIMATES: ClassVar[bool] = True
 
     def __init__(

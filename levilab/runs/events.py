@@ -25,6 +25,7 @@ class RunEvent(StrEnum):
     MISCOUNTED = "miscounted"
     LEFT_OUT = "left out"
     COUNTED = "counted"
+    GAPS = "gaps"  # samples of it are missing
     NO_RECORD = "no record"
     LOOK_AT_THE_SCALE = "look at the scale"
     SCANNED = "scanned"

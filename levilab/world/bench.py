@@ -51,6 +51,9 @@ VIRTUAL = {kind: virtual_settings(kind, models[0].name) for kind, models in CATA
 #: Field of the virtual bench's coil at the top, per volt of the generator [T/V]: 10 Vpp make 0.4 mT.
 COIL_T_PER_V = 0.4e-3 / 5.0
 
+#: Where a phone lies: on the table, 20 cm beside the base's middle [m above that].
+PHONE_M = np.array([0.2, 0.0, 0.0])
+
 
 #: Makes a virtual instrument that is connected to a world.
 Maker = Callable[["World"], VirtualInstrument]
@@ -129,13 +132,19 @@ def connect_magnetometer(model: Callable[..., VirtualInstrument]) -> Maker:
     return lambda world: model(world.clock, flux_density=world.flux_density)
 
 
-#: Kind, or scheme of the address → what connects a virtual instrument to the world.
+def connect_phone(model: Callable[..., VirtualInstrument]) -> Maker:
+    """Connect a phone: it lies beside the base."""
+    return lambda world: model(world.clock, magnetic_field=lambda times: world.magnetic_field(times, PHONE_M))
+
+
+#: Kind, or scheme of a model's addresses → what connects a virtual instrument to the world.
 _CONNECT: dict[str, Callable[[Callable[..., VirtualInstrument]], Maker]] = {
     "counter": connect_counter,
     "generator": connect_generator,
     "oscilloscope": connect_oscilloscope,
     "sound": connect_sound,
     "magnetometer": connect_magnetometer,
+    "phyphox": connect_phone,
 }
 #: Kind → model → what makes it.
 VIRTUAL_MODELS: dict[str, dict[str, Maker]] = {

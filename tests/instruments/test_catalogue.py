@@ -12,8 +12,9 @@ from instruments.ieee488 import identity_fields
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
+from levilab.bench.bench import open_bench
 from levilab.bench.discover import driver_for_identity
-from levilab.world.bench import practice_world, virtual_bus
+from levilab.world.bench import practice_world, virtual_bus, virtual_wiring
 from support import hostile
 from support.models import KIND_OF, PREPARE, ROWS, measure
 from support.paths import ROOT
@@ -33,11 +34,21 @@ class Opened:
         self.driver = ROWS[name].driver(transport, clock=self.room.clock)
 
 
-@EACH
+@pytest.mark.parametrize("name", [*ROWS, "phyphox"])
 def test_a_model_and_its_driver_stand_on_the_page_of_their_kind(name):
     page = (ROOT / "docs" / "instruments" / f"{KIND_OF[name]}.md").read_text(encoding="utf-8")
     assert f"`{name}`" in page
-    assert f"`{ROWS[name].driver.__name__}`" in page
+    (model,) = (model for model in CATALOGUE[KIND_OF[name]] if model.name == name)
+    assert f"`{model.driver.__name__}`" in page
+
+
+@pytest.mark.parametrize("kind", CATALOGUE)
+def test_a_bench_finds_every_twin_by_the_identity_that_its_driver_reads(kind):
+    for model in CATALOGUE[kind]:
+        wiring = virtual_wiring(practice_world(), models={kind: model.name})
+        with open_bench(wiring, (kind,)) as bench:
+            assert driver_for_identity(bench.instruments[kind].identity()) == (kind, model.name)
+            assert {type(value) for value in bench.instruments[kind].settings().values()} <= {bool, int, float, str}
 
 
 @EACH

@@ -11,6 +11,7 @@ import sys
 
 import numpy as np
 
+from instruments.catalogue import CATALOGUE
 from instruments.clock import VirtualClock
 from instruments.virtual.bench.session import Session
 from instruments.virtual.core.message import LONGEST_LINE
@@ -62,7 +63,8 @@ class Room:
         return 0.019
 
 
-NAMES = {name: (kind, name) for kind, models in VIRTUAL_MODELS.items() for name in models}
+#: The models that answer messages of SCPI; those with a scheme of their own have a link of their own, too.
+NAMES = {row.name: (kind, row.name) for kind, rows in CATALOGUE.items() for row in rows if not row.scheme}
 
 
 def instrument(name, room=None):

@@ -16,6 +16,27 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
+class Signal:
+    """What a counter counts.
+
+    Attributes:
+        name: of the signal, as people read it where there is none.
+        advice: what may be wrong then, as a question.
+        has_level: whether it is counted at a trigger level.
+    """
+
+    name: str
+    advice: str
+    has_level: bool = False
+
+
+#: The phototransistor's signal.
+LIGHT = Signal(
+    "light pulses", "is the top floating and lit, and the trigger level between dark and bright", has_level=True
+)
+
+
+@dataclass(frozen=True)
 class Count:
     """A count of an instrument that estimates the frequency from samples.
 
@@ -23,20 +44,25 @@ class Count:
         frequency: [Hz].
         u: its standard uncertainty, without that of the clock [Hz].
         time: the moment at which it holds, on the clock of the bench [s].
+        gaps: lengths of the pauses in its samples [s].
+        folds: other frequencies that it may be, as samples at this rate cannot tell [Hz].
     """
 
     frequency: float
     u: float | None
     time: float
+    gaps: tuple[float, ...] = ()
+    folds: tuple[float, ...] = ()
 
 
 class Counter(Instrument, Protocol):
     """What every counter offers.
 
-    ESTIMATES: whether it estimates from samples, so that each count has a u and a time; last: the last such count, None
-    where there was none.
+    SIGNAL: what it counts; ESTIMATES: whether it estimates from samples, so that each count has a u and a time; last:
+    the last such count, None where there was none.
     """
 
+    SIGNAL: ClassVar[Signal]
     ESTIMATES: ClassVar[bool]
     last: Count | None
 

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from instruments.drivers.counter import LIGHT
 from instruments.drivers.scpi import ScpiInstrument, parse_reading
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, OutOfRange
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from instruments.drivers.counter import Count
+    from instruments.drivers.counter import Count, Signal
 
 #: Readings that are fetched with one question: an answer of 25 kB, seconds apart at most.
 READINGS_AT_ONCE = 1000
@@ -34,6 +35,7 @@ class ReciprocalCounter(ScpiInstrument):
     MOST: ClassVar[int] = 1_000_000
     EMPTY_IS_NONE: ClassVar[bool] = False
     ANSWERS_JOINED = True
+    SIGNAL: ClassVar[Signal] = LIGHT
     ESTIMATES: ClassVar[bool] = False
     last: Count | None = None
 

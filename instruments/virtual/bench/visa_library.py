@@ -129,6 +129,31 @@ class LevilabVisaLibrary(VisaLibraryBase):
             link.close()
         return self.handle_return_value(session, StatusCode.success)
 
+    def connect(self, address: str) -> Callable[[bytes, float], bytes]:
+        """Return what carries requests over HTTP to an instrument of the bench, see `instruments.links.http.Exchange`.
+
+        The instrument is given the first line of a request.
+        """
+
+        def exchange(request: bytes, within: float) -> bytes:
+            session = self._bench().open(address)
+            if session is None:
+                raise ConnectionError("no such instrument on the virtual bench, or it is away")
+            try:
+                session.write(request.partition(b"\r\n")[0])
+                data, ended = b"", False
+                while not ended:
+                    if (got := session.read(1 << 20, within)) is None:
+                        raise TimeoutError
+                    data, ended = data + got[0], got[1]
+            except LinkLost:
+                raise ConnectionError("the connection was lost") from None
+            finally:
+                session.close()
+            return data
+
+        return exchange
+
     def _use(
         self, session: VISASession, act: Callable[[Link, Attributes], tuple[T, StatusCode]], otherwise: T
     ) -> tuple[T, StatusCode]:

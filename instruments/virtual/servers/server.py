@@ -12,17 +12,21 @@ from typing import TYPE_CHECKING, Self
 from instruments.virtual.servers import serial_port
 from instruments.virtual.servers.clients import Listener, ServedInstrument
 from instruments.virtual.servers.hislip import HislipServer
+from instruments.virtual.servers.http_server import http_listener
 from instruments.virtual.servers.port_mapper import PORT, TCP, PortMapper
 from instruments.virtual.servers.socket_server import socket_listener
 from instruments.virtual.servers.vxi11 import ABORT, CORE, PROGRAM_VERSION, Vxi11Server
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Iterator
+    from collections.abc import AsyncIterator, Callable, Iterator
     from types import TracebackType
 
     from instruments.virtual.bench.bench import VirtualBench
 
 LOOPBACK = "127.0.0.1"
+
+#: Scheme of an address → what serves the instrument; others can be reached in this process alone.
+_BY_SCHEME: dict[str, Callable[[ServedInstrument], Listener]] = {"phyphox": http_listener}
 
 #: Ports that an instrument takes when they are numbered: socket, HiSLIP, VXI-11 and its abort channel.
 PORTS_PER_INSTRUMENT = 4
@@ -94,7 +98,8 @@ async def _listen(
     instrument: ServedInstrument, address: str, listen_at: ListenAt, index: int, opened: contextlib.AsyncExitStack
 ) -> dict[str, str]:
     """Begin to listen for one instrument.  Returns its resource names, by protocol."""
-    if not address.upper().startswith("ASRL"):
+    scheme = address.partition("://")[0] if "://" in address else ""
+    if not (scheme or address.upper().startswith("ASRL")):
         listen_at = listen_at.of_instrument(index)
     ports, host = listen_at.ports(index), listen_at.name_in_resources()
 
@@ -103,6 +108,9 @@ async def _listen(
         await listener.open(listen_at.host, next(ports))
         return listener.port
 
+    if scheme:
+        serve = _BY_SCHEME.get(scheme)
+        return {scheme: f"{scheme}://{host}:{await listen(serve(instrument))}"} if serve else {}
     if address.upper().startswith("ASRL"):
         resources = {"socket": f"ASRLsocket://{host}:{await listen(socket_listener(instrument))}::INSTR"}
         if serial_port.HAS_PSEUDO_TERMINALS:

@@ -106,7 +106,7 @@ def test_a_top_that_falls_is_asked_for_and_the_sweep_goes_on(tmp_path, monkeypat
     run, failed = swept(tmp_path, monkeypatch, [31.0, 31.5, 32.0], weaken)
     assert (run.status, measured(run), failed) == ("finished", [31.0, 31.5, 32.0], ())
     assert len(events(run, "asked the person")) == 1
-    assert "no light pulses under a drive of 31.50 Hz; try 1 of 2" in events(run, "lock lost")[0]
+    assert "no top seen under a drive of 31.50 Hz; try 1 of 2" in events(run, "lock lost")[0]
 
 
 def test_a_top_that_no_drive_takes_up_again_ends_the_sweep_with_what_was_measured(tmp_path, monkeypatch):
