@@ -313,18 +313,20 @@ def write_and_print(
     left_out: why other analyses have no result.
     """
     from levilab.pipelines.catalogue import print_analysis
-    from levilab.pipelines.suits import remarks
+    from levilab.pipelines.suits import left_out_of, remarks, texts_of
 
     in_words = partial(with_options, app=context.find_root().command)
     failures: list[LevilabError] = []
-    messages = [*left_out, *map(str, remarks([found.remarks for _, found in results]))]
+    said = remarks([found.remarks for _, found in results])
+    messages = [*left_out, *texts_of(said)]
     for analysis, found in results:
         if save:
             failure, written = _save(analysis, found, out)
             failures += [failure] if failure else []
             messages += [f"wrote {path}" for path in written]
     if as_json:
-        documents = [analysis.document(found, out or found.output_folder) for analysis, found in results]
+        more = {"left_out": left_out_of(said)} if left_out_of(said) else {}
+        documents = [analysis.document(found, out or found.output_folder) | more for analysis, found in results]
         print_json(documents[0] if len(documents) == 1 else documents, sort_keys=True)
     else:
         for analysis, found in results:

@@ -70,7 +70,7 @@ KINDS = (
     Kind("a presentation", "", (".pptx", ".ppt", ".odp", ".key")),
     Kind(
         "a picture",
-        "the numbers that it shows are needed, as a table",
+        "the numbers that it shows are needed, as CSV or a spreadsheet",
         (".png", ".jpg", ".jpeg", ".gif", ".bmp", ".tif", ".tiff", ".heic", ".heif", ".webp", ".svg", ".avif"),
         (
             (0, b"\x89PNG"),

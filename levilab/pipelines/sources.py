@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import difflib
 import hashlib
+import json
 import math
 import os
+import re
 from collections import Counter
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -13,8 +15,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
+from levilab.formats.columns import NoSuchColumn
+from levilab.formats.kinds import AUDIO, OTHER, Kind, kind_of
 from levilab.formats.texts import locate
 from levilab.formats.understanding import SeveralRuns
+from levilab.formats.waveforms.audio import advice_on_sound
 from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.record import SEARCHED
 from levilab.pipelines.correction import describe, place_of_correction, read_correction
@@ -158,8 +163,54 @@ class Skipped:
         return f"skipped {self.reason}"
 
 
+@dataclass(frozen=True)
+class LeftOut:
+    """A file of a folder that no analysis which was asked for reads.
+
+    Attributes:
+        kind: of file, with what to do.
+    """
+
+    path: Path
+    kind: Kind = field(compare=False)
+
+    def __str__(self) -> str:
+        return in_words([self])
+
+
+class NothingSuits(DoesNotSuit):
+    """A folder without anything for an analysis.
+
+    Attributes:
+        left_out: the files in it.
+    """
+
+    def __init__(self, text: str, left_out: tuple[LeftOut, ...]) -> None:
+        self.left_out = left_out
+        super().__init__(text)
+
+
+#: Of texts and spreadsheets.
+OTHER_COLUMNS = Kind("a table with other columns", "name one to see why", plural="tables with other columns")
+#: Files of a kind that are named beside their number.
+_NAMED = 2
+
+
+def in_words(left_out: Sequence[LeftOut]) -> str:
+    """Return the files by kind and number, with what to do, as one line."""
+    kinds: dict[Kind, list[str]] = {}
+    for one in left_out:
+        kinds.setdefault(one.kind, []).append(one.path.name)
+    texts = []
+    for kind, names in kinds.items():
+        named = ", ".join([*names[:_NAMED], *["…"] * (len(names) > _NAMED)])
+        count = f"{len(names)} {kind.several}" if len(names) > 1 else kind.name
+        texts.append(f"{count} ({named}{f': {kind.advice}' if kind.advice else ''})")
+    return f"left out: {'; '.join(texts)}"
+
+
 #: What lies in a folder and is no input, without a cause for a warning.
-Remark = SkippedRuns | Skipped
+Remark = SkippedRuns | Skipped | LeftOut
 
 
 @dataclass(frozen=True)
@@ -326,27 +377,44 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
         except DataError as error:
             broken.append(Skipped(str(error)))
     files = data_files(root)
+    remarks += [LeftOut(file, _kind(file)) for file in other_files(root)]
     for file in files:
-        with _skipping(broken, remarks):
+        with _skipping(file, broken, remarks):
             found += _at(file, needs, lambda path: replace(options(path), guess=False))
     kinds = [SkippedRuns(kind, count) for kind, count in sorted(others.items())]
     if not found:
-        text = f"{root}: {_nothing_found(needs, kinds, broken, [file.name for file in files])}"
+        left_out = tuple(one for one in remarks if isinstance(one, LeftOut))
+        text = f"{root}: {_nothing_found(needs, kinds, broken, left_out)}"
+        if not broken:
+            raise NothingSuits(text, left_out)
         raise NoneUsable(text, tuple(map(str, broken))) if broken else DoesNotSuit(text)
     return Found(tuple(found), tuple(map(str, broken)), (*kinds, *remarks))
 
 
 @contextmanager
-def _skipping(broken: list[Skipped], remarks: list[Remark]) -> Iterator[None]:
-    """Note what is wrong with a data file that was found in a folder; one of another kind is of no concern."""
+def _skipping(file: Path, broken: list[Skipped], remarks: list[Remark]) -> Iterator[None]:
+    """Note what is wrong with a data file that was found in a folder, or of which kind it is."""
     try:
         yield
     except NoRate as error:
         remarks.append(Skipped(str(error)))
-    except DoesNotSuit:
-        return
+    except DoesNotSuit as error:
+        remarks.append(LeftOut(file, OTHER_COLUMNS if isinstance(error, NoSuchColumn) else _kind(file)))
     except DataError as error:
         broken.append(Skipped(str(error)))
+
+
+def _kind(file: Path) -> Kind:
+    """Return the kind of a file that is left out."""
+    try:
+        kind = kind_of(file)
+    except OSError as error:
+        return Kind(
+            f"a file that cannot be read ({error.strerror})", plural=f"files that cannot be read ({error.strerror})"
+        )
+    if kind is AUDIO:
+        return replace(kind, advice=advice_on_sound())
+    return OTHER_COLUMNS if kind is OTHER and file.suffix.casefold() in SEARCHED else kind
 
 
 def data_files(root: Path) -> list[Path]:
@@ -354,6 +422,34 @@ def data_files(root: Path) -> list[Path]:
 
     A folder below with a file `SKIP` is left out, with all in it.
     """
+    return sorted(path for path in _files(root) if path.suffix.casefold() in SEARCHED)
+
+
+def other_files(root: Path) -> list[Path]:
+    """Find the other files at or below a folder, but for those that levilab or a computer's desktop keeps there."""
+    others = [path for path in _files(root) if path.suffix.casefold() not in SEARCHED]
+    results = [path for path in others if _RESULT.search(path.name)]
+    own = {*results, *(path for path in others if path.name.endswith(_CORRECTION))}
+    own |= {result.with_name(f"{_RESULT.sub('', result.name)}{_analysis_of(result)}.png") for result in results}
+    return sorted(path for path in others if path not in own)
+
+
+def _analysis_of(result: Path) -> str:
+    """Return the name of the analysis that wrote a result; empty where it cannot be read."""
+    try:
+        return str(json.loads(result.read_bytes())["analysis"])
+    except (OSError, ValueError, LookupError, TypeError):
+        return ""
+
+
+#: How names of files begin that are not a person's.
+_OF_DESKTOPS = (".", "~$", "desktop.ini", "Thumbs.db", SKIP)
+#: How names of files end that levilab writes beside what it reads.
+_RESULT, _CORRECTION = re.compile(r"result(\.\w+)?\.json$"), ".levilab.toml"
+
+
+def _files(root: Path) -> list[Path]:
+    """Return the files at or below a folder that belong to no run."""
     found, seen = [], set()
     for folder, below, files in os.walk(root, followlinks=True):
         real = os.path.realpath(folder)
@@ -361,14 +457,16 @@ def data_files(root: Path) -> list[Path]:
             below.clear()
             continue
         seen.add(real)
-        found += [Path(folder) / name for name in files if Path(name).suffix.casefold() in SEARCHED]
-    return sorted(found)
+        found += [Path(folder) / name for name in files if not name.startswith(_OF_DESKTOPS)]
+    return found
 
 
-def _nothing_found(needs: Needs[Any], others: list[SkippedRuns], broken: list[Skipped], files: list[str]) -> str:
+def _nothing_found(
+    needs: Needs[Any], others: list[SkippedRuns], broken: list[Skipped], left_out: Sequence[LeftOut]
+) -> str:
     seen = [f"{one.count} {one.experiment} run{'s' * (one.count > 1)}" for one in others]
     seen += [f"{len(broken)} that cannot be used, as {broken[0].reason}"] if broken else []
-    seen += [f"{len(files)} data file{'s' * (len(files) > 1)}, as {files[0]}"] if files else []
+    seen += [in_words(left_out).removeprefix("left out: ")] if any(one.kind is not OTHER for one in left_out) else []
     if not seen:
         return "holds no run and no data file; name a run folder, a data file, or a folder with some of them"
     return f"no {needs.runs} to analyze in this folder (found only {'; '.join(seen)}); name a run folder or a data file"

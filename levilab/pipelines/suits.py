@@ -16,7 +16,7 @@ from levilab.errors import DataError, DoesNotSuit, NoneUsable
 from levilab.pipelines import catalogue
 from levilab.pipelines.result import ResultError, is_of_another, read_inputs, results_in
 from levilab.pipelines.result import save as save_files
-from levilab.pipelines.sources import Found, SkippedRuns, data_files, find, join
+from levilab.pipelines.sources import Found, LeftOut, NothingSuits, Skipped, data_files, find, in_words, join
 from levilab.runs.run import RECORD, Run, find_run, find_runs
 
 if TYPE_CHECKING:
@@ -239,8 +239,16 @@ def _refusal(path: Path, errors: Mapping[str, DataError]) -> DataError:
         kinds = " or ".join(counts)
         return DoesNotSuit(f"{path}: there is no analysis of a {kinds} run (found {'; '.join(seen)})")
     if files:
-        return DoesNotSuit(f"{path}: no analysis reads what is in it ({seen[0]}): name a file to see why")
+        return DoesNotSuit(
+            f"{path}: no analysis reads what is in it; {_left_out(errors) or seen[0]}: name a file to see why"
+        )
     return next(iter(errors.values()))
+
+
+def _left_out(errors: Mapping[str, DataError]) -> str:
+    """Return the files of a folder in which no analysis found anything, by kind."""
+    lists = [error.left_out for error in errors.values() if isinstance(error, NothingSuits)]
+    return in_words(lists[0]) if lists else ""
 
 
 def _usable_runs(root: Path) -> list[Run]:
@@ -255,9 +263,24 @@ def _usable_runs(root: Path) -> list[Run]:
 
 
 def remarks(of_each: Sequence[Sequence[Remark]]) -> list[Remark]:
-    """Join the remarks of several analyses; runs that were skipped count only if all of them did."""
+    """Join the remarks of several analyses; runs and files that were left out count only if all of them did."""
     said = list(dict.fromkeys(remark for those in of_each for remark in those))
-    return [one for one in said if not isinstance(one, SkippedRuns) or all(one in those for those in of_each)]
+    return [one for one in said if isinstance(one, Skipped) or all(one in those for those in of_each)]
+
+
+def left_out_of(remarks: Sequence[Remark]) -> list[dict[str, str]]:
+    """Return the files that are left out, for programs."""
+    return [
+        {"path": one.path.as_posix(), "kind": one.kind.name.partition(" ")[2], "advice": one.kind.advice}
+        for one in remarks
+        if isinstance(one, LeftOut)
+    ]
+
+
+def texts_of(remarks: Sequence[Remark]) -> list[str]:
+    """Return remarks as lines of text, the files that are left out in one."""
+    left_out = [one for one in remarks if isinstance(one, LeftOut)]
+    return [*(str(one) for one in remarks if not isinstance(one, LeftOut)), *([in_words(left_out)] if left_out else [])]
 
 
 # --- writing -------------------------------------------------------------------------------------------

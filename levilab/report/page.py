@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import DoesNotSuit, NoneUsable, UsageError
 from levilab.files import check_writable, replace_atomically, writing
 from levilab.pipelines.sources import SkippedRuns, data_files
-from levilab.pipelines.suits import recall_suiting, remarks
+from levilab.pipelines.suits import recall_suiting, remarks, texts_of
 from levilab.present.clock import local
 from levilab.present.numbers import list_in_words
 from levilab.report.document import document_of, notebook_blocks
@@ -171,9 +171,8 @@ def _values(results: Results, others: Found, folder: Path) -> Iterator[Values]:
 def _remarks(results: Results, others: Found) -> Iterator[str]:
     """Yield what lies there and is not in the report, and what has no result."""
     reported = {kind.experiment for kind, _ in others}
-    for remark in remarks([found.remarks for _, found in results]):
-        if not (isinstance(remark, SkippedRuns) and remark.experiment in reported):
-            yield str(remark)
+    said = remarks([found.remarks for _, found in results])
+    yield from texts_of([one for one in said if not (isinstance(one, SkippedRuns) and one.experiment in reported)])
     yield from _without_result(results)
 
 

@@ -45,8 +45,8 @@ def read_audio(path: Path) -> Waveform:
         NoTable: the extra is not installed.
         TableError: it has no sound, or is damaged.
     """
-    if util.find_spec("imageio_ffmpeg") is None:
-        kind = replace(AUDIO, advice=how_to_read())
+    if not _is_installed():
+        kind = replace(AUDIO, advice=advice_on_sound())
         raise NoTable(path, f"is {kind.name}: {kind.advice}", kind=kind)
     errors: list[str] = []
     count, rate = 0, 0
@@ -73,8 +73,14 @@ def read_audio(path: Path) -> Waveform:
     return Waveform(path, "sound file", 0.0, 1 / rate, count, signals_of(channels), read, tuple(damage))
 
 
-def how_to_read() -> str:
-    """Return what to do with a sound file without the extra."""
+def _is_installed() -> bool:
+    return util.find_spec("imageio_ffmpeg") is not None
+
+
+def advice_on_sound() -> str:
+    """Return what to do with a sound file, with the extra and without."""
+    if _is_installed():
+        return AUDIO.advice
     extra = f"the extra video (imageio-ffmpeg, which is not installed) reads it: {how_to_install('video')}"
     return f"{extra}; or make it a WAV with Audacity (File, Export Audio) or by ffmpeg -i sound.m4a sound.wav"
 

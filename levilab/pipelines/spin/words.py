@@ -13,7 +13,8 @@ def finding_text(found: Finding, part: str = "window") -> str:
     >>> finding_text(Finding("missing", values=(1, 40), where=(2, 1, 5)), "record")
     'record 2: 1 turn has no pulse'
     """
-    text = _SENTENCES[found.name, found.of](*found.values)
+    whole = (int(value) if float(value).is_integer() else value for value in found.values)  # a result has 31.0
+    text = _SENTENCES[found.name, found.of](*whole)
     if not found.where:
         return text
     first, number, of = found.where

@@ -286,7 +286,7 @@ ERRORS = {
     "text but no header": ("Scope 7\n0,61\n1,61\n2,60\n", None, ["line 1", "no header", "t=1,f=2"]),
     "prose": ("Dear all,\nsee you.\n", None, ["line 1", "Dear all"]),
     "contradicting units": ("t/s,f\nms,Hz\n0,61\n1,61\n2,60\n", None, ["'t/s'", "'ms'"]),
-    "PNG": (b"\x89PNG\r\n\x1a\n\0\0", None, ["picture", "as a table"]),
+    "PNG": (b"\x89PNG\r\n\x1a\n\0\0", None, ["picture", "as CSV"]),
     "xlsx": (b"PK\x03\x04\x14\0", None, ["damaged ZIP or Excel file", "save it again"]),
     "zeros": (b"\0" * 100, None, ["binary", "export it as CSV"]),
     "one endless line": (b"1," * 50000, None, ["without end"]),

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import shutil
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from levilab.errors import DataError
+from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.sources import Skipped, SkippedRuns, collect, sha256_of
 from levilab.pipelines.spindown.analysis import METHOD, NEEDS
 from levilab.pipelines.spindown.readings import Readings
+from levilab.pipelines.suits import analyze_suiting, left_out_of, remarks, save, texts_of
 from support.spin_downs import spin_down_csv
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
 
 def with_crlf(text: str) -> str:
@@ -138,3 +140,56 @@ def test_a_copy_whose_fingerprint_is_rounded_otherwise_is_found(
     monkeypatch.setattr(Readings, "fingerprint", property(lambda _: next(fingerprints)))
     found = collect([tmp_path], NEEDS, lambda _: SpinDownOptions())
     assert (len(found.sources), len(found.warnings)) == (1, 1)
+
+
+def folder_of_a_student(folder: Path, sample_data: Path) -> None:
+    spin_down_csv(folder / "run.csv")
+    shutil.copy(sample_data / "scope-files" / "recording.wav", folder)
+    for name, content in {
+        "other.csv": b"a,b\n1,2\n3,4\n5,6\n", "notes.txt": b"hello\n", "foto.jpg": b"\xff\xd8\xff\xe0", "a.png": b"",
+        "exp.cmbl": b"<xml/>", "README.md": b"x", ".DS_Store": b"x", "~$run.xlsx": b"x", "run.csv.levilab.toml": b"",
+    }.items():  # fmt: skip
+        (folder / name).write_bytes(content)
+
+
+def test_a_folder_names_every_file_that_it_leaves_out_by_kind_and_number(tmp_path: Path, sample_data: Path) -> None:
+    folder_of_a_student(tmp_path, sample_data)
+    for _ in range(2):  # the second time with results and figures beside the files
+        results = analyze_suiting([tmp_path], {})
+        said = remarks([found.remarks for _, found in results])
+        assert sorted(Path(one["path"]).name for one in left_out_of(said)) == [
+            "README.md", "a.png", "exp.cmbl", "foto.jpg", "notes.txt", "other.csv",
+        ]  # fmt: skip
+        (text,) = texts_of(said)
+        for part in (
+            "2 pictures (a.png, foto.jpg: ", "a Logger Pro file (exp.cmbl: in Logger Pro: File, Export As, CSV)",
+            "2 tables with other columns (notes.txt, other.csv: name one to see why)",
+        ):  # fmt: skip
+            assert part in text
+        for analysis, found in results:
+            save(analysis, found)
+
+
+def test_what_another_analysis_reads_is_left_out_of_one_alone(tmp_path: Path, sample_data: Path) -> None:
+    folder_of_a_student(tmp_path, sample_data)
+    found = METHOD.analyze([tmp_path], SpinDownOptions())
+    (sound,) = [one for one in left_out_of(found.remarks) if one["path"].endswith(".wav")]
+    assert (sound["kind"], sound["advice"]) == ("WAV recording", "levilab analyze spin reads it")
+
+
+def test_a_folder_without_anything_to_read_says_of_what_kind_its_files_are(tmp_path: Path) -> None:
+    (tmp_path / "foto.jpg").write_bytes(b"\xff\xd8\xff\xe0")
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    with pytest.raises(DoesNotSuit, match=r"left out: a picture \(foto\.jpg: .*; a table with other columns \(other"):
+        analyze_suiting([tmp_path], {})
+
+
+def test_sound_without_the_extra_is_counted_with_what_to_install(
+    tmp_path: Path, sample_data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spin_down_csv(tmp_path / "run.csv")
+    for name in ("a.m4a", "b.m4a"):
+        shutil.copy(sample_data / "scope-files" / "phone.m4a", tmp_path / name)
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    (text,) = texts_of(remarks([found.remarks for _, found in analyze_suiting([tmp_path], {})]))
+    assert text.startswith("left out: 2 sound files (a.m4a, b.m4a: the extra video")
