@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
@@ -58,6 +59,11 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
         u, note = given, "as given to the analysis"
     elif isinstance(measured, float) and measured > 0:
         u, note = measured, f"{kind}.clock_u of the bench file"
+    elif drift := _clock_drift(about):
+        u = math.hypot(*drift)
+        note = (
+            f"it gained {1e6 * drift[0]:.0f}×10⁻⁶ on the computer's clock during the run, to {1e6 * drift[1]:.0f}×10⁻⁶"
+        )
     elif known:
         u = u_of_limit(known.limit)
         note = (
@@ -69,6 +75,14 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
     else:
         u, note = None, "no instrument is recorded: the option --clock-u gives it, from the manual"
     return Component("time_base", what, "B", u, "1", sensitivity, included=False, note=note, remedy=remedy)
+
+
+def _clock_drift(about: Mapping[str, Any] | None) -> tuple[float, float] | None:
+    """Return how much faster than the bench's an instrument's clock was found to go, relative, and u; None: unknown."""
+    found = (about or {}).get("settings_end")
+    drift = [found.get(name) for name in ("clock_drift", "clock_drift_u")] if isinstance(found, dict) else []
+    known = [float(value) for value in drift if isinstance(value, int | float) and not isinstance(value, bool)]
+    return (known[0], known[1]) if len(known) == 2 else None
 
 
 def bench_clock(sensitivity: float) -> Component:
