@@ -2,8 +2,10 @@
 
 Sources: Agilent Truevolt Series Operating and Service Guide, pages 168 (CONFigure, MEASure) and 198 (aperture, filter,
 range); Agilent 34401A User's Guide; HTML help of the 34980A (time-outs of the filters: 1 s, 0.1 s, 0.01 s);
-PyMeasure's suite for a real 34401A.  Assumed: the hysteresis, 5 % of the range.  It has frequency and period and no
-other function; it takes commands in local mode, and with any settings of a serial line.
+PyMeasure's suite for a real 34401A.  Assumed: it fires 6 % of the range above the mean and arms 1 % below.
+
+It has frequency and period and no other function; it takes commands in local mode, and with any settings of a serial
+line.
 """
 
 from __future__ import annotations
@@ -25,7 +27,9 @@ if TYPE_CHECKING:
 
 #: Ranges of the input [V], and which part of it the r.m.s. may be at most.
 _RANGES, _OVERLOAD = (0.1, 1.0, 10.0, 100.0, 750.0), 1.2
-_HYSTERESIS = 0.05
+#: Where it fires above the mean of the signal, and how far below that it arms, in parts of the range: noise of 1 % of
+#: it in the dark is no signal, and pulses of 3 % of a turn are one.
+_FIRES, _HYSTERESIS = 0.06, 0.07
 #: Filter, by the slowest signal that it is for [Hz] → how long an edge is waited for [s].
 _FILTERS = {3.0: 1.0, 20.0: 0.1, 200.0: 0.01}
 #: Resolution in parts of the range → gate [s]; the finest first.
@@ -168,9 +172,9 @@ class Virtual34461A(VirtualCounter):
         return _range_for(self._rms() / _OVERLOAD) if self.settings["automatic_range"] else self.value("range")
 
     def trigger_input(self, channel: int, *, falling: bool) -> TriggerInput:
-        """See the base: a zero crossing of what the coupling lets through, with a hysteresis on both sides of it."""
-        hysteresis = _HYSTERESIS * self._range()
-        return TriggerInput(hysteresis / 2, hysteresis, window=1.0, alternating=True, falling=falling)
+        """See the base: near the zero crossing of what the coupling lets through."""
+        wide = self._range()
+        return TriggerInput(_FIRES * wide, _HYSTERESIS * wide, window=1.0, alternating=True, falling=falling)
 
     # --- measuring ---
 

@@ -91,6 +91,13 @@ def test_darkness_reads_0_and_too_large_a_signal_is_an_overload():
     assert ask(device, "CONF:FREQ;:FREQ:RANG:LOW 3;:FREQ:VOLT:RANG 1;:READ?") == "+9.90000000E+37"
 
 
+def test_noise_in_the_dark_is_no_signal():
+    noise = np.random.default_rng(1).normal(0.1, 0.01, 1_000_000)  # 10 mV, as on the virtual bench
+    _, it = meter(lambda start, step, n: noise[np.round((start + step * np.arange(n)) * 20_000).astype(int)])
+    it.prepare(gate_s=1.0, trigger_level_v=0.6)
+    assert it.frequency() is None
+
+
 @pytest.mark.parametrize(
     ("sent", "gate"), [("FREQ 100,0.01", 0.01), ("FREQ 100,0.001", 0.1), ("FREQ 100,1E-4", 1.0), ("PER", 0.1)]
 )
