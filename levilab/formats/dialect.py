@@ -34,6 +34,8 @@ DATED = re.compile(
     r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?|" + _GERMAN.pattern.replace("(", "(?:")
     .replace("(?:?:", "(?:")
 )  # fmt: skip
+#: What phyphox writes for a cell that a spreadsheet would take for a formula: '-1.5.
+GUARDED = re.compile(r"'[=+@-]")
 #: A number and the unit behind it.
 _WITH_UNIT = re.compile(r"(?P<number>[+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,+/-].*)")
 Kind = Literal["number", "clock", "missing", "text"]
@@ -54,10 +56,14 @@ class Dialect:
     def skips(self, line: str) -> bool:
         """Return whether a line is blank or a comment; tabs that separate are empty fields, not blanks."""
         plain = line.strip(" \n") if self.separator == "\t" else line.strip()
-        return not plain or plain.lstrip().startswith(self.comments)
+        return not plain or (plain.lstrip().startswith(self.comments) and not GUARDED.match(plain))
 
     def split(self, line: str) -> list[str]:
-        """Return the fields of a line, stripped, without their quotation marks."""
+        """Return the fields of a line, stripped, without quotation marks and without what guards = + - @ in phyphox."""
+        fields = self._split(line)
+        return [field[1:] if GUARDED.match(field) else field for field in fields] if "'" in line else fields
+
+    def _split(self, line: str) -> list[str]:
         if self.separator is None:
             return _split_at_blanks(line)
         if '"' not in line:

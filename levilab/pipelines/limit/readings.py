@@ -11,6 +11,7 @@ import numpy as np
 from levilab.errors import DoesNotSuit
 from levilab.formats.columns import NoSuchColumn, NoTable, TableError
 from levilab.formats.table import Table, must_be_positive, read_table
+from levilab.formats.texts import locate, texts_of
 from levilab.formats.titles import read_title, unit_factor
 
 if TYPE_CHECKING:
@@ -90,7 +91,12 @@ def _single_column(path: Path, *, guess: bool) -> Table | None:
 
     None of a file that holds anything else.
     """
-    text = path.read_bytes()[:_MOST_BYTES].decode("utf-8-sig", errors="replace")
+    file, inside = locate(path)
+    one = next((text for text in texts_of(file) if not inside or text.path == path), None)
+    if one is None:
+        return None
+    with one.open() as stream:
+        text = stream.read(_MOST_BYTES).decode("utf-8-sig", errors="replace")
     lines = [(k, line.strip()) for k, line in enumerate(text.splitlines(), 1)]
     filled = [(k, line) for k, line in lines if line and not line.startswith("#")]
     titles = [line for _, line in filled if not _NUMBER.fullmatch(line)]

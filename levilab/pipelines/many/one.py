@@ -160,6 +160,8 @@ def _analyze(task: Task, analysis: Analysis[Any], about: dict[str, Any]) -> dict
     """Return the input's part of result.json.  Raises DataError, CannotWrite."""
     options = replace(task.options, guess=False) if task.searched and not task.is_run else task.options
     found = analysis.analyze([task.path], options)
+    if len(found.sources) > 1:
+        raise DataError(f"{task.path}: holds several runs: name each, as {found.sources[0].path}")
     about["readings_sha256"] = found.sources[0].sha256
     document = analysis.document(found, task.path.parent)
     about["warnings"] = len(document["warnings"])

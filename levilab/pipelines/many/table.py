@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DataError, NoneUsable
+from levilab.formats.texts import locate
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.many.file import TableFile, check_name
 from levilab.pipelines.many.one import PassedOver, Row, Task, analyze_one, columns_of, name_of, row
@@ -167,7 +168,7 @@ def inputs(paths: Sequence[Path]) -> Iterator[tuple[str, bool, bool]]:
     As text: a Path takes a kilobyte.  Raises DataError for a path that does not exist.
     """
     for path in map(find_run, paths):
-        if not path.exists():
+        if not locate(path)[0].exists():
             raise no_such_path(path)
         yield from _below(path)
 
