@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.spin import DECAYS
-from levilab.stability.published.printed import published
 from levilab.world.base import Base, Stand, random_base
 from levilab.world.coil import Coil
 from levilab.world.light import Laser, Tape
@@ -130,7 +129,7 @@ class SpinScene:
     start_hz: float = 30.0
     drag: str = "disc"
     constants: tuple[float, ...] = (2.34e-4,)
-    fall_hz: float = published("thesis")["measured.mean"].value
+    fall_hz: float = 21.86
     later_falls_hz: tuple[float, ...] = ()
     lock_torque: float = 0.03 * 0.714 / 2 / 1.731314e-6
     tape: Tape = field(default_factory=Tape)
