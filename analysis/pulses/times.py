@@ -30,8 +30,9 @@ SELDOM = 1e-3
 CERTAIN = 8.0
 #: Pulses between a jump and the ends of the list, at least.
 FROM_ENDS = 8
-#: The smallest buffer of a sound card, 64 samples at 48 kHz, lasts longer [s]; a rounding has fewer steps of a clock.
-LEAST_LOST, STEPS = 1e-3, 2.5
+#: No jump is shorter [s], or than this number of steps of a clock, which a rounding may have.  The smallest buffer of a
+#: sound card lasts 1.3 ms, but whole turns cannot be seen, so what is seen of a lost buffer may be shorter.
+LEAST_LOST, STEPS = 1e-4, 2.5
 #: The place of a jump is looked for again with the fit that has one, until it stays: four times at most.
 TRIES = 4
 #: Pulses on each side that show a jump alone: to a quarter of its size and twice their uncertainty.
