@@ -106,7 +106,9 @@ def report() -> Callable[..., None]:
     return report
 
 
-@app.command(name="open", cls=Later, epilog='Example: levilab open my.csv --columns "t=1,f=3 [rpm]" --keep -o my.html')
+@app.command(
+    name="open", cls=Later, epilog=r'Example: levilab open my.csv --columns "t=1,f=3 \[rpm]" --keep -o my.html'
+)
 def open_files() -> Callable[..., None]:
     """Open data files: which columns hold what, in which units; correct that, keep it, analyze and report.
 

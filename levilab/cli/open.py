@@ -9,7 +9,7 @@ import typer
 
 from levilab.cli.analyze import takes_options, write_and_print
 from levilab.cli.options import Json
-from levilab.cli.output import interruptible, message, place_of_report, print_json
+from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.errors import NoneUsable, UsageError
 from levilab.pipelines.options import OF_FILES, read_options
@@ -55,12 +55,12 @@ def open_files(
     files, options = paths or [], read_options(given, typed=True)
     shows = _has_browser() and not (keep or output or as_json) if browser is None else browser
     if not files and not shows:
-        raise UsageError("paths", "name a data file: levilab open FILE", value="nothing")
+        raise UsageError("FILE", "name a data file, as levilab open my.csv: there is no browser here to choose one")
     looks = [look_at(path, {**read_correction(path), **options}, plots=False) for path in files]
-    _print_looks(looks, as_json=as_json)
+    _print_looks(context, looks, as_json=as_json)
     readable = [look.path for look in looks if not look.problem]
     for path in readable if keep else []:
-        message(f"kept in {write_correction(path, options)}")
+        message(f"kept in {write_correction(path, {**read_correction(path), **options})}")
     if shows:
         _serve([(path, options) for path in files])
     if not readable:
@@ -92,7 +92,7 @@ def _report(context: typer.Context, paths: "Sequence[Path]", options: "Mapping[s
     app, place = context.find_root().command, place_of_report(output)
     with interruptible("no report is written"):
         write_report(paths, output, options, lambda text: message(with_options(text, app)))
-    message(place)
+    result(place)
 
 
 def _has_browser() -> bool:
@@ -110,14 +110,14 @@ def _serve(files: "list[tuple[Path, Mapping[str, Any]]]") -> NoReturn:
     serve("Ctrl-C ends the page", opens=True, port=0, files=tuple(files))
 
 
-def _print_looks(looks: "Sequence[Look]", *, as_json: bool) -> None:
+def _print_looks(context: typer.Context, looks: "Sequence[Look]", *, as_json: bool) -> None:
     if as_json:
         print_json([look.as_dict() for look in looks])
         return
     for look in looks:
         _print_look(look)
         if look.problem and len(looks) > 1:
-            message(f"not read: {look.problem}")
+            message(with_options(f"not read: {look.problem}", context.find_root().command))
 
 
 def _print_look(look: "Look") -> None:

@@ -236,7 +236,8 @@ def test_a_flood_of_questions_leaves_time_to_others(tmp_path: Path) -> None:
     flood = Flood()
 
     async def serve() -> float:
-        pages = Pages(Hall(tmp_path, "", Doors(1)))
+        hall = Hall(tmp_path, "", Doors(1))
+        pages = Pages(hall, hall.doors)
         begin = time.monotonic()
         flooded = asyncio.create_task(pages.frames(flood))  # type: ignore[arg-type]
         for _ in range(20):  # what another page takes
