@@ -63,7 +63,9 @@ def identify(address: str, library: str) -> Found:
         except Exception as error:  # noqa: BLE001 - a port that is no port: others are still to be asked
             return Found(address, trouble=f"cannot be asked ({one_line(error)})")
         try:
-            identity = _printable(transport.query("*IDN?"))
+            # one with a link of its own says in its own way who it is
+            answer = driver(transport).identity() if scheme_of(address) else transport.query("*IDN?")
+            identity = _printable(answer)
         except InstrumentError as error:
             trouble = error.reason
         else:
@@ -76,6 +78,9 @@ def identify(address: str, library: str) -> Found:
 
 def _lines_to_try(address: str) -> Iterator[tuple[type[Instrument], dict[str, Any]]]:
     """Yield the drivers whose links are tried, and their lines: for a serial port one of each line, else any driver."""
+    if scheme := scheme_of(address):
+        yield next(row.driver for kind in KINDS.values() for row in kind.models if row.scheme == scheme), {}
+        return
     if "::" in address and not address.upper().startswith("ASRL"):
         yield COUNTER.models[0].driver, {}
         return
@@ -86,6 +91,13 @@ def _lines_to_try(address: str) -> Iterator[tuple[type[Instrument], dict[str, An
             if line and line not in seen:
                 seen.append(line)
                 yield model.driver, line
+
+
+def scheme_of(address: str) -> str:
+    """Return the scheme of an address, where a model of ours has it; else empty."""
+    scheme = address.partition("://")[0].lower()
+    known = {row.scheme for kind in KINDS.values() for row in kind.models}
+    return scheme if "://" in address and scheme in known else ""
 
 
 def _printable(identity: str) -> str:
