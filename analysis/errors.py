@@ -1,7 +1,5 @@
 """What an analysis raises when the readings do not allow it; each carries what was seen as attributes."""
 
-from analysis.numbers import digits
-
 
 class AnalysisError(Exception):
     """The readings do not allow this analysis. The text is one sentence fit for a person."""
@@ -13,23 +11,6 @@ class TooFewReadings(AnalysisError):
     def __init__(self, *, seen: int, needed: int) -> None:
         self.seen, self.needed = seen, needed
         super().__init__(f"{seen} usable readings, at least {needed} are needed: record longer or more often")
-
-
-class NoLine(AnalysisError):
-    """No line stands out of a magnetometer's noise.
-
-    Attributes:
-        lowest, highest: where it was searched [Hz].
-        duration: of the record [s].
-        gain: of the strongest one, as natural logarithm of a likelihood.
-    """
-
-    def __init__(self, *, lowest: float, highest: float, duration: float, gain: float) -> None:
-        self.lowest, self.highest, self.duration, self.gain = lowest, highest, duration, gain
-        super().__init__(
-            f"in {digits(duration, 3)} s no line from {digits(lowest, 3)} to {digits(highest, 3)} Hz stands out of the "
-            "noise: bring the sensor nearer to the top, or record longer"
-        )
 
 
 class ShapesDiffer(AnalysisError):

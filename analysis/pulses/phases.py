@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from analysis.pulses.track import Track
 
 Array = NDArray[np.float64]
 Kind = Literal["speeding-up", "held", "coasting", "nothing"]
@@ -22,6 +19,26 @@ NEIGHBOURS = 3
 SHORTEST = 2
 
 
+class Windows(Protocol):
+    """Frequency against time [s], [Hz], [Hz/s], arrays of shape (m,), and (start, end) of times without one [s]."""
+
+    @property
+    def time(self) -> Array:
+        """Of each window."""
+
+    @property
+    def frequency(self) -> Array:
+        """At these times."""
+
+    @property
+    def chirp(self) -> Array:
+        """Its slope there."""
+
+    @property
+    def empty(self) -> tuple[tuple[float, float], ...]:
+        """Times without a frequency."""
+
+
 @dataclass(frozen=True)
 class Phase:
     """What the top did from start to end [s], and between which windows of the track (first, last + 1)."""
@@ -32,11 +49,11 @@ class Phase:
     windows: tuple[int, int]
 
 
-def phases(track: Track, *, still: float = STILL) -> tuple[Phase, ...]:
+def phases(track: Windows, *, still: float = STILL) -> tuple[Phase, ...]:
     """Cut a track into phases.
 
     Args:
-        track: of `track_of_times` or `track_of_blocks`.
+        track: of `track_of_times` or `track_of_blocks`, or of a magnetometer.
         still: relative slope [1/s] below which a top counts as held at its frequency, as by a drive that it follows.
     """
     kinds = _kinds(track, still)
@@ -52,7 +69,7 @@ def phases(track: Track, *, still: float = STILL) -> tuple[Phase, ...]:
     return tuple(_extend_to_gaps(sorted(found, key=lambda phase: phase.start)))
 
 
-def _kinds(track: Track, still: float) -> list[Kind]:
+def _kinds(track: Windows, still: float) -> list[Kind]:
     slope = np.array([_slope(track, i) for i in range(track.time.size)]) / track.frequency
     kinds: list[Kind] = ["speeding-up" if s > still else "coasting" if s < -still else "held" for s in slope]
     first = 0
@@ -66,7 +83,7 @@ def _kinds(track: Track, still: float) -> list[Kind]:
     return kinds
 
 
-def _slope(track: Track, i: int) -> float:
+def _slope(track: Windows, i: int) -> float:
     """Return the slope of the frequency at a window from its neighbours [Hz/s]."""
     reach = NEIGHBOURS // 2
     near = np.arange(max(i - reach, 0), min(i + reach + 1, track.time.size))
@@ -76,11 +93,11 @@ def _slope(track: Track, i: int) -> float:
     return float(away @ track.frequency[near] / (away @ away))
 
 
-def _gap_before(track: Track, i: int) -> bool:
+def _gap_before(track: Windows, i: int) -> bool:
     return any(track.time[i - 1] < start < track.time[i] for start, _ in track.empty)
 
 
-def _edge(track: Track, i: int, side: int) -> float:
+def _edge(track: Windows, i: int, side: int) -> float:
     """Return the time half-way to the next window, or as far beyond the last one."""
     j = i + side
     if 0 <= j < track.time.size:

@@ -2,6 +2,7 @@
 
 from analysis.rotation.result import FieldSpin, Fold
 from analysis.rotation.spin import spin_of_field
+from analysis.rotation.tilt import transverse_moment
 from analysis.rotation.track import FieldTrack, Flight, track_of_field
 
-__all__ = ["FieldSpin", "FieldTrack", "Flight", "Fold", "spin_of_field", "track_of_field"]
+__all__ = ["FieldSpin", "FieldTrack", "Flight", "Fold", "spin_of_field", "track_of_field", "transverse_moment"]

@@ -30,6 +30,7 @@ class LineFit:
     Attributes:
         frequency, chirp: at the record's middle [Hz], [Hz/s].
         covariance: of both, shape (2, 2).
+        u_of_noise: their standard uncertainties, had the bend been known.
         amplitudes: of cosine and sine in each axis, shape (2, k) [unit of the record].
         amplitude_u: standard uncertainty of each, shape (k,) [unit of the record].
         variance: of a sample in each axis, shape (k,) [unit²].
@@ -42,6 +43,7 @@ class LineFit:
     frequency: float
     chirp: float
     covariance: Array
+    u_of_noise: tuple[float, float]
     amplitudes: Array
     amplitude_u: Array
     variance: Array
@@ -80,6 +82,7 @@ def fit_line(record: Record, frequency: float, chirp: float) -> LineFit:
         ahead = np.stack([amplitudes[1], -amplitudes[0]])
         information = np.einsum("ipjq,pq->ij", beside, (ahead / variance) @ ahead.T) * np.outer(scale, scale)
         gradient = scale * np.einsum("ipk,pk->i", left, ahead / variance)
+        known = np.linalg.inv(information[:2, :2] + 1e-12 * np.eye(2))
         # the bend's prior: known but for the law of the drag
         information[2, 2] += 1 / max((UNDER_DRAG_U * abs(bend_unit)) ** 2, 1e-24)
         information[[0, 1], [0, 1]] += 1e-12  # no line at all leaves nothing to divide by
@@ -99,6 +102,7 @@ def fit_line(record: Record, frequency: float, chirp: float) -> LineFit:
         frequency=frequency,
         chirp=chirp,
         covariance=np.asarray(covariance[:2, :2], dtype=np.float64),
+        u_of_noise=(float(known[0, 0]) ** 0.5, float(known[1, 1]) ** 0.5),
         amplitudes=amplitudes,
         amplitude_u=np.sqrt(variance * 0.5 * float(np.trace(inverse))),
         variance=variance,

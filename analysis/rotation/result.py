@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -37,6 +38,7 @@ class FieldSpin:
         u_frequency: its standard uncertainty [Hz].
         chirp: its slope there [Hz/s].
         u_chirp: its standard uncertainty [Hz/s].
+        u_of_noise: standard uncertainties of both, were the law of the drag known [Hz], [Hz/s].
         reference_time: the mean of the times [s].
         amplitude: of the line in each axis, shape (k,) [T].
         u_amplitude: their standard uncertainties, shape (k,) [T].
@@ -45,6 +47,7 @@ class FieldSpin:
         bound: Cramér–Rao bound of the frequency in white noise [Hz].
         snr_db: 20 log₁₀ of amplitude over noise of a sample, in the axis where it is greatest.
         rate: samples per second.
+        duration: of the record [s].
         samples: number of those used.
         folds: frequencies that could be it, the most probable first, which is this one.
         kinds: of warnings.
@@ -54,6 +57,7 @@ class FieldSpin:
     u_frequency: float
     chirp: float
     u_chirp: float
+    u_of_noise: tuple[float, float]
     reference_time: float
     amplitude: tuple[float, ...]
     u_amplitude: tuple[float, ...]
@@ -62,9 +66,20 @@ class FieldSpin:
     bound: float
     snr_db: float
     rate: float
+    duration: float
     samples: int
     folds: tuple[Fold, ...]
     kinds: tuple[Kind, ...] = ()
+
+    @property
+    def turns(self) -> int:
+        """Number of turns in the record."""
+        return round(self.frequency * self.duration)
+
+    @property
+    def scatter(self) -> float:
+        """Standard deviation of the time of one turn, as its own samples tell it [s]."""
+        return self.bound * self.duration * math.sqrt(self.turns / 12) / self.frequency
 
     @property
     def doubtful(self) -> bool:

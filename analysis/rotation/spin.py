@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.errors import NoLine
+from analysis.rotation.errors import NoLine
 from analysis.rotation.folds import evidence_of, images_between, weigh
 from analysis.rotation.line import LineFit, fit_line
 from analysis.rotation.record import MAINS_HZ, Line, Record, read_samples
@@ -97,6 +97,7 @@ def result_of(record: Record, seen: Evidence, weighed: Weighed) -> FieldSpin:
         u_frequency=float(u_frequency),
         chirp=fit.chirp,
         u_chirp=float(u_chirp),
+        u_of_noise=fit.u_of_noise,
         reference_time=record.middle,
         amplitude=tuple((record.unit * amplitude).tolist()),
         u_amplitude=tuple((record.unit * fit.amplitude_u).tolist()),
@@ -105,6 +106,7 @@ def result_of(record: Record, seen: Evidence, weighed: Weighed) -> FieldSpin:
         bound=bound,
         snr_db=20 * math.log10(max(float(np.max(amplitude / noise)), 1e-9)),
         rate=record.rate,
+        duration=2 * record.half,
         samples=record.late.size,
         folds=folds,
         kinds=tuple(_kinds(record, fit, weighed)),

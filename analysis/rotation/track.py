@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.errors import AnalysisError, NoLine, NotPositive
+from analysis.errors import AnalysisError, NotPositive
+from analysis.rotation.errors import NoLine
 from analysis.rotation.folds import Evidence, evidence_of, images_between, weigh
 from analysis.rotation.line import UNDER_DRAG, LineFit, fit_line
 from analysis.rotation.record import FEWEST, Line, Record, read_samples

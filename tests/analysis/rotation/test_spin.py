@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from analysis.errors import NoLine, ShapesDiffer, TimesNotIncreasing, TooFewReadings
+from analysis.errors import ShapesDiffer, TimesNotIncreasing, TooFewReadings
 from analysis.rotation import spin_of_field
+from analysis.rotation.errors import NoLine
 from analysis.rotation.synthetic import synthetic_field
 
 TRIALS = 60

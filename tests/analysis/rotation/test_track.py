@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from analysis.errors import NoLine, NotPositive
+from analysis.errors import NotPositive
 from analysis.rotation import FieldTrack, track_of_field
+from analysis.rotation.errors import NoLine
 from analysis.rotation.synthetic import synthetic_flight
 
 
