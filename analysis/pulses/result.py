@@ -9,7 +9,7 @@ from typing import Literal
 from analysis.pulses.jump import Jump  # noqa: TC001 - results are read by the types of their fields
 from analysis.uncertainty import Estimate
 
-Method = Literal["edges", "matched", "likelihood"]
+Method = Literal["edges", "matched", "likelihood", "line"]
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class SpinFrequency:
         chirp: its slope there [Hz/s].
         phase: there [turns], from 0 to 1; the middle of a pulse passes at 0.
         reference_time: [s]; the middle of the record, moved a little where pulses are missing on one side.
-        method: by which it was found.
+        method: by which it was found; line: of a magnetometer, whose turns count as pulses.
         bound: Cramér–Rao bound of the frequency [Hz], for the noise and the pulse as estimated; None for lists of
             times, where it is the uncertainty itself.
         pulses: number of those used.

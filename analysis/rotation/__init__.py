@@ -1,8 +1,18 @@
 """Spin frequency of a top from the magnetic field that its tilted moment turns past a magnetometer."""
 
 from analysis.rotation.result import FieldSpin, Fold
-from analysis.rotation.spin import spin_of_field
+from analysis.rotation.spin import LineSamples, samples_of_line, spin_of_field
 from analysis.rotation.tilt import transverse_moment
 from analysis.rotation.track import FieldTrack, Flight, track_of_field
 
-__all__ = ["FieldSpin", "FieldTrack", "Flight", "Fold", "spin_of_field", "track_of_field", "transverse_moment"]
+__all__ = [
+    "FieldSpin",
+    "FieldTrack",
+    "Flight",
+    "Fold",
+    "LineSamples",
+    "samples_of_line",
+    "spin_of_field",
+    "track_of_field",
+    "transverse_moment",
+]

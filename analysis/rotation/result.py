@@ -8,8 +8,8 @@ from typing import Literal
 
 #: "folded": above half the sampling rate, as the times or the slope tell; "fold-doubt": `folds` cannot be
 #: distinguished; "fold-by-slope": they are distinguished by the slope alone, of a spin that falls; "regular": the
-#: samples lie more evenly than their times say; "weak": the line hardly stands out; "mains": it lies on a mains line.
-Kind = Literal["folded", "fold-doubt", "fold-by-slope", "regular", "weak", "mains"]
+#: samples lie more evenly than their times say; "weak": the line hardly stands out; "on-mains": it may be the mains.
+Kind = Literal["folded", "fold-doubt", "fold-by-slope", "regular", "weak", "on-mains"]
 
 
 @dataclass(frozen=True)

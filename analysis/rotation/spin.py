@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from analysis.rotation.folds import Evidence, Weighed
+    from analysis.rotation.record import Array
 
 #: A line that is named may lie this part of the given frequency beside it.
 NEAR = 0.1
@@ -58,6 +60,42 @@ def spin_of_field(
     seen = evidence_of(record, fit, images, record.rate)
     u = float(fit.covariance[1, 1]) ** 0.5
     return result_of(record, seen, weigh([seen], [one.sign for one in images], fit.chirp, u))
+
+
+@dataclass(frozen=True, eq=False)
+class LineSamples:
+    """The samples of one window as a picture shows them.
+
+    Attributes:
+        time: shape (n,) [s].
+        field: without drift, mains and other lines, shape (n, k) [T].
+        line: of the spin, shape (n, k) [T].
+        turns: of the line since the reference time, shape (n,).
+    """
+
+    time: Array
+    field: Array
+    line: Array
+    turns: Array
+
+
+def samples_of_line(times: ArrayLike, field: ArrayLike, found: FieldSpin) -> LineSamples:
+    """Return the samples of the window in which a spin was found."""
+    t, b = read_samples(times, field)
+    near = np.abs(t - found.reference_time) <= 0.6 * found.duration  # the mean is not quite in the middle
+    record = Record(t[near], b[near])
+    line = Line(found.frequency, found.chirp).at(record.middle - found.reference_time)
+    fit = fit_line(record, line.frequency, line.chirp)
+    record.add_lines(other_lines(record, record.rest(fit.columns @ fit.amplitudes), line))
+    fit = fit_line(record, line.frequency, line.chirp)
+    wave = fit.columns @ fit.amplitudes
+    late = record.late
+    return LineSamples(
+        time=t[near],
+        field=record.unit * (record.rest(wave) + wave),
+        line=record.unit * wave,
+        turns=fit.frequency * late + fit.chirp * late**2 / 2,
+    )
 
 
 def strongest(record: Record, low: float, high: float) -> LineFit:
@@ -136,4 +174,4 @@ def _kinds(record: Record, fit: LineFit, weighed: Weighed) -> Iterator[Kind]:
     if fit.gain < WEAK_GAIN:
         yield "weak"
     if any(abs(fit.frequency - mains) < 0.5 / record.half for mains in MAINS_HZ):
-        yield "mains"
+        yield "on-mains"

@@ -162,6 +162,26 @@ class SpinOptions(RecordOptions):
         "How pulses are found: edges is the fastest, likelihood for weak ones.", choices=get_args(Method),
     ))  # fmt: skip
     clock_u: float | None = field(default=None, metadata=_CLOCK_U)
+    near: float | None = field(default=None, metadata=_about(
+        "About where the spin of a magnetometer's record is, to 10 %, where its samples leave a choice.",
+        kind=float, metavar="HZ", unit="Hz", above=0.0,
+    ))  # fmt: skip
+    distance_m: float | None = field(default=None, metadata=_about(
+        "Distance of a magnetometer from the axis of the top, horizontally; the tilt of its moment follows.",
+        kind=float, metavar="M", typed="distance", unit="m", above=0.0,
+    ))  # fmt: skip
+    distance_u_m: float | None = field(default=None, metadata=_about(
+        "Standard uncertainty of --distance, and of --below.", default_text="0.005", needs="distance_m",
+        kind=float, metavar="M", typed="distance_u", unit="m", above=0.0,
+    ))  # fmt: skip
+    below_m: float | None = field(default=None, metadata=_about(
+        "Height of the top above the magnetometer.", default_text="0, the same height", needs="distance_m",
+        kind=float, metavar="M", typed="below", unit="m", low=-1.0, high=1.0,
+    ))  # fmt: skip
+    moment_a_m2: float | None = field(default=None, metadata=_about(
+        "Moment of the top, as levilab analyze field finds it; the angle of its tilt follows.", needs="distance_m",
+        kind=float, metavar="A_M2", typed="moment", unit="A m^2", above=0.0,
+    ))  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -22,11 +22,13 @@ from analysis.pulses import (
     track_of_times,
 )
 from analysis.pulses.errors import OnlyHum
+from analysis.rotation import FieldSpin, spin_of_field, track_of_field, transverse_moment
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.options import SpinOptions
 from levilab.pipelines.sources import Needs
+from levilab.pipelines.spin.magnetometer import findings_of, spin_of_line, track_middle
 from levilab.pipelines.spin.readings import Records, read_spin_file, read_spin_run, track_of_record
 from levilab.pipelines.spin.words import finding_text
 from levilab.present.numbers import with_uncertainty
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
     from analysis.pulses import Phase, Track
     from levilab.formats.waveforms.waveform import Waveform
     from levilab.pipelines.sources import Source
+    from levilab.pipelines.spin.magnetometer import FieldRecord
 
 Array = NDArray[np.float64]
 
@@ -58,6 +61,8 @@ NEEDS = Needs(
 LONGEST_WHOLE_S = 12.0
 #: Length of a window of a longer record [s].
 WINDOW_S = 2.0
+#: Standard uncertainty of the place of a phone's sensor [m]: where it sits in the phone is seldom known better.
+DISTANCE_U_M = 0.005
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +112,9 @@ class SpinRun:
         notes: findings.
         parts: "frequency", "chirp" → what u of it is made of; empty where that is not known.
         code: one step of the oscilloscope's or sound card's numbers over the noise of a sample; None: not known.
+        line: of a magnetometer, the same with what its axes tell.
+        transverse: the part of the moment that turns, where the magnetometer's distance is given [A m²].
+        tilt: of the moment, where that is given, too [rad].
     """
 
     spin: SpinFrequency
@@ -114,6 +122,9 @@ class SpinRun:
     notes: tuple[Finding, ...]
     parts: Mapping[str, UParts] = field(default_factory=dict)
     code: float | None = None
+    line: FieldSpin | None = None
+    transverse: Estimate | None = None
+    tilt: Estimate | None = None
 
     @property
     def which(self) -> str:
@@ -165,6 +176,8 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
         method = self.options.method
         if method != "auto" and all(source.readings.pulses for source in self.sources):
             yield f"the method {method} was chosen, but a list of pulse times leaves no choice"
+        if self.options.distance_m is not None and not any(run.transverse for run in self.runs):
+            yield "a distance was given, but no record of a magnetometer has three axes: no tilt follows"
 
     def about_run(self, run: SpinRun) -> Iterable[str]:
         """Return what to know of one input."""
@@ -181,6 +194,8 @@ def spin_of_source(source: Source[Records], options: SpinOptions) -> SpinRun:
     """Return the spin of one input.  Raises DataError, which names the file."""
     records = source.readings
     try:
+        if records.field:
+            return _of_field(records.field, options)
         if records.pulses:
             return _of_times(records.pulses.times)
         if len(records.waveforms) == 1:
@@ -214,6 +229,35 @@ def _of_waveform(waveform: Waveform, channel: str, options: SpinOptions) -> Spin
         found = _with_rate(spin, waveform)
         return replace(_of_one(found), parts=parts_of(spin, found), code=_code(samples, found))
     return _of_track(track_of_record(waveform, channel, WINDOW_S, options.method))
+
+
+def _of_field(record: FieldRecord, options: SpinOptions) -> SpinRun:
+    if record.duration <= LONGEST_WHOLE_S:
+        line = spin_of_field(record.times, record.field, near=options.near)
+        spin = spin_of_line(line)
+        run = _of_one(spin)
+    else:
+        track = track_of_field(record.times, record.field, near=options.near)
+        line = track.spins[track_middle(track)]
+        spin = spin_of_line(line)
+        series = Series(track.time, track.frequency, track.u, tuple(map(_phase, phases(track))), of="window")
+        run = SpinRun(spin, series, findings_of(track.spins))
+    moment = None
+    if options.distance_m is not None:
+        distance = Estimate(options.distance_m, options.distance_u_m or DISTANCE_U_M, "m")
+        moment = transverse_moment(line, distance, options.below_m or 0.0)
+    return replace(
+        run, parts=parts_of(spin, spin), line=line, transverse=moment, tilt=_tilt(moment, options.moment_a_m2)
+    )
+
+
+def _tilt(transverse: Estimate | None, moment: float | None) -> Estimate | None:
+    """Return the angle of a moment whose size and transverse part are known [rad]."""
+    if transverse is None or transverse.value is None or not moment or transverse.value >= moment:
+        return None
+    value = math.asin(transverse.value / moment)
+    u = None if transverse.u is None else transverse.u / moment / math.cos(value)
+    return Estimate(value, u, "rad")
 
 
 def _with_rate(spin: SpinFrequency, waveform: Waveform) -> SpinFrequency:
@@ -302,11 +346,13 @@ def _columns(spins: Sequence[SpinFrequency]) -> tuple[Array, Array, Array]:
 def in_a_sentence(run: SpinRun) -> str:
     """Return what the data say of one input."""
     spin, series = run.spin, run.series
-    at = f"{with_uncertainty(spin.frequency)} at {spin.reference_time:.4g} s"
+    folds = run.line.folds[1:] if run.line and run.line.doubtful else ()
+    other = "".join(f" or {fold.frequency:.2f} Hz" for fold in folds)
+    at = f"{with_uncertainty(spin.frequency)}{other} at {spin.reference_time:.4g} s"
     if len(series) == 1:
         return f"The spin is {at}, its slope {with_uncertainty(spin.chirp)}."
     ends = f"{series.frequency[0]:.3f} Hz at {series.time[0]:.1f} s to {series.frequency[-1]:.3f} Hz"
-    phases = ", ".join(f"{kind} {start:.1f} to {end:.1f} s" for kind, start, end in series.phases[:6])
+    phases = ", ".join(f"{kind} {start + 0.0:.1f} to {end:.1f} s" for kind, start, end in series.phases[:6])
     in_phases = f"; {phases}" if phases else ""
     slope = f" Its slope through all {series.of}s is {with_uncertainty(run.trend)}." if run.trend else ""
     return (

@@ -22,6 +22,20 @@ if TYPE_CHECKING:
 #: Powers of the record's length by which u falls, with as much noise, and pulses as often.
 _BY_LENGTH = {"frequency": "√8", "chirp": "√32"}
 
+#: What noise is of, what helps against it, and what is beyond it with its reason.
+_OF_PULSES = (
+    "train of such pulses",
+    "more light",
+    "scatter of the pulses beyond the noise",
+    "jitter of the pulses, neighbours that are alike, and few pulses to see both by",
+)
+_OF_A_LINE = (
+    "line of such amplitudes",
+    "the magnetometer nearer to the top",
+    "drift, mains and other lines",
+    "what of the samples they may take from the line",
+)
+
 
 def budget_of_run(source: Source[Records], run: SpinRun, options: SpinOptions) -> tuple[Budget, ...]:
     """Return the budgets of one record; of a long one or of several, of the window or record in the middle."""
@@ -31,7 +45,7 @@ def budget_of_run(source: Source[Records], run: SpinRun, options: SpinOptions) -
         if name not in run.parts or estimate.value is None or not estimate.u:
             continue
         rows = [*_of_pulses(run, name, run.parts[name], estimate), *_of_the_rest(run.parts[name], estimate)]
-        what = "" if source.run else "clock of the recording"
+        what = "" if source.run else "clock of the phone" if run.line else "clock of the recording"
         rows.append(time_base(source, "oscilloscope", by_clock * estimate.value, options.clock_u, what=what))
         made.append(Budget(name, estimate.value, estimate.u, estimate.unit, tuple(rows)))
     return tuple(made)
@@ -59,12 +73,12 @@ def _of_pulses(run: SpinRun, name: str, parts: UParts, estimate: Estimate) -> It
             "resolution", "bits of the oscilloscope", of_codes, estimate.unit, note, "a finer vertical scale"
         )
         noise = rest(noise, of_codes)
-    note = "the Cramér–Rao bound of a train of such pulses: no method does better"
-    yield direct_row("noise", "noise of the samples", noise, estimate.unit, note, f"more light, or {longer}", "A")
+    of, more, jitter, why = _OF_A_LINE if run.line else _OF_PULSES
+    note = f"the Cramér–Rao bound of a {of}: no method does better"
+    yield direct_row("noise", "noise of the samples", noise, estimate.unit, note, f"{more}, or {longer}", "A")
     beyond = rest(whole, min(bound, whole))
     if beyond > 0:
-        note = "jitter of the pulses, neighbours that are alike, and few pulses to see both by"
-        yield direct_row("jitter", "scatter of the pulses beyond the noise", beyond, estimate.unit, note, longer, "A")
+        yield direct_row("jitter", jitter, beyond, estimate.unit, why, longer, "A")
 
 
 def _bound(spin: SpinFrequency, name: str) -> float | None:

@@ -14,7 +14,7 @@ from levilab.pipelines.result import Result, RunPart
 from levilab.pipelines.row import find_all
 from levilab.pipelines.spin.analysis import METHOD, SpinAnalysis, SpinRun
 from levilab.pipelines.spin.budget import budget_of_run
-from levilab.pipelines.spin.quantities import QUANTITIES
+from levilab.pipelines.spin.quantities import OF_A_LINE, QUANTITIES
 
 
 class SpinPart(RunPart):
@@ -30,6 +30,11 @@ class SettingsPart(Settings):
     rate: float | None = Field(gt=0, alias="rate_hz")
     method: Method
     clock_u: float | None = Field(default=None, gt=0)
+    near: float | None = Field(default=None, gt=0, alias="near_hz")
+    distance_m: float | None = Field(default=None, gt=0)
+    distance_u_m: float | None = Field(default=None, gt=0)
+    below_m: float | None = None
+    moment_a_m2: float | None = Field(default=None, gt=0)
 
 
 class SpinResult(Result):
@@ -45,7 +50,8 @@ def _entries(analysis: SpinAnalysis) -> dict[str, Any]:
 
 
 def _run_entries(run: SpinRun) -> dict[str, Any]:
-    return {"values": values_of(find_all(QUANTITIES, run.spin)), "method": run.spin.method}
+    found = find_all(QUANTITIES, run.spin) | find_all(OF_A_LINE, run)
+    return {"values": values_of(found), "method": run.spin.method}
 
 
 DOCUMENT = Document(

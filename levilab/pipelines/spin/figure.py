@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.numbers import digits, with_minus
+from analysis.rotation import samples_of_line
 from levilab.pipelines.spin.analysis import MOST_DRAWN
 from levilab.present.drawing import SMALL, band, headline, panel, synthetic_mark, write
 from levilab.present.looks import LOOKS
@@ -17,10 +18,13 @@ from levilab.present.numbers import short_name, with_uncertainty
 from levilab.present.style import STYLE, WIDE
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     from analysis.pulses import SpinFrequency
+    from analysis.rotation import FieldSpin, LineSamples
     from levilab.formats.waveforms.waveform import Waveform
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spin.analysis import SpinAnalysis, SpinRun
@@ -35,8 +39,10 @@ TURNS_SHOWN, LONGEST_FOLDED_S = 6, 12.0
 READINGS, PULSES, FIT = LOOKS["readings"].colour, LOOKS["pulses"].colour, LOOKS["fit"].colour
 #: Height of the sentence above all, and of the four panels of an input [inch].
 _HEAD, _EACH = 0.42, 4.35
-#: Bins of the folded pulse.
-BINS = 240
+#: Bins of the folded pulse, and of the field of a magnetometer.
+BINS, FOLDED_BINS = 240, 24
+#: Colours of the axes of a magnetometer, that are told by their darkness, too.
+AXES = ("#0072b2", "#d55e00", "#009e73")
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +100,14 @@ def _drawable(name: str) -> str:
 
 
 def _draw(panels: list[Axes], source: Source[Records], run: SpinRun, k: int) -> None:
+    if source.readings.field and run.line:
+        samples = samples_of_line(source.readings.field.times, source.readings.field.field, run.line)
+        axes = source.readings.field.axes
+        _draw_field(panels[0], samples, axes, run.spin)
+        _draw_folded_field(panels[1], samples, axes)
+        _draw_spectrum(panels[2], samples, run.line)
+        _draw_series(panels[3], run, samples.time, gid=f"readings-{k}")
+        return
     excerpt = _excerpt(source.readings, run.spin)
     if source.readings.pulses:
         _draw_intervals(panels[0], excerpt)
@@ -102,7 +116,7 @@ def _draw(panels: list[Axes], source: Source[Records], run: SpinRun, k: int) -> 
         _draw_trace(panels[0], excerpt, run.spin)
         _draw_folded(panels[1], excerpt)
     _draw_residuals(panels[2], excerpt, run.spin)
-    _draw_series(panels[3], run, excerpt, gid=f"readings-{k}")
+    _draw_series(panels[3], run, excerpt.time, gid=f"readings-{k}")
 
 
 # --- what is drawn -------------------------------------------------------------------------------------
@@ -254,6 +268,69 @@ def _draw_folded(axes: Axes, excerpt: _Excerpt) -> None:
     axes.set_title(f"{turns} turns over each other; black: mean", loc="left")
 
 
+def _draw_field(panel: Axes, samples: LineSamples, axes: Sequence[str], spin: SpinFrequency) -> None:
+    """Draw a few turns about the reference time: samples without drift and mains, and the line."""
+    half = TURNS_SHOWN / 2 / (spin.frequency.value or 1.0)
+    near = np.abs(samples.time - spin.reference_time) <= half
+    fine = np.linspace(samples.time[near][0], samples.time[near][-1], 400)
+    turns = np.interp(fine, samples.time, samples.turns)
+    for k, name in enumerate(axes):
+        colour = AXES[k]
+        panel.plot(samples.time[near], 1e6 * samples.field[near, k], ".", color=colour, markersize=4, label=name)
+        panel.plot(fine, 1e6 * _wave(samples, k, turns), color=colour, linewidth=0.9)
+    panel.legend(loc="upper right", ncols=3, fontsize=SMALL, borderaxespad=0, columnspacing=1, handlelength=1)
+    low, high = panel.get_ylim()
+    panel.set_ylim(low, high + 0.25 * (high - low))
+    panel.set(xlabel="time  [s]", ylabel="field  [µT]")
+    panel.locator_params(axis="x", nbins=6)
+    panel.set_title("Field without drift and mains; the line", loc="left")
+
+
+def _wave(samples: LineSamples, k: int, turns: Array) -> Array:
+    """Return the line in an axis at other turns [T]."""
+    angle = 2 * np.pi * samples.turns
+    columns = np.column_stack([np.cos(angle), np.sin(angle)])
+    cosine, sine = np.linalg.lstsq(columns, samples.line[:, k])[0]
+    wave: Array = cosine * np.cos(2 * np.pi * turns) + sine * np.sin(2 * np.pi * turns)
+    return wave
+
+
+def _draw_folded_field(panel: Axes, samples: LineSamples, axes: Sequence[str]) -> None:
+    """Draw all turns over each other: means over a part of a turn with their standard errors, and the line."""
+    part = samples.turns % 1.0
+    bins = np.minimum((part * FOLDED_BINS).astype(np.intp), FOLDED_BINS - 1)
+    count = np.maximum(np.bincount(bins, minlength=FOLDED_BINS), 1)
+    at, fine = (np.arange(FOLDED_BINS) + 0.5) / FOLDED_BINS, np.linspace(0, 1, 200)
+    for k in range(len(axes)):
+        values = 1e6 * samples.field[:, k]
+        mean = np.bincount(bins, values, minlength=FOLDED_BINS) / count
+        error = np.std(values - 1e6 * samples.line[:, k]) / np.sqrt(count)
+        panel.errorbar(at, mean, error, color=AXES[k], fmt=".", markersize=3, elinewidth=0.7)
+        panel.plot(fine, 1e6 * _wave(samples, k, fine), color=AXES[k], linewidth=0.9)
+    turns = round(float(np.ptp(samples.turns)))
+    panel.set(xlabel="part of a turn", ylabel="field  [µT]", xlim=(0, 1))
+    panel.set_title(f"{turns} turns over each other: means and line", loc="left")
+
+
+def _draw_spectrum(panel: Axes, samples: LineSamples, found: FieldSpin) -> None:
+    """Draw amplitudes against frequency, and without the line: whether another one is in the way."""
+    nyquist = found.rate / 2
+    trial = np.arange(1.0, max(nyquist, 1.1 * found.frequency), 0.5 / found.duration)
+    turns = samples.turns / found.frequency  # along its slope the line is sharp, and no other one
+    wave = np.exp(-2j * np.pi * np.outer(trial, turns)) / samples.time.size
+    for field, colour, label in (
+        (samples.field, "0.6", "field"),
+        (samples.field - samples.line, "black", "without the line"),
+    ):
+        size = 2e6 * np.sqrt(np.sum(np.abs(wave @ field) ** 2, axis=1))
+        panel.plot(trial, size, color=colour, linewidth=0.7, label=label)
+    panel.axvline(found.frequency, linewidth=0.9, zorder=1, **LOOKS["pulses"].as_line)
+    panel.set(xlabel="frequency  [Hz]", ylabel="amplitude  [µT]", xlim=(0, trial[-1]))
+    panel.set_ylim(bottom=0, top=1.3 * panel.get_ylim()[1])
+    panel.legend(loc="upper right", ncols=2, fontsize=SMALL, borderaxespad=0, columnspacing=1, handlelength=1.2)
+    panel.set_title("Amplitudes; dashed: the spin", loc="left")
+
+
 def _draw_intervals(axes: Axes, excerpt: _Excerpt) -> None:
     style: Any = {"marker": ".", "markersize": 4, "linestyle": "none", "color": "black"}
     axes.plot(excerpt.time[1:], 1e3 * np.diff(excerpt.time), **style)
@@ -291,11 +368,11 @@ def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
     axes.set_title("Residuals of the pulses' times", loc="left")
 
 
-def _draw_series(axes: Axes, run: SpinRun, excerpt: _Excerpt, gid: str) -> None:
+def _draw_series(axes: Axes, run: SpinRun, time: Array, gid: str) -> None:
     """Draw frequency against time: of windows or records, or by the fit of the only one."""
     series, spin = run.series, run.spin
     if len(series) == 1:
-        t = np.linspace(float(excerpt.time[0]), float(excerpt.time[-1]), 50)
+        t = np.linspace(float(time[0]), float(time[-1]), 50)
         along = [spin.at(float(x)) for x in t]
         nu = np.array([one.value for one in along], dtype=np.float64)
         u = np.array([one.u if one.u is not None else np.nan for one in along])

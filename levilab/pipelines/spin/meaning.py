@@ -68,6 +68,7 @@ def _sentences(run: SpinRun) -> Iterator[str]:
         return
     at = f" at {spin.reference_time:.3g} s" if len(run.series) > 1 else ""
     yield f"The top turns with {with_uncertainty(frequency)}{at}, {60 * frequency.value:.0f} times a minute."
+    yield from _about_line(run)
     if (change := _change(run)) is None:
         return
     yield from _about_change(change, frequency.value)
@@ -75,11 +76,22 @@ def _sentences(run: SpinRun) -> Iterator[str]:
         ratio = run.parts["frequency"].pulses / spin.bound
         if ratio < _AT_BOUND:
             yield "With such noise no other method would find it much better."
-        else:
+        elif not run.line:
             yield (
                 f"The uncertainty is {digits(ratio)} times the least that any method could reach with such noise: the "
                 "pulses themselves scatter, or the samples lie far apart."
             )
+
+
+def _about_line(run: SpinRun) -> Iterator[str]:
+    """Yield the sense of rotation, and the part of the moment that turns."""
+    if run.line and run.line.sense:
+        # beside the top a dipole's field turns against the dipole
+        way = "clockwise" if run.line.sense > 0 else "counterclockwise"
+        yield f"Seen from above it turns {way}, if the phone lay beside it with its screen up."
+    if run.transverse and run.transverse.value:
+        text = f"The part of its moment that turns is {with_uncertainty(run.transverse)}"
+        yield f"{text}: the moment leans by {with_uncertainty(run.tilt)} from the axis." if run.tilt else f"{text}."
 
 
 def _about_change(change: _Change, frequency: float) -> Iterator[str]:

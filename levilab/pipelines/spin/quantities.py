@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from analysis.uncertainty import Estimate
 from levilab.pipelines.row import Column, Quantity, columns_of, entry
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from analysis.pulses.result import SpinFrequency
+    from levilab.pipelines.spin.analysis import SpinRun
 
 
 def _correlation(k: int) -> Callable[[SpinFrequency], Any]:
@@ -35,8 +37,37 @@ QUANTITIES = (
     ),
 )
 
+
+def _axis(k: int) -> Callable[[SpinRun], Estimate | None]:
+    """Return a function to the amplitude in an axis; None where the record lacks it."""
+
+    def amplitude(run: SpinRun) -> Estimate | None:
+        line = run.line
+        return Estimate(line.amplitude[k], line.u_amplitude[k], "T") if line and k < len(line.amplitude) else None
+
+    return amplitude
+
+
+#: Of a run of a magnetometer.
+OF_A_LINE = (
+    *(
+        Quantity(
+            f"amplitude_{k}",
+            "T",
+            f"of the turning field, axis {k}",
+            of=_axis(k - 1),
+            optional=True,
+            fine=True,
+        )
+        for k in (1, 2, 3)
+    ),
+    Quantity("transverse_moment", "A m^2", "the part of the moment that turns", "μ_t", of="transverse", optional=True),
+    Quantity("moment_tilt", "rad", "angle between moment and axis", "tilt", of="tilt", optional=True),
+)
+
 SPIN_ROW = (
     *columns_of(QUANTITIES),
+    *columns_of(OF_A_LINE),
     entry("method", "text", "how the pulses were found"),
     entry("pulses", "count", "pulses that were found", "result.spin.pulses"),
     entry("missing", "count", "pulses that are missing", "result.spin.missing"),

@@ -1,4 +1,4 @@
-"""What the analysis of a spin reads: records of a detector's signal, or times of pulses."""
+"""What the analysis of a spin reads: records of a detector's signal or of a magnetometer, or times of pulses."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from analysis.pulses import track_of_blocks, track_of_samples
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
+from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
 from levilab.runs.traces import INDEX, undescribed_codes
 from levilab.runs.waveforms import run_waveforms
 
@@ -36,6 +37,7 @@ class Records:
         channel: its name.
         pulses: the list.
         origin: the file or folder.
+        field: samples of a magnetometer.
     """
 
     origin: Path
@@ -43,8 +45,11 @@ class Records:
     channel: str
     pulses: PulseTimes | None
     warnings: tuple[str, ...]
+    field: FieldRecord | None = None
 
     def __len__(self) -> int:
+        if self.field:
+            return len(self.field)
         return sum(waveform.count for waveform in self.waveforms) + (len(self.pulses.times) if self.pulses else 0)
 
     @property
@@ -59,6 +64,8 @@ class Records:
     @property
     def kind(self) -> str:
         """What it is, in words."""
+        if self.field:
+            return self.field.kind
         if self.pulses:
             return self.pulses.format
         if len(self.waveforms) > 1:
@@ -85,6 +92,9 @@ def read_spin_file(path: Path, options: InputOptions) -> Records:
         DoesNotSuit: it holds neither samples nor pulse times.
         DataError: it cannot be used.
     """
+    field = read_field_record(path, options)
+    if field:
+        return Records(path, (), "", None, field.warnings, field)
     record = read_record(path, columns=options.columns, rate=options.rate, guess=options.guess)
     if isinstance(record, PulseTimes):
         return Records(path, (), "", record, record.warnings)

@@ -10,7 +10,7 @@ from analysis.uncertainty import Estimate
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts
 from levilab.pipelines.spin.analysis import MOST_DRAWN, in_a_sentence
 from levilab.pipelines.spin.meaning import meaning
-from levilab.pipelines.spin.table import frequency_table, pulse_table, series_table
+from levilab.pipelines.spin.table import frequency_table, quality_tables, series_table
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
 from levilab.present.numbers import enumeration, with_uncertainty
 
@@ -46,16 +46,21 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
             alt="Traces with the turns found in them, turns laid over each other, residuals, frequency in time",
             points=_points(analysis),
         ),
-        runs_title="The pulses",
-        runs=(Tabular("spin-pulses", replace(pulse_table(analysis), title=""), _PULSES, first_column_wraps=True),),
+        runs_title="The line" if all(run.line for run in analysis.runs) else "The pulses",
+        runs=tuple(
+            Tabular(name, replace(one, title=""), _QUALITY[name], first_column_wraps=True)
+            for name, one in quality_tables(analysis).items()
+        ),
         inputs=input_parts(analysis, _in_words, _series, in_a_sentence),
     )
 
 
 def _count_pulses(analysis: SpinAnalysis) -> str:
     """Return the number of pulses of single records, and of records or windows, of which each has its pulses."""
-    pulses = sum(run.spin.pulses for run in analysis.runs if not run.which)
-    counts = {"pulse": pulses} if pulses else {}
+    counts = {}
+    for name, is_line in (("pulse", False), ("turn", True)):
+        if number := sum(run.spin.pulses for run in analysis.runs if not run.which and bool(run.line) is is_line):
+            counts[name] = number
     for run in analysis.runs:
         if run.which:
             counts[run.series.of] = counts.get(run.series.of, 0) + len(run.series)
@@ -69,15 +74,23 @@ _FREQUENCIES = (
     "Of several records or windows this table, that of the pulses and the budgets are of the one in the middle; the "
     "text gives the slope through all."
 )
-_PULSES = (
-    "missing: turns without a pulse; doubled: pulses beyond one a turn; scatter: standard deviation of one pulse's "
-    "time; S/N: height of a pulse over the noise of a sample."
-)
+_QUALITY = {
+    "spin-pulses": (
+        "missing: turns without a pulse; doubled: pulses beyond one a turn; scatter: standard deviation of one pulse's "
+        "time; S/N: height of a pulse over the noise of a sample."
+    ),
+    "spin-line": (
+        "A: amplitude of the field that turns with the top, in each axis; noise: standard deviation of a sample there; "
+        "S/N: amplitude over noise, in the axis where it is greatest."
+    ),
+}
 
 
 def _in_words(source: Source[Records], run: SpinRun, *_: object) -> tuple[str, ...]:
     records, count = source.readings, len(source.readings)
     of = f"{run.which}: " if run.which else ""
+    if run.line:
+        return f"{records.kind}; {count} samples", f"{of}{run.line.turns} turns"
     what = "pulse times" if records.pulses else f"samples of {records.channel}"
     return f"{records.kind}; {count} {what}", f"{of}{run.spin.pulses} pulses, {run.spin.missing} missing"
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from levilab.pipelines.part import title_of
+from levilab.pipelines.row import cells_of
+from levilab.pipelines.spin.quantities import OF_A_LINE
 from levilab.present.clock import with_clock
 from levilab.present.numbers import column, plain, short_name, with_decimals
 from levilab.present.tables import Table, table
@@ -24,7 +26,7 @@ MOST_VALUES = 12
 
 def spin_tables(analysis: SpinAnalysis) -> tuple[Table, ...]:
     """Return frequency, slope and time of each input; the quality of its pulses; of one input its series."""
-    tables = [frequency_table(analysis), pulse_table(analysis)]
+    tables = [frequency_table(analysis), *quality_tables(analysis).values()]
     if len(analysis.runs) == 1 and len(analysis.runs[0].series) > 1:
         tables.append(series_table(analysis.sources[0], analysis.runs[0], MOST_VALUES))
     return tuple(tables)
@@ -50,6 +52,35 @@ def frequency_table(analysis: SpinAnalysis) -> Table:
     return table(title_of("Spin frequency", analysis.sources, "input"), heads, rows, numbers=["at [s]", heads[-1]])
 
 
+def quality_tables(analysis: SpinAnalysis) -> dict[str, Table]:
+    """Return the tables of the quality of the pulses, and of the lines of magnetometers, by their names."""
+    made = {"spin-pulses": pulse_table} if any(not run.line for run in analysis.runs) else {}
+    made |= {"spin-line": line_table} if any(run.line for run in analysis.runs) else {}
+    return {name: make(analysis) for name, make in made.items()}
+
+
+def line_table(analysis: SpinAnalysis) -> Table:
+    """Return a table of the lines of magnetometers: amplitude and noise of each axis, and the moment that turns."""
+    of_lines = [(source, run) for source, run in zip(analysis.sources, analysis.runs, strict=True) if run.line]
+    several = any(run.which for _, run in of_lines)
+    quantities = [one for one in OF_A_LINE if any(one.find(run) for _, run in of_lines)]
+    cells = zip(*cells_of(quantities, [run for _, run in of_lines]), strict=True)
+    rows = [
+        (
+            short_name(source.name),
+            source.readings.kind,
+            *row,
+            " ".join(plain(1e6 * noise, 2) for noise in run.line.noise),
+            plain(run.line.snr_db),
+        )
+        for (source, run), row in zip(of_lines, cells, strict=True)
+        if run.line
+    ]
+    title = "The line" + (", of several windows that of the one above" if several else "")
+    heads = ("input", "what it is", *(one.head for one in quantities), "noise [µT]", "S/N\n[dB]")
+    return table(title, heads, rows, numbers=heads[2:])
+
+
 def pulse_table(analysis: SpinAnalysis) -> Table:
     """Return a table of the quality of the pulses."""
     several = any(run.which for run in analysis.runs)
@@ -64,6 +95,7 @@ def pulse_table(analysis: SpinAnalysis) -> Table:
             plain(run.spin.snr_db),
         )
         for source, run in zip(analysis.sources, analysis.runs, strict=True)
+        if not run.line
     ]
     numbers = ("pulses", "missing", "doubled", "scatter\n[µs]", "S/N\n[dB]")
     title = "The pulses" + (", of several records or windows those of the one above" if several else "")

@@ -1,4 +1,4 @@
-"""Findings about pulses, as sentences."""
+"""Findings about pulses and lines, as sentences."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -68,6 +68,31 @@ def _unlike(hertz: float, time: float, other_hertz: float, other_time: float, nu
     return f"neighbouring windows have {seen}: pulses are missing or doubled in a pattern{often}"
 
 
+def _choices(folds: tuple[float, ...]) -> str:
+    return " or ".join(f"{fold:.2f}" for fold in folds)
+
+
+def _fold_doubt(rate: float, *folds: float) -> str:
+    return (
+        f"at {rate:.4g} samples/s the spin may be {_choices(folds)} Hz: the times are too even and the slope too small "
+        f"to know; choose with `near` = {folds[0]:.0f} or {folds[1]:.0f}"
+    )
+
+
+def _folded(rate: float, *folds: float) -> str:
+    return (
+        f"{folds[0]:.2f} Hz is above half of {rate:.4g} samples/s, where it looks like {_choices(folds[1:])} Hz: if a "
+        f"drive speeds the top up, choose with `near` = {folds[1]:.0f}"
+    )
+
+
+def _fold_by_slope(rate: float, *folds: float) -> str:
+    return (
+        f"at {rate:.4g} samples/s {_choices(folds)} Hz look alike: the first is taken, since a free spin falls; if a "
+        f"drive speeds the top up, choose with `near` = {folds[1]:.0f}"
+    )
+
+
 #: Name and case of a finding → its values as a sentence.
 _SENTENCES: Mapping[tuple[str, str], Callable[..., str]] = MappingProxyType({
     ("missing", ""): _missing,
@@ -95,6 +120,13 @@ _SENTENCES: Mapping[tuple[str, str], Callable[..., str]] = MappingProxyType({
     ("fell-back", "missing"): _fell_back("{} of {} turns have no pulse"),
     ("fell-back", "wrong"): _fell_back("{} of {} pulses are not at their place"),
     ("unlike", ""): _unlike,
+    ("folded", ""): _folded,
+    ("fold-doubt", ""): _fold_doubt,
+    ("fold-by-slope", ""): _fold_by_slope,
+    ("regular", ""): lambda *_: "the samples lie more evenly than their times say: the times tell nothing above half "
+                                "the rate",
+    ("weak", ""): lambda *_: "the line hardly stands out of the noise: bring the magnetometer nearer",
+    ("on-mains", ""): lambda *_: "the line lies on 50 or 60 Hz: is it the mains, or a drive locked to them?",
     ("no-pulses", ""): _no_pulses("no pulses that return regularly"),
     ("no-pulses", "hum"): _no_pulses("hum of the mains, and no pulses that return regularly"),
 })  # fmt: skip

@@ -6,12 +6,13 @@ import json
 import re
 import shutil
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import pytest
 
 import levilab
+from analysis.rotation.result import Kind
 from instruments.drivers.oscilloscope import Trace
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
@@ -339,9 +340,9 @@ def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data: Pat
     )
 
 
-def test_each_finding_about_pulses_has_a_sentence() -> None:
+def test_each_finding_about_pulses_and_lines_has_a_sentence() -> None:
     source = "".join(file.read_text(encoding="utf-8") for file in (ROOT / "analysis/pulses").glob("*.py"))
-    made = set(re.findall(r'Finding\("([\w-]+)"', source)) | {"no-pulses"}
+    made = set(re.findall(r'Finding\("([\w-]+)"', source)) | {"no-pulses", *get_args(Kind)}
     assert made == {name for name, _ in words._SENTENCES}
 
 

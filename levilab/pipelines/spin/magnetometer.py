@@ -1,0 +1,149 @@
+"""A magnetometer's record: components of the field against time, as a phone writes them, and the spin in it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.pulses import Finding, SpinFrequency
+from analysis.uncertainty import Estimate
+from levilab.formats.columns import TableError
+from levilab.formats.table import read_table
+from levilab.formats.titles import COMPONENTS
+from levilab.formats.understanding import Request, SeveralRuns, plan_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from analysis.rotation import FieldSpin, FieldTrack
+    from levilab.pipelines.options import InputOptions
+
+Array = NDArray[np.float64]
+
+#: Columns of a record; a Bz beside a Bx is a component.
+QUANTITIES = ("time_s", *COMPONENTS, "flux_density_t")
+#: No field that a phone survives is as strong [T]: the unit is in doubt.
+STRONGEST_T = 0.1
+#: A slower record shows no spin [samples/s]: a scan of the field by hand has one a second.
+SLOWEST_RATE = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class FieldRecord:
+    """Samples of a magnetometer.
+
+    Attributes:
+        times: increasing, shape (n,) [s].
+        field: shape (n, k) [T].
+        axes: their names, "x" to "z".
+        warnings: about the file.
+    """
+
+    times: Array
+    field: Array
+    axes: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return self.times.size
+
+    @property
+    def duration(self) -> float:
+        """Duration [s]."""
+        return float(self.times[-1] - self.times[0])
+
+    @property
+    def rate(self) -> float:
+        """Samples per second."""
+        return (self.times.size - 1) / self.duration
+
+    @property
+    def kind(self) -> str:
+        """The kind of record, in words."""
+        return f"magnetometer, {', '.join(self.axes)}, {self.rate:.4g} samples/s"
+
+
+def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
+    """Return the samples in a data file; None: it holds no component of a field against time.
+
+    Raises:
+        TableError: it does, but cannot be used.
+    """
+    try:
+        plan = plan_of(path, Request(options.columns or {}, QUANTITIES, guess=False))
+    except SeveralRuns:
+        raise
+    except (TableError, OSError):  # another reader says why
+        return None
+    if not set(COMPONENTS).intersection(column.name for column in plan.columns):
+        return None
+    table = read_table(path, columns=options.columns, quantities=QUANTITIES, guess=False)
+    axes = {name: name[-3] for name in COMPONENTS if name in table.columns}
+    if axes and COMPONENTS[2] not in axes and "flux_density_t" in table.columns:
+        axes["flux_density_t"] = "z"
+    if "time_s" not in table.columns:
+        return None
+    times = table.column("time_s")
+    field = np.stack([table.column(name) for name in axes], axis=1)
+    warnings = list(table.warnings)
+    back = np.flatnonzero(np.diff(times) < 0)
+    if back.size:
+        k = int(back[0])
+        what = (
+            f"the time {times[k + 1]:.9g} s comes after {times[k]:.9g} s: cut the file where the recording was started"
+        )
+        raise TableError(path, f"{what} again", line=int(table.lines[k + 1]))
+    strongest = float(np.abs(np.median(field, axis=0)).max())
+    if strongest > STRONGEST_T:
+        units = ",".join(f"b{axis}=NAME [µT]" for axis in axes.values())
+        what = f"{path.name}: a field of {strongest:.3g} T is stronger than a phone measures, so the unit is another"
+        warnings.append(f"{what}; say it with the columns: {units}")
+    record = FieldRecord(times, field, tuple(axes.values()), tuple(warnings))
+    return record if record.duration > 0 and record.rate > SLOWEST_RATE else None
+
+
+# --- as the spin of a train of pulses has it ---
+
+
+def spin_of_line(found: FieldSpin) -> SpinFrequency:
+    """Return a line's frequency in the form of that of pulses: its turns, and the time scatter of one turn."""
+    return SpinFrequency(
+        frequency=Estimate(found.frequency, found.u_frequency, "Hz"),
+        chirp=Estimate(found.chirp, found.u_chirp, "Hz/s"),
+        phase=Estimate(None, None, "1"),
+        reference_time=found.reference_time,
+        method="line",
+        bound=found.bound,
+        pulses=found.turns,
+        missing=0,
+        doubled=0,
+        scatter=found.scatter,
+        snr_db=found.snr_db,
+        notes=findings_of([found]),
+        u_of_pulses=found.u_of_noise,
+    )
+
+
+def findings_of(spins: Sequence[FieldSpin]) -> tuple[Finding, ...]:
+    """Return the findings of windows, each name once."""
+    counts = Counter(kind for spin in spins for kind in spin.kinds)
+    first = {kind: next(spin for spin in spins if kind in spin.kinds) for kind in counts}
+    whole = len(spins)
+    return tuple(
+        Finding(
+            kind,
+            values=(first[kind].rate, *(fold.frequency for fold in first[kind].folds)),
+            where=(spins.index(first[kind]) + 1, number, whole) if whole > 1 else (),
+        )
+        for kind, number in counts.items()
+    )
+
+
+def track_middle(track: FieldTrack) -> int:
+    """Return the number of the window in the middle."""
+    return int(np.abs(track.time - 0.5 * (track.time[0] + track.time[-1])).argmin())
