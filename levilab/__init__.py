@@ -137,6 +137,11 @@ def analyze(
     height_u_m: float | None = None,
     free_radii: bool = False,
     clock_u: float | None = None,
+    near: float | None = None,
+    distance_m: float | None = None,
+    distance_u_m: float | None = None,
+    below_m: float | None = None,
+    moment_a_m2: float | None = None,
 ) -> AnalysisResult:
     """Analyze runs, data files or DataFrames.  Nothing is written; `save(folder)` of the result does.
 
@@ -160,6 +165,11 @@ def analyze(
         height_u_m: standard uncertainty of it [m]; by default that of the scan's heights (field).
         free_radii: let the scan move the radii, within what the calliper says (field).
         clock_u: relative standard uncertainty of the clock that counts or samples, for the budgets (all but field).
+        near: about where the spin of a magnetometer's record is, to 10 % [Hz] (spin).
+        distance_m: of a magnetometer from the top's axis, horizontally [m]; the moment's tilt follows (spin).
+        distance_u_m: standard uncertainty of distance_m and below_m [m] (spin).
+        below_m: height of the top above the magnetometer [m] (spin).
+        moment_a_m2: moment of the top [A m²]; the angle of its tilt follows (spin).
 
     Returns:
         The result: `values`, `verdict`, `warnings`, `summary()`, `to_dataframe()`, `plot()`, `save(folder)`.

@@ -8,11 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.errors import AnalysisError
+from analysis.limits import spin_at_fall
+from analysis.rotation import track_of_field
 from levilab.errors import DoesNotSuit
 from levilab.formats.columns import NoSuchColumn, NoTable, TableError
-from levilab.formats.table import Table, must_be_positive, read_table
+from levilab.formats.table import FEWEST, Table, must_be_positive, read_table
 from levilab.formats.texts import locate, texts_of
 from levilab.formats.titles import read_title, unit_factor
+from levilab.pipelines.spin.magnetometer import read_field_record
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from levilab.pipelines.options import InputOptions
+    from levilab.pipelines.spin.magnetometer import FieldRecord
     from levilab.runs.run import Run
 
     Array = NDArray[np.float64]
@@ -32,6 +37,8 @@ _MOST_SPREAD = 0.25
 _FEWEST_STEPS = 4
 #: A number on a line of its own, with a decimal point or comma, and what is read of a file that holds nothing else.
 _NUMBER, _MOST_BYTES = re.compile(r"[+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?"), 1 << 20
+#: A line is seen to end to three pieces of half a second of a magnetometer's record, to either side [s].
+END_S = 1.5
 #: Relative: units and printed digits round in about the tenth digit.
 _SAME = 1e-9
 
@@ -65,6 +72,9 @@ class LimitReadings:
 
 def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
     """Return the limits in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
+    field = read_field_record(path, options)
+    if field:
+        return limits_in_field(path, field)
     try:
         table = read_table(
             path, columns=options.columns, quantities=QUANTITIES, needed=QUANTITIES[:1], guess=options.guess
@@ -84,6 +94,30 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
             "expected (leave out the column of times if these are limits)"
         )
     return readings
+
+
+def limits_in_field(path: Path, record: FieldRecord) -> LimitReadings:
+    """Return the spins at which tops fell in a magnetometer's record, each continued from its last windows.
+
+    Raises:
+        DoesNotSuit: in the record no top falls after three windows or more, or its folds cannot be distinguished.
+    """
+    try:
+        track = track_of_field(record.times, record.field)
+    except AnalysisError as error:
+        raise DoesNotSuit(f"{path}: {error}") from error
+    falls = []
+    for one in track.flights:
+        part = slice(one.first, one.last)
+        known = not any(spin.doubtful for spin in track.spins[part])
+        if one.ended and known and one.last - one.first >= FEWEST:
+            between = (one.end - END_S, one.end + END_S)
+            u = float(np.median(track.u[part]))
+            falls.append(spin_at_fall(track.time[part], track.frequency[part], u, between))
+    if not falls:
+        raise DoesNotSuit(f"{path}: no top falls in it after {FEWEST} windows whose spin is certain")
+    notes = (*record.warnings, f"{path.name}: {len(falls)} of {len(track.flights)} tops fall in this record")
+    return LimitReadings(np.array([one.value for one in falls]), np.array([one.u for one in falls]), notes)
 
 
 def _single_column(path: Path, *, guess: bool) -> Table | None:

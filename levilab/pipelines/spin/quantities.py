@@ -67,7 +67,6 @@ OF_A_LINE = (
 
 SPIN_ROW = (
     *columns_of(QUANTITIES),
-    *columns_of(OF_A_LINE),
     entry("method", "text", "how the pulses were found"),
     entry("pulses", "count", "pulses that were found", "result.spin.pulses"),
     entry("missing", "count", "pulses that are missing", "result.spin.missing"),

@@ -8,6 +8,8 @@ import numpy as np
 from analysis.errors import AnalysisError, NotPositive, TimesNotIncreasing
 from analysis.numbers import digits
 from analysis.pulses import phases, track_of_times
+from analysis.rotation import track_of_field
+from analysis.rotation.track import WINDOW_S as FIELD_WINDOW_S
 from analysis.spindown.readings import check_readings
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
@@ -16,17 +18,21 @@ from levilab.formats.understanding import FASTEST_SPIN_HZ, SLOWEST_SPIN_HZ, poss
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes
+from levilab.pipelines.spin.magnetometer import findings_of, read_field_record
 from levilab.pipelines.spin.readings import track_of_record
 from levilab.pipelines.spin.words import finding_text
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from analysis.pulses import Track
+    from analysis.rotation import FieldTrack
     from levilab.formats.waveforms.waveform import Waveform
     from levilab.pipelines.options import InputOptions
+    from levilab.pipelines.spin.magnetometer import FieldRecord
     from levilab.runs.run import Run
 
 #: Columns of a table that are looked at.
@@ -86,6 +92,11 @@ def read_spin_file(path: "Path", options: "InputOptions") -> Readings:
         DoesNotSuit: it holds neither.
         DataError: it cannot be used.
     """
+    field = read_field_record(path, options)
+    return field_readings(path, field, options) if field else _read_pulses_or_table(path, options)
+
+
+def _read_pulses_or_table(path: "Path", options: "InputOptions") -> Readings:
     try:
         record = read_record(path, columns=options.columns, rate=options.rate, guess=options.guess)
     except NoRate as error:
@@ -115,9 +126,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
     path = record.path
     times = record.times if isinstance(record, PulseTimes) else None
     duration = record.duration if not isinstance(record, PulseTimes) else float(record.times[-1] - record.times[0])
-    if duration < FEWEST * WINDOW_S:
-        expected = f"a spin-down needs {FEWEST} windows of {WINDOW_S:g} s at least"
-        raise DoesNotSuit(f"{path}: lasts {digits(duration, 3)} s, {expected}")
+    _must_last(path, duration, WINDOW_S)
     try:
         if isinstance(record, PulseTimes):
             track = track_of_times(record.times, window=WINDOW_S)
@@ -125,23 +134,50 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
             track = track_of_record(record, options.channel, WINDOW_S, "auto")
     except AnalysisError as error:
         raise (DataError if options.guess else DoesNotSuit)(f"{path}: {error}") from error
+    notes = [f"{path.name}: {finding_text(note)}" for note in track.notes]
+    what = f"{'list of pulse times' if times is not None else 'record'} of {digits(duration, 3)} s"
+    return _of_track(path, track, WINDOW_S, what, (record.warnings, notes))
+
+
+def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions") -> Readings:
+    """Return the frequency in each window of a magnetometer's record, while the top coasts.  Raises as above."""
+    _must_last(path, record.duration, FIELD_WINDOW_S)
+    try:
+        track = track_of_field(record.times, record.field)
+    except AnalysisError as error:
+        raise (DataError if options.guess else DoesNotSuit)(f"{path}: {error}") from error
+    notes = [f"{path.name}: {finding_text(note)}" for note in findings_of(track.spins)]
+    what = f"magnetometer's record of {digits(record.duration, 3)} s"
+    readings = _of_track(path, track, FIELD_WINDOW_S, what, (record.warnings, notes))
+    return replace(readings, doubtful=any(spin.doubtful for spin in track.spins))
+
+
+def _must_last(path: "Path", duration: float, window: float) -> None:
+    if duration < FEWEST * window:
+        expected = f"a spin-down needs {FEWEST} windows of {window:g} s at least"
+        raise DoesNotSuit(f"{path}: lasts {digits(duration, 3)} s, {expected}")
+
+
+def _of_track(
+    path: "Path", track: "Track | FieldTrack", window: float, what: str, notes: "tuple[Iterable[str], Iterable[str]]"
+) -> Readings:
+    """Return the windows in which the top coasts.  notes: of the record, and of what was found in it."""
     first, last = _coasting(track)
     start, end = track.frequency[first], track.frequency[last - 1]
     if last - first < FEWEST or end > (1 - LEAST_FALL) * start:
-        seen = f"the spin in it goes from {start:.6g} Hz to {end:.6g} Hz in {last - first} windows of {WINDOW_S:g} s"
+        seen = f"the spin in it goes from {start:.6g} Hz to {end:.6g} Hz in {last - first} windows of {window:g} s"
         expected = "a falling spin is expected: is the drive still on?"
         raise DoesNotSuit(f"{path}: {seen}, {expected}")
-    notes = [f"{path.name}: {finding_text(note)}" for note in track.notes]
-    what = f"{path.name}: a {'list of pulse times' if times is not None else 'record'} of {digits(duration, 3)} s: "
-    how_read = [f"{what}each reading is the frequency in a window of {WINDOW_S:g} s"]
+    how_read = [f"{path.name}: a {what}: each reading is the frequency in a window of {window:g} s"]
     if last - first < len(track.time):
         span = f"{track.time[first]:.1f} s to {track.time[last - 1]:.1f} s"
         how_read.append(f"{path.name}: the top coasts from {span}; the windows before and after are left out")
     part = slice(first, last)
-    return Readings(track.time[part], track.frequency[part], track.u[part], (*record.warnings, *how_read, *notes))
+    of_record, of_track = notes
+    return Readings(track.time[part], track.frequency[part], track.u[part], (*of_record, *how_read, *of_track))
 
 
-def _coasting(track: "Track") -> tuple[int, int]:
+def _coasting(track: "Track | FieldTrack") -> tuple[int, int]:
     """Return the windows [first, end) of the longest phase in which the top coasts; all without one."""
     coasting = [phase.windows for phase in phases(track) if phase.kind == "coasting"]
     first, last = max(coasting, key=lambda ends: ends[1] - ends[0], default=(0, len(track.time)))

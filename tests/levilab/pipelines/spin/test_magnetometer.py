@@ -1,0 +1,115 @@
+"""A phone's record through the analyses: its spin, its drag law, its limit, and what is in doubt."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from analysis.rotation.synthetic import synthetic_field, synthetic_flight
+from levilab.errors import DataError
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.options import LimitOptions, SpinDownOptions, SpinOptions
+from levilab.pipelines.spin.figure import spin_figure
+from levilab.pipelines.spin.meaning import meaning
+from levilab.pipelines.suits import analyze_suiting
+from support.figures import faults
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def phone(path: Path, times: np.ndarray, field: np.ndarray) -> Path:
+    """Write a record as phyphox does."""
+    titles = ["Time (s)", *(f"Magnetic Field {axis} (µT)" for axis in "xyz"), "Absolute field (µT)"]
+    rows = np.column_stack([times, 1e6 * field, 1e6 * np.linalg.norm(field, axis=1)])
+    head = ",".join(f'"{title}"' for title in titles)
+    np.savetxt(path, rows, fmt="%.9E", delimiter=",", header=head, comments="", encoding="utf-8")
+    return path
+
+
+def said(found) -> list[str]:
+    """Return all warnings."""
+    return [text for group in found.grouped_warnings for text in group]
+
+
+@pytest.fixture(scope="module")
+def long(tmp_path_factory) -> Path:
+    times, field, _ = synthetic_flight(np.random.default_rng(51), duration=170.0, up=(0.0, 163.2), start_hz=37.0)
+    return phone(tmp_path_factory.mktemp("phone") / "long.csv", times, field)
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory) -> Path:
+    return phone(tmp_path_factory.mktemp("phone") / "short.csv", *synthetic_field(np.random.default_rng(52)))
+
+
+def test_a_phones_record_gives_spin_amplitudes_and_budget(short):
+    found = ANALYSES["spin"].analyze([short], SpinOptions())
+    (run,) = found.runs
+    assert abs(run.spin.frequency.value - 31.0) < 4 * run.spin.frequency.u
+    values = ANALYSES["spin"].document(found, short.parent)["values"]
+    assert values["amplitude_1"]["value"] == pytest.approx(1e-6, rel=0.15)  # 6 dB over 0.5 µT: 6 u
+    assert {one.name for budget in found.budget for one in budget.components} >= {"noise", "drag"}
+    assert "clockwise" in " ".join(meaning(found))
+
+
+def test_the_tilt_of_the_moment_follows_from_distance_and_moment(short):
+    found = ANALYSES["spin"].analyze([short], SpinOptions(distance_m=0.2, moment_a_m2=0.714))
+    (run,) = found.runs
+    size = 1e-6 * np.sqrt(1 + 0.25 + 0.09)  # as the record was made, at the top's height: √5 μ₀m/4πr³
+    assert run.transverse.value == pytest.approx(size * 0.2**3 / 1e-7 / np.sqrt(5), abs=3 * run.transverse.u)
+    assert run.tilt.value == pytest.approx(np.arcsin(run.transverse.value / 0.714))
+
+
+def test_a_long_record_gives_the_drag_law_and_the_limit(long):
+    spindown = ANALYSES["spindown"].analyze([long], SpinDownOptions())
+    stokes = spindown.runs[0].fit("stokes").parameters["c1"]
+    assert abs(stokes.value - 3.2e-3) < 4 * stokes.u
+    limit = ANALYSES["limit"].analyze([long], LimitOptions())
+    truth = 37.0 * np.exp(-3.2e-3 * 163.2)
+    assert limit.sources[0].readings.limit == pytest.approx([truth], abs=4 * limit.sources[0].readings.u[0])
+
+
+def test_a_record_suits_the_analyses_that_find_something_in_it(long, short):
+    assert [analysis.name for analysis, _ in analyze_suiting([long], {})] == ["spindown", "spin", "limit"]
+    assert [analysis.name for analysis, _ in analyze_suiting([short], {})] == ["spin"]
+
+
+def test_a_spin_that_may_be_folded_is_named_with_its_choices(tmp_path):
+    made = synthetic_field(np.random.default_rng(53), frequency=61.0, chirp=0.0, jitter=0.0)
+    path = phone(tmp_path / "even.csv", *made)
+    found = ANALYSES["spin"].analyze([path], SpinOptions())
+    assert " or " in found.text
+    assert any("39.00" in text and "61.00" in text for text in said(found))
+    chosen = ANALYSES["spin"].analyze([path], SpinOptions(near=60.0))
+    assert chosen.runs[0].spin.frequency.value == pytest.approx(61.0, abs=0.02)
+    assert not any("fold" in text for text in said(chosen))
+
+
+def test_a_field_too_strong_for_a_phone_is_in_another_unit(tmp_path):
+    times, field = synthetic_field(np.random.default_rng(54))
+    path = tmp_path / "bare.csv"
+    np.savetxt(path, np.column_stack([times, 1e6 * field]), delimiter=",", header="t,Bx,By,Bz", comments="")
+    found = ANALYSES["spin"].analyze([path], SpinOptions())
+    assert any("[µT]" in text for text in said(found))
+    assert abs(found.runs[0].spin.frequency.value - 31.0) < 5 * found.runs[0].spin.frequency.u
+
+
+def test_times_that_go_back_are_refused_with_their_line(tmp_path):
+    times, field = synthetic_field(np.random.default_rng(55))
+    path = phone(tmp_path / "twice.csv", np.concatenate([times, times]), np.concatenate([field, field]))
+    with pytest.raises(DataError, match="line 1002"):
+        ANALYSES["spin"].analyze([path], SpinOptions())
+
+
+@pytest.mark.parametrize("name", ["short", "long"])
+def test_the_figure_of_a_phones_record_has_no_faults(name, request):
+    assert not faults(spin_figure(ANALYSES["spin"].analyze([request.getfixturevalue(name)], SpinOptions())))
+
+
+def test_a_record_without_a_line_is_refused(tmp_path):
+    times, field = synthetic_field(np.random.default_rng(56), snr_db=-60.0)
+    with pytest.raises(DataError, match="stands out"):
+        ANALYSES["spin"].analyze([phone(tmp_path / "empty.csv", times, field)], SpinOptions())
