@@ -155,6 +155,10 @@ class Record:
         lines = self._normal @ of_field
         return np.asarray(field - self._lines @ lines - self._spline @ (by[:, q:] - by[:, :q] @ lines))
 
+    def without_drift(self) -> Array:
+        """Return the field without the spline alone, shape (n, k) [unit]."""
+        return np.asarray(self.field - self._spline @ self._on_spline(self.field)[1])
+
 
 def read_samples(times: Any, field: Any) -> tuple[Array, Array]:
     """Return times, shape (n,) [s], and field, shape (n, k) [T], without samples that are no numbers.

@@ -227,7 +227,8 @@ def _extent(t: Array, b: Array, windows: list[_Window], inner: _Window) -> tuple
         count = max(round(2 * record.half / _PIECE_S), 2)
         starts = np.unique(np.searchsorted(t[cut], np.linspace(t[cut][0], t[cut][-1], count + 1)[:-1]))
         sizes = np.diff(np.append(starts, late.size))
-        sums = np.abs(np.add.reduceat(record.rest() * record.unit * wave[:, None], starts)) ** 2
+        # mains stay: a piece resolves them, and at a fold of theirs they would take the line
+        sums = np.abs(np.add.reduceat(record.without_drift() * record.unit * wave[:, None], starts)) ** 2
         power = np.sum(2 * sums / sizes[:, None] / noise, axis=1)
         half = 0.25 * sizes * np.sum(expected / noise)
         # no piece counts for more than the line, so that a jolt of the field is no line

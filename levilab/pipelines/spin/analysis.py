@@ -352,7 +352,7 @@ def in_a_sentence(run: SpinRun) -> str:
     if len(series) == 1:
         return f"The spin is {at}, its slope {with_uncertainty(spin.chirp)}."
     ends = f"{series.frequency[0]:.3f} Hz at {series.time[0]:.1f} s to {series.frequency[-1]:.3f} Hz"
-    phases = ", ".join(f"{kind} {start + 0.0:.1f} to {end:.1f} s" for kind, start, end in series.phases[:6])
+    phases = ", ".join(f"{kind} {round(start, 1) + 0.0:.1f} to {end:.1f} s" for kind, start, end in series.phases[:6])
     in_phases = f"; {phases}" if phases else ""
     slope = f" Its slope through all {series.of}s is {with_uncertainty(run.trend)}." if run.trend else ""
     return (

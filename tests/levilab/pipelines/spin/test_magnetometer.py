@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +16,7 @@ from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spin.meaning import meaning
 from levilab.pipelines.suits import analyze_suiting
 from support.figures import faults
+from support.paths import ROOT
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -113,3 +115,17 @@ def test_a_record_without_a_line_is_refused(tmp_path):
     times, field = synthetic_field(np.random.default_rng(56), snr_db=-60.0)
     with pytest.raises(DataError, match="stands out"):
         ANALYSES["spin"].analyze([phone(tmp_path / "empty.csv", times, field)], SpinOptions())
+
+
+def test_the_sample_record_is_made_by_its_script_and_gives_the_tilt(sample_data):
+    path = sample_data / "phone" / "magnetometer.csv"
+    made = importlib.util.spec_from_file_location("phone", ROOT / "sample_data" / "phone.py")
+    module = importlib.util.module_from_spec(made)
+    made.loader.exec_module(module)
+    ours = np.loadtxt(module.make().splitlines(), delimiter=",", skiprows=1)
+    kept = np.loadtxt(path, delimiter=",", skiprows=1, encoding="utf-8")
+    np.testing.assert_allclose(kept, ours, rtol=1e-8)  # its last digits depend on the processor
+    run = ANALYSES["spin"].analyze([path], SpinOptions(distance_m=0.2, moment_a_m2=0.714)).runs[0]
+    assert abs(run.tilt.value - 0.03) < 3 * run.tilt.u
+    spin = 40.0 * (1 + 2.34e-4 * np.sqrt(2 * np.pi * 40) * run.series.time / 2) ** -2  # of a laminar disc
+    assert np.all(np.abs(run.series.frequency - spin) < 4 * run.series.u)
