@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from analysis.errors import NoLine
 from analysis.rotation import spin_of_field
+from analysis.rotation.errors import NoLine
 from instruments.drivers import Instrument
 from instruments.drivers.counter.phyphox import FieldLine, Phyphox
 from instruments.drivers.oscilloscope.sound import SoundCard
