@@ -72,12 +72,12 @@ class SilentInput(NeverTriggered):
 
     def __init__(self, address: str, waited_s: float) -> None:
         super().__init__(address, level_v=0.0, source="the input", waited_s=waited_s)
-        text = (
-            f"{address}: only zeros came in {waited_s:.3g} s: is the input muted?  macOS gives zeros until the "
+        self.reason = (
+            f"only zeros came in {waited_s:.3g} s: is the input muted?  macOS gives zeros until the "
             "terminal may use the microphone (System Settings, Privacy & Security, Microphone), Windows until desktop "
             "apps may (Settings, Privacy, Microphone)"
         )
-        self.args = (text,)
+        self.args = (f"{address}: {self.reason}",)
 
 
 @dataclass(frozen=True, eq=False)
