@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.simulator.field import field_of, flux_density
-
 if TYPE_CHECKING:
     from levilab.simulator import parts
     from levilab.world import base
@@ -72,6 +70,8 @@ def field_beside(
 
 def base_beside(place: Array, ring: base.Base | parts.Base) -> Array:
     """Return the field of the base at a place off its axis, exactly, shape (3,) [T].  A series holds near the axis."""
+    from levilab.simulator.field import field_of, flux_density  # with numba
+
     radii = ring.inner_radius_m, ring.outer_radius_m
     field = field_of(*radii, ring.strength_t_m, "exact", thickness=ring.thickness_m, origin=ring.origin_m)
     return flux_density(field, place)

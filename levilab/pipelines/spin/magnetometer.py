@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 
 #: Columns of a record; a Bz beside a Bx is a component.
 QUANTITIES = ("time_s", *COMPONENTS, "flux_density_t")
+#: Those that make a table a record.
+NEEDED = ("time_s", COMPONENTS[0])
 #: No field that a phone survives is as strong [T]: the unit is in doubt.
 STRONGEST_T = 0.1
 #: A slower record shows no spin [samples/s]: a scan of the field by hand has one a second.
@@ -75,19 +77,15 @@ def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
         TableError: it does, but cannot be used.
     """
     try:
-        plan = plan_of(path, Request(options.columns or {}, QUANTITIES, guess=False))
+        plan_of(path, Request(options.columns or {}, QUANTITIES, NEEDED, guess=False))
     except SeveralRuns:
         raise
     except (TableError, OSError):  # another reader says why
         return None
-    if not set(COMPONENTS).intersection(column.name for column in plan.columns):
-        return None
-    table = read_table(path, columns=options.columns, quantities=QUANTITIES, guess=False)
+    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=False)
     axes = {name: name[-3] for name in COMPONENTS if name in table.columns}
     if axes and COMPONENTS[2] not in axes and "flux_density_t" in table.columns:
         axes["flux_density_t"] = "z"
-    if "time_s" not in table.columns:
-        return None
     times = table.column("time_s")
     field = np.stack([table.column(name) for name in axes], axis=1)
     warnings = list(table.warnings)

@@ -1,5 +1,6 @@
 """What a table of readings must fulfil before an analysis may trust it."""
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -93,6 +94,9 @@ def read_spin_file(path: "Path", options: "InputOptions") -> Readings:
         DataError: it cannot be used.
     """
     field = read_field_record(path, options)
+    if field and field.duration < FEWEST * FIELD_WINDOW_S:  # beside it in a zip there may be a table of frequencies
+        with suppress(DataError):
+            return _read_pulses_or_table(path, options)
     return field_readings(path, field, options) if field else _read_pulses_or_table(path, options)
 
 
