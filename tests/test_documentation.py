@@ -170,7 +170,7 @@ def test_the_bench_of_the_page_is_a_valid_one(tmp_path: Path) -> None:
     from levilab.acquisition.table import Configuration, settings_of
     from levilab.bench.config import read_bench
 
-    ((_, text),) = blocks("toml")
+    (text,) = (text for page, text in blocks("toml") if page == "bench.md")
     path = tmp_path / "bench.toml"
     path.write_text(text, encoding="utf-8")
     bench = read_bench(path, Configuration)

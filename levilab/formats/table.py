@@ -18,7 +18,7 @@ from levilab.formats.columns import SHORTHANDS, Column, TableError, shorten
 from levilab.formats.dialect import MISSING_WORDS, Dialect
 from levilab.formats.layout import Layout
 from levilab.formats.rows import Rows, read_rows
-from levilab.formats.texts import Text, locate
+from levilab.formats.texts import Text, must_be_file
 from levilab.formats.titles import CANONICAL, COMPANIONS, QUANTITIES, companion
 from levilab.formats.understanding import Plan, Request, no_column, plan_of
 
@@ -171,21 +171,11 @@ def parse_columns(text: str) -> dict[str, str]:
     return found
 
 
-def _must_be_file(path: Path) -> None:
-    path = locate(path)[0]
-    if path.is_dir():
-        raise TableError(path, "is a folder; a data file is expected: name the file in it")
-    if not path.exists():  # also for a name that no file can have
-        raise FileNotFoundError
-    if not path.is_file():
-        raise TableError(path, "is a device or a pipe; a data file is expected: save it to a file first")
-
-
 @contextmanager
 def file_errors(path: Path) -> Iterator[None]:
     """Say in one line what keeps a file from being opened."""
     try:
-        _must_be_file(path)
+        must_be_file(path)
         yield
     except FileNotFoundError as error:
         raise TableError(path, "no such file; check the name and the folder") from error

@@ -89,6 +89,17 @@ def locate(path: Path) -> tuple[Path, str]:
     return path, ""
 
 
+def must_be_file(path: Path) -> None:
+    """Raise TableError for a folder, a pipe or a device, FileNotFoundError for nothing: reading it would wait."""
+    path = locate(path)[0]
+    if path.is_dir():
+        raise TableError(path, "is a folder; a data file is expected: name the file in it")
+    if not path.exists():  # also for a name that no file can have
+        raise FileNotFoundError
+    if not path.is_file():
+        raise TableError(path, "is a device or a pipe; a data file is expected: save it to a file first")
+
+
 def texts_of(file: Path) -> tuple[Text, ...]:
     """Return the texts in a file, at least one.
 
@@ -97,6 +108,7 @@ def texts_of(file: Path) -> tuple[Text, ...]:
         TableError: it is damaged, locked, or too large when unpacked.
         OSError: it cannot be read.
     """
+    must_be_file(file)
     status = file.stat()
     return _texts(file, status.st_mtime_ns, status.st_size)
 

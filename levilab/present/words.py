@@ -64,10 +64,10 @@ def value_in_words(key: str, value: Any) -> str:
     text = unit.text if unit else ""
     if abs(value) >= INFINITE:
         return "high impedance" if text == "Ω" else "infinite"
-    if unit and unit.fine.factor > 1:
-        fine = abs(value) * unit.fine.factor
-        if fine < _MOST and (fine >= _LEAST or unit.si == "kg"):  # its prefixes are those of the gram
-            return f"{value * unit.fine.factor:g} {unit.fine.unit}"
+    for scale in (unit.fine, unit.shown) if unit and unit.fine.factor > 1 else ():
+        size = abs(value) * scale.factor
+        if size < _MOST and (size >= _LEAST or text == "kg"):  # its prefixes are those of the gram
+            return f"{value * scale.factor:g} {scale.unit}"
     if not text or 0.01 <= abs(value) < 1000 or value == 0:
         return f"{value:g} {text}".strip()
     factor, prefix = next(((f, p) for f, p in _PREFIXES if abs(value) >= f), _PREFIXES[-1])
