@@ -9,6 +9,8 @@ import numpy as np
 
 from analysis.budget import rest
 from analysis.pulses import spin_of_times, spin_of_trace
+from analysis.rotation import spin_of_field
+from analysis.uncertainty import Estimate
 from levilab.crosscheck.own.model import Own
 from levilab.crosscheck.subject import Trial, TrialFailed, pull_of
 
@@ -16,12 +18,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from analysis.pulses import SpinFrequency
+    from analysis.rotation import FieldSpin
     from levilab.pipelines.spin.analysis import SpinAnalysis
 
     Array = NDArray[np.float64]
 
 #: Processor time of a trial and of a sample of it [s].
 _COST_S, _COST_OF_SAMPLE_S = 0.004, 8e-8
+#: The same of a magnetometer's window.
+_COST_OF_FIELD_S = 0.03
 #: Width of a pulse, standard deviation over a turn: narrower ones no sample shows, wider ones are no pulses.
 _NARROWEST, _WIDEST = 0.002, 0.12
 
@@ -31,6 +36,11 @@ def trials_of(found: SpinAnalysis) -> Own:
     run, source, options = found.runs[0], found.sources[0], found.options
     spin = run.spin
     turns = spin.pulses + spin.missing
+    if line := run.line:
+        about = (
+            f"a record of {line.samples} samples with a line of this spin and slope, of these amplitudes, in this noise"
+        )
+        return Own(about, lambda random: _of_field(random, line), _COST_OF_FIELD_S)
     if source.readings.pulses or spin.bound is None or spin.snr_db is None:
         about = f"the times of {turns} pulses of this spin and slope, each off by as much as these"
         return Own(about, lambda random: _of_times(random, spin), _COST_S)
@@ -88,6 +98,22 @@ def _of_times(random: np.random.Generator, spin: SpinFrequency) -> Trial:
     kept[random.choice(times.size, min(spin.missing, times.size // 4), replace=False)] = False
     times = np.sort(times + spin.scatter * random.standard_normal(times.size))[kept]
     return _compare(spin_of_times(times), spin)
+
+
+def _of_field(random: np.random.Generator, line: FieldSpin) -> Trial:
+    """Try a line under a drag of a power from 1 to 2 of the spin, near the frequency: its folds are not in question."""
+    late = np.asarray((np.arange(line.samples) - (line.samples - 1) / 2) / line.rate)
+    bend = random.uniform(1, 2) * line.chirp**2 / line.frequency
+    turns = late * (line.frequency + late * (line.chirp / 2 + late * bend / 6))
+    angles = 2 * np.pi * (turns[:, None] + random.uniform(size=len(line.noise)))
+    field = line.amplitude * np.cos(angles) + line.noise * random.standard_normal(angles.shape)
+    found = spin_of_field(late, field, near=line.frequency)
+    return Trial(
+        [
+            pull_of("frequency", Estimate(found.frequency, found.u_frequency, "Hz"), line.frequency),
+            pull_of("chirp", Estimate(found.chirp, found.u_chirp, "Hz/s"), line.chirp),
+        ]
+    )
 
 
 def _of_trace(
