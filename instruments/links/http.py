@@ -69,14 +69,14 @@ class HttpTransport:
         self._advice, self._log, self._closed = advice, log, False
         try:
             parts = urlsplit(address)
-            host, port = parts.hostname, parts.port or port
-        except ValueError:
-            host = None
+            host, port = (parts.hostname or "").encode("idna").decode("ascii"), parts.port or port
+        except ValueError:  # of the port, or of a name that no host can have
+            host = ""
         if not host:
             raise NotConnected(
                 address, f"the address of a host is expected, as {address.partition(':')[0]}://HOST:{port}"
             )
-        self.url = f"http://{host}:{port}"
+        self.url = f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
         connect: Callable[[str], Exchange] | None = getattr(library, "connect", None)
         self._exchange: Exchange = connect(address) if connect else _TcpExchange(host, port)
 
@@ -171,7 +171,7 @@ class _TcpExchange:
         end = time.monotonic() + within
         try:
             link = socket.create_connection((self._host, self._port), timeout=within)
-        except (TimeoutError, UnicodeError) as error:  # a host that does not exist, on most networks; no name of a host
+        except TimeoutError as error:  # a host that does not exist, on most networks
             raise ConnectionError(one_line(error)) from error
         with link:
             link.settimeout(_left(end))

@@ -126,11 +126,28 @@ def test_where_nothing_listens_the_error_says_what_to_do_in_the_app():
     text = str(refused.value)
     assert f"nothing answers at http://127.0.0.1:{server.port} (" in text
     assert "menu ⋮ → Allow remote access; the address stands at the bottom of the screen" in text
-    with pytest.raises(NotConnected, match="nothing answers"):
-        open_link("phyphox://no..host", line={}).query("/meta")
 
 
-@pytest.mark.parametrize("address", ["phyphox://", "phyphox://:8080", "phyphox://host:port", "phyphox://host:99999"])
+@pytest.mark.parametrize(
+    ("address", "url"),
+    [("phyphox://Händy.fritz.box", "http://xn--hndy-loa.fritz.box:8080"), ("phyphox://[::1]:80", "http://[::1]:80")],
+)
+def test_a_host_is_written_as_http_wants_it(address, url):
+    sent = []
+
+    class Library:
+        def connect(self, _):
+            return lambda request, _: sent.append(request) or b"HTTP/1.1 200 OK\r\n\r\n{}"
+
+    link = open_link(address, line={}, library=Library())
+    assert link.query("/meta") == "{}"
+    assert f"\r\nHost: {url.removeprefix('http://')}\r\n".encode() in sent[0]
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["phyphox://", "phyphox://:8080", "phyphox://host:port", "phyphox://host:99999", "phyphox://no..host"],
+)
 def test_an_address_without_a_host_is_refused(address):
     with pytest.raises(NotConnected, match="phyphox://HOST:8080"):
         open_link(address, line={})
