@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from instruments.clock import WallClock
 from instruments.virtual.servers.clients import first_of
-from instruments.virtual.servers.server import LOOPBACK, PORTS_PER_INSTRUMENT, ListenAt, serve_bench
+from instruments.virtual.servers.server import BY_SCHEME, LOOPBACK, PORTS_PER_INSTRUMENT, ListenAt, serve_bench
 from levilab.errors import LevilabError, UsageError
 from levilab.interruption import end_with_standard_input, watching_for_end
 from levilab.world.bench import (
@@ -21,6 +21,7 @@ from levilab.world.bench import (
     scene_world,
     virtual_bus,
     virtual_instruments,
+    virtual_settings,
 )
 
 if TYPE_CHECKING:
@@ -109,6 +110,10 @@ def chosen_models(words: list[str]) -> dict[str, str]:
         if model.upper() not in known:
             raise UsageError("models", f"no such {kind}, known are {', '.join(known.values())}", value=word)
         chosen[kind] = known[model.upper()]
+        scheme, _, host = virtual_settings(kind, model).address.partition("://")
+        if host and scheme not in BY_SCHEME:
+            why = f"other programs cannot reach a virtual {model}; `levilab acquire --mock` has one"
+            raise UsageError("models", why, value=word)
     return chosen
 
 

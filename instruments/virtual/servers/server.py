@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 LOOPBACK = "127.0.0.1"
 
 #: Scheme of an address → what serves the instrument; others can be reached in this process alone.
-_BY_SCHEME: dict[str, Callable[[ServedInstrument], Listener]] = {"phyphox": http_listener}
+BY_SCHEME: dict[str, Callable[[ServedInstrument], Listener]] = {"phyphox": http_listener}
 
 #: Ports that an instrument takes when they are numbered: socket, HiSLIP, VXI-11 and its abort channel.
 PORTS_PER_INSTRUMENT = 4
@@ -109,7 +109,7 @@ async def _listen(
         return listener.port
 
     if scheme:
-        serve = _BY_SCHEME.get(scheme)
+        serve = BY_SCHEME.get(scheme)
         return {scheme: f"{scheme}://{host}:{await listen(serve(instrument))}"} if serve else {}
     if address.upper().startswith("ASRL"):
         resources = {"socket": f"ASRLsocket://{host}:{await listen(socket_listener(instrument))}::INSTR"}

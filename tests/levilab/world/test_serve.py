@@ -185,6 +185,7 @@ def test_models_are_chosen_by_kind_in_any_case():
         (["counter=DVM"], "no such counter, known are "),
         (["piano=1"], "'piano' is no kind of instrument"),
         (["counter"], "no such counter"),
+        (["oscilloscope=sound"], "other programs cannot reach a virtual sound; `levilab acquire --mock` has one"),
     ],
 )
 def test_a_model_that_there_is_not_is_wrong_usage(words, says):
