@@ -37,8 +37,9 @@ _PIECE_S = 0.05
 _LEAST_SHARE = 0.5
 #: No sound card's clock is off by more.
 _MOST_OFF = 1e-3
-#: Arrivals are compared by the earliest in each of so many parts of the time; fewer would not show their scatter.
-_PARTS = 24
+#: Arrivals are compared by the earliest in each of these parts of the time, of at least this number of blocks; fewer
+#: parts would not show their scatter.
+_PARTS, _FEWEST_PARTS, _BLOCKS_OF_PART = 24, 6, 4
 #: Standard uncertainty of a computer's clock unless another is given: one that the network does not set is up to
 #: 2·10⁻⁵ off, one that it sets some 10⁻⁶.
 COMPUTER_U = 1e-5
@@ -46,6 +47,14 @@ COMPUTER_U = 1e-5
 
 class NoTone(LevilabError):
     """The record holds no tone near the one that was named."""
+
+
+class TooFewBlocks(LevilabError):
+    """The samples came in so few blocks that the scatter of their arrivals is not known.  seen: their number."""
+
+    def __init__(self, seen: int, duration_s: float) -> None:
+        self.seen = seen
+        super().__init__(f"in {duration_s:g} s the samples came in {seen} blocks, too few: take a longer `duration`")
 
 
 class ClockTooFarOff(LevilabError):
@@ -181,15 +190,18 @@ def by_computer(scope: SoundCard, duration_s: float, reference_u: float, tell: C
     Raises:
         ClockTooFarOff: by more than a thousandth.
         SamplesLost: before the end.
+        TooFewBlocks: in a time that is too short.
     """
     scope.clock_error = 0.0
     # the network sets the time of day; the clock that only goes on is corrected by it on some systems alone
     wall, own = time.time(), time.monotonic()
     counts, arrived = scope.arrivals(duration_s, tell)
     stretch = (time.time() - wall) / (time.monotonic() - own) if isinstance(scope.clock, WallClock) else 1.0
+    if counts.size < _FEWEST_PARTS * _BLOCKS_OF_PART:
+        raise TooFewBlocks(counts.size, duration_s)
     nominal = counts / scope.rate
     late = (arrived - arrived[0]) * stretch - nominal
-    parts = np.array_split(np.arange(late.size), min(_PARTS, late.size // 4))
+    parts = np.array_split(np.arange(late.size), min(_PARTS, late.size // _BLOCKS_OF_PART))
     earliest = np.array([part[np.argmin(late[part])] for part in parts])
     slope, u = _line(np.asarray(nominal[earliest], dtype=np.float64), late[earliest])
     return _error(1 / (1 + slope) - 1, u, reference_u, scope.rate)
@@ -219,7 +231,13 @@ def keep_clock(path: Path, settings: InstrumentSettings, found: ClockError) -> N
     if described is None:
         table = f'[oscilloscope]\nmodel = "{settings.model}"\naddress = "{settings.address}"\n'
         text = f"{text.rstrip()}\n\n{table}".lstrip()
-    head, table, rest = re.split(r"(?m)^(\s*\[\s*oscilloscope\s*\].*\n)", text, maxsplit=1)
+    head, *after = re.split(r"(?m)^(\s*\[\s*oscilloscope\s*\].*\n)", text, maxsplit=1)
+    if not after:  # an inline table, or dotted keys
+        raise ConfigError(
+            f"{path}: has no line [oscilloscope]: add clock_error = {found.value:.4e} and clock_u = {found.u:.1e} to "
+            "its oscilloscope by hand"
+        )
+    table, rest = after
     others = re.search(r"(?m)^\s*\[", rest)
     end = others.start() if others else len(rest)
     kept = re.sub(r"(?m)^\s*clock_(?:error|u)\s*=.*\n?", "", rest[:end])

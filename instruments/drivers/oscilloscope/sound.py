@@ -298,8 +298,8 @@ class SoundCard:
                 tell(min(count / rate / duration_s, 1.0))
         finally:
             self._link.input.stop()
-        counts, times = zip(*found, strict=True)
-        return np.array(counts, dtype=np.int64), np.array(times, dtype=np.float64)
+        counts, times = np.array(found).reshape(-1, 2).T  # a float64 counts for 6000 years
+        return counts.astype(np.int64), times
 
     def _next(self) -> Block:
         """Return the next samples.  Raises NotConnected."""
@@ -385,8 +385,14 @@ class _Came:
 
     def samples(self, first: int, stop: int) -> Samples:
         """Return the samples of these numbers, shape (n, channels)."""
-        whole = np.concatenate([samples for samples, _, _ in self._blocks])
-        return whole[max(first - self.start, 0) : stop - self.start]
+        start = self.end
+        parts: list[Samples] = []
+        for samples, _, _ in reversed(self._blocks):  # a trigger is looked for in the last ones, for minutes perhaps
+            start -= len(samples)
+            parts.append(samples)
+            if start <= first:
+                break
+        return np.concatenate(parts[::-1])[max(first - start, 0) : stop - start]
 
     def record(self, first: int, count: int, trigger: int, rate: float) -> _Record:
         """Return the longest part of a record that has no loss.

@@ -11,7 +11,16 @@ from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.oscilloscope.sound import VirtualSoundCard
 from levilab.bench.bench import open_bench
-from levilab.bench.clock import ClockError, ClockTooFarOff, NoTone, by_computer, by_tone, keep_clock, tone_in
+from levilab.bench.clock import (
+    ClockError,
+    ClockTooFarOff,
+    NoTone,
+    TooFewBlocks,
+    by_computer,
+    by_tone,
+    keep_clock,
+    tone_in,
+)
 from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings, read_bench
 from levilab.bench.wiring import Wiring, described_wiring
 from levilab.world.bench import practice_world, virtual_wiring
@@ -67,6 +76,16 @@ def test_what_is_no_clock_of_a_sound_card_is_refused():
         by_computer(driver, 60.0, 1e-7, lambda _: None)
 
 
+@pytest.mark.parametrize("blocks", [0, 1, 3, 8])
+def test_too_few_blocks_are_no_clock(blocks, monkeypatch):
+    driver, _ = card_of(1)
+    half_a_second = np.zeros((24_000, 1), np.int16)
+    arrivals = iter([(half_a_second, 0.5 * k, False) for k in range(1, blocks + 1)])
+    monkeypatch.setattr(driver.transport.input, "read", lambda _: next(arrivals))
+    with pytest.raises(TooFewBlocks, match=f"came in {blocks} blocks, too few: take a longer `duration`"):
+        by_computer(driver, 0.5 * blocks, 1e-5, lambda _: None)
+
+
 SOUND = InstrumentSettings(model="sound", address="sound://USB")
 
 
@@ -101,6 +120,13 @@ def test_a_clock_that_is_measured_again_replaces_its_lines_alone(tmp_path):
     config = read_bench(path, BenchConfig)
     assert config.oscilloscope is not None
     assert (config.oscilloscope.clock_error, config.oscilloscope.clock_u) == (4.7e-5, 1.1e-6)
+
+
+def test_where_the_oscilloscope_has_no_table_its_lines_are_said(tmp_path):
+    path = tmp_path / "bench.toml"
+    path.write_text('oscilloscope = {model = "sound", address = "sound://USB"}\n', encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"has no line \[oscilloscope\]: add clock_error = 4\.7000e-05 and clock_u"):
+        keep_clock(path, SOUND, FOUND)
 
 
 def test_a_clock_is_not_kept_with_another_instrument(tmp_path):
