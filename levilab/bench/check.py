@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from instruments.drivers.oscilloscope.sound import SoundCard
 from instruments.errors import InstrumentError
 from levilab.bench.bench import Bench, open_bench
 from levilab.bench.config import ConfigError
+from levilab.bench.discover import scheme_of
 from levilab.bench.hearing import listen
-from levilab.bench.kinds import KINDS
+from levilab.bench.kinds import COUNTER, KINDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
 class Checked:
     """One instrument.
 
-    maker, model, serial_number, firmware: as it says itself; reading: as text, with value and unit where there is
-    one; trouble: what is wrong and what to try, empty if all is well.
+    maker, model, serial_number, firmware: as it says itself; device, software: of a phone or a sound card, which have
+    a name instead of a number, and the version of the program that reads them; reading: as text, with value and unit
+    where there is one; trouble: what is wrong and what to try, empty if all is well.
     """
 
     kind: str
@@ -33,10 +35,22 @@ class Checked:
     model: str = ""
     serial_number: str = ""
     firmware: str = ""
+    device: str = ""
+    software: str = ""
     reading: str = ""
     value: float | None = None
     unit: str = ""
     trouble: str = ""
+
+    @property
+    def identity(self) -> str:
+        """Who it says it is, as people read it; empty where it did not say it."""
+        if not self.model:
+            return ""
+        named = {"": self.device, "version ": self.software}
+        if not self.device:
+            named = {"serial number ": self.serial_number or "-", "firmware ": self.firmware or "-"}
+        return ", ".join((f"{self.maker} {self.model}", *(f"{name}{text}" for name, text in named.items())))
 
 
 @dataclass(frozen=True)
@@ -118,8 +132,9 @@ def _check(kind: str, wiring: Wiring, light: Light) -> Checked:
     address = wiring.instruments[kind].address
     seen: dict[str, Any] = {}
     try:
-        with open_bench(wiring, (kind,)) as bench:
-            seen = _identity(bench.instruments[kind].identity())
+        # a counter that is described is checked, even where the oscilloscope counts
+        with open_bench(replace(wiring, count_with=COUNTER.name), (kind,)) as bench:
+            seen = _identity(bench.instruments[kind].identity(), _NAMES if scheme_of(address) else _NUMBERS)
             reading, value, unit = READINGS[kind](bench, light)
     except InstrumentError as error:
         return Checked(kind, address, **seen, trouble=error.reason)
@@ -128,10 +143,15 @@ def _check(kind: str, wiring: Wiring, light: Light) -> Checked:
     return Checked(kind, address, **seen, reading=reading, value=_finite(value), unit=unit)
 
 
-def _identity(answer: str) -> dict[str, str]:
-    """Return the four fields of an answer to ``*IDN?`` (IEEE 488.2, 10.14); those that are missing are empty."""
+#: Fields of an identity: of an instrument (IEEE 488.2, 10.14), and behind an address with a scheme of its own.
+_NUMBERS = ("maker", "model", "serial_number", "firmware")
+_NAMES = ("maker", "model", "device", "software")
+
+
+def _identity(answer: str, names: tuple[str, ...]) -> dict[str, str]:
+    """Return the four fields of an identity by name; those that are missing are empty."""
     fields = [*(field.strip() for field in answer.split(",", 3)), "", "", ""]
-    return dict(zip(("maker", "model", "serial_number", "firmware"), fields, strict=False))
+    return dict(zip(names, fields, strict=False))
 
 
 def _finite(value: float | None) -> float | None:

@@ -55,7 +55,10 @@ class SampledCounter:
 
     MODELS: ClassVar[str] = ".*"
     SERIAL: ClassVar[Mapping[str, Any]] = {}
-    SIGNAL: ClassVar[Signal] = LIGHT
+    #: A record needs no trigger, so there is no level that could be wrong.
+    SIGNAL: ClassVar[Signal] = Signal(
+        LIGHT.name, "is the top floating and lit, and the phototransistor plugged into the first input"
+    )
     ESTIMATES: ClassVar[bool] = True
 
     def __init__(

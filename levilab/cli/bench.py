@@ -116,8 +116,8 @@ def bench_check(
 
 def _print_checked(one: "Checked") -> None:
     result(f"{one.kind} at {one.address}")
-    if one.model:
-        result(f"  {one.maker} {one.model}, serial number {one.serial_number or '-'}, firmware {one.firmware or '-'}")
+    if one.identity:
+        result(f"  {one.identity}")
     result(f"  {'FAILED: ' + one.trouble if one.trouble else one.reading}")
 
 

@@ -101,6 +101,26 @@ def test_a_check_reads_each_kind_and_leaves_the_output_off():
     assert seen["magnetometer"].value == pytest.approx(0.01909, abs=1e-4)
     assert seen["generator"].reading.startswith("output off")
     assert seen["counter"].serial_number == "VIRTUAL"
+    assert seen["counter"].identity == "Keysight Technologies 53230A, serial number VIRTUAL, firmware 3.09-levilab"
+
+
+@pytest.mark.parametrize(
+    ("kind", "model", "says"),
+    [
+        ("counter", "phyphox", "RWTH Aachen phyphox, levilab VIRTUAL, version 1.2.0"),
+        ("oscilloscope", "sound", "Virtual bench sound, VIRTUAL, version levilab"),
+    ],
+)
+def test_a_phone_and_a_sound_card_have_no_serial_number(kind, model, says):
+    seen = {one.kind: one for one in check(virtual_wiring(practice_world(), models={kind: model}), Light())}
+    assert seen[kind].identity == says
+    assert not seen[kind].serial_number
+
+
+def test_a_counter_that_is_described_is_checked_though_the_scope_counts():
+    wiring = replace(virtual_wiring(practice_world()), count_with="oscilloscope")
+    seen = {one.kind: one for one in check(wiring, Light())}
+    assert (seen["counter"].model, seen["oscilloscope"].model) == ("53230A", "DS1054Z")
 
 
 def test_the_commands_find_write_and_check(levilab, tmp_path):
