@@ -11,11 +11,14 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_
 from pydantic_core import PydanticCustomError
 
 from analysis.precession.gates import FEWEST, Gates, Rate, Swing, pulses_too_many, rates_at_point, swing_of
+from instruments.drivers.counter import LIGHT
 from instruments.errors import InstrumentError
 from levilab.acquisition.counting import gate_began, prepare_counter, prepare_counter_again
 from levilab.acquisition.driving import DriveSettings, NotHeld, PointFailed, check_drive, held_spin, sweep_drive
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.session import ExperimentFailed
+from levilab.bench.config import ConfigError
+from levilab.bench.kinds import COUNTER
 from levilab.bench.person import Task
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
 
     from instruments.drivers.generator import Limits as DriveLimits
     from levilab.acquisition.session import Row, Session
-    from levilab.bench.config import Limits
+    from levilab.bench.config import BenchConfig, Limits
 
     Array = NDArray[np.float64]
 
@@ -78,6 +81,13 @@ class PrecessionSettings(DriveSettings):
     record_laser_channel: PositiveInt = Field(default=3, description="where the laser is,")
     record_drive_channel: PositiveInt = Field(default=2, description="and the generator's output")
     longest_s: PositiveFloat = Field(default=4 * 3600.0, description="an end if it takes longer")
+
+    def for_bench(self, config: BenchConfig) -> Self:
+        """See the base.  Raises ConfigError for a counter that counts no light, and so no laser."""
+        counter = config.counter if config.count_with == COUNTER.name else None
+        if counter is not None and COUNTER.model(counter.model).driver.SIGNAL is not LIGHT:
+            raise ConfigError(f"{counter.model} cannot count a laser beam: the precession needs another counter")
+        return self
 
     @property
     def sweep(self) -> tuple[float, ...]:

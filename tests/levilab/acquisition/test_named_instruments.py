@@ -59,6 +59,11 @@ def test_the_named_model_of_the_bench_file_is_the_one_described():
     assert COUNTER.named("cnt-91", described) == described
 
 
+def test_a_counter_that_counts_no_light_is_refused_before_a_top_is_driven_up():
+    with pytest.raises(ConfigError, match="phyphox cannot count a laser beam: the precession needs another counter"):
+        request_for("precession", AcquisitionOptions(mock=True, counter="phyphox"))
+
+
 @pytest.mark.parametrize(
     ("options", "what"),
     [
