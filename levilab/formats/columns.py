@@ -20,6 +20,7 @@ from levilab.formats.titles import (
     dimension,
     foreign_unit,
     implied_unit,
+    is_unit,
     nearly_a_frequency,
     read_title,
     unit_factor,
@@ -189,7 +190,8 @@ def choose_columns(
             warnings += [_angular(path, header[index])] * (name == quantity)
             unit = "rad/s"
         factor = _factor(path, name, header[index], unit)
-        sure = bool(unit) and not (name not in stated and implied_unit(meant[index]))
+        says_unit = not implied_unit(meant[index]) or is_unit(meant[index])  # rpm does, omega does not
+        sure = bool(unit) and (name in stated or says_unit)
         columns.append(Column(name, index, header[index], factor, unit=unit or _SI[dimension(name)], written=sure))
     return tuple(sorted(columns, key=lambda c: CANONICAL.index(c.name))), tuple(warnings)
 

@@ -103,14 +103,16 @@ def _monitor(lines: Sequence[str]) -> Dressed:
 
 # --- CASSY, LabVIEW ------------------------------------------------------------------------------------
 
-_DEFINITION = re.compile(r"\s*DEF\s*=")
+_DEFINITION = re.compile(r"(?:.*\t)?\s*DEF\s*=\s*")
 _OTHER_KEYS = re.compile(r"\s*(MIN|MAX|SCALE|DEC)\s*=")
 
 
 def _cassy(lines: Sequence[str]) -> Dressed:
-    """MIN=, MAX=, SCALE= … above DEF="t/s" and the other titles."""
-    plain = ["" if _OTHER_KEYS.match(line) else _DEFINITION.sub("", line, count=1) for line in lines]
-    return Dressed(_content(plain))
+    """MIN=, MAX=, SCALE= … above DEF="t/s" and the other titles, or a line of all these for each column."""
+    defined = {k: line[found.end() :] for k, line in enumerate(lines) if (found := _DEFINITION.match(line))}
+    titles = {max(defined): "\t".join(defined.values())}
+    plain = ["" if k in defined or _OTHER_KEYS.match(line) else line for k, line in enumerate(lines)]
+    return Dressed(_content([titles.get(k, line) for k, line in enumerate(plain)]))
 
 
 _END = "***End_of_Header***"

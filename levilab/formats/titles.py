@@ -79,7 +79,7 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
 
 # Names that say their unit themselves; every other bare name is taken as SI.
 IMPLIED_UNITS = dict.fromkeys((*ANGULAR, "rad/s"), "rad/s") | {
-    "rpm": "rpm", "ms": "ms", "milliseconds": "ms", "minutes": "min", "hertz": "Hz",
+    "rpm": "rpm", "ms": "ms", "milliseconds": "ms", "minutes": "min", "hertz": "Hz", "hz": "Hz",
 }  # fmt: skip
 # The time of a turn, and turns in a time, are read where the title says their unit: T [ms], turns in 10 s.
 PERIODS = (

@@ -161,8 +161,9 @@ def _shown(look: "_Look", request: "Request", *, alone: bool) -> UnderstoodRun:
     used = {column.index: column for column in _known(look, layout, part, request)}
     seen = [_column(k, layout, used.get(k)) for k in range(layout.width) if part.has(k, layout.header)]
     seen = [column for column in seen if column.title or any(column.values)]
-    doubts = [doubt for column in used.values() if (doubt := _unit_doubt(layout, column, used))]
-    doubts += [error.doubt] if isinstance(error, NoSuchColumn | Ambiguous) and error.doubt else []
+    doubts = [doubt for column in used.values() if (doubt := _unit_doubt(layout, column, used.values()))]
+    asked = error.doubt if isinstance(error, NoSuchColumn | Ambiguous) else None
+    doubts += [asked] if asked and asked not in doubts else []
     problem = str(error) if error else ""
     return UnderstoodRun(
         look.path, name, layout.header_line, tuple(seen), tuple(doubts), plan.warnings if plan else (), problem
@@ -227,14 +228,29 @@ def _question(
     return Doubt("unit", f"{seen}: {', '.join(others)} or {end}?", index, tuple(choices))
 
 
-def _unit_doubt(layout: Layout, column: Column, used: Mapping[int, Column]) -> Doubt | None:
+def _unanswered(path: Path, doubt: Doubt) -> NoSuchColumn:
+    """Return the error for a spin whose unit is asked for."""
+    example = ",".join(f"{key}={to}" for key, to in doubt.choices[0].columns.items())
+    return NoSuchColumn(path, f'{doubt.text} say `columns` = "{example}"', doubt=doubt)
+
+
+def _must_be_sure(plan: "Plan") -> "Plan":
+    """Return a plan whose spin is in a stated or a possible unit.  Raises NoSuchColumn, with the question."""
+    for column in plan.columns:
+        doubt = None if column.written else _unit_doubt(plan.layout, column, plan.columns)
+        if doubt:
+            raise _unanswered(plan.path, doubt)
+    return plan
+
+
+def _unit_doubt(layout: Layout, column: Column, used: Iterable[Column]) -> Doubt | None:
     """Return the question about a spin that is taken in a unit in which no top has it."""
     if column.name != _SPIN or column.inverse:
         return None
     numbers = _numbers(layout, column.index)
     if not numbers or SLOWEST_SPIN_HZ <= median(numbers) * column.factor <= FASTEST_SPIN_HZ:
         return None
-    time = next((one for one in used.values() if one.name == "time_s"), None)
+    time = next((one for one in used if one.name == "time_s"), None)
     what = f"the unit {column.unit}" if column.written else f"no unit, and would be in {column.unit}"
     return _question(layout, column.index, time, what=what)
 
@@ -257,8 +273,7 @@ def _by_values(
         return None, ""
     (index,) = left
     if doubt := _question(layout, index, time, always=_needs_unit(meant[index])):
-        example = ",".join(f"{key}={to}" for key, to in doubt.choices[0].columns.items())
-        raise NoSuchColumn(path, f'{doubt.text} say `columns` = "{example}"', doubt=doubt)
+        raise _unanswered(path, doubt)
     numbers = _numbers(layout, index)
     if "Hz" not in possible_spins(median(numbers) if numbers else 0.0):
         return None, ""
@@ -388,7 +403,7 @@ def _looks_at(file: Path, text: Text, request: Request) -> Iterator[_Look]:
         path = text.path / part.name if part.name else text.path
         here = "/".join(filter(None, (name, part.name)))
         try:
-            plan = _plan(path, text, layout, part, request)
+            plan = _must_be_sure(_plan(path, text, layout, part, request))
         except TableError as error:
             yield _Look(path, here, layout, part, error=error)
         else:

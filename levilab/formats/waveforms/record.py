@@ -52,7 +52,10 @@ def read_record(
         if record is not None:
             return record
         if inside or any(text.rewritten for text in texts_of(file)):
-            raise NoWaveform(path, "is a table of another program, or one in a file with several")
+            raise NoWaveform(
+                path,
+                "is read for readings alone, as spreadsheets, ZIP, JSON and serial logs are: save samples as CSV",
+            )
         head = read_head(path)
         if set(columns or ()) - {"t", "time_s"}:
             raise NoWaveform(path, "holds readings: its columns are named")

@@ -12,6 +12,8 @@ from levilab.formats import texts
 from levilab.formats.columns import NoSuchColumn, NoTable, TableError
 from levilab.formats.table import read_table
 from levilab.formats.understanding import SPIN, SeveralRuns, understand
+from levilab.formats.waveforms.header import NoWaveform
+from levilab.formats.waveforms.record import read_record
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.sources import data_files
 from support.paths import ROOT
@@ -118,7 +120,7 @@ def test_what_was_found_of_runs_in_a_file_is_recalled(tmp_path):
 
 
 def test_what_is_shown_of_a_file_is_what_is_read():
-    for name in NAMES:
+    for name in sorted({*NAMES} - {*OPTIONS}):
         understanding = understand(FILES / name)
         assert not understanding.problem, name
         for run in (run for run in understanding.runs if not run.problem):
@@ -136,10 +138,28 @@ def test_an_angular_velocity_of_tracker_is_a_question_with_its_choices():
     assert (doubt.kind, doubt.column) == ("unit", 2)
     assert "column 3 'ω' has the values 1.369e+04 to 7785 and no unit" in doubt.text
     assert doubt.choices[0].text == "°/s (38 to 21.6 Hz)"
-    (source,) = spin_down(FILES / "tracker.txt").sources
-    assert source.readings.doubtful
+    assert {column.quantity for column in run.columns} == {"time_s", "spin_frequency_hz", None}
+    with pytest.raises(
+        NoSuchColumn, match=r"no unit, and would be in rad/s: °/s .* say `columns` = \"t=1,f=3 \[°/s\]\""
+    ):
+        spin_down(FILES / "tracker.txt")
     (source,) = spin_down(FILES / "tracker.txt", columns=doubt.choices[0].columns).sources
     assert not source.readings.doubtful
+
+
+def test_definitions_of_cassy_may_stand_one_below_the_other(tmp_path):
+    file = tmp_path / "cassy.txt"
+    heads = "".join(f'MIN=0\tMAX=200\tSCALE=20\tDEF="{title}"\n' for title in ("t/s", "f_1/Hz"))
+    file.write_text(heads + "0\t38\n10\t37.5\n20\t37\n", encoding="utf-8")
+    table = read_table(file, quantities=SPIN)
+    assert table.column("spin_frequency_hz").tolist() == [38, 37.5, 37]
+    assert table.lines.tolist() == [3, 4, 5]
+
+
+def test_a_table_that_holds_no_samples_says_what_to_do():
+    for name in ("excel.xlsx", "arduino-monitor.txt", "libreoffice.ods/Messung 1"):
+        with pytest.raises(NoWaveform, match="save samples as CSV"):
+            read_record(FILES / name)
 
 
 def test_a_column_without_name_and_unit_is_asked_about(tmp_path):

@@ -272,7 +272,7 @@ ERRORS = {
     "too few fields": ("t,f\n0,61.5\n0.5\n1,61\n", None, ["line 3", "'0.5'", "1 field,", "2 are expected"]),
     "too many fields": ("t,f\n0,61.5\n0.5,61,7\n1,61\n2,60\n", None, ["line 3", "3 fields"]),
     "second header": (GOOD + GOOD, None, ["line 5", "'t'"]),
-    "thousands separator": ("t;f\n0;1.061\n1;1.061,2\n2;1.061,1\n", None, ["line 2", "'1.061'"]),
+    "thousands separator": ("t;f [Hz]\n0;1.061\n1;1.061,2\n2;1.061,1\n", None, ["line 2", "'1.061'"]),
     "underscore": ("t,f\n0,61\n1,6_1\n2,60\n", None, ["line 3", "'6_1'"]),
     "two frequencies": ("t,f,rpm\n0,1,60\n1,1,60\n2,1,60\n", None, ["'f', 'rpm'", "`columns` = f=2 or f=3"]),
     "wrong name": (GOOD, {"f": "nu"}, ["no column 'nu'", "'t', 'f'"]),

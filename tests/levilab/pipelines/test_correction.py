@@ -81,7 +81,7 @@ def test_each_file_of_a_folder_has_its_own(swapped: Path) -> None:
 
 def test_a_report_follows_a_changed_correction(swapped: Path) -> None:
     analysis = ANALYSES["spindown"]
-    write_correction(swapped, {"columns": {"t": "2", "f": "1"}})
+    write_correction(swapped, {"columns": {"t": "2", "f": "1 [Hz]"}})
     assert command("analyze", "spindown", "my.csv", cwd=swapped.parent).status == 0
     as_written = analysis.recall([swapped], analysis.options_from({}))
     assert as_written.origins[0].text.startswith("as levilab analyze found it")

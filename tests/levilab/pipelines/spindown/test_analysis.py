@@ -13,6 +13,7 @@ import pytest
 from analysis.spindown.drag import LAWS
 from levilab.errors import DataError, LevilabError
 from levilab.files import CannotWrite
+from levilab.formats.columns import NoSuchColumn
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.analysis import METHOD
@@ -173,7 +174,11 @@ def test_another_unit_taken_for_hertz_is_doubted(tmp_path: Path, unit: str, fact
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
     np.savetxt(path, np.c_[t, factor * nu], delimiter=",", header="t,f", comments="")
-    (source,) = METHOD.analyze([path], SpinDownOptions()).sources
+    with pytest.raises(NoSuchColumn) as error:
+        METHOD.analyze([path], SpinDownOptions())
+    assert error.value.doubt.choices[0].columns == {"t": "1", "f": f"2 [{unit}]"}
+    np.savetxt(path, np.c_[t, factor * nu], delimiter=",", header="t,f [Hz]", comments="")
+    (source,) = METHOD.analyze([path], SpinDownOptions()).sources  # stated: a note
     assert source.readings.doubtful
     assert f"f=NAME [{unit}]" in source.warnings[0]
     stated = METHOD.analyze([path], SpinDownOptions(columns={"t": "t", "f": f"f [{unit}]"}))
@@ -195,7 +200,7 @@ def test_hertz_taken_for_another_unit_are_doubted(tmp_path: Path) -> None:
 def test_a_run_whose_unit_is_in_doubt_stays_out_of_the_means(sample_data: Path, tmp_path: Path) -> None:
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
-    np.savetxt(path, np.c_[t, 360 * nu], delimiter=",", header="t,f", comments="")
+    np.savetxt(path, np.c_[t, 360 * nu], delimiter=",", header="t,f [Hz]", comments="")
     alone = METHOD.analyze([sample_data], SpinDownOptions())
     both = METHOD.analyze([sample_data, path], SpinDownOptions())
     assert both.combined.fit("disc").constants == alone.combined.fit("disc").constants
