@@ -61,7 +61,7 @@ def test_json_is_the_understanding_alone(doubtful: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("nothere.csv",), "nothere.csv: no such file"),
+        (("nothere.csv",), "nothere.csv: there is no such file"),
         ((), "FILE: name a data file"),
         (("my.csv", "--columns", "t=1,f=9"), "has no column '9'"),
         ((str(OMEGA), "--keep"), "--keep: goes with --columns"),
