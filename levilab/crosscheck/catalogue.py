@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from levilab.crosscheck.subjects import field, motion, precession, spin, spindown
+from levilab.crosscheck.subjects import field, motion, phone, precession, spin, spindown
 
 #: Name → subject.
 SUBJECTS = MappingProxyType(
@@ -14,6 +14,7 @@ SUBJECTS = MappingProxyType(
             spin.SUBJECT,
             spindown.SUBJECT,
             spindown.SOUND,
+            phone.SUBJECT,
             motion.SUBJECT,
             precession.SUBJECT,
             field.SUBJECT,

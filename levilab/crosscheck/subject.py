@@ -79,14 +79,17 @@ def acquire_mock(
     folder: Path,
     change: Callable[[AcquisitionRequest], AcquisitionRequest],
     *,
+    counter: str | None = None,
     scope: str | None = None,
 ) -> Run:
-    """Return a finished run of a mock experiment.  change: puts it into a world of known numbers; scope: that counts.
+    """Return a finished run of a mock experiment.
+
+    change: puts it into a world of known numbers; counter, scope: in place of the bench's.
 
     Raises TrialFailed; KeyboardInterrupt where Ctrl-C ended the run: it is meant for the whole cross-check.
     """
-    request = request_for(experiment, AcquisitionOptions(mock=True, out=folder, seed=seed, scope=scope))
-    run = acquire(change(request), Display())
+    options = AcquisitionOptions(mock=True, counter=counter, scope=scope, out=folder, seed=seed)
+    run = acquire(change(request_for(experiment, options)), Display())
     if run.status == "interrupted":
         raise KeyboardInterrupt
     if run.status != "finished":

@@ -134,7 +134,9 @@ def connect_magnetometer(model: Callable[..., VirtualInstrument]) -> Maker:
 
 def connect_phone(model: Callable[..., VirtualInstrument]) -> Maker:
     """Connect a phone: it lies beside the base."""
-    return lambda world: model(world.clock, magnetic_field=lambda times: world.magnetic_field(times, PHONE_M))
+    return lambda world: model(
+        world.clock, magnetic_field=lambda times: world.magnetic_field(times, PHONE_M), seed=world.seed
+    )
 
 
 #: Kind, or scheme of a model's addresses → what connects a virtual instrument to the world.

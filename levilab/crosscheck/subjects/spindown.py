@@ -31,20 +31,25 @@ START_HZ = 40.0
 RATE = 10.0
 
 
-def trial(seed: int, folder: Path, scope: str | None = None) -> list[Pull]:
-    """Try one spin-down: the seed draws drag, fall and scatter of the pulses; scope: an oscilloscope that counts."""
+def draw_scene(seed: int) -> SpinScene:
+    """Draw drag, fall and scatter of the pulses."""
     random = np.random.default_rng((seed, 2))
     law = sorted(LAWS)[int(random.integers(len(LAWS)))]
-    usual, names, exponent = LAWS[law].usual, LAWS[law].names, LAWS[law].exponent
-    scene = SpinScene(
+    return SpinScene(
         start_hz=float(random.uniform(28.0, 33.0)),
         drag=law,
-        constants=tuple(c * float(random.uniform(0.8, 1.2)) for c in usual),
+        constants=tuple(c * float(random.uniform(0.8, 1.2)) for c in LAWS[law].usual),
         fall_hz=float(random.uniform(21.4, 22.4)),
         jitter=SpinScene.jitter * float(random.uniform(0.5, 2.0)),
         seed=seed,
     )
-    run = acquire_mock("spin", seed, folder, lambda request: _in_world(request, scene), scope=scope)
+
+
+def trial(seed: int, folder: Path, counter: str | None = None, scope: str | None = None) -> list[Pull]:
+    """Try one spin-down.  counter, scope: that counts in place of the bench's."""
+    scene = draw_scene(seed)
+    law, names, exponent = scene.drag, LAWS[scene.drag].names, LAWS[scene.drag].exponent
+    run = acquire_mock("spin", seed, folder, lambda request: _in_world(request, scene), counter=counter, scope=scope)
     found = spindown_of(run.folder, tilt="none")  # a count of this world is the spin
     pulls = [
         pull_of(f"{law} {name}", found.fit(law).parameters[name], truth)

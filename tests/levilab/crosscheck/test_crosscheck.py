@@ -113,6 +113,11 @@ def test_ctrl_c_in_a_trial_ends_the_cross_check():
     [
         ("spin", 1, {"frequency", "chirp"}),
         ("spindown", 1, {"newton c2", "start frequency", "exponent", "fall"}),
+        (
+            "phone",
+            1,
+            {"newton c2", "start frequency", "exponent", "fall", "frequency", "chirp", "lower limit"},
+        ),
         ("motion", 1, {"disc c32", "exponent", "fall"}),
         (
             "field",
@@ -135,7 +140,7 @@ def test_a_trial_goes_through_drivers_and_analysis(tmp_path, name, seed, quantit
     assert {pull.quantity for pull in pulls} == quantities
     # a wrong truth or a slip in its unit would be thousands of u away
     assert max(abs(pull.value) for pull in pulls) < 15
-    (run,) = tmp_path.iterdir()
+    (run,) = tmp_path.glob("*/")
     assert (run / "readings.csv").exists()
 
 
