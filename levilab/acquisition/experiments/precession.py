@@ -83,10 +83,15 @@ class PrecessionSettings(DriveSettings):
     longest_s: PositiveFloat = Field(default=4 * 3600.0, description="an end if it takes longer")
 
     def for_bench(self, config: BenchConfig) -> Self:
-        """See the base.  Raises ConfigError for a counter that counts no light, and so no laser."""
-        counter = config.counter if config.count_with == COUNTER.name else None
-        if counter is not None and COUNTER.model(counter.model).driver.SIGNAL is not LIGHT:
-            raise ConfigError(f"{counter.model} cannot count a laser beam: the precession needs another counter")
+        """See the base.
+
+        Raises ConfigError for a counter that counts no light, and so no laser, and for an oscilloscope that counts: its
+        input 2 shows the drive, that of a sound card a pickup coil, and both would be taken for the laser.
+        """
+        if config.count_with != COUNTER.name:
+            raise ConfigError("an oscilloscope cannot count the laser beside the spin: name a `counter`, too")
+        if config.counter is not None and COUNTER.model(config.counter.model).driver.SIGNAL is not LIGHT:
+            raise ConfigError(f"{config.counter.model} cannot count a laser beam: the precession needs another counter")
         return self
 
     @property

@@ -59,9 +59,17 @@ def test_the_named_model_of_the_bench_file_is_the_one_described():
     assert COUNTER.named("cnt-91", described) == described
 
 
-def test_a_counter_that_counts_no_light_is_refused_before_a_top_is_driven_up():
+def test_a_counter_that_counts_no_laser_is_refused_before_a_top_is_driven_up():
     with pytest.raises(ConfigError, match="phyphox cannot count a laser beam: the precession needs another counter"):
         request_for("precession", AcquisitionOptions(mock=True, counter="phyphox"))
+
+
+@pytest.mark.parametrize("scope", ["sound", "DS1000Z"])
+def test_the_drive_or_a_pickup_coil_at_an_oscilloscope_is_not_counted_as_the_laser(scope):
+    with pytest.raises(ConfigError, match="an oscilloscope cannot count the laser beside the spin: name a `counter`"):
+        request_for("precession", AcquisitionOptions(mock=True, scope=scope))
+    request = request_for("precession", AcquisitionOptions(mock=True, scope=scope, counter="53230A"))
+    assert request.config.count_with == "counter"
 
 
 @pytest.mark.parametrize(

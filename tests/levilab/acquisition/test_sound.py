@@ -188,5 +188,6 @@ def test_a_top_that_is_spun_by_hand_needs_no_generator(experiment, tmp_path):
 @pytest.mark.parametrize("settings", [("limit.which=upper",), ()])
 def test_what_needs_a_drive_is_refused_without_one(settings, tmp_path):
     experiment = "limit" if settings else "precession"
+    options = AcquisitionOptions(mock=True, out=tmp_path, settings=(*settings, f"{experiment}.drive_waveform=NONE"))
     with pytest.raises(UsageError, match=r"drive_waveform = NONE: th.* needs a drive"):
-        request(experiment, tmp_path, *settings, f"{experiment}.drive_waveform=NONE")
+        request_for(experiment, options)
