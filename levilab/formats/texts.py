@@ -127,6 +127,16 @@ def _texts(file: Path, _: int, size: int) -> tuple[Text, ...]:
     return (Text(file, dressed.content, dressed.titles) if dressed else Text(file),)
 
 
+def _place(file: Path, name: str) -> Path:
+    r"""Return the path of a sheet or a member as if the file were a folder: below it, whatever the name says.
+
+    >>> _place(Path("my.zip"), "/../C:\\a/./b.csv").as_posix()
+    'my.zip/C-/a/b.csv'
+    """
+    parts = re.split(r"[/\\]", name.replace(":", "-"))
+    return file.joinpath(*([part for part in parts if part not in {"", ".", ".."}] or ["unnamed"]))
+
+
 def forget() -> None:
     """Forget the texts of the files that were opened."""
     _texts.cache_clear()
@@ -193,7 +203,7 @@ def _members(file: Path, archive: zipfile.ZipFile, members: Iterable[zipfile.Zip
         content = b"".join(blocks)
         left -= len(content)
         dressed = undress(content[: 1 << 16], partial(bytes, content))
-        inside = file / member.filename
+        inside = _place(file, member.filename)
         yield Text(inside, dressed.content, dressed.titles) if dressed else Text(inside, content)
 
 
@@ -304,7 +314,7 @@ def _sheets(file: Path) -> tuple[Text, ...]:
         raise TableError(file, "is a damaged spreadsheet: open it and save it again as .xlsx") from error
     if not found:
         raise NoTable(file, "is an empty spreadsheet")
-    return tuple(Text(file / name.replace("/", "-"), _lines(rows), aligned=True) for name, rows in found)
+    return tuple(Text(_place(file, name.replace("/", "-")), _lines(rows), aligned=True) for name, rows in found)
 
 
 def _must_be_of_a_size(file: Path, sheets: Sequence[Any]) -> None:

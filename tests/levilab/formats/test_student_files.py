@@ -156,6 +156,16 @@ def test_definitions_of_cassy_may_stand_one_below_the_other(tmp_path):
     assert table.lines.tolist() == [3, 4, 5]
 
 
+@pytest.mark.parametrize("name", ["/etc/x.csv", "C:/x.csv", "C:\\x.csv", "a/b/x.csv"])
+def test_a_member_of_a_zip_stays_in_it_whatever_its_name(tmp_path, name):
+    file = tmp_path / "my.zip"
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr(name, "t,f\n0,38\n10,37\n20,36\n")
+    table = read_table(file, quantities=SPIN)
+    assert table.path.relative_to(file).name == "x.csv"
+    assert ".." not in table.path.relative_to(file).parts
+
+
 def test_a_table_that_holds_no_samples_says_what_to_do():
     for name in ("excel.xlsx", "arduino-monitor.txt", "libreoffice.ods/Messung 1"):
         with pytest.raises(NoWaveform, match="save samples as CSV"):
