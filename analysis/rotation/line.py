@@ -57,15 +57,14 @@ def fit_line(record: Record, frequency: float, chirp: float) -> LineFit:
     """Return the line of greatest likelihood near a frequency [Hz] and a slope [Hz/s] at the record's middle."""
     x, half = record.late_of_half, record.half
     n = x.size
-    powers = record.powers[:, :, None]
     freedom = max(n - record.parameters - 2.0, 1.0)
     for _ in range(_STEPS):
         bend_unit = chirp * abs(chirp) / frequency if chirp < 0 else 0.0  # of an even drive there is none
         bend = UNDER_DRAG * abs(bend_unit)
         turns = half * x * (frequency + half * x * (chirp / 2 + half * x * bend / 6))
         angle = 2 * np.pi * turns
-        wave = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        columns = (powers * wave[:, None, :]).reshape(n, 8)
+        wave = (np.cos(angle) + 1j * np.sin(angle))[:, None]
+        columns = (record.powers * wave).view(np.float64)  # cosine and sine for each power
         normal, product = record.project(columns)
         own = normal[:2, :2] + PRIOR * np.eye(2)
         inverse = np.linalg.inv(own)
@@ -108,6 +107,6 @@ def fit_line(record: Record, frequency: float, chirp: float) -> LineFit:
         variance=variance,
         likelihood=likelihood,
         gain=0.5 * n * float(np.sum(np.log(whole / squares))),
-        columns=wave,
+        columns=wave.view(np.float64),
         shift=shift,
     )

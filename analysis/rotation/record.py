@@ -115,8 +115,8 @@ class Record:
         self.others: tuple[Line, ...] = (*map(Line, self.mains_hz), *lines)
         frequency, chirp = np.array([(line.frequency, line.chirp) for line in self.others]).reshape(-1, 2).T
         angle = 2 * np.pi * self.late[:, None] * (frequency + 0.5 * chirp * self.late[:, None])
-        wave = np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
-        self._lines = (wave[:, :, None] * self.powers[:, None, :3]).reshape(self.late.size, -1)
+        wave, x = np.concatenate([np.cos(angle), np.sin(angle)], axis=1), self.late_of_half[:, None]
+        self._lines = np.concatenate([wave, x * wave, x * x * wave], axis=1)
         self._fixed = np.concatenate([self._lines, self.field], axis=1)
         self._on_fixed, self._by_fixed = self._on_spline(self._fixed)
         gram = self._fixed.T @ self._fixed - self._on_fixed.T @ self._by_fixed
@@ -149,11 +149,10 @@ class Record:
     def rest(self, line: Array | float = 0.0) -> Array:
         """Return the field without all that is beside the line, and without the line itself, shape (n, k) [unit]."""
         field = self.field - line
-        on, by = self._on_spline(np.concatenate([self._lines, field], axis=1))
+        _, by = self._on_spline(field)
         q = self._lines.shape[1]
-        of_field = self._lines.T @ field - on[:, :q].T @ by[:, q:]
-        lines = self._normal @ of_field
-        return np.asarray(field - self._lines @ lines - self._spline @ (by[:, q:] - by[:, :q] @ lines))
+        lines = self._normal @ (self._lines.T @ field - self._on_fixed[:, :q].T @ by)
+        return np.asarray(field - self._lines @ lines - self._spline @ (by - self._by_fixed[:, :q] @ lines))
 
     def without_drift(self) -> Array:
         """Return the field without the spline alone, shape (n, k) [unit]."""
