@@ -39,7 +39,7 @@ def place_of_correction(file: Path) -> Path:
     'my.csv.levilab.toml'
     """
     file, _ = locate(file)
-    return file.with_name(file.name + ENDING)
+    return file.parent / f"{file.name}{ENDING}"  # of a folder, too, which may have no name
 
 
 def read_correction(file: Path) -> dict[str, Any]:

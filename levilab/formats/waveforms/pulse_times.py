@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from levilab.formats.waveforms.head import Head
     from levilab.formats.waveforms.rows import Block
 
+#: Slower turns are no turns [s]: times in µs or ms without a unit, of which a window of seconds holds none.
+_LONGEST_TURN_S = 10.0
 #: Lines that may stand above the first number.
 _MOST_TITLES = 20
 
@@ -66,6 +68,9 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
         )
     if len(times) < FEWEST_PULSES:
         raise NoWaveform(path, f"holds {len(times)} numbers, at least {FEWEST_PULSES} pulse times are needed")
+    if (apart := float(np.median(np.diff(times)))) > _LONGEST_TURN_S:
+        what = f"its pulses are {apart:.4g} s apart, which no turn of a top lasts"
+        raise TableError(path, f"{what}: write the unit above the numbers, as t [us] or t [ms]", line=first + 1)
     warnings = [f"{path.name}, {block.torn}" for block in found if block.torn]
     return PulseTimes(path, "list of pulse times", times, tuple(warnings))
 

@@ -136,6 +136,12 @@ def test_a_table_reads_the_same_in_every_dialect(name, table_file):
     assert (table.frame.dtypes == np.float64).all()
 
 
+@pytest.mark.parametrize(("title", "unit"), [("millis", 1e-3), ("micros", 1e-6)])
+def test_arduinos_clocks_say_their_unit_by_their_name(table_file, title, unit):
+    table = read_table(table_file(f"{title},rpm\n0,2404\n10000,2309\n20000,2220\n"))
+    assert table.columns["time_s"][1] == pytest.approx(10_000 * unit, rel=1e-12)
+
+
 def test_times_of_hours_and_minutes_are_doubted(table_file):
     """A stopwatch begins at 0 minutes, as in the tables above; 14:05 and 14:06 may be a minute apart."""
     table = read_table(table_file("time,f\n14:05,61.5\n14:06,61.25\n14:07,61\n"))

@@ -299,6 +299,13 @@ def test_a_column_of_times_is_a_list_of_pulses(text, write):
     np.testing.assert_allclose(record.times[:4], [0.1, 0.2, 0.35, 0.4], rtol=1e-12)
 
 
+def test_pulse_times_in_microseconds_without_a_unit_are_asked_for_it(write):
+    times = "".join(f"{25_000 * k}\n" for k in range(300))
+    with pytest.raises(TableError, match="25000 s apart"):
+        read_record(write(times))
+    assert read_record(write(f"t [us]\n{times}")).times[1] == pytest.approx(0.025, rel=1e-12)
+
+
 @pytest.mark.parametrize("title", ["f [Hz]", "rpm", "signal [V]", "height"])
 def test_a_column_of_another_quantity_is_no_list_of_pulses(title, write):
     """The numbers increase, as times do."""
