@@ -55,8 +55,8 @@ _COMPONENTS = (
 QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "time_s": ("time", (
         "time", "t", "zeit", "elapsed", "elapsed_time", "timestamp", "seconds", "sekunden", "milliseconds", "minutes",
-        "ms", "millis", "micros", "x_value", "clock", "uhrzeit", "temps", "tiempo", "tempo", "tid", "laufzeit", "messzeit", "zeitpunkt",
-        "heure", "hora", "tidpunkt", "secondes", "segundos", "sekunder")),
+        "ms", "millis", "micros", "x_value", "clock", "uhrzeit", "temps", "tiempo", "tempo", "tid", "laufzeit",
+        "messzeit", "zeitpunkt", "heure", "hora", "tidpunkt", "secondes", "segundos", "sekunder")),
     "spin_frequency_hz": ("frequency", (
         "spin_frequency", "f", "freq", "frequency", "frequenz", "nu", "ν", "nu3", "ν3", "f3", "ν_3", "nu_3", "f_3",
         "spin", "spin_freq", "f_spin", "rotation_frequency", "rotation", "drehfrequenz", "hz", "hertz", "rpm", "rad/s",
@@ -79,7 +79,8 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
 
 # Names that say their unit themselves; every other bare name is taken as SI.
 IMPLIED_UNITS = dict.fromkeys((*ANGULAR, "rad/s"), "rad/s") | {
-    "rpm": "rpm", "ms": "ms", "milliseconds": "ms", "millis": "ms", "micros": "us", "minutes": "min", "hertz": "Hz", "hz": "Hz",
+    "rpm": "rpm", "ms": "ms", "milliseconds": "ms", "millis": "ms", "micros": "us", "minutes": "min",
+    "hertz": "Hz", "hz": "Hz",
 }  # fmt: skip
 # The time of a turn, and turns in a time, are read where the title says their unit: T [ms], turns in 10 s.
 PERIODS = (

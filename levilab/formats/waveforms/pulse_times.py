@@ -69,7 +69,7 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
     if len(times) < FEWEST_PULSES:
         raise NoWaveform(path, f"holds {len(times)} numbers, at least {FEWEST_PULSES} pulse times are needed")
     if (apart := float(np.median(np.diff(times)))) > _LONGEST_TURN_S:
-        what = f"its pulses are {apart:.4g} s apart, which no turn of a top lasts"
+        what = f"its pulses are {apart:g} s apart, which no turn of a top lasts"
         raise TableError(path, f"{what}: write the unit above the numbers, as t [us] or t [ms]", line=first + 1)
     warnings = [f"{path.name}, {block.torn}" for block in found if block.torn]
     return PulseTimes(path, "list of pulse times", times, tuple(warnings))
