@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from analysis.pulses import track_of_blocks, track_of_samples
+from analysis.rotation.record import FEWEST
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
@@ -93,6 +94,8 @@ def read_spin_file(path: Path, options: InputOptions) -> Records:
         DataError: it cannot be used.
     """
     field = read_field_record(path, options)
+    if field and len(field) < FEWEST:
+        raise DoesNotSuit(f"{path}: holds {len(field)} samples of a field, at least {FEWEST} are needed: record longer")
     if field:
         return Records(path, (), "", None, field.warnings, field)
     record = read_record(path, columns=options.columns, rate=options.rate, guess=options.guess)

@@ -215,6 +215,11 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
     return Readings(time, frequency, u, (*table.warnings, *doubts), doubtful=bool(doubts))
 
 
+#: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, times in ms
+#: 3e-6; a brake of eddy currents and a poor vacuum lie between.
+FASTEST_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 1e-5
+
+
 def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[str]:
     """Return doubts about units: a spin that no such top has, readings closer than a turn."""
     middle, step = float(np.median(frequency)), float(np.median(np.diff(time)))
@@ -228,6 +233,12 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
     if step * middle < 1:  # nor does a counter give a reading in less
         doubt = f"{table.path.name}: the readings lie {1e3 * step:.3g} ms apart, the top needs {1e3 / middle:.3g} ms"
         return [f"{doubt} for a turn; if the times are in seconds, say so with their column, as t=NAME [s]"]
+    lasts = float(time[-1] - time[0])
+    loss = float(np.log(frequency[0] / frequency[-1])) / lasts
+    if loss > FASTEST_LOSS_PER_S or (0 < loss < SLOWEST_LOSS_PER_S):
+        doubt = f"{table.path.name}: the spin goes from {frequency[0]:.4g} to {frequency[-1]:.4g} Hz in {lasts:.4g} s"
+        unit = "min" if loss > FASTEST_LOSS_PER_S else "ms"
+        return [f"{doubt}, in air it takes minutes; if the times are not in seconds, say so, as t=NAME [{unit}]"]
     return []
 
 

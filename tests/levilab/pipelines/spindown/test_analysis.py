@@ -17,6 +17,7 @@ from levilab.formats.columns import NoSuchColumn
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.analysis import METHOD
+from levilab.pipelines.spindown.readings import read_spin_file
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
 from levilab.pipelines.suits import save
@@ -264,3 +265,15 @@ def test_few_readings_give_a_result_without_nan_that_says_what_it_cannot_tell(tm
     analysis = METHOD.analyze([spin_down_csv(tmp_path / "my.csv", n=n)], SpinDownOptions())
     text = json.dumps(ANALYSES["spindown"].document(analysis, tmp_path), allow_nan=False)
     assert json.loads(text)["warnings"]
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1 / 60, "min"), (1000, "ms")])
+def test_times_in_a_unit_that_no_fall_has_are_doubted_and_stay_out_of_means(tmp_path, factor, unit):
+    seconds = np.arange(0, 190, 10.0)
+    spin = (1 / np.sqrt(2 * np.pi * 40) + 2.34e-4 * seconds / 2) ** -2 / (2 * np.pi)
+    file = tmp_path / "my.csv"
+    rows = zip(seconds * factor, spin, strict=True)
+    file.write_text("t,f\n" + "".join(f"{t:.5f},{f:.3f}\n" for t, f in rows), encoding="utf-8")
+    readings = read_spin_file(file, SpinDownOptions())
+    assert readings.doubtful
+    assert f"t=NAME [{unit}]" in readings.warnings[-1]
