@@ -65,7 +65,7 @@ class UnderstoodColumn:
     Attributes:
         index: in the file, from 0 on; `columns` counts from 1.
         title: in the file; empty where it has none.
-        quantity: canonical name of what it is taken for; None: it is not used.
+        quantity: canonical name of its quantity; None: it is not used.
         unit: of its numbers as they are taken; empty where it is not used.
         factor: from those numbers to SI; of a period, to seconds a turn.
         inverse: whether it holds a period, or its uncertainty.

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from levilab.formats.waveforms.waveform import Waveform
 
-#: What a column may hold, in words, and the units to choose from.
+#: Quantities that a column may hold, as text, and the units to choose from.
 QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType({
     "time_s": ("time", ("s", "ms", "min", "h")),
     "spin_frequency_hz": ("spin frequency", ("Hz", "rpm", "rad/s", "°/s", "kHz", "mHz")),
@@ -71,7 +71,7 @@ class Look:
     """How a file is understood.
 
     Attributes:
-        holds: the kind of content, in words.
+        holds: the kind of content, as text.
         runs: its tables; of a record one, whose columns are the channels.
         problem: why nothing of it is read; empty if any run is.
         channels: names of the channels of a record.

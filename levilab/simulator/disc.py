@@ -36,7 +36,7 @@ class Rule(NamedTuple):
     angles: int
 
     def with_more(self, number: int) -> Rule:
-        """Return the rule with so many more of each, or fewer: one of each less has a well larger error."""
+        """Return the rule with a number more of each, or fewer: one of each less has a well larger error."""
         return Rule(max(self.rings + number, 1), max(self.layers + number, 1), max(self.angles + number, 3))
 
 

@@ -83,7 +83,7 @@ _HEIGHT_FOR_NODES = 2.0
 
 
 def _nodes(scene: Scene, angles: int) -> Array:
-    """Return the nodes of the scene's magnet, with so many angles."""
+    """Return the nodes of the scene's magnet, with the given number of angles."""
     top, distance = scene.top, math.hypot(1, _HEIGHT_FOR_NODES) * scene.base.inner_radius_m
     return nodes_of(top, rule_for(top.magnet_radius_m, top.magnet_height_m, distance)._replace(angles=angles))
 

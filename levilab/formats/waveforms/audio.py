@@ -86,7 +86,7 @@ def advice_on_sound() -> str:
 
 
 def _read_whole(stream: IO[bytes], size: int) -> bytes:
-    """Return so many bytes of a pipe, fewer at its end alone."""
+    """Return the given number of bytes of a pipe, fewer at its end alone."""
     parts, left = [], size
     while left and (part := stream.read(left)):
         parts.append(part)

@@ -239,12 +239,12 @@ def tell_apart(groups: Iterable[Limits]) -> tuple[Limits, ...]:
 
 
 def synthetic_source(source: Source[LimitReadings]) -> bool | None:
-    """Return whether an input was simulated or made up; None of a data file, which does not say it."""
+    """Return whether an input is synthetic; None of a data file, which does not say it."""
     return source.synthetic if source.run else None
 
 
 def synthetic_runs(runs: Iterable[Limits]) -> bool | None:
-    """Return whether runs were simulated or made up; None where that is not known of all, or not alike."""
+    """Return whether runs are synthetic; None where that is not known of all, or not alike."""
     kinds = {run.conditions.synthetic for run in runs}
     return kinds.pop() if len(kinds) == 1 else None
 

@@ -41,7 +41,7 @@ READINGS, PULSES, FIT = LOOKS["readings"].colour, LOOKS["pulses"].colour, LOOKS[
 _HEAD, _EACH = 0.42, 4.35
 #: Bins of the folded pulse, and of the field of a magnetometer.
 BINS, FOLDED_BINS = 240, 24
-#: Colours of the axes of a magnetometer, that are told by their darkness, too.
+#: Colours of the axes of a magnetometer, which differ in darkness, too.
 AXES = ("#0072b2", "#d55e00", "#009e73")
 
 

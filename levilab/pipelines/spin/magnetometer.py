@@ -66,7 +66,7 @@ class FieldRecord:
 
     @property
     def kind(self) -> str:
-        """The kind of record, in words."""
+        """The kind of record, as text."""
         return f"magnetometer, {', '.join(self.axes)}, {self.rate:.4g} samples/s"
 
 
@@ -109,7 +109,7 @@ def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
 
 
 def spin_of_line(found: FieldSpin) -> SpinFrequency:
-    """Return a line's frequency in the form of that of pulses: its turns, and the time scatter of one turn."""
+    """Return a line's frequency in the form of a result of pulses: its turns, and the time scatter of one turn."""
     return SpinFrequency(
         frequency=Estimate(found.frequency, found.u_frequency, "Hz"),
         chirp=Estimate(found.chirp, found.u_chirp, "Hz/s"),
