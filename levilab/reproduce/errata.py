@@ -144,7 +144,7 @@ def bracket() -> Finding:
     a, aside = 100 * base.inner_radius_m, 0.02
     exact = field_of(base.inner_radius_m, base.outer_radius_m, base.strength_t_m, "exact")
     far, near = (np.linalg.norm(flux_density(exact, [r * base.inner_radius_m, 0.0, z])) for r in (aside, 0.0))
-    b, slope, second = on_axis(exact, np.array([z]))[:3, 0]
+    b, slope, second = on_axis(exact, np.array([z]))[:, 0]
     per_cm2 = float((slope / b) ** 2 - 2 * second / b) * 1e-4
     return erratum(
         "(2.54)",

@@ -90,7 +90,7 @@ def base_like(simon: Simon, ratio: float = RATIO) -> tuple[float, float, float]:
     wanted = b * second / slope**2
 
     def off(z: float) -> float:
-        f, s, c = on_axis(unit, z)[:3, 0]
+        f, s, c = on_axis(unit, z)[:, 0]
         return float(f * c / s**2) - wanted
 
     heights = np.linspace(1.2 * ratio**0.5, 4.0 * ratio, 400)

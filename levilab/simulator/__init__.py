@@ -21,22 +21,8 @@ if TYPE_CHECKING:
     from levilab.simulator.single import simulate
     from levilab.simulator.trajectory import Accuracy, Event, Trajectory
 
-_HOME = {
-    "Ensemble": "ensemble",
-    "grid": "ensemble",
-    "simulate_many": "ensemble",
-    "step_share_of": "ensemble",
-    "Scene": "scene",
-    "SceneError": "scene",
-    "preset": "scene",
-    "presets": "scene",
-    "read_scene": "scene",
-    "with_settings": "scene",
-    "simulate": "single",
-    "Accuracy": "trajectory",
-    "Event": "trajectory",
-    "Trajectory": "trajectory",
-}
+#: The modules of the names, those that are quicker to load first.
+_MODULES = ("scene", "trajectory", "single", "ensemble")
 
 __all__ = [
     "Accuracy", "Ensemble", "Event", "Scene", "SceneError", "SimulationError", "Trajectory",
@@ -45,6 +31,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    for module in map(import_module, (f"{__name__}.{part}" for part in _MODULES if name in __all__)):
+        if hasattr(module, name):
+            return getattr(module, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

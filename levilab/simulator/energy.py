@@ -81,8 +81,3 @@ def both_spins(states: Array, axial: ArrayLike, washers: ArrayLike) -> Array:
 def spin_of(scene: Scene, states: Array) -> Array:
     """Return ω₃ = L·n/I₃ of the states [rad/s]; with loose washers that of the core, which carries the magnet."""
     return core_spin(np.atleast_2d(states), scene.top.inertia_axial_kg_m2, scene.washers.inertia_kg_m2)
-
-
-def spins_of(scene: Scene, states: Array) -> Array:
-    """Return ω₃ of the top, or of its core, and that of loose washers, shape (n, 2) [rad/s]; without them the same."""
-    return both_spins(np.atleast_2d(states), scene.top.inertia_axial_kg_m2, scene.washers.inertia_kg_m2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -266,12 +266,12 @@ def windows_over(scene: Scene, masses: ArrayLike) -> MassWindows:
     masses = np.atleast_1d(np.asarray(masses, dtype=np.float64))
     top, field = top_of(scene), axial_field(scene)
     heights = floating_heights(scene, masses)
-    slowest, fastest = np.full((2, masses.size), math.nan)
-    floats = np.flatnonzero(np.isfinite(heights))
-    if floats.size:
-        slowest[floats], fastest[floats] = _first_windows(field, top, heights[floats], masses[floats])
+    spins = np.full((masses.size, 2), math.nan)
+    for k in np.flatnonzero(np.isfinite(heights)):
+        found = stability.spin_windows(field, replace(top, mass=float(masses[k])), float(heights[k]))
+        spins[k] = found[0] if found else math.nan
     adiabatic = tuple(w for w in stability.windows(field, top, *_range(scene)) if _lifts(w, top, field))
-    return MassWindows(masses, heights, slowest, fastest, adiabatic)
+    return MassWindows(masses, heights, spins[:, 0], spins[:, 1], adiabatic)
 
 
 #: Newton's steps at most; each doubles the digits, and where it leaves the bracket half of that is taken instead.
@@ -325,71 +325,6 @@ def _crossings(field: stability.AxialField, top: stability.SymmetricTop, weights
             break
         place = np.where(found, place, better)
     return place
-
-
-def _first_windows(
-    field: stability.AxialField, top: stability.SymmetricTop, heights: Array, masses: Array
-) -> tuple[Array, Array]:
-    """Return the first window of spin [Hz] with four real modes of each top, shape (n,) each.
-
-    The quartic x⁴ − βs x³ + c x² − δs x + e of `stability.quartic` depends on the spin s so that its discriminant is a
-    cubic in s².  Between two of its positive roots the modes are real at every spin or at none, so one spin decides.
-    """
-    tilt, sideways, both = top.stiffness(field, heights)
-    p, half = -tilt / top.transverse, -sideways / masses
-    beta = np.full(heights.shape, top.axial / top.transverse)
-    c, delta, e = p + half, beta * half, p * half - both**2 / masses / top.transverse
-    limits = 2 * np.sqrt(np.maximum(p, 0)) / beta  # of the sleeping top [rad/s]
-    end = 20 * limits
-    squares = _real_roots(_discriminant_cubic(beta, c, delta, e))
-    edges = np.sort(np.where((squares > 0) & (squares < (end**2)[:, None]), np.sqrt(np.abs(squares)), np.nan), axis=1)
-    bounds = np.column_stack([np.zeros(heights.size), edges, end])
-    # an edge that is missing is the one before: a window of no width
-    for i in range(1, 5):
-        bounds[:, i] = np.where(np.isnan(bounds[:, i]), bounds[:, i - 1], bounds[:, i])
-    middles = (bounds[:, 1:] + bounds[:, :-1]) / 2
-    companion = np.zeros((*middles.shape, 4, 4))
-    companion[..., [1, 2, 3], [0, 1, 2]] = 1
-    companion[..., 0, 0], companion[..., 0, 1] = beta[:, None] * middles, -c[:, None]
-    companion[..., 0, 2], companion[..., 0, 3] = delta[:, None] * middles, -e[:, None]
-    roots = np.linalg.eigvals(companion)
-    real = np.abs(roots.imag).max(axis=-1) < 1e-6 * np.abs(roots).max(axis=-1)
-    real &= (bounds[:, 1:] > bounds[:, :-1]) & (limits > 0)[:, None]
-    first = np.argmax(real, axis=1)
-    at = np.arange(heights.size)
-    slow, fast = bounds[at, first], bounds[at, first + 1]
-    fast = np.where(fast == end, math.inf, fast)
-    none = ~real.any(axis=1)
-    return np.where(none, math.nan, slow / (2 * math.pi)), np.where(none, math.nan, fast / (2 * math.pi))
-
-
-def _discriminant_cubic(beta: Array, c: Array, delta: Array, e: Array) -> Array:
-    """Return the discriminant of x⁴ − βs x³ + c x² − δs x + e as a cubic in s², highest power first, shape (n, 4)."""
-    b2, bd, d2 = beta * beta, beta * delta, delta * delta  # of s², each
-    constant = 16 * c**4 * e - 128 * c**2 * e**2 + 256 * e**3
-    first = (
-        -4 * c**3 * b2 * e - 4 * c**3 * d2 - 80 * bd * c**2 * e + 144 * b2 * c * e**2 + 144 * c * d2 * e
-        - 192 * bd * e**2
-    )  # fmt: skip
-    second = c**2 * bd**2 - 27 * b2**2 * e**2 + 18 * b2 * bd * c * e + 18 * bd * d2 * c - 6 * bd**2 * e - 27 * d2**2
-    third = -4 * bd**3
-    return np.stack([third, second, first, constant], axis=-1)
-
-
-def _real_roots(cubics: Array) -> Array:
-    """Return the real roots of cubics, shape (n, 4), to the last digits, shape (n, 3); NaN for those that are not."""
-    a = cubics[:, 1:] / cubics[:, :1]
-    companion = np.zeros((len(cubics), 3, 3))
-    companion[:, [1, 2], [0, 1]] = 1
-    companion[:, 0] = -a
-    roots = np.linalg.eigvals(companion)
-    x = np.where(np.abs(roots.imag) < 1e-6 * np.abs(roots).max(axis=1, keepdims=True), roots.real, np.nan)
-    for _ in range(3):
-        value = ((x + a[:, :1]) * x + a[:, 1:2]) * x + a[:, 2:]
-        slope = (3 * x + 2 * a[:, :1]) * x + a[:, 1:2]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            x = np.where(slope != 0, x - value / slope, x)
-    return x
 
 
 def advice(found: Stability) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 Array = NDArray[np.float64]
-#: Radius and height of the escapes of many tops, shape (n,) each [m].
-Limits = tuple[Array, Array]
+#: Radius and height of the escape [m]: the same for all tops, or shape (n,) each.
+Limits = tuple[Any, Any]
 
 #: Newton's steps at most; each doubles the digits, and where it leaves the bracket half of that is taken instead.
 _MOST = 60
@@ -32,11 +32,11 @@ def exit_speeds(states: Array, across_height: NDArray[np.bool_]) -> Array:
 
 def crossed_height(states: Array, escape: Limits) -> NDArray[np.bool_]:
     """Return whether states are farther outside of, or nearer to, the height than the radius."""
-    return np.asarray(np.argmin(_margins(states, escape), axis=0) == 0)
+    return np.asarray(np.argmin(margins(states, escape), axis=0) == 0)
 
 
-def _margins(states: Array, escape: Limits) -> Array:
-    """Return how far inside of the height and of the radius states are [m], shape (2, n)."""
+def margins(states: Array, escape: Limits) -> Array:
+    """Return how far inside of the height and of the radius states are [m], shape (2, n); negative outside."""
     x, y, z = states[:, R].T
     return np.array([z - escape[1], escape[0] - np.hypot(x, y)])
 
@@ -55,7 +55,7 @@ def at_the_crossing(after: Array, lengths: Array, escape: Limits, moved: Callabl
     low, high = np.zeros_like(lengths), lengths.copy()
     time, states, found = lengths.copy(), after, np.zeros(lengths.shape, dtype=np.bool_)
     for _ in range(_MOST):
-        up, sideways = _margins(states, escape)
+        up, sideways = margins(states, escape)
         margin = np.where(height, up, sideways)
         low, high = np.where(margin > 0, time, low), np.where(margin > 0, high, time)
         newton = time + margin / (_margin_rates(states, height))
@@ -79,23 +79,7 @@ def _margin_rates(states: Array, height: NDArray[np.bool_]) -> Array:
     return np.where(shrinking > 0, shrinking, 1e-300)
 
 
-def margins(state: Array, escape: tuple[float, float]) -> dict[str, float]:
-    """Return how far [m] a state is inside of either limit; negative outside."""
-    x, y, z = state[R]
-    return {"radius": escape[0] - float(np.hypot(x, y)), "height": float(z) - escape[1]}
-
-
-def exit_speed(state: Array, name: str) -> float:
-    """Return how fast [m/s] a state moves across the limit of that name; never quite 0."""
-    x, y, _ = state[R]
-    vx, vy, vz = state[V]
-    across = vz if name == "height" else (x * vx + y * vy) / max(float(np.hypot(x, y)), 1e-300)
-    return max(abs(float(across)), 1e-12)
-
-
-def locate_escape(
-    before: Array, length: float, moved: Callable[[Array, float], Array], escape: tuple[float, float]
-) -> Event:
+def locate_escape(before: Array, length: float, moved: Callable[[Array, float], Array], escape: Limits) -> Event:
     """Return the escape within a step from a state.
 
     Args:
@@ -105,8 +89,9 @@ def locate_escape(
         escape: the limits, radius and height [m].
     """
     after = moved(before, length)
-    name = min(margins(after, escape), key=lambda key: margins(after, escape)[key])
-    return locate_zero(name, before, length, moved, lambda state: margins(state, escape)[name])
+    limit = int(np.argmin(margins(after[None], escape)))
+    name = ("height", "radius")[limit]
+    return locate_zero(name, before, length, moved, lambda state: float(margins(state[None], escape)[limit, 0]))
 
 
 def locate_zero(

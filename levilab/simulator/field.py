@@ -131,35 +131,13 @@ def flux_gradient(field: Field, positions: ArrayLike) -> Array:
     return gradient
 
 
-def on_axis(field: Field, z: ArrayLike, order: int = 3) -> Array:
-    """B_z on the axis and its derivatives up to order 3, at heights of shape (n,) [m]; shape (order + 1, n) [T/mᵏ].
+def on_axis(field: Field, z: ArrayLike) -> Array:
+    """B_z on the axis and its first two derivatives at heights of shape (n,) [m]; shape (3, n) [T/mᵏ].
 
-    On the axis s = −∂²B_z/∂z²/2 where the divergence vanishes, and its derivative comes from a series of high power.
+    On the axis s = −∂²B_z/∂z²/2, where the divergence vanishes.
     """
     heights = np.atleast_1d(np.asarray(z, dtype=np.float64))
     places = np.zeros((heights.size, 3))
     places[:, 2] = heights
     _, five = _five(field, places)
-    values = [five[:, 2], five[:, 4], -2 * five[:, 3], _third(field, heights)]
-    return np.array(values[: order + 1])
-
-
-def _third(field: Field, z: Array) -> Array:
-    """∂³B_z/∂z³ on the axis [T/m³]: −φ₄, in closed form."""
-    h = field.thickness if isinstance(field, ParaxialThick | Thick) else 0.0
-    height = z - field.origin
-
-    def phi(n: int, at: Array) -> Array:
-        """φ₃ or φ₄ of the sheet."""
-        total = np.zeros_like(at)
-        for radius2, sign in ((field.inner2, 1), (field.outer2, -1)):
-            u2 = 1 / (radius2 + at * at)
-            if n == 3:
-                total += sign * 3 * radius2 * u2**3.5 * (4 * at * at - radius2)
-            else:
-                total -= sign * 15 * radius2 * u2**4.5 * at * (4 * at * at - 3 * radius2)
-        return field.strength * total
-
-    if h == 0:
-        return -phi(4, height)
-    return (phi(3, height - h / 2) - phi(3, height + h / 2)) / h
+    return np.array([five[:, 2], five[:, 4], -2 * five[:, 3]])

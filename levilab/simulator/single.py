@@ -20,8 +20,8 @@ from levilab.simulator.accuracy import (
     longest_step,
     rounding_error,
 )
-from levilab.simulator.energy import spins_of
-from levilab.simulator.escape import exit_speed, locate_zero, margins
+from levilab.simulator.energy import both_spins
+from levilab.simulator.escape import exit_speeds, locate_zero, margins
 from levilab.simulator.kernels.loads import Disc
 from levilab.simulator.kernels.motion import CLOCK, TIME, L, N, R, V
 from levilab.simulator.model import model_of
@@ -152,7 +152,7 @@ def simulate(
     state = start_of(scene) if start is None else np.array(start, dtype=np.float64)
     if not np.all(np.isfinite(state)):
         raise SimulationError("the start has a value that is no number: 18 finite numbers are expected")
-    if start is None and min(margins(state, (scene.escape.radius_m, scene.escape.height_m)).values()) < 0:
+    if start is None and margins(state[None], (scene.escape.radius_m, scene.escape.height_m)).min() < 0:
         raise SimulationError(
             f"escape.height_m = {scene.escape.height_m}: the top starts at {state[R][2]:.4g} m, outside of the limits "
             "of the escape, where it would be lost before it began"
@@ -253,7 +253,7 @@ def _errors(problem: Problem, run: Run, step: float) -> tuple[Array, Array]:
         fewer, fewest = (_state_with_steps(problem.with_nodes(-less), end[TIME], length) for less in (1, 2))
         of_nodes += [estimate(twice[part], fewer[part], fewest[part], NODES_ORDER) for part in (R, N)]
     if run.fell is not None:  # the error of the place, over the speed across the limit, is an error of the fall's time
-        speed = exit_speed(end, run.fell.name)
+        speed = float(exit_speeds(end[None], np.array([run.fell.name == "height"]))[0])
         turning = float(np.linalg.norm(np.cross(end[L], end[N]))) * problem.model.body.inverse_transverse
         late = np.array([np.linalg.norm(end[V]), turning]) / speed
         of_steps, of_nodes = of_steps + of_steps[0] * late, of_nodes + of_nodes[0] * late
@@ -273,7 +273,9 @@ def _crosses_kink(problem: Problem, run: Run, step: float) -> bool:
     if np.abs(np.diff(states[:, TIME])).max() > _CLOSE_S:
         until = states[-1, TIME]
         states = integrate_each_step(problem, stops_between(problem.start[TIME], until, step, problem.scene.drive))
-    return bool(np.any(comes_near_zero(spins_of(problem.scene, states))))
+    scene = problem.scene
+    spins = both_spins(states, scene.top.inertia_axial_kg_m2, scene.washers.inertia_kg_m2)
+    return bool(np.any(comes_near_zero(spins)))
 
 
 def _coarser_ends(problem: Problem, until: float, step: float) -> tuple[Array, Array, float]:

@@ -47,26 +47,21 @@ def _precession(scene: Scene, spin: Any, place: Any) -> Any:
         return spin / (1 + cos(start.tilt_rad))
     if start.precession == "none":
         return 0.0
-    return steady_precession(scene, spin, place)
+    return steady_rates(scene, spin, place)[0]
 
 
-def steady_precession(scene: Scene, spin: Any, place: Any) -> Any:
-    """Return the rate of steady precession, without nutation [rad/s].
+def steady_rates(scene: Scene, spin: Any, place: Any) -> tuple[Any, Any]:
+    """Return the rates of steady precession, without nutation, and of a steady nutation [rad/s].
 
-    It is the slow root of I₁ cosθ φ̇² − I₃ω₃ φ̇ + P = 0, P = −μB_z (Goldstein, Classical Mechanics, § 5.7, with the
-    torque of the field in place of the weight's).  A top too slow for a steady precession, (I₃ω₃)² < 4 I₁ cosθ P,
-    starts at the rate I₃ω₃/(2 I₁ cosθ), at which the missing torque is smallest.
+    They are the slow and the fast root of I₁ cosθ φ̇² − I₃ω₃ φ̇ + P = 0, P = −μB_z (Goldstein, Classical Mechanics,
+    § 5.7, with the torque of the field in place of the weight's).  A top too slow for a steady precession, (I₃ω₃)² <
+    4 I₁ cosθ P, has the rate I₃ω₃/(2 I₁ cosθ) for both, at which the missing torque is smallest.
 
     Args:
         scene: with top, base and tilt.
         spin: ω₃ [rad/s].
         place: of the top, three numbers [m].
     """
-    return steady_rates(scene, spin, place)[0]
-
-
-def steady_rates(scene: Scene, spin: Any, place: Any) -> tuple[Any, Any]:
-    """Return both roots of the equation of `steady_precession` [rad/s]: the precession and a steady nutation."""
     top = scene.top
     bz = flux_density(base_field(scene), row(*place))[..., 2]
     restoring = -top.moment_a_m2 * top.moment_tilt[1] * bz

@@ -69,12 +69,6 @@ def stop_after_each_step(stops: Stops) -> Stops:
     return Stops(times, np.ones(index.size, dtype=np.int64), stops.levels[index], stops.slopes[index])
 
 
-def even_stops(times: Array, count: int) -> Stops:
-    """Return stops at these times [s] with so many steps from each to the next, and no kink of the drive."""
-    n = times.size - 1
-    return Stops(times, np.full(n, count), np.ones(n), np.zeros(n))
-
-
 #: The most steps and kinks: more would take days, or the machine's memory.
 MOST_STEPS, MOST_KINKS = 10**11, 10**7
 
@@ -102,7 +96,7 @@ def stops_between(start: float, end: float, step: float, drive: Drive, samples: 
     if corners is NO_TIMES and (samples is None or samples.size == 0):
         count = max(math.ceil((high - low) / step * (1 - 1e-12)), 1)
         if count <= STEPS_BETWEEN_STOPS:
-            return even_stops(np.array([start, end]), count)
+            return Stops(np.array([start, end]), np.array([count]), np.ones(1), np.zeros(1))
     wanted = [np.array([low, high]), corners]
     if samples is not None:
         wanted.append(samples[(samples > low) & (samples < high)])

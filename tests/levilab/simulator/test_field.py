@@ -150,12 +150,10 @@ def test_elliptic_integrals_are_those_of_mpmath(m):
 
 
 def test_the_field_at_the_height_of_the_top():
-    b, slope, bend, third = on_axis(EXACT, [0.073])[:, 0]
+    b, slope, bend = on_axis(EXACT, [0.073])[:, 0]
     assert abs(b) == pytest.approx(18.7455e-3, abs=5e-8)
     assert slope == pytest.approx(-3.47396e-1, abs=5e-7)
     assert bend == pytest.approx(1.9805, abs=5e-5)
-    h = 1e-4
-    assert third == pytest.approx(np.diff(on_axis(EXACT, [0.073 - h, 0.073 + h])[2])[0] / (2 * h), rel=1e-4)
 
 
 @pytest.mark.parametrize(("r", "along", "across"), [(0.010, 0.056, -1.9), (0.0144, 0.24, -3.6), (0.020, 0.85, -6.2)])

@@ -9,7 +9,7 @@ from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
-from levilab.simulator.start import start_of, steady_precession
+from levilab.simulator.start import start_of, steady_rates
 
 TILT = 0.01
 SCENE = preset("undriven").changed(
@@ -23,7 +23,7 @@ EDGE = math.sqrt(4 * I1 * math.cos(TILT) * RESTORING) / I3
 
 
 def rate(spin):
-    return steady_precession(SCENE, spin, PLACE)
+    return steady_rates(SCENE, spin, PLACE)[0]
 
 
 def missing(spin, rate):
