@@ -18,8 +18,8 @@ import numpy as np
 
 import levilab.benchmark.simulator as room
 from as_called import many
-from levilab.benchmark.simulator.motion import MOTIONS, MU, UNDRIVEN, Motion
-from levilab.benchmark.simulator.taylor import heyoka_start, heyoka_system, propagate
+from as_called.motions import MOTIONS, UNDRIVEN, Motion, heyoka_start, propagate, system_of
+from levilab.benchmark.simulator.motion import MU
 
 Q = np.longdouble
 WHERE = Path(room.__file__).parent / "references.json"
@@ -28,7 +28,7 @@ WHERE = Path(room.__file__).parent / "references.json"
 def integrator_of(motion: Motion, tolerance: float) -> Any:
     """Return an integrator of one top, on 80-bit numbers."""
     start = heyoka_start(motion).astype(Q)
-    system = heyoka_system(motion, each_pull=motion.drive == "off")
+    system = system_of(motion, each_pull=motion.drive == "off")
     return hy.taylor_adaptive(system, start, tol=Q(tolerance), fp_type=Q, compact_mode=True)
 
 

@@ -15,14 +15,15 @@ from typing import TYPE_CHECKING, Any
 from as_called.comparison import Case, measure_calls
 from as_called.overhead import OVERHEADS, Overhead, overhead
 from as_called.tasks import TASKS
-from levilab.benchmark.found import give, tell
-from levilab.benchmark.machine import describe_measurement
+from levilab.benchmark.found import describe_measurement, give, tell
 from levilab.benchmark.simulator.command import number
 from levilab.benchmark.simulator.work_precision import as_point, as_ratio
 from levilab.present.terminal import Terminal, new_table, terminal
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from levilab.present.style import Figure
 
 
 def print_called(console: Terminal, cases: Iterable[Case]) -> None:
@@ -86,14 +87,12 @@ def main() -> None:
         print_called(terminal(), cases)
         print_overheads(terminal(), overheads)
 
-    def save(path: Path) -> None:
+    def draw() -> Figure:
         from as_called.figure import as_called_figure
-        from levilab.present.style import save_png
 
-        save_png(as_called_figure(cases), path)
+        return as_called_figure(cases)
 
-    figures = {"simulator_as_called.png": save}
-    give("simulator_as_called", as_document(cases, overheads), print_tables, figures, out=options.out, as_json=False)
+    give("simulator_as_called", as_document(cases, overheads), print_tables, draw, out=options.out, as_json=False)
 
 
 if __name__ == "__main__":

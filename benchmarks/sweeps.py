@@ -32,7 +32,7 @@ import numpy as np
 import psutil
 
 import sweeps_fake
-from levilab.benchmark.machine import processor
+from levilab.benchmark.found import processor
 from levilab.simulator import preset
 from levilab.sweeps.axes import parse_axis
 from levilab.sweeps.observables import cut

@@ -10,7 +10,7 @@ import numpy as np
 
 from as_called.contenders import Contender
 from levilab.benchmark.simulator.peers import Point, best_time_and_result
-from levilab.benchmark.simulator.speeds import Ratio, best_speed
+from levilab.benchmark.simulator.work_precision import Ratio, best_speed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

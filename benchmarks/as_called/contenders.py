@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levilab.benchmark.simulator import motion as given
-from levilab.benchmark.simulator import taylor
-from levilab.benchmark.simulator.motion import Array, Motion, vector_rate, vector_start
+from as_called.motions import UNDRIVEN, Motion, caller, vector_start
+from levilab.benchmark.simulator.motion import DRIVE_T, I3, Array, vector_rate
 from levilab.simulator.scene import Scene, preset
 from levilab.simulator.single import simulate
 
@@ -64,14 +63,14 @@ def _simulate(motion: Motion, tolerance: float) -> Call:
 
 
 #: Numbers whose errors are judged by their own size: places and velocities, directions, angular momenta.
-_SIZES = np.repeat([1e-2, 1e-2, 1.0, given.I3 * given.UNDRIVEN.spin, 1.0], 3)
+_SIZES = np.repeat([1e-2, 1e-2, 1.0, I3 * UNDRIVEN.spin, 1.0], 3)
 
 
 def _dop853(motion: Motion, tolerance: float) -> Call:
     from scipy.integrate import solve_ivp
 
     solve: Any = solve_ivp
-    swing = given.DRIVE_T if motion.drive == "sine" else 0.0
+    swing = DRIVE_T if motion.drive == "sine" else 0.0
 
     def call(duration: float) -> Array:
         state = vector_start(motion)
@@ -89,6 +88,6 @@ def _dop853(motion: Motion, tolerance: float) -> Call:
 #: `simulate` holds everything but the first call's compiling.
 CONTENDERS = (
     Contender("simulate", "levilab", (1e-4, 3e-5, 1e-5, 1e-6, 1e-7, 3e-8, 1e-8, 1e-9, 1e-10, 3e-11, 1e-11), _simulate),
-    Contender("heyoka", "heyoka", tuple(10.0**-k for k in range(3, 13)), taylor.caller),
+    Contender("heyoka", "heyoka", tuple(10.0**-k for k in range(3, 13)), caller),
     Contender("scipy DOP853", "scipy", (1e-6, 1e-8, 1e-10, 1e-12), _dop853, rounds=1),
 )

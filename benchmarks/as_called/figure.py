@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from as_called.comparison import Case
-    from levilab.benchmark.simulator.speeds import Ratio
+    from levilab.benchmark.simulator.work_precision import Ratio
 
 #: Methods that are drawn: colour, marker, line, name in the legend.
 LINES: dict[str, tuple[str, str, Any, str]] = {

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from as_called.contenders import Contender, scene_of
-from levilab.benchmark.simulator import motion as given
-from levilab.benchmark.simulator import taylor
-from levilab.benchmark.simulator.motion import UNDRIVEN, Array, Motion, references, vector_start
+from as_called.motions import UNDRIVEN, Motion, vector_start
+from levilab.benchmark.simulator.motion import MU, Array, references
+from levilab.benchmark.simulator.taylor import heyoka_batch
 from levilab.simulator.ensemble import simulate_many
 
 if TYPE_CHECKING:
@@ -54,8 +54,8 @@ def _simulate_many(_tops: Sequence[Motion], tolerance: float) -> Call:
 
 def _heyoka_batch(lanes: int, tops: Sequence[Motion], tolerance: float) -> Call:
     starts = np.array([vector_start(top) for top in tops]).T.copy()
-    pulls = np.array([given.MU / top.mass for top in tops])
-    integrator = taylor.heyoka_batch(UNDRIVEN, tolerance, lanes)
+    pulls = np.array([MU / top.mass for top in tops])
+    integrator = heyoka_batch(tolerance, lanes)
     state, parameters, zeros = integrator.state, integrator.pars, np.zeros(lanes)
 
     def call(duration: float) -> Array:

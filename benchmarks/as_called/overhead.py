@@ -11,7 +11,7 @@ from numba.core.dispatcher import Dispatcher
 
 from as_called import many
 from as_called.contenders import scene_of
-from levilab.benchmark.simulator.motion import UNDRIVEN
+from as_called.motions import UNDRIVEN
 from levilab.benchmark.simulator.peers import CLOCK
 from levilab.simulator.single import simulate
 

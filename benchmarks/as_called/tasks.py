@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from as_called import many
 from as_called.contenders import CONTENDERS, Contender
-from levilab.benchmark.simulator.motion import MOTIONS, Motion, reference
+from as_called.motions import MOTIONS, Motion, reference
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

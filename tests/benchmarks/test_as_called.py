@@ -8,14 +8,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from as_called import many
+from as_called import many, motions
 from as_called.comparison import Case
 from as_called.contenders import CONTENDERS, scene_of
+from as_called.motions import UNDRIVEN, heyoka_start, reference, system_of, vector_start
 from as_called.overhead import Watched, outside_all, overhead
 from as_called.tasks import TASKS
-from levilab.benchmark.simulator import motion
+from levilab.benchmark.simulator.motion import MU, vector_rate
 from levilab.benchmark.simulator.peers import Point
-from levilab.benchmark.simulator.taylor import VARIABLES, heyoka_start, heyoka_system
+from levilab.benchmark.simulator.taylor import VARIABLES
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.single import simulate
 from levilab.simulator.stops import kinks
@@ -33,27 +34,27 @@ CASE = Case(
 )
 
 
-@pytest.mark.parametrize("name", motion.MOTIONS)
+@pytest.mark.parametrize("name", motions.MOTIONS)
 def test_the_equations_for_the_peers_are_the_simulator_s_motion(name):
-    """For 0.2 s, over twelve kinks of the square wave; DOP853 on motion.vector_rate."""
-    one = motion.MOTIONS[name]
+    """For 0.2 s, over twelve kinks of the square wave; DOP853 on vector_rate."""
+    one = motions.MOTIONS[name]
     dop853 = next(contender for contender in CONTENDERS if contender.package == "scipy")
     ours = simulate(scene_of(one), 0.2, tolerance=1e-12, rate=None)
     assert dop853.prepare(one, 1e-12)(0.2) == pytest.approx(ours.position[-1], abs=1e-11)
 
 
-@pytest.mark.parametrize("name", motion.MOTIONS)
+@pytest.mark.parametrize("name", motions.MOTIONS)
 def test_the_equations_for_heyoka_are_those_of_the_other_sides(monkeypatch, name):
     """Of numbers in the place of heyoka's symbols."""
-    one, field = motion.MOTIONS[name], 3e-4
+    one, field = motions.MOTIONS[name], 3e-4
     place, axis, momentum = [2e-3, -1e-3, 0.073, 0.02, 0.03, -0.01], [0.1, -0.2, 0.97], [2e-6, -3e-6, 4e-4]
     values = dict(zip(VARIABLES, place + axis + momentum, strict=True))
     values |= {"mx": 0.12, "my": -0.17, "mz": 0.93, "cosine": field, "sine": 1e-4}
     symbols = SimpleNamespace(make_vars=lambda *names: [values[name] for name in names], par=[field])
     monkeypatch.setitem(sys.modules, "heyoka", symbols)
-    rates = [rate for _, rate in heyoka_system(one)]
-    state = np.array([*values.values()][: len(motion.vector_start(one))])
-    expected = motion.vector_rate(0.0, state, one.mass, 0.0 if one.drive == "off" else field, 0.0)
+    rates = [rate for _, rate in system_of(one)]
+    state = np.array([*values.values()][: len(vector_start(one))])
+    expected = vector_rate(0.0, state, one.mass, 0.0 if one.drive == "off" else field, 0.0)
     np.testing.assert_allclose(rates[: state.size], expected, rtol=1e-12)
     turning = [-2 * math.pi * 30 * 1e-4, 2 * math.pi * 30 * field] if one.drive == "sine" else []
     assert rates[state.size :] == pytest.approx(turning)
@@ -62,16 +63,16 @@ def test_the_equations_for_heyoka_are_those_of_the_other_sides(monkeypatch, name
 
 def test_the_ratio_of_moment_and_mass_may_be_a_parameter_of_heyoka_s(monkeypatch):
     values = dict(zip(VARIABLES, np.arange(0.03, 0.15, 0.01), strict=True))
-    symbols = SimpleNamespace(make_vars=lambda *names: [values[name] for name in names], par=[motion.MU / 0.0251])
+    symbols = SimpleNamespace(make_vars=lambda *names: [values[name] for name in names], par=[MU / 0.0251])
     monkeypatch.setitem(sys.modules, "heyoka", symbols)
-    rates = [rate for _, rate in heyoka_system(each_pull=True)]
-    expected = motion.vector_rate(0.0, np.array([*values.values()]), 0.0251, 0.0, 0.0)
+    rates = [rate for _, rate in system_of(UNDRIVEN, each_pull=True)]
+    expected = vector_rate(0.0, np.array([*values.values()]), 0.0251, 0.0, 0.0)
     # terms of 1e-3 N m and 1e3 1/s, of which some cancel
     np.testing.assert_allclose(rates, expected, rtol=1e-12, atol=1e-15)
 
 
 def test_the_square_wave_s_pieces_end_at_the_simulator_s_kinks():
-    square = motion.MOTIONS["square"]
+    square = motions.MOTIONS["square"]
     pieces = square.pieces(0.31)
     inside = [end for _, end, _ in pieces[:-1]]
     assert inside == pytest.approx(kinks(scene_of(square).drive, 0.0, 0.31), abs=1e-15)
@@ -91,14 +92,14 @@ def test_the_references_are_ends_of_the_simulator_s_motions(task):
 def test_the_reference_of_the_undriven_motion_is_the_golden_end_of_the_first_start():
     golden = json.loads((GOLDEN / "trajectories.json").read_text(encoding="utf-8"))
     end = next(case for case in golden if case["name"] == "IC1")
-    assert motion.reference() == pytest.approx(end["position_m"], abs=1e-16)
+    assert reference(UNDRIVEN, 5.0) == pytest.approx(end["position_m"], abs=1e-16)
 
 
 def test_the_ensemble_s_references_are_ends_of_its_tops():
     tops = many.tops()
     chosen = [tops[i] for i in many.COMPARED[::7]]
     over = {"start.spin_hz": [t.spin / (2 * math.pi) for t in chosen], "top.mass_kg": [t.mass for t in chosen]}
-    ours = simulate_many(scene_of(motion.UNDRIVEN), over, many.DURATION, tolerance=1e-11, cores=1)
+    ours = simulate_many(scene_of(UNDRIVEN), over, many.DURATION, tolerance=1e-11, cores=1)
     assert ours.survived.all()
     assert np.abs(ours.position - many.reference()[::7]).max() < 2e-11
 
@@ -118,6 +119,6 @@ def test_the_kernels_of_a_call_are_watched():
         seen.extend(kernels)
         return outside_all(begin, end, kernels)
 
-    found = overhead(Watched("called", "x", lambda: simulate(scene_of(motion.UNDRIVEN), 0.1), outside, 1, 1.0))
+    found = overhead(Watched("called", "x", lambda: simulate(scene_of(UNDRIVEN), 0.1), outside, 1, 1.0))
     assert any(module == "levilab.simulator.kernels.splitting" for module, *_ in seen)
     assert 0 < found.outside < found.whole

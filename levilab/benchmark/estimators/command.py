@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 from levilab.benchmark.estimators.study import OURS, Study, as_document, study
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from levilab.present.style import Figure
+
 
 def run_and_tell(*, trials: int, cases: Sequence[str], seed: int, out: Path | None, as_json: bool) -> None:
     """Carry out the whole command.  Raises CannotWrite, and UsageError for a case that is none."""
@@ -21,20 +24,12 @@ def run_and_tell(*, trials: int, cases: Sequence[str], seed: int, out: Path | No
         raise UsageError("out", "`out` keeps a figure of all cases: leave `case` away, or take `json` for the numbers")
     found = study(trials=trials, cases=cases, seed=seed, tell=tell)
 
-    def save_figure(path: Path) -> None:
+    def draw() -> Figure:
         from levilab.benchmark.estimators.figure import estimators_figure
-        from levilab.present.style import save_png
 
-        save_png(estimators_figure(found), path)
+        return estimators_figure(found)
 
-    give(
-        "estimators",
-        as_document(found),
-        lambda: print_study(found),
-        {"estimators.png": save_figure},
-        out=out,
-        as_json=as_json,
-    )
+    give("estimators", as_document(found), partial(print_study, found), draw, out=out, as_json=as_json)
 
 
 def print_study(found: Study) -> None:

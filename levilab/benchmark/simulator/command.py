@@ -16,19 +16,19 @@ from levilab.software import how_to_install
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from levilab.present.style import Figure
+
 
 def run_and_tell(*, quick: bool, out: Path | None, as_json: bool) -> None:
     """Carry out the whole command.  Raises CannotWrite."""
     found = compare(quick=quick, tell=tell)
 
-    def save(path: Path) -> None:
+    def draw() -> Figure:
         from levilab.benchmark.simulator.figure import work_precision_figure
-        from levilab.present.style import save_png
 
-        save_png(work_precision_figure(found), path)
+        return work_precision_figure(found)
 
-    tables = partial(print_comparison, found)
-    give("simulator", as_document(found), tables, {"simulator.png": save}, out=out, as_json=as_json)
+    give("simulator", as_document(found), partial(print_comparison, found), draw, out=out, as_json=as_json)
 
 
 def print_comparison(found: Comparison) -> None:

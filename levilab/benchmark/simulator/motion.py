@@ -1,16 +1,13 @@
-"""The motions that every contender integrates, with their equations once more, apart from the simulator's.
+"""The motion that every contender integrates, with its equations once more, apart from the simulator's.
 
 In place, velocity, axis and angular momentum (12 numbers; with the direction of the moment, where it is not the axis,
-15), and for the undriven top in Euler angles, as the master's thesis on the Levitron has them (12 numbers, singular
-at θ = 0).
+15), and in Euler angles, as the master's thesis on the Levitron has them (12 numbers, singular at θ = 0).
 """
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
-from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
 
@@ -26,62 +23,9 @@ TILT = 0.01
 DRIVE_T, DRIVE_HZ = 4e-4, 30.0
 
 
-@dataclass(frozen=True)
-class Motion:
-    """One motion: as a scene for the simulator, and in numbers for its peers.
-
-    Attributes:
-        name: of the motion.
-        preset: the scene of that name …
-        changes: … with these values of its dotted keys.
-        mass: [kg].
-        spin: ω₃ at the start [rad/s].
-        across, along: parts of the moment across and along the axis.
-        drive: waveform of the field along y that swings as a cosine or its sign; "off", "sine" or "square".
-
-    All of them stay up for 60 s, between 7.04 and 7.48 cm and within 4 mm of the axis, and none is chaotic: neighbours
-    are by then at most 250 times as far apart as at the start.  So errors mean something.
-    """
-
-    name: str
-    preset: str
-    changes: tuple[tuple[str, Any], ...] = ()
-    mass: float = 0.02445
-    spin: float = 2 * math.pi * 30.0
-    across: float = 0.03
-    along: float = 0.97
-    drive: str = "off"
-
-    @property
-    def precession(self) -> float:
-        """φ̇ = ψ̇ at the start [rad/s]."""
-        return self.spin / (1 + math.cos(TILT))
-
-    def field_at(self, t: float) -> float:
-        """Return the drive's field along y at a time that is no kink [T]."""
-        value = math.cos(2 * math.pi * DRIVE_HZ * t)
-        return {"off": 0.0, "sine": DRIVE_T * value, "square": math.copysign(DRIVE_T, value)}[self.drive]
-
-    def pieces(self, duration: float) -> list[tuple[float, float, float]]:
-        """Return the smooth pieces of a drive, of which a square wave has many: begin and end [s], steady field [T]."""
-        if self.drive != "square":
-            return [(0.0, duration, 0.0)]
-        inside = np.arange(1, math.ceil(2 * DRIVE_HZ * duration + 0.5)) / (2 * DRIVE_HZ) - 0.25 / DRIVE_HZ
-        ends = [0.0, *inside[inside < duration].tolist(), duration]
-        return [(a, b, self.field_at((a + b) / 2)) for a, b in itertools.pairwise(ends)]
-
-
-MOTIONS = {
-    motion.name: motion
-    for motion in (
-        Motion("undriven", "undriven", mass=M, across=0.0, along=1.0),
-        Motion("tilted", "tilted"),
-        Motion("sine", "driven", spin=2 * math.pi * 30.03, drive="sine"),
-        Motion("square", "driven", (("drive.waveform", "square"),), spin=2 * math.pi * 30.03, drive="square"),
-    )
-}
-#: The motion of the kernels' comparison, and its length [s].
-UNDRIVEN, DURATION = MOTIONS["undriven"], 5.0
+#: Length of the motion [s], the top's spin ω₃ and φ̇ = ψ̇ at the start [rad/s].
+DURATION, SPIN = 5.0, 2 * math.pi * 30.0
+PRECESSION = SPIN / (1 + math.cos(TILT))
 
 
 def references() -> dict[str, Any]:
@@ -94,24 +38,17 @@ def references() -> dict[str, Any]:
     return found
 
 
-def reference(motion: Motion = UNDRIVEN, duration: float = DURATION) -> Array:
-    """Return the true place at the end, shape (3,) [m]."""
-    return np.array(references()["places_m"][motion.name][f"{duration:g}"])
-
-
-def vector_start(motion: Motion = UNDRIVEN) -> Array:
-    """(r, v, n, L), and the moment's direction if it is not n, at the start."""
+def vector_start(spin: float = SPIN) -> Array:
+    """(r, v, n, L) at the start, with a spin ω₃ [rad/s]."""
     n = np.array([0.0, -math.sin(TILT), math.cos(TILT)])
-    momentum = I3 * motion.spin * n + I1 * motion.precession * (np.array([0.0, 0.0, 1.0]) - n * math.cos(TILT))
-    moment = motion.along * n + motion.across * np.array([1.0, 0.0, 0.0])
-    state = [np.array([0.001, 0, 0.071, -0.0007, 0, 0.002]), n, momentum]
-    return np.concatenate([*state, moment] if motion.across else state)
+    precession = spin / (1 + math.cos(TILT))
+    momentum = I3 * spin * n + I1 * precession * (np.array([0.0, 0.0, 1.0]) - n * math.cos(TILT))
+    return np.concatenate([[0.001, 0, 0.071, -0.0007, 0, 0.002], n, momentum])
 
 
 def euler_start() -> Array:
-    """(x, y, z, θ, φ, ψ and their rates) of the undriven top at the start."""
-    rate = UNDRIVEN.precession
-    return np.array([0.001, 0, 0.071, TILT, 0, 0, -0.0007, 0, 0.002, 0, rate, rate])
+    """(x, y, z, θ, φ, ψ and their rates) at the start."""
+    return np.array([0.001, 0, 0.071, TILT, 0, 0, -0.0007, 0, 0.002, 0, PRECESSION, PRECESSION])
 
 
 @numba.njit(cache=True)

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 Result = TypeVar("Result")
 
 #: The true place at the end of the undriven motion [m].
-REFERENCE = motion.reference()
+REFERENCE = np.array(motion.references()["places_m"]["undriven"][f"{motion.DURATION:g}"])
 #: Time of the processor, which other programs do not add to; Windows counts it in ticks of 16 ms.
 CLOCK = time.process_time if os.name == "posix" else time.perf_counter
 
@@ -59,13 +59,8 @@ class Peer:
         return find_spec(self.package) is not None
 
 
-def best_time(work: Callable[[], Any], least: float = 0.1) -> float:
-    """Return the shortest time [s] of the calls that fit into `least`, at least one."""
-    return best_time_and_result(work, least)[0]
-
-
 def best_time_and_result(work: Callable[[], Result], least: float = 0.1) -> tuple[float, Result]:
-    """Return the shortest time [s], and the last result of the work."""
+    """Return the shortest time [s] of the calls that fit into `least`, at least one, and the last one's result."""
     times: list[float] = []
     while not times or (sum(times) < least and len(times) < 200):
         begin = CLOCK()
@@ -86,10 +81,10 @@ def _scipy(method: str, tolerances: list[float], form: str) -> Callable[[bool], 
         rate, start, arguments = (
             (motion.euler_rate, motion.euler_start(), ())
             if form == "Euler"
-            else (motion.vector_rate, motion.vector_start(), (motion.UNDRIVEN.mass, 0.0, 0.0))
+            else (motion.vector_rate, motion.vector_start(), (motion.M, 0.0, 0.0))
         )
         # errors are judged for each of the numbers by its own size: lengths, angles, angular momenta
-        size = np.array([1e-2] * 3 + [1e-2] * 3 + [1.0] * 3 + [motion.I3 * motion.UNDRIVEN.spin] * 3)
+        size = np.array([1e-2] * 3 + [1e-2] * 3 + [1.0] * 3 + [motion.I3 * motion.SPIN] * 3)
         if form == "Euler":
             size = np.array([1e-2] * 3 + [1e-2, 1, 1] + [1e-2] * 3 + [1.0, 1e2, 1e2])
         solve: Any = solve_ivp
@@ -110,14 +105,14 @@ HEYOKA_TOLERANCES = [1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 3e-8, *(10.0**-k 
 def _heyoka_scalar(quick: bool) -> Iterator[Point]:  # noqa: FBT001
     start = motion.vector_start()
     for tolerance in HEYOKA_TOLERANCES[:: 2 if quick else 1]:
-        integrator = heyoka_integrator(motion.UNDRIVEN, tolerance)
+        integrator = heyoka_integrator(tolerance)
 
         def work(integrator: Any = integrator) -> None:
             integrator.time = 0.0
             integrator.state[:] = start
             integrator.propagate_until(motion.DURATION)
 
-        seconds = best_time(work)
+        seconds, _ = best_time_and_result(work)
         yield Point("heyoka", f"tol {tolerance:g}", error_of(integrator.state[:3]), motion.DURATION / seconds)
 
 
@@ -128,7 +123,7 @@ def _heyoka_batch(quick: bool) -> Iterator[Point]:  # noqa: FBT001
         starts = np.repeat(start[:, None], lanes, axis=1)
         starts[0] += np.arange(lanes) * 1e-5
         for tolerance in HEYOKA_TOLERANCES[:: 2 if quick else 1]:
-            integrator = heyoka_batch(motion.UNDRIVEN, tolerance, lanes)
+            integrator = heyoka_batch(tolerance, lanes)
             integrator.pars[0] = motion.MU / motion.M
 
             def work(integrator: Any = integrator, lanes: int = lanes, starts: Array = starts) -> None:
@@ -136,7 +131,7 @@ def _heyoka_batch(quick: bool) -> Iterator[Point]:  # noqa: FBT001
                 integrator.state[:] = starts
                 integrator.propagate_until(np.full(lanes, motion.DURATION))
 
-            seconds = best_time(work)
+            seconds, _ = best_time_and_result(work)
             speed = lanes * motion.DURATION / seconds
             yield Point("heyoka batch", f"tol {tolerance:g}, {lanes} lanes", error_of(integrator.state[:3, 0]), speed)
 

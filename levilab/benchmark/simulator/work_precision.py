@@ -1,4 +1,4 @@
-"""All points of a run, and the ratios that they come to."""
+"""All points of a run, the speeds at a wanted error that they come to, and their ratios."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from levilab.benchmark.machine import describe_measurement
+from levilab.benchmark.found import describe_measurement
 from levilab.benchmark.simulator import ours
 from levilab.benchmark.simulator.peers import PEERS, Peer
-from levilab.benchmark.simulator.speeds import Ratio, best_speed
+from levilab.files import finite
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from levilab.benchmark.simulator.peers import Point
 
@@ -24,6 +24,51 @@ AIMS = (
     ("many at once", "heyoka batch", 1e-11, 6.0),
     ("one top", "scipy BDF", 1e-7, 3000.0),
 )
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """speed, peer_speed: simulated seconds per second for the error [m]; NaN where a side has no such point."""
+
+    ours: str
+    peer: str
+    error: float
+    speed: float
+    peer_speed: float
+    aim: float
+
+    @property
+    def ratio(self) -> float:
+        """How many times faster."""
+        return self.speed / self.peer_speed
+
+
+def best_speed(points: Iterable[Point], error: float) -> float:
+    """Return the speed at which the best method reaches an error, between two of its points; NaN if none does.
+
+    Between two settings of a method the logarithm of the speed is taken as linear in that of the error; beyond the
+    loosest setting nothing is assumed.
+    """
+    methods: dict[str, list[Point]] = {}
+    for point in points:
+        if point.error > 0 and math.isfinite(point.error):
+            key = f"{point.method}{point.setting.partition(',')[2]}"
+            methods.setdefault(key, []).append(point)
+    speeds = (_between(rows, error) for rows in methods.values())
+    return max((speed for speed in speeds if not math.isnan(speed)), default=math.nan)
+
+
+def _between(rows: list[Point], error: float) -> float:
+    good = [p.speed for p in rows if p.error <= error]
+    best = max(good, default=math.nan)
+    for p in rows:
+        for q in rows:
+            if p.error <= error < q.error and q.speed > p.speed:
+                share = math.log(error / p.error) / math.log(q.error / p.error)
+                # only neighbours: nothing in between
+                if not any(p.error < r.error < q.error for r in rows):
+                    best = max(best, math.exp(math.log(p.speed) + share * math.log(q.speed / p.speed)))
+    return best
 
 
 @dataclass(frozen=True)
@@ -92,21 +137,10 @@ def as_document(found: Comparison) -> dict[str, Any]:
 
 def as_point(p: Point) -> dict[str, Any]:
     """Return a point with units in the names."""
-    return {"method": p.method, "setting": p.setting, "error_m": _finite(p.error), "simulated_s_per_s": p.speed}
+    return {"method": p.method, "setting": p.setting, "error_m": finite(p.error), "simulated_s_per_s": p.speed}
 
 
 def as_ratio(r: Ratio) -> dict[str, Any]:
     """Return a ratio with units in the names."""
-    return {
-        "ours": r.ours,
-        "peer": r.peer,
-        "error_m": r.error,
-        "simulated_s_per_s": _finite(r.speed),
-        "peer_simulated_s_per_s": _finite(r.peer_speed),
-        "ratio": _finite(r.ratio),
-        "aim": r.aim,
-    }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    speeds = {"simulated_s_per_s": r.speed, "peer_simulated_s_per_s": r.peer_speed, "ratio": r.ratio}
+    return {"ours": r.ours, "peer": r.peer, "error_m": r.error, **finite(speeds), "aim": r.aim}

@@ -10,7 +10,7 @@ from analysis.pulses.synthetic import HARD, RATE, Case, make
 from levilab.benchmark.estimators import study
 from levilab.benchmark.estimators.command import print_study
 from levilab.benchmark.estimators.figure import estimators_figure
-from levilab.benchmark.estimators.peers import PEERS
+from levilab.benchmark.estimators.study import PEERS
 from support.figures import faults
 
 

@@ -9,8 +9,7 @@ from levilab.benchmark.simulator import motion
 from levilab.benchmark.simulator.command import print_comparison
 from levilab.benchmark.simulator.ours import problem
 from levilab.benchmark.simulator.peers import PEERS, Peer, Point
-from levilab.benchmark.simulator.speeds import best_speed
-from levilab.benchmark.simulator.work_precision import Comparison, as_document, ratios
+from levilab.benchmark.simulator.work_precision import Comparison, as_document, best_speed, ratios
 from levilab.simulator.single import simulate
 
 POINTS = (
