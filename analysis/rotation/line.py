@@ -81,7 +81,6 @@ def fit_line(record: Record, frequency: float, chirp: float) -> LineFit:
         ahead = np.stack([amplitudes[1], -amplitudes[0]])
         information = np.einsum("ipjq,pq->ij", beside, (ahead / variance) @ ahead.T) * np.outer(scale, scale)
         gradient = scale * np.einsum("ipk,pk->i", left, ahead / variance)
-        known = np.linalg.inv(information[:2, :2] + 1e-12 * np.eye(2))
         # the bend's prior: known but for the law of the drag
         information[2, 2] += 1 / max((UNDER_DRAG_U * abs(bend_unit)) ** 2, 1e-24)
         information[[0, 1], [0, 1]] += 1e-12  # no line at all leaves nothing to divide by
@@ -95,6 +94,7 @@ def fit_line(record: Record, frequency: float, chirp: float) -> LineFit:
         chirp += float(step[1] / limit)
         if shift < _NEAR:
             break
+    known = np.linalg.inv(information[:2, :2])
     whole = np.maximum(np.diagonal(record.squares), 1e-12 * n)
     likelihood = -0.5 * n * float(np.sum(np.log(squares)))
     return LineFit(

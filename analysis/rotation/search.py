@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.rotation.record import Array, Line, Record
+from analysis.rotation.record import Array, Line, Record, deviation
 
 #: A top floats from 20 to 85 Hz [Hz]; other lines are searched from where the spline ends, too.
 LOWEST, HIGHEST, SLOW = 15.0, 85.0, 3.0
@@ -39,7 +39,7 @@ def search(record: Record, low: float, high: float) -> Line:
     First powers of pieces are added along slopes, which forgives phases; then with phases on a fine grid.
     """
     rest = record.rest()
-    weight = 1 / np.maximum(rest.std(axis=0), 1e-12)
+    weight = 1 / np.maximum(deviation(rest), 1e-12)
     pieces = max(round(2 * record.half / PIECE_S), 1)
     power, unit = _raster(record, rest * weight, pieces, CELLS)
     middle = (np.arange(pieces) + 0.5 - pieces / 2) * 2 * record.half / pieces
@@ -89,7 +89,7 @@ def other_lines(record: Record, rest: Array, line: Line, moves: float = 0.0) -> 
         line: of the spin.
         moves: what the line may come to until these lines are used [Hz].
     """
-    power, unit = _raster(record, rest / np.maximum(rest.std(axis=0), 1e-12), 1, 1)
+    power, unit = _raster(record, rest / np.maximum(deviation(rest), 1e-12), 1, 1)
     frequency = np.arange(power.shape[1]) * unit
     allowed = (frequency > SLOW) & (frequency < record.rate / 2)
     spread = _APART + 1.5 / record.half + abs(line.chirp) * record.half + moves

@@ -9,6 +9,9 @@ import numpy as np
 if TYPE_CHECKING:
     from analysis.rotation.record import Array
 
+#: Amplitude of the line in each axis, relative.
+AXES = np.array([1.0, 0.5, 0.3])
+
 
 def synthetic_field(
     random: np.random.Generator,
@@ -40,7 +43,7 @@ def synthetic_field(
     n = round(duration * rate)
     times = np.sort(np.arange(n) / rate + random.normal(0, jitter, n))
     late = times - times.mean()
-    size = noise * 10 ** (snr_db / 20) * np.array([1.0, 0.5, 0.3])
+    size = noise * 10 ** (snr_db / 20) * AXES
     turns = frequency * late + chirp * late**2 / 2 + bend * chirp**2 / frequency * late**3 / 6
     shifts = random.uniform() + np.array([0.0, -0.25, 0.07])
     field = size * np.cos(2 * np.pi * (turns[:, None] + shifts)) + random.normal(0, noise, (n, 3))
@@ -55,6 +58,26 @@ def synthetic_field(
             axes = amplitude * random.uniform(-1, 1, 3), random.uniform(size=3)
             field += axes[0] * np.cos(2 * np.pi * (turns[:, None] + axes[1]))
     return times, field
+
+
+def frequency_bounds(times: Array, frequency: float, chirp: float, snr_db: float) -> tuple[float, float]:
+    """Return the bounds of the frequency's error in a synthetic field, from the truth [Hz].
+
+    The first is the Cramér–Rao bound where the law of the drag is known; the second the Bayesian one (Van Trees) where
+    its power is from 1 to 2, evenly distributed, which leaves the change of the slope to the samples.
+
+    Args:
+        times: shape (n,) [s].
+        frequency: at the mean time [Hz].
+        chirp: its slope there [Hz/s].
+        snr_db: of the greatest axis.
+    """
+    late = times - times.mean()
+    by = 2 * np.pi * np.stack([late, late**2 / 2, late**3 / 6, np.ones_like(late)])  # frequency, slope, bend, phase
+    information = 0.5 * 10 ** (snr_db / 10) * float(AXES @ AXES) * by @ by.T
+    known = np.delete(np.delete(information, 2, 0), 2, 1)
+    information[2, 2] += 12 * (frequency / chirp**2) ** 2
+    return float(np.linalg.inv(known)[0, 0]) ** 0.5, float(np.linalg.inv(information)[0, 0]) ** 0.5
 
 
 def synthetic_flight(
@@ -88,7 +111,7 @@ def synthetic_flight(
     turns = -start_hz * np.expm1(-loss * times) / loss
     is_up = (times >= up[0]) & (times < up[1])
     line = np.where(is_up, 1.0, 0.0)[:, None] * np.cos(2 * np.pi * (turns[:, None] + np.array([0.1, -0.15, 0.17])))
-    field = amplitude * np.array([1.0, 0.5, 0.3]) * line + random.normal(0, noise, (n, 3))
+    field = amplitude * AXES * line + random.normal(0, noise, (n, 3))
     jolt = np.where(is_up, 1.0, 0.0)[:, None] * np.array(
         [4e-6, 1e-6, -9e-6]
     )  # the top's own field, which falls with it

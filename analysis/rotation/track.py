@@ -13,7 +13,7 @@ from analysis.errors import AnalysisError, NotPositive
 from analysis.rotation.errors import NoLine
 from analysis.rotation.folds import Evidence, evidence_of, images_between, weigh
 from analysis.rotation.line import UNDER_DRAG, LineFit, fit_line
-from analysis.rotation.record import FEWEST, Line, Record, read_samples
+from analysis.rotation.record import FEWEST, Line, Record, deviation, read_samples
 from analysis.rotation.search import other_lines, refine
 from analysis.rotation.spin import LEAST_GAIN, limits_near, result_of, strongest
 
@@ -171,7 +171,7 @@ def _follow(t: Array, b: Array, cut: slice, before: _Window) -> _Window | None:
     bend = UNDER_DRAG * line.chirp**2 / line.frequency if line.chirp < 0 else 0.0
     expected = Line(line.frequency + later * (line.chirp + later * bend / 2), line.chirp + later * bend)
     left = record.rest()
-    start = refine(record, left / np.maximum(left.std(axis=0), 1e-12), expected, _BY_HZ, _BY_SLOPE)
+    start = refine(record, left / np.maximum(deviation(left), 1e-12), expected, _BY_HZ, _BY_SLOPE)
     found = fit_line(record, start.frequency, start.chirp)
     if found.gain < LEAST_GAIN or abs(found.frequency - expected.frequency) > 2 * _BY_HZ:
         return None

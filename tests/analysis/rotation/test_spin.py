@@ -6,7 +6,7 @@ import pytest
 from analysis.errors import ShapesDiffer, TimesNotIncreasing, TooFewReadings
 from analysis.rotation import spin_of_field
 from analysis.rotation.errors import NoLine
-from analysis.rotation.synthetic import synthetic_field
+from analysis.rotation.synthetic import frequency_bounds, synthetic_field
 
 TRIALS = 60
 
@@ -17,15 +17,17 @@ def fresh() -> np.random.Generator:
     return np.random.default_rng(20261124)
 
 
-def test_errors_are_as_large_as_the_bound_and_as_u_say(fresh):
+@pytest.mark.parametrize("snr_db", [6.0, 20.0])
+def test_errors_are_as_large_as_the_bound_and_as_u_say(fresh, snr_db):
     errors, u, bound = [], [], []
     for _ in range(TRIALS):
         frequency = fresh.uniform(22, 45)
         chirp = -fresh.uniform(2e-3, 4e-3) * frequency
-        found = spin_of_field(*synthetic_field(fresh, frequency=frequency, chirp=chirp, bend=fresh.uniform(1, 2)))
+        times, field = synthetic_field(fresh, frequency=frequency, chirp=chirp, bend=fresh.uniform(1, 2), snr_db=snr_db)
+        found = spin_of_field(times, field)
         errors += [(found.frequency - frequency, found.chirp - chirp)]
         u += [(found.u_frequency, found.u_chirp)]
-        bound.append(found.bound)
+        bound.append(frequency_bounds(times, frequency, chirp, snr_db)[1])
     pulls = np.array(errors) / np.array(u)
     # 4 standard errors of a standard deviation from 60
     assert pulls.std(axis=0) == pytest.approx([1, 1], abs=4 / np.sqrt(2 * TRIALS))
