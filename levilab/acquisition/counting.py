@@ -13,6 +13,8 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from levilab.acquisition.session import Row, Session
 
 S = TypeVar("S", bound=CounterSettings)
@@ -220,6 +222,16 @@ class FreeTop(Generic[S]):
     def _is_plausible(self, reading: Row) -> bool:
         """Return whether a reading is the first, or plausible after the last one."""
         return self.last is None or is_plausible(self.last, reading)
+
+
+def free_top(session: Session[S], before: Sequence[Row] = ()) -> FreeTop[S]:
+    """Return a top that was let go; a counter that estimates takes no samples of the time under the drive.
+
+    before: the readings so far.
+    """
+    if session.bench.counter.ESTIMATES:
+        prepare_counter_again(session)
+    return FreeTop(session, list(before))
 
 
 def gate_began(end: float, gate_s: float, count: float) -> float:

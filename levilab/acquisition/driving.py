@@ -171,8 +171,6 @@ def drive_up_and_let_go(session: Session[D]) -> None:
         session.event(RunEvent.COASTS, "the top was spun by hand and spins down freely")
         return
     drive_until(session, lambda _: None)
-    if session.bench.counter.ESTIMATES:  # not from samples of the time under the drive
-        prepare_counter_again(session)
     session.event(RunEvent.DRIVE_OFF, "drive off, the top spins down freely")
 
 

@@ -105,7 +105,7 @@ class ClockComparison:
     """The phone's clock beside the bench's.
 
     Attributes:
-        offset: bench time − experiment time of the app [s]; too large by the way of an answer, some ms to some 0.1 s.
+        offset: bench time − experiment time of the app [s]; too large by the age of a sample that is sent, some 10 ms.
         drift: by which the phone's clock goes faster, relative; None before there is enough to compare.
         drift_u: its standard uncertainty.
     """
@@ -152,7 +152,7 @@ class Phyphox:
         self._near: float | None = None
         self._started = False
         self._status: dict[str, Any] = {}
-        # bench time of an answer [s], and its difference to the newest sample's time
+        # bench time half-way between question and answer [s], and its difference to the newest sample's time
         self._lags: deque[tuple[float, float]] = deque(maxlen=_COMPARED)
 
     # --- what every instrument offers ---
@@ -329,8 +329,9 @@ class Phyphox:
         time, *rest = self._buffers
         others = "".join(f"&{quote(name)}={start:.8g}%7C{quote(time)}" for name in rest)
         question = f"/get?{quote(time)}={start:.8g}{others}"
+        asked = self.clock.now()
         buffers = self._ask(question, *self._buffers)
-        now = self.clock.now()
+        now = (asked + self.clock.now()) / 2  # half-way, as question and answer take about as long
         if len({buffers[name].size for name in self._buffers}) > 1:
             sizes = ", ".join(f"{buffers[name].size} of {name}" for name in self._buffers)
             raise BadAnswer(self.transport.address, question, sizes, "as many numbers in each buffer")

@@ -11,7 +11,7 @@ from pydantic import Field, PositiveFloat, PositiveInt
 
 from analysis.limits import spin_at_fall
 from analysis.locked import slip_of
-from levilab.acquisition.counting import NO_TOP, AnotherTop, FreeTop, Missed, prepare_counter, spin_now
+from levilab.acquisition.counting import NO_TOP, AnotherTop, Missed, free_top, prepare_counter, spin_now
 from levilab.acquisition.driving import (
     RAMP_STEP_S,
     DidNotFollow,
@@ -175,7 +175,7 @@ def _lower(session: Session[LimitSettings], keep: Callable[[Row], None]) -> bool
     """Drive the top up, let it go, watch it until it falls, and keep its limit; False where the time is over."""
     settings = session.settings
     drive_up_and_let_go(session)
-    top = FreeTop(session)
+    top = free_top(session)
     seen: list[Row] = []
     missed_since: float | None = None
     while not is_over(session):
@@ -295,7 +295,7 @@ def _say_how_it_was_lost(
     session: Session[LimitSettings], lost: NotHeld, limit: Row, seen: list[tuple[float, float]]
 ) -> None:
     """Return whether the top is still up, and whether its tape slipped on the way; once the limit is kept."""
-    top = FreeTop(session)
+    top = free_top(session)
     is_up = lost.spin is not None or top.read() is not None or top.missed[-1] is Missed.UNSTEADY
     kind, what = (RunEvent.LOCK_LOST, "the drive lost the top") if is_up else (RunEvent.TOP_LOST, "the top fell")
     spin, held = limit["spin_frequency_hz"], limit["drive_frequency_hz"]

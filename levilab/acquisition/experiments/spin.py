@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, ClassVar
 
 from analysis.spindown.fall import FALLS_BETWEEN_HZ
-from levilab.acquisition.counting import FreeTop, prepare_counter
+from levilab.acquisition.counting import free_top, prepare_counter
 from levilab.acquisition.driving import DriveSettings, drive_up_and_let_go, drives
 from levilab.acquisition.experiment import Experiment
 from levilab.runs.channel import Channel
@@ -52,7 +52,7 @@ def run(session: Session[SpinSettings]) -> None:
     settings = session.settings
     prepare_counter(session)
     session.begin(lambda: drive_up_and_let_go(session))
-    top = FreeTop(session, session.rows[-3:])
+    top = free_top(session, session.rows[-3:])
     said = False
     for asked in session.readings_every(settings.interval_s, settings.longest_s):
         reading = top.read()

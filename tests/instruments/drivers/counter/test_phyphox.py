@@ -38,9 +38,19 @@ def test_a_phone_counts_the_top_beside_it():
     assert phone.driver.frequency() == pytest.approx(30.0, abs=0.02)  # the step of the estimator
     found = phone.driver.last
     assert found.u == 0.01
-    # three seconds of samples, up to 1/100 s and a message of 15 ms ago
-    assert found.time == pytest.approx(phone.clock.now() - 1.5, abs=0.05)
+    # three seconds of samples up to the last look, and looks each 0.1 s
+    assert found.time == pytest.approx(phone.clock.now() - 1.55, abs=0.05)
     assert phone.driver.readings(2) == pytest.approx([30.0, 30.0], abs=0.02)
+
+
+def test_a_count_has_the_benchs_time_to_the_age_of_a_sample():
+    phone = Phone(sensor=Sensor(drift=0.0))
+    phone.clock.sleep(5.0)
+    phone.twin.start()
+    began = phone.clock.now()
+    phone.prepared().driver.frequency()
+    # a sample is sent when it is 5 to 15 ms old, and half a message of 15 ms is not known
+    assert 0 < phone.driver.clocks().offset - began < 0.02
 
 
 def test_a_longer_gate_is_the_window():
