@@ -15,8 +15,8 @@ from instruments.virtual.core.parameters import (
     number,
     parameter,
 )
-from instruments.virtual.core.parser import Parser, ScpiError, Table
-from instruments.virtual.core.rows import Ask, Do, Own
+from instruments.virtual.core.parser import Parser, ScpiError
+from instruments.virtual.core.rows import Ask, Do, Own, Table
 from instruments.virtual.core.status import OPERATION_COMPLETE, Status
 from instruments.virtual.core.steps import run_to_end
 
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from instruments.clock import Clock
-    from instruments.virtual.core.parser import Row, Value
+    from instruments.virtual.core.parser import Value
+    from instruments.virtual.core.rows import Row
     from instruments.virtual.core.steps import Steps, Work
 
 
@@ -134,15 +135,7 @@ class VirtualInstrument:
         self.begun = self._ready = 0.0
         #: On the message that came last, if it is worked on in slices: it may not be done yet.
         self.work: Work[None] | None = None
-        self.parser = Parser(
-            self,
-            self.commands,
-            queue_size=self.queue_size,
-            no_error=self.no_error,
-            on_next=self.begin_next,
-            on_error=self.status.note_error,
-            path_memory=self.path_memory,
-        )
+        self.parser = Parser(self)
 
     def execute(self, message: str) -> Answer | None:
         """Run one message, a line without its end.  Returns the answers of its queries, None where it has none."""

@@ -11,9 +11,9 @@ function that depends on the channel takes its number as well.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from instruments.virtual.core.parameters import (
     choice,
@@ -25,41 +25,86 @@ from instruments.virtual.core.parameters import (
     parameter,
     read_quoted,
 )
-from instruments.virtual.core.parser import Row, ScpiError, Value
+from instruments.virtual.core.parser import ScpiError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Mapping
 
+    from instruments.virtual.core.parser import Action, Value
     from instruments.virtual.core.steps import Steps
 
 _BOUNDS = {"MIN", "MAX", "DEF", "MINIMUM", "MAXIMUM", "DEFAULT"}
+#: A word of a printed header, what of it the short form leaves out, and the beginning of a word on the wire.
+_MNEMONIC, _LOWER, _BEGINNING = re.compile(r"[A-Za-z*_]+"), re.compile("[a-z]+"), re.compile("[^0-9]{0,2}")
 #: The characters that would end a string or a message.
 _NOT_IN_TEXTS = dict.fromkeys(map(ord, "\"';\n"))
 
 
-class Device(Protocol):
-    """What a row needs of a device."""
+@dataclass(frozen=True)
+class Row:
+    """One command of an instrument, with its query: by default those of a setting, which has one parameter.
 
-    settings: dict[str, Value]
-    lenient: bool
+    Attributes:
+        header: as the manual prints it, ``[SOURce[1]:]FREQuency[:CW|:FIXed]``.
+        of: the number of the channel, for a row of a channel; functions take it behind the device.
+        name: of the setting, where the row is one; its ``default`` is the value after ``*RST``.
+    """
 
-    def on_number_change(self, name: str, before: float) -> None:
-        """React to a setting that has changed.  before: its former value, 0 where that was no number."""
+    header: str
+    name: str = field(default_factory=str, kw_only=True)  # no default that a class below would inherit
+    of: tuple[int, ...] = field(default=(), kw_only=True)
 
-    def read_boolean(self, text: str) -> bool:
-        """Return the value of a switch, from its text on the wire."""
+    def has(self, *, query: bool) -> bool:
+        """Return whether there is a query, or else a command."""
+        return True
 
-    def spell(self, value: float) -> str:
-        """Return a number as the device prints it."""
+    def set(self, device: Any, parameters: list[str]) -> Steps[Any] | str | None:
+        """Execute the command, and return the answer where it has one.  Raises ScpiError."""
+        self.put(device, self.read(device, parameter(parameters)))
+        return None
 
-    def reply(self, header: str, text: str, unit: str = "") -> str:
-        """Return an answer: the text alone, or with its header and unit."""
+    def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
+        """Answer the query.  Raises ScpiError."""
+        no_parameters(parameters)
+        text: str = device.reply(self.header, self.format_value(device, device.settings[self.name]))
+        return text
+
+    def put(self, device: Any, value: Value) -> None:
+        """Change the setting."""
+        before = device.settings[self.name]
+        device.settings[self.name] = value
+        device.on_number_change(self.name, before if isinstance(before, float) else 0.0)
+
+    def read(self, device: Any, text: str) -> Value:
+        """Return the value that a program has sent.  Raises ScpiError."""
+        raise NotImplementedError
+
+    def format_value(self, device: Any, value: Any) -> str:
+        """Return the value as the answer has it, without header and unit."""
+        return str(value)
+
+    def defaults(self) -> dict[str, Value]:
+        """Return the settings behind this row, with their values after ``*RST``."""
+        return {}
+
+    def of_channel(self, n: int) -> Self:
+        """Return the row of one channel: ``{n}`` in its texts is the channel's number.
+
+        ``[n]`` is the number, too, which may be left out for channel 1, with all that stands in the brackets around it.
+
+        >>> Row("[SOURce[n]:]SUM").of_channel(1).header, Row("[SOURce[n]:]SUM").of_channel(2).header
+        ('[SOURce[1]:]SUM', 'SOURce2:SUM')
+        """
+        texts = {field.name: getattr(self, field.name) for field in fields(self)}
+        of_channel = {name: _of_channel(text, n) for name, text in texts.items() if isinstance(text, str)}
+        return replace(self, of=(n,), **of_channel)
 
 
-def _put(device: Device, name: str, value: Value) -> None:
-    before = device.settings[name]
-    device.settings[name] = value
-    device.on_number_change(name, before if isinstance(before, float) else 0.0)
+def _of_channel(text: str, n: int) -> str:
+    text = text.replace("{n}", str(n))
+    if n > 1:
+        text = re.sub(r"\[(\w+)\[n\](:?)\]", rf"\g<1>{n}\2", text)
+    return text.replace("[n]", "[1]" if n == 1 else str(n))
 
 
 @dataclass(frozen=True)
@@ -67,8 +112,6 @@ class Number(Row):
     """A number to set and to query, with MIN, MAX and DEF.
 
     Attributes:
-        name: of the setting.
-        default: its value after ``*RST``.
         limits: lowest and highest number, or a function of the device (and the channel) that returns them.
         unit: that a program may send with the number.
         rounded: rounds it to what the instrument can do.
@@ -94,24 +137,19 @@ class Number(Row):
         """See the base."""
         return {} if self.alias else {self.name: self.default}
 
-    def of_channel(self, n: int) -> Self:
-        """See the base."""
-        row, find = super().of_channel(n), self.limits
-        return replace(row, limits=lambda device: find(device, n)) if callable(find) else row
-
-    def range(self, device: Device) -> tuple[float, float]:
+    def range(self, device: Any) -> tuple[float, float]:
         """Return the lowest and the highest number allowed now."""
-        return self.limits(device) if callable(self.limits) else self.limits
+        return self.limits(device, *self.of) if callable(self.limits) else self.limits
 
-    def set(self, device: Device, parameters: list[str]) -> None:
+    def set(self, device: Any, parameters: list[str]) -> None:
         """See the base."""
         if device.lenient:
             if len(parameters) > 2:
                 raise ScpiError(-108)
             parameters = parameters[:1]
-        _put(device, self.name, self.rounded(self.read(device, parameter(parameters)) / self.factor))
+        self.put(device, self.rounded(self.read(device, parameter(parameters)) / self.factor))
 
-    def read(self, device: Device, text: str) -> float:
+    def read(self, device: Any, text: str) -> float:
         """Read the number that a program has sent, within its limits.  Raises ScpiError."""
         low, high = self.range(device)
         default = self.factor * self.default
@@ -120,18 +158,23 @@ class Number(Row):
             return min(max(sent, low), high)
         return one_of(number(text, low=low, high=high, default=default, unit=self.unit), self.values)
 
-    def ask(self, device: Device, parameters: list[str]) -> str:
+    def ask(self, device: Any, parameters: list[str]) -> str:
         """See the base."""
         asked = optional_parameter(parameters[:1] if device.lenient else parameters)
         if asked.upper() in _BOUNDS or (asked and not device.lenient):
             low, high = self.range(device)
             value = limit(asked, low=low, high=high, default=self.factor * self.default)
         else:
-            value = self.factor * float(device.settings[self.name])
-        return device.reply(self.header, self.format_value(device, value), self.unit)
+            value = self.value(device)
+        text: str = device.reply(self.header, self.format_value(device, value), self.unit)
+        return text
 
-    def format_value(self, device: Device, value: float) -> str:
-        """Return the number as the answer has it, without header and unit."""
+    def value(self, device: Any) -> float:
+        """Return the number that the query asks for."""
+        return self.factor * float(device.settings[self.name])
+
+    def format_value(self, device: Any, value: float) -> str:
+        """See the base."""
         return (self.spell or device.spell)(value)
 
 
@@ -145,7 +188,6 @@ class Word(Row):
     """One word of several, in its long form with the short form in capitals; the answer is the short form.
 
     Attributes:
-        name: of the setting.
         words: separated by blanks, or a function of the device that returns them.
         default: in its short form, where it is neither the word behind an asterisk nor the first.
     """
@@ -162,15 +204,9 @@ class Word(Row):
         first = next((word for word in self.words.split() if word.startswith("*")), self.words.split()[0])
         return {self.name: choice(first.removeprefix("*"), _split(self.words))}
 
-    def set(self, device: Device, parameters: list[str]) -> None:
+    def read(self, device: Any, text: str) -> str:
         """See the base."""
-        words = self.words(device) if callable(self.words) else self.words
-        _put(device, self.name, choice(parameter(parameters), _split(words)))
-
-    def ask(self, device: Device, parameters: list[str]) -> str:
-        """See the base."""
-        no_parameters(parameters)
-        return device.reply(self.header, str(device.settings[self.name]))
+        return choice(text, _split(self.words(device) if callable(self.words) else self.words))
 
 
 @cache
@@ -184,7 +220,6 @@ class Switch(Row):
     """ON or OFF.
 
     Attributes:
-        name: of the setting.
         default: its value after ``*RST``, or a function of the channel that returns it.
         words: the answers for off and for on.
     """
@@ -195,22 +230,16 @@ class Switch(Row):
 
     def defaults(self) -> dict[str, Value]:
         """See the base."""
-        assert isinstance(self.default, bool), "of a channel"
-        return {self.name: self.default}
+        return {self.name: self.default(*self.of) if callable(self.default) else self.default}
 
-    def of_channel(self, n: int) -> Self:
+    def read(self, device: Any, text: str) -> bool:
         """See the base."""
-        row, find = super().of_channel(n), self.default
-        return replace(row, default=find(n)) if callable(find) else row
+        on: bool = device.read_boolean(text)
+        return on
 
-    def set(self, device: Device, parameters: list[str]) -> None:
+    def format_value(self, device: Any, value: bool) -> str:  # noqa: FBT001
         """See the base."""
-        _put(device, self.name, device.read_boolean(parameter(parameters)))
-
-    def ask(self, device: Device, parameters: list[str]) -> str:
-        """See the base."""
-        no_parameters(parameters)
-        return device.reply(self.header, self.words[bool(device.settings[self.name])])
+        return self.words[bool(value)]
 
 
 @dataclass(frozen=True)
@@ -225,66 +254,52 @@ class Text(Row):
         """See the base."""
         return {self.name: self.default}
 
-    def set(self, device: Device, parameters: list[str]) -> None:
+    def read(self, device: Any, text: str) -> str:
         """See the base."""
-        _put(device, self.name, read_quoted(parameters).translate(_NOT_IN_TEXTS)[: self.longest].upper())
+        return read_quoted([text]).translate(_NOT_IN_TEXTS)[: self.longest].upper()
 
-    def ask(self, device: Device, parameters: list[str]) -> str:
+    def format_value(self, device: Any, value: str) -> str:
         """See the base."""
-        no_parameters(parameters)
-        return f'"{device.settings[self.name]}"'
+        return f'"{value}"'
 
 
 @dataclass(frozen=True)
 class Do(Row):
     """A command without parameters.  act: does it, given the device; by default it does nothing."""
 
-    act: Callable[..., Steps[None] | None] = field(default=lambda _device: None, repr=False)
+    act: Callable[..., Steps[None] | None] = field(default=lambda *_: None, repr=False)
 
-    @property
-    def askable(self) -> bool:
+    def has(self, *, query: bool) -> bool:
         """See the base."""
-        return False
-
-    def of_channel(self, n: int) -> Self:
-        """See the base: act takes the channel's number behind the device."""
-        act = self.act
-        return replace(super().of_channel(n), act=lambda device: act(device, n))
+        return not query
 
     def set(self, device: Any, parameters: list[str]) -> Steps[None] | None:
         """See the base."""
         no_parameters(parameters)
-        return self.act(device)
+        return self.act(device, *self.of)
 
 
 @dataclass(frozen=True)
 class Ask(Row):
     """A query without parameters.  answer: the text of the answer, given the device."""
 
-    answer: Callable[..., Steps[str] | str] = field(default=lambda _device: "0", repr=False)
+    answer: Callable[..., Steps[str] | str] = field(default=lambda *_: "0", repr=False)
 
-    @property
-    def settable(self) -> bool:
+    def has(self, *, query: bool) -> bool:
         """See the base."""
-        return False
-
-    def of_channel(self, n: int) -> Self:
-        """See the base: answer takes the channel's number behind the device."""
-        answer = self.answer
-        return replace(super().of_channel(n), answer=lambda device: answer(device, n))
+        return query
 
     def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
         """See the base."""
         no_parameters(parameters)
-        return self.answer(device)
+        return self.answer(device, *self.of)
 
 
 @dataclass(frozen=True)
 class Tell(Ask):
     """A command that is answered, without parameters; its query is the same."""
 
-    @property
-    def settable(self) -> bool:
+    def has(self, *, query: bool) -> bool:
         """See the base."""
         return True
 
@@ -307,55 +322,105 @@ class Both(Row):
     answer: Callable[..., Steps[str] | str] | None = field(default=None, repr=False)
     keeps: tuple[str, Value] | None = None
 
-    @property
-    def settable(self) -> bool:
+    def has(self, *, query: bool) -> bool:
         """See the base."""
-        return self.act is not None
-
-    @property
-    def askable(self) -> bool:
-        """See the base."""
-        return self.answer is not None
+        return (self.answer if query else self.act) is not None
 
     def defaults(self) -> dict[str, Value]:
         """See the base."""
-        return dict((self.keeps,)) if self.keeps else {}
-
-    def of_channel(self, n: int) -> Self:
-        """See the base: act and answer take the channel's number behind the device."""
-        act, answer, keeps = self.act, self.answer, self.keeps
-        return replace(
-            super().of_channel(n),
-            act=act and (lambda device, parameters: act(device, n, parameters)),
-            answer=answer and (lambda device, parameters: answer(device, n, parameters)),
-            keeps=keeps and (keeps[0].format(n=n), keeps[1]),
-        )
+        return {self.keeps[0].format(n=self.of[0] if self.of else 0): self.keeps[1]} if self.keeps else {}
 
     def set(self, device: Any, parameters: list[str]) -> Steps[None] | None:
         """See the base."""
         assert self.act
-        return self.act(device, parameters)
+        return self.act(device, *self.of, parameters)
 
     def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
         """See the base."""
         assert self.answer
-        return self.answer(device, parameters)
+        return self.answer(device, *self.of, parameters)
 
 
 @dataclass(frozen=True)
 class Own(Both):
     """As Both, but the query has no parameters: answer takes the device alone."""
 
-    def of_channel(self, n: int) -> Self:
-        """See the base."""
-        row, answer = super().of_channel(n), self.answer
-        return replace(row, answer=answer and (lambda device: answer(device, n)))
-
     def ask(self, device: Any, parameters: list[str]) -> Steps[str] | str:
         """See the base."""
         assert self.answer
         no_parameters(parameters)
-        return self.answer(device)
+        return self.answer(device, *self.of)
+
+
+class Table:
+    """The rows of a model, and its settings.  Where several rows fit a header, the first one counts.
+
+    Args:
+        rows: of the model.
+        others: settings that no row has.
+
+    Attributes:
+        defaults: all settings, with their values after ``*RST``.
+    """
+
+    def __init__(self, rows: Iterable[Row], others: Mapping[str, Value]) -> None:
+        self.rows = tuple(rows)
+        self.defaults = {**others, **{name: value for row in self.rows for name, value in row.defaults().items()}}
+        self._actions: dict[str, Action] = {}
+
+    def find(self, header: str) -> Action:
+        """Return the function of a header; that of a query ends with a question mark.  Raises ScpiError."""
+        name = header.upper()
+        action = self._actions.get(name)
+        if action is None:  # only known headers are kept: there could be any number of unknown ones
+            action = self._actions[name] = self._search(header)
+        return action
+
+    def _search(self, header: str) -> Action:
+        plain = header.removesuffix("?").upper()
+        beginnings = {_BEGINNING.match(word)[0] for word in plain.split(":") if word}  # type: ignore[index]
+        # few rows are left, so few regular expressions are compiled
+        near = [row for row in self.rows if beginnings <= _beginnings(row.header)]
+        rows = [row for row in near if header_pattern(row.header).fullmatch(plain)]
+        if not rows:
+            raise ScpiError(-113, plain[:40])
+        for row in rows:
+            if row.has(query=header.endswith("?")):
+                return row.ask if header.endswith("?") else row.set
+        raise ScpiError(-113, header)
+
+
+@cache
+def _beginnings(pattern: str) -> frozenset[str]:
+    """Return the first two letters of each word of a printed header, in its long and its short form.
+
+    >>> sorted(_beginnings("[SOURce[1]:]FREQuency[:CW|:FIXed]")), sorted(_beginnings("C1:BaSic_WaVe"))
+    (['CW', 'FI', 'FR', 'SO'], ['BA', 'BS', 'C'])
+    """
+    words = _MNEMONIC.findall(pattern)
+    return frozenset({word[:2].upper() for word in words} | {_LOWER.sub("", word)[:2] for word in words})
+
+
+@cache
+def header_pattern(pattern: str) -> re.Pattern[str]:
+    """Return a printed header as a regular expression for a header without its question mark."""
+    return re.compile(_expression(pattern), re.IGNORECASE)
+
+
+def _expression(pattern: str) -> str:
+    """Return a printed header as a regular expression: FREQuency → (?:FREQUENCY|FREQ), [x] → (?:x)?.
+
+    >>> _expression("[SOURce[1]:]FREQuency")
+    '(?:(?:SOURCE|SOUR)(?:1)?:)?(?:FREQUENCY|FREQ)'
+    """
+
+    def mnemonic(match: re.Match[str]) -> str:
+        long = match[0].upper()
+        short = re.sub("[a-z]", "", match[0])
+        return long if long == short else f"(?:{long}|{short})"
+
+    words = re.sub(r"[A-Z]+[a-z]*", mnemonic, pattern.replace("*", r"\*").replace("[", "\0"))
+    return words.replace("\0", "(?:").replace("]", ")?")
 
 
 def short_header(pattern: str) -> str:

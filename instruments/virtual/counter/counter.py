@@ -12,8 +12,8 @@ import numpy as np
 from instruments.ieee488 import INFINITY
 from instruments.virtual.core.device import VirtualInstrument, has_node
 from instruments.virtual.core.parameters import boolean, limit, number, optional_parameter, parameter
-from instruments.virtual.core.parser import ScpiError, header_pattern
-from instruments.virtual.core.rows import Number
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.rows import Number, header_pattern
 from instruments.virtual.core.signal import no_signal
 from instruments.virtual.core.status import OPERATION_COMPLETE
 from instruments.virtual.core.steps import run_to_end

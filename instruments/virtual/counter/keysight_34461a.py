@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.parameters import number, parameter
-from instruments.virtual.core.parser import Row, ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Switch, Text, Word
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Text, Word
 from instruments.virtual.counter.counter import Count, Function, VirtualCounter
 from instruments.virtual.counter.edges import RATE, TriggerInput
 from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement, Reading

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.parameters import block_text, choice, number, parameter
-from instruments.virtual.core.parser import Row, ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Switch, Word
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Word
 from instruments.virtual.counter.counter import AUTOMATIC, DARK, LEVEL, Count, Function, VirtualCounter
 from instruments.virtual.counter.edges import TriggerInput
 from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement, Wanted, first_edge

@@ -6,8 +6,8 @@ import math
 from typing import ClassVar
 
 from instruments.virtual.core.parameters import optional_parameter, parameter
-from instruments.virtual.core.parser import Row, ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Own, Switch, Word
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Own, Row, Switch, Word
 from instruments.virtual.generator.arbitrary import DeviceError, plain_name
 from instruments.virtual.generator.family import Family, Waveform
 from instruments.virtual.generator.generator import VirtualGenerator

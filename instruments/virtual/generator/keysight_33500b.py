@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.core.parameters import parameter
-from instruments.virtual.core.parser import Row, ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Own, Switch, Word
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Own, Row, Switch, Word
 from instruments.virtual.generator.arbitrary import DeviceError, plain_name
 from instruments.virtual.generator.channel import Channel
 from instruments.virtual.generator.family import Family, Waveform
@@ -80,13 +80,13 @@ _CHANNEL: tuple[Row, ...] = (
     Quantity(
         *(f"{_ARB}:FREQuency", "{n}:arb_rate", 160.0, lambda c: (1e-6, _FASTEST / c.points), "HZ"),
         get=lambda c: c.number("arb_rate") / c.points,
-        put=lambda c, value: c.set_rate(value * c.points),
+        keep=lambda c, value: c.set_rate(value * c.points),
         alias=True,
     ),
     Quantity(
         *(f"{_ARB}:PERiod", "{n}:arb_rate", 6.25e-3, lambda c: (c.points / _FASTEST, 1e6), "S"),
         get=lambda c: c.points / c.number("arb_rate"),
-        put=lambda c, value: c.set_rate(1 / value * c.points),
+        keep=lambda c, value: c.set_rate(1 / value * c.points),
         alias=True,
     ),
     Ask(f"{_ARB}:POINts", lambda s, n: f"{s.channel(n).points:+d}"),

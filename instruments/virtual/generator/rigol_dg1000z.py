@@ -11,8 +11,8 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from instruments.virtual.core.parser import Row, ScpiError
-from instruments.virtual.core.rows import Both, Switch
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.rows import Both, Row, Switch
 from instruments.virtual.generator.channel import INFINITE
 from instruments.virtual.generator.family import Family, Waveform
 from instruments.virtual.generator.generator import VirtualGenerator

@@ -6,12 +6,10 @@ Sources: Keysight 33500 Series Operating and Service Guide; Agilent 33220A User'
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Self
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from instruments.virtual.core.parameters import limit, optional_parameter, parameter
-from instruments.virtual.core.parser import Row
-from instruments.virtual.core.rows import Ask, Both, Do, Own, Switch, Word
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Word
 from instruments.virtual.generator.channel import INFINITE, Channel, quantity_of
 
 if TYPE_CHECKING:
@@ -23,42 +21,28 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Quantity(Row):
+class Quantity(Number):
     """A number of a channel that is clipped at its limits, with an entry in the error queue.
 
     Attributes:
-        name: of the setting.
-        default: its value after ``*RST``, and by DEF.
         limits: lowest and highest, or a function of the channel that returns them.
-        unit: that a program may send with the number.
         get: returns the number, where it is not kept as sent.
-        put: keeps it, in the same case.
+        keep: keeps it, in the same case.
         endless: whether it may be infinite.
-        alias: whether another row has the same setting, and gives its value after ``*RST``.
-        channel: the number of the channel.
+        angle: whether it is a phase, kept in degrees; UNIT:ANGLe says the unit on the wire.
     """
 
-    name: str
-    default: float
-    limits: tuple[float, float] | Callable[[Channel], tuple[float, float]]
-    unit: str = ""
     get: Callable[[Channel], float] | None = field(default=None, repr=False)
-    put: Callable[[Channel, float], None] | None = field(default=None, repr=False)
+    keep: Callable[[Channel, float], None] | None = field(default=None, repr=False)
     endless: bool = False
-    alias: bool = False
-    channel: int = 1
+    angle: bool = False
 
-    def of_channel(self, n: int) -> Self:
+    def _channel(self, device: VirtualGenerator) -> Channel:
+        return device.channel(*self.of)
+
+    def range(self, device: VirtualGenerator) -> tuple[float, float]:
         """See the base."""
-        return replace(super().of_channel(n), channel=n)
-
-    def defaults(self) -> dict[str, Value]:
-        """See the base."""
-        return {} if self.alias else {self.name: self.default}
-
-    def range(self, channel: Channel) -> tuple[float, float]:
-        """Return the lowest and the highest number allowed now."""
-        return self.limits(channel) if callable(self.limits) else self.limits
+        return self.limits(self._channel(device)) if callable(self.limits) else self.limits
 
     def _is_infinite(self, text: str) -> bool:
         if not self.endless:
@@ -67,50 +51,32 @@ class Quantity(Row):
             return text.upper() in {"INF", "INFINITY"}
         return quantity_of(text, (self.unit,))[0] >= INFINITE
 
-    def read(self, channel: Channel, text: str) -> float:
-        """Read the number that a program has sent, within its limits.  Raises ScpiError."""
+    def read(self, device: VirtualGenerator, text: str) -> float:
+        """See the base."""
+        channel, limits = self._channel(device), self.range(device)
         if self._is_infinite(text):
             return INFINITE
-        return channel.read(text, *self.range(channel), self.default, self.unit)
+        if self.angle and not text[:1].isalpha():
+            value, unit = quantity_of(text, ("", "DEG", "RAD"))
+            degrees = {"": channel.degrees_per_unit(), "DEG": 1.0, "RAD": math.degrees(1)}
+            return channel.clip(value * degrees[unit], *limits)
+        return channel.read(text, *limits, self.default, self.unit)
 
-    def set(self, device: VirtualGenerator, parameters: list[str]) -> None:
+    def put(self, device: VirtualGenerator, value: Value) -> None:
         """See the base."""
-        channel = device.channel(self.channel)
-        value = self.read(channel, parameter(parameters))
-        if self.put:
-            self.put(channel, value)
+        if self.keep:
+            self.keep(self._channel(device), float(value))
+            device.on_change(self.name)
         else:
-            device.settings[self.name] = value
-        device.on_change(self.name)
+            super().put(device, value)
 
-    def ask(self, device: VirtualGenerator, parameters: list[str]) -> str:
+    def value(self, device: VirtualGenerator) -> float:
         """See the base."""
-        return device.spell(self.value_or_limit(device.channel(self.channel), parameters))
+        return self.get(self._channel(device)) if self.get else super().value(device)
 
-    def value_or_limit(self, channel: Channel, parameters: list[str]) -> float:
-        """Return the number, or the limit that the query asks for.  Raises ScpiError."""
-        if text := optional_parameter(parameters):
-            low, high = self.range(channel)
-            return limit(text, low=low, high=high, default=self.default)
-        return self.get(channel) if self.get else channel.number(self.name.rpartition(":")[2])
-
-
-@dataclass(frozen=True)
-class Angle(Quantity):
-    """A phase, kept in degrees; a number without a unit, and the answer, are in the unit of UNIT:ANGLe."""
-
-    def read(self, channel: Channel, text: str) -> float:
+    def format_value(self, device: VirtualGenerator, value: float) -> str:
         """See the base."""
-        if text[:1].isalpha():
-            return super().read(channel, text)
-        value, unit = quantity_of(text, ("", "DEG", "RAD"))
-        degrees = {"": channel.degrees_per_unit(), "DEG": 1.0, "RAD": math.degrees(1)}
-        return channel.clip(value * degrees[unit], *self.range(channel))
-
-    def ask(self, device: VirtualGenerator, parameters: list[str]) -> str:
-        """See the base."""
-        channel = device.channel(self.channel)
-        return device.spell(self.value_or_limit(channel, parameters) / channel.degrees_per_unit())
+        return device.spell(value / self._channel(device).degrees_per_unit() if self.angle else value)
 
 
 _PULSE = "[SOURce[n]:][FUNCtion:]PULSe:"
@@ -125,15 +91,15 @@ CHANNEL: tuple[Row, ...] = (
     Quantity(
         *("[SOURce[n]:]FREQuency[:CW|:FIXed]", "{n}:frequency", 1e3, Channel.frequency_limits, "HZ"),
         get=lambda c: c.frequency,
-        put=Channel.set_frequency,
+        keep=Channel.set_frequency,
     ),
     Quantity(
         *("[SOURce[n]:]FUNCtion:SQUare:PERiod", "{n}:frequency", 1e-3, Channel.square_periods, "S"),
         get=Channel.period,
-        put=Channel.set_period,
+        keep=Channel.set_period,
         alias=True,
     ),
-    Angle("[SOURce[n]:]PHASe[:ADJust]", "{n}:phase", 0.0, _TURN),
+    Quantity("[SOURce[n]:]PHASe[:ADJust]", "{n}:phase", 0.0, _TURN, angle=True),
     Do("[SOURce[n]:]PHASe:REFerence", lambda _s, _n: None),
     Quantity("[SOURce[n]:]FUNCtion:SQUare:DCYCle", "{n}:duty", 50.0, Channel.square_duties, "PCT"),
     Quantity("[SOURce[n]:]FUNCtion:RAMP:SYMMetry", "{n}:symmetry", 100.0, (0, 100), "PCT"),
@@ -154,13 +120,13 @@ CHANNEL: tuple[Row, ...] = (
     Quantity(
         *(f"{_LEVEL}:HIGH", "{n}:amplitude_vpp", 0.05, Channel.high_limits, "V"),
         get=Channel.high,
-        put=Channel.set_high,
+        keep=Channel.set_high,
         alias=True,
     ),
     Quantity(
         *(f"{_LEVEL}:LOW", "{n}:amplitude_vpp", -0.05, Channel.low_limits, "V"),
         get=Channel.low,
-        put=Channel.set_low,
+        keep=Channel.set_low,
         alias=True,
     ),
     Switch("[SOURce[n]:]VOLTage:LIMit:STATe", "{n}:limits_on"),
@@ -168,17 +134,17 @@ CHANNEL: tuple[Row, ...] = (
     Quantity("[SOURce[n]:]VOLTage:LIMit:LOW", "{n}:limit_low", -5.0, (-10, 10), "V"),
     Switch("[SOURce[n]:]VOLTage:RANGe:AUTO", "{n}:automatic_range", default=True),
     Switch("OUTPut[n][:STATe]", "{n}:output"),
-    Quantity("OUTPut[n]:LOAD", "{n}:load", 50.0, (1, 1e4), "OHM", put=Channel.set_load, endless=True),
+    Quantity("OUTPut[n]:LOAD", "{n}:load", 50.0, (1, 1e4), "OHM", keep=Channel.set_load, endless=True),
     Word("OUTPut[n]:POLarity", "{n}:polarity", "NORMal INVerted"),
     # pulses
-    Quantity(f"{_PULSE}WIDTh", "{n}:pulse_width", 1e-4, Channel.pulse_limits, "S", put=Channel.set_width),
-    Quantity(f"{_PULSE}DCYCle", "{n}:pulse_duty", 10.0, Channel.pulse_duties, "PCT", put=Channel.set_pulse_duty),
+    Quantity(f"{_PULSE}WIDTh", "{n}:pulse_width", 1e-4, Channel.pulse_limits, "S", keep=Channel.set_width),
+    Quantity(f"{_PULSE}DCYCle", "{n}:pulse_duty", 10.0, Channel.pulse_duties, "PCT", keep=Channel.set_pulse_duty),
     Word("[SOURce[n]:]FUNCtion:PULSe:HOLD", "{n}:pulse_hold", "WIDTh DCYCle"),
     # bursts and triggers
     Switch("[SOURce[n]:]BURSt:STATe", "{n}:burst"),
     Word("[SOURce[n]:]BURSt:MODE", "{n}:burst_mode", "TRIGgered GATed"),
     Word("[SOURce[n]:]BURSt:GATE:POLarity", "{n}:gate_polarity", "NORMal INVerted"),
-    Angle("[SOURce[n]:]BURSt:PHASe", "{n}:burst_phase", 0.0, _TURN),
+    Quantity("[SOURce[n]:]BURSt:PHASe", "{n}:burst_phase", 0.0, _TURN, angle=True),
     Quantity("[SOURce[n]:]BURSt:INTernal:PERiod", "{n}:burst_period", 1e-2, Channel.burst_periods, "S"),
     Word("TRIGger[n]:SLOPe", "{n}:trigger_slope", "POSitive NEGative"),
     Do("TRIGger[n][:IMMediate]", lambda s, n: s.start(n)),
@@ -191,13 +157,13 @@ CHANNEL: tuple[Row, ...] = (
     Quantity(
         *("[SOURce[n]:]FREQuency:CENTer", "{n}:sweep_start", 550.0, (1e-6, 30e6), "HZ"),
         get=Channel.sweep_centre,
-        put=Channel.set_sweep_centre,
+        keep=Channel.set_sweep_centre,
         alias=True,
     ),
     Quantity(
         *("[SOURce[n]:]FREQuency:SPAN", "{n}:sweep_start", 900.0, (-30e6, 30e6), "HZ"),
         get=Channel.sweep_span,
-        put=Channel.set_sweep_span,
+        keep=Channel.set_sweep_span,
         alias=True,
     ),
     Quantity("[SOURce[n]:]SWEep:HTIMe", "{n}:sweep_hold", 0.0, (0, 3600), "S"),
@@ -269,17 +235,17 @@ def pulses(periods: tuple[float, float], edges: tuple[float, float], edge: float
         Quantity(
             *(f"{_PULSE}PERiod", "{n}:frequency", 1e-3, periods, "S"),
             get=Channel.period,
-            put=Channel.set_period,
+            keep=Channel.set_period,
             alias=True,
         ),
         Quantity(f"{edge_of}:LEADing", "{n}:pulse_leading", edge, edges, "S"),
         Quantity(f"{edge_of}:TRAiling", "{n}:pulse_trailing", edge, edges, "S"),
-        Quantity(f"{edge_of}[:BOTH]", "{n}:pulse_leading", edge, edges, "S", put=Channel.set_edges, alias=True),
+        Quantity(f"{edge_of}[:BOTH]", "{n}:pulse_leading", edge, edges, "S", keep=Channel.set_edges, alias=True),
     )
 
 
 def burst_cycles(most: float) -> Row:
     """Return the row of the cycles of a burst."""
     return Quantity(
-        *("[SOURce[n]:]BURSt:NCYCles", "{n}:burst_cycles", 1.0, (1, most)), put=Channel.set_burst_cycles, endless=True
+        *("[SOURce[n]:]BURSt:NCYCles", "{n}:burst_cycles", 1.0, (1, most)), keep=Channel.set_burst_cycles, endless=True
     )

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import boolean, choice, number, optional_parameter, parameter
-from instruments.virtual.core.parser import Row, ScpiError, Value
-from instruments.virtual.core.rows import Ask, Both, Own, Switch, Word, short_header
+from instruments.virtual.core.parser import ScpiError, Value
+from instruments.virtual.core.rows import Ask, Both, Own, Row, Switch, Word, short_header
 from instruments.virtual.generator.channel import INFINITE, OPEN_V, SOURCE_OHM, Output
 
 if TYPE_CHECKING:

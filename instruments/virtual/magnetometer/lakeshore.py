@@ -18,8 +18,8 @@ import numpy as np
 
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import no_parameters, number
-from instruments.virtual.core.parser import Row, ScpiError, Value
-from instruments.virtual.core.rows import Ask, Both, Do, Own
+from instruments.virtual.core.parser import ScpiError, Value
+from instruments.virtual.core.rows import Ask, Both, Do, Own, Row
 from instruments.virtual.magnetometer.hall_probe import HallProbe, Reading
 
 if TYPE_CHECKING:

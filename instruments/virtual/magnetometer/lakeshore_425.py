@@ -9,7 +9,7 @@ from instruments.virtual.core.rows import Ask
 from instruments.virtual.magnetometer.lakeshore import FAMILY, Field, Fields, VirtualGaussmeter, field_text
 
 if TYPE_CHECKING:
-    from instruments.virtual.core.parser import Row
+    from instruments.virtual.core.rows import Row
 
 _OWN: tuple[Row, ...] = (
     Fields("RDGMODE", (Field("mode", 1, 2, 1), Field("filter", 0, 1, 1), Field("band", 1, 2, 1))),

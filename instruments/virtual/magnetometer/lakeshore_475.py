@@ -10,7 +10,7 @@ from instruments.virtual.core.rows import Ask, Do
 from instruments.virtual.magnetometer.lakeshore import FAMILY, Field, Fields, VirtualGaussmeter, field_text
 
 if TYPE_CHECKING:
-    from instruments.virtual.core.parser import Row
+    from instruments.virtual.core.rows import Row
     from instruments.virtual.magnetometer.hall_probe import Reading
 
 

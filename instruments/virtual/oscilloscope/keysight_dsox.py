@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from instruments.virtual.core.parameters import choice, number, parameter
-from instruments.virtual.core.parser import Row, ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Switch, Text, Word, whole
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Text, Word, whole
 from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input
 from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 

@@ -14,8 +14,8 @@ import struct
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from instruments.virtual.core.parameters import choice, parameter
-from instruments.virtual.core.parser import Row, ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Switch, Tell, Word, short_header
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Tell, Word, short_header
 from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, one_two_five
 from instruments.virtual.oscilloscope.screenshot import bmp24, draw
 

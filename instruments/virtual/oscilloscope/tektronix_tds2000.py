@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from instruments.virtual.core.device import COMMON
-from instruments.virtual.core.parameters import choice, no_parameters, parameter
-from instruments.virtual.core.parser import Row, ScpiError
-from instruments.virtual.core.rows import Ask, Both, Number, Own, Switch, Word, short_header, whole
+from instruments.virtual.core.parameters import choice, parameter
+from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.rows import Ask, Both, Number, Own, Row, Switch, Word, short_header, whole
 from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD
 from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input
 
@@ -57,13 +57,11 @@ def _levels(scope: VirtualTDS2000) -> tuple[float, float]:
 class LongWord(Word):
     """A word that is answered in its long form, in capitals, unless VERBose is off."""
 
-    def ask(self, device: Any, parameters: list[str]) -> str:
+    def format_value(self, device: Any, value: str) -> str:
         """See the base."""
-        no_parameters(parameters)
-        short = str(device.settings[self.name])
         words = (self.words(device) if callable(self.words) else self.words).replace("*", "").split()
-        long = next(word.upper() for word in words if re.sub("[a-z]", "", word) == short)
-        return str(device.reply(self.header, long if device.settings["verbose"] else short))
+        long = next(word.upper() for word in words if re.sub("[a-z]", "", word) == value)
+        return long if device.settings["verbose"] else value
 
 
 def _names(scope: VirtualTDS2000) -> str:

@@ -72,7 +72,7 @@ def reported(device):
 
 def values(row, device):
     """What can be sent to set a row, as far as its kind says it; else None."""
-    if isinstance(row, Number | Quantity):
+    if isinstance(row, Number):
         return [f"{value:.17g}" for value in numbers(row, device)]
     if isinstance(row, Word):
         return [word.removeprefix("*") for word in (row.words(device) if callable(row.words) else row.words).split()]
@@ -85,14 +85,9 @@ def values(row, device):
     return None
 
 
-def row_limits(row, device):
-    """The lowest and the highest number that can be sent now."""
-    return row.range(device.channel(row.channel) if isinstance(row, Quantity) else device)
-
-
 def numbers(row, device):
     """The lowest and the highest number, or all of few."""
-    return getattr(row, "values", ()) or row_limits(row, device)
+    return getattr(row, "values", ()) or row.range(device)
 
 
 def _limits(row):
@@ -101,11 +96,11 @@ def _limits(row):
 
 def is_same(row, sent, answer):
     """Whether an answer is what was sent, as far as the kind of the row says it."""
+    if isinstance(row, Quantity):
+        return float(answer) == pytest.approx(float(sent), rel=1e-9)
     if isinstance(row, Number):
         # an instrument rounds to its digits, at least three, or to its steps: then it may be the next one
         return float(answer.rstrip("SV")) == pytest.approx(float(sent), rel=5e-3 if row.rounded is float else 0.5)
-    if isinstance(row, Quantity):
-        return float(answer) == pytest.approx(float(sent), rel=1e-9)
     if isinstance(row, Word):
         return answer in {re.sub("[a-z]", "", sent), sent.upper()}
     if isinstance(row, Switch):
@@ -120,7 +115,7 @@ def settings_of(name):
     device, found = prepared(name), {}
     for row in device.commands.rows:
         header = hostile.spellings(row.header)[0]
-        if not row.settable or not row.askable or row.header.startswith(NO_SETTING):
+        if not row.has(query=False) or not row.has(query=True) or row.header.startswith(NO_SETTING):
             continue
         answer = said(device, header)
         if not reported(device) and answer is not None and "#" not in answer:
@@ -133,8 +128,8 @@ def test_every_header_finds_its_own_row(name):
     commands = hostile.instrument(name).commands
     for row in commands.rows:
         for header in (word for word in hostile.spellings(row.header) if word.upper() not in ONE_SHORT_FORM):
-            assert not row.settable or commands.find(header) == row.set
-            assert not row.askable or commands.find(header + "?") == row.ask
+            assert not row.has(query=False) or commands.find(header) == row.set
+            assert not row.has(query=True) or commands.find(header + "?") == row.ask
 
 
 @pytest.mark.parametrize("name", FAMILIES)
@@ -170,8 +165,8 @@ def test_every_row_is_set_asked_and_reset(name):
 def test_every_number_says_its_limits_where_it_is_asked(name):
     device = reset(hostile.instrument(name))
     for row in device.commands.rows:
-        if isinstance(row, Number | Quantity):
+        if isinstance(row, Number):
             header = hostile.spellings(row.header)[0]
-            for word, limit in zip(("MIN", "MAX"), row_limits(row, device), strict=True):
+            for word, limit in zip(("MIN", "MAX"), row.range(device), strict=True):
                 answer = ask(device, f"{header}? {word}").rpartition(" ")[2]
                 assert float(answer.rstrip("SV")) == pytest.approx(limit, rel=5e-3), (header, word)
