@@ -12,14 +12,13 @@ import numpy as np
 from analysis.precession.sweep import Sweep, fit_sweep
 from analysis.spindown.fit import fit_spin_down
 from analysis.stability import wobble_resonance
-from levilab.motion.lines import lines_of, rate_for
+from levilab.motion.lines import lines_of
 from levilab.motion.lock import body_angle
 from levilab.present.document.blocks import Note, Picture
 from levilab.present.numbers import enumeration, with_sign
-from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Because, check, statement
+from levilab.reproduce.check import Because, Found, check, statement
 from levilab.reproduce.figure import counter_figure, window_figure
-from levilab.reproduce.tops import DURATION_S, MASS_KG, THESIS, Array, many, preset_at
+from levilab.reproduce.tops import DURATION_S, MASS_KG, THESIS, Array, known, many, preset_at, simulate_for_lines
 from levilab.simulator.equilibrium import modes_at, stability_of, windows_over
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
@@ -80,14 +79,13 @@ def count_fall() -> Counted:
 
 def about_window() -> list[Finding]:
     """Compare the edges of the exact window with the thesis's limits, at the mass of its simulations."""
-    found = stability_of(preset_at(ABOVE))
-    assert found.floating is not None
-    low, high = found.floating.spins[0]
+    floating = known(stability_of(preset_at(ABOVE)).floating)
+    low, high = floating.spins[0]
     lower, upper = (np.array(limits) for limits in zip(*SIMULATED_HZ.values(), strict=True))
     above = {name: limits[1] - high for name, limits in SIMULATED_HZ.items() if limits[1] > high}
     inside = [name for name in SIMULATED_HZ if name not in above]
     beyond = "; ".join(f"{name} lies {off:.2f} Hz above it" for name, off in above.items())
-    place = f"quartic, {1e3 * MASS_KG:.3f} g at {100 * found.floating.height:.2f} cm"
+    place = f"quartic, {1e3 * MASS_KG:.3f} g at {100 * floating.height:.2f} cm"
     return [
         statement(
             "the exact window of small motions: lower edge",
@@ -126,20 +124,15 @@ def _why_above(edge: float) -> str:
 def about_counter(seen: Counted) -> list[Finding]:
     """Compute how the count differs from the spin, and how that changes the exponent of the drag."""
     laws = ("disc", "power")
-    of_spin, of_count = (
-        fit_spin_down(seen.time, values, 0.003, laws=laws, tilt=False, keep_outliers=True)
-        .fit("power")
-        .parameters["exponent"]
+    fits = (
+        fit_spin_down(seen.time, values, 0.003, laws=laws, tilt=False, keep_outliers=True).fit("power")
         for values in (seen.spin, seen.count)
     )
-    assert of_spin.value is not None
-    assert of_count.value is not None
+    of_spin, of_count = (known(fit.parameters["exponent"].value) for fit in fits)
     high = seen.count - seen.spin
     rest = seen.count - seen.cosine
-    scene = preset("spindown")
-    found = stability_of(scene)
-    assert found.floating is not None
-    resonance = wobble_resonance(found.field, found.top, found.floating.height)
+    found = stability_of(preset("spindown"))
+    resonance = wobble_resonance(found.field, found.top, known(found.floating).height)
     return [
         statement(
             "what a mark on the rim counts",
@@ -154,9 +147,9 @@ def about_counter(seen: Counted) -> list[Finding]:
             "what that does to the law of drag",
             "the spin-downs' figures",
             "",
-            f"true n = 1.5: the spin ω₃ itself gives n = {of_spin.value:.2f}, the counts n = {of_count.value:.2f}; "
+            f"true n = 1.5: the spin ω₃ itself gives n = {of_spin:.2f}, the counts n = {of_count:.2f}; "
             f"the tilt grows towards the resonance at {resonance:.1f} Hz, to {seen.tilt[-1]:.3f} rad",
-            holds=abs(of_spin.value - 1.5) < 0.03 and of_count.value > of_spin.value + 0.02,
+            holds=abs(of_spin - 1.5) < 0.03 and of_count > of_spin + 0.02,
         ),
     ]
 
@@ -168,7 +161,7 @@ def about_lock() -> list[Finding]:
         scene = preset("precession").changed(
             {"drive.waveform": "sine", "drive.frequency_hz": drive, "start.spin_hz": drive, "start.tilt_rad": 0.005}
         )
-        motion = simulate(scene, HELD_S, tolerance=1e-7, rate=float(math.ceil(rate_for(scene))))
+        motion = simulate_for_lines(scene, HELD_S, 1e-7)
         lines = [line for line in lines_of(motion).lines if abs(line.frequency - drive) < 1.0]
         found.append(min(lines, key=lambda line: abs(line.frequency - drive)).frequency)
     fit = fit_sweep(Sweep(DRIVES_HZ, np.array(found), np.full(DRIVES_HZ.size, LINE_U_HZ)))

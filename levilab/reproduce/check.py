@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
+from levilab.files import finite
 from levilab.present.numbers import with_uncertainty
 from levilab.present.units import unit as unit_row
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from levilab.present.document.blocks import Block
     from levilab.stability.published.printed import Printed
 
 #: What a float loses in a difference of two numbers with few digits.
@@ -25,11 +27,11 @@ _FLOAT = 1e-9
 
 
 class Verdict(Enum):
-    """What a comparison says."""
+    """What a comparison says, in the words before its reason."""
 
     AGREES = "agrees"
-    DIFFERS = "differs, for the reason shown"
-    ADDED = "found here, nothing is published"
+    DIFFERS = "differs, because"
+    ADDED = "found here"
     UNEXPECTED = "UNEXPECTED"
 
 
@@ -41,11 +43,6 @@ class Comparison(Enum):
     FITTED = "published; fitted"
     CONSTRUCTED = "published; by construction"
     RECOMPUTED = "our second way"
-
-
-@dataclass(frozen=True)
-class Rounding:
-    """Ours is the published number within half a unit of its last digit, beside our own u."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +90,8 @@ class Because:
     tolerance: float = 0.0
 
 
-Way = Rounding | Within | Among | Because
+#: None: ours is the published number within half a unit of its last digit, beside our own u.
+Way = Within | Among | Because | None
 
 
 class Kind(Enum):
@@ -131,11 +129,28 @@ class Finding:
     values: Mapping[str, Any] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Found:
+    """What a chapter found.
+
+    Attributes:
+        findings: in their order.
+        blocks: figures, and what is said about them.
+        said: what the chapter says in a sentence or two, above its table.
+        synthetic: what in it was made up or simulated, and how; empty where nothing stands for a measurement.
+    """
+
+    findings: tuple[Finding, ...]
+    blocks: tuple[Block, ...]
+    said: str
+    synthetic: str = ""
+
+
 def check(
     name: str,
     published: Printed,
     value: float | None,
-    way: Way = Rounding(),
+    way: Way = None,
     how: Comparison = Comparison.INDEPENDENT,
     *,
     u: float | None = None,
@@ -167,7 +182,7 @@ def check(
         "published": published.value,
         "rounding": published.rounding,
         "recomputed": published.recomputed,
-        "ours": _finite(ours.value),
+        "ours": finite(ours.value),
         "u": ours.u,
         "unit": ours.unit,
     }
@@ -194,13 +209,12 @@ def _judge(published: Printed, ours: Estimate, way: Way, off: float) -> Verdict:
     if isinstance(way, Among):
         room = (published.rounding + way.step) * (1 + _FLOAT)
         return Verdict.AGREES if way.low - room <= published.value <= way.high + room else Verdict.UNEXPECTED
-    return Verdict.DIFFERS if isinstance(way, Because) and _explains(way, published) else Verdict.UNEXPECTED
-
-
-def _explains(way: Because, published: Printed) -> bool:
-    if isinstance(way.explained, bool):
-        return way.explained
-    return abs(way.explained - published.value) <= (published.rounding + way.tolerance) * (1 + _FLOAT)
+    if not isinstance(way, Because):
+        return Verdict.UNEXPECTED
+    holds = way.explained
+    if not isinstance(holds, bool):
+        holds = abs(holds - published.value) <= (published.rounding + way.tolerance) * (1 + _FLOAT)
+    return Verdict.DIFFERS if holds else Verdict.UNEXPECTED
 
 
 def erratum(
@@ -212,7 +226,7 @@ def erratum(
     truth: float,
     by_printed: float | None,
     by_corrected: float,
-    tolerance: float,
+    tolerance: float = 1e-9,
     unit: str = "",
     reading: str = "",
 ) -> Finding:
@@ -249,7 +263,7 @@ def erratum(
         Verdict.DIFFERS if is_true(by_corrected) and not is_true(by_printed) else Verdict.UNEXPECTED,
         Comparison.INDEPENDENT,
         f"{printed}; {corrected}" + (f" ({reading})" if reading else ""),
-        {"printed": _finite(by_printed), "corrected": by_corrected, "true": truth, "unit": unit},
+        {"printed": finite(by_printed), "corrected": by_corrected, "true": truth, "unit": unit},
     )
 
 
@@ -341,7 +355,3 @@ def as_document(finding: Finding) -> dict[str, Any]:
     if finding.values:
         document["values"] = dict(finding.values)
     return document
-
-
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None

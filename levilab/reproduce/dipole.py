@@ -9,8 +9,7 @@ import numpy as np
 
 from levilab.present.document.blocks import Picture
 from levilab.present.numbers import with_sign
-from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import check, statement
+from levilab.reproduce.check import Found, check, statement
 from levilab.reproduce.figure import dipole_figure
 from levilab.reproduce.tops import THESIS, Array
 from levilab.simulator.disc import nodes_of, rule_for

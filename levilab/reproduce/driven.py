@@ -8,20 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.motion.lines import lines_of, rate_for
+from levilab.motion.lines import lines_of
 from levilab.motion.lock import is_locked
 from levilab.present.document.blocks import Note, Picture
 from levilab.present.numbers import with_decimals
-from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Within, check, statement
-from levilab.reproduce.figure import Azimuth, azimuth_figure, driven_figure
-from levilab.reproduce.tops import THESIS, TOLERANCE
+from levilab.reproduce.check import Found, Within, check, statement
+from levilab.reproduce.figure import azimuth_figure, driven_figure
+from levilab.reproduce.tops import THESIS, simulate_for_lines
 from levilab.simulator.scene import preset
-from levilab.simulator.single import simulate
 
 if TYPE_CHECKING:
     from levilab.motion.lines import AxisLines
     from levilab.reproduce.check import Finding
+    from levilab.reproduce.tops import Array
     from levilab.simulator.trajectory import Trajectory
 
 #: Distances from a line within which the power of the axis is counted [Hz].
@@ -30,21 +29,12 @@ NEAR_LINES_HZ = (0.1, 1.0)
 RUN_S, WINDOW_S = THESIS["driven.duration"].value, 30.0
 
 
-def azimuth(motion: Trajectory, fastest: float) -> Azimuth:
-    """φ̇ from the state itself: φ̇ = (n × ṅ)_z/sin²θ with ṅ = L × n/I₁, which no sampling falsifies.
-
-    Args:
-        motion: of the top.
-        fastest: the highest frequency in the motion of the axis [Hz].
-    """
+def azimuth_rate(motion: Trajectory) -> Array:
+    """Return φ̇/2π from the state, shape (n,) [Hz]: φ̇ = (n × ṅ)_z/sin²θ, ṅ = L × n/I₁; no sampling falsifies it."""
     n, momentum = motion.axis, motion.angular_momentum
     turning = np.cross(momentum, n) / motion.scene.top.inertia_transverse_kg_m2
     across = n[:, 0] ** 2 + n[:, 1] ** 2
-    rate = (n[:, 0] * turning[:, 1] - n[:, 1] * turning[:, 0]) / across / (2 * math.pi)
-    near = (rate > fastest) | (rate < 0)
-    return Azimuth(
-        rate, motion.tilt, near, float(near.mean()), float(np.median(motion.tilt[near])), float(np.median(motion.tilt))
-    )
+    return np.asarray((n[:, 0] * turning[:, 1] - n[:, 1] * turning[:, 0]) / across / (2 * math.pi))
 
 
 def wave(lines: AxisLines, name: str) -> float:
@@ -65,9 +55,7 @@ def of_spin(motion: Trajectory, lines: AxisLines) -> list[Finding]:
     spin, drive = motion.spin_hz, THESIS["driven.drive"]
     turns = float(np.trapezoid(spin, motion.time)) / float(motion.time[-1])
     locked = is_locked(motion.scene, motion.states, survived=motion.survived)
-    early = lines_of(
-        simulate(motion.scene, WINDOW_S, tolerance=TOLERANCE, rate=float(math.ceil(rate_for(motion.scene))))
-    )
+    early = lines_of(simulate_for_lines(motion.scene, WINDOW_S))
     precession = wave(early, "precession")
     return [
         statement(
@@ -123,9 +111,11 @@ def power_near(lines: AxisLines, width: float) -> float:
     return float(np.sum(amplitude[near] ** 2) / np.sum(amplitude**2))
 
 
-def of_azimuth(found: Azimuth, lines: AxisLines) -> list[Finding]:
-    """Explain why φ̇ looks chaotic, and the spectrum does not."""
+def of_azimuth(rate: Array, tilt: Array, lines: AxisLines) -> list[Finding]:
+    """Explain why φ̇ looks chaotic, and the spectrum does not, from φ̇/2π [Hz] and θ [rad], shape (n,)."""
     named = [line for line in lines.lines if line.name]
+    beyond = (rate > max(line.frequency for line in named)) | (rate < 0)
+    tilt_then, tilt_ever = float(np.median(tilt[beyond])), float(np.median(tilt))
     power = sum(line.amplitude**2 for line in named)
     all_power = float(np.mean(np.abs(lines.signal[0]) ** 2)) if lines.signal else math.nan
     near = {width: power_near(lines, width) for width in NEAR_LINES_HZ}
@@ -135,17 +125,17 @@ def of_azimuth(found: Azimuth, lines: AxisLines) -> list[Finding]:
             "φ̇ of the driven top",
             "figure of the driven precession",
             "φ̇ looks chaotic",
-            f"φ̇/2π from {with_decimals(float(found.rate.min()), 0)} to {found.rate.max():.0f} Hz, far beyond any "
+            f"φ̇/2π from {with_decimals(float(rate.min()), 0)} to {rate.max():.0f} Hz, far beyond any "
             "frequency of the axis",
-            holds=bool(found.rate.max() > 100 and found.rate.min() < -20),
+            holds=bool(rate.max() > 100 and rate.min() < -20),
         ),
         statement(
             "its irregularity comes from passages near θ = 0",
             "figure of the driven precession",
             "",
-            f"φ̇ is beyond the nutation or backwards {100 * found.share:.0f} % of the time; the median tilt is then "
-            f"{1e3 * found.tilt_then:.0f} mrad, and {1e3 * found.tilt_ever:.0f} mrad at all times",
-            holds=found.tilt_then < 0.7 * found.tilt_ever,
+            f"φ̇ is beyond the nutation or backwards {100 * beyond.mean():.0f} % of the time; the median tilt is then "
+            f"{1e3 * tilt_then:.0f} mrad, and {1e3 * tilt_ever:.0f} mrad at all times",
+            holds=tilt_then < 0.7 * tilt_ever,
         ),
         statement(
             "n_x + i n_y of the same run keeps to lines",
@@ -161,11 +151,9 @@ def of_azimuth(found: Azimuth, lines: AxisLines) -> list[Finding]:
 
 def make() -> Found:
     """Make the chapter."""
-    scene = preset("driven")
-    motion = simulate(scene, RUN_S, tolerance=TOLERANCE, rate=float(math.ceil(rate_for(scene))))
+    motion = simulate_for_lines(preset("driven"), RUN_S)
     lines = lines_of(motion)
-    nutation = max(line.frequency for line in lines.lines if line.name)
-    rates = azimuth(motion, nutation)
+    rate = azimuth_rate(motion)
     pictures = (
         Picture(
             "driven",
@@ -182,7 +170,7 @@ def make() -> Found:
             "where θ is small, since the azimuth turns by half a turn when the axis passes the vertical. Below: the "
             "spectrum of n_x + i n_y of the whole run, with the names of its lines.",
             "Rate of the azimuth over time and tilt, and the spectrum of the axis",
-            partial(azimuth_figure, motion, rates, lines),
+            partial(azimuth_figure, motion, rate, lines),
             raster=True,
         ),
     )
@@ -191,4 +179,4 @@ def make() -> Found:
         "property of the coordinate, not of the motion."
     )
     said = "The thesis's driven run, 300 s without drag, with the moment tilted by 1.77°."
-    return Found((*of_spin(motion, lines), *of_azimuth(rates, lines)), (*pictures, note), said)
+    return Found((*of_spin(motion, lines), *of_azimuth(rate, motion.tilt, lines)), (*pictures, note), said)

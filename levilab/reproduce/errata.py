@@ -10,9 +10,8 @@ import numpy as np
 from analysis.field.ring import Ring
 from analysis.field.ring import on_axis as ring_on_axis
 from levilab.present.document.blocks import Note
-from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import erratum
-from levilab.reproduce.tops import ESTIMATE_KG, MASS_KG, THESIS, estimate_hz, many, preset_at, scan
+from levilab.reproduce.check import Found, erratum
+from levilab.reproduce.tops import ESTIMATE_KG, MASS_KG, THESIS, estimate_hz, known, many, preset_at, scan
 from levilab.simulator.energy import magnetic_energy
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.field import field_of, flux_density, on_axis
@@ -20,6 +19,7 @@ from levilab.simulator.kernels.motion import R, V
 from levilab.simulator.model import base_field
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
+from levilab.stability.published.printed import several
 from levilab.stability.scan import lower_limit
 
 if TYPE_CHECKING:
@@ -66,7 +66,6 @@ def centre_of_mass() -> Finding:
         truth=height / 2,
         by_printed=integral,
         by_corrected=integral / grams,
-        tolerance=1e-9,
         unit="cm",
     )
 
@@ -133,7 +132,6 @@ def thickness() -> Finding:
         truth=(flux(1e-3, h, h / 2) + flux(1e-3, h, -h / 2)) / one,
         by_printed=flux(0.5e-3, 2 * h, 0.0) / one,
         by_corrected=flux(2e-3, 2 * h, 0.0) / one,
-        tolerance=1e-9,
         reading="read as the factor from magnetisation to the strength of a thin sheet",
     )
 
@@ -165,9 +163,8 @@ def least_spin() -> Finding:
     Of the top of the first chapter, where it floats: a heavier one floats lower, in a stronger field, and needs more.
     """
     found = stability_of(preset("undriven"))
-    top = found.top
-    assert found.floating is not None
-    p = -top.moment * float(found.field(np.array([found.floating.height]))[0, 0])
+    top, height = found.top, known(found.floating).height
+    p = -top.moment * float(found.field(np.array([height]))[0, 0])
     low, high = 10.0, 40.0
     for _ in range(60):
         middle = (low + high) / 2
@@ -177,12 +174,11 @@ def least_spin() -> Finding:
         "(2.57)",
         "lacks the factor 2√(I₁/I₃) = 1.55",
         "2√(I₁P)/I₃",
-        f"least spin of a sleeping top, {1e3 * top.mass:.2f} g at {100 * found.floating.height:.2f} cm; true: where "
+        f"least spin of a sleeping top, {1e3 * top.mass:.2f} g at {100 * height:.2f} cm; true: where "
         "its roots become real",
         truth=high,
         by_printed=found.thesis_estimate,
         by_corrected=found.thesis_estimate * 2 * math.sqrt(top.transverse / top.axial),
-        tolerance=1e-9,
         unit="Hz",
         reading=f"the printed {estimate_hz():.3f} Hz are its own equation's for {1e3 * ESTIMATE_KG:.2f} g at 7.3 cm",
     )
@@ -228,7 +224,7 @@ def drag() -> list[Finding]:
     backwards = preset("friction").changed({**ON_AXIS, "start.spin_hz": -30.0})
     forwards = preset("friction").changed(ON_AXIS)
     c, spin = forwards.drag.constants[0], 2 * math.pi * 30.0
-    c2, top = several_mean("spindown.c2"), forwards.top
+    c2, top = float(np.mean([one.value for one in several("thesis", "spindown.c2")])), forwards.top
     newton = solve_ivp(lambda _, w: -c2 * w**2, (0.0, 100.0), [spin], rtol=1e-12, atol=1e-12)
     torque = rate(forwards, lambda motion: np.einsum("ij,ij->i", motion.angular_momentum, motion.axis))
     return [
@@ -251,7 +247,6 @@ def drag() -> list[Finding]:
             truth=float(newton.y[0, -1]) / (2 * math.pi),
             by_printed=1 / (1 / spin - c2 * 100.0) / (2 * math.pi),
             by_corrected=1 / (1 / spin + c2 * 100.0) / (2 * math.pi),
-            tolerance=1e-9,
             unit="Hz",
         ),
         erratum(
@@ -277,11 +272,6 @@ def drag() -> list[Finding]:
             unit="N m",
         ),
     ]
-
-
-def several_mean(name: str) -> float:
-    """Compute the mean of a printed list."""
-    return float(np.mean([THESIS[f"{name}.{k}"].value for k in range(4)]))
 
 
 def tilting() -> Finding:
@@ -343,7 +333,6 @@ def table_of_parameters() -> list[Finding]:
             truth=true,
             by_printed=None,
             by_corrected=lifted,
-            tolerance=1e-9,
             unit="g",
         ),
         erratum(
@@ -373,7 +362,6 @@ def tilt_of_moment() -> Finding:
         truth=math.degrees(math.asin(float(np.linalg.norm(torque)) / float(np.linalg.norm(moment)))),
         by_printed=THESIS["device.tilt"].value,
         by_corrected=math.degrees(math.atan2(across, along)),
-        tolerance=1e-9,
         unit="°",
     )
 

@@ -16,7 +16,7 @@ from matplotlib.patches import Patch
 from levilab.present.looks import BLACK, BLUE, GREEN, GREY, LOOKS, ORANGE, SERIES, VERMILION
 from levilab.present.numbers import with_decimals
 from levilab.present.style import STYLE, WIDE
-from levilab.reproduce.tops import MASS_KG
+from levilab.reproduce.tops import MASS_KG, known
 from levilab.stability.thesis import SIMULATED_HZ, WITH_DRAG_HZ
 
 if TYPE_CHECKING:
@@ -137,85 +137,72 @@ def window_figure(over: MassWindows, estimate: float) -> Figure:
 # --- limits ---
 
 
-@dataclass(frozen=True)
-class Scans:
-    """What the chapter of the limits simulated.
-
-    Attributes:
-        spins: of the upper scans, shape (n,) [Hz].
-        up: by start, shape (n,).
-        masses: shape (m,) [g].
-        lower: lower limits by start, shape (m,) [Hz].
-        falling: spins at the fall with drag, by start [Hz].
-        aside: places of the third start beside the axis [cm].
-        lower_aside: its lower limits [Hz].
-    """
-
-    spins: Array
-    up: Mapping[str, Flags]
-    masses: Array
-    lower: Mapping[str, Array]
-    falling: Mapping[str, Array]
-    aside: Array
-    lower_aside: Array
-
-
 @mpl.rc_context(STYLE)
-def limits_figure(shown: Scans) -> Figure:
-    """Draw scans of the upper limit, and the dependences of the lower ones."""
+def limits_figure(
+    scans: tuple[Array, Mapping[str, Flags]],
+    lower: tuple[Array, Mapping[str, Array]],
+    falling: Mapping[str, Array],
+    aside: tuple[Array, Array],
+) -> Figure:
+    """Draw scans of the upper limit, and the dependences of the lower ones.
+
+    Args:
+        scans: spins, shape (n,) [Hz], and by start which tops are up, shape (n,).
+        lower: masses, shape (m,) [g], and lower limits by start, shape (m,) [Hz].
+        falling: spins at the fall with drag, by start [Hz].
+        aside: places of the third start beside the axis [cm], and its lower limits [Hz].
+    """
     figure, panels = _figure(
         5.2, (0.085, 0.63, 0.9, 0.26), (0.085, 0.1, 0.26, 0.37), (0.49, 0.1, 0.205, 0.37), (0.785, 0.1, 0.2, 0.37)
     )
-    _draw_scans(panels[0], shown)
+    _draw_scans(panels[0], *scans)
     figure.legend(handles=[_UP, _LOST, Line2D([], [], **_THESIS, label="thesis")], loc="upper right", ncols=3)
-    _draw_lower(panels[1], shown)
-    _draw_falls(panels[2], shown)
-    _draw_aside(panels[3], shown)
+    _draw_lower(panels[1], *lower)
+    _draw_falls(panels[2], falling)
+    _draw_aside(panels[3], *aside)
     return figure
 
 
-def _draw_scans(axes: Axes, shown: Scans) -> None:
-    half = (shown.spins[1] - shown.spins[0]) / 2
-    extent = (shown.spins[0] - half, shown.spins[-1] + half)
-    for k, (name, up) in enumerate(shown.up.items()):
+def _draw_scans(axes: Axes, spins: Array, tops: Mapping[str, Flags]) -> None:
+    half = (spins[1] - spins[0]) / 2
+    extent = (spins[0] - half, spins[-1] + half)
+    for k, (name, up) in enumerate(tops.items()):
         axes.imshow(
             up[None, :].astype(float), cmap=FATES, vmin=0, vmax=1, aspect="auto", interpolation="nearest",
             extent=(*extent, k + 0.32, k - 0.32),
         )  # fmt: skip
         axes.plot(SIMULATED_HZ[name][1], k - 0.42, **_THESIS)
-    axes.set_yticks(range(len(shown.up)), list(shown.up))
+    axes.set_yticks(range(len(tops)), list(tops))
     axes.tick_params(axis="y", which="both", length=0)
-    axes.set(xlim=extent, ylim=(len(shown.up) - 0.5, -0.75), xlabel="spin at the start  [Hz]")
+    axes.set(xlim=extent, ylim=(len(tops) - 0.5, -0.75), xlabel="spin at the start  [Hz]")
     axes.spines["left"].set_visible(False)
     axes.set_title("The upper edge, scanned")
 
 
-def _draw_lower(axes: Axes, shown: Scans) -> None:
-    for (name, values), colour in zip(shown.lower.items(), SERIES, strict=False):
-        axes.plot(shown.masses, values, color=colour)
+def _draw_lower(axes: Axes, masses: Array, lower: Mapping[str, Array]) -> None:
+    for (name, values), colour in zip(lower.items(), SERIES, strict=False):
+        axes.plot(masses, values, color=colour)
         axes.axhline(SIMULATED_HZ[name][0], color=colour, linestyle=(0, (4, 2)), linewidth=0.8)
         axes.annotate(
-            name, (shown.masses[-1], SIMULATED_HZ[name][0]), (4, 0), textcoords="offset points", color=colour,
+            name, (masses[-1], SIMULATED_HZ[name][0]), (4, 0), textcoords="offset points", color=colour,
             fontsize=8, va="center", annotation_clip=False,
         )  # fmt: skip
-    axes.set(
-        xlabel="mass  [g]", ylabel="lower limit  [Hz]", ylim=(21.6, 23.3), xlim=(shown.masses[0], shown.masses[-1])
-    )
+    axes.set(xlabel="mass  [g]", ylabel="lower limit  [Hz]", ylim=(21.6, 23.3), xlim=(masses[0], masses[-1]))
     axes.set_title("Lower limit over mass")
 
 
-def _draw_falls(axes: Axes, shown: Scans) -> None:
-    for k, ((name, values), colour) in enumerate(zip(shown.falling.items(), SERIES, strict=False)):
+def _draw_falls(axes: Axes, falling: Mapping[str, Array]) -> None:
+    for k, ((name, values), colour) in enumerate(zip(falling.items(), SERIES, strict=False)):
         spread = 0.5 * (np.arange(values.size) / (values.size - 1) - 0.5)
         axes.plot(k + spread, values, ".", color=colour, markersize=3)
         axes.plot([k - 0.4, k + 0.4], [WITH_DRAG_HZ[name]] * 2, color=colour, linestyle=(0, (4, 2)))
-    axes.set_xticks(range(len(shown.falling)), list(shown.falling))
+    axes.set_xticks(range(len(falling)), list(falling))
     axes.set_ylabel("spin at the fall  [Hz]")
     axes.set_title("With drag")
 
 
-def _draw_aside(axes: Axes, shown: Scans) -> None:
-    axes.plot(shown.aside, shown.lower_aside, "o-", color=SERIES[2], markersize=3)
+def _draw_aside(axes: Axes, places: Array, lower: Array) -> None:
+    axes.plot(places, lower, "o-", color=SERIES[2], markersize=3)
     axes.axhline(SIMULATED_HZ["IC3"][0], color=SERIES[2], linestyle=(0, (4, 2)))
     for x in (0.3, 0.5):
         axes.axvline(x, color=GREY, linewidth=0.6, linestyle=":")
@@ -301,27 +288,6 @@ def driven_figure(motion: Trajectory) -> Figure:
     return figure
 
 
-@dataclass(frozen=True)
-class Azimuth:
-    """The rate of the azimuth φ of the axis.
-
-    Attributes:
-        rate: φ̇/2π, shape (n,) [Hz].
-        tilt: θ, shape (n,) [rad].
-        near: φ̇/2π is beyond the axis's own frequencies, shape (n,).
-        share: part of the time with such a rate.
-        tilt_then: median of θ then [rad].
-        tilt_ever: median of θ [rad].
-    """
-
-    rate: Array
-    tilt: Array
-    near: Flags
-    share: float
-    tilt_then: float
-    tilt_ever: float
-
-
 #: Rates of the azimuth are cut here for the figure [Hz].
 _CUT_HZ = 120.0
 #: Lines that are slower have one name together: they stand too near to each other.
@@ -329,20 +295,19 @@ _SLOW_HZ = 2.0
 
 
 @mpl.rc_context(STYLE)
-def azimuth_figure(motion: Trajectory, found: Azimuth, lines: AxisLines) -> Figure:
-    """Draw the azimuth's rate, and the spectrum of the axis."""
+def azimuth_figure(motion: Trajectory, rate: Array, lines: AxisLines) -> Figure:
+    """Draw the azimuth's rate [Hz], and the spectrum of the axis."""
     figure, panels = _figure(4.6, (0.085, 0.63, 0.5, 0.3), (0.68, 0.63, 0.305, 0.3), (0.085, 0.11, 0.9, 0.35))
     early = motion.time <= 5.0
-    rate = np.where(np.abs(found.rate) > _CUT_HZ, np.nan, found.rate)
-    panels[0].plot(motion.time[early], rate[early], color=LOOKS["precession"].colour, linewidth=0.7)
+    shown = np.where(np.abs(rate) > _CUT_HZ, np.nan, rate)
+    panels[0].plot(motion.time[early], shown[early], color=LOOKS["precession"].colour, linewidth=0.7)
     panels[0].set(xlabel="time  [s]", ylabel="φ̇/2π  [Hz]", xlim=(0, 5), ylim=(-_CUT_HZ, _CUT_HZ))
     panels[0].set_title("The rate of the azimuth")
     some = slice(None, None, 7)
-    panels[1].plot(1e3 * found.tilt[some], found.rate[some], ",", color=LOOKS["precession"].colour)
-    panels[1].set(xlabel="tilt θ  [mrad]", xlim=(0, 1e3 * found.tilt.max()), ylim=(-_CUT_HZ, _CUT_HZ))
+    panels[1].plot(1e3 * motion.tilt[some], rate[some], ",", color=LOOKS["precession"].colour)
+    panels[1].set(xlabel="tilt θ  [mrad]", xlim=(0, 1e3 * motion.tilt.max()), ylim=(-_CUT_HZ, _CUT_HZ))
     panels[1].set_title("... is large near θ = 0")
-    assert lines.spectrum is not None
-    frequency, amplitude = lines.spectrum
+    frequency, amplitude = known(lines.spectrum)
     near = (frequency > -13) & (frequency < 60)
     axes = panels[2]
     axes.semilogy(frequency[near], 1e3 * amplitude[near], color=BLUE, linewidth=0.5)
@@ -400,12 +365,8 @@ def statistics_figure(values: Array, found: Statistics, edge: float) -> Figure:
     """Draw the ten limits, and their normal quantiles."""
     from scipy.special import ndtri
 
-    assert found.mean.value is not None
-    assert found.mean.u is not None
-    assert found.scatter is not None
-    assert found.scatter.value is not None
+    mean, u, scatter = (known(value) for value in (found.mean.value, found.mean.u, known(found.scatter).value))
     figure, panels = _figure(2.9, (0.085, 0.16, 0.5, 0.75), (0.67, 0.16, 0.315, 0.75))
-    mean, u, scatter = found.mean.value, found.mean.u, found.scatter.value
     left, right = panels
     left.axhspan(mean - u, mean + u, color=LOOKS["fit"].colour, alpha=0.25, linewidth=0)
     left.axhline(mean, color=LOOKS["fit"].colour)

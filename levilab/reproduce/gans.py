@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.present.document.blocks import Note, Picture
-from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import statement
+from levilab.reproduce.check import Found, statement
 from levilab.reproduce.figure import gans_figure
-from levilab.reproduce.tops import Array, Flags, many
+from levilab.reproduce.tops import Array, known, many
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset
 from levilab.stability.published.printed import published
@@ -30,16 +29,13 @@ ABSTRACT = "abstract"
 #: field differs by the square of the half width, in parts of the radius.
 RADIUS_M, HALF_WIDTH = 0.0347, 1e-3
 MASS_KG, MOMENT_A_M2, GRAVITY = 0.02135, 0.65, 9.82
+#: √(g/R) in turns per second [Hz].
+UNIT_HZ = math.sqrt(GRAVITY / RADIUS_M) / (2 * math.pi)
 DURATION_S = 30.0
 #: Spins in √(g/R), and tilts [rad].
 SPINS, TILTS = np.linspace(4.0, 10.5, 66), np.geomspace(0.002, 0.3, 26)
 #: Tilts for the amplitude of the motion [rad].
 SMALL_TILTS = np.geomspace(1e-4, 0.02, 8)
-
-
-def unit_hz() -> float:
-    """√(g/R) in turns per second [Hz]."""
-    return math.sqrt(GRAVITY / RADIUS_M) / (2 * math.pi)
 
 
 def scene() -> Scene:
@@ -62,7 +58,7 @@ def scene() -> Scene:
             "start.velocity_m_s": [0.0, 0.0, 0.0],
             "start.precession": "none",
             "start.tilt_rad": get["tilt"],
-            "start.spin_hz": get["spin"] * unit_hz(),
+            "start.spin_hz": get["spin"] * UNIT_HZ,
         }
     )
 
@@ -90,12 +86,6 @@ def _zeros(polynomial: Any) -> list[float]:
     return [float(root.real) for root in polynomial.roots() if abs(root.imag) < 1e-9 and root.real > 1e-9]
 
 
-def survival_map() -> Flags:
-    """Return which tops are up over spin and tilt, shape (spins, tilts)."""
-    over = {"start.spin_hz": SPINS[:, None] * unit_hz(), "start.tilt_rad": TILTS[None, :]}
-    return many(scene(), over, DURATION_S).survived
-
-
 def amplitudes() -> tuple[Array, float]:
     """Return the largest distance from the axis over the start's tilt [R], and the power of the tilt it grows with."""
     found = many(scene(), {"start.tilt_rad": SMALL_TILTS}, 10.0, rate=200.0, columns=[0, 1])
@@ -107,13 +97,13 @@ def make() -> Found:
     """Make the chapter."""
     top = scene()
     found = stability_of(top)
-    assert found.floating is not None
+    floating = known(found.floating)
     window = found.lifted[-1]
     low, high = window.low / RADIUS_M, window.high / RADIUS_M
     by_hand = edges_by_hand()
-    height = found.floating.height / RADIUS_M
-    spins = [spin / unit_hz() for spin in found.floating.spins[0]]
-    up = survival_map()
+    height = floating.height / RADIUS_M
+    spins = [spin / UNIT_HZ for spin in floating.spins[0]]
+    up = many(top, {"start.spin_hz": SPINS[:, None] * UNIT_HZ, "start.tilt_rad": TILTS[None, :]}, DURATION_S).survived
     away, power = amplitudes()
     calm = SPINS[up[:, 0]]
     row = int(np.argmin(np.abs(SPINS - GANS["model.spin"].value)))

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.present.document.blocks import Note, Picture
-from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Among, Because, Comparison, Within, check, statement
-from levilab.reproduce.figure import Scans, limits_figure
-from levilab.reproduce.tops import DURATION_S, FALL_M, MASS_KG, THESIS, Array, Flags, many, preset_at, scan, survivors
+from levilab.reproduce.check import Among, Because, Comparison, Found, Within, check, statement
+from levilab.reproduce.figure import limits_figure
+from levilab.reproduce.tops import DURATION_S, FALL_M, MASS_KG, THESIS, Array, Flags, known, many, preset_at, scan
 from levilab.simulator.equilibrium import stability_of
 from levilab.stability.scan import all_up_until, last_up, lower_limit, upper_edges
 from levilab.stability.thesis import SIMULATED_HZ, STARTS
@@ -70,7 +69,7 @@ def best_mass(lower: dict[str, Array]) -> tuple[float, Array]:
 
 def upper_scan(name: str, spins: Array) -> Upper:
     """Scan for the upper limit from a start."""
-    up = survivors(preset_at(name), spins)
+    up = many(preset_at(name), {"start.spin_hz": spins}).survived
     lasts = float(many(preset_at(name), {"start.spin_hz": [SIMULATED_HZ[name][1]]}).time[0])
     return Upper(all_up_until(spins, up), last_up(spins, up), upper_edges(spins, up), up, lasts)
 
@@ -110,8 +109,7 @@ def lower_checks(lower: dict[str, Array], mass: float) -> list[Finding]:
 
 def upper_checks(uppers: dict[str, Upper]) -> list[Finding]:
     """Compare the upper limits: a single number only where no island is."""
-    edge = stability_of(preset_at("IC1")).floating
-    assert edge is not None
+    edge = known(stability_of(preset_at("IC1")).floating)
     found: list[Finding] = []
     for name, one in uppers.items():
         printed = THESIS[f"limits.upper.{name}"]
@@ -215,15 +213,7 @@ def make() -> Found:
     dragged, falling = drag_checks()
     slip, by_x = misprint(falling["IC3"])
     findings = [*lower_checks(lower, mass), *upper_checks(uppers), *dragged, *slip]
-    scans = Scans(
-        spins,
-        {name: one.up for name, one in uppers.items()},
-        1e3 * MASSES_KG,
-        lower,
-        falling,
-        100 * ASIDE_M,
-        by_x,
-    )
+    scans = spins, {name: one.up for name, one in uppers.items()}
     picture = Picture(
         "limits",
         "One mass fits four lower limits; upper limits are torn.",
@@ -233,7 +223,7 @@ def make() -> Found:
         "(dots) with the thesis's (dashes); the lower limit of IC3 over its place beside the axis, which is the "
         "printed one at 0.30 cm and not at 0.50 cm.",
         "Scans of survival over spin, and lower limits over mass, with drag, and over the place of the third start",
-        partial(limits_figure, scans),
+        partial(limits_figure, scans, (1e3 * MASSES_KG, lower), falling, (100 * ASIDE_M, by_x)),
     )
     said = (
         f"Survival over 30 s, scanned in steps of {STEP_HZ:g} Hz (lower) and {UPPER_STEP_HZ:g} Hz (upper), in the "

@@ -10,12 +10,11 @@ import numpy as np
 
 from analysis.numbers import digits
 from analysis.stability import sleeping_limit
-from levilab.motion.lines import lines_of, rate_for
+from levilab.motion.lines import lines_of
 from levilab.present.document.blocks import Picture
-from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Because, Within, check, statement
+from levilab.reproduce.check import Because, Found, Within, check, statement
 from levilab.reproduce.figure import fall_figure, paths_figure, tilted_figure
-from levilab.reproduce.tops import DURATION_S, FALL_M, THESIS, many, preset_at
+from levilab.reproduce.tops import DURATION_S, FALL_M, THESIS, known, many, preset_at, simulate_for_lines
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
@@ -61,7 +60,7 @@ def modes() -> list[Finding]:
     """Compare the lines of the calm start IC2 with the roots of the quartic."""
     scene = preset_at("IC2")
     found = stability_of(scene)
-    motion = simulate(scene, DURATION_S, tolerance=1e-8, rate=float(math.ceil(rate_for(scene))))
+    motion = simulate_for_lines(scene, DURATION_S, 1e-8)
     lines = {line.name: line.frequency for line in lines_of(motion).lines if line.name and not line.sideband}
     theory = dict(zip(("nutation", "precession"), sorted(found.modes.real, key=abs)[:1:-1], strict=True))
     off = {name: lines.get(name, math.nan) / frequency - 1 for name, frequency in theory.items()}
@@ -85,15 +84,14 @@ def compare_sleeping_limits(scene: Scene) -> tuple[float, str, bool]:
         the limit [Hz]; both in words; whether their heights alone make the difference.
     """
     own, first = stability_of(scene), stability_of(preset("undriven"))
-    assert own.floating is not None
-    assert first.floating is not None
+    here, there = known(own.floating).height, known(first.floating).height
     words = (
-        f"{own.sleeping:.2f} Hz for its {1e3 * own.top.mass:.3f} g, which float at {100 * own.floating.height:.2f} cm; "
-        f"the first chapter's {1e3 * first.top.mass:.2f} g float at {100 * first.floating.height:.2f} cm, in a weaker "
+        f"{own.sleeping:.2f} Hz for its {1e3 * own.top.mass:.3f} g, which float at {100 * here:.2f} cm; "
+        f"the first chapter's {1e3 * first.top.mass:.2f} g float at {100 * there:.2f} cm, in a weaker "
         f"field: {first.sleeping:.2f} Hz"
     )
-    there = sleeping_limit(own.field, own.top, first.floating.height)
-    return own.sleeping, words, math.isclose(there, first.sleeping, rel_tol=1e-9)
+    limit = sleeping_limit(own.field, own.top, there)
+    return own.sleeping, words, math.isclose(limit, first.sleeping, rel_tol=1e-9)
 
 
 def fall() -> tuple[Finding, Trajectory]:
@@ -169,9 +167,7 @@ def compare_tilted() -> tuple[list[Finding], tuple[Trajectory, Trajectory]]:
     motions = tuple(simulate(one, 4.0, tolerance=1e-8, rate=1000.0) for one in (scene, aligned))
     angle, norm = math.degrees(math.atan2(across, along)), math.hypot(across, along)
     printed = THESIS["device.tilt"]
-    lines = [
-        lines_of(simulate(one, 20.0, tolerance=1e-7, rate=float(math.ceil(rate_for(one))))) for one in (scene, aligned)
-    ]
+    lines = [lines_of(simulate_for_lines(one, 20.0, 1e-7)) for one in (scene, aligned)]
     spin = scene.start.spin_hz
     wobble = [max((x.amplitude for x in one.lines if abs(x.frequency - spin) < 0.05), default=0.0) for one in lines]
     found: list[Finding] = [

@@ -12,8 +12,7 @@ import numpy as np
 from analysis.stability import SymmetricTop, sleeping_limit, spin_windows
 from levilab.present.document.blocks import Note, Picture
 from levilab.present.numbers import with_sign
-from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Among, Because, check, statement
+from levilab.reproduce.check import Among, Because, Found, check, statement
 from levilab.reproduce.figure import simon_figure
 from levilab.reproduce.tops import Array, Flags, many, scan
 from levilab.simulator.field import field_of, on_axis

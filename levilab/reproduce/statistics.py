@@ -11,10 +11,9 @@ import numpy as np
 from analysis.limits import Sample, compare, summarize
 from levilab.present.document.blocks import Picture
 from levilab.present.numbers import with_sign
-from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import check, statement
+from levilab.reproduce.check import Found, check, statement
 from levilab.reproduce.figure import statistics_figure
-from levilab.reproduce.tops import THESIS
+from levilab.reproduce.tops import THESIS, known
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset
 from levilab.stability.published.printed import several
@@ -48,49 +47,41 @@ def make() -> Found:
     """Make the chapter."""
     values = np.array([one.value for one in several("thesis", "measured.limits")])
     found = summarize(Sample(values))
-    assert found.scatter is not None
-    assert found.scatter.value is not None
-    assert found.scatter.u is not None
-    assert found.mean.value is not None
-    assert found.mean.u is not None
+    scatter, mean, trend = (known(one) for one in (found.scatter, found.mean, found.trend))
+    spread, spread_u, middle, middle_u = (known(one) for one in (scatter.value, scatter.u, mean.value, mean.u))
+    trend_p = known(found.trend_p)
     w, p = normality(values)
     step = STEP_HZ / math.sqrt(12)
-    floating = stability_of(preset("undriven")).floating
-    assert floating is not None
-    edge = compare(found, "edge", floating.spins[0][0])
-    assert edge.difference.value is not None
-    assert edge.p is not None
-    assert found.trend is not None
-    assert found.trend.value is not None
-    assert found.trend_p is not None
+    edge = compare(found, "edge", known(stability_of(preset("undriven")).floating).spins[0][0])
+    above, edge_p = known(edge.difference.value), known(edge.p)
     findings: list[Finding] = [
-        check("mean of ten", THESIS["measured.mean"], found.mean.value),
+        check("mean of ten", THESIS["measured.mean"], middle),
         statement(
             "rounding to 0.1 Hz",
             THESIS["measured.limits.0"].place,
             "",
             f"adds {1e3 * step:.0f} mHz to the scatter, "
-            f"{100 * (1 - math.sqrt(1 - (step / found.scatter.value) ** 2)):.1f} % of it, and "
+            f"{100 * (1 - math.sqrt(1 - (step / spread) ** 2)):.1f} % of it, and "
             f"{1e3 * step / math.sqrt(10):.0f} mHz to the mean: nothing to correct",
-            holds=step < 0.2 * found.scatter.value,
+            holds=step < 0.2 * spread,
         ),
         statement(
             "are the ten normal?",
             THESIS["measured.limits.0"].place,
             "",
-            f"Shapiro and Wilk: W = {w:.3f}, p = {p:.2f}; no outlier; {_trend(found.trend_p)} "
-            f"({with_sign(1e3 * found.trend.value, 0)} mHz a top, p = {found.trend_p:.3f}); ten values leave the "
-            f"scatter ± {found.scatter.u:.2f} Hz",
+            f"Shapiro and Wilk: W = {w:.3f}, p = {p:.2f}; no outlier; {_trend(trend_p)} "
+            f"({with_sign(1e3 * known(trend.value), 0)} mHz a top, p = {trend_p:.3f}); ten values leave the "
+            f"scatter ± {spread_u:.2f} Hz",
             holds=p > 0.05 and not found.outliers,
         ),
         statement(
             "against the exact edge of small motions",
             THESIS["measured.mean"].place,
             "21.86 Hz measured; 14.005 Hz by its own estimate",
-            f"scatter {found.scatter.value:.2f} Hz, standard error {found.mean.u:.2f} Hz; "
-            f"{with_sign(edge.difference.value, 2)} Hz above the edge at {edge.expected:.2f} Hz (p = {edge.p:.2f}), "
-            f"{found.mean.value - THESIS['stability.estimate'].value:.1f} Hz above the estimate",
-            holds=0 < edge.difference.value < 0.5,
+            f"scatter {spread:.2f} Hz, standard error {middle_u:.2f} Hz; "
+            f"{with_sign(above, 2)} Hz above the edge at {edge.expected:.2f} Hz (p = {edge_p:.2f}), "
+            f"{middle - THESIS['stability.estimate'].value:.1f} Hz above the estimate",
+            holds=0 < above < 0.5,
         ),
     ]
     picture = Picture(

@@ -13,13 +13,6 @@ if TYPE_CHECKING:
     from levilab.reproduce.check import Finding
     from levilab.reproduce.run import Reproduction
 
-#: The words of a verdict before its reason.
-WORDS = {
-    Verdict.AGREES: "agrees",
-    Verdict.DIFFERS: "differs, because",
-    Verdict.ADDED: "found here",
-    Verdict.UNEXPECTED: "UNEXPECTED",
-}
 HEADS = ("", "compared with", "here", "agreement")
 #: Heads of the overview for those that agree.
 KINDS = {
@@ -39,7 +32,7 @@ def findings_table(title: str, findings: Sequence[Finding]) -> Table:
 
 
 def _cells(one: Finding) -> tuple[str, ...]:
-    agreement = f"{WORDS[one.verdict]}: {one.why}" if one.why else WORDS[one.verdict]
+    agreement = f"{one.verdict.value}: {one.why}" if one.why else one.verdict.value
     return f"{one.name}\n{one.place}", _comparison(one), one.ours_text, agreement
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import math
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.stability import thesis_limit
+from levilab.motion.lines import rate_for
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset, with_settings
+from levilab.simulator.single import simulate
 from levilab.stability.published.printed import published
 from levilab.stability.thesis import STARTS
 
@@ -19,7 +22,9 @@ if TYPE_CHECKING:
 
     from levilab.simulator.ensemble import Ensemble
     from levilab.simulator.scene import Scene
+    from levilab.simulator.trajectory import Trajectory
 
+T = TypeVar("T")
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -67,6 +72,12 @@ def scan(low: float, high: float, step: float) -> Array:
     return np.asarray(np.round(low + step * np.arange(round((high - low) / step) + 1), 9))
 
 
-def survivors(scene: Scene, spins: Array, duration: float = DURATION_S) -> Flags:
-    """Return which tops are still up after a time [s]."""
-    return many(scene, {"start.spin_hz": spins}, duration).survived
+def simulate_for_lines(scene: Scene, duration: float, tolerance: float = TOLERANCE) -> Trajectory:
+    """Simulate a top with samples close enough for the lines of its axis."""
+    return simulate(scene, duration, tolerance=tolerance, rate=float(math.ceil(rate_for(scene))))
+
+
+def known(value: T | None) -> T:
+    """Return a value that is there."""
+    assert value is not None
+    return value

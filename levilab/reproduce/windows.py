@@ -10,11 +10,12 @@ import numpy as np
 
 from analysis.stability import floating_mass, reduced_mass
 from levilab.present.document.blocks import Note, Picture
-from levilab.reproduce.chapter import Found
-from levilab.reproduce.check import Because, Comparison, check
+from levilab.reproduce.check import Because, Comparison, Found, check
 from levilab.reproduce.figure import Contours, contour_figure
-from levilab.reproduce.tops import ESTIMATE_KG, THESIS, estimate_hz
+from levilab.reproduce.tops import ESTIMATE_KG, THESIS, estimate_hz, known
 from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.field import flux_density
+from levilab.simulator.model import base_field
 from levilab.simulator.scene import preset
 
 if TYPE_CHECKING:
@@ -51,8 +52,7 @@ def effective_masses() -> list[Finding]:
         check(f"b = 2a: effective mass of the {word} top", THESIS[f"stability.twice_{key}"], mass * per_kg)
         for word, key, mass in (("lightest", "light", window.light), ("heaviest", "heavy", window.heavy))
     ]
-    resting = stability_of(scene.changed({"top.mass_kg": RESTING / per_kg})).floating
-    assert resting is not None
+    resting = known(stability_of(scene.changed({"top.mass_kg": RESTING / per_kg})).floating)
     height = resting.height / base.inner_radius_m
     return [*masses, check(f"b = 2a: height of the top with M = {RESTING:.4f}", THESIS["stability.twice_rest"], height)]
 
@@ -60,19 +60,18 @@ def effective_masses() -> list[Finding]:
 def device() -> list[Finding]:
     """Compare the thesis's statements on its own top: masses, height, and its estimate of the least spin."""
     found = stability_of(preset("undriven"))
-    window = found.lifted[-1]
-    assert found.floating is not None
+    window, floating = found.lifted[-1], known(found.floating)
     estimate = estimate_hz()
     lifted = floating_mass(found.field, found.top, THESIS["device.height"].value / 100)
     factor = 2 * math.sqrt(found.top.transverse / found.top.axial)
-    exact = found.floating.spins[0][0]
+    exact = floating.spins[0][0]
     true = check(
         "least spin of the thesis's own estimate against the exact one",
         THESIS["stability.estimate"],
         exact,
         Because(
             f"the estimate lacks the factor 2√(I₁/I₃) = {factor:.3f}: with it, for "
-            f"{found.scene.top.mass_kg * 1e3:.2f} g at {100 * found.floating.height:.2f} cm, where they float, it is "
+            f"{found.scene.top.mass_kg * 1e3:.2f} g at {100 * floating.height:.2f} cm, where they float, it is "
             f"{found.sleeping:.2f} Hz, the sleeping top's limit, and the sideways motion moves that to {exact:.2f} "
             f"Hz; without it, for {1e3 * ESTIMATE_KG:.2f} g at 7.3 cm, it is {estimate:.3f} Hz, as printed",
             estimate,
@@ -94,7 +93,7 @@ def device() -> list[Finding]:
         check(
             f"height of a top of {1e3 * found.scene.top.mass_kg:.2f} g",
             THESIS["device.height"],
-            100 * found.floating.height,
+            100 * floating.height,
             how=Comparison.FITTED,
         ),
         check(
@@ -109,18 +108,14 @@ def device() -> list[Finding]:
 
 def contours(scene: Scene) -> Contours:
     """Return U = mgz + |μ||B| − its value at the minimum, over r and z [J], in the exact field."""
-    from levilab.simulator.field import flux_density
-    from levilab.simulator.model import base_field
-
-    found = stability_of(scene)
-    assert found.floating is not None
+    height = known(stability_of(scene).floating).height
     r = np.linspace(-0.03, 0.03, 121)
     z = np.linspace(0.060, 0.086, 131)
     places = np.stack([*np.meshgrid(r, [0.0], z, indexing="ij")], axis=-1)[:, 0]
     field = np.linalg.norm(flux_density(base_field(scene), places), axis=-1)
     energy = scene.top.mass_kg * scene.gravity_m_s2 * z[None, :] + abs(scene.top.moment_a_m2) * field
-    rest = float(energy[60, np.argmin(np.abs(z - found.floating.height))])
-    return Contours(100 * r, 100 * z, 1e6 * (energy.T - rest), 100 * found.floating.height)
+    rest = float(energy[60, np.argmin(np.abs(z - height))])
+    return Contours(100 * r, 100 * z, 1e6 * (energy.T - rest), 100 * height)
 
 
 def make() -> Found:

@@ -14,7 +14,7 @@ from levilab.present.style import as_svg
 from levilab.reproduce import beyond, dipole, driven, errata, gans, limits, paths, simon, spindown, statistics, windows
 from levilab.reproduce.check import Because, Comparison, Kind, Verdict, check, counts
 from levilab.reproduce.table import numbers
-from levilab.reproduce.tops import THESIS, preset_at, scan, survivors
+from levilab.reproduce.tops import THESIS, many, preset_at, scan
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset
 from levilab.stability.scan import all_up_until, last_up, lower_limit, upper_edges
@@ -169,10 +169,10 @@ def test_the_edges_over_a_ring_of_dipoles_are_zeros_of_polynomials():
 
 def test_the_third_start_gives_its_limit_from_three_millimetres_and_not_from_five():
     spins = scan(22.0, 22.6, 0.05)
-    three = lower_limit(spins, survivors(preset_at("IC3"), spins))
+    three = lower_limit(spins, many(preset_at("IC3"), {"start.spin_hz": spins}).survived)
     assert three == pytest.approx(THESIS["limits.lower.IC3"].value, abs=0.05)
-    five = survivors(preset_at("IC3", "undriven", "start.position_m=[0.005,0,0.0725]"), spins)
-    assert not five.any()
+    five = many(preset_at("IC3", "undriven", "start.position_m=[0.005,0,0.0725]"), {"start.spin_hz": spins})
+    assert not five.survived.any()
 
 
 def test_an_upper_limit_that_is_torn_differs_for_that_reason_alone():

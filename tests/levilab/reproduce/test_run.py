@@ -8,22 +8,21 @@ import pytest
 
 from levilab.errors import UsageError
 from levilab.report.html.page import page_of
-from levilab.reproduce import catalogue, run
-from levilab.reproduce.chapter import Chapter, Found
-from levilab.reproduce.check import Verdict, statement
+from levilab.reproduce import run
+from levilab.reproduce.check import Found, Verdict, statement
 from levilab.reproduce.report import document_of
 from levilab.reproduce.table import numbers
 from support.commands import command
 from support.paths import ROOT
 
 
-def chapter(name: str, *, holds: bool) -> Chapter:
+def chapter(name: str, *, holds: bool) -> run.Chapter:
     found = Found((statement("<b>one</b>", "there", "it is", "we see", holds=holds),), (), "Said.", "made up")
-    return Chapter(name, f"The {name}", lambda: found)
+    return run.Chapter(name, f"The {name}", lambda: found)
 
 
 def test_chapters_come_in_their_order_and_a_wrong_name_is_refused(tmp_path):
-    assert [one.name for one in run.choose(None)] == list(catalogue.CHAPTERS)
+    assert [one.name for one in run.choose(None)] == list(run.CHAPTERS)
     assert [one.name for one in run.choose("gans,limits")] == ["limits", "gans"]
     ended = command("reproduce", "--only", "limit", cwd=tmp_path)
     assert ended.status == 2
@@ -76,7 +75,7 @@ def test_json_is_one_document_and_writes_no_report(tmp_path):
 
 
 def test_a_wrong_number_ends_the_command_with_one(monkeypatch, tmp_path):
-    monkeypatch.setitem(catalogue.CHAPTERS, "statistics", chapter("statistics", holds=False))
+    monkeypatch.setitem(run.CHAPTERS, "statistics", chapter("statistics", holds=False))
     ended = command("reproduce", "--only", "statistics", "-o", str(tmp_path / "ten.html"), cwd=tmp_path)
     assert ended.status == 1
     assert "UNEXPECTED" in ended.out
