@@ -24,8 +24,8 @@ from instruments.virtual.bench.session import LinkLost
 from instruments.virtual.core.message import Framer, Overrun
 from instruments.virtual.servers import hislip, vxi11
 from instruments.virtual.servers.clients import Disconnected, ServedInstrument
-from instruments.virtual.servers.hislip_messages import Message, Type
-from instruments.virtual.servers.xdr import pack
+from instruments.virtual.servers.hislip import Message, Type
+from instruments.virtual.servers.rpc import pack
 from support import hostile
 
 if TYPE_CHECKING:

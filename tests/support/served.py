@@ -19,9 +19,9 @@ from instruments.clock import WallClock
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.rows import Ask, Number, Own
-from instruments.virtual.servers.hislip_messages import HEADER, Type
-from instruments.virtual.servers.serial_port import HAS_PSEUDO_TERMINALS
+from instruments.virtual.servers.hislip import HEADER, Type
 from instruments.virtual.servers.server import BenchServer, ListenAt
+from instruments.virtual.servers.streams import HAS_PSEUDO_TERMINALS
 from support.waiting import HANG_GUARD_S
 
 #: What a client waits for at most [s]; a time-out that is meant to be reached [ms].

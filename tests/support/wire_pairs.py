@@ -29,8 +29,8 @@ from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.servers.serial_port import HAS_PSEUDO_TERMINALS
 from instruments.virtual.servers.server import BenchServer
+from instruments.virtual.servers.streams import HAS_PSEUDO_TERMINALS
 from support import hostile
 from support.models import FAMILIES, KIND_OF, PREPARE, ROWS
 from support.proxy import LOOPBACK, Proxy

@@ -121,25 +121,9 @@ class Serial(SerialBase):
     def _update_rts_state(self) -> None: ...
     def _update_dtr_state(self) -> None: ...
 
-    @property
-    def cts(self) -> bool:
-        """Clear to send: always."""
-        return True
-
-    @property
-    def dsr(self) -> bool:
-        """Data set ready: always."""
-        return True
-
-    @property
-    def ri(self) -> bool:
-        """Ring: never."""
-        return False
-
-    @property
-    def cd(self) -> bool:
-        """Carrier: always."""
-        return True
+    #: Clear to send, data set ready and carrier: always; ring: never.
+    cts = dsr = cd = True
+    ri = False
 
 
 @contextlib.contextmanager

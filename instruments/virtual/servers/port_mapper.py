@@ -13,8 +13,7 @@ import socket
 from typing import TYPE_CHECKING
 
 from instruments.virtual.servers.clients import Disconnected, Listener
-from instruments.virtual.servers.rpc import Program, answer, serve
-from instruments.virtual.servers.xdr import Reader, pack
+from instruments.virtual.servers.rpc import Program, Reader, answer, pack, serve
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

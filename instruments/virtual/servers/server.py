@@ -9,12 +9,10 @@ import threading
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Self
 
-from instruments.virtual.servers import serial_port
 from instruments.virtual.servers.clients import Listener, ServedInstrument
 from instruments.virtual.servers.hislip import HislipServer
-from instruments.virtual.servers.http_server import http_listener
 from instruments.virtual.servers.port_mapper import PORT, TCP, PortMapper
-from instruments.virtual.servers.socket_server import socket_listener
+from instruments.virtual.servers.streams import HAS_PSEUDO_TERMINALS, PseudoTerminal, http_listener, socket_listener
 from instruments.virtual.servers.vxi11 import ABORT, CORE, PROGRAM_VERSION, Vxi11Server
 
 if TYPE_CHECKING:
@@ -113,8 +111,8 @@ async def _listen(
         return {scheme: f"{scheme}://{host}:{await listen(serve(instrument))}"} if serve else {}
     if address.upper().startswith("ASRL"):
         resources = {"socket": f"ASRLsocket://{host}:{await listen(socket_listener(instrument))}::INSTR"}
-        if serial_port.HAS_PSEUDO_TERMINALS:
-            line = serial_port.PseudoTerminal(instrument)
+        if HAS_PSEUDO_TERMINALS:
+            line = PseudoTerminal(instrument)
             opened.push_async_callback(line.close)
             line.open()
             resources["pty"] = f"ASRL{line.name}::INSTR"

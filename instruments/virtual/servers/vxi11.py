@@ -15,8 +15,7 @@ from enum import IntEnum, IntFlag
 from typing import TYPE_CHECKING
 
 from instruments.virtual.servers.clients import CHUNK, MOST_CLIENTS, Link, Listener
-from instruments.virtual.servers.rpc import Program, serve
-from instruments.virtual.servers.xdr import Reader, pack
+from instruments.virtual.servers.rpc import Program, Reader, pack, serve
 
 if TYPE_CHECKING:
     import asyncio

@@ -11,9 +11,9 @@ import pytest
 from instruments.clock import WallClock
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.servers.clients import ServedInstrument
-from instruments.virtual.servers.hislip_messages import Type
+from instruments.virtual.servers.hislip import Type
 from instruments.virtual.servers.server import ListenAt
-from instruments.virtual.servers.socket_server import socket_listener
+from instruments.virtual.servers.streams import socket_listener
 from support.served import AT_MOST, NETWORK, Served, Thing, channels, rpc, send
 
 

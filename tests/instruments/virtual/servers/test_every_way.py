@@ -13,7 +13,7 @@ from instruments.clock import VirtualClock, WallClock
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import Fault
 from instruments.virtual.servers import clients
-from instruments.virtual.servers.hislip_messages import Type
+from instruments.virtual.servers.hislip import Type
 from instruments.virtual.servers.server import ListenAt
 from support.served import (
     ALL,

@@ -8,8 +8,7 @@ import pytest
 from instruments.clock import WallClock
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.servers.clients import Link, ServedInstrument
-from instruments.virtual.servers.hislip import Client
-from instruments.virtual.servers.hislip_messages import HEADER, LONGEST, Channel, Message, Type
+from instruments.virtual.servers.hislip import HEADER, LONGEST, Channel, Client, Message, Type
 from support.served import NETWORK, NO_ERROR, Thing, channels, header, send, until
 
 

@@ -15,9 +15,8 @@ from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.core.signal import no_signal
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.servers.clients import LINGER, Link, ServedInstrument
-from instruments.virtual.servers.hislip import HislipServer
-from instruments.virtual.servers.hislip_messages import HEADER, Type
-from instruments.virtual.servers.socket_server import TcpWire, converse
+from instruments.virtual.servers.hislip import HEADER, HislipServer, Type
+from instruments.virtual.servers.streams import socket_listener
 from instruments.virtual.servers.vxi11 import Vxi11Server
 from support.served import NETWORK, Thing
 
@@ -86,7 +85,7 @@ class Leaving:
 async def over_a_stream(instrument, messages):
     client = Leaving(b"".join(message + b"\n" for message in messages))
     client.reader.feed_eof()
-    await converse(instrument, TcpWire(client.reader, client))
+    await socket_listener(instrument)._talk(client.reader, client)
     return client.got
 
 

@@ -5,7 +5,7 @@ import contextlib
 import pytest
 import pyvisa
 
-from instruments.virtual.servers.serial_port import HAS_PSEUDO_TERMINALS
+from instruments.virtual.servers.streams import HAS_PSEUDO_TERMINALS
 from support.served import Thing, until
 
 pytestmark = pytest.mark.skipif(not HAS_PSEUDO_TERMINALS, reason="no pseudo-terminals here")
