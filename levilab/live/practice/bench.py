@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from levilab.errors import LevilabError
-from levilab.live.practice.commands import PracticeEvent, RecordRun, event_from_bytes, to_bytes
+from levilab.live.practice.commands import PracticeEvent, RecordRun
 from levilab.live.practice.process import PracticeOptions, work
 from levilab.telemetry.address import Address
 from levilab.workers.pool import Apart
@@ -80,7 +80,7 @@ class PracticeBench:
         if self._pipe is None:
             raise gone
         try:
-            self._pipe.send_bytes(to_bytes(self._number, command))
+            self._pipe.send((self._number, command))
         except (OSError, ValueError) as error:
             raise gone from error
         if isinstance(command, RecordRun):
@@ -99,7 +99,7 @@ class PracticeBench:
             try:
                 if not self._pipe.poll():
                     break
-                event = event_from_bytes(self._pipe.recv_bytes())
+                event = self._pipe.recv()
             except (EOFError, OSError):
                 event = PracticeEvent("ended", "the process of the bench is gone")
             if event.kind == "ready":

@@ -6,14 +6,12 @@ bench file.  A refusal says what was seen, what is expected and what to do.
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, TypeAdapter, ValidationError
 
 from levilab.errors import LevilabError
-from levilab.files import finite, parse_json
 from levilab.settings import Settings, in_one_line
 
 #: The speeds of the bench: seconds of it in one of the wall.
@@ -148,30 +146,3 @@ class PracticeEvent:
     scene: dict[str, Any] = field(default_factory=dict)
     port: int = 0
     token: str = ""
-
-
-def to_bytes(number: int, command: Command) -> bytes:
-    """Return the bytes of a command on its way to the bench."""
-    return json.dumps({"number": number, "command": command.model_dump(mode="json")}).encode()
-
-
-def from_bytes(data: bytes) -> tuple[int, Command]:
-    """Return number and command.  Raises CommandRefused."""
-    try:
-        table = parse_json(data.decode())
-        number, command = table["number"], table["command"]
-    except (ValueError, KeyError, TypeError) as error:
-        raise CommandRefused(f"not a command: {error}") from error
-    if type(number) is not int:
-        raise CommandRefused(f"number = {number!r}: a whole number is expected")
-    return number, command_of(command)
-
-
-def event_to_bytes(event: PracticeEvent) -> bytes:
-    """Return the bytes of an event on its way to the views."""
-    return json.dumps(finite(asdict(event))).encode()
-
-
-def event_from_bytes(data: bytes) -> PracticeEvent:
-    """Return an event of the bench, which is of this program."""
-    return PracticeEvent(**json.loads(data))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import math
 from dataclasses import dataclass, field, replace
-from functools import singledispatchmethod
+from functools import partial, singledispatchmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,8 +38,6 @@ from levilab.live.practice.commands import (
     StopRun,
     SwitchDrive,
     TuneDrive,
-    event_to_bytes,
-    from_bytes,
 )
 from levilab.present.progress import Display
 from levilab.simulator.scene import read_scene
@@ -56,7 +54,7 @@ if TYPE_CHECKING:
     from levilab.bench.bench import Bench
     from levilab.bench.wiring import Wiring
     from levilab.interruption import End
-    from levilab.live.practice.commands import Command
+    from levilab.live.practice.commands import Command, EventKind
     from levilab.simulator.scene import Scene
     from levilab.world.spin_world import World
 
@@ -179,43 +177,36 @@ def _in_words(spin: float | None) -> str:
 def work(options: PracticeOptions, pipe: Connection) -> None:
     """Run the bench until the far end of the pipe is closed, or a signal asks for the end."""
     with watching_for_end() as end:
-        report = Reporter(pipe)
         try:
             scene = read_scene(options.scene)
             clock = PacedClock(options.speed)
-            world = scene_world(scene, lambda: clock, lambda text: report(PracticeEvent("message", text)))
+            world = scene_world(scene, lambda: clock, partial(_report, pipe, "message"))
             with Publisher() as publisher:
                 PracticeProcess(options, scene, world, pipe, publisher=publisher, end=end).run()
         except (LevilabError, InstrumentError) as error:
-            report(PracticeEvent("ended", unquote(str(error))))
+            _report(pipe, "ended", unquote(str(error)))
         except Exception as error:
-            report(PracticeEvent("ended", f"{type(error).__name__}: {error}"))
+            _report(pipe, "ended", f"{type(error).__name__}: {error}")
             raise
         else:
-            report(PracticeEvent("ended", "the bench is switched off"))
+            _report(pipe, "ended", "the bench is switched off")
 
 
-class Reporter:
-    """Sends events to the process that holds the bench; where that is gone, to nowhere."""
-
-    def __init__(self, pipe: Connection) -> None:
-        self._pipe = pipe
-
-    def __call__(self, event: PracticeEvent) -> None:
-        """Send an event."""
-        with contextlib.suppress(OSError, ValueError):
-            self._pipe.send_bytes(event_to_bytes(event))
+def _report(pipe: Connection, kind: EventKind, text: str, number: int | None = None, **about: Any) -> None:
+    """Send an event to the process that holds the bench; where that is gone, to nowhere."""
+    with contextlib.suppress(OSError):
+        pipe.send(PracticeEvent(kind, text, number, **about))
 
 
 class LinesToReport(Display):
     """The display of a run that is recorded: its messages go to the person at the bench."""
 
-    def __init__(self, report: Reporter) -> None:
-        self._report = report
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell = tell
 
     def message(self, text: str) -> None:
         """Report a line."""
-        self._report(PracticeEvent("message", text))
+        self._tell(text)
 
 
 class PracticeProcess:
@@ -244,7 +235,7 @@ class PracticeProcess:
         self.world, self.clock = world, world.clock
         self.scene = scene
         self._options, self._pipe, self._publisher, self._end = options, pipe, publisher, end
-        self._report = Reporter(pipe)
+        self._report = partial(_report, pipe)
         self._wiring: Wiring = virtual_wiring(world, Limits())
         self._knobs, self._seen, self._sent = Knobs(), Seen(), Sent()
         self._bench: Bench | None = None  # open between runs
@@ -271,26 +262,23 @@ class PracticeProcess:
         """Run the bench until the end."""
         address = self._publisher.address
         said: dict[str, Any] = {"port": address.port, "token": address.token.hex()} if address else {}
-        ready = PracticeEvent("ready", f"the top of the scene {self.scene.name}", scene=self.scene.as_table(), **said)
         self._place_probe(0.072)
         while not self._over:
             with open_bench(self._wiring, tuple(self._wiring.instruments)) as bench, self._looking_at(bench):
                 self._set_up(bench)
                 if not self._is_ready:
-                    self._report(ready)
+                    text = f"the top of the scene {self.scene.name}"
+                    self._report("ready", text, scene=self.scene.as_table(), **said)
                     self._is_ready = True
                 while not self._is_called_away():
                     self._measure(bench)
-            if (wanted := self._next_run()) is not None:
-                self._record(wanted)
+            if self._wanted and not self._over:
+                self._record(self._wanted)
             self._wanted = None
 
     def _is_called_away(self) -> bool:
         """Return whether a run is to be recorded, or the bench is to end; a command may say so during a count."""
         return self._over or self._wanted is not None
-
-    def _next_run(self) -> RecordRun | None:
-        return None if self._over else self._wanted
 
     @contextlib.contextmanager
     def _looking_at(self, bench: Bench) -> Iterator[None]:
@@ -341,7 +329,7 @@ class PracticeProcess:
             self._hold.is_lost, self._text = True, ""
         low, high = sorted(FALLS_BETWEEN_HZ)
         slow = f"too slow for the spin to hold it up, as every top between {high:.0f} and {low:.0f} Hz"
-        self._report(PracticeEvent("message", f"the top fell at {spin:.1f} Hz, {slow}: put it back"))
+        self._report("message", f"the top fell at {spin:.1f} Hz, {slow}: put it back")
 
     def _saw(self, channel: str, value: float | None) -> None:
         if value is None:
@@ -375,7 +363,7 @@ class PracticeProcess:
             self._finish(f"the signal {self._end.by}")
         try:
             while not self._over and self._pipe.poll():
-                self._answer(self._pipe.recv_bytes())
+                self._answer(*self._pipe.recv())
         except (EOFError, OSError):
             self._finish("the end of the program")
 
@@ -386,17 +374,15 @@ class PracticeProcess:
         if self._session is not None:
             self._session.stop.by = self._session.stop.by or self._stopped
 
-    def _answer(self, data: bytes) -> None:
-        number = None
+    def _answer(self, number: int, command: Command) -> None:
         try:
-            number, command = from_bytes(data)
             text = self._carry_out(command)
         except (LevilabError, InstrumentError) as error:
-            self._report(PracticeEvent("refused", unquote(str(error)), number))
+            self._report("refused", unquote(str(error)), number)
         else:
             if command is self._wanted:
                 self._number = number
-            self._report(PracticeEvent("done", text, number))
+            self._report("done", text, number)
 
     def _publish(self) -> None:
         if not self._publisher.is_due():
@@ -544,7 +530,7 @@ class PracticeProcess:
             lasting: what stands in the head, where those numbers would grow old; empty: the text itself.
         """
         self._text = lasting or text
-        self._report(PracticeEvent("message", text))
+        self._report("message", text)
 
     def _free_bench(self) -> Bench:
         """Return the open bench.  Raises CommandRefused while a run is recorded."""
@@ -673,17 +659,17 @@ class PracticeProcess:
         self._seen.records.clear()  # else views get them once more when the run is over
         self._folder = ""  # a run may fail before it has one
         try:
-            run = acquire(self._request(command), LinesToReport(self._report), self._watching)
+            run = acquire(self._request(command), LinesToReport(partial(self._report, "message")), self._watching)
         except (LevilabError, InstrumentError) as error:
             text, status, folder = unquote(str(error)), "failed", self._folder
         else:
             text, status, folder = f"{run.status}: {run.count()} readings", run.status, str(run.folder)
-        self._report(PracticeEvent("recorded", text, self._number, status=status, folder=folder))
+        self._report("recorded", text, self._number, status=status, folder=folder)
         self._place_probe(self._probe_m)  # a run may have moved it
         if AFTER_A_RUN < self.clock.speed < math.inf:
             self.clock.speed = AFTER_A_RUN
             text = f"the run is over: speed {AFTER_A_RUN:g}\u00a0× again"
-            self._report(PracticeEvent("message", text))  # not in the page's head: the speed may be changed
+            self._report("message", text)  # not in the page's head: the speed may be changed
 
     @contextlib.contextmanager
     def _watching(self, session: Session[Any], wiring: Wiring) -> Iterator[Callable[[], None]]:
@@ -692,7 +678,7 @@ class PracticeProcess:
         if self._stopped:
             session.stop.by = self._stopped
         experiment = session.writer.record.experiment
-        self._report(PracticeEvent("recording", experiment, self._number, folder=self._folder))
+        self._report("recording", experiment, self._number, folder=self._folder)
         try:
             yield self.look
         except ExperimentFailed as failed:

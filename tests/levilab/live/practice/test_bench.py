@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from levilab.live.practice.bench import BenchGone, PracticeBench
-from levilab.live.practice.commands import Pause, PracticeEvent, RecordRun, event_to_bytes
+from levilab.live.practice.commands import Pause, PracticeEvent, RecordRun
 from levilab.runs.run import Run
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def test_without_a_run_the_end_waits_a_second_and_with_one_for_its_reading(tmp_p
         assert not bench.may_record
         bench.command(RecordRun(experiment="field"))
         for answer in answers:
-            far_end.send_bytes(event_to_bytes(answer))
+            far_end.send(answer)
         bench.close()
         assert bench.may_record is may_record
         assert process.did[0] == ("join 20 s" if may_record else "join 1 s")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,12 +15,12 @@ from levilab.live.practice.commands import (
     Command,
     MatchDrive,
     PlaceProbe,
+    PracticeEvent,
     PutBack,
     RecordRun,
     StopRun,
     SwitchDrive,
     TuneDrive,
-    to_bytes,
 )
 from levilab.live.practice.process import PracticeOptions, PracticeProcess
 from levilab.runs.run import Run
@@ -49,16 +48,16 @@ class Script:
             self.states.append(self.process.state())
         return self.clock.now() >= self.commands[0][0]
 
-    def recv_bytes(self) -> bytes:
+    def recv(self) -> tuple[int, Command]:
         command = self.commands[0][1]
         if command is None:
             raise EOFError
         del self.commands[0]
         self.sent += 1
-        return to_bytes(self.sent, command)
+        return self.sent, command
 
-    def send_bytes(self, data: bytes) -> None:
-        self.events.append(json.loads(data))
+    def send(self, event: PracticeEvent) -> None:
+        self.events.append(asdict(event))
 
     def said(self, kind: str) -> list[str]:
         return [event["text"] for event in self.events if event["kind"] == kind]
