@@ -94,30 +94,14 @@ class StoredTrace:
         return f"was cut short: {self.trace.codes.size} of its {self.announced} points are kept"
 
 
-def head_of(trace: Trace, number: int, time_s: float, channel: str, announced: int | None = None) -> Head:
-    """Return the head of a record.
+#: What a head and a `Trace` call alike.
+_SHARED = ("dt_s", "t0_s", "volts_per_code", "offset_v", "lowest", "highest", "none")
 
-    Args:
-        trace: the record.
-        number: in the run, from 1 on.
-        time_s: when it was taken, on the clock of the readings.
-        channel: the quantity that it shows.
-        announced: points that it is to have, where it has fewer.
-    """
-    return Head(
-        number=number,
-        time_s=time_s,
-        channel=channel,
-        scope_channel=trace.channel,
-        dt_s=trace.dt_s,
-        t0_s=trace.t0_s,
-        volts_per_code=trace.volts_per_code,
-        offset_v=trace.offset_v,
-        lowest=trace.lowest,
-        highest=trace.highest,
-        none=trace.none,
-        announced=announced,
-    )
+
+def head_of(trace: Trace, number: int, time_s: float, channel: str, announced: int | None = None) -> Head:
+    """Return the head of a record; see `StoredTrace`."""
+    about = {name: getattr(trace, name) for name in _SHARED} | {"scope_channel": trace.channel, "announced": announced}
+    return Head(number=number, time_s=time_s, channel=channel, **about)
 
 
 def begin_arriving(folder: Path, head: Head, codes: Codes) -> None:
@@ -275,15 +259,5 @@ def _load(folder: Path, record: Record) -> StoredTrace:
 
 
 def _make_trace(head: Head, codes: Codes) -> StoredTrace:
-    trace = Trace(
-        codes,
-        head.dt_s,
-        head.t0_s,
-        head.volts_per_code,
-        head.offset_v,
-        head.scope_channel,
-        head.lowest,
-        head.highest,
-        head.none,
-    )
+    trace = Trace(codes, channel=head.scope_channel, **{name: getattr(head, name) for name in _SHARED})
     return StoredTrace(head.number, head.time_s, head.channel, trace, head.announced)
