@@ -3,8 +3,8 @@
 import codecs
 import os
 import sys
-from collections.abc import Callable
-from typing import Annotated, Any, NoReturn
+from importlib import import_module
+from typing import Annotated, Any, NamedTuple, NoReturn
 
 import typer
 import typer.core
@@ -87,159 +87,108 @@ def levilab(
     """Acquire, analyze and report experiments on the Levitron."""
 
 
-@app.command(
-    cls=Later,
-    epilog="Example: levilab report sample_data/ -o report.html, or -o report.pdf --tables",
-)
-def report() -> Callable[..., None]:
-    """Report runs and simulations in one file, HTML or PDF: what was measured, with what, figures, numbers, warnings.
+class Row(NamedTuple):
+    """A command: the module of levilab.cli and the function or application in it, its help, and an example."""
 
-    A PATH is a run folder, a data file, a folder to search, a simulated motion, a sweep's NAME.zarr, or the output of
-    levilab stability --json; all of them go together.
-
-    The numbers are those that levilab analyze wrote beside the runs, of every analysis; where it wrote them elsewhere
-    (--out), give that folder or result.json.  What has no result, or one of other readings or options than the given,
-    is analyzed for the page.
-    """
-    from levilab.cli.report import report
-
-    return report
+    made_of: str
+    help: str
+    example: str = ""
 
 
-@app.command(
-    name="open", cls=Later, epilog=r'Example: levilab open my.csv --columns "t=1,f=3 \[rpm]" --keep -o my.html'
-)
-def open_files() -> Callable[..., None]:
-    """Open data files: which columns hold what, in which units; correct that, keep it, analyze and report.
+#: The commands by their names; what each is made of is imported by its call.
+COMMANDS = {
+    "report": Row(
+        "report.report",
+        """Report runs and simulations in one file, HTML or PDF: what was measured, how, figures, numbers, warnings.
 
-    Shows the files in the browser, where a click corrects them, or in the terminal with the option for each answer.
-    What is understood is analyzed, as by levilab analyze; -o writes the report.
-    """
-    from levilab.cli.open import open_files
+        A PATH is a run folder, a data file, a folder to search, a simulated motion, a sweep's NAME.zarr, or the output
+        of levilab stability --json; all of them go together.
 
-    return open_files
+        The numbers are those that levilab analyze wrote beside the runs, of every analysis; where it wrote them
+        elsewhere (--out), give that folder or result.json.  What has no result, or one of other readings or options
+        than the given, is analyzed for the page.""",
+        "levilab report sample_data/ -o report.html, or -o report.pdf --tables",
+    ),
+    "open": Row(
+        "open.open_files",
+        """Open data files: which columns hold what, in which units; correct that, keep it, analyze and report.
 
+        Shows the files in the browser, where a click corrects them, or in the terminal with the option for each answer.
+        What is understood is analyzed, as by levilab analyze; -o writes the report.""",
+        r'levilab open my.csv --columns "t=1,f=3 \[rpm]" --keep -o my.html',
+    ),
+    "runs": Row("report.runs", "List runs: when, what, status, length.", "levilab runs runs/"),
+    "simulate": Row(
+        "simulate.simulate",
+        """Simulate the motion: does the top stay up, where and how fast does it turn, which frequencies are in it.
 
-@app.command(cls=Later, epilog="Example: levilab runs runs/")
-def runs() -> Callable[..., None]:
-    """List runs: when, what, status, length."""
-    from levilab.cli.report import runs
+        The first run for a kind of scene compiles for about 2 s of processor time.  Ctrl-C ends it, and nothing is
+        written then.""",
+        "levilab simulate driven --duration 60 --set drive.frequency_hz=30.1 --out runs",
+    ),
+    "stability": Row(
+        "simulate.stability",
+        "Find where the top floats: heights, masses and spins, from the field and the theory of small motions.",
+        "levilab stability undriven --set top.mass_kg=0.0255",
+    ),
+    "sweep": Row(
+        "sweep.sweep",
+        """Map a scene over its parameters: does the top survive, and how long, at each of thousands of points.
 
-    return runs
+        Results go chunk by chunk into a store of Zarr.  Ctrl-C costs only the chunks under way, and --resume goes on.
+        The store's name instead of a scene shows its summary and draws its figure again, without simulating.""",
+        "levilab sweep undriven --sweep start.spin_hz=18:40:23 --sweep top.mass_kg=0.0250:0.0255:11 "
+        "--duration 5 --out map.zarr",
+    ),
+    "crosscheck": Row(
+        "crosscheck.crosscheck",
+        """Check the analyses: simulate, acquire through the real drivers, analyze, compare with the truth, many times.
 
+        A pull is (estimate − truth)/u.  Where estimates and uncertainties are right, pulls have the mean 0 and the
+        standard deviation 1, and 68 % of the truths lie within u.  Ends with 1 where they do not.""",
+        "levilab crosscheck spindown --trials 100",
+    ),
+    "reproduce": Row(
+        "reproduce.reproduce",
+        """Compute the tables and figures of the Levitron thesis and of two papers again: published value beside ours.
 
-@app.command(
-    cls=Later, epilog="Example: levilab simulate driven --duration 60 --set drive.frequency_hz=30.1 --out runs"
-)
-def simulate() -> Callable[..., None]:
-    """Simulate the motion: does the top stay up, where and how fast does it turn, which frequencies are in it.
+        Prints published, ours and agreement, and writes all with figures as a report.  A minute on two cores.  Ends
+        with 1 where a value neither agrees nor differs for the reason that is shown.""",
+        'levilab reproduce --only "limits,errata" -o reproduce.html',
+    ),
+    "top": Row(
+        "top.top",
+        "Calculate mass and moments of inertia of a top from its parts, taken as cylinders, with uncertainties.",
+        "levilab top sample_data/device.toml",
+    ),
+    "acquire": Row("acquire.acquire_app", "Run an experiment on the bench and write a run folder."),
+    "analyze": Row(
+        "analyze.analyze_app",
+        "Analyze runs or data files.  Without a COMMAND: each analysis that suits, as levilab analyze runs/.",
+    ),
+    "bench": Row("bench.bench_app", "Check the instruments, or serve a virtual bench to practise."),
+    "live": Row(
+        "live.live",
+        r"""Show the bench in a web browser: a run as it grows, a finished one, or with --mock a bench to play with.
 
-    The first run for a kind of scene compiles for about 2 s of processor time.  Ctrl-C ends it, and nothing is
-    written then.
-    """
-    from levilab.cli.simulate import simulate
-
-    return simulate
-
-
-@app.command(cls=Later, epilog="Example: levilab stability undriven --set top.mass_kg=0.0255")
-def stability() -> Callable[..., None]:
-    """Find where the top floats: heights, masses and spins, from the field and the theory of small motions."""
-    from levilab.cli.simulate import stability
-
-    return stability
-
-
-@app.command(
-    cls=Later,
-    epilog="Example: levilab sweep undriven --sweep start.spin_hz=18:40:23 --sweep top.mass_kg=0.0250:0.0255:11 "
-    "--duration 5 --out map.zarr",
-)
-def sweep() -> Callable[..., None]:
-    """Map a scene over its parameters: does the top survive, and how long, at each of thousands of points.
-
-    Results go chunk by chunk into a store of Zarr.  Ctrl-C costs only the chunks under way, and --resume goes on.
-    The store's name instead of a scene shows its summary and draws its figure again, without simulating.
-    """
-    from levilab.cli.sweep import sweep
-
-    return sweep
-
-
-@app.command(cls=Later, epilog="Example: levilab crosscheck spindown --trials 100")
-def crosscheck() -> Callable[..., None]:
-    """Check the analyses: simulate, acquire through the real drivers, analyze, and compare with the truth, many times.
-
-    A pull is (estimate − truth)/u.  Where estimates and uncertainties are right, pulls have the mean 0 and the standard
-    deviation 1, and 68 % of the truths lie within u.  Ends with 1 where they do not.
-    """
-    from levilab.cli.crosscheck import crosscheck
-
-    return crosscheck
-
-
-@app.command(cls=Later, epilog='Example: levilab reproduce --only "limits,errata" -o reproduce.html')
-def reproduce() -> Callable[..., None]:
-    """Compute the tables and figures of the Levitron thesis and of two papers again: published value beside ours.
-
-    Prints published, ours and agreement, and writes all with figures as a report.  A minute on two cores.  Ends with 1
-    where a value neither agrees nor differs for the reason that is shown.
-    """
-    from levilab.cli.reproduce import reproduce
-
-    return reproduce
-
-
-@app.command(cls=Later, epilog="Example: levilab top sample_data/device.toml")
-def top() -> Callable[..., None]:
-    """Calculate mass and moments of inertia of a top from its parts, taken as cylinders, with uncertainties."""
-    from levilab.cli.top import top
-
-    return top
+        A view only, in a process of its own: a run goes on when it is closed, and it can be opened again at any time.
+        No program of another machine reaches it.  Needs the extra live: pip install ".\[live]" in the clone.""",
+        "levilab live --mock",
+    ),
+    "benchmark": Row("simulate.benchmark_app", "Compare speed and error with other programs."),
+}
 
 
-@app.command(cls=Later)
-def acquire() -> typer.Typer:
-    """Run an experiment on the bench and write a run folder."""
-    from levilab.cli.acquire import acquire_app
+def _add(name: str, row: Row) -> None:
+    module, _, made = row.made_of.partition(".")
 
-    return acquire_app
-
-
-@app.command(cls=Later)
-def analyze() -> typer.Typer:
-    """Analyze runs or data files.  Without a COMMAND: each analysis that suits, as levilab analyze runs/."""
-    from levilab.cli.analyze import analyze_app
-
-    return analyze_app
+    @app.command(name, cls=Later, help=row.help, epilog=f"Example: {row.example}" if row.example else None)
+    def command() -> Any:
+        return getattr(import_module(f"levilab.cli.{module}"), made)
 
 
-@app.command(cls=Later)
-def bench() -> typer.Typer:
-    """Check the instruments, or serve a virtual bench to practise."""
-    from levilab.cli.bench import bench_app
-
-    return bench_app
-
-
-@app.command(cls=Later, epilog="Example: levilab live --mock")
-def live() -> Callable[..., None]:
-    r"""Show the bench in a web browser: a run as it grows, a finished one, or with --mock a bench to play with.
-
-    A view only, in a process of its own: a run goes on when it is closed, and it can be opened again at any time.  No
-    program of another machine reaches it.  Needs the extra live: pip install ".\[live]" in the clone.
-    """
-    from levilab.cli.live import live
-
-    return live
-
-
-@app.command(cls=Later)
-def benchmark() -> typer.Typer:
-    """Compare speed and error with other programs."""
-    from levilab.cli.simulate import benchmark_app
-
-    return benchmark_app
+for _name, _row in COMMANDS.items():
+    _add(_name, _row)
 
 
 def main() -> None:
