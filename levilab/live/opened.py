@@ -6,7 +6,6 @@ import contextlib
 import hashlib
 import re
 import secrets
-import tempfile
 import unicodedata
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
 #: The largest file that is taken in [bytes]: an hour of sound, two million rows of an oscilloscope.
 MOST_BYTES = 400 << 20
-#: Files that are open at once, the oldest goes; and letters of a name.
+#: Files that are open at once, the oldest goes; and bytes of a name: those of its results are longer, 255 at most.
 MOST_FILES, LONGEST_NAME = 64, 120
 #: What no system takes in the name of a file, and names that Windows keeps for devices.
 _REFUSED = re.compile(r'[<>:"/\\|?*\x00-\x1f\x7f]')
@@ -43,7 +42,8 @@ def plain_name(name: str) -> str:
     last = re.split(r"[/\\]", unicodedata.normalize("NFC", name))[-1]
     plain = _REFUSED.sub("_", "".join(c for c in last if c.isprintable())).strip(" .")
     stem, dot, suffix = plain.rpartition(".") if "." in plain[-12:] else (plain, "", "")
-    plain = f"{stem[: LONGEST_NAME - len(suffix) - 1]}{dot}{suffix}" or "file"
+    room = LONGEST_NAME - len(f"{dot}{suffix}".encode())
+    plain = f"{stem.encode()[:room].decode(errors='ignore')}{dot}{suffix}" or "file"
     return f"_{plain}" if _DEVICES.fullmatch(plain) else plain
 
 
@@ -94,26 +94,25 @@ class Opened:
         name = plain_name(name)
         if name.casefold().endswith(ENDING):
             raise CannotTake(f"{name} says how a data file is read: drop the data file, and correct it here")
-        size, digest = 0, hashlib.sha256()
+        size, digest, part = 0, hashlib.sha256(), self.folder / f".incoming-{secrets.token_hex(8)}"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile(dir=self.folder, prefix=".incoming-", delete=False) as file:
-                part = Path(file.name)
-                try:
-                    async for piece in pieces:
-                        size += len(piece)
-                        if size > MOST_BYTES:
-                            raise CannotTake(f"{name}: is larger than {MOST_BYTES >> 20} MB: levilab open reads it")
-                        digest.update(piece)
-                        file.write(piece)
-                    file.close()
-                    place = self._place(name, digest.hexdigest())
-                    if not place.exists():
-                        part.rename(place)
-                finally:
-                    part.unlink(missing_ok=True)
+            part.touch(0o600, exist_ok=False)
+            with part.open("wb") as file:
+                async for piece in pieces:
+                    size += len(piece)
+                    if size > MOST_BYTES:
+                        raise CannotTake(f"{name}: is larger than {MOST_BYTES >> 20} MB: levilab open reads it")
+                    digest.update(piece)
+                    file.write(piece)
+            place = self._place(name, digest.hexdigest())
+            if not place.exists():
+                part.rename(place)
         except OSError as error:
             raise CannotTake(f"{name}: cannot be kept in {self.folder} ({error.strerror})") from error
+        finally:  # the file is closed by now: Windows removes none that is open
+            with contextlib.suppress(OSError):
+                part.unlink()
         return self.add(place)
 
     def _place(self, name: str, sha256: str) -> Path:

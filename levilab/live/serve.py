@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from levilab.errors import DataError, LevilabError, UsageError
 from levilab.live.desk import Desk
@@ -27,8 +28,10 @@ if TYPE_CHECKING:
 
 #: Only programs of this machine reach it; a shared view has a second socket, for guests.
 HOST = "127.0.0.1"
-#: Pages that are open are given so long to close [s].
-_GOODBYE_S = 1
+#: Pages that are open are given so long to close [s], and a connection has so long for its first request [s].
+_GOODBYE_S, _FIRST_REQUEST_S = 1, 10.0
+#: Connections of guests at a time: 60 phones that look, and 15 that load the page; macOS allows a process 256 files.
+_MOST_OF_GUESTS = 150
 
 
 class CannotShow(LevilabError):
@@ -129,6 +132,30 @@ def serve_live(
             server.run(sockets=sockets)
 
 
+class Connection(H11Protocol):
+    """A connection that is closed where its first request does not come, or where guests have too many.
+
+    Else a program in the network, which needs no token for that, could take all that this process may have open.
+    """
+
+    def connection_made(self, transport: Any) -> None:
+        """Take a connection in, or not."""
+        super().connection_made(transport)
+        app: Any = self.config.app  # a Guard
+        connections: set[Any] = self.connections  # WebSockets, too
+        here = transport.get_extra_info("sockname")
+        is_of_guest = app.shared is not None and here[1] == app.shared[1].port
+        if is_of_guest and sum(one.server == here for one in connections) > _MOST_OF_GUESTS:
+            transport.abort()
+        else:
+            self.loop.call_later(_FIRST_REQUEST_S, self._expect_request)
+
+    def _expect_request(self) -> None:
+        cycle: Any = self.cycle  # of a request and its answer
+        if cycle is None and self in self.connections:  # where a WebSocket has taken its place
+            self.transport.close()
+
+
 def configuration(hall: Hall) -> uvicorn.Config:
     """Return how the view is served.  Raises MissingThree."""
     return uvicorn.Config(
@@ -137,6 +164,7 @@ def configuration(hall: Hall) -> uvicorn.Config:
         log_level="critical",  # else a line for each request that is no HTTP, on the terminal of a measurement
         access_log=False,
         lifespan="on",
+        http=Connection,
         ws="websockets-sansio",
         ws_max_size=1 << 16,
         server_header=False,

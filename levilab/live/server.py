@@ -185,21 +185,20 @@ class Hall:
 
     async def wait_for_news(self, watch: Watch, tick: object) -> None:
         """Return once there is news for a page, or it has waited long enough."""
-        end = time.monotonic() + PATIENCE_S
         before = self.desk.count if self.desk else 0
-        while (
-            watch.tick == tick and (not self.desk or self.desk.count == before) and (left := end - time.monotonic()) > 0
-        ):
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self.new.wait(), left)
+        await self._wait(lambda: watch.tick != tick or (self.desk is not None and self.desk.count != before))
 
     async def wait_for_answer(self, desk: Desk, number: int) -> PracticeEvent | None:
         """Return the answer of the bench for practice to a command; None if it takes longer than PATIENCE_S."""
-        end = time.monotonic() + PATIENCE_S
-        while number not in desk.answers and (left := end - time.monotonic()) > 0:
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self.new.wait(), left)
+        await self._wait(lambda: number in desk.answers)
         return desk.answers.get(number)
+
+    async def _wait(self, is_over: Callable[[], bool]) -> None:
+        """Wait for something that comes with news, PATIENCE_S at most."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(PATIENCE_S):
+                while not is_over():
+                    await self.new.wait()
 
 
 def _time_task(task: Callable[[], Running | None]) -> tuple[Running | None, float]:
@@ -259,29 +258,24 @@ class Pages:
         scene = self.hall.scene(request.query_params.get("run", ""))
         return self._json(await asyncio.to_thread(parts_for, scene))
 
-    async def of_run(self, request: Request) -> Response:
-        """Return a figure or the report of a run."""
-        name = request.path_params["run"]
-        return self._shown(self.hall.root / name if self.hall.is_run(name) else None, request.path_params["name"])
+    def _input(self, request: Request) -> Path | None:
+        """Return the run, or the data file that is open, of a request; None where there is none."""
+        name = request.path_params["input"]
+        if request.path_params["kind"] == "run":
+            return self.hall.root / name if self.hall.is_run(name) else None
+        one = self.hall.opened.files.get(name)
+        return one.path if one else None
 
-    async def of_file(self, request: Request) -> Response:
-        """Return a figure or the report of a data file that is open."""
-        one = self.hall.opened.files.get(request.path_params["file"])
-        return self._shown(one.path if one else None, request.path_params["name"])
-
-    def _shown(self, path: Path | None, name: str) -> Response:
+    async def result(self, request: Request) -> Response:
+        """Return a figure or the report of an input."""
+        path, name = self._input(request), request.path_params["name"]
         place = beside(path) if path else None
         return self._file(place.file(name), REPORT_POLICY) if place and is_shown(place, name) else _nothing()
 
     async def analysis(self, request: Request) -> Response:
-        """Return the progress of a run's analysis, and its answer."""
-        name = request.path_params["run"]
-        return self._json(self.hall.analyses.about(self.hall.root / name) if self.hall.is_run(name) else {})
-
-    async def analysis_of_file(self, request: Request) -> Response:
-        """Return the progress of the analysis of a data file that is open."""
-        one = self.hall.opened.files.get(request.path_params["file"])
-        return self._json(self.hall.analyses.about(one.path) if one else {})
+        """Return the progress of an input's analysis, and its answer."""
+        path = self._input(request)
+        return self._json(self.hall.analyses.about(path) if path else {})
 
     async def take(self, request: Request) -> Response:
         """Keep a file that is dropped into a page, and open it."""
@@ -354,12 +348,10 @@ def application(hall: Hall) -> Guard:
 
     own = [
         Route("/do", pages.do, methods=["POST"]),
-        Route("/run/{run}/analysis", pages.analysis),
-        Route("/run/{run}/{name}", pages.of_run),
         Route("/open", pages.open),
         Route("/file", pages.take, methods=["POST"]),
-        Route("/file/{file}/analysis", pages.analysis_of_file),
-        Route("/file/{file}/{name}", pages.of_file),
+        Route("/{kind}/{input}/analysis", pages.analysis),
+        Route("/{kind}/{input}/{name}", pages.result),
     ]
     shared = (Starlette(routes=_views(Pages(hall, hall.guests))), hall.guests) if hall.guests else None
     return Guard(Starlette(routes=[*_views(pages), *own], lifespan=lifespan), hall.doors, shared)

@@ -15,7 +15,7 @@ from levilab.live.serve import configuration
 from levilab.live.server import Hall
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
     from playwright.sync_api import Page
@@ -66,6 +66,14 @@ def until(page: Page, expression: str) -> Any:
         assert time.monotonic() < end, f"still not: {expression}; {page.evaluate('document.body.innerText')[:600]}"
         page.wait_for_timeout(30)
     return found
+
+
+def wait_for(condition: Callable[[], object]) -> None:
+    """Wait for something in this process."""
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
 
 
 def publish(watch: Watch, *messages: Message) -> None:

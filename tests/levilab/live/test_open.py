@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from levilab.live.opened import MOST_FILES, Opened, OpenedFile, plain_name
+from levilab.live.opened import LONGEST_NAME, MOST_FILES, Opened, OpenedFile, plain_name
 from levilab.pipelines.correction import read_correction
 from support.browser import PHONE
-from support.live_pages import address, serving, until
+from support.live_pages import address, serving, until, wait_for
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Iterator
@@ -138,6 +138,32 @@ def test_a_file_needs_the_token(hall: Hall) -> None:
     assert hall.opened.files == before
 
 
+def test_a_page_of_elsewhere_cannot_send_a_file(hall: Hall) -> None:
+    before, name = dict(hall.opened.files), {"X-Levilab-Name": "a.csv"}
+    assert request(hall, "/file", b"t,f\n", Origin="http://evil.example", **name | {"X-Levilab-Token": ""})[0] == 403
+    with pytest.raises(json.JSONDecodeError):  # DNS rebinding: turned away before anything reads it
+        request(hall, "/file", b"t,f\n", Host="evil.example", **name)
+    assert hall.opened.files == before
+
+
+def test_a_file_that_breaks_off_on_its_way_leaves_nothing(hall: Hall) -> None:
+    import socket
+
+    head = f"POST /file HTTP/1.1\r\nHost: 127.0.0.1:{hall.doors.port}\r\nX-Levilab-Token: {hall.doors.token}\r\n"
+    with socket.create_connection(("127.0.0.1", hall.doors.port)) as raw:
+        raw.sendall(f"{head}X-Levilab-Name: torn.csv\r\nContent-Length: 9999\r\n\r\nt,f\n".encode())
+        wait_for(lambda: [*hall.opened.folder.glob(".incoming*")])
+    wait_for(lambda: not [*hall.opened.folder.glob(".incoming*")])
+    assert not (hall.opened.folder / "torn.csv").exists()
+
+
+def test_a_file_replaces_a_link_and_is_not_written_through_it(hall: Hall, tmp_path: Path) -> None:
+    hall.opened.folder.mkdir(parents=True, exist_ok=True)
+    (hall.opened.folder / "link.csv").symlink_to(tmp_path / "elsewhere.csv")
+    assert request(hall, "/file", b"t,f\n", **{"X-Levilab-Name": "link.csv"})[0] == 200
+    assert not (tmp_path / "elsewhere.csv").exists()
+
+
 def test_a_file_that_is_too_large_leaves_nothing(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("levilab.live.opened.MOST_BYTES", 1000)
     status, answer = request(hall, "/file", 1001 * b"x", **{"X-Levilab-Name": "large.csv"})
@@ -184,12 +210,13 @@ def test_a_dropped_file_replaces_no_other(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["../x.csv", "/etc/passwd", "..", "", "a\x00b.csv", "con", 500 * "ü" + ".csv", "x" * 300]
+    "name",
+    ["../x.csv", "/etc/passwd", "..", "", "a\x00b.csv", "con", 500 * "ü" + ".csv", 200 * "Ж", 99 * "😀" + ".txt"],
 )
 def test_a_dropped_file_stays_in_its_folder(tmp_path: Path, name: str) -> None:
     plain = plain_name(name)
     assert (tmp_path / plain).resolve().parent == tmp_path.resolve()
-    assert 0 < len(plain.encode()) < 255
+    assert 0 < len(plain.encode()) <= LONGEST_NAME
     assert plain_name(plain) == plain
 
 

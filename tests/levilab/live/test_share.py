@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import json
 import socket
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
+from urllib.request import urlopen
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -16,7 +18,7 @@ from levilab.live.desk import Desk
 from levilab.live.practice.bench import PracticeBench
 from levilab.live.share import NoNetwork, address_in_network, code_of, who_may_look
 from support.browser import PHONE
-from support.live_pages import PATIENCE_S, GrowingRun, address_for_guests, serving, spin_down, until
+from support.live_pages import PATIENCE_S, GrowingRun, address, address_for_guests, serving, spin_down, until
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -111,6 +113,30 @@ def test_more_guests_than_are_let_in_wait(hall: Hall, monkeypatch: pytest.Monkey
             second.recv(timeout=PATIENCE_S)
     assert closed.value.rcvd is not None
     assert closed.value.rcvd.code == 1013
+
+
+def test_a_stranger_in_the_network_keeps_nobody_at_this_machine_out(
+    hall: Hall, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("levilab.live.serve._MOST_OF_GUESTS", 3)
+    there = urlsplit(address_for_guests(hall))
+    with contextlib.ExitStack() as at_end:
+        opened = [
+            at_end.enter_context(socket.create_connection((there.hostname, there.port), timeout=PATIENCE_S))
+            for _ in range(20)
+        ]
+        with contextlib.suppress(ConnectionResetError):
+            assert opened[-1].recv(1) == b""
+        with urlopen(address(hall)) as answer:
+            assert answer.status == 200
+
+
+def test_a_connection_without_a_request_is_closed(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("levilab.live.serve._FIRST_REQUEST_S", 0.05)
+    there = urlsplit(address_for_guests(hall))
+    with socket.create_connection((there.hostname, there.port), timeout=PATIENCE_S) as slow:
+        slow.sendall(b"GET / HTTP/1.1\r\nX-Slow: ")
+        assert slow.recv(1) == b""
 
 
 def test_a_phone_sees_the_practice_bench_without_its_controls(hall: Hall, watched: Callable[..., Page]) -> None:
