@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import http.client
 import json
 import socket
 import threading
 import time
 from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
 
 from levilab.live.doors import Doors, doors_for_guests
 from levilab.live.serve import configuration
 from levilab.live.server import Hall
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from playwright.sync_api import Page
@@ -57,6 +59,17 @@ def address_for_guests(hall: Hall) -> str:
     """Where a guest's page of the server is."""
     assert hall.guests
     return f"http://127.0.0.1:{hall.guests.port}/{hall.guests.token}/"
+
+
+def request(
+    there: str, path: str, body: bytes | None = None, *, method: str = "", headers: Mapping[str, str] | None = None
+) -> tuple[int, str]:
+    """Status and text of the answer to a request as it stands, at the server of an address; a body is posted."""
+    connection = http.client.HTTPConnection(urlsplit(there).netloc, timeout=PATIENCE_S)
+    with contextlib.closing(connection):
+        connection.request(method or ("GET" if body is None else "POST"), path, body, headers or {})
+        answer = connection.getresponse()
+        return answer.status, answer.read().decode("utf-8", "replace")
 
 
 def until(page: Page, expression: str) -> Any:

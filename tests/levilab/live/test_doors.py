@@ -9,7 +9,7 @@ import pytest
 
 from levilab.live.doors import Doors
 from levilab.live.practice.commands import EventKind, PracticeEvent
-from support.live_pages import PATIENCE_S, GrowingRun, address, serving
+from support.live_pages import PATIENCE_S, GrowingRun, address, request, serving
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -81,21 +81,8 @@ def hall(tmp_path_factory: pytest.TempPathFactory, bench: Bench) -> Iterator[Hal
         yield hall
 
 
-def request(hall: Hall, path: str, body: object = None, **headers: str) -> tuple[int, str]:
-    import http.client
-
-    connection = http.client.HTTPConnection("127.0.0.1", hall.doors.port, timeout=60)
-    try:
-        method = "GET" if body is None else "POST"
-        connection.request(method, path, None if body is None else json.dumps(body), headers)
-        answer = connection.getresponse()
-        return answer.status, answer.read().decode("utf-8", "replace")
-    finally:
-        connection.close()
-
-
 def test_another_name_for_this_machine_is_turned_away(hall: Hall) -> None:
-    assert request(hall, "/runs", Host="evil.example")[0] == 421
+    assert request(address(hall), "/runs", headers={"Host": "evil.example"})[0] == 421
 
 
 @pytest.mark.parametrize(
@@ -105,7 +92,7 @@ def test_another_name_for_this_machine_is_turned_away(hall: Hall) -> None:
      f"/run/{5000 * 'a'}/report.html"],
 )  # fmt: skip
 def test_nothing_but_figures_and_the_report_is_served(hall: Hall, path: str) -> None:
-    status, text = request(hall, path)
+    status, text = request(address(hall), path)
     assert (status, "secret" in text) == (404, False)
 
 
@@ -119,11 +106,12 @@ def test_a_report_is_a_page_of_no_origin(hall: Hall) -> None:
 
 
 def test_a_command_needs_the_token(hall: Hall, bench: Bench) -> None:
-    wanted = {"do": "pause", "on": True}
-    assert request(hall, "/do", wanted)[0] == 403
-    assert request(hall, "/do", wanted, **{"X-Levilab-Token": "guess"})[0] == 403
+    wanted = b'{"do": "pause", "on": true}'
+    for wrong in ({}, {"X-Levilab-Token": "guess"}):
+        assert request(address(hall), "/do", wanted, headers=wrong)[0] == 403
     assert bench.commands == []
-    assert request(hall, "/do", wanted, **{"X-Levilab-Token": hall.doors.token}) == (200, '{"number":1}')
+    right = {"X-Levilab-Token": hall.doors.token}
+    assert request(address(hall), "/do", wanted, headers=right) == (200, '{"number":1}')
     assert [(one.do, one.on) for one in bench.commands] == [("pause", True)]
 
 
@@ -133,7 +121,8 @@ def test_a_command_needs_the_token(hall: Hall, bench: Bench) -> None:
      {"do": "tune the drive", "frequency_hz": "30"}, {"do": "stop the run"}],
 )  # fmt: skip
 def test_what_is_no_command_is_refused_in_words(hall: Hall, wanted: object) -> None:
-    status, text = request(hall, "/do", wanted, **{"X-Levilab-Token": hall.doors.token})
+    right = {"X-Levilab-Token": hall.doors.token}
+    status, text = request(address(hall), "/do", json.dumps(wanted).encode(), headers=right)
     assert status in {400, 404, 409}
     assert json.loads(text)["error"]
 

@@ -12,7 +12,7 @@ import pytest
 from levilab.live.opened import LONGEST_NAME, MOST_FILES, Opened, OpenedFile, plain_name
 from levilab.pipelines.correction import read_correction
 from support.browser import PHONE
-from support.live_pages import address, serving, until, wait_for
+from support.live_pages import address, request, serving, until, wait_for
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Iterator
@@ -120,29 +120,23 @@ def test_a_page_without_the_token_opens_nothing(hall: Hall, watched: Callable[..
 # --- the server ---
 
 
-def request(hall: Hall, path: str, body: bytes, **headers: str) -> tuple[int, dict[str, Any]]:
-    import http.client
-
-    connection = http.client.HTTPConnection("127.0.0.1", hall.doors.port, timeout=60)
-    try:
-        connection.request("POST", path, body, {"X-Levilab-Token": hall.doors.token, **headers})
-        answer = connection.getresponse()
-        return answer.status, json.loads(answer.read())
-    finally:
-        connection.close()
+def post(hall: Hall, path: str, body: bytes, **headers: str) -> tuple[int, dict[str, Any]]:
+    """Status and answer to a page that has the token."""
+    status, text = request(address(hall), path, body, headers={"X-Levilab-Token": hall.doors.token, **headers})
+    return status, json.loads(text)
 
 
 def test_a_file_needs_the_token(hall: Hall) -> None:
     before = dict(hall.opened.files)
-    assert request(hall, "/file", b"t,f\n", **{"X-Levilab-Token": "guess", "X-Levilab-Name": "a.csv"})[0] == 403
+    assert post(hall, "/file", b"t,f\n", **{"X-Levilab-Token": "guess", "X-Levilab-Name": "a.csv"})[0] == 403
     assert hall.opened.files == before
 
 
 def test_a_page_of_elsewhere_cannot_send_a_file(hall: Hall) -> None:
     before, name = dict(hall.opened.files), {"X-Levilab-Name": "a.csv"}
-    assert request(hall, "/file", b"t,f\n", Origin="http://evil.example", **name | {"X-Levilab-Token": ""})[0] == 403
+    assert post(hall, "/file", b"t,f\n", Origin="http://evil.example", **name | {"X-Levilab-Token": ""})[0] == 403
     with pytest.raises(json.JSONDecodeError):  # DNS rebinding: turned away before anything reads it
-        request(hall, "/file", b"t,f\n", Host="evil.example", **name)
+        post(hall, "/file", b"t,f\n", Host="evil.example", **name)
     assert hall.opened.files == before
 
 
@@ -160,13 +154,13 @@ def test_a_file_that_breaks_off_on_its_way_leaves_nothing(hall: Hall) -> None:
 def test_a_file_replaces_a_link_and_is_not_written_through_it(hall: Hall, tmp_path: Path) -> None:
     hall.opened.folder.mkdir(parents=True, exist_ok=True)
     (hall.opened.folder / "link.csv").symlink_to(tmp_path / "elsewhere.csv")
-    assert request(hall, "/file", b"t,f\n", **{"X-Levilab-Name": "link.csv"})[0] == 200
+    assert post(hall, "/file", b"t,f\n", **{"X-Levilab-Name": "link.csv"})[0] == 200
     assert not (tmp_path / "elsewhere.csv").exists()
 
 
 def test_a_file_that_is_too_large_leaves_nothing(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("levilab.live.opened.MOST_BYTES", 1000)
-    status, answer = request(hall, "/file", 1001 * b"x", **{"X-Levilab-Name": "large.csv"})
+    status, answer = post(hall, "/file", 1001 * b"x", **{"X-Levilab-Name": "large.csv"})
     assert (status, "large.csv: is larger than" in answer["error"]) == (400, True)
     assert [path.name for path in hall.opened.folder.glob("*large*")] == []
     assert [path.name for path in hall.opened.folder.glob(".incoming*")] == []
@@ -183,7 +177,7 @@ def test_a_file_that_is_too_large_leaves_nothing(hall: Hall, monkeypatch: pytest
 def test_what_is_no_command_for_a_file_is_refused_in_words(hall: Hall, tmp_path: Path, wanted: dict[str, Any]) -> None:
     key = hall.opened.add(tmp_path / "my.csv")
     given = {name: key if value == "KEY" else value for name, value in wanted.items()}
-    status, answer = request(hall, "/do", json.dumps(given).encode())
+    status, answer = post(hall, "/do", json.dumps(given).encode())
     assert (status, bool(answer["error"])) == (400, True)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import http.client
 import json
 import socket
 from typing import TYPE_CHECKING
@@ -18,7 +17,7 @@ from levilab.live.desk import Desk
 from levilab.live.practice.bench import PracticeBench
 from levilab.live.share import NoNetwork, address_in_network, code_of, who_may_look
 from support.browser import PHONE
-from support.live_pages import PATIENCE_S, GrowingRun, address, address_for_guests, serving, spin_down, until
+from support.live_pages import PATIENCE_S, GrowingRun, address, address_for_guests, request, serving, spin_down, until
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -42,30 +41,17 @@ def hall(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
         yield hall
 
 
-def request(
-    hall: Hall, path: str, *, method: str = "GET", body: object = None, headers: dict[str, str] | None = None
-) -> tuple[int, str]:
-    """The answer at a guest's address."""
-    there = urlsplit(address_for_guests(hall))
-    connection = http.client.HTTPConnection(there.netloc, timeout=60)
-    try:
-        connection.request(method, path, json.dumps(body), headers or {})
-        answer = connection.getresponse()
-        return answer.status, answer.read().decode("utf-8", "replace")
-    finally:
-        connection.close()
-
-
 def inside(hall: Hall, path: str) -> str:
     return urlsplit(address_for_guests(hall)).path + path
 
 
 @pytest.mark.parametrize("path", ["", "runs", "parts", "page/live.js"])
 def test_a_guest_sees_what_the_view_shows(hall: Hall, path: str) -> None:
-    assert request(hall, inside(hall, path))[0] == 200
+    there = address_for_guests(hall)
+    assert request(there, inside(hall, path))[0] == 200
     for wrong in ("", "guess/", f"{hall.doors.token}/"):
-        assert request(hall, f"/{wrong}{path}")[0] == 421
-    assert request(hall, inside(hall, path), headers={"Host": "evil.example"})[0] == 421
+        assert request(there, f"/{wrong}{path}")[0] == 421
+    assert request(there, inside(hall, path), headers={"Host": "evil.example"})[0] == 421
 
 
 @pytest.mark.parametrize(
@@ -76,8 +62,8 @@ def test_a_guest_sees_what_the_view_shows(hall: Hall, path: str) -> None:
 @pytest.mark.parametrize("method", ["GET", "POST", "PUT", "DELETE"])
 def test_nothing_else_is_there_for_a_guest(hall: Hall, path: str, method: str) -> None:
     for token in (hall.doors.token, urlsplit(address_for_guests(hall)).path.strip("/")):
-        headers = {"X-Levilab-Token": token}
-        status, text = request(hall, inside(hall, path), method=method, body=COMMANDS[0], headers=headers)
+        there, headers, body = address_for_guests(hall), {"X-Levilab-Token": token}, json.dumps(COMMANDS[0]).encode()
+        status, text = request(there, inside(hall, path), body, method=method, headers=headers)
         assert status == 404
         assert "secret" not in text
 
@@ -115,7 +101,7 @@ def test_more_guests_than_are_let_in_wait(hall: Hall, monkeypatch: pytest.Monkey
     assert closed.value.rcvd.code == 1013
 
 
-def test_a_stranger_in_the_network_keeps_nobody_at_this_machine_out(
+def test_a_stranger_in_the_network_does_not_close_the_page_at_the_bench(
     hall: Hall, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("levilab.live.serve._MOST_OF_GUESTS", 3)

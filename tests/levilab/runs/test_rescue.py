@@ -208,33 +208,23 @@ def test_a_run_without_a_loss_is_not_rescued(tmp_path: Path) -> None:
 # --- what is never discarded ---
 
 
-def test_a_run_that_never_began_is_discarded(tmp_path: Path) -> None:
+def test_a_run_is_discarded_that_never_began_and_no_other(tmp_path: Path) -> None:
     with create(tmp_path, []) as writer:
         assert writer.discard()
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_run_that_holds_readings_is_not_discarded(tmp_path: Path) -> None:
     with create(tmp_path, []) as writer:
         writer.reading(row(0))
         assert not writer.discard()
-    assert times(writer.folder) == [0]
-
-
-def test_a_run_is_not_discarded_if_its_file_holds_readings(tmp_path: Path) -> None:
-    with create(tmp_path, []) as writer:
-        with (writer.folder / "readings.csv").open("a", encoding="utf-8") as file:
+    with create(tmp_path, []) as other:
+        with (other.folder / "readings.csv").open("a", encoding="utf-8") as file:
             file.write("0.0,40.0\n")  # another program's
-        assert not writer.discard()
-    assert times(writer.folder) == [0]
-
-
-def test_a_resumed_run_is_never_discarded(tmp_path: Path) -> None:
-    with create(tmp_path, []) as writer:
+        assert not other.discard()
+    with create(tmp_path, []) as resumed:
         pass
-    with RunWriter.reopen(Run.load(writer.folder)) as again:
+    with RunWriter.reopen(Run.load(resumed.folder)) as again:
         assert not again.discard()
-    assert (writer.folder / "run.json").exists()
+    assert [times(one.folder) for one in (writer, other)] == [[0], [0]]
+    assert (resumed.folder / "run.json").exists()
 
 
 def test_a_resume_at_a_bench_that_does_not_answer_keeps_the_run(tmp_path: Path) -> None:
