@@ -6,7 +6,7 @@ import math
 import threading
 from collections import deque
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any
 
 from instruments.clock import WallClock
 from instruments.ieee488 import INFINITY
@@ -74,16 +74,6 @@ class ClientLock:
         return bool(self.holders) and all(holder is not who for holder in self.holders)
 
 
-class AnswerFault(Protocol):
-    """A fault that changes answers on their way; see `faults.Fault`."""
-
-    def strikes(self, message: str) -> bool:
-        """Return whether the fault changes the answer to this message."""
-
-    def act(self, session: Session, answer: Answer) -> Answer | None:
-        """Return the answer as the fault leaves it, None where it is lost."""
-
-
 @dataclass(eq=False)
 class Session:
     """One program's link to one instrument.
@@ -98,7 +88,7 @@ class Session:
     stream: bool = False
     lock: threading.RLock = field(default_factory=threading.RLock)
     client_lock: ClientLock = field(default_factory=ClientLock)
-    faults: Sequence[AnswerFault] = ()
+    faults: Sequence[Any] = ()  # of `faults.Fault`, which change answers on their way
     unreachable_until: dict[int, float] = field(default_factory=dict)
     chunk: int = 1 << 30  # bytes of an answer handed over in one piece, at most
     lost_after: int | None = None  # bytes that still arrive before the link is lost
@@ -113,7 +103,7 @@ class Session:
 
     def _change_state(self, event: Event) -> None:
         """Go to the next state, and queue the error that the table says."""
-        self._state, error = self._table[self._state, event]
+        self._state, error = self._table.get((self._state, event), (self._state, 0))
         if self._state in {State.IDLE, State.ASKED}:
             self._answers.clear()
         if error:
@@ -179,7 +169,7 @@ class Session:
 
     def _run(self, message: str, before: Work[None] | None) -> Steps[None]:
         if before and not before.done:
-            if self.is_abort(message):
+            if self.device.is_abort(message):
                 before.cancel()
             while before.step():
                 yield
@@ -197,14 +187,10 @@ class Session:
             if waiting > MOST_ANSWERS or (waiting > 1 and sum(len(a.data) for a in self._answers) > LONGEST_ANSWER):
                 self._change_state(Event.OVERFLOW)  # the program asks and never reads
 
-    def is_abort(self, message: str) -> bool:
-        """Return whether this message aborts what the instrument works on."""
-        return self.device.is_abort(message)
-
     def bytes_are_abort(self, data: bytes, *, end: bool = True) -> bool:
         """Return whether these bytes are one whole message that aborts what the instrument works on."""
         whole = not self._framer.begun and ((end and not self.stream) or data.endswith(b"\n"))
-        return whole and self.is_abort(data.decode("latin-1"))
+        return whole and self.device.is_abort(data.decode("latin-1"))
 
     def _check_link(self) -> None:
         if self.lost_after is not None and self.lost_after <= 0:

@@ -80,7 +80,7 @@ class Job:
         """Return whether the instrument may take the message now."""
         link = self.link
         if link.instrument.working:
-            return link.session.is_abort(self.message or "") and not link.is_locked_out()
+            return link.session.device.is_abort(self.message or "") and not link.is_locked_out()
         if self.work or not link.session.stream:  # the servers of the other protocols have waited for the lock
             return True
         # on a stream answers follow each other, so the last one must have gone first

@@ -19,7 +19,7 @@ from instruments.virtual.servers.rpc import Program, Reader, pack, serve
 
 if TYPE_CHECKING:
     import asyncio
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from instruments.virtual.servers.clients import ServedInstrument
     from instruments.virtual.servers.rpc import Procedure
@@ -85,7 +85,7 @@ class Vxi11Server:
 
     def __init__(self, instrument: ServedInstrument, *, device: str = "inst0") -> None:
         self._instrument, self._device = instrument, device
-        self._links: dict[int, OpenLink] = {}
+        self.links: dict[int, OpenLink] = {}
         self._numbers = itertools.count(1)
         self.core, self.abort = Listener(instrument, self._talk), Listener(instrument, self._talk_abort)
 
@@ -104,7 +104,7 @@ class Vxi11Server:
 
     async def _device_abort(self, parameters: Reader) -> bytes:
         """End the call that waits on a link (B.7.1)."""
-        found = self._links.get(parameters.number())
+        found = self.links.get(parameters.number())
         if found is None:
             return pack(Error.INVALID_LINK)
         found.aborted = True
@@ -115,19 +115,11 @@ class Vxi11Server:
         """Create a link to the device.  Returns an error code, and the number of the link."""
         if device.lower() not in {"", self._device}:
             return Error.NOT_ACCESSIBLE, 0
-        if len(self._links) >= MOST_CLIENTS:
+        if len(self.links) >= MOST_CLIENTS:
             return Error.OUT_OF_RESOURCES, 0
-        number = next(number for number in (n & 0x7FFFFFFF for n in self._numbers) if number not in self._links)
-        self._links[number] = OpenLink(Link(self._instrument))
+        number = next(number for number in (n & 0x7FFFFFFF for n in self._numbers) if number not in self.links)
+        self.links[number] = OpenLink(Link(self._instrument))
         return Error.NONE, number
-
-    def destroy(self, number: int) -> None:
-        """Close a link, and release its lock."""
-        self._links.pop(number).link.close()
-
-    def link(self, number: int) -> OpenLink:
-        """Return the link with this number, which must exist."""
-        return self._links[number]
 
 
 class _Connection:
@@ -135,17 +127,20 @@ class _Connection:
 
     def __init__(self, server: Vxi11Server) -> None:
         self._server = server
-        self._numbers: set[int] = set()
+        self._links: dict[int, OpenLink] = {}
 
     async def linger(self) -> None:
         """Wait until the instrument has worked on the last commands."""
-        for number in self._numbers:
-            link = self._server.link(number).link
-            await link.linger(link.wait_until_done)
+        for found in self._links.values():
+            await found.link.linger(found.link.wait_until_done)
 
     def close(self) -> None:
-        for number in self._numbers:
-            self._server.destroy(number)
+        for number in list(self._links):
+            self._forget(number)
+
+    def _forget(self, number: int) -> None:
+        self._links.pop(number)
+        self._server.links.pop(number).link.close()
 
     def procedures(self) -> Mapping[int, Procedure]:
         """Return the procedures of the core channel (B.6)."""
@@ -154,17 +149,17 @@ class _Connection:
             11: self._device_write,
             12: self._device_read,
             13: self._device_read_status_byte,
-            14: self._device_trigger,
-            15: self._device_clear,
-            16: self._device_remote_or_local,
-            17: self._device_remote_or_local,
+            14: self._once_unlocked(Link.trigger),
+            15: self._once_unlocked(Link.clear),
+            16: self._once_unlocked(),  # remote and local: there is no front panel to lock
+            17: self._once_unlocked(),
             18: self._device_lock,
             19: self._device_unlock,
             20: self._device_enable_request,
-            22: self._device_do_command,
+            22: _always(Error.NOT_SUPPORTED, b""),  # device_docmd
             23: self._destroy_link,
-            25: self._create_interrupt_channel,
-            26: self._destroy_interrupt_channel,
+            25: _always(Error.NOT_SUPPORTED),  # create_intr_chan
+            26: _always(Error.CHANNEL_NOT_ESTABLISHED),  # destroy_intr_chan
         }
 
     async def _wait_for_lock(self, number: int, flags: int, lock_timeout: int) -> tuple[Error, OpenLink | None]:
@@ -178,9 +173,8 @@ class _Connection:
         Returns:
             An error code, and the link where there is no error.
         """
-        if number not in self._numbers:
+        if (found := self._links.get(number)) is None:
             return Error.INVALID_LINK, None
-        found = self._server.link(number)
         found.aborted = False
         timeout = lock_timeout / 1000 if flags & Flag.WAIT_LOCK else 0.0
         if await found.link.wait_unlocked(timeout, give_up=lambda: found.aborted):
@@ -191,8 +185,8 @@ class _Connection:
         _, wants_lock, lock_timeout = parameters.numbers(3)
         error, number = self._server.create(parameters.opaque().decode("latin-1"))
         if error == Error.NONE:
-            self._numbers.add(number)
-            if wants_lock and not await self._server.link(number).link.lock(None, lock_timeout / 1000):
+            found = self._links[number] = self._server.links[number]
+            if wants_lock and not await found.link.lock(None, lock_timeout / 1000):
                 self._forget(number)
                 error, number = Error.LOCKED_BY_ANOTHER, 0
         return pack(error, number, self._server.abort.port, LONGEST)
@@ -245,21 +239,16 @@ class _Connection:
             await found.link.catch_up()
         return pack(error, found.link.status_byte() if found else 0)
 
-    async def _device_trigger(self, parameters: Reader) -> bytes:
-        error, found = await self._generic(parameters)
-        if found:
-            found.link.trigger()
-        return pack(error)
+    def _once_unlocked(self, act: Callable[[Link], None] = lambda _link: None) -> Procedure:
+        """Return a procedure that does this with its link, once no other link has the instrument locked."""
 
-    async def _device_clear(self, parameters: Reader) -> bytes:
-        error, found = await self._generic(parameters)
-        if found:
-            found.link.clear()
-        return pack(error)
+        async def procedure(parameters: Reader) -> bytes:
+            error, found = await self._generic(parameters)
+            if found:
+                act(found.link)
+            return pack(error)
 
-    async def _device_remote_or_local(self, parameters: Reader) -> bytes:
-        error, _ = await self._generic(parameters)  # there is no front panel to lock
-        return pack(error)
+        return procedure
 
     async def _device_lock(self, parameters: Reader) -> bytes:
         number, flags, lock_timeout = parameters.numbers(3)
@@ -269,37 +258,30 @@ class _Connection:
         return pack(error)
 
     async def _device_unlock(self, parameters: Reader) -> bytes:
-        number = parameters.number()
-        if number not in self._numbers:
+        if (found := self._links.get(parameters.number())) is None:
             return pack(Error.INVALID_LINK)
-        link = self._server.link(number).link
-        if not link.has_lock():
+        if not found.link.has_lock():
             return pack(Error.NOT_LOCKED)
-        link.unlock()
+        found.link.unlock()
         return pack(Error.NONE)
 
     async def _device_enable_request(self, parameters: Reader) -> bytes:
         number, _ = parameters.numbers(2)
-        return pack(Error.NONE if number in self._numbers else Error.INVALID_LINK)
-
-    async def _device_do_command(self, parameters: Reader) -> bytes:
-        return pack(Error.NOT_SUPPORTED, b"")
+        return pack(Error.NONE if number in self._links else Error.INVALID_LINK)
 
     async def _destroy_link(self, parameters: Reader) -> bytes:
         number = parameters.number()
-        if number not in self._numbers:
+        if (found := self._links.get(number)) is None:
             return pack(Error.INVALID_LINK)
-        link = self._server.link(number).link
-        await link.linger(link.wait_until_done)  # the last commands may wait for those of other clients
+        await found.link.linger(found.link.wait_until_done)  # the last commands may wait for those of other clients
         self._forget(number)
         return pack(Error.NONE)
 
-    def _forget(self, number: int) -> None:
-        self._numbers.remove(number)
-        self._server.destroy(number)
 
-    async def _create_interrupt_channel(self, parameters: Reader) -> bytes:
-        return pack(Error.NOT_SUPPORTED)
+def _always(*results: int | bytes) -> Procedure:
+    """Return a procedure with the same results whatever its parameters."""
 
-    async def _destroy_interrupt_channel(self, parameters: Reader) -> bytes:
-        return pack(Error.CHANNEL_NOT_ESTABLISHED)
+    async def procedure(_: Reader) -> bytes:
+        return pack(*results)
+
+    return procedure
