@@ -225,7 +225,7 @@ async def _vxi11(instrument: ServedInstrument, stream: io.BytesIO) -> None:
             program = vxi11.ABORT if client is clients[2] else vxi11.CORE
             await client.send(_call(next(serial), program, data[0] if data else 0, data[1:]))
     await _ended(clients)
-    assert not server._links
+    assert not server.links
 
 
 def _call(number: int, program: int, procedure: int, parameters: bytes) -> bytes:
