@@ -10,7 +10,7 @@ operation register; a single acquisition and a digitize begin with an empty memo
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -18,13 +18,9 @@ from instruments.virtual.core.parameters import choice, number, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Text, Word, whole
 from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input
-from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from instruments.clock import Clock
-    from instruments.virtual.core.signal import Signal
     from instruments.virtual.oscilloscope.record import Record
 
 #: The fastest rate [1/s].
@@ -35,35 +31,27 @@ _RUN, _WAIT_TRIGGER, _OVERLOAD = 8, 32, 2048
 #: Points of a record for the screen.
 _FOR_SCREEN = 62_500
 
+#: The measurements as this maker spells them, and their names in `measure`: the same in capitals, but for four.
 _MEASUREMENTS = {
-    "FREQuency": "FREQUENCY",
-    "PERiod": "PERIOD",
-    "VPP": "VPP",
-    "VMAX": "VMAX",
-    "VMIN": "VMIN",
-    "VAMPlitude": "VAMPLITUDE",
-    "VTOP": "VTOP",
-    "VBASe": "VBASE",
-    "VAVerage": "VAVERAGE",
-    "VRMS": "VRMS",
-    "SDEViation": "SDEVIATION",
-    "RISetime": "RISETIME",
-    "FALLtime": "FALLTIME",
-    "PWIDth": "PWIDTH",
-    "NWIDth": "NWIDTH",
-    "DUTYcycle": "PDUTY",
-    "NDUTy": "NDUTY",
-    "OVERshoot": "OVERSHOOT",
-    "PREShoot": "PRESHOOT",
-    "XMAX": "TVMAX",
-    "XMIN": "TVMIN",
-    "AREa": "AREA",
-    "PPULses": "PPULSES",
-    "NPULses": "NPULSES",
-    "PEDGes": "PEDGES",
-    "NEDGes": "NEDGES",
-    "COUNter": "FREQUENCY",
-}
+    word: word.upper()
+    for word in (
+        *(
+            "FREQuency",
+            "PERiod",
+            "VPP",
+            "VMAX",
+            "VMIN",
+            "VAMPlitude",
+            "VTOP",
+            "VBASe",
+            "VAVerage",
+            "VRMS",
+            "SDEViation",
+        ),
+        *("RISetime", "FALLtime", "PWIDth", "NWIDth", "NDUTy", "OVERshoot", "PREShoot", "AREa"),
+        *("PPULses", "NPULses", "PEDGes", "NEDGes"),
+    )
+} | {"DUTYcycle": "PDUTY", "XMAX": "TVMAX", "XMIN": "TVMIN", "COUNter": "FREQUENCY"}
 #: Measurements whose answers are percentages.
 _PERCENT = {"PDUTY", "NDUTY", "OVERSHOOT", "PRESHOOT"}
 #: Words before the source: the interval of the measurement.
@@ -77,10 +65,6 @@ def _levels(scope: VirtualDSOX1000) -> tuple[float, float]:
     channel = scope.source_channel() or 1
     reach, middle = 6 * scope.division(channel), scope.value(f"chan{channel}_offset")
     return middle - reach, middle + reach
-
-
-def _names(scope: VirtualDSOX1000) -> str:
-    return " ".join(f"CHANnel{n}" for n in scope.channels)
 
 
 _CHANNEL: tuple[Row, ...] = (
@@ -141,7 +125,7 @@ _TIME: tuple[Row, ...] = (
 )
 _TRIGGER: tuple[Row, ...] = (
     Word("TRIGger:MODE", "trigger_mode", "EDGE GLITch PATTern TV SHOLd TRANsition SBUS1"),
-    Word("TRIGger[:EDGE]:SOURce", "trigger_source", lambda s: _names(s) + " EXTernal LINE WGEN", "CHAN1"),
+    Word("TRIGger[:EDGE]:SOURce", "trigger_source", lambda s: s.channel_words() + " EXTernal LINE WGEN", "CHAN1"),
     Word("TRIGger[:EDGE]:SLOPe", "trigger_slope", "NEGative *POSitive EITHer ALTernate"),
     Number("TRIGger[:EDGE]:LEVel", "trigger_level", 0.0, _levels, "V"),
     Do("TRIGger:LEVel:ASETup", lambda s: s.half_level()),
@@ -157,7 +141,7 @@ _TRIGGER: tuple[Row, ...] = (
 _PARTS = {"TYPE": 1, "COUNt": 3, "XINCrement": 4, "XORigin": 5, "XREFerence": 6}
 _PARTS |= {"YINCrement": 7, "YORigin": 8, "YREFerence": 9}
 _WAVEFORM: tuple[Row, ...] = (
-    Word("WAVeform:SOURce", "wav_source", lambda s: " ".join((_names(s), *_EMPTY_SOURCES)), "CHAN1"),
+    Word("WAVeform:SOURce", "wav_source", lambda s: " ".join((s.channel_words(), *_EMPTY_SOURCES)), "CHAN1"),
     Word("WAVeform:FORMat", "wav_format", "WORD *BYTE ASCii"),
     Word("WAVeform:BYTeorder", "wav_order", "LSBFirst *MSBFirst"),
     Switch("WAVeform:UNSigned", "wav_unsigned", default=True),
@@ -189,7 +173,7 @@ _REST: tuple[Row, ...] = (
 
 
 class VirtualDSOX1000(VirtualOscilloscope):
-    """A DSOX1102G: two channels, a million points, 100 MHz.  memory: points of another model's."""
+    """A DSOX1102G: two channels, a million points, 100 MHz.  memory: points of another model's; model: see the base."""
 
     identity = "KEYSIGHT TECHNOLOGIES,DSO-X 1102G,VIRTUAL,01.20.2019061038"
     queue_size = 30
@@ -199,18 +183,10 @@ class VirtualDSOX1000(VirtualOscilloscope):
     DEFAULTS: ClassVar = {"wav_points": float(_FOR_SCREEN), "measure_source": "CHAN1"}
     ROWS: ClassVar = (*_CONTROL, *_TIME, *_TRIGGER, *_WAVEFORM, *_REST)
 
-    def __init__(
-        self,
-        clock: Clock,
-        *,
-        signals: Mapping[int, Signal],
-        channels: int = 2,
-        memory: int = 1_000_000,
-        identity: str | None = None,
-    ) -> None:
+    def __init__(self, clock: Clock, *, channels: int = 2, memory: int = 1_000_000, **model: Any) -> None:
         self._memory = memory
         self._results: list[tuple[str, int]] = []
-        super().__init__(clock, signals=signals, channels=channels, identity=identity)
+        super().__init__(clock, channels=channels, **model)
 
     def spell(self, value: float) -> str:
         """Return a number with seven digits, as in the preamble of a real one."""
@@ -230,7 +206,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
         """Raise ScpiError in roll and XY mode, where there is no record."""
         if self.settings["time_mode"] in {"ROLL", "XY"}:
             raise ScpiError(-221)
-        words = (*(f"CHANnel{n}" for n in self.channels), *_EMPTY_SOURCES)
+        words = (*self.channel_words().split(), *_EMPTY_SOURCES)
         for source in parameters[:5]:
             word = choice(source, words)
             if word.startswith("CHAN"):
@@ -386,20 +362,14 @@ class VirtualDSOX1000(VirtualOscilloscope):
         )
         form = str(self.settings["wav_format"])
         if form == "ASC":
-            return self.block(self._as_text(record, channel, codes.astype(float)))
+            volts = record.inputs[channel].shown(codes) if channel else np.full(points, 9.9e37)  # no sample
+            return self.block(",".join(f"{v:+.5E}" for v in volts).encode())
         signed = 0 if self.settings["wav_unsigned"] else self.middle
         shifted = codes.astype(np.int32) - signed
         if form == "WORD":
             order = "<" if self.settings["wav_order"] == "LSBF" else ">"
             return self.block((256 * shifted).astype(f"{order}i4").astype(f"{order}u2").tobytes())
         return self.block(shifted.astype(np.uint8).tobytes())
-
-    @staticmethod
-    def _as_text(record: Record, channel: int, codes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> bytes:
-        if not channel:  # no sample
-            return ",".join(["+9.90000E+37"] * codes.size).encode()
-        scale = record.inputs[channel]
-        return ",".join(f"{v:+.5E}" for v in (codes - scale.zero) * scale.volts_per_code).encode()
 
     # --- measurements and pictures ---
 
@@ -442,9 +412,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
         if len(parameters) > 2:
             raise ScpiError(-108)
         form, palette = (*parameters, *("BMP", "COLor")[len(parameters) :])
-        writers = {"BMP": bmp24, "BMP8": bmp8, "PNG": png}
-        write = writers[choice(form, ("BMP", "BMP8bit", "PNG"))]
-        picture = draw(self.traces_on_screen(), columns=self.columns)
-        grey_wanted = choice(palette, ("COLor", "GRAYscale", "MONochrome")) != "COL"
-        picture = grey(picture) if grey_wanted else picture
-        return self.block(write(255 - picture if self.settings["ink_saver"] else picture))
+        form = {"BMP": "BMP24", "BMP8": "BMP8", "PNG": "PNG"}[choice(form, ("BMP", "BMP8bit", "PNG"))]
+        colour = choice(palette, ("COLor", "GRAYscale", "MONochrome")) == "COL"
+        return self.block(self.screenshot(form, colour=colour, inverted=bool(self.settings["ink_saver"])))

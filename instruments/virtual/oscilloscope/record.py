@@ -55,6 +55,10 @@ class Input:
         codes = np.rint(self.volts(start, step, n) / self.volts_per_code) + self.zero
         return np.asarray(np.clip(codes, self.lowest, self.highest), dtype=np.uint8)
 
+    def shown(self, codes: Codes) -> NDArray[np.float64]:
+        """Return the voltages that codes stand for."""
+        return (codes.astype(np.float64) - self.zero) * self.volts_per_code
+
 
 @dataclass(frozen=True, eq=False)
 class Record:

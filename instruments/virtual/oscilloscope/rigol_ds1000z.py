@@ -15,7 +15,6 @@ from instruments.virtual.core.parameters import boolean, choice, limit, number, 
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Word, whole
 from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input, one_two_five
-from instruments.virtual.oscilloscope.screenshot import bmp8, bmp24, draw, grey, png
 
 if TYPE_CHECKING:
     from instruments.virtual.oscilloscope.record import Codes, Record
@@ -28,43 +27,17 @@ _ON_SCREEN = 1200
 #: Points that one block may have, by format.
 _LONGEST = {"BYTE": 250_000, "WORD": 125_000, "ASC": 15_625}
 
-#: The items of :MEASure:ITEM as this maker spells them, and their names here.
+#: The items of :MEASure:ITEM as this maker spells them, and their names in `measure`: most are the same in capitals.
 _ITEMS = {
-    "VMAX": "VMAX",
-    "VMIN": "VMIN",
-    "VPP": "VPP",
-    "VTOP": "VTOP",
-    "VBASe": "VBASE",
-    "VAMP": "VAMPLITUDE",
-    "VAVG": "VAVERAGE",
-    "VRMS": "VRMS",
-    "PVRMS": "PVRMS",
-    "VARIance": "VARIANCE",
-    "VUPPer": "VUPPER",
-    "VUP": "VUPPER",
-    "VMID": "VMID",
-    "VLOWer": "VLOWER",
-    "OVERshoot": "OVERSHOOT",
-    "PREShoot": "PRESHOOT",
-    "MARea": "AREA",
-    "MPARea": "PERIODAREA",
-    "PERiod": "PERIOD",
-    "FREQuency": "FREQUENCY",
-    "RTIMe": "RISETIME",
-    "FTIMe": "FALLTIME",
-    "PWIDth": "PWIDTH",
-    "NWIDth": "NWIDTH",
-    "PDUTy": "PDUTY",
-    "NDUTy": "NDUTY",
-    "TVMAX": "TVMAX",
-    "TVMIN": "TVMIN",
-    "PSLEWrate": "PSLEWRATE",
-    "NSLEWrate": "NSLEWRATE",
-    "PPULses": "PPULSES",
-    "NPULses": "NPULSES",
-    "PEDGes": "PEDGES",
-    "NEDGes": "NEDGES",
+    word: word.upper()
+    for word in (
+        *("VMAX", "VMIN", "VPP", "VTOP", "VBASe", "VRMS", "PVRMS", "VARIance", "VUPPer", "VMID", "VLOWer"),
+        *("OVERshoot", "PREShoot", "PERiod", "FREQuency", "PWIDth", "NWIDth", "PDUTy", "NDUTy", "TVMAX", "TVMIN"),
+        *("PSLEWrate", "NSLEWrate", "PPULses", "NPULses", "PEDGes", "NEDGes"),
+    )
 }
+_ITEMS |= {"VAMP": "VAMPLITUDE", "VAVG": "VAVERAGE", "VUP": "VUPPER", "MARea": "AREA", "MPARea": "PERIODAREA"}
+_ITEMS |= {"RTIMe": "RISETIME", "FTIMe": "FALLTIME"}
 _WORDS = tuple(_ITEMS)
 _STATISTICS = ("MAXimum", "MINimum", "CURRent", "AVERages", "DEViation")
 
@@ -82,10 +55,6 @@ def _levels(scope: VirtualDS1000Z) -> tuple[float, float]:
     channel = scope.source_channel() or 1
     reach, offset = 5 * scope.division(channel), scope.value(f"chan{channel}_offset")
     return -reach - offset, reach - offset
-
-
-def _names(scope: VirtualDS1000Z) -> str:
-    return " ".join(f"CHANnel{n}" for n in scope.channels)
 
 
 _CHANNEL: tuple[Row, ...] = (
@@ -129,7 +98,7 @@ _TIME: tuple[Row, ...] = (
 )
 _TRIGGER: tuple[Row, ...] = (
     Word("TRIGger:MODE", "trigger_mode", "EDGE PULSe SLOPe VIDeo TIMeout"),
-    Word("TRIGger:EDGe:SOURce", "trigger_source", lambda s: _names(s) + " EXT EXT5 ACLine", "CHAN1"),
+    Word("TRIGger:EDGe:SOURce", "trigger_source", lambda s: s.channel_words() + " EXT EXT5 ACLine", "CHAN1"),
     Word("TRIGger:EDGe:SLOPe", "trigger_slope", "POSitive NEGative RFALl"),
     Number("TRIGger[:EDGe]:LEVel", "trigger_level", 0.0, _levels, "V"),
     Word("TRIGger:SWEep", "trigger_sweep", "AUTO NORMal SINGle"),
@@ -141,7 +110,7 @@ _TRIGGER: tuple[Row, ...] = (
 )
 _PARTS = ("XINCrement", "XORigin", "XREFerence", "YINCrement", "YORigin", "YREFerence")
 _WAVEFORM: tuple[Row, ...] = (
-    Word("WAVeform:SOURce", "wav_source", _names, "CHAN1"),
+    Word("WAVeform:SOURce", "wav_source", VirtualOscilloscope.channel_words, "CHAN1"),
     Word("WAVeform:MODE", "wav_mode", "NORMal MAXimum RAW"),
     Word("WAVeform:FORMat", "wav_format", "WORD *BYTE ASCii"),
     whole("WAVeform:STARt", "wav_start", 1.0, (1, 24e6)),
@@ -154,7 +123,7 @@ _WAVEFORM: tuple[Row, ...] = (
 #: What only changes the picture.
 _IGNORED = ("CLEar", "RECover", "ADISplay", "AMSource", "STATistic:DISPlay", "STATistic:RESet")
 _REST: tuple[Row, ...] = (
-    Word("MEASure:SOURce", "measure_source", _names, "CHAN1"),
+    Word("MEASure:SOURce", "measure_source", VirtualOscilloscope.channel_words, "CHAN1"),
     Both("MEASure:ITEM", lambda s, p: s.install(p), lambda s, p: s.item(p)),
     Both("MEASure:STATistic:ITEM", lambda s, p: s.install(p), lambda s, p: s.statistic(p)),
     *(
@@ -347,9 +316,7 @@ class VirtualDS1000Z(VirtualOscilloscope):
             return codes.tobytes()
         if form == "WORD":  # the higher byte is always 0
             return codes.astype("<u2").tobytes()
-        scale = record.inputs[channel]
-        volts = (codes.astype(float) - scale.zero) * scale.volts_per_code
-        return ",".join(self.spell(v) for v in volts).encode()
+        return ",".join(self.spell(v) for v in record.inputs[channel].shown(codes)).encode()
 
     # --- measurements and pictures ---
 
@@ -384,12 +351,10 @@ class VirtualDS1000Z(VirtualOscilloscope):
         if len(parameters) > 3:
             raise ScpiError(-108)
         colour, invert, form = (*parameters, *("ON", "OFF", "BMP24")[len(parameters) :])
-        writers = {"BMP24": lambda p: bmp24(p) + b"\0\0", "BMP8": bmp8, "PNG": png}
-        name = choice(form, tuple(writers))
-        picture = draw(self.traces_on_screen(), columns=self.columns)
-        picture = picture if boolean(colour) else grey(picture)
-        picture = 255 - picture if invert.upper() in {"ON", "1", "INVERT", "INV"} else picture
-        return self.block(writers[name](picture))
+        form = choice(form, ("BMP24", "BMP8", "PNG"))
+        inverted = invert.upper() in {"ON", "1", "INVERT", "INV"}
+        picture = self.screenshot(form, colour=boolean(colour), inverted=inverted)
+        return self.block(picture + b"\0\0" * (form == "BMP24"))
 
 
 def _refuse_mathematics(on: bool) -> None:  # noqa: FBT001

@@ -21,6 +21,7 @@ from instruments.virtual.core.trigger import crossings
 from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD, Acquisition, Plan
 from instruments.virtual.oscilloscope.measure import Measured, measure
 from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record
+from instruments.virtual.oscilloscope.screenshot import draw, grey, picture_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -71,6 +72,9 @@ class VirtualOscilloscope(VirtualInstrument):
     #: What a measurement is answered with that the trace does not show.
     no_measurement: ClassVar[float] = 9.9e37
 
+    #: The word for a channel, before its number.
+    channel_word: ClassVar[str] = "CHANnel"
+
     def __init__(
         self, clock: Clock, *, signals: Mapping[int, Signal], channels: int = 4, identity: str | None = None
     ) -> None:
@@ -117,9 +121,9 @@ class VirtualOscilloscope(VirtualInstrument):
         """Return the setting that holds the trigger level of a channel."""
         return "trigger_level"
 
-    def source_word(self, channel: int) -> str:
-        """Return the word for a channel as the trigger's source."""
-        return f"CHAN{channel}"
+    def channel_words(self) -> str:
+        """Return the words for the channels."""
+        return " ".join(f"{self.channel_word}{n}" for n in self.channels)
 
     def slope_name(self, channel: int) -> str:
         """Return the setting that holds the trigger slope of a channel."""
@@ -144,8 +148,7 @@ class VirtualOscilloscope(VirtualInstrument):
 
     def channel_of(self, text: str) -> int:
         """Return the channel of ``CHAN1`` or ``CHANnel1``.  Raises ScpiError."""
-        words = tuple(f"CHANnel{n}" for n in self.channels)
-        return int(choice(text, words)[4:])
+        return int(choice(text, tuple(self.channel_words().split()))[-1])
 
     # --- when a setting changes ---
 
@@ -343,8 +346,7 @@ class VirtualOscilloscope(VirtualInstrument):
         points = max(2, min(points, round(length * record.rate)))
         step = length / points
         codes = record.codes(channel, 0, points, of=points, start=start, step=step)
-        scale = record.inputs[channel]
-        return Measured((codes.astype(np.float64) - scale.zero) * scale.volts_per_code, step, start)
+        return Measured(record.inputs[channel].shown(codes), step, start)
 
     def measure(self, name: str, channel: int) -> float:
         """Return a measurement on the screen, or the number for none."""
@@ -361,6 +363,12 @@ class VirtualOscilloscope(VirtualInstrument):
             middle, span = self.codes_on_screen(n)
             heights[n] = 0.5 + (codes.astype(np.float64) - middle) / span
         return heights
+
+    def screenshot(self, form: str = "BMP24", *, colour: bool = True, inverted: bool = False) -> bytes:
+        """Return the picture of the screen, as a file of this form; see `screenshot.picture_file`."""
+        picture = draw(self.traces_on_screen(), columns=self.columns)
+        picture = picture if colour else grey(picture)
+        return picture_file(255 - picture if inverted else picture, form)
 
     # --- settings from the signal ---
 
@@ -386,7 +394,8 @@ class VirtualOscilloscope(VirtualInstrument):
             if found.size > 1:
                 period = float(np.diff(found).mean()) * COARSEST
                 self.settings["time_scale"] = one_two_five(3 * period / self.columns, up=True)
-            self.settings |= {"trigger_source": self.source_word(n), self.level_name(n): (low + high) / 2}
+            source = choice(f"{self.channel_word}{n}", tuple(self.channel_words().split()))
+            self.settings |= {"trigger_source": source, self.level_name(n): (low + high) / 2}
             self.settings[self.slope_name(n)] = "POS"
             break
         self.settings |= {"time_offset": 0.0, "trigger_sweep": "AUTO"}

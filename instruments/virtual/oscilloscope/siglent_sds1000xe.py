@@ -17,13 +17,10 @@ from instruments.virtual.core.parameters import choice, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Tell, Word, short_header
 from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, one_two_five
-from instruments.virtual.oscilloscope.screenshot import bmp24, draw
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from instruments.clock import Clock
-    from instruments.virtual.core.signal import Signal
     from instruments.virtual.oscilloscope.record import Record
 
 _COLUMNS = 14
@@ -114,18 +111,16 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     CHANNEL_ROWS: ClassVar = _CHANNEL
     DEFAULTS: ClassVar = {"trigger_source": "C1"}
 
-    def __init__(
-        self, clock: Clock, *, signals: Mapping[int, Signal], channels: int = 4, identity: str | None = None
-    ) -> None:
-        self._setup = {"SP": 0, "NP": 0, "FP": 0}
-        super().__init__(clock, signals=signals, channels=channels, identity=identity)
+    channel_word = "C"
+    #: WFSU: every which point is sent, how many at most (0: all), from which on.
+    _setup: Mapping[str, int] = {"SP": 0, "NP": 0, "FP": 0}
 
     def reset(self) -> None:
         """Go to the state after ``*RST``; the form of answers stays."""
         header = self.settings["header"]
         super().reset()
         self.settings["header"] = header
-        self._setup = {"SP": 0, "NP": 0, "FP": 0}
+        self._setup = type(self)._setup
 
     def spell(self, value: float) -> str:
         """Return a number with three digits, as a real one answers: 5.00E-01."""
@@ -151,10 +146,6 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         """Return the name of the slope; each channel has its own."""
         return f"chan{channel}_slope"
 
-    def source_word(self, channel: int) -> str:
-        """See the base."""
-        return f"C{channel}"
-
     def select_trigger(self, parameters: list[str]) -> None:
         """TRSE EDGE,SR,C1,HT,OFF: the type, then names and their values.  Raises ScpiError."""
         if len(parameters) % 2 == 0:
@@ -166,7 +157,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
         if "HT" in pairs:
             choice(pairs["HT"], ("OFF", "TI"))
         if "SR" in pairs:
-            words = (*(f"C{n}" for n in self.channels), "EX", "EX5", "LINE")
+            words = (*self.channel_words().split(), "EX", "EX5", "LINE")
             self.settings["trigger_source"] = choice(pairs["SR"], words)
             self.on_change("trigger_source")
 
@@ -268,7 +259,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
             digits = text.strip()
             if name not in self._setup or not (digits.isascii() and digits.isdigit() and len(digits) < 9):
                 raise ScpiError(-224, text[:20])
-        self._setup |= {name: int(text) for name, text in given.items()}
+        self._setup = {**self._setup, **{name: int(text) for name, text in given.items()}}
 
     def waveform_setup(self) -> str:
         """WFSU?: as it is set."""
@@ -325,7 +316,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
 
     def sample_number(self, parameters: list[str]) -> str:
         """SANU? C1: points of the record, as 14Mpts."""
-        choice(parameter(parameters), tuple(f"C{n}" for n in self.channels))
+        self.channel_of(parameter(parameters))
         points = self.full_scale()[1]
         scale, prefix = (1e6, "M") if points >= 1e6 else (1e3, "k") if points >= 1e3 else (1, "")
         return self.reply("SANU", f"{points / scale:g}{prefix}", "pts")
@@ -340,4 +331,4 @@ class VirtualSDS1000XE(VirtualOscilloscope):
 
     def picture(self) -> str:
         """SCDP: a bitmap, in no block."""
-        return bmp24(draw(self.traces_on_screen(), columns=self.columns)).decode("latin-1")
+        return self.screenshot().decode("latin-1")

@@ -64,10 +64,6 @@ class LongWord(Word):
         return long if device.settings["verbose"] else value
 
 
-def _names(scope: VirtualTDS2000) -> str:
-    return " ".join(f"CH{n}" for n in scope.channels)
-
-
 #: Fields of the preamble, and their places in it.
 _PARTS = {"BYT_Nr": 0, "BIT_Nr": 1, "ENCdg": 2, "BN_Fmt": 3, "BYT_Or": 4, "NR_Pt": 5, "WFId": 6, "PT_Fmt": 7}
 _PARTS |= {"XINcr": 8, "PT_Off": 9, "XZEro": 10, "XUNit": 11, "YMUlt": 12, "YZEro": 13, "YOFf": 14, "YUNit": 15}
@@ -116,14 +112,14 @@ _ROWS: tuple[Row, ...] = (
     Ask("TRIGger:STATE", lambda s: s.reply("TRIGger:STATE", s.state())),
     LongWord("TRIGger:MAIn:TYPe", "trigger_type", "*EDGE PULse VIDeo"),
     LongWord("TRIGger:MAIn:MODe", "trigger_sweep", "*AUTO NORMal"),
-    LongWord("TRIGger:MAIn:EDGE:SOUrce", "trigger_source", lambda s: _names(s) + " EXT EXT5 LINE", "CH1"),
+    LongWord("TRIGger:MAIn:EDGE:SOUrce", "trigger_source", lambda s: s.channel_words() + " EXT EXT5 LINE", "CH1"),
     LongWord("TRIGger:MAIn:EDGE:SLOpe", "trigger_slope", "*RISe FALL"),
     LongWord("TRIGger:MAIn:EDGE:COUPling", "trigger_coupling", "*DC AC NOISErej HFRej LFRej"),
     Number("TRIGger:MAIn:LEVel", "trigger_level", 0.0, _levels, "V"),
     Number("TRIGger:MAIn:HOLDOff:VALue", "holdoff", 5e-7, (5e-7, 10.0), "S"),
     # data
     Both("DATa", lambda s, p: s.set_data(p)),
-    LongWord("DATa:SOUrce", "wav_source", _names, "CH1"),
+    LongWord("DATa:SOUrce", "wav_source", VirtualOscilloscope.channel_words, "CH1"),
     LongWord("DATa:ENCdg", "wav_encoding", "ASCIi RIBinary *RPBinary SRIbinary SRPbinary"),
     whole("DATa:WIDth", "wav_width", 1.0, (1, 2)),
     whole("DATa:STARt", "wav_start", 1.0, (1, _POINTS)),
@@ -132,7 +128,7 @@ _ROWS: tuple[Row, ...] = (
     *(Ask(f"WFMPre:{word}", lambda s, k=k, w=word: s.part(k, w)) for word, k in _PARTS.items()),
     Ask("CURVe", lambda s: s.reply("CURVe", s.curve())),
     # measurements
-    LongWord("MEASUrement:IMMed:SOUrce", "wav_measured", lambda s: _names(s) + " MATH", "CH1"),
+    LongWord("MEASUrement:IMMed:SOUrce", "wav_measured", lambda s: s.channel_words() + " MATH", "CH1"),
     LongWord("MEASUrement:IMMed:TYPe", "wav_measurement", " ".join(_MEASUREMENTS)),
     Ask("MEASUrement:IMMed:UNIts", lambda s: s.reply("MEASUrement:IMMed:UNIts", f'"{s.measurement()[1]}"')),
     Ask("MEASUrement:IMMed:VALue", lambda s: s.reply("MEASUrement:IMMed:VALue", s.measured_value())),
@@ -145,6 +141,7 @@ class VirtualTDS2000(VirtualOscilloscope):
 
     identity = "TEKTRONIX,TDS 2024B,VIRTUAL,CF:91.1CT FV:v22.11"
     columns, lowest, digits, keeps_old = _COLUMNS, 0, 0, True
+    channel_word = "CH"
     COMMON: ClassVar = _COMMON
     CHANNEL_ROWS: ClassVar = _CHANNEL
     ROWS: ClassVar = _ROWS
@@ -187,14 +184,6 @@ class VirtualTDS2000(VirtualOscilloscope):
         self._events = ()
 
     # --- settings ---
-
-    def source_word(self, channel: int) -> str:
-        """See the base."""
-        return f"CH{channel}"
-
-    def channel_of(self, text: str) -> int:
-        """Return the channel of CH1.  Raises ScpiError."""
-        return int(choice(text, tuple(f"CH{n}" for n in self.channels))[2:])
 
     def scaling(self, channel: int) -> tuple[float, int]:
         """See the base; the trace is moved by divisions."""

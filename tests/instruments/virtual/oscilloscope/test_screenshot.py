@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from instruments.virtual.oscilloscope.screenshot import HEIGHT, WIDTH, bmp8, bmp24, draw
+from instruments.virtual.oscilloscope.screenshot import HEIGHT, WIDTH, draw, picture_file
 
 
 def test_a_jump_is_a_line_from_the_height_before_to_the_one_after():
@@ -19,10 +19,10 @@ def test_a_jump_is_a_line_from_the_height_before_to_the_one_after():
     assert (np.delete(lit, 300) == 1).all()
 
 
-@pytest.mark.parametrize("form", [bmp24, bmp8])
+@pytest.mark.parametrize("form", ["BMP24", "BMP8"])
 def test_a_bitmap_is_what_another_library_reads(form):
     picture = draw({1: np.linspace(0, 1, WIDTH)}, columns=10)
-    data = form(picture)
+    data = picture_file(picture, form)
     assert struct.unpack_from("<H", data, 26) == (1,)  # planes: always one (Windows GDI, BITMAPINFOHEADER)
     read = np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
-    assert np.abs(read.astype(int) - picture).max() <= (0 if form is bmp24 else 25)  # half a step of 51
+    assert np.abs(read.astype(int) - picture).max() <= (0 if form == "BMP24" else 25)  # half a step of 51
