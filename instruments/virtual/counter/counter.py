@@ -13,23 +13,21 @@ from instruments.ieee488 import INFINITY
 from instruments.virtual.core.device import VirtualInstrument, has_node
 from instruments.virtual.core.parameters import boolean, limit, number, optional_parameter, parameter
 from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.core.rows import Number, header_pattern
+from instruments.virtual.core.rows import Ask, Do, Number, Own, Row, Switch, Word, header_pattern
 from instruments.virtual.core.signal import no_signal
 from instruments.virtual.core.status import OPERATION_COMPLETE
 from instruments.virtual.core.steps import run_to_end
 from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement, measurement
-from instruments.virtual.counter.memory import Memory, statistics
-from instruments.virtual.counter.parameters import without_channels
+from instruments.virtual.counter.run import Memory, Run, statistics
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from instruments.clock import Clock
     from instruments.virtual.core.device import Answer
-    from instruments.virtual.core.signal import Signal
+    from instruments.virtual.core.signal import Array, Signal
     from instruments.virtual.core.steps import Steps
     from instruments.virtual.counter.edges import TriggerInput
-    from instruments.virtual.counter.run import Run
 
 #: When an answer is ready that never comes [s].
 NEVER = INFINITY
@@ -40,6 +38,41 @@ DARK = 60.0
 AUTOMATIC, LEVEL = ("automatic{n}", True), ("level{n}", 0.0)
 
 _ABORT = re.compile(r"[\x00-\x20]*:?ABORT?[\x00-\x20]*", re.IGNORECASE)
+
+
+# blanks match in one place only: \s* before a set that has them, too, takes a time that grows with their square
+_CHANNELS = re.compile(r"\(@([\d,\s]+)\)")
+_BRACKETED = re.compile(r"\(([^@()]*)\)")
+
+
+def channels_of(parameters: list[str], numbered: Sequence[int]) -> tuple[int, ...]:
+    """Return the channels in channel lists, in their order.
+
+    Args:
+        parameters: of a command.
+        numbered: the channels of the counter.
+
+    Raises:
+        ScpiError: the counter does not have one of them.
+
+    >>> channels_of(["10", "(@2)", "(@1)"], (1, 2))
+    (2, 1)
+    """
+    lists = [found for text in parameters if (found := _CHANNELS.fullmatch(text))]
+    named = [word.strip().lstrip("0") for found in lists for word in found[1].split(",") if word.strip()]
+    if any(word not in map(str, numbered) for word in named):  # compared as text: a number may have any length
+        raise ScpiError(-224, "channel")
+    return tuple(map(int, named))
+
+
+def without_channels(parameters: list[str]) -> list[str]:
+    """Return the parameters without channel lists; a number may stand in brackets, as in the CNT-91's handbook.
+
+    >>> without_channels(["(100)", "(@1)"])
+    ['100']
+    """
+    plain = [text for text in parameters if not _CHANNELS.fullmatch(text)]
+    return [found[1].strip() if (found := _BRACKETED.fullmatch(text)) else text for text in plain]
 
 
 @dataclass(frozen=True)
@@ -75,6 +108,29 @@ class Count(Number):
     def format_value(self, device: Any, value: float) -> str:
         """See the base."""
         return str(device.spell_whole(value))
+
+
+#: Of every counter.
+SHARED: tuple[Row, ...] = (
+    Ask("CONFigure", lambda d: d.configuration()),
+    Own("[SENSe[1]:]FUNCtion[:ON]", lambda d, p: d.set_function(p), lambda d: d.function()),
+    Do("INITiate[:IMMediate]", lambda d: d.initiate()),
+    Do("ABORt", lambda d: d.abandon()),
+)
+#: Of each input of those with two.
+INPUT: tuple[Row, ...] = (
+    Word("INPut[n]:COUPling", "coupling{n}", "AC DC"),
+    Number("INPut[n]:IMPedance", "impedance{n}", 1e6, (50, 1e6), "OHM", values=(50, 1e6)),
+    Switch("INPut[n]:FILTer[:LPASs][:STATe]", "filter{n}"),
+)
+#: Of those with a status system and a number format.
+SYSTEM: tuple[Row, ...] = (
+    Word("FORMat:BORDer", "byte_order", "NORMal SWAPped"),
+    Do("SYSTem:PRESet", lambda d: d.reset()),
+    Ask("STATus:OPERation:CONDition", lambda d: d.operation()),
+    Do("STATus:PRESet"),
+    Ask("*OPT"),
+)
 
 
 class VirtualCounter(VirtualInstrument):
@@ -248,6 +304,47 @@ class VirtualCounter(VirtualInstrument):
             raise ScpiError(-224, words[0][:20] if words else "")
         self.choose(found, tuple(map(int, words[1:])) or self._channels[:1])
         self.on_change("function")
+
+    def function(self) -> str:
+        """Answer FUNCtion? with the function that is set."""
+        return f'"{self._function}"'
+
+    def set_function(self, parameters: list[str]) -> None:
+        """Execute FUNCtion "FREQ (@1)"; see `select_function`.  Raises ScpiError."""
+        self.select_function(re.sub(r"[(@),]", " ", parameter(parameters).strip("\"'")).split())
+
+    def configure(self, name: str, parameters: list[str]) -> None:
+        """CONFigure: a function, its channels, what is expected and how finely.  Raises ScpiError."""
+        raise NotImplementedError
+
+    def measure_once(self, name: str, parameters: list[str]) -> Steps[str]:
+        """MEASure?: CONFigure and READ?."""
+        self.configure(name, parameters)
+        return (yield from self.read())
+
+    def initiate(self) -> None:
+        """INITiate: one run of as many readings as triggers and samples make."""
+        raise NotImplementedError
+
+    def read(self) -> Steps[str]:
+        """READ?: INITiate, and the answer comes with the last reading."""
+        # the question would wait for a trigger that cannot come before it is answered
+        if self.settings["trigger_source"] == "BUS" or math.isinf(self.value("triggers")):
+            raise ScpiError(-221)
+        self.initiate()
+        return (yield from self.fetch())
+
+    def fetch(self) -> Steps[str]:
+        """FETCh?: all readings, when there are all; they stay in the memory."""
+        if self._run is None and not self._memory.size:
+            raise ScpiError(-230)
+        if not (yield from self.wait_for()):
+            return ""
+        return self.spell_all(self._memory.slice(self._memory.n_fetched, self._memory.size)[0])
+
+    def spell_all(self, values: Array) -> str:
+        """Return readings as they are answered."""
+        return ",".join(map(self.spell, values))
 
     def greatest_level(self, channel: int) -> float:
         """Return the greatest absolute trigger level [V]."""

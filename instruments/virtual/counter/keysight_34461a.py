@@ -10,20 +10,16 @@ line.
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.parameters import number, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Text, Word
-from instruments.virtual.counter.counter import Count, Function, VirtualCounter
+from instruments.virtual.counter.counter import SHARED, Count, Function, VirtualCounter
 from instruments.virtual.counter.edges import RATE, TriggerInput
 from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement, Reading
 from instruments.virtual.counter.run import Run
-
-if TYPE_CHECKING:
-    from instruments.virtual.core.steps import Steps
 
 #: Ranges of the input [V], and which part of it the r.m.s. may be at most.
 _RANGES, _OVERLOAD = (0.1, 1.0, 10.0, 100.0, 750.0), 1.2
@@ -74,15 +70,12 @@ _ROWS: tuple[Row, ...] = (
             Both(f"MEASure{header}", answer=lambda d, p, f=name: d.measure_once(f, p)),
         )
     ),
-    Ask("CONFigure", lambda d: d.configuration()),
-    Own("[SENSe[1]:]FUNCtion[:ON]", lambda d, p: d.set_function(p), lambda d: d.function()),
+    *SHARED,
     *_of_both("FREQuency", alias=False),
     *_of_both("PERiod", alias=True),
     Number("[SENSe[1]:]DETector:BANDwidth", "slowest", 20.0, (3.0, 200.0), "HZ", rounded=_filter_for, alias=True),
-    Do("INITiate[:IMMediate]", lambda d: d.initiate()),
     Ask("READ", lambda d: d.read()),
     Ask("FETCh", lambda d: d.fetch()),
-    Do("ABORt", lambda d: d.abandon()),
     Count("SAMPle:COUNt", "samples", 1.0, (1, 5e4)),
     Count("TRIGger:COUNt", "triggers", 1.0, (1, 5e4), endless=True),
     Word("TRIGger:SOURce", "trigger_source", "IMMediate EXTernal BUS"),
@@ -143,10 +136,6 @@ class Virtual34461A(VirtualCounter):
         low = self.value("slowest") if self._function == "FREQ" else 1 / self.value("slowest")
         return f'"{self._function} {low:+.8E},{part * low:+.8E}"'
 
-    def function(self) -> str:
-        """Answer FUNCtion? with the function that is set."""
-        return f'"{self._function}"'
-
     def set_function(self, parameters: list[str]) -> None:
         """Execute FUNCtion "FREQ"; see `select_function`."""
         self.select_function([parameter(parameters).strip("\"'")])
@@ -178,11 +167,6 @@ class Virtual34461A(VirtualCounter):
 
     # --- measuring ---
 
-    def measure_once(self, name: str, parameters: list[str]) -> Steps[str]:
-        """MEASure?: CONFigure and READ?."""
-        self.configure(name, parameters)
-        return (yield from self.read())
-
     def initiate(self) -> None:
         """INITiate: one run of as many readings as triggers and samples make."""
         gate, patience = self.value("gate"), _FILTERS[self.value("slowest")]
@@ -206,19 +190,3 @@ class Virtual34461A(VirtualCounter):
                 immediate=self.settings["trigger_source"] == "IMM",
             )
         )
-
-    def read(self) -> Steps[str]:
-        """READ?: INITiate, and the answer comes with the last reading."""
-        if self.settings["trigger_source"] == "BUS" or math.isinf(self.value("triggers")):
-            raise ScpiError(-221)
-        self.initiate()
-        return (yield from self.fetch())
-
-    def fetch(self) -> Steps[str]:
-        """FETCh?: all readings, when there are all."""
-        if self._run is None and not self._memory.size:
-            raise ScpiError(-230)
-        if not (yield from self.wait_for()):
-            return ""
-        values, _ = self._memory.slice(0, self._memory.size)
-        return ",".join(map(self.spell, values))

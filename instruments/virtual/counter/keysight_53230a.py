@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -12,10 +11,21 @@ from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.parameters import block_text, choice, limit, number, optional_parameter, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Word
-from instruments.virtual.counter.counter import AUTOMATIC, DARK, LEVEL, Count, Function, VirtualCounter
+from instruments.virtual.counter.counter import (
+    AUTOMATIC,
+    DARK,
+    INPUT,
+    LEVEL,
+    SHARED,
+    SYSTEM,
+    Count,
+    Function,
+    VirtualCounter,
+    channels_of,
+    without_channels,
+)
 from instruments.virtual.counter.edges import TriggerInput
 from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement
-from instruments.virtual.counter.parameters import channels_of, without_channels
 from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
@@ -49,12 +59,8 @@ _MEASURING: tuple[Row, ...] = (
         for name, header in _HEADERS.items()
     ),
     *(Both("MEASure" + header, answer=lambda d, p, f=name: d.measure_once(f, p)) for name, header in _HEADERS.items()),
-    Ask("CONFigure", lambda d: d.configuration()),
-    Own("[SENSe[1]:]FUNCtion[:ON]", lambda d, p: d.set_function(p), lambda d: d.function()),
-    Do("INITiate[:IMMediate]", lambda d: d.initiate()),
     Ask("READ", lambda d: d.read()),
     Ask("FETCh", lambda d: d.fetch()),
-    Do("ABORt", lambda d: d.abandon()),
 )
 _GATE: tuple[Row, ...] = (
     Word("[SENSe[1]:]FREQuency:GATE:SOURce", "gate_source", "TIME EXTernal ADVanced IMMediate"),
@@ -69,13 +75,11 @@ _GATE: tuple[Row, ...] = (
     Number("[SENSe[1]:]ROSCillator:EXTernal:FREQuency", "reference_hz", 1e7, (1e6, 1e7), "HZ"),
 )
 _INPUT: tuple[Row, ...] = (
-    Word("INPut[n]:COUPling", "coupling{n}", "AC DC"),
-    Number("INPut[n]:IMPedance", "impedance{n}", 1e6, (50, 1e6), "OHM", values=(50, 1e6)),
+    *INPUT,
     Number("INPut[n]:PROBe", "probe_factor{n}", 1.0, (1, 10), values=(1, 10)),
     Number("INPut[n]:RANGe", "range{n}", 5.0, (5, 50), "V", values=(5, 50)),
     Word("INPut[n]:SLOPe[1]", "slope{n}", "POSitive NEGative"),
     Switch("INPut[n]:NREJect", "noise_rejection{n}"),
-    Switch("INPut[n]:FILTer[:LPASs][:STATe]", "filter{n}"),
     Own("INPut[n]:LEVel[1]:AUTO", lambda d, n, p: d.set_automatic(n, p), lambda d, n: d.automatic(n), AUTOMATIC),
     Both("INPut[n]:LEVel[1][:ABSolute]", lambda d, n, p: d.set_level(n, p), lambda d, n, p: d.level(n, p), LEVEL),
     Count("INPut[n]:LEVel[1]:RELative", "relative{n}", 50.0, (10, 90)),
@@ -96,7 +100,6 @@ _MEMORY: tuple[Row, ...] = (
     Ask("DATA:POINts", lambda d: f"{d.points():+d}"),
     Ask("DATA:LAST", lambda d: d.last()),
     Own("FORMat[:DATA]", lambda d, p: d.set_format(p), lambda d: d.format(), keeps=("format", "ASC")),
-    Word("FORMat:BORDer", "byte_order", "NORMal SWAPped"),
 )
 _STATISTICS = {
     "AVERage": "mean",
@@ -117,16 +120,12 @@ _CALCULATION: tuple[Row, ...] = (
 _SYSTEM: tuple[Row, ...] = (
     Both("SYSTem:TIMeout", lambda d, p: d.set_timeout(p), lambda d, p: d.timeout(p), keeps=("timeout", 1.0)),
     Number("SYSTem:ALEVel:FREQuency", "slowest", 50.0, (50, 1e4), "HZ"),
-    Do("SYSTem:PRESet", lambda d: d.reset()),
-    Ask("STATus:OPERation:CONDition", lambda d: d.operation()),
     Ask("STATus:OPERation[:EVENt]", lambda _d: "+0"),
     Ask("STATus:QUEStionable:CONDition", lambda d: d.questionable()),
     Ask("STATus:QUEStionable[:EVENt]", lambda d: d.questionable()),
     Count("STATus:OPERation:ENABle", "operation_enable", 0.0, (0, 65535)),
     Count("STATus:QUEStionable:ENABle", "questionable_enable", 0.0, (0, 65535)),
-    Do("STATus:PRESet"),
     Switch("DISPlay[:WINDow][:STATe]", "display", default=True),
-    Ask("*OPT"),
 )
 
 
@@ -146,7 +145,7 @@ class Virtual53230A(VirtualCounter):
     identity = "Keysight Technologies,53230A,VIRTUAL,3.09-levilab"
     FUNCTIONS: ClassVar = _FUNCTIONS
     CHANNEL_ROWS: ClassVar = _INPUT
-    ROWS: ClassVar = (*_MEASURING, *_GATE, *_TRIGGERING, *_MEMORY, *_CALCULATION, *_SYSTEM)
+    ROWS: ClassVar = (*SHARED, *SYSTEM, *_MEASURING, *_GATE, *_TRIGGERING, *_MEMORY, *_CALCULATION, *_SYSTEM)
 
     def __init__(self, clock: Clock, *, digits: int = 12, **model: Any) -> None:
         self._resolution = 10.0**-digits
@@ -189,20 +188,7 @@ class Virtual53230A(VirtualCounter):
             return 0.1
         return min(max(self._resolution * expected / resolution, 1e-4), 1e3)
 
-    def function(self) -> str:
-        """Answer FUNCtion? with the function that is set."""
-        return f'"{self._function}"'
-
-    def set_function(self, parameters: list[str]) -> None:
-        """Execute FUNCtion "FREQ (@1)"; see `select_function`."""
-        self.select_function(re.sub(r"[(@),]", " ", parameter(parameters).strip("\"'")).split())
-
     # --- measuring ---
-
-    def measure_once(self, name: str, parameters: list[str]) -> Steps[str]:
-        """MEASure?: CONFigure and READ?."""
-        self.configure(name, parameters)
-        return (yield from self.read())
 
     def initiate(self) -> None:
         """INITiate: one run of as many readings as triggers and samples make."""
@@ -232,14 +218,6 @@ class Virtual53230A(VirtualCounter):
                 immediate=self.settings["trigger_source"] == "IMM",
             )
         )
-
-    def read(self) -> Steps[str]:
-        """READ?: INITiate, and the answer comes with the last reading."""
-        if self.settings["trigger_source"] == "BUS":
-            # the question would wait for a trigger that cannot come before it is answered
-            raise ScpiError(-221)
-        self.initiate()
-        return (yield from self.fetch())
 
     def operation(self) -> str:
         """STATus:OPERation:CONDition?, bit 4: measuring; bit 5: waiting for a trigger."""
@@ -302,15 +280,6 @@ class Virtual53230A(VirtualCounter):
 
     # --- the memory ---
 
-    def fetch(self) -> Steps[str]:
-        """FETCh?: all readings, when there are all; they stay in the memory."""
-        if self._run is None and not self._memory.size:
-            raise ScpiError(-230)
-        if not (yield from self.wait_for()):
-            return ""
-        values, _ = self._memory.slice(self._memory.n_fetched, self._memory.size)
-        return self._spell(values, head="#0")
-
     def remove_available(self, parameters: list[str]) -> str:
         """R? [n]: at most n of the readings that are there, as a block, taken out of the memory."""
         text = optional_parameter(parameters)
@@ -344,7 +313,7 @@ class Virtual53230A(VirtualCounter):
         values, _ = self._memory.slice(start, start + count)
         if as_block and self.settings["format"] == "ASC":
             return block_text(",".join(map(self.spell, values)).encode())
-        return self._spell(values)
+        return self.spell_all(values, head="")
 
     def points(self) -> int:
         """DATA:POINts?: readings that are there and have not been removed."""
@@ -357,10 +326,10 @@ class Virtual53230A(VirtualCounter):
 
     # --- formats and statistics ---
 
-    def _spell(self, values: Array, head: str = "") -> str:
-        """Return readings in the format that is set.  head: of a block, if it does not give its length."""
+    def spell_all(self, values: Array, *, head: str = "#0") -> str:
+        """See the base: in the format that is set.  head: of a block, if it does not give its length."""
         if self.settings["format"] == "ASC":
-            return ",".join(map(self.spell, values))
+            return super().spell_all(values)
         data = values.astype("<f8" if self.settings["byte_order"] == "SWAP" else ">f8").tobytes()
         return head + data.decode("latin-1") if head else block_text(data)
 

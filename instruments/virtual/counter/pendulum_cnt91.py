@@ -11,10 +11,21 @@ from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.parameters import block_text, choice, number, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Word
-from instruments.virtual.counter.counter import AUTOMATIC, DARK, LEVEL, Count, Function, VirtualCounter
+from instruments.virtual.counter.counter import (
+    AUTOMATIC,
+    DARK,
+    INPUT,
+    LEVEL,
+    SHARED,
+    SYSTEM,
+    Count,
+    Function,
+    VirtualCounter,
+    channels_of,
+    without_channels,
+)
 from instruments.virtual.counter.edges import TriggerInput
 from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement, Wanted, first_edge
-from instruments.virtual.counter.parameters import channels_of, without_channels
 from instruments.virtual.counter.run import Run
 
 if TYPE_CHECKING:
@@ -73,11 +84,7 @@ _MEASURING: tuple[Row, ...] = (
         Both("MEASure" + way, answer=lambda d, p, f=name, a=array: d.measure_once(f, p, array=a))
         for way, name, array in _WAYS
     ),
-    Ask("CONFigure", lambda d: d.configuration()),
-    Own("[SENSe[1]:]FUNCtion[:ON]", lambda d, p: d.set_function(p), lambda d: d.function()),
-    Do("INITiate[:IMMediate]", lambda d: d.initiate()),
     Switch("INITiate:CONTinuous", "continuous"),
-    Do("ABORt", lambda d: d.abandon()),
     Number("[SENSe[1]:]ACQuisition:APERture", "gate", 0.01, (2e-8, 1e3), "S"),
     Word("[SENSe[1]:]ROSCillator:SOURce", "reference", "INTernal EXTernal *AUTO"),
     Switch("[SENSe[1]:]FREQuency:REGRession", "regression"),
@@ -90,10 +97,8 @@ _FETCHING: tuple[Row, ...] = (
     Ask("CALCulate:DATA", lambda d: d.fetch(-1)),
 )
 _INPUT: tuple[Row, ...] = (
-    Word("INPut[n]:COUPling", "coupling{n}", "AC DC"),
-    Number("INPut[n]:IMPedance", "impedance{n}", 1e6, (50, 1e6), "OHM", values=(50, 1e6)),
+    *INPUT,
     Number("INPut[n]:ATTenuation", "attenuation{n}", 1.0, (1, 10), spell="{:+.0f}".format, values=(1, 10)),
-    Switch("INPut[n]:FILTer[:LPASs][:STATe]", "filter{n}"),
     Switch("INPut[n]:FILTer:DIGital", "digital_filter{n}"),
     Number("INPut[n]:FILTer:DIGital:FREQuency", "cutoff{n}", 1e5, (1, 5e7), "HZ"),
     Word("INPut[n]:SLOPe", "slope{n}", "POSitive NEGative"),
@@ -115,7 +120,6 @@ _ARMING: tuple[Row, ...] = (
 )
 _FORMAT: tuple[Row, ...] = (
     Word("FORMat[:DATA]", "format", "ASCii REAL PACKed"),
-    Word("FORMat:BORDer", "byte_order", "NORMal SWAPped"),
     Switch("FORMat:TINFormation", "stamps"),
     Count("FORMat:SMAX", "most", _MOST, (4, _MOST)),
 )
@@ -132,16 +136,12 @@ _SYSTEM: tuple[Row, ...] = (
     Number("SYSTem:TOUT:TIME", "timeout", 0.1, (0.01, 1000), "S"),
     Switch("SYSTem:SDETect", "signal_detection"),
     Switch("SYSTem:TALKonly", "talk_only"),
-    Do("SYSTem:PRESet", lambda d: d.reset()),
-    Ask("STATus:OPERation:CONDition", lambda d: d.operation()),
     Ask("STATus:OPERation[:EVENt]"),
     Ask("STATus:QUEStionable:CONDition"),
     Ask("STATus:QUEStionable[:EVENt]"),
-    Do("STATus:PRESet"),
     Switch("DISPlay:ENABle", "display", default=True),
     Switch("CALibration:INTerpolator:AUTO", "calibrating", default=True),
     Both("AUTO", lambda d, p: d.set_automatically(p)),
-    Ask("*OPT"),
 )
 
 
@@ -176,7 +176,7 @@ class VirtualCNT91(VirtualCounter):
     no_error = '0,"No error"'
     FUNCTIONS: ClassVar = _FUNCTIONS
     CHANNEL_ROWS: ClassVar = _INPUT
-    ROWS: ClassVar = (*_MEASURING, *_FETCHING, *_ARMING, *_FORMAT, *_CALCULATION, *_SYSTEM)
+    ROWS: ClassVar = (*SHARED, *SYSTEM, *_MEASURING, *_FETCHING, *_ARMING, *_FORMAT, *_CALCULATION, *_SYSTEM)
     native = False
 
     def abandon(self) -> None:
@@ -200,7 +200,7 @@ class VirtualCNT91(VirtualCounter):
 
     # --- configuration ---
 
-    def configure(self, name: str, parameters: list[str], *, array: bool) -> None:
+    def configure(self, name: str, parameters: list[str], *, array: bool = False) -> None:
         """CONFigure: function, channels, one result or an array; the counter no longer runs freely."""
         channels, plain = channels_of(parameters, self.numbered), without_channels(parameters)
         if len(channels) > self.functions[name].inputs:
@@ -226,13 +226,9 @@ class VirtualCNT91(VirtualCounter):
         """Answer FUNCtion? with the function that is set, and its channels."""
         return f'"{self._function} {",".join(map(str, self._channels))}"'
 
-    def set_function(self, parameters: list[str]) -> None:
-        """Execute FUNCtion "FREQ 1"; see `select_function`."""
-        self.select_function(parameter(parameters).strip("\"'").replace(",", " ").replace("@", "").split())
-
     # --- measuring ---
 
-    def measure_once(self, name: str, parameters: list[str], *, array: bool) -> Steps[str]:
+    def measure_once(self, name: str, parameters: list[str], *, array: bool = False) -> Steps[str]:
         """MEASure?: CONFigure, INITiate and FETCh?."""
         self.configure(name, parameters, array=array)
         self.initiate()
@@ -365,7 +361,7 @@ class VirtualCNT91(VirtualCounter):
             self._memory.n_fetched, fresh = 0, there
         return (yield from self.fetch(int(min(fresh, self.value("most"))), size_known=False))
 
-    def fetch(self, count: int, *, size_known: bool = True) -> Steps[str]:
+    def fetch(self, count: int = 1, *, size_known: bool = True) -> Steps[str]:
         """Fetch results from where the last fetch ended; a negative number: the last ones, the place is kept."""
         if self._run is None and not self._memory.size:
             raise ScpiError(-230)
