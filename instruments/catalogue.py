@@ -66,6 +66,7 @@ class Model(Generic[I_co]):
             connected to.  Its identity holds the word VIRTUAL, by which a run with it is known as synthetic.
         address: an address as one of it may have; one without a host, as ``sound://``, is complete for any of them.
         answers_as: the model field of ``*IDN?``, whole (regular expression), where it does not hold the name.
+        inputs: of a counter, those for slow pulses.
     """
 
     name: str
@@ -73,6 +74,7 @@ class Model(Generic[I_co]):
     twin: Callable[..., VirtualInstrument]
     address: str
     answers_as: str = ""
+    inputs: int = 2
 
     @property
     def scheme(self) -> str:
@@ -100,6 +102,7 @@ COUNTERS: tuple[Model[Counter], ...] = (
             identity="Keysight Technologies,53210A,VIRTUAL,3.09-levilab",
         ),
         "TCPIP0::192.168.1.20::5025::SOCKET",
+        inputs=1,
     ),
     Model("CNT-91", PendulumCNT91, VirtualCNT91, "GPIB0::10::INSTR"),
     Model(
@@ -122,6 +125,7 @@ COUNTERS: tuple[Model[Counter], ...] = (
                 Virtual34461A, lacks=("DETector",), identity=f"Keysight Technologies,{name},VIRTUAL,A.03.03-levilab"
             ),
             "TCPIP0::192.168.1.21::5025::SOCKET",
+            inputs=1,
         )
         for name in ("34461A", "34460A", "34465A")
     ),
@@ -130,6 +134,7 @@ COUNTERS: tuple[Model[Counter], ...] = (
         Keysight34461A,
         partial(Virtual34461A, lacks=("LOWer", "ABORt"), identity="HEWLETT-PACKARD,34401A,VIRTUAL,11-5-2"),
         "GPIB0::22::INSTR",
+        inputs=1,
     ),
     Model("phyphox", Phyphox, VirtualPhyphox, "phyphox://192.168.1.40:8080"),
 )

@@ -15,7 +15,7 @@ from levilab.acquisition.keys import refusal, refuse_unknown
 from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
 from levilab.bench.config import BenchConfig, ConfigError, read_bench
-from levilab.bench.kinds import KINDS, estimates_u
+from levilab.bench.kinds import COUNTER, KINDS, estimates_u
 from levilab.bench.person import ask_no_person
 from levilab.bench.wiring import described_wiring
 from levilab.errors import DataError, LevilabError, UsageError
@@ -100,9 +100,12 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     named = named_instruments(options, run)
     without = _configuration(options, run, named, virtual=virtual)
     without = _with_named_instruments(without, named, EXPERIMENTS[experiment].instruments, virtual=virtual)
+    if virtual:
+        without = without.model_copy(update={"visa_library": "@levilab", **virtual_instruments(named)})
     without = with_settings(without, experiment, settings_of(without, experiment).for_bench(without))
     config = _with_given_settings(without, experiment, options.settings)
     _check_given(config, without, experiment)
+    _refuse_unused(options, config, experiment)
     request = AcquisitionRequest(
         experiment,
         config,
@@ -200,6 +203,16 @@ def _with_named_instruments(
     return config.model_copy(update=changes)
 
 
+def _refuse_unused(options: AcquisitionOptions, config: BenchConfig, experiment: str) -> None:
+    """Raise UsageError for a named instrument that the experiment would leave alone."""
+    kinds = EXPERIMENTS[experiment].kinds(settings_of(config, experiment))
+    used = {config.count_with if kind == COUNTER.name else kind for kind in kinds}
+    for kind, option in NAMING.items():
+        if (text := getattr(options, option)) is not None and kind not in used:
+            why = ": the counter counts; leave out one of the two" if options.counter and options.scope else ""
+            raise UsageError(option, f"is not used by these settings of levilab acquire {experiment}{why}", value=text)
+
+
 def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequence[str]) -> BenchConfig:
     """Return the configuration with some of the experiment's settings changed.  Raises UsageError."""
     return _with_texts(config, experiment, dict(_key_and_text(config, experiment, setting) for setting in settings))
@@ -263,8 +276,9 @@ def _check_given(config: BenchConfig, without: BenchConfig, experiment: str) -> 
 
 def _refusal(config: BenchConfig, experiment: str) -> ConfigError | None:
     """Return why the bench does not allow the experiment's settings; None if it does."""
+    settings = settings_of(config, experiment)
     try:
-        settings_of(config, experiment).check(experiment, config.limits)
+        settings.for_bench(config).check(experiment, config.limits)
     except ConfigError as error:
         return error
     return None
@@ -349,9 +363,8 @@ def _on_the_virtual_bench(
     run = request.resume
     seed = run.record.seed if run else options.seed
     seed = secrets.randbelow(1 << 31) if seed is None else seed
-    places = virtual_instruments(request.named)
-    config = request.config.model_copy(update={"visa_library": "@levilab", **places})
-    request = replace(request, seed=seed, config=config)
+    config = request.config
+    request = replace(request, seed=seed)
     scene = _scene(options.scene or EXPERIMENTS[request.experiment].mock_scene, run)
 
     def clock() -> VirtualClock:

@@ -133,7 +133,7 @@ def bench_clock(
     ] = None,
     duration: Annotated[
         float | None,
-        typer.Option(metavar="S", min=1.0, max=86_400.0, help="How long.", show_default="600, with --tone 20"),
+        typer.Option(metavar="S", min=1.0, max=86_400.0, help="How long.", show_default="600, a tone 20, --mock 60"),
     ] = None,
     clock_u: Annotated[
         float | None,
@@ -168,8 +168,10 @@ def bench_clock(
         raise UsageError("clock_u", "is that of the computer's clock, which a tone replaces")
     config = chosen_bench(AcquisitionOptions(mock=mock, bench=bench, scope=scope))
     wiring = virtual_wiring(practice_world(), models={"oscilloscope": scope}) if mock else described_wiring(config)
-    how = Comparison(tone, u, duration or (600.0 if tone is None else 20.0), COMPUTER_U if clock_u is None else clock_u)
-    progress = ShareBar("listening")
+    usual_s = 20.0 if tone is not None else 60.0 if mock else 600.0  # a virtual second takes a fifth of a real one
+    how = Comparison(tone, u, duration or usual_s, COMPUTER_U if clock_u is None else clock_u)
+    message(f"listening for {how.duration_s:g} s" + " of the virtual bench" * mock)
+    progress = ShareBar("listening", line_every=10.0)
     try:
         found = measure_clock(wiring, how, progress)
     finally:

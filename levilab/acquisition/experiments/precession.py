@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from instruments.drivers.generator import Limits as DriveLimits
     from levilab.acquisition.session import Row, Session
     from levilab.bench.config import BenchConfig, Limits
+    from levilab.simulator.scene import Scene
 
     Array = NDArray[np.float64]
 
@@ -83,15 +84,38 @@ class PrecessionSettings(DriveSettings):
     longest_s: PositiveFloat = Field(default=4 * 3600.0, description="an end if it takes longer")
 
     def for_bench(self, config: BenchConfig) -> Self:
-        """See the base.
+        """See the base: a counter with one input has its cable changed.
 
-        Raises ConfigError for a counter that counts no light, and so no laser, and for an oscilloscope that counts: its
-        input 2 shows the drive, that of a sound card a pickup coil, and both would be taken for the laser.
+        Raises ConfigError for a counter that cannot count the laser as well.
         """
         if config.count_with != COUNTER.name:
-            raise ConfigError("an oscilloscope cannot count the laser beside the spin: name a `counter`, too")
-        if config.counter is not None and COUNTER.model(config.counter.model).driver.SIGNAL is not LIGHT:
-            raise ConfigError(f"{config.counter.model} cannot count a laser beam: the precession needs another counter")
+            raise ConfigError(
+                "an oscilloscope cannot count the laser beside the spin: name a `counter`, too; the second input shows "
+                "the drive, that of a sound card a pickup coil, and would be taken for the laser"
+            )
+        if config.counter is None:
+            return self
+        model = COUNTER.model(config.counter.model)
+        if model.driver.SIGNAL is not LIGHT:
+            raise ConfigError(
+                f"{model.name} cannot count a laser beam: the precession needs another counter, one of pulses of light"
+            )
+        if self.laser_input <= model.inputs:
+            return self
+        if "laser_input" in self.model_fields_set:
+            raise ConfigError(
+                f"precession.laser_input = {self.laser_input}: the {model.name} has one input; take 1, and change the "
+                "cable when you are asked to"
+            )
+        return self.model_copy(update={"laser_input": 1})
+
+    def for_scene(self, scene: Scene) -> Self:
+        """See the base.  Raises ConfigError where a person would have to change a cable."""
+        if self.laser_input == 1:
+            raise ConfigError(
+                "the virtual bench has no person who could change the counter's cable (precession.laser_input = 1): "
+                "take 2, and a counter with two inputs"
+            )
         return self
 
     @property
@@ -153,10 +177,6 @@ def channels(settings: PrecessionSettings) -> tuple[Channel, ...]:
 def run(session: Session[PrecessionSettings]) -> None:
     """Drive the top up and through the sweep; where it is lost, drive it up again."""
     settings = session.settings
-    if settings.laser_input == 1 and session.writer.record.seed is not None:
-        raise ExperimentFailed(
-            "the virtual bench has no person who could change the counter's cable (precession.laser_input = 1): take 2"
-        )
     prepare_counter(session)
     session.begin(lambda: None, resumed="the top is driven up again")
     left = settings.sweep[_points_done(session.rows, settings.sweep) :]

@@ -68,8 +68,26 @@ def test_a_counter_that_counts_no_laser_is_refused_before_a_top_is_driven_up():
 def test_the_drive_or_a_pickup_coil_at_an_oscilloscope_is_not_counted_as_the_laser(scope):
     with pytest.raises(ConfigError, match="an oscilloscope cannot count the laser beside the spin: name a `counter`"):
         request_for("precession", AcquisitionOptions(mock=True, scope=scope))
-    request = request_for("precession", AcquisitionOptions(mock=True, scope=scope, counter="53230A"))
-    assert request.config.count_with == "counter"
+    both = AcquisitionOptions(mock=True, scope=scope, counter="53230A", settings=("record_s=6",))
+    assert request_for("precession", both).config.count_with == "counter"
+
+
+@pytest.mark.parametrize("experiment", ["spin", "precession"])
+def test_an_oscilloscope_beside_a_counter_that_counts_is_refused(experiment):
+    with pytest.raises(UsageError, match="the counter counts; leave out one of the two") as refused:
+        request_for(experiment, AcquisitionOptions(mock=True, scope="sound", counter="CNT-91"))
+    assert refused.value.value == "sound"
+
+
+@pytest.mark.parametrize("counter", ["34461A", "34401A", "53210A"])
+def test_a_counter_with_one_input_has_its_cable_changed_by_a_person(counter, tmp_path):
+    with pytest.raises(ConfigError, match="virtual bench has no person who could change the counter's cable"):
+        request_for("precession", AcquisitionOptions(mock=True, counter=counter))
+    bench = tmp_path / "bench.toml"
+    bench.write_text(BENCH.replace("53230A", counter), encoding="utf-8")
+    assert request_for("precession", AcquisitionOptions(bench=bench)).config.precession.laser_input == 1
+    with pytest.raises(UsageError, match=f"laser_input = 2: the {counter} has one input; take 1"):
+        request_for("precession", AcquisitionOptions(bench=bench, settings=("laser_input=2",)))
 
 
 @pytest.mark.parametrize(
