@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, cast
 
@@ -95,10 +96,12 @@ def offset_setting(digits: int) -> LimitedSetting:
 class DriveGenerator(ScpiInstrument):
     """What both families do with their settings.
 
-    OUTPUT: how the headers of the output begin; TRIANGLE_IS_RAMP: whether it has no triangle, but a symmetry of ramps.
+    OUTPUT: how the headers of the output begin; TWO_OUTPUTS: the models that have a second one, which nothing here
+    drives (regular expression); TRIANGLE_IS_RAMP: whether it has no triangle, but a symmetry of ramps.
     """
 
     OUTPUT: ClassVar[str]
+    TWO_OUTPUTS: ClassVar[str] = ""
     TRIANGLE_IS_RAMP: ClassVar[bool] = False
 
     waveform: Setting[str]
@@ -177,8 +180,11 @@ class DriveGenerator(ScpiInstrument):
             self.symmetry = 50.0
 
     def outputs(self) -> tuple[str, ...]:
-        """Return the beginning of the headers of each output."""
-        return (self.OUTPUT,)
+        """Return the beginning of the headers of each output; `*IDN?` is sent first where the model is to be known."""
+        if self.TWO_OUTPUTS and not self._fields:
+            self.identity()
+        two = self.TWO_OUTPUTS and re.fullmatch(self.TWO_OUTPUTS, self._fields[1], re.IGNORECASE)
+        return (self.OUTPUT, self.OUTPUT.replace("1", "2")) if two else (self.OUTPUT,)
 
     def off(self) -> None:
         """Switch every output off, and see that it is.  Raises CommandRefused if one is not.
@@ -200,6 +206,7 @@ class DriveGenerator(ScpiInstrument):
     def _is_on(self, output: str) -> bool:
         question = f"{output}?"
         answer = self.transport.query(question)
-        if answer not in {"0", "1"}:
-            self.reject(question, answer, "0 or 1")
-        return answer == "1"
+        try:
+            return {"0": False, "1": True}[self.field_of(answer, output, "")]
+        except (ValueError, KeyError):
+            self.reject(question, answer, "0 or 1, or ON or OFF")

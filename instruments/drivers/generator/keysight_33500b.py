@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from instruments.drivers.generator.drive import (
     DriveGenerator,
@@ -14,10 +14,6 @@ from instruments.drivers.generator.drive import (
 )
 from instruments.drivers.setting import Setting
 from instruments.ieee488 import INFINITY, Form
-
-if TYPE_CHECKING:
-    from instruments.clock import Clock
-    from instruments.links.transport import Transport
 
 
 class Keysight33500B(DriveGenerator):
@@ -31,8 +27,7 @@ class Keysight33500B(DriveGenerator):
     #: Operating and Service Guide, "typical response" of its queries.
     NUMBER: ClassVar[Form] = Form(r"[+-]\d\.\d{15}E[+-]\d{2}", "+1.000000000000000E+03")
     OUTPUT: ClassVar[str] = "OUTP1"
-    #: Those of the series that have a second channel, which nothing here drives.
-    TWO_CHANNELS: ClassVar[frozenset[str]] = frozenset({"33510B", "33512B", "33520B", "33522A", "33522B"})
+    TWO_OUTPUTS: ClassVar[str] = "335(1[02]B|20B|22[AB])"
 
     waveform = Setting(
         "FUNC",
@@ -45,19 +40,3 @@ class Keysight33500B(DriveGenerator):
     offset = offset_setting(digits=16)
     load = LoadSetting("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
     output = OutputSwitch("OUTP1", bool)
-
-    def __init__(self, transport: Transport, *, clock: Clock | None = None) -> None:
-        super().__init__(transport, clock=clock)
-        self._model = ""
-
-    def identity(self) -> str:
-        """Ask ``*IDN?``; the answer says how many channels there are."""
-        answer = super().identity()
-        self._model = answer.split(",")[1].strip().upper()
-        return answer
-
-    def outputs(self) -> tuple[str, ...]:
-        """Return the beginning of the headers of each output; `*IDN?` is sent first if it was not yet."""
-        if not self._model:
-            self.identity()
-        return ("OUTP1", "OUTP2") if self._model in self.TWO_CHANNELS else ("OUTP1",)

@@ -27,6 +27,7 @@ class RigolDG1000Z(DriveGenerator):
     MODELS: ClassVar[str] = r"DG8[123][12]|DG10[236]2Z"
     NUMBER: ClassVar[Form] = Form(r"-?\d\.\d{6}E[+-]\d{2}", "1.000000E+02")
     OUTPUT: ClassVar[str] = "OUTP1"
+    TWO_OUTPUTS: ClassVar[str] = r"DG8\d2|DG10\d2Z"
     TRIANGLE_IS_RAMP = True
 
     waveform = Setting(
@@ -44,15 +45,3 @@ class RigolDG1000Z(DriveGenerator):
     def field_of(self, answer: str, header: str, key: str) -> str:
         """Return the answer, ON and OFF as 1 and 0."""
         return {"ON": "1", "OFF": "0"}.get(answer, answer)
-
-    def outputs(self) -> tuple[str, ...]:
-        """Return the beginning of the headers of each output; `*IDN?` is sent first if it was not yet."""
-        if not self._fields:
-            self.identity()
-        return ("OUTP1", "OUTP2") if self._fields[1].rstrip("Z").endswith("2") else ("OUTP1",)
-
-    def _is_on(self, output: str) -> bool:
-        answer = self.field_of(self.transport.query(f"{output}?"), output, "")
-        if answer not in {"0", "1"}:
-            self.reject(f"{output}?", answer, "ON or OFF")
-        return answer == "1"

@@ -149,10 +149,3 @@ class SiglentSDG1000X(DriveGenerator):
     def outputs(self) -> tuple[str, ...]:
         """Return the beginning of the headers of both outputs."""
         return ("C1:OUTP", "C2:OUTP")
-
-    def _is_on(self, output: str) -> bool:
-        answer = self.transport.query(f"{output}?")
-        try:
-            return {"1": True, "0": False}[self.field_of(answer, output, "")]
-        except (ValueError, KeyError):
-            self.reject(f"{output}?", answer, f"{output} ON or {output} OFF, and more")
