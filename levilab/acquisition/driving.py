@@ -50,7 +50,7 @@ _DRIFTS_HZ, _DRIFTS_BY_U, _FEWEST_IN_HALF = 0.1, 3.0, 3
 _LOOK_EVERY_S, _TRIES_TO_HOLD = 10.0, 4
 #: Interval between looks for a top that a person was asked for [s].
 _LOOK_FOR_TOP_S = 2.0
-#: Time that a person has to spin the top of a spin-down without a drive [s].
+#: Time that a person has to spin and float the top of a spin-down without a drive, or of a sweep [s].
 _BY_HAND_S = 600.0
 #: Tries of a point of a sweep, and failed points in succession that end the sweep.
 TRIES, MOST_FAILED = 2, 3
@@ -389,27 +389,7 @@ def is_over(session: Session[D]) -> bool:
 # --- a sweep ---
 
 
-@dataclass(frozen=True)
-class FailedPoint:
-    """A point of a sweep at which nothing was measured.
-
-    Attributes:
-        drive: its frequency [Hz].
-        reason: of the last try.
-    """
-
-    drive: float
-    reason: str
-
-
-def sweep_drive(
-    session: Session[D],
-    points: Sequence[float],
-    measure: Callable[[float], None],
-    *,
-    within_s: float = 600.0,
-    most_failed: int = MOST_FAILED,
-) -> tuple[FailedPoint, ...]:
+def sweep_drive(session: Session[D], points: Sequence[float], measure: Callable[[float], None]) -> None:
     """Bring the drive with a held top from point to point of a sweep, and measure at each.
 
     Where the top is lost, at a point or on the way to it, the drive goes off, takes hold of the top at its own spin and
@@ -422,22 +402,16 @@ def sweep_drive(
         points: frequencies of the drive, in order [Hz].
         measure: measures at a frequency at which the drive now is, and keeps the reading itself.  Raises NotHeld where
             the top is lost, or not locked; PointFailed where another try at this point would not help.
-        within_s: how long a person has to float a top [s].
-        most_failed: number of points that fail in succession and end the sweep.
-
-    Returns:
-        The points that failed.
 
     Raises:
         ExperimentFailed: no top was floated, or measure raised it.  What was measured is kept.
     """
-    sweep = _Sweep(session, measure, within_s, held=session.settings.drive_frequency_hz)
-    failed: list[FailedPoint] = []
+    sweep = _Sweep(session, measure, held=session.settings.drive_frequency_hz)
     in_a_row = 0
     for k, drive in enumerate(points):
-        if in_a_row == most_failed:
+        if in_a_row == MOST_FAILED:
             left = ", ".join(f"{drive:g}" for drive in points[k:])
-            text = f"{most_failed} points one after the other failed: the sweep ends here; not tried: {left} Hz"
+            text = f"{MOST_FAILED} points one after the other failed: the sweep ends here; not tried: {left} Hz"
             session.event(RunEvent.ENDED, text)
             break
         reason = sweep.carry_out(drive)
@@ -445,25 +419,21 @@ def sweep_drive(
             break
         in_a_row = in_a_row + 1 if reason else 0
         if reason:
-            failed.append(FailedPoint(drive, reason))
-            session.event(
-                RunEvent.LEFT_OUT, f"the point of {drive:g} Hz is left out: {reason}", drive_frequency_hz=drive
-            )
+            text = f"the point of {drive:g} Hz is left out: {reason}"
+            session.event(RunEvent.LEFT_OUT, text, drive_frequency_hz=drive)
     drive_off(session)
-    return tuple(failed)
 
 
 @dataclass
 class _Sweep:
     """Where a sweep is.
 
-    session, measure, within_s: as `sweep_drive` has them; held: the last frequency that held the top [Hz]; at: the
-    drive's frequency [Hz], None while it is off.
+    session, measure: as `sweep_drive` has them; held: the last frequency that held the top [Hz]; at: the drive's
+    frequency [Hz], None while it is off.
     """
 
     session: Session[Any]
     measure: Callable[[float], None]
-    within_s: float
     held: float
     at: float | None = None
 
@@ -498,7 +468,7 @@ class _Sweep:
         session = self.session
         if self.at is None:
             text = "The counter sees no top: spin the top and let it float."
-            have_a_top(session, text, len(session.rows), within_s=self.within_s)
+            have_a_top(session, text, len(session.rows), within_s=_BY_HAND_S)
             drive_up(session, self.held)
             self.at = self.held
         if not math.isclose(self.at, drive, rel_tol=1e-9):

@@ -12,7 +12,6 @@ from instruments.errors import NoAnswer
 from levilab.acquisition.counting import prepare_counter
 from levilab.acquisition.driving import (
     DriveSettings,
-    FailedPoint,
     NotHeld,
     _hold,
     _ramp_end,
@@ -37,8 +36,6 @@ SCENE = SpinScene(fall_hz=24.0)
 
 def swept(out, monkeypatch, points, at_point=lambda _, __: None):
     """A sweep that keeps a row a point, in the place of the experiment `precession`."""
-    failed = []
-
     def run(session):
         def measure(drive):
             at_point(session, drive)
@@ -47,7 +44,7 @@ def swept(out, monkeypatch, points, at_point=lambda _, __: None):
 
         prepare_counter(session)
         session.begin(lambda: None)
-        failed.extend(sweep_drive(session, points, measure))
+        sweep_drive(session, points, measure)
 
     row = Experiment("precession", "a sweep", ("counter", "generator"), DriveSettings, lambda _: CHANNELS, run)
     monkeypatch.setitem(EXPERIMENTS, "precession", row)
@@ -55,7 +52,7 @@ def swept(out, monkeypatch, points, at_point=lambda _, __: None):
     world = SpinWorld(SCENE, VirtualClock())
     wiring = virtual_wiring(world, config.limits)
     request = AcquisitionRequest("precession", config, lambda: wiring, out=out, synthetic_how="a test")
-    return acquire(request, Silent()), tuple(failed)
+    return acquire(request, Silent())
 
 
 def measured(run):
@@ -80,9 +77,8 @@ def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(tmp_path, monkeypa
         if drive == 32.0:
             raise NotHeld(31.2, drive)
 
-    run, failed = swept(tmp_path, monkeypatch, [31.0, 32.0, 33.0], lose)
+    run = swept(tmp_path, monkeypatch, [31.0, 32.0, 33.0], lose)
     assert (run.status, measured(run)) == ("finished", [31.0, 33.0])
-    assert failed == (FailedPoint(32.0, "a spin of 31.20 Hz under a drive of 32.00 Hz"),)
     assert "try 2 of 2" in events(run, "lock lost")[1]
     (left_out,) = events(run, "left out")
     assert left_out == "the point of 32 Hz is left out: a spin of 31.20 Hz under a drive of 32.00 Hz"
@@ -103,8 +99,8 @@ def test_a_top_that_falls_is_asked_for_and_the_sweep_goes_on(tmp_path, monkeypat
             session.bench.outputs_off()
             session.wait(120.0)  # from 31.5 to below 24 Hz takes 90 s
 
-    run, failed = swept(tmp_path, monkeypatch, [31.0, 31.5, 32.0], weaken)
-    assert (run.status, measured(run), failed) == ("finished", [31.0, 31.5, 32.0], ())
+    run = swept(tmp_path, monkeypatch, [31.0, 31.5, 32.0], weaken)
+    assert (run.status, measured(run), events(run, "left out")) == ("finished", [31.0, 31.5, 32.0], [])
     assert len(events(run, "asked the person")) == 1
     assert "no top seen under a drive of 31.50 Hz; try 1 of 2" in events(run, "lock lost")[0]
 
@@ -120,10 +116,11 @@ def test_a_top_that_no_drive_takes_up_again_ends_the_sweep_with_what_was_measure
             )
             session.wait(20.0)  # 2 Hz
 
-    run, failed = swept(tmp_path, monkeypatch, [31.0, 31.5, 32.0, 32.5, 33.0], forbid)
+    run = swept(tmp_path, monkeypatch, [31.0, 31.5, 32.0, 32.5, 33.0], forbid)
     assert (run.status, measured(run)) == ("finished", [31.0])
-    assert [point.drive for point in failed] == [31.5, 32.0, 32.5]
-    assert all("did not follow the drive to 31 Hz" in point.reason for point in failed)
+    left_out = [event for event in run.events() if event["kind"] == "left out"]
+    assert [event["drive_frequency_hz"] for event in left_out] == [31.5, 32.0, 32.5]
+    assert all("did not follow the drive to 31 Hz" in event["text"] for event in left_out)
     assert events(run, "ended")[0].endswith("the sweep ends here; not tried: 33 Hz")
 
 
@@ -135,8 +132,8 @@ def test_a_generator_that_fails_on_the_way_costs_no_point(tmp_path, monkeypatch)
             lost.append(drive)
             raise NoAnswer(session.bench.address("generator"), "OUTP1?", 1.0)
 
-    run, failed = swept(tmp_path, monkeypatch, [31.0, 31.5], fail)
-    assert (measured(run), failed) == ([31.0, 31.5], ())
+    run = swept(tmp_path, monkeypatch, [31.0, 31.5], fail)
+    assert (measured(run), events(run, "left out")) == ([31.0, 31.5], [])
     assert len(events(run, "found again")) == 1
     assert events(run, "lock lost") == []
 
