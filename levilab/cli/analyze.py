@@ -307,10 +307,11 @@ def write_and_print(
     save: bool,
     out: Path | None,
     as_json: bool,
+    tables: bool = True,
 ) -> None:
     """Write the results before printing them: a closed pipe must not cost a result.
 
-    left_out: why other analyses have no result.
+    left_out: why other analyses have no result; tables: whether tables are printed.
     """
     from levilab.pipelines.catalogue import print_analysis
     from levilab.pipelines.suits import left_out_of, remarks, texts_of
@@ -330,7 +331,7 @@ def write_and_print(
         print_json(documents[0] if len(documents) == 1 else documents, sort_keys=True)
     else:
         for analysis, found in results:
-            print_analysis(analysis, found, in_words)
+            print_analysis(analysis, found, in_words, tables=tables)
     for text in messages:
         message(in_words(text))
     if failures:

@@ -83,7 +83,9 @@ def _analyze(context: typer.Context, paths: "Sequence[Path]", options: "Mapping[
     left_out: list[str] = []
     with interruptible("nothing is written"):
         results = analyze_suiting(paths, options, left_out.append)
-    write_and_print(context, results, left_out, save=True, out=None, as_json=False)
+    write_and_print(context, results, left_out, save=True, out=None, as_json=False, tables=False)
+    same = " with the same options" if options else ""
+    message(f"all numbers: levilab analyze {' '.join(map(str, paths))}{same}")
 
 
 def _report(context: typer.Context, paths: "Sequence[Path]", options: "Mapping[str, Any]", output: Path) -> None:

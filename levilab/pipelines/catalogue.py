@@ -162,7 +162,12 @@ ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 
 
 def print_analysis(
-    analysis: Analysis[A], found: A, in_words: Callable[[str], str] = unquote, console: Console | None = None
+    analysis: Analysis[A],
+    found: A,
+    in_words: Callable[[str], str] = unquote,
+    console: Console | None = None,
+    *,
+    tables: bool = True,
 ) -> None:
     """Print the tables, what the data say, and the warnings.
 
@@ -171,13 +176,14 @@ def print_analysis(
         found: what it found.
         in_words: a message as the person reads it.
         console: where it is printed, by default the terminal.
+        tables: whether tables are printed.
     """
     from rich.markup import escape
 
     from levilab.present.terminal import draw, terminal  # with rich
 
     console = console or terminal()
-    for table in analysis.tables(found):
+    for table in analysis.tables(found) if tables else ():
         console.print(draw(table))
     starts = [f"{short_name(one.name)} {moment(one.start)}" for one in found.sources if one.start]
     if starts:

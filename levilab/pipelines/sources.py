@@ -206,7 +206,8 @@ def in_words(left_out: Sequence[LeftOut]) -> str:
         named = ", ".join([*names[:_NAMED], *["…"] * (len(names) > _NAMED)])
         count = f"{len(names)} {kind.several}" if len(names) > 1 else kind.name
         texts.append(f"{count} ({named}{f': {kind.advice}' if kind.advice else ''})")
-    return f"left out: {'; '.join(texts)}"
+    all_named = "" if max(map(len, kinds.values()), default=0) <= _NAMED else "; levilab analyze --json names all"
+    return f"left out: {'; '.join(texts)}{all_named}"
 
 
 #: What lies in a folder and is no input, without a cause for a warning.

@@ -50,7 +50,10 @@ async function open(file) {
 /** Ask how the file is understood, with other options perhaps. */
 async function lookAt(wanted) {
   const answer = await ask(wanted, token);
-  if (answer.error) return write(look ? "problem" : "said", answer.error);
+  if (answer.error) {
+    if (look) hold("It was not taken, as said above: correct it, or undo corrections.");
+    return write(look ? "problem" : "said", answer.error);
+  }
   look = answer;
   show();
 }
@@ -78,12 +81,19 @@ function show() {
   by("rate").value = look.rate === null ? "" : String(Number(look.rate.toPrecision(9)));
   const notes = [...new Set(look.runs.flatMap(({warnings}) => warnings))];
   by("notes").replaceChildren(...notes.map((text) => make("li", inWords(text))));
-  by("analyze").disabled = Boolean(look.problem);
+  const asks = look.runs.some(({problem, doubts}) => problem && doubts.length);
+  hold(asks ? "Answer the question above first." : look.problem ? "It is not read; the reason stands above." : "");
   by("keep").disabled = Boolean(look.problem) || !look.words.length;
   by("again").disabled = !look.words.length;
   write("command", ["levilab analyze", look.name, ...look.words].map((word, k) => k && /[^\w.,=/-]/.test(word) ? `"${word}"` : word).join(" "));
   const used = look.runs.flatMap(({columns}) => columns).filter(({quantity}) => quantity).map(({title, quantity, unit}) => `${title || "a column"} is ${wordsOf(quantity)} in ${unit}`);
   write("news", inWords(look.problem) || `${look.name}: ${used.join(", ")}`);
+}
+
+/** Let nothing be analyzed for a reason, which stands beside the button; "" lets it. */
+function hold(why) {
+  by("analyze").disabled = Boolean(why);
+  write("why", why);
 }
 
 const wordsOf = (quantity) => quantities[quantity]?.words || quantity;

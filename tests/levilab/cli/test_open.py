@@ -47,6 +47,8 @@ def test_an_answer_is_kept_analyzed_and_reported(doubtful: Path) -> None:
     names = {path.name for path in doubtful.parent.iterdir()}
     assert {"my.html", "my.csv.levilab.toml", "my.csv.result.json", "my.csv.spindown.png"} <= names
     again = command("open", "my.csv", cwd=doubtful.parent)
+    assert len(again.out.splitlines()) <= 20  # with some messages a screen of 25
+    assert "all numbers: levilab analyze my.csv" in again.err
     assert (again.status, "is read as my.csv.levilab.toml says" in again.out) == (0, True)
 
 

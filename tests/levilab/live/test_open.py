@@ -54,7 +54,8 @@ def test_a_file_is_dropped_corrected_kept_and_analyzed(hall: Hall, watched: Call
     until(page, "window.levilab?.look")
     file = hall.root.parent / "opened" / "Müller's omega.csv"
     assert file.read_text("utf-8") == OMEGA
-    assert page.get_by_role("button", name="Analyze").is_disabled()  # a question is open
+    assert page.get_by_role("button", name="Analyze").is_disabled()
+    assert page.inner_text("#why") == "Answer the question above first."
     assert "no unit" in page.get_by_role("group").first.inner_text()
     page.get_by_role("button", name="rad/s (38").press("Enter")
     until(page, "levilab.look.plots['0']")
@@ -94,6 +95,8 @@ def test_a_choice_in_the_table_changes_how_it_is_read(hall: Hall, watched: Calla
     assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
     page.get_by_role("button", name="Undo corrections").click()
     until(page, "levilab.look.problem")
+    assert page.inner_text("#why")
+    assert page.get_by_role("button", name="Analyze").is_disabled()
     nameless = """[...document.querySelectorAll("button, select, input, a[href], canvas, [tabindex='0']")]
         .filter((one) => !(one.getAttribute("aria-label") || one.textContent.trim() || one.labels?.[0]))
         .map((one) => one.outerHTML)"""
