@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from instruments.drivers.oscilloscope import Preamble
 from instruments.drivers.oscilloscope.scope import TRIGGER_MODES, TRIGGER_SOURCES, Scope
-from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup
+from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup, time_scales
 from instruments.drivers.setting import Setting
 from instruments.errors import OutOfRange
 from instruments.ieee488 import NR1, Form
@@ -77,6 +77,9 @@ class RigolDS1000Z(Scope):
     PREAMBLE = (NR1, NR1, NR1, NR1, _NUMBER, _NUMBER, NR1, _NUMBER, NR1, NR1)
     CHANNEL = _RigolChannel
     OFFSET_SIGN = -1.0
+    COLUMNS = 12
+    TIME_SCALES: ClassVar[tuple[float, ...]] = time_scales(5e-9, 50.0)
+    FORCE = ":TFOR"
     #: Some firmware takes no memory depth when it has stopped.
     WHILE_SETTING_UP = ":RUN"
     SLOPES: ClassVar[Mapping[str, str]] = SLOPES | {"either": "RFAL"}
@@ -102,23 +105,12 @@ class RigolDS1000Z(Scope):
     #: Points of one block; how long a STOP may be an old one [s].
     _LONGEST_BLOCK = 250_000
     _SETTLED = 0.2
-    #: With sweep auto the trigger is forced after this time [s].
-    _PATIENCE = 0.1
 
     def _times(self, setup: Setup) -> dict[str, Value]:
         """Choose twelve divisions of 1, 2 or 5 · 10ⁿ s: up to 2.5 times the duration that was asked for."""
         scale = self._time_scale(setup.duration_s)
         depth = self._depth(setup.points, len(setup.shown))
-        self._duration = 12 * scale
         return {"time_scale": scale, "time_offset": 0.0, "acquisition_type": "NORM", "memory_depth": str(depth)}
-
-    def _time_scale(self, duration: float) -> float:
-        """Return the least time per division with which twelve of them are as long."""
-        scales = (float(f"{m}e{k}") for k in range(-9, 2) for m in (1, 2, 5))
-        found = next((s for s in scales if s >= 5e-9 and 12 * s >= duration * (1 - 1e-9)), None)
-        if found is None or duration <= 0:
-            raise OutOfRange(self.transport.address, "duration_s", duration, "0 to 600 s")
-        return found
 
     def _depth(self, points: int, shown: int) -> int:
         share = {1: 1, 2: 2}.get(shown, 4)
@@ -129,20 +121,17 @@ class RigolDS1000Z(Scope):
 
     def _start(self) -> None:
         self.command(":SING")
-        self._started, self._seen, self._forced = self.clock.now(), False, False
-        self._forces = self._setup is not None and self._setup.sweep == "auto"
+        self._seen = False
 
     def _complete(self) -> bool:
         status = self.transport.query(":TRIG:STAT?")
         if status not in {"TD", "WAIT", "RUN", "AUTO", "STOP"}:
             self.reject(":TRIG:STAT?", status, "TD, WAIT, RUN, AUTO or STOP")
-        waited = self.clock.now() - self._started
         if status == "STOP":
-            return self._seen or waited >= self._SETTLED
+            return self._seen or self.clock.now() - self._started >= self._SETTLED
         self._seen = True
-        if self._forces and status == "WAIT" and not self._forced and waited >= self._PATIENCE:
-            self.command(":TFOR")
-            self._forced = True
+        if status == "WAIT":
+            self._force_trigger()
         return False
 
     def _select(self, channel: int) -> None:

@@ -45,6 +45,8 @@ TRIGGER_SOURCES = (
     *(f"D{n}" for n in range(16)),
     *(f"DIGital{n}" for n in range(16)),
 )
+#: With sweep auto a scope that cannot do so itself is triggered after this time [s].
+_FORCED_AFTER_S = 0.1
 #: Beyond the transport's time-out, a block may take this long on its way [s]; 1 MB over a slow link.
 _BLOCK_PATIENCE = 10.0
 
@@ -56,7 +58,8 @@ class Scope(ScpiInstrument):
     acquisition; MAIN, EDGE: the settings that choose the time base, and the trigger on edges; OFFSET_SIGN: of the
     voltage in the middle of the screen, in its offset; WHILE_SETTING_UP: how it acquires then; SLOPES, SWEEPS: its
     words for them; CODES: of a clipped trace, and of no sample; CHANGED_BY_ACQUIRE: settings that acquire() leaves in
-    another state than they were prepared; PREAMBLE: the form of each of its ten fields.
+    another state than they were prepared; PREAMBLE: the form of each of its ten fields; COLUMNS, TIME_SCALES: divisions
+    of the screen, and what one may be [s], for `_time_scale`; FORCE: triggers at once, for `_force_trigger`.
     """
 
     CHANNEL: ClassVar[type[Channel]]
@@ -72,6 +75,9 @@ class Scope(ScpiInstrument):
     CODES: ClassVar[tuple[int, int, int | None]] = (0, 255, None)
     CHANGED_BY_ACQUIRE: ClassVar[Mapping[str, str]] = {}
     PREAMBLE: ClassVar[tuple[Form, ...]]
+    COLUMNS: ClassVar[int]
+    TIME_SCALES: ClassVar[tuple[float, ...]]
+    FORCE: ClassVar[str]
 
     trigger_source: Setting[str]
     trigger_level: Setting[float]
@@ -191,6 +197,15 @@ class Scope(ScpiInstrument):
         """Return the settings of time base and memory, in the order in which they are set.  Raises OutOfRange."""
         raise NotImplementedError
 
+    def _time_scale(self, duration: float) -> float:
+        """Return the least time per division with which the screen is as long [s].  Raises OutOfRange."""
+        found = next((s for s in self.TIME_SCALES if self.COLUMNS * s >= duration * (1 - 1e-9)), None)
+        if found is None or duration <= 0:
+            longest = self.COLUMNS * self.TIME_SCALES[-1]
+            raise OutOfRange(self.transport.address, "duration_s", duration, f"0 to {longest:g} s")
+        self._duration = self.COLUMNS * found
+        return found
+
     def _scaling(self, setup: Setup) -> dict[str, Value]:
         return {
             "display": True,
@@ -282,6 +297,7 @@ class Scope(ScpiInstrument):
         self._acquired = False
         try:
             self._start()
+            self._started, self._forced = self.clock.now(), False
             self._wait(timeout_s)
         except BaseException:
             with contextlib.suppress(InstrumentError):  # the first error is raised
@@ -298,6 +314,13 @@ class Scope(ScpiInstrument):
                 level, source = self.trigger_level, self.trigger_source
                 raise NeverTriggered(self.transport.address, level_v=level, source=source, waited_s=timeout)
             self.clock.sleep(_POLL)
+
+    def _force_trigger(self) -> None:
+        """Trigger once, with sweep auto, after a while."""
+        waits = self._setup is not None and self._setup.sweep == "auto" and not self._forced
+        if waits and self.clock.now() - self._started >= _FORCED_AFTER_S:
+            self.command(self.FORCE)
+            self._forced = True
 
     def _start(self) -> None:
         raise NotImplementedError

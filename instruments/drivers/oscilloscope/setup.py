@@ -16,6 +16,12 @@ _OF_A_DIVISION, _OF_THE_RECORD = 0.1, 0.01
 SLOPES = {"rising": "POS", "falling": "NEG"}
 
 
+def time_scales(low: float, high: float, mantissas: tuple[float, ...] = (1, 2, 5)) -> tuple[float, ...]:
+    """Return the times per division of a scope, 1, 2 and 5 · 10ⁿ s, from the lowest to the highest."""
+    every = (float(f"{m}e{k}") for k in range(-9, 3) for m in mantissas)
+    return tuple(scale for scale in every if low <= scale <= high)
+
+
 @dataclass(frozen=True)
 class Setup:
     """What prepare() was asked for; see :class:`instruments.drivers.oscilloscope.Oscilloscope`."""

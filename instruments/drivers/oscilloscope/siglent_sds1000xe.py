@@ -9,7 +9,7 @@ import numpy as np
 
 from instruments.drivers.oscilloscope import Preamble
 from instruments.drivers.oscilloscope.scope import Scope
-from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup
+from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup, time_scales
 from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, OutOfRange
 from instruments.ieee488 import NR1, BlockForm, Form
@@ -30,7 +30,7 @@ _FACTOR = Form(r"(0|[1-9]\d{0,4})(\.\d{1,3})?", "10")
 #: Points of the memory where one channel of a pair (1 and 2, 3 and 4) is on; half where both are.
 _DEPTHS = {"14K": 14_000, "140K": 140_000, "1.4M": 1_400_000, "14M": 14_000_000}
 _HALVES = {"7K": 7_000, "70K": 70_000, "700K": 700_000, "7M": 7_000_000}
-_COLUMNS, _CODES_PER_DIVISION = 14, 25
+_CODES_PER_DIVISION = 25
 #: Code 0 of the wire, a signed byte, is the middle of the screen: here it is 128.
 _MIDDLE = 128
 #: "C1:WF DAT2,#9…", and two line feeds at the end.
@@ -100,6 +100,9 @@ class SiglentSDS1000XE(Scope):
     MAIN: ClassVar[Mapping[str, Value]] = {}
     EDGE: ClassVar[Mapping[str, Value]] = {}
     OFFSET_SIGN = -1.0
+    COLUMNS = 14
+    TIME_SCALES: ClassVar[tuple[float, ...]] = time_scales(1e-9, 100.0)
+    FORCE = "FRTR"
     WHILE_SETTING_UP = "TRMD STOP"
     #: That WINDOW triggers on both slopes is inferred from the front panel's three choices.
     SLOPES: ClassVar[Mapping[str, str]] = SLOPES | {"either": "WINDOW"}
@@ -117,9 +120,6 @@ class SiglentSDS1000XE(Scope):
     trigger_source = Setting("TRSE", str, key="EDGE,SR", choices=("C1", "C2", "C3", "C4", "EX", "EX5", "LINE"))
     trigger_slope = Setting("TRSL", str, choices=("POS", "NEG", "WINDOW"))
     trigger_level = Setting("TRLV", float, unit="V", form=_VOLTAGE, low=-1e5, high=1e5, suffix="V")
-
-    #: With sweep auto the trigger is forced after this time [s].
-    _PATIENCE = 0.1
 
     def header_in_use(self, header: str) -> str:
         """Return the header; level and slope have that of the trigger's source."""
@@ -153,12 +153,8 @@ class SiglentSDS1000XE(Scope):
         """Choose fourteen divisions of 1, 2 or 5 · 10ⁿ s: up to 2.5 times the duration that was asked for."""
         if not 1 <= setup.points <= max(_DEPTHS.values()):
             raise OutOfRange(self.transport.address, "points", setup.points, f"1 to {max(_DEPTHS.values())}")
-        scales = (float(f"{m}e{k}") for k in range(-9, 3) for m in (1, 2, 5))
-        found = next((s for s in scales if s <= 100 and _COLUMNS * s >= setup.duration_s * (1 - 1e-9)), None)
-        if found is None or setup.duration_s <= 0:
-            raise OutOfRange(self.transport.address, "duration_s", setup.duration_s, "0 to 1400 s")
-        self._duration = _COLUMNS * found
-        return {"time_scale": found, "time_offset": 0.0, "acquisition_type": "SAMPLING"}
+        scale = self._time_scale(setup.duration_s)
+        return {"time_scale": scale, "time_offset": 0.0, "acquisition_type": "SAMPLING"}
 
     def _scaling(self, setup: Setup) -> dict[str, Value]:
         return super()._scaling(setup) | {"coupling": self.COUPLINGS[setup.coupling]}
@@ -179,15 +175,11 @@ class SiglentSDS1000XE(Scope):
         self.transport.write("TRMD SINGLE")
         self._has_new_record()  # reading it forgets an earlier one: before it is armed, or it may be this one
         self.transport.write("ARM")
-        self._started, self._forced = self.clock.now(), False
 
     def _complete(self) -> bool:
         if self._has_new_record():
             return True
-        forces = self._setup is not None and self._setup.sweep == "auto"
-        if forces and not self._forced and self.clock.now() - self._started >= self._PATIENCE:
-            self.transport.write("FRTR")
-            self._forced = True
+        self._force_trigger()
         return False
 
     def _has_new_record(self) -> bool:

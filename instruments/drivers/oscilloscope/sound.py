@@ -15,6 +15,7 @@ import numpy as np
 
 from instruments.clock import WallClock
 from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired, Trace
+from instruments.drivers.oscilloscope.setup import Setup
 from instruments.errors import InstrumentError, NotConnected, OutOfRange, WrongInstrument
 from instruments.links.sound import SoundLink
 
@@ -99,18 +100,6 @@ class _Record:
     whole: int
 
 
-@dataclass(frozen=True)
-class _Request:
-    """What prepare() was asked for: channels, samples, level in codes, slope, the trigger's channel, and sweep."""
-
-    channels: tuple[int, ...]
-    samples: int
-    level: float
-    slope: str
-    source: int
-    sweep: str
-
-
 class SoundCard:
     """A sound card; see :class:`instruments.drivers.oscilloscope.Oscilloscope`.
 
@@ -140,7 +129,7 @@ class SoundCard:
         self.clock: Clock = clock or WallClock()
         self.last_set = {}
         self.clock_error, self.clock_u = 0.0, None
-        self._request: _Request | None = None
+        self._request: Setup | None = None
         self._record: _Record | None = None
         self._heard = False
 
@@ -227,9 +216,10 @@ class SoundCard:
         if not -1 < trigger_level_v < 1:
             allowed_v = "between -1 and 1 V, which stand for full scale"
             raise OutOfRange(self.transport.address, "trigger_level_v", trigger_level_v, allowed_v)
-        samples = math.ceil(duration_s * self._link.input.rate)
-        level = trigger_level_v * FULL_SCALE
-        self._request = _Request(tuple(channels), samples, level, trigger_slope, trigger_source, sweep)
+        self._request = Setup(
+            *(tuple(channels), duration_s, points, volts_per_division, offset_v, coupling),
+            *(trigger_level_v, trigger_slope, trigger_source, sweep),
+        )
 
     def acquire(self, *, timeout_s: float) -> None:
         """Take one record; see :class:`instruments.drivers.oscilloscope.Oscilloscope`.
@@ -245,14 +235,16 @@ class SoundCard:
         finally:
             self._link.input.stop()
 
-    def _collect(self, request: _Request, timeout_s: float) -> _Record:
+    def _collect(self, request: Setup, timeout_s: float) -> _Record:
         """Read blocks until a record is complete."""
-        rate, before = self._link.input.rate, request.samples // 2
+        rate = self._link.input.rate
+        samples = math.ceil(request.duration_s * rate)
+        before = samples // 2
         came = _Came()
-        deadline = self.clock.now() + _SETTLES_S + request.samples / rate + timeout_s
+        deadline = self.clock.now() + _SETTLES_S + samples / rate + timeout_s
         settled = searched = round(_SETTLES_S * rate)
         trigger = None
-        while trigger is None or came.end < trigger + request.samples - before:
+        while trigger is None or came.end < trigger + samples - before:
             block = self._next()
             if block[2] and trigger is None:  # the record begins behind it
                 settled = searched = max(settled, came.end)
@@ -265,10 +257,10 @@ class SoundCard:
                 came.keep(before + 1)
             if trigger is None and self.clock.now() > deadline:
                 self._check_silence(came, timeout_s)
-                level, source = request.level / FULL_SCALE, f"channel {request.source}"
+                level, source = request.trigger_level_v, f"channel {request.trigger_source}"
                 raise NeverTriggered(self.transport.address, level_v=level, source=source, waited_s=timeout_s)
-        self._check_silence(came, request.samples / rate)
-        return came.record(trigger - before, request.samples, trigger, rate)
+        self._check_silence(came, samples / rate)
+        return came.record(trigger - before, samples, trigger, rate)
 
     def arrivals(self, duration_s: float, tell: Callable[[float], None]) -> tuple[NDArray[np.int64], Times]:
         """Listen for a while without keeping the samples.
@@ -311,10 +303,10 @@ class SoundCard:
             )
         return block
 
-    def _find_trigger(self, request: _Request, came: _Came, first: int) -> int | None:
+    def _find_trigger(self, request: Setup, came: _Came, first: int) -> int | None:
         """Return the number of the first sample behind a crossing of the level, from a number on."""
-        above = came.samples(first, came.end)[:, request.source - 1] >= request.level
-        crossings = np.flatnonzero(_SLOPES[request.slope](above[1:].astype(np.int8) - above[:-1]))
+        above = came.samples(first, came.end)[:, request.trigger_source - 1] >= request.trigger_level_v * FULL_SCALE
+        crossings = np.flatnonzero(_SLOPES[request.trigger_slope](above[1:].astype(np.int8) - above[:-1]))
         return first + int(crossings[0]) + 1 if crossings.size else None
 
     def _check_silence(self, came: _Came, waited_s: float) -> None:

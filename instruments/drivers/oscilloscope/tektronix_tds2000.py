@@ -8,7 +8,7 @@ import numpy as np
 
 from instruments.drivers.oscilloscope import Preamble
 from instruments.drivers.oscilloscope.scope import Scope
-from instruments.drivers.oscilloscope.setup import Channel, Setup
+from instruments.drivers.oscilloscope.setup import Channel, Setup, time_scales
 from instruments.drivers.setting import Setting
 from instruments.errors import CommandRefused, OutOfRange
 from instruments.ieee488 import NR1, Form
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 #: "1.0E0", "2.5E-3", "-1.25E-8": no zero that need not be, in the exponent neither.
 _NUMBER = Form(r"-?\d\.\d{1,9}E-?\d{1,2}", "2.5E-3")
-#: Points of every record, on ten divisions; codes of a division, and the middle of the screen as a byte from 0 on.
-_POINTS, _COLUMNS, _CODES, _MIDDLE = 2500, 10, 25, 128
+#: Points of every record; codes of a division, and the middle of the screen as a byte from 0 on.
+_POINTS, _CODES, _MIDDLE = 2500, 25, 128
 #: *ESR?: query, device, execution and command error.
 _ERRORS = 0b0011_1100
 #: Fields of WFMPre?, by their places: the format that was asked for, then numbers.
@@ -86,6 +86,8 @@ class TektronixTDS2000(Scope):
     MAIN: ClassVar[Mapping[str, Value]] = {"time_view": "MAI"}
     EDGE: ClassVar[Mapping[str, Value]] = {"trigger_type": "EDGE"}
     WHILE_SETTING_UP = "ACQ:STATE STOP"
+    COLUMNS = 10
+    TIME_SCALES: ClassVar[tuple[float, ...]] = time_scales(5e-9, 50.0, (1, 2.5, 5))
     SLOPES: ClassVar[Mapping[str, str]] = {"rising": "RIS", "falling": "FALL"}
     SWEEPS: ClassVar[Mapping[str, str]] = {"normal": "NORM", "single": "NORM", "auto": "AUTO"}
 
@@ -124,12 +126,8 @@ class TektronixTDS2000(Scope):
         """Choose ten divisions of 1, 2.5 or 5 · 10ⁿ s: up to 2.5 times the duration that was asked for."""
         if setup.points < 1:
             raise OutOfRange(self.transport.address, "points", setup.points, f"1 on; there are always {_POINTS}")
-        scales = (float(f"{m}e{k}") for k in range(-9, 2) for m in (1, 2.5, 5))
-        found = next((s for s in scales if s >= 5e-9 and _COLUMNS * s >= setup.duration_s * (1 - 1e-9)), None)
-        if found is None or setup.duration_s <= 0:
-            raise OutOfRange(self.transport.address, "duration_s", setup.duration_s, "0 to 500 s")
-        self._duration = _COLUMNS * found
-        return {"time_scale": found, "time_offset": 0.0, "acquisition_type": "SAM"}
+        scale = self._time_scale(setup.duration_s)
+        return {"time_scale": scale, "time_offset": 0.0, "acquisition_type": "SAM"}
 
     def _scaling(self, setup: Setup) -> dict[str, Value]:
         wanted = super()._scaling(setup)

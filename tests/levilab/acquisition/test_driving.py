@@ -36,6 +36,7 @@ SCENE = SpinScene(fall_hz=24.0)
 
 def swept(out, monkeypatch, points, at_point=lambda _, __: None):
     """A sweep that keeps a row a point, in the place of the experiment `precession`."""
+
     def run(session):
         def measure(drive):
             at_point(session, drive)
