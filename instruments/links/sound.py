@@ -87,22 +87,17 @@ class InputDevice:
     is_default: bool
 
 
-@dataclass(frozen=True)
-class _Wanted:
-    """What an address asks for.  name: part of a name, or a number; rate: None: the input's own [1/s]."""
+def _name_and_rate(address: str) -> tuple[str, float | None]:
+    """Return the name or number that an address asks for, and the rate [1/s], None for the input's own.
 
-    name: str
-    rate: float | None
-
-    @classmethod
-    def of(cls, address: str) -> _Wanted:
-        """Read an address.  Raises NotConnected."""
-        name, _, query = address.partition("://")[2].partition("?")
-        keys = dict(parse_qsl(query, keep_blank_values=True))
-        rate = keys.pop("rate", None)
-        if keys or not re.fullmatch(r"\d{4,6}", rate or "48000"):
-            raise NotConnected(address, "expected sound://NAME?rate=48000, with a rate from 1000 to 999999 Hz")
-        return cls(unquote(name).strip("/").strip(), None if rate is None else float(rate))
+    Raises NotConnected.
+    """
+    name, _, query = address.partition("://")[2].partition("?")
+    keys = dict(parse_qsl(query, keep_blank_values=True))
+    rate = keys.pop("rate", None)
+    if keys or not re.fullmatch(r"\d{4,6}", rate or "48000"):
+        raise NotConnected(address, "expected sound://NAME?rate=48000, with a rate from 1000 to 999999 Hz")
+    return unquote(name).strip("/").strip(), None if rate is None else float(rate)
 
 
 class SoundLink:
@@ -181,11 +176,11 @@ class _Microphone:
 
     def __init__(self, address: str, clock: Clock) -> None:
         sd = _sounddevice(address)
-        wanted = _Wanted.of(address)
-        device = choose_input(address, wanted.name, inputs(address))
+        name, rate = _name_and_rate(address)
+        device = choose_input(address, name, inputs(address))
         self._address, self._clock, self._came = address, clock, queue.SimpleQueue[Block]()
         self.channels = min(device.channels, MOST_CHANNELS)
-        self.rate = wanted.rate or self._usual_rate(device)
+        self.rate = rate or self._usual_rate(device)
         text = re.sub(r"[,\s]+", " ", f"{device.host},{device.name}".replace(",", "\0")).split("\0", 1)
         version = sd.get_portaudio_version()[1].partition(",")[0]
         self.identity = f"{text[0]},sound,{text[1]},{version}"

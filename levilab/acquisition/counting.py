@@ -81,15 +81,15 @@ def spin_now(session: Session[S], gate_s: float | None = None) -> float | None:
 
     gate_s: as it was prepared.
     """
-    while True:
-        try:
-            spin = session.bench.counter.frequency()
-            session.check_settings("counter")
-        except InstrumentError as error:
-            session.reconnect("counter", error, lambda: prepare_counter(session, gate_s))
-        else:
-            session.saw("spin_frequency_hz", spin)
-            return spin
+
+    def count() -> float | None:
+        spin = session.bench.counter.frequency()
+        session.check_settings("counter")
+        return spin
+
+    spin = session.insist("counter", count, lambda: prepare_counter(session, gate_s))
+    session.saw("spin_frequency_hz", spin)
+    return spin
 
 
 @dataclass

@@ -204,7 +204,9 @@ def drive_up(session: Session[D], to: float | None = None) -> None:
     target = settings.drive_frequency_hz if to is None else to
     seen = ""
     for tries in range(1, _TRIES_TO_HOLD + 1):
-        spin = _free_spin(session, target, seen)
+        spin = spin_now(session)
+        if spin is None:
+            raise _did_not_follow(session, target, f"{seen}; then it fell") if seen else _no_light(session)
         session.stop.check()  # the drive does not go on once the end was asked for
         session.bench.generator.prepare(
             waveform=settings.drive_waveform, frequency_hz=spin, amplitude_vpp=settings.drive_amplitude_vpp
@@ -240,16 +242,6 @@ def _did_not_follow(session: Session[D], target: float, seen: str) -> DidNotFoll
         observed,
         f"ramp slower ({name}.ramp_hz_per_s) or drive harder ({name}.drive_amplitude_vpp)",
     )
-
-
-def _free_spin(session: Session[D], target: float, before: str) -> float:
-    """Return the spin before the drive is on; before: end of the last try.  Raises ExperimentFailed."""
-    spin = spin_now(session)
-    if spin is None and before:
-        raise _did_not_follow(session, target, f"{before}; then it fell")
-    if spin is None:
-        raise _no_light(session)
-    return spin
 
 
 def _no_light(session: Session[D]) -> NoLight:

@@ -215,7 +215,16 @@ def _refuse_unused(options: AcquisitionOptions, config: BenchConfig, experiment:
 
 def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequence[str]) -> BenchConfig:
     """Return the configuration with some of the experiment's settings changed.  Raises UsageError."""
-    return _with_texts(config, experiment, dict(_key_and_text(config, experiment, setting) for setting in settings))
+    texts = dict(_key_and_text(config, experiment, setting) for setting in settings)
+    if not texts:
+        return config
+    table = config.model_dump(mode="json", exclude_unset=True)  # defaults may still be suited to a scene
+    values = {name: parse_setting(f"{name}={text}")[1] for name, text in texts.items()}
+    table[experiment] = table.get(experiment, {}) | values
+    try:
+        return Configuration.model_validate(table)
+    except ValidationError as error:
+        raise refusal(error, texts, config, experiment) from error
 
 
 def _key_and_text(config: BenchConfig, experiment: str, setting: str) -> tuple[str, str]:
@@ -242,19 +251,6 @@ def _wrong_form(experiment: str, setting: str, why: str = "") -> UsageError:
     return UsageError("settings", what, value=setting)
 
 
-def _with_texts(config: BenchConfig, experiment: str, texts: Mapping[str, str]) -> BenchConfig:
-    """Return the configuration with texts as values at some of the experiment's keys.  Raises UsageError."""
-    if not texts:
-        return config
-    table = config.model_dump(mode="json", exclude_unset=True)  # defaults may still be suited to a scene
-    values = {name: parse_setting(f"{name}={text}")[1] for name, text in texts.items()}
-    table[experiment] = table.get(experiment, {}) | values
-    try:
-        return Configuration.model_validate(table)
-    except ValidationError as error:
-        raise refusal(error, texts, config, experiment) from error
-
-
 def _check_given(config: BenchConfig, without: BenchConfig, experiment: str) -> None:
     """Check what the bench allows of an experiment.
 
@@ -267,21 +263,16 @@ def _check_given(config: BenchConfig, without: BenchConfig, experiment: str) -> 
         UsageError: the bench allows the configuration without the given settings, and not with them.
         ConfigError: it allows neither.
     """
-    refused = _refusal(config, experiment)
-    if refused and not _refusal(without, experiment):
-        raise UsageError("settings", str(refused)) from refused
-    if refused:
-        raise refused
-
-
-def _refusal(config: BenchConfig, experiment: str) -> ConfigError | None:
-    """Return why the bench does not allow the experiment's settings; None if it does."""
-    settings = settings_of(config, experiment)
     try:
-        settings.for_bench(config).check(experiment, config.limits)
-    except ConfigError as error:
-        return error
-    return None
+        _check_settings(config, experiment)
+    except ConfigError as refused:
+        _check_settings(without, experiment)
+        raise UsageError("settings", str(refused)) from refused
+
+
+def _check_settings(config: BenchConfig, experiment: str) -> None:
+    """Raise ConfigError for settings of an experiment that the bench does not allow."""
+    settings_of(config, experiment).for_bench(config).check(experiment, config.limits)
 
 
 def _original_configuration(run: Run) -> BenchConfig:

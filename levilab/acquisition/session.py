@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from levilab.runs.writer import RunWriter
 
 S = TypeVar("S", bound=Settings)
+T = TypeVar("T")
 
 #: Longest sleep between two checks for Ctrl-C [s], by the clock on the wall: one that jumps sleeps through at once.
 _NAP_S = 0.2
@@ -329,7 +330,7 @@ class Session(Generic[S]):
             raise SettingsLost(self.bench.address(kind), changed)
 
     def reconnect(self, kind: str, error: InstrumentError, set_up: Callable[[], None]) -> None:
-        """Reach an instrument that failed in the middle of a run again and set it up, or give up.
+        """Reach an instrument that failed in the middle of a run again and set it up, or give up; see `insist`.
 
         Raises the error that began it after the last of the tries in REOPENING_S, or where it is lost again and again.
         """
@@ -350,6 +351,14 @@ class Session(Generic[S]):
                 self.event(RunEvent.FOUND_AGAIN, f"{kind} answers again and is set up as before")
                 return
         raise error
+
+    def insist(self, kind: str, attempt: Callable[[], T], set_up: Callable[[], None]) -> T:
+        """Return the result of an attempt; repeat it where the instrument fails and is reached again."""
+        while True:
+            try:
+                return attempt()
+            except InstrumentError as error:
+                self.reconnect(kind, error, set_up)
 
 
 # --- the line of a reading ---

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 from pydantic_core import PydanticCustomError
 
-from instruments.errors import InstrumentError
 from levilab.acquisition.experiment import Experiment, ExperimentSettings
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
@@ -190,13 +189,7 @@ def _zero(session: Session[FieldSettings]) -> None:
     """Zero the probe in its chamber.  Each start does that: the instrument may have been off meanwhile."""
     session.ask(ShieldProbe("Put the probe into its zero-gauss chamber."))
     session.wait(session.settings.settle_s)
-    while True:
-        try:
-            session.bench.magnetometer.zero()
-        except InstrumentError as error:
-            session.reconnect("magnetometer", error, lambda: _set_up(session))
-        else:
-            return
+    session.insist("magnetometer", session.bench.magnetometer.zero, lambda: _set_up(session))
 
 
 # --- the heights ---
@@ -234,16 +227,15 @@ def parse_height(answer: str) -> float | None:
 
 def _measure(session: Session[FieldSettings], height: float) -> Row:
     """Return the mean of the readings at a height; set up a magnetometer that fails again, and read again."""
-    while True:
-        try:
-            session.wait(session.settings.settle_s)
-            begin = session.now()
-            values = [_read(session, height) for _ in range(session.settings.readings)]
-            session.check_settings("magnetometer")
-        except InstrumentError as error:
-            session.reconnect("magnetometer", error, lambda: _set_up(session))
-        else:
-            return {"time_s": (begin + session.now()) / 2, "height_m": height} | _mean(session.settings, values)
+
+    def measure() -> Row:
+        session.wait(session.settings.settle_s)
+        begin = session.now()
+        values = [_read(session, height) for _ in range(session.settings.readings)]
+        session.check_settings("magnetometer")
+        return {"time_s": (begin + session.now()) / 2, "height_m": height} | _mean(session.settings, values)
+
+    return session.insist("magnetometer", measure, lambda: _set_up(session))
 
 
 def _read(session: Session[FieldSettings], height: float) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
@@ -97,23 +96,16 @@ def run(session: Session[LimitSettings]) -> None:
     prepare_counter(session)
     session.begin(lambda: None, resumed="going on with the next top")
     measure = _lower if settings.which == "lower" else _upper
-    keep = _Keeper(session, len(session.rows))
+    before = len(session.rows)
+
+    def keep(row: Row) -> None:
+        """Keep the limit of a top as soon as it is known."""
+        done = len(session.rows) + 1
+        session.keep(row, (settings.repetitions - done) * session.time_spent() / (done - before))
+
     while len(session.rows) < settings.repetitions and not is_over(session):
         if not _with_a_top(session, measure, keep):
             return
-
-
-@dataclass
-class _Keeper:
-    """Keeps the limit of a top as soon as it is known.  before: tops of the run that is resumed."""
-
-    session: Session[LimitSettings]
-    before: int
-
-    def __call__(self, row: Row) -> None:
-        session = self.session
-        done = len(session.rows) + 1
-        session.keep(row, (session.settings.repetitions - done) * session.time_spent() / (done - self.before))
 
 
 def _with_a_top(
@@ -145,16 +137,11 @@ def _have_the_next_top(session: Session[LimitSettings]) -> bool:
     """See that the next top floats; where none does, ask for one, and return True.  Raises ExperimentFailed."""
     settings, number = session.settings, len(session.rows)
     session.progress(f"top {number + 1} of {settings.repetitions}", number / settings.repetitions)
-    if number and _spins_freely(session):
+    spin = spin_now(session) if number else None
+    if spin is not None and spin > settings.drive_frequency_hz:  # the last one only lost its lock
         _coast_down(session)
     text = f"Top {number + 1} of {settings.repetitions}: spin the top and let it float."
     return have_a_top(session, text, number, within_s=settings.float_s)
-
-
-def _spins_freely(session: Session[LimitSettings]) -> bool:
-    """Return whether the last top still spins, faster than the drive is to begin: one that only lost its lock."""
-    spin = spin_now(session)
-    return spin is not None and spin > session.settings.drive_frequency_hz
 
 
 def _coast_down(session: Session[LimitSettings]) -> None:
