@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.simulator.kernels.motion import ARM, TIME, N
-from levilab.simulator.model import has_attitude
+from levilab.simulator.model import has_attitude, with_attitude
 from levilab.simulator.single import simulate
 from levilab.simulator.trajectory import Trajectory
+from levilab.world.pose import quaternions
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: The transverse part that makes the simulator integrate the turn of an aligned moment.
-_NEGLIGIBLE_TILT = 1e-17
 #: Error of the end of the span, of place [m] and axis [rad].
 TOLERANCE = 1e-7
 
@@ -63,8 +62,7 @@ class Poses:
     @property
     def axes(self) -> Array:
         """The top's axis, shape (n, 3)."""
-        x, y, z, w = self.quaternions.T
-        return np.stack([2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)], axis=1)
+        return matrices(self.quaternions)[:, :, 2]
 
     @property
     def tilts(self) -> Array:
@@ -91,7 +89,7 @@ def poses_of(
     Raises:
         SimulationError: for what cannot be simulated.
     """
-    scene, state = _with_attitude(motion.scene), _state_at(motion, start)
+    scene, state = with_attitude(motion.scene), _state_at(motion, start)
     found = simulate(
         scene, stop - start, tolerance=TOLERANCE, rate=count / (stop - start), start=state, progress=progress
     )
@@ -106,21 +104,15 @@ def poses_of(
         found.position,
         quaternions_of(found.states[:, ARM], found.axis),
         found.spin_hz,
-        _slips(found),
+        2 * np.pi * found.slips,
         drive_share(scene.drive, times[:whole]),
         fell=motion.fell is not None and stop >= motion.time[-1],
     )
 
 
-def _with_attitude(scene: Scene) -> Scene:
-    if has_attitude(scene):
-        return scene
-    return scene.changed({"top.moment_tilt": [_NEGLIGIBLE_TILT, scene.top.moment_tilt[1]]})
-
-
 def _state_at(motion: Trajectory, time: float) -> Array:
     """Return the state at a time between two samples, with an arm at right angles to the axis, shape (18,)."""
-    scene = _with_attitude(motion.scene)
+    scene = with_attitude(motion.scene)
     k = max(int(np.searchsorted(motion.time, time, side="right")) - 1, 0)
     state = motion.states[k].copy()
     if not has_attitude(motion.scene):  # no arm was carried along: any one will do
@@ -151,30 +143,10 @@ def quaternions_of(arms: Array, axes: Array) -> Array:
     >>> quaternions_of(np.array([[0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 1.0]])).round(4).tolist()
     [[0.0, 0.0, 0.7071, 0.7071]]
     """
-    third = np.cross(axes, arms)
-    m = np.stack([arms, third, axes], axis=-1)  # columns: what the body's x, y, z become
-    xx, yy, zz = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
-    # four times the products of the quaternion's parts; the row of the largest square is divided by without loss
-    squares = np.stack([1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz], axis=1)
-    xy, xz, yz = m[:, 0, 1] + m[:, 1, 0], m[:, 0, 2] + m[:, 2, 0], m[:, 1, 2] + m[:, 2, 1]
-    xw, yw, zw = m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]
-    rows = np.stack([
-        np.stack([squares[:, 0], xy, xz, xw], axis=1),
-        np.stack([xy, squares[:, 1], yz, yw], axis=1),
-        np.stack([xz, yz, squares[:, 2], zw], axis=1),
-        np.stack([xw, yw, zw, squares[:, 3]], axis=1),
-    ], axis=1)  # fmt: skip
-    chosen = rows[np.arange(len(m)), np.argmax(squares, axis=1)]
-    found = chosen / np.linalg.norm(chosen, axis=1, keepdims=True)
+    found = quaternions(axes, arms)
     turns_over = np.sum(found[1:] * found[:-1], axis=1) < 0
     signs = np.concatenate([[1.0], np.where(np.cumsum(turns_over) % 2, -1.0, 1.0)])
     return np.asarray(found * signs[:, None])
-
-
-def _slips(motion: Trajectory) -> Array:
-    """Return the turn of loose washers on the top since the first state, shape (n,) [rad]; the slip changes slowly."""
-    rates = 2 * np.pi * (motion.washer_spin_hz - motion.spin_hz)
-    return np.concatenate([[0.0], np.cumsum(np.diff(motion.time) * (rates[1:] + rates[:-1]) / 2)])
 
 
 #: The drive's waveforms at a phase [rad].
@@ -203,15 +175,8 @@ def turn_rate(motion: Trajectory) -> float:
     return float(max(np.abs(motion.spin_hz).max(), np.abs(motion.washer_spin_hz).max()))
 
 
-def matrices(quaternions: Array) -> Array:
-    """Return the turns as matrices, shape (n, 3, 3)."""
-    x, y, z, w = quaternions.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.asarray(np.moveaxis(np.array(rows), -1, 0), dtype=np.float64)
+def matrices(turns: Array) -> Array:
+    """Return quaternions, shape (n, 4), as matrices, shape (n, 3, 3)."""
+    from scipy.spatial.transform import Rotation  # takes a moment to load
 
-
-__all__ = ["Poses", "drive_share", "height_for_camera", "matrices", "poses_of", "quaternions_of", "turn_rate"]
+    return np.asarray(Rotation.from_quat(turns).as_matrix())

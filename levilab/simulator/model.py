@@ -70,6 +70,18 @@ def has_attitude(scene: Scene) -> bool:
     return bool(scene.top.moment_tilt[0] != 0 or scene.top.magnet == "disc" or scene.washers.inertia_kg_m2 > 0)
 
 
+#: The transverse part that makes the simulator integrate the turn of an aligned moment: less than the rounding of the
+#: axial one.
+_NEGLIGIBLE_TILT = 1e-17
+
+
+def with_attitude(scene: Scene) -> Scene:
+    """Return the scene whose motion carries the turn about the axis along, and is otherwise the same."""
+    if has_attitude(scene):
+        return scene
+    return scene.changed({"top.moment_tilt": [_NEGLIGIBLE_TILT, scene.top.moment_tilt[1]]})
+
+
 def _magnet(scene: Scene, place: Any, more_nodes: int) -> Any:
     top = scene.top
     transverse, axial = top.moment_tilt

@@ -134,6 +134,15 @@ class Trajectory:
         return self.states[:, LOOSE] / (2 * np.pi * inertia) if inertia else self.spin_hz
 
     @property
+    def slips(self) -> Array:
+        """Turns of loose washers relative to the top since the first state, shape (n,); 0 where none are loose.
+
+        They are negative, for washers turn more slowly.  By the trapezium rule, since the slip changes within seconds.
+        """
+        rates = self.washer_spin_hz - self.spin_hz
+        return np.concatenate([[0.0], np.cumsum(np.diff(self.time) * (rates[1:] + rates[:-1]) / 2)])
+
+    @property
     def survived(self) -> bool:
         """Whether the top was still up at the end."""
         return self.fell is None

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from levilab.errors import LeftRange
 from levilab.simulator.kernels.motion import ARM, TIME, L, N, R, V
 from levilab.simulator.keys import SceneError
+from levilab.simulator.model import with_attitude
 from levilab.simulator.single import simulate
 from levilab.simulator.start import start_of
 from levilab.world.timeline import Timeline
@@ -36,10 +37,6 @@ _REMEMBERED = 4
 
 #: In so short a time [s] no motion is to be simulated.
 _AT_ONCE = 1e-9
-
-#: The tape's place needs the full attitude, which the simulator integrates only for a tilted moment.  An aligned moment
-#: gets this transverse part, which is less than the rounding of the axial one.
-_NEGLIGIBLE_TILT = 1e-17
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,10 +113,8 @@ class Flight:
     def __init__(self, scene: Scene, put_back_after_s: float | None = None, *, stem_height_m: float = 0.03) -> None:
         if scene.observed != "motion":
             raise SceneError(f"observed = {scene.observed}: a scene for the bench is expected to have motion")
-        transverse, axial = scene.top.moment_tilt
-        self._scene = scene.changed(
-            {"drive.waveform": "off", "drive.off_s": None, "top.moment_tilt": [transverse or _NEGLIGIBLE_TILT, axial]}
-        )
+        # the tape's place needs the full attitude
+        self._scene = with_attitude(scene.changed({"drive.waveform": "off", "drive.off_s": None}))
         self._put_back_after_s, self._stem_height = put_back_after_s, stem_height_m
         self._pieces: Timeline[_Flying | _Absent] = Timeline(-math.inf, _Absent(-math.inf))
         self._step: float | None = None
@@ -280,7 +275,7 @@ class Flight:
         return self._samples[piece]
 
     def _sample(self, motion: Trajectory, slip: float) -> _Samples:
-        slips = slip + _slips(motion)
+        slips = slip + motion.slips
         return _Samples(
             motion.time.copy(), _turns(motion) + slips, slips, _stem(motion, self._stem_height), _lift(motion)
         )
@@ -361,19 +356,6 @@ def _state_within(piece: _Flying, time: float) -> Array:
         state = motion.states[-1].copy()
     state[TIME] = time
     return state
-
-
-def _slips(motion: Trajectory) -> Array:
-    """Return the turns of loose washers relative to the top since the first sample, shape (n,).
-
-    They are negative, for washers turn more slowly; 0 if none are loose.  The trapezium rule is enough, for the slip
-    changes within seconds, and the samples are 2.5 ms apart.
-    """
-    if motion.scene.washers.inertia_kg_m2 == 0:
-        return np.zeros(motion.time.size)
-    rate = motion.washer_spin_hz - motion.spin_hz
-    steps = np.diff(motion.time) * (rate[1:] + rate[:-1]) / 2
-    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _turns(motion: Trajectory) -> Array:
