@@ -34,6 +34,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from levilab.reproduce.synthetic import NOISE_HZ, READINGS, solve
 from numpy.typing import NDArray
 
 from analysis.locked import slip_of
@@ -41,9 +42,8 @@ from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.present.numbers import with_sign
 from levilab.present.progress import Display
-from levilab.reproduce.synthetic import NOISE_HZ, READINGS, solve
 from levilab.simulator import preset
-from levilab.stability.published.printed import several
+from levilab.simulator.published.printed import several
 
 HERE = Path(__file__).parent
 #: (C₁ [1/s], |C₂| [1/rad], readings): the thesis's four runs, C₁ printed to six decimals, C₂ to eight.

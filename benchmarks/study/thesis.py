@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from levilab.stability.published.printed import published
+from levilab.simulator.published.printed import published
 from levilab.stability.thesis import MEASURED_HZ, MEASURED_U_HZ, SCATTER_HZ, SIMULATED_HZ, WITH_DRAG_HZ
 
 THESIS: dict[str, Any] = {

@@ -169,7 +169,7 @@ def _compute(store: Store, cores: int | None, scheduler: str | None) -> bool:
 def _show(store: Store, *, as_json: bool) -> list[Path]:
     """Print the summary; draw the figures and return their paths."""
     from levilab.sweeps.adaptive import report_in
-    from levilab.sweeps.drawing import draw_figures
+    from levilab.sweeps.report import draw_figures
     from levilab.sweeps.summary import (
         FEW_POINTS,
         as_document,

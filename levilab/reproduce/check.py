@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from levilab.present.document.blocks import Block
-    from levilab.stability.published.printed import Printed
+    from levilab.simulator.published.printed import Printed
 
 #: What a float loses in a difference of two numbers with few digits.
 _FLOAT = 1e-9
@@ -309,7 +309,7 @@ def _with_unit(number: str, unit: str) -> str:
 def _like(value: float, published: Printed) -> str:
     """Return a number with one decimal more than the print, at least two, so that its rounding is seen.
 
-    >>> from levilab.stability.published.printed import Printed
+    >>> from levilab.simulator.published.printed import Printed
     >>> _like(22.0799, Printed("22.06", "Hz", "", "")), _like(1.76004e-5, Printed("1.760e-5", "1/rad", "", ""))
     ('22.080', '1.7600×10⁻⁵')
     """

@@ -17,9 +17,9 @@ from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.field import field_of, flux_density, on_axis
 from levilab.simulator.kernels.motion import R, V
 from levilab.simulator.model import base_field
+from levilab.simulator.published.printed import several
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
-from levilab.stability.published.printed import several
 from levilab.stability.scan import lower_limit
 
 if TYPE_CHECKING:

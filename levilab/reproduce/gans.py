@@ -17,8 +17,8 @@ from levilab.reproduce.check import Found, statement
 from levilab.reproduce.figure import gans_figure
 from levilab.reproduce.tops import Array, known, many
 from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.published.printed import published
 from levilab.simulator.scene import preset
-from levilab.stability.published.printed import published
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene

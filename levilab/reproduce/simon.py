@@ -16,8 +16,8 @@ from levilab.reproduce.check import Among, Because, Found, check, statement
 from levilab.reproduce.figure import simon_figure
 from levilab.reproduce.tops import Array, Flags, many, scan
 from levilab.simulator.field import field_of, on_axis
+from levilab.simulator.published.printed import published
 from levilab.simulator.scene import preset
-from levilab.stability.published.printed import published
 from levilab.stability.scan import all_up_until, lower_limit
 
 if TYPE_CHECKING:

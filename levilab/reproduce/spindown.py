@@ -22,8 +22,8 @@ from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.check import Comparison, Found, Within, check, statement
 from levilab.reproduce.figure import spindown_figure
 from levilab.reproduce.tops import THESIS, Array, known
+from levilab.simulator.published.printed import several
 from levilab.simulator.scene import preset
-from levilab.stability.published.printed import several
 
 if TYPE_CHECKING:
     from analysis.spindown.fit import SpinDown

@@ -15,8 +15,8 @@ from levilab.reproduce.check import Found, check, statement
 from levilab.reproduce.figure import statistics_figure
 from levilab.reproduce.tops import THESIS, known
 from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.published.printed import several
 from levilab.simulator.scene import preset
-from levilab.stability.published.printed import several
 
 if TYPE_CHECKING:
     from levilab.reproduce.check import Finding

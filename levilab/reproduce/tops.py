@@ -12,9 +12,9 @@ from analysis.stability import thesis_limit
 from levilab.motion.lines import rate_for
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.published.printed import published
 from levilab.simulator.scene import preset, with_settings
 from levilab.simulator.single import simulate
-from levilab.stability.published.printed import published
 from levilab.stability.thesis import STARTS
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import math
 import statistics
 from typing import TYPE_CHECKING
 
-from levilab.stability.published.printed import published, several
+from levilab.simulator.published.printed import published, several
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene

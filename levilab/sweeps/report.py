@@ -1,4 +1,4 @@
-"""A sweep, as it lies in its store → a section of a report.  Nothing is simulated."""
+"""A sweep, as it lies in its store → its figures, and a section of a report.  Nothing is simulated."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from levilab.files import writing
 from levilab.motion.report import SYNTHETIC, command_text, scene_blocks
 from levilab.present.document.blocks import (
     Bullets,
@@ -23,7 +24,7 @@ from levilab.present.document.blocks import (
 )
 from levilab.sweeps.adaptive import in_words, report_in
 from levilab.sweeps.axes import in_words as axis_in_words
-from levilab.sweeps.drawing import load_drawn
+from levilab.sweeps.observables import GROUPS, columns_of
 from levilab.sweeps.store import Store
 from levilab.sweeps.summary import columns_table, headline, points_table, summarise
 
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
     from levilab.present.document.blocks import Block
     from levilab.present.style import Figure
+    from levilab.sweeps.observables import Observable
     from levilab.sweeps.store import Map
     from levilab.sweeps.summary import Summary
 
@@ -42,6 +44,8 @@ MOST_FIGURES = 6
 MOST_ROWS = 500
 #: A store of more points is read from itself, by programs that read Zarr.
 MOST_IN_A_TABLE = 100_000
+#: A map with more points is not drawn: it would have to be in memory, and a picture cannot show so many.
+MOST_POINTS = 20_000_000
 
 
 def sweep_section(path: Path) -> Section:
@@ -142,3 +146,44 @@ def _reproduction(store: Store) -> Iterator[Block]:
     facts.append(Fact("When", (f"begun {str(store.group.attrs.get('created_utc', '—'))[:19].replace('T', ' ')} UTC",)))
     yield Facts(tuple(facts))
     yield Note("On a processor of the same kind the same command gives the same numbers to the last digit.")
+
+
+# --- figures beside the store ---
+
+
+def load_drawn(store: Store) -> tuple[Map, tuple[Observable, ...]] | None:
+    """Return a map and its columns that are drawn; None of one with more than `MOST_POINTS`, or that has no figure."""
+    from levilab.sweeps.figure import has_figure
+
+    if not has_figure(store.plan) or store.plan.size > MOST_POINTS:
+        return None
+    found = store.load()
+    columns = columns_of(name for name in store.plan.observables if name not in GROUPS)
+    return (found, columns) if found.computed.any() else None
+
+
+def draw_figures(store: Store) -> list[Path]:
+    """Draw each column of a map into STORE.NAME.png beside its store; older figures there are replaced.
+
+    Returns:
+        The pictures: none where the plan is no map, or has more than `MOST_POINTS`, or nothing is computed.
+
+    Raises:
+        CannotWrite: a picture cannot be written.
+    """
+    from levilab.present.style import save_png
+    from levilab.sweeps.figure import map_figure
+
+    drawn = None if store.path is None else load_drawn(store)
+    if store.path is None or drawn is None:
+        return []
+    found, columns = drawn
+    report = report_in(store)
+    notes = in_words(report, store.plan) if report else []
+    pictures = []
+    for column in columns:
+        picture = store.path.with_name(f"{store.path.name}.{column.name}.png")
+        with writing(f"{picture} cannot be written", "free space, or change the folder's permissions"):
+            save_png(map_figure(found, column.name, notes), picture)
+        pictures.append(picture)
+    return pictures

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,8 +16,8 @@ from instruments.virtual.bench.protocol_levilab import plug_in
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.device import VirtualInstrument
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits
+from levilab.bench.person import FloatTop, PlaceProbe, ShieldProbe
 from levilab.bench.wiring import Wiring
-from levilab.world.person import VirtualPerson
 from levilab.world.pose import FLOATS_M
 from levilab.world.spin_world import SpinScene, SpinWorld
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
     from instruments.clock import Clock
     from instruments.virtual.counter.edges import Thresholds
+    from levilab.bench.person import Task
     from levilab.simulator.scene import Scene
     from levilab.world.spin_world import Array, World
 
@@ -55,7 +57,8 @@ COIL_T_PER_V = 0.4e-3 / 5.0
 PHONE_M = np.array([0.2, 0.0, 0.0])
 
 
-#: Makes a virtual instrument that is connected to a world.
+#: Makes a virtual instrument; and one that is connected to a world.
+Model = Callable[..., VirtualInstrument]
 Maker = Callable[["World"], VirtualInstrument]
 
 
@@ -97,16 +100,6 @@ class PickupCoil:
         return np.asarray(self.amplifier * self.turns * self.area_m2 * np.diff(field) / step)
 
 
-def connect_counter(model: Callable[..., VirtualInstrument]) -> Maker:
-    """Connect a counter: input 1 to the phototransistor that sees the tape, input 2 to the laser's."""
-    return lambda world: model(world.clock, signal=Light(world), second=world.laser)
-
-
-def connect_generator(model: Callable[..., VirtualInstrument]) -> Maker:
-    """Connect a generator: its output to the coil."""
-    return lambda world: model(world.clock, listener=lambda time, output: world.drive(time, output.times(COIL_T_PER_V)))
-
-
 def scope_signals(world: World) -> dict[int, Callable[[float, float, int], Array]]:
     """Return the signals of an oscilloscope's channels.
 
@@ -117,40 +110,46 @@ def scope_signals(world: World) -> dict[int, Callable[[float, float, int], Array
     return {1: world.light, 2: drive, 3: world.laser}
 
 
-def connect_oscilloscope(model: Callable[..., VirtualInstrument]) -> Maker:
-    """Connect an oscilloscope: see `scope_signals`."""
-    return lambda world: model(world.clock, signals=scope_signals(world))
+def _connect_counter(model: Model, world: World) -> VirtualInstrument:
+    return model(world.clock, signal=Light(world), second=world.laser)
 
 
-def connect_sound(model: Callable[..., VirtualInstrument]) -> Maker:
-    """Connect a sound card: left to the tape's phototransistor, right to a pickup coil beside the top."""
-    return lambda world: model(world.clock, signals={1: world.light, 2: PickupCoil(world)}, seed=world.seed)
+def _connect_generator(model: Model, world: World) -> VirtualInstrument:
+    return model(world.clock, listener=lambda time, output: world.drive(time, output.times(COIL_T_PER_V)))
 
 
-def connect_magnetometer(model: Callable[..., VirtualInstrument]) -> Maker:
-    """Connect a gaussmeter: its probe is on the base's axis."""
-    return lambda world: model(world.clock, flux_density=world.flux_density)
+def _connect_oscilloscope(model: Model, world: World) -> VirtualInstrument:
+    return model(world.clock, signals=scope_signals(world))
 
 
-def connect_phone(model: Callable[..., VirtualInstrument]) -> Maker:
-    """Connect a phone: it lies beside the base."""
-    return lambda world: model(
-        world.clock, magnetic_field=lambda times: world.magnetic_field(times, PHONE_M), seed=world.seed
-    )
+def _connect_sound(model: Model, world: World) -> VirtualInstrument:
+    return model(world.clock, signals={1: world.light, 2: PickupCoil(world)}, seed=world.seed)
 
 
-#: Kind, or scheme of a model's addresses → what connects a virtual instrument to the world.
-_CONNECT: dict[str, Callable[[Callable[..., VirtualInstrument]], Maker]] = {
-    "counter": connect_counter,
-    "generator": connect_generator,
-    "oscilloscope": connect_oscilloscope,
-    "sound": connect_sound,
-    "magnetometer": connect_magnetometer,
-    "phyphox": connect_phone,
+def _connect_magnetometer(model: Model, world: World) -> VirtualInstrument:
+    return model(world.clock, flux_density=world.flux_density)
+
+
+def _connect_phone(model: Model, world: World) -> VirtualInstrument:
+    field = lambda times: world.magnetic_field(times, PHONE_M)  # noqa: E731
+    return model(world.clock, magnetic_field=field, seed=world.seed)
+
+
+#: Kind, or scheme of a model's addresses → what connects a virtual instrument to the world: a counter's input 1 to the
+#: phototransistor that sees the tape and input 2 to the laser's, a generator's output to the coil, a sound card's left
+#: to the tape's phototransistor and right to a pickup coil beside the top, a gaussmeter's probe on the base's axis, a
+#: phone beside the base.
+_CONNECT: dict[str, Callable[[Model, World], VirtualInstrument]] = {
+    "counter": _connect_counter,
+    "generator": _connect_generator,
+    "oscilloscope": _connect_oscilloscope,
+    "sound": _connect_sound,
+    "magnetometer": _connect_magnetometer,
+    "phyphox": _connect_phone,
 }
 #: Kind → model → what makes it.
 VIRTUAL_MODELS: dict[str, dict[str, Maker]] = {
-    kind: {model.name: _CONNECT[model.scheme or kind](model.twin) for model in models}
+    kind: {model.name: partial(_CONNECT[model.scheme or kind], model.twin) for model in models}
     for kind, models in CATALOGUE.items()
 }
 
@@ -190,6 +189,24 @@ def virtual_wiring(world: World, limits: Limits | None = None, models: Mapping[s
     instruments = virtual_instruments(models)
     person, poses = VirtualPerson(world), world.poses
     return Wiring(instruments, limits or Limits(), library, world.clock, person=person, poses=poses)
+
+
+class VirtualPerson:
+    """Carries out, at once, the tasks that change something in the world; all others are answered with nothing."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+
+    def __call__(self, task: Task) -> str:
+        """Carry out a task; returns the answer."""
+        match task:
+            case FloatTop():
+                self.world.float_top(task.number)
+            case PlaceProbe():
+                self.world.place_probe(task.height_m)
+            case ShieldProbe():
+                self.world.place_probe(None)
+        return ""
 
 
 def plug_in_serial(bus: VirtualBench | None = None) -> VirtualBench:

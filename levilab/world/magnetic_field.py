@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from levilab.simulator.parts import Top
+
 if TYPE_CHECKING:
     from levilab.simulator import parts
     from levilab.world import base
@@ -20,7 +22,7 @@ Array = NDArray[np.float64]
 #: μ₀/4π [T m/A].
 _MU_0_OVER_4_PI = 1e-7
 #: Moment of the thesis's top along its axis [A m²], and the transverse and axial fractions of it.
-MOMENT_A_M2, MOMENT_TILT = -0.714, (0.03, 0.97)
+MOMENT_A_M2, MOMENT_TILT = Top().moment_a_m2, (0.03, 0.97)
 
 
 def dipole_field(moment: Array, away: Array) -> Array:

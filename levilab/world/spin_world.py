@@ -15,6 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.virtual.generator.voltage import fundamental
+from levilab.simulator.laws import LAWS
+from levilab.simulator.parts import Top
+from levilab.simulator.published.printed import published
 from levilab.simulator.spin import DECAYS
 from levilab.world.base import Base, Stand, random_base
 from levilab.world.coil import Coil
@@ -128,10 +131,10 @@ class SpinScene:
 
     start_hz: float = 30.0
     drag: str = "disc"
-    constants: tuple[float, ...] = (2.34e-4,)
-    fall_hz: float = 21.86
+    constants: tuple[float, ...] = LAWS["disc"].usual
+    fall_hz: float = published("thesis")["measured.mean"].value
     later_falls_hz: tuple[float, ...] = ()
-    lock_torque: float = 0.03 * 0.714 / 2 / 1.731314e-6
+    lock_torque: float = MOMENT_TILT[0] * abs(MOMENT_A_M2) / 2 / Top().inertia_axial_kg_m2
     tape: Tape = field(default_factory=Tape)
     laser: Laser = field(default_factory=Laser)
     jitter: float = 0.03 / math.sqrt(2)

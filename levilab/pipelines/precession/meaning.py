@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from analysis.numbers import digits
 from levilab.pipelines.precession.analysis import slope_of
 from levilab.present.numbers import plain, with_uncertainty
-from levilab.stability.published.printed import published
+from levilab.simulator.published.printed import published
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -19,10 +19,10 @@ from levilab.reproduce.check import (
     statement,
 )
 from levilab.reproduce.check import check as checked
-from levilab.stability.published.printed import Printed, published, several
+from levilab.simulator.published.printed import Printed, published, several
 from support.paths import ROOT
 
-PUBLISHED = ROOT / "levilab/stability/published"
+PUBLISHED = ROOT / "levilab/simulator/published"
 MEAN = Printed("21.86", "Hz", "ten", "a thesis")
 
 

@@ -53,7 +53,7 @@ def published(source: str) -> Mapping[str, Printed]:
     >>> published("thesis")["limits.lower.IC1"].text, published("thesis")["measured.limits.0"].value
     ('22.06', 21.7)
     """
-    file = resources.files("levilab.stability.published") / f"{source}.toml"
+    file = resources.files("levilab.simulator.published") / f"{source}.toml"
     table = tomllib.loads(file.read_text(encoding="utf-8"))
     return dict(_numbers(table, "", str(table.pop("source"))))
 
