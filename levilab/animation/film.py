@@ -148,7 +148,6 @@ def still(film: Film, k: int, *, with_words: bool = True) -> Image:
 
 
 def _artist(film: Film, *, with_words: bool = True) -> Callable[[int], Image]:
-    """Return a function that draws the k-th picture."""
     poses, parts = film.poses, parts_of(film.poses.scene, height_for_camera(film.poses))
     painter = Painter(parts, film.size, film.theme)
     turns = matrices(poses.quaternions)

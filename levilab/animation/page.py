@@ -184,7 +184,6 @@ def _data(page: Page, alt: str, readings: list[tuple[str, str, int]]) -> dict[st
 
 
 def _readings(poses: Poses) -> list[tuple[str, str, int]]:
-    """Return name, unit and digits after the point of each number on display."""
     found = [("time", "\u00a0s", 3), ("height", "\u00a0cm", 2), ("tilt", "°", 1), ("spin", "\u00a0Hz", 2)]
     columns = columns_of(poses)
     if "slip" in columns:
@@ -223,7 +222,6 @@ def _legend(poses: Poses) -> list[tuple[str, str]]:
 
 
 def _swatches(poses: Poses) -> str:
-    """Return the colours of the legend, by day and by night."""
     names = [name for name, _ in _legend(poses)]
     rules = {
         theme: "".join(f".colour-{name} span{{background:{COLOURS[theme][name]}}}" for name in names)
@@ -233,7 +231,6 @@ def _swatches(poses: Poses) -> str:
 
 
 def _numbers(page: Page) -> list[tuple[str, str]]:
-    """Return the table of numbers."""
     poses, motion = page.poses, page.summary.motion
     scene, accuracy = poses.scene, page.summary.motion.accuracy
     tilts, heights = np.degrees(poses.tilts), 100 * poses.positions[:, 2]
@@ -261,7 +258,6 @@ def _numbers(page: Page) -> list[tuple[str, str]]:
 
 
 def _licence(three: bytes) -> str:
-    """Return the licence's lines at the head of three.js."""
     head = re.match(rb"/\*\*?(.*?)\*/", three, re.DOTALL)
     if head is None:
         raise MissingThree("three.js out of nicegui has no licence at its head: install nicegui 3.18 or a later one")

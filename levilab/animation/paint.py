@@ -204,17 +204,14 @@ class Painter:
             layer = Image.new("RGBA", (_FINER * self.size[0], _FINER * self.size[1]))
             # inner wall, then the upper face, then the outer wall: none of them reaches over a later one
             surface = _Surface(corners[half], normals[half], self.colours["base"])
-            self._draw_facets(ImageDraw.Draw(layer), surface, self._order_of_ring(surface))
+            away = np.linalg.norm(surface.corners.mean(axis=1) - self._camera.place, axis=1)
+            self._draw_facets(ImageDraw.Draw(layer), surface, np.argsort(-away, kind="stable"))
             halves.append(layer)
         boxes = [half.getbbox() for half in halves]
         left, upper = (min(box[k] for box in boxes if box) for k in (0, 1))
         right, lower = (max(box[k] for box in boxes if box) for k in (2, 3))
         box = (left, upper, right, lower)
         return halves[0].crop(box), halves[1].crop(box), (left, upper)
-
-    def _order_of_ring(self, surface: _Surface) -> Places:
-        away = np.linalg.norm(surface.corners.mean(axis=1) - self._camera.place, axis=1)
-        return np.argsort(-away, kind="stable")
 
     # --- what moves ---
 
@@ -422,7 +419,6 @@ def _about_z(angle: float) -> Array:
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the first places of the runs of True, and the places after their last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
 

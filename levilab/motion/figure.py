@@ -99,7 +99,6 @@ def _has_spectrum(summary: Summary) -> bool:
 
 
 def _spin_figure(summary: Summary) -> Figure:
-    """Draw the spin of a scene that has no motion."""
     figure = Figure(figsize=(WIDE, 3.0))
     axes = panel(figure, _LEFT, 0.85, _FULL, 1.6)
     headline(figure, _finding(summary), "SYNTHETIC")
@@ -227,7 +226,6 @@ def _energy_title(summary: Summary) -> str:
 
 
 def _draw_quantity(axes: Axes, quantity: _Quantity, time: Array) -> None:
-    """Return the curves over the whole time, with what they are above them."""
     envelope = False
     for name, label, values in quantity.curves:
         envelope |= curve(axes, time, values, LOOKS[name], pieces=PIECES, label=label)
@@ -241,7 +239,6 @@ def _draw_quantity(axes: Axes, quantity: _Quantity, time: Array) -> None:
 
 
 def _draw_zoom(axes: Axes, quantity: _Quantity, time: Array, zoom: tuple[float, float]) -> None:
-    """Return the same curves for a second."""
     inside = slice(*np.searchsorted(time, zoom))
     for name, _, values in quantity.curves:
         axes.plot(time[inside], values[inside], linewidth=0.9, **LOOKS[name].as_line)

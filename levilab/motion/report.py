@@ -292,7 +292,6 @@ def _simulate_again(run: Run, scene: Scene, found: Mapping[str, Any]) -> Summary
 
 
 def _last_state(path: Path) -> str:
-    """Return the last line of a file; empty if there is none."""
     try:
         with path.open("rb") as file:
             file.seek(0, 2)

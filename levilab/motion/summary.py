@@ -104,11 +104,6 @@ class Summary:
             f"{said}; {with_decimals(low, 3)} to {with_decimals(high, 3)} Hz, mean {with_decimals(spin.mean(), 3)} Hz"
         )
 
-    @property
-    def why_no_lines(self) -> str:
-        """Why there are no lines, and what to change; empty if there are some."""
-        return "" if self.lines.lines else _why_no_lines(self.motion, self.lines)
-
 
 def summarise(
     motion: Trajectory, duration: float, rate: float, computing: float, *, uses_states: bool = True
@@ -127,12 +122,6 @@ def summarise(
     lines = lines_of(motion)
     notes = _notes(motion, lines, rate if uses_states else math.inf)
     return Summary(motion, duration, rate, computing, lines, change, tuple(notes))
-
-
-def height_range(motion: Trajectory) -> tuple[float, float]:
-    """Return the lowest and the highest place of the samples [m], up to the end or to the fall."""
-    height = motion.position[:, 2]
-    return float(height.min()), float(height.max())
 
 
 def changing_energy(scene: Scene) -> tuple[str, ...]:
@@ -202,7 +191,6 @@ def as_document(summary: Summary) -> dict[str, Any]:
     """Return the summary for programs, with units in the names; a value that is not finite is null."""
     motion = summary.motion
     height, accuracy, fell = motion.position[:, 2], motion.accuracy, motion.fell
-    lowest, highest = height_range(motion)
     has_washers = motion.scene.washers.inertia_kg_m2 > 0
     document = {
         "scene": motion.scene.name,
@@ -211,8 +199,8 @@ def as_document(summary: Summary) -> dict[str, Any]:
         "duration_s": summary.duration,
         "end_s": summary.end,
         "height_mean_m": float(height.mean()),
-        "height_min_m": lowest,
-        "height_max_m": highest,
+        "height_min_m": float(height.min()),
+        "height_max_m": float(height.max()),
         "distance_from_axis_max_m": float(np.hypot(*motion.position[:, :2].T).max()),
         "tilt_max_rad": float(motion.tilt.max()),
         "spin_start_hz": float(motion.spin_hz[0]),
@@ -228,7 +216,7 @@ def as_document(summary: Summary) -> dict[str, Any]:
             {"frequency_hz": line.frequency, "amplitude_rad": line.amplitude, "name": line.name}
             for line in summary.lines.lines
         ],
-        "no_lines_because": summary.why_no_lines or None,
+        "no_lines_because": None if summary.lines.lines else _why_no_lines(motion, summary.lines),
         "line_resolution_hz": summary.lines.resolution,
         "lines_until_s": summary.lines.until,
         "position_error_m": float(accuracy.position),

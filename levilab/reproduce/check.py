@@ -321,7 +321,6 @@ def _like(value: float, published: Printed) -> str:
 
 
 def _with_power(text: str) -> str:
-    """Return a number's text with its power of ten as people write it."""
     mantissa, _, power = text.lower().partition("e")
     return f"{mantissa}×10{power.translate(_HIGH)}" if power else text
 

@@ -82,7 +82,6 @@ def edges_by_hand() -> tuple[float, float]:
 
 
 def _zeros(polynomial: Any) -> list[float]:
-    """Return the real zeros above 0."""
     return [float(root.real) for root in polynomial.roots() if abs(root.imag) < 1e-9 and root.real > 1e-9]
 
 

@@ -145,13 +145,14 @@ def simulate_many(
     which: Any = columns
     kept = np.arange(STATE_SIZE)[which] if rate else np.empty(0, dtype=np.intp)
     times = np.arange(math.floor(duration * rate * (1 + 1e-12)) + 1) / rate if rate else np.empty(0)
-    wanted = _Wanted(duration, rate or 0.0, kept.astype(np.int64), errors)
-    ends = _Ends.empty(math.prod(shape), times.size, kept.size)
+    ends = _Ends.empty(math.prod(shape))
+    sampling = _Sampling(rate or 0.0, kept.astype(np.int64), np.full((math.prod(shape), times.size, kept.size), np.nan))
     threads = cores or os.cpu_count() or 1
     work = [part for group in groups for part in _parts(group, threads)]
 
     def advance(part: Batch) -> None:
-        _advance(part, wanted, np.full(part.longest.shape, step) if step else part.longest * (step_share or 1.0), ends)
+        steps = np.full(part.longest.shape, step) if step else part.longest * (step_share or 1.0)
+        _advance(part, duration, steps, sampling, ends, errors=errors)
 
     with ThreadPoolExecutor(threads) as pool:
         for done, _ in enumerate(pool.map(advance, work), 1):
@@ -167,12 +168,11 @@ def simulate_many(
         ends.position_error.reshape(shape),
         ends.axis_error.reshape(shape),
         times,
-        ends.samples.reshape(*shape, times.size, kept.size),
+        sampling.samples.reshape(*shape, times.size, kept.size),
     )
 
 
 def _check_forwards(scene: Scene, duration: float) -> None:
-    """Raise SceneError or SimulationError for what many at once cannot do."""
     if duration < 0:
         raise SimulationError(f"duration = {duration} s: many at once go forwards only")
     if scene.observed == "spin":
@@ -226,27 +226,16 @@ def grid(axes: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
     }
 
 
-class _Wanted(NamedTuple):
-    """The request to `simulate_many`: duration [s], samples per second (0: none) of these columns, error estimates."""
-
-    duration: float
-    sample_rate: float
-    columns: NDArray[np.int64]
-    errors: bool
-
-
 @dataclass(frozen=True)
 class _Ends:
     states: Array
     survived: NDArray[np.bool_]
     position_error: Array
     axis_error: Array
-    samples: Array
 
     @classmethod
-    def empty(cls, n: int, samples: int, columns: int) -> _Ends:
-        unknown = np.full(n, np.nan), np.full(n, np.nan), np.full((n, samples, columns), np.nan)
-        return cls(np.empty((n, STATE_SIZE)), np.zeros(n, dtype=np.bool_), *unknown)
+    def empty(cls, n: int) -> _Ends:
+        return cls(np.empty((n, STATE_SIZE)), np.zeros(n, dtype=np.bool_), np.full(n, np.nan), np.full(n, np.nan))
 
 
 class _Sampling(NamedTuple):
@@ -319,7 +308,6 @@ def _more_pilots(size: int) -> list[list[int]]:
 def _shares_of(
     scene: Scene, values: Mapping[str, NDArray[Any]], pilots: list[int], duration: float, tolerance: float
 ) -> _Shares:
-    """Return the parts of their longest steps that some tops take."""
     some = {key: np.array([column.flat[i] for i in pilots], dtype=column.dtype) for key, column in values.items()}
     time = min(duration, PILOT_DURATION)
     found = _Shares([], [], [])
@@ -342,15 +330,14 @@ def _parts(group: Batch, threads: int) -> list[Batch]:
     return [group.part(slice(i, i + size)) for i in range(0, n, size)]
 
 
-def _advance(some: Batch, wanted: _Wanted, steps: Array, ends: _Ends) -> None:
-    """Simulate tops of one kind, and write into `ends` at their places."""
-    _check_counts(some, wanted.duration, steps)
+def _advance(some: Batch, duration: float, steps: Array, sampling: _Sampling, ends: _Ends, *, errors: bool) -> None:
+    """Simulate tops of one kind, and write into `ends` and samples at their places."""
+    _check_counts(some, duration, steps)
     together = some.where[-1] - some.where[0] + 1 == some.where.size  # then samples are written where they belong
-    samples = ends.samples[some.where[0] : some.where[-1] + 1] if together else ends.samples[some.where]
-    sampling = _Sampling(wanted.sample_rate, wanted.columns, samples)
-    passed = integrate_in_lanes(some, runs_of(some, wanted.duration, steps), sampling)
+    samples = sampling.samples[some.where[0] : some.where[-1] + 1] if together else sampling.samples[some.where]
+    passed = integrate_in_lanes(some, runs_of(some, duration, steps), sampling._replace(samples=samples))
     states = passed.states
-    if wanted.errors:
+    if errors:
         ends.position_error[some.where], ends.axis_error[some.where] = _estimates(some, states, steps)
     late = np.flatnonzero(~passed.survived)
     if late.size:
@@ -358,11 +345,11 @@ def _advance(some: Batch, wanted: _Wanted, steps: Array, ends: _Ends) -> None:
         states[late] = at_the_crossing(
             states[late], last[:, 0], _limits(fallen), lambda s, times: _in_one_step(fallen, s, times, last)
         )
-        if wanted.errors:
+        if errors:
             _add_uncertain_moment(fallen, states[late], ends)
     ends.states[some.where], ends.survived[some.where] = states, passed.survived
     if not together:
-        ends.samples[some.where] = samples
+        sampling.samples[some.where] = samples
 
 
 def _check_counts(some: Batch, duration: float, steps: Array) -> None:

@@ -185,7 +185,6 @@ def _is_key(table: Table, path: str) -> bool:
 
 
 def _likeness(word: str, known: str) -> float:
-    """Return how similar a word is to a known one, from 0 to 1."""
     return difflib.SequenceMatcher(None, known, word.lower()).ratio()
 
 

@@ -91,7 +91,6 @@ def broadcast(over: Mapping[str, ArrayLike]) -> Values:
 
 
 def _array(key: str, values: ArrayLike) -> NDArray[Any]:
-    """Return the values of a key as an array.  Raises SimulationError."""
     try:
         return np.asarray(values)
     except ValueError:
@@ -194,7 +193,6 @@ def _checker(key: str) -> TypeAdapter[Any] | None:
 
 
 def _check(scene: Scene, key: str, column: NDArray[Any]) -> None:
-    """Check values of a key by the type of its field.  Raises SceneError."""
     checker = _checker(key)
     assert checker is not None
     try:
@@ -274,7 +272,6 @@ def _of_one_scene(scene: Scene, values: Values, group: Indices, view: Callable[[
 
 
 def _broken(view: Callable[[Indices], Scene], size: int) -> Iterator[int]:
-    """Yield a top that breaks a rule of scenes, for each rule that is broken."""
     for rule in RULES:
         for which, holds in split(np.arange(size), lambda which, rule=rule: rule.holds(view(which))):  # type: ignore[misc]
             if not np.all(holds):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
+from levilab.files import finite
 from levilab.present.numbers import with_decimals
 from levilab.present.terminal import new_table, terminal
 from levilab.simulator.equilibrium import advice
@@ -152,19 +153,15 @@ def as_document(found: Stability) -> dict[str, Any]:
             {"low_m": w.low, "high_m": w.high, "light_kg": w.light, "heavy_kg": w.heavy} for w in found.windows
         ],
         "equilibria": [
-            {"height_m": e.height, "stable": e.stable, "spins_hz": [[_finite(a), _finite(b)] for a, b in e.spins]}
+            {"height_m": e.height, "stable": e.stable, "spins_hz": [[finite(a), finite(b)] for a, b in e.spins]}
             for e in found.equilibria
         ],
         "floats": floating is not None,
         "height_m": floating.height if floating else None,
         "nearest_mass_kg": found.nearest,
         "modes_hz": [{"frequency": float(m.real), "growth_per_s": float(-2 * math.pi * m.imag)} for m in found.modes],
-        "vertical_mode_hz": _finite(found.vertical),
-        "sleeping_limit_hz": _finite(found.sleeping),
-        "thesis_estimate_hz": _finite(found.thesis_estimate),
+        "vertical_mode_hz": finite(found.vertical),
+        "sleeping_limit_hz": finite(found.sleeping),
+        "thesis_estimate_hz": finite(found.thesis_estimate),
         "remarks": remarks(found),
     }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -83,7 +83,6 @@ def _scale(rest: Sequence[str], text: str) -> Scale:
 
 
 def _check_span(key: str, span: tuple[float, float, int], scale: Scale, text: str) -> None:
-    """Raise UsageError unless first, last and how many make an axis of increasing values."""
     first, last, count = span
     ending = ":log" if scale == "log" else ""
     if first == last or count == 1:
@@ -257,7 +256,6 @@ def _points_to_try(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
 
 
 def _try(scene: Scene, values: dict[str, Any], name: str) -> Scene:
-    """Return the scene with these values.  Raises UsageError where they are invalid."""
     if error := error_at(scene, values):
         raise UsageError(name, error)
     return scene.changed(values)

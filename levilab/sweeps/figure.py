@@ -472,7 +472,6 @@ def _headline(found: Map, column: str) -> str:
 
 
 def _caption(found: Map, view: _View, sentences: Sequence[str], width: float) -> list[str]:
-    """Return the lines that explain the map below it."""
     wide, high = (_step(axis) for axis in (view.x, view.y))
     cell = f"Each cell is one top, simulated for {found.plan.duration_s:g} s, and spans {wide} by {high}"
     said = [f"{cell}: a limit is known no better."]

@@ -298,7 +298,6 @@ def _are_locked(ends: Ensemble) -> NDArray[np.bool_]:
 
 
 def _motion_of(ends: Ensemble, where: int) -> tuple[Scene, NDArray[np.float64]]:
-    """Return scene and states of one motion: its samples, and its end."""
     samples = ends.samples.reshape(-1, *ends.samples.shape[-2:])[where]
     end = ends.states.reshape(-1, STATE_SIZE)[where]
     states = np.vstack([samples[ends.sample_times < end[TIME] * (1 - 1e-12)], end])

@@ -226,7 +226,6 @@ def _open_cells(values: Flags, linked: Sequence[int]) -> Flags:
 
 
 def _corners(cells: Flags, linked: Sequence[int]) -> Flags:
-    """Return which points are corners of these cells."""
     for axis in linked:
         wide = np.pad(cells, [(1, 1) if k == axis else (0, 0) for k in range(cells.ndim)])
         cells = _before(wide, axis) | _after(wide, axis)

@@ -86,7 +86,6 @@ def sweep_values(path: Path) -> tuple[tuple[str, ...], tuple[tuple[Any, ...], ..
 
 
 def _cell(value: Any) -> Any:
-    """Return a value as Python's own; None for one that is not defined."""
     plain = value.item()
     return None if isinstance(plain, float) and not math.isfinite(plain) else plain
 

@@ -120,7 +120,6 @@ class Store:
 
     @classmethod
     def _in(cls, place: Any, path: Path | None, plan: Plan, begin: Callable[[Store], None] | None) -> Store:
-        """Make the group and its arrays in a place where nothing is.  Raises OSError."""
         import zarr
 
         group = zarr.create_group(
@@ -180,7 +179,6 @@ class Store:
 
     @classmethod
     def _of(cls, group: Any, path: Path) -> Store:
-        """Return the store of a group.  Raises DataError where it is another group, or not whole."""
         if group.attrs.get("schema") != SCHEMA:
             raise DataError(f"{path}: its schema is {group.attrs.get('schema')!r}, and {SCHEMA!r} is expected")
         table: Any = as_value(group.attrs["plan"])

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.numbers import with_minus
+from levilab.files import finite
 from levilab.present.tables import Table, table
 from levilab.present.units import unit
 from levilab.sweeps.axes import in_words
@@ -94,17 +95,13 @@ def as_document(summary: Summary) -> dict[str, Any]:
                 "unit": one.column.unit,
                 "meaning": one.column.meaning,
                 "defined": one.defined,
-                "least": _finite(one.least),
-                "mean": _finite(one.mean),
-                "greatest": _finite(one.greatest),
+                "least": finite(one.least),
+                "mean": finite(one.mean),
+                "greatest": finite(one.greatest),
             }
             for one in summary.columns
         },
     }
-
-
-def _finite(number: float) -> float | None:
-    return number if math.isfinite(number) else None
 
 
 # --- tables ---

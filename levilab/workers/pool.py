@@ -107,7 +107,6 @@ def _without_main() -> Iterator[None]:
 
 
 def _begin() -> None:
-    """Prepare a worker process; this runs in it."""
     ignore_interruption()
     threading.Thread(target=_end_with_the_parent, daemon=True).start()
 

@@ -103,8 +103,6 @@ def _count_of(count: int | None) -> int:
 
 
 class _InThisThread(Executor):
-    """An executor that does a task when it is submitted."""
-
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
         future: Future[Any] = Future()
         future.set_result(function(*arguments, **named))

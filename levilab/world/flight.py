@@ -262,14 +262,12 @@ class Flight:
                 yield piece, part
 
     def _states_of(self, piece: _Flying) -> tuple[Array, Array]:
-        """Return times and states of a piece; those of the last pieces are kept."""
         if piece not in self._states:
             motion = _simulate_again(piece)
             _keep(self._states, piece, (motion.time.copy(), motion.states.copy()), _REMEMBERED)
         return self._states[piece]
 
     def _samples_of(self, piece: _Flying) -> _Samples:
-        """Return the samples of a piece; those of the last SAMPLED pieces are kept."""
         if piece not in self._samples:
             _keep(self._samples, piece, self._sample(_simulate_again(piece), piece.slip), SAMPLED)
         return self._samples[piece]
@@ -297,7 +295,6 @@ class Flight:
         return state
 
     def _advance(self, state: Array) -> None:
-        """Simulate the next piece of motion from this state."""
         begin = float(state[TIME])
         try:
             motion = self._motion(state)

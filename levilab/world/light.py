@@ -286,7 +286,6 @@ def noise(times: Array, seed: tuple[int, int]) -> Array:
 
 
 def _normal_at(numbers: NDArray[np.int64], seed: tuple[int, int]) -> Array:
-    """Return a normal number for each whole number."""
     return _normal()[_hash(numbers.view(np.uint64) + _first_number(seed))]
 
 
@@ -297,7 +296,6 @@ def _first_number(seed: tuple[int, int]) -> np.uint64:
 
 
 def _hash(numbers: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Return sixteen bits of a hash of each number."""
     z = numbers * np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)

@@ -224,7 +224,6 @@ def _endpoints(service: Service, offer: Endpoints) -> Served:
 
 
 async def _wait_for(end: End) -> None:
-    """Wait until something asks for the end."""
     event, loop = asyncio.Event(), asyncio.get_running_loop()
     end.wake = lambda: loop.call_soon_threadsafe(event.set)
     if end.by is None:

@@ -68,6 +68,5 @@ def work_precision_figure(found: Comparison) -> Figure:
 
 
 def _lanes(found: Comparison) -> str:
-    """Return the batch size of heyoka that is fastest."""
     batch = [p for p in found.points if p.method == "heyoka batch"]
     return max(batch, key=lambda p: p.speed).setting.partition(", ")[2] if batch else ""
