@@ -34,7 +34,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from levilab.reproduce.synthetic import NOISE_HZ, READINGS, solve
 from numpy.typing import NDArray
 
 from analysis.locked import slip_of
@@ -42,6 +41,7 @@ from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.present.numbers import with_sign
 from levilab.present.progress import Display
+from levilab.reproduce.spindown import NOISE_HZ, READINGS, solve
 from levilab.simulator import preset
 from levilab.simulator.published.printed import several
 

@@ -72,7 +72,6 @@ class Setting(Generic[T]):
         values: the only numbers that the instrument has.
         span: the lowest and the highest number that it may answer, where these are not low and high: with a probe, an
             attenuator or a load other than the driver's.
-        about: its meaning, for `help`.
         name: of the attribute; Python sets it.
     """
 
@@ -90,7 +89,6 @@ class Setting(Generic[T]):
     suffix: str = ""
     values: tuple[float, ...] = ()
     span: tuple[float, float] | None = None
-    about: str = ""
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -99,12 +97,8 @@ class Setting(Generic[T]):
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
-        self.__doc__ = self.description()
-
-    def description(self) -> str:
-        """Return the text of `help`: the meaning, the header on the wire, range and unit."""
-        about = f"{self.about}: " if self.about else ""
-        return f"{about}{self.header}{f' {self.key}' if self.key else ''}, {self._describe_allowed()}."
+        # for `help`: the header on the wire, range and unit
+        self.__doc__ = f"{self.header}{f' {self.key}' if self.key else ''}, {self._describe_allowed()}."
 
     def _describe_allowed(self, span: tuple[float, float] | None = None) -> str:
         """Return the text that describes the allowed values."""

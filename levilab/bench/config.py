@@ -82,13 +82,8 @@ class BenchConfig(Settings):
 
     def instruments(self) -> dict[str, InstrumentSettings]:
         """Return the described instruments, by kind."""
-        described = {
-            "counter": self.counter,
-            "generator": self.generator,
-            "oscilloscope": self.oscilloscope,
-            "magnetometer": self.magnetometer,
-        }
-        return {kind: settings for kind, settings in described.items() if settings is not None}
+        kinds = ("counter", "generator", "oscilloscope", "magnetometer")
+        return {kind: settings for kind in kinds if (settings := getattr(self, kind)) is not None}
 
 
 C = TypeVar("C", bound=BenchConfig)

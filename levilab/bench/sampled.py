@@ -13,11 +13,10 @@ from instruments.drivers.counter import LIGHT, Count, Signal
 from instruments.drivers.oscilloscope.sound import SamplesLost
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
-    from analysis.pulses import SpinFrequency
     from instruments.drivers import Value
     from instruments.drivers.oscilloscope import Oscilloscope
     from instruments.links.transport import Transport
@@ -34,19 +33,6 @@ _PATIENCE_S = 5.0
 _TIME_U_S = 5e-3
 
 
-def spin_of_record(volts: Array, rate: float) -> SpinFrequency | None:
-    """Return the spin in a record of pulses; None where no pulses return regularly.
-
-    Args:
-        volts: shape (n,).
-        rate: samples per second [1/s].
-    """
-    try:
-        return spin_of_trace(volts, rate)
-    except AnalysisError:
-        return None
-
-
 class SampledCounter:
     """A counter made of an oscilloscope; see :class:`instruments.drivers.counter.Counter`.
 
@@ -61,10 +47,8 @@ class SampledCounter:
     )
     ESTIMATES: ClassVar[bool] = True
 
-    def __init__(
-        self, scope: Oscilloscope, estimate: Callable[[Array, float], SpinFrequency | None] = spin_of_record
-    ) -> None:
-        self.scope, self._estimate = scope, estimate
+    def __init__(self, scope: Oscilloscope) -> None:
+        self.scope = scope
         self.transport: Transport = scope.transport
         self.last_set: dict[str, Value] = {}
         self.last: Count | None = None
@@ -96,8 +80,11 @@ class SampledCounter:
             if lost.kept is None:
                 raise
             trace = lost.kept
-        found = self._estimate(trace.volts, 1 / trace.dt_s)
-        if found is None or found.frequency.value is None:
+        try:
+            found = spin_of_trace(trace.volts, 1 / trace.dt_s)
+        except AnalysisError:  # no pulses return regularly
+            return None
+        if found.frequency.value is None:
             return None
         time = self.scope.ended - trace.codes.size * trace.dt_s + found.reference_time
         u = math.hypot(found.frequency.u or 0.0, (found.chirp.value or 0.0) * _TIME_U_S)

@@ -1,5 +1,7 @@
 """The bench, opened and left: whatever happens, the drive is off and everything is closed."""
 
+from functools import partial
+
 import pytest
 import pyvisa
 
@@ -20,7 +22,7 @@ from levilab.bench.config import (
 from levilab.bench.wiring import described_wiring
 from levilab.errors import LevilabError
 from levilab.interruption import Interrupted
-from levilab.world.bench import VIRTUAL, VIRTUAL_MODELS, connect_generator, virtual_wiring
+from levilab.world.bench import VIRTUAL, VIRTUAL_MODELS, _connect_generator, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
 from support.waiting import HANG_GUARD_S
 
@@ -69,7 +71,7 @@ def faulty(monkeypatch):
     """The virtual bench with a generator whose faults a test can switch on."""
     monkeypatch.setattr(Faulty, "silent", 0)
     monkeypatch.setattr(Faulty, "stuck", False)
-    monkeypatch.setitem(VIRTUAL_MODELS["generator"], "33500B", connect_generator(Faulty))
+    monkeypatch.setitem(VIRTUAL_MODELS["generator"], "33500B", partial(_connect_generator, Faulty))
     return Faulty
 
 
@@ -213,7 +215,7 @@ def test_the_second_output_is_off_as_soon_as_the_bench_is_open_and_when_it_is_le
             self.settings |= {"1:output": True, "2:output": True}
             made.append(self)
 
-    monkeypatch.setitem(VIRTUAL_MODELS["generator"], "33500B", connect_generator(LeftOn))
+    monkeypatch.setitem(VIRTUAL_MODELS["generator"], "33500B", partial(_connect_generator, LeftOn))
     with open_bench(virtual_wiring(world), KINDS):
         assert (made[0].settings["1:output"], made[0].settings["2:output"]) == (False, False)
         made[0].settings["2:output"] = True
