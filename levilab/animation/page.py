@@ -14,7 +14,6 @@ import io
 import json
 import math
 import re
-from dataclasses import dataclass
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
@@ -52,21 +51,6 @@ POSES_A_TURN, FEWEST_A_TURN = 16, 12
 _TRAIL_S = 0.5
 
 
-@dataclass(frozen=True)
-class Page:
-    """What a page shows.
-
-    Attributes:
-        poses: to be played.
-        summary: of the motion that they are a span of.
-        speed: at which it plays at first, as a part of the real one.
-    """
-
-    poses: Poses
-    summary: Summary
-    speed: float
-
-
 def most_poses(columns: int) -> int:
     """Return the number of poses, each of `columns` numbers, that a page holds."""
     return int((LARGEST - _REST) / (columns * _BYTES_PER_NUMBER))
@@ -85,8 +69,13 @@ def three_for_page() -> Path:
     return three_js("an animation as .html", ", or name a file that ends in .gif")
 
 
-def as_page(page: Page) -> bytes:
+def as_page(poses: Poses, summary: Summary, speed: float) -> bytes:
     """Make the page.
+
+    Args:
+        poses: to be played.
+        summary: of the motion that they are a span of.
+        speed: at which it plays at first, as a part of the real one.
 
     Raises:
         MissingThree: three.js is not there.
@@ -96,14 +85,13 @@ def as_page(page: Page) -> bytes:
 
     three = three_for_page().read_bytes()
     files = {name: _text(name) for name in ("page.css", "player.js", "top.js")}
-    poses = page.poses
     folder = str(resources.files("levilab.animation"))
     environment = Environment(
         loader=FileSystemLoader(folder), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     environment.filters["bind_units"] = bind_units
     title = poses.scene.name or "A scene without a name"
-    alt = _alt(page)
+    alt = _alt(poses)
     middle = len(poses.times) // 2
     stills = {
         theme: still(Film(poses, None, 20.0, (800, 550), trail_s=_TRAIL_S, theme=theme), middle)
@@ -112,22 +100,22 @@ def as_page(page: Page) -> bytes:
     readings = _readings(poses)
     text = environment.get_template("page.html.j2").render(
         title=title,
-        lead=f"A Levitron as computed by levilab, {span_text(poses)}, at first at {speed_text(page.speed)}.",
+        lead=f"A Levitron as computed by levilab, {span_text(poses)}, at first at {speed_text(speed)}.",
         alt=alt,
         still_light=_data_address(stills["light"], "light"),
         still_dark=_data_address(stills["dark"], "dark"),
         readings=readings,
-        speeds=[(short_speed(speed), speed) for speed in sorted({*_SPEEDS, page.speed}, reverse=True)],
-        speed=page.speed,
+        speeds=[(short_speed(speed), speed) for speed in sorted({*_SPEEDS, speed}, reverse=True)],
+        speed=speed,
         legend=_legend(poses),
-        numbers=_numbers(page),
+        numbers=_numbers(poses, summary),
         version=software_versions().get("levilab", ""),
         licence=_licence(three),
         style=files["page.css"] + _swatches(poses),
         style_hash=_hash(files["page.css"] + _swatches(poses)),
         script=files["player.js"],
         script_hash=_hash(files["player.js"]),
-        data=_json(_data(page, alt, readings)),
+        data=_json(_data(poses, alt, readings)),
         poses=_numbers_as_text(poses),
         three=base64.b64encode(gzip.compress(three, 9, mtime=0)).decode("ascii"),
         top=files["top.js"],
@@ -165,8 +153,7 @@ def _numbers_as_text(poses: Poses) -> str:
     return base64.b64encode(numbers.tobytes()).decode("ascii")
 
 
-def _data(page: Page, alt: str, readings: list[tuple[str, str, int]]) -> dict[str, Any]:
-    poses = page.poses
+def _data(poses: Poses, alt: str, readings: list[tuple[str, str, int]]) -> dict[str, Any]:
     span = max(float(np.ptp(poses.positions[:, :2], axis=0).max()), 1e-6)
     bar = nice_length(0.45 * span)
     return {
@@ -193,8 +180,7 @@ def _readings(poses: Poses) -> list[tuple[str, str, int]]:
     return found
 
 
-def _alt(page: Page) -> str:
-    poses = page.poses
+def _alt(poses: Poses) -> str:
     height, tilt = 100 * poses.positions[:, 2].mean(), math.degrees(poses.tilts.max())
     return (
         f"A spinning top with a magnet, a disc and a stem, on average {height:.1f} cm above a ring magnet, "
@@ -230,14 +216,14 @@ def _swatches(poses: Poses) -> str:
     return f"{rules['light']}\n@media (prefers-color-scheme: dark){{{rules['dark']}}}\n"
 
 
-def _numbers(page: Page) -> list[tuple[str, str]]:
-    poses, motion = page.poses, page.summary.motion
-    scene, accuracy = poses.scene, page.summary.motion.accuracy
+def _numbers(poses: Poses, summary: Summary) -> list[tuple[str, str]]:
+    scene, motion = poses.scene, summary.motion
+    accuracy = motion.accuracy
     tilts, heights = np.degrees(poses.tilts), 100 * poses.positions[:, 2]
     found = [
         ("scene", scene.description or "no description"),
         ("shown", f"{span_text(poses)}, of {float(motion.time[-1]):.4g} s that were simulated"),
-        ("end", page.summary.ending),
+        ("end", summary.ending),
         ("height", f"{heights.min():.2f} to {heights.max():.2f} cm above the base's centre"),
         ("tilt", f"{tilts.min():.1f} to {tilts.max():.1f}° of the axis against the base's"),
         ("spin", f"{with_decimals(poses.spins.min(), 2)} to {with_decimals(poses.spins.max(), 2)} Hz"),

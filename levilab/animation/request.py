@@ -10,7 +10,6 @@ from levilab.animation.film import Film, as_gif, as_mp4, check_encoder
 from levilab.animation.page import (
     FEWEST_A_TURN,
     POSES_A_TURN,
-    Page,
     as_page,
     columns_of,
     most_poses,
@@ -186,7 +185,7 @@ def animate(
     with announce_compilation(message):
         poses = poses_of(summary.motion, start, stop, count)
     if chosen.encode is None:
-        content = as_page(Page(poses, summary, speed))
+        content = as_page(poses, summary, speed)
     else:
         if note := _stroboscopic(turn_rate(summary.motion), speed, chosen.pictures_per_s):
             message(note)

@@ -6,6 +6,7 @@ the one in states.csv to the last digit; otherwise, or where that would take lon
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import math
 import shlex
@@ -90,7 +91,10 @@ def motions_overview(runs: Sequence[Run]) -> Section:
 
 def motion_values(runs: Sequence[Run]) -> tuple[tuple[str, ...], tuple[tuple[str | float | bool | None, ...], ...]]:
     """Return heads and rows of a table for programs: the single numbers and words of each motion in run.json."""
-    found = [(run, document) for run in runs if (document := _document_or_none(run))]
+    found = []
+    for run in runs:
+        with contextlib.suppress(DataError):
+            found.append((run, _document(run)))
     plain_keys = {
         key: None
         for _, document in found
@@ -101,13 +105,6 @@ def motion_values(runs: Sequence[Run]) -> tuple[tuple[str, ...], tuple[tuple[str
     return ("input", "synthetic", *plain_keys), tuple(
         tuple(None if isinstance(cell, dict | list) else cell for cell in row) for row in rows
     )
-
-
-def _document_or_none(run: Run) -> Mapping[str, Any] | None:
-    try:
-        return _document(run)
-    except DataError:
-        return None
 
 
 def _document(run: Run) -> Mapping[str, Any]:

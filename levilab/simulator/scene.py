@@ -95,14 +95,6 @@ class Rule(NamedTuple):
     expected: str
 
 
-def _place_is_given(s: Scene) -> bool:
-    return s.start.place == "given"
-
-
-def _as_many_coefficients_as_the_law_has(s: Scene) -> bool:
-    return s.drag.law == "none" or len(s.drag.constants) == len(LAWS[s.drag.law].names)
-
-
 RULES: tuple[Rule, ...] = (
     Rule(
         "base.outer_radius_m",
@@ -129,7 +121,7 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "drag.coefficient",
-        _as_many_coefficients_as_the_law_has,
+        lambda s: s.drag.law == "none" or len(s.drag.constants) == len(LAWS[s.drag.law].names),
         "two numbers, [c1, c2], are expected with drag.law = mixed and one with every other law (here: {s.drag.law})",
     ),
     Rule(
@@ -139,12 +131,12 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "start.position_m",
-        lambda s: not _place_is_given(s) or s.start.position_m[2] > max(0.0, s.escape.height_m),
+        lambda s: s.start.place != "given" or s.start.position_m[2] > max(0.0, s.escape.height_m),
         "a height (the third number) above the base, 0, and above escape.height_m = {s.escape.height_m} is expected",
     ),
     Rule(
         "start.position_m",
-        lambda s: not _place_is_given(s) or s.start.away2 <= s.escape.radius_m * s.escape.radius_m,
+        lambda s: s.start.place != "given" or s.start.away2 <= s.escape.radius_m * s.escape.radius_m,
         "a place within escape.radius_m = {s.escape.radius_m} of the base's axis is expected",
     ),
     Rule(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +11,6 @@ from numpy.typing import NDArray
 from instruments.virtual.generator.channel import Output
 from instruments.virtual.generator.voltage import voltage
 from levilab.world.timeline import Timeline
-
-if TYPE_CHECKING:
-    from instruments.virtual.generator.channel import Burst
 
 Array = NDArray[np.float64]
 
@@ -36,15 +32,6 @@ class _Stretch:
         # 1e-9 of a turn: the end of a burst is no sample of its beginning
         playing = turns < burst.cycles - 1e-9
         return np.where(playing, voltage(self.output, turns, times), self.output.offset)
-
-
-def _goes_on(before: Output, after: Output) -> bool:
-    """Return whether bursts that start by themselves go on in their rhythm."""
-    return (before.burst, before.frequency) == (after.burst, after.frequency)
-
-
-def _repeats(burst: Burst | None) -> bool:
-    return burst is not None and burst.period is not None
 
 
 class Coil:
@@ -75,8 +62,11 @@ class Coil:
     def _next(last: _Stretch, time: float, output: Output) -> _Stretch:
         if not last.output.amplitude:
             return _Stretch(output, time, 0.0)
-        if _repeats(output.burst):
-            return _Stretch(output, last.origin if _goes_on(last.output, output) else time, 0.0)
+        if (
+            output.burst is not None and output.burst.period is not None
+        ):  # bursts that start by themselves keep their rhythm
+            same = (last.output.burst, last.output.frequency) == (output.burst, output.frequency)
+            return _Stretch(output, last.origin if same else time, 0.0)
         turns = last.turns + last.output.frequency * (time - last.origin)
         # the random bits repeat after 127 turns, all others after one
         return _Stretch(output, time, turns % 127.0)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from levilab.animation.page import LARGEST, Page, as_page, columns_of, most_poses
+from levilab.animation.page import LARGEST, as_page, columns_of, most_poses
 from levilab.animation.poses import poses_of
 from levilab.motion.summary import summarise
 from levilab.simulator.scene import preset
@@ -28,13 +28,13 @@ WINDOW = {"width": 640, "height": 700}
 def page_of_top():
     scene = preset("loose-washers").changed({"name": HOSTILE, "description": f"{HOSTILE} \u2028 '\""})
     motion = simulate(scene, 1.0, rate=480.0)
-    return Page(poses_of(motion, 0.0, 1.0, 480), summarise(motion, 1.0, 100.0, 0.1), 0.1)
+    return poses_of(motion, 0.0, 1.0, 480), summarise(motion, 1.0, 100.0, 0.1), 0.1
 
 
 @pytest.fixture(scope="module")
 def path(page_of_top, tmp_path_factory):
     place = tmp_path_factory.mktemp("page") / "top.html"
-    place.write_bytes(as_page(page_of_top))
+    place.write_bytes(as_page(*page_of_top))
     return place
 
 
@@ -81,12 +81,12 @@ def read(page, name):
 
 def test_it_is_small_and_has_the_same_bytes_each_time(page_of_top, path):
     content = path.read_bytes()
-    assert content == as_page(page_of_top)
+    assert content == as_page(*page_of_top)
     assert len(content) < LARGEST
     assert "MIT" in (text := content.decode())
     assert "Three.js Authors" in text
     # what is not the poses leaves the room for them that is counted with
-    poses = len(page_of_top.poses.times) * len(columns_of(page_of_top.poses)) * 16 / 3
+    poses = len(page_of_top[0].times) * len(columns_of(page_of_top[0])) * 16 / 3
     assert len(content) - poses < LARGEST - most_poses(10) * 10 * 16 / 3
 
 
@@ -114,7 +114,7 @@ def test_it_draws_and_the_picture_changes_with_the_time(opened):
 
 
 def test_it_reads_what_the_poses_are(opened, page_of_top):
-    poses = page_of_top.poses
+    poses, *_ = page_of_top
     seek(opened, 0.5)
     k = 240
     assert read(opened, "time") == pytest.approx(poses.times[k], abs=6e-4)
