@@ -99,14 +99,6 @@ def _lock_by_another(session: Session, answer: Answer) -> Answer:
     return answer
 
 
-def _head_says_more(data: bytes) -> bytes:
-    return _change_head(data, 10)
-
-
-def _head_says_less(data: bytes) -> bytes:
-    return _change_head(data, -10)
-
-
 def _change_head(data: bytes, more: int) -> bytes:
     """Let the head of a block state a length that is off by this number of bytes; bytes that are no block stay."""
     head = re.match(rb"#([1-9])", data)
@@ -126,8 +118,8 @@ FAULTS: dict[str, Act] = {
     "garbage before": _change_bytes(lambda data: b"\x7f~#!" + data),
     "bytes that are no text before": _change_bytes(lambda data: b"\xff\xfe" + data),
     "garbage after": _change_bytes(lambda data: data + b"~#!\n"),
-    "block longer than it says": _change_bytes(_head_says_less),
-    "block shorter than it says": _change_bytes(_head_says_more),
+    "block longer than it says": _change_bytes(lambda data: _change_head(data, -10)),
+    "block shorter than it says": _change_bytes(lambda data: _change_head(data, 10)),
     "cut in the middle": _cut_in_half,
     "disconnected": _disconnect,
     "away for 5 s": _make_unreachable,

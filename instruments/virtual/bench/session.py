@@ -139,18 +139,18 @@ class Session:
                 elif message:
                     yield message
 
-    def begin(self, message: str) -> Work[None]:
+    def begin(self, message: str) -> Work:
         """Give the instrument a message; go_on() works on it, after the one that the instrument already works on."""
         with self.lock:
             self._check_link()
             work = self.device.work = Work(self._run(message, self.device.work))
             return work
 
-    def catch_up(self) -> Work[None]:
+    def catch_up(self) -> Work:
         """Begin to work out what has happened in the instrument since the last message; go_on() does the work."""
         return Work(self.device.catch_up())
 
-    def go_on(self, work: Work[None]) -> bool:
+    def go_on(self, work: Work) -> bool:
         """Work for a slice, with the bench locked.  Returns whether there is more to do."""
         with self.lock:
             end = _WALL.now() + SLICE
@@ -160,14 +160,14 @@ class Session:
             raise work.error
         return not work.done
 
-    def cancel(self, work: Work[None]) -> None:
+    def cancel(self, work: Work) -> None:
         """End this work on a message, and what the message has asked for."""
         with self.lock:
             if not work.done:
                 work.cancel()
                 self.device.end_since(self.device.begun)
 
-    def _run(self, message: str, before: Work[None] | None) -> Steps[None]:
+    def _run(self, message: str, before: Work | None) -> Steps[None]:
         if before and not before.done:
             if self.device.is_abort(message):
                 before.cancel()

@@ -134,7 +134,7 @@ class VirtualInstrument:
         #: When it begins with the message that came last, and when it is done with that [s].
         self.begun = self._ready = 0.0
         #: On the message that came last, if it is worked on in slices: it may not be done yet.
-        self.work: Work[None] | None = None
+        self.work: Work | None = None
         self.parser = Parser(self)
 
     def execute(self, message: str) -> Answer | None:

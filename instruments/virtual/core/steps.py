@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Generator
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 T = TypeVar("T")
 
@@ -27,30 +27,27 @@ def run_to_end(steps: Steps[T]) -> T:
             return result
 
 
-class Work(Generic[T]):
+class Work:
     """Steps to run one by one, until they are done or cancelled.
 
     Attributes:
         done: whether they have ended.
-        result: of the steps; None until they are done, and after cancel().
         error: the exception that ended them, None where none did.
     """
 
-    def __init__(self, steps: Steps[T]) -> None:
+    def __init__(self, steps: Steps[None]) -> None:
         self._steps = steps
         self.done = False
-        self.result: T | None = None
         self.error: Exception | None = None
 
     def step(self) -> bool:
         """Run one step.  Returns whether there is more to do."""
-        if not self.done:
-            try:
-                next(self._steps)
-            except StopIteration as end:
-                self.result, self.done = end.value, True
-            except Exception as error:  # noqa: BLE001 - raised where the result is needed
-                self.error, self.done = error, True
+        try:
+            next(self._steps)
+        except StopIteration:
+            self.done = True
+        except Exception as error:  # noqa: BLE001 - raised where the end is awaited
+            self.error, self.done = error, True
         return not self.done
 
     def cancel(self) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from instruments.virtual.core.parser import Value
-    from instruments.virtual.generator.family import Family, Waveform
 
 #: The generator's own resistance [Ω], its greatest voltage without a load [V], and SCPI's infinity.
 SOURCE_OHM, OPEN_V, INFINITE = 50.0, 10.0, 9.9e37
@@ -44,6 +44,69 @@ def quantity_of(text: str, units: tuple[str, ...]) -> tuple[float, str]:
             if error.number != -131 or unit == units[-1]:
                 raise
     raise ScpiError(-131)
+
+
+@dataclass(frozen=True)
+class Waveform:
+    """A waveform that a family can make.
+
+    Attributes:
+        word: as the manual prints it.
+        top: its highest frequency [Hz].
+        bottom: its lowest frequency [Hz].
+        crest: peak to peak over r.m.s.
+        bursts: whether it can come in bursts.
+        sweeps: whether its frequency can be swept.
+    """
+
+    word: str
+    top: float
+    bottom: float = 1e-6
+    crest: float = 2.0
+    bursts: bool = True
+    sweeps: bool = True
+
+    @cached_property
+    def short(self) -> str:
+        """The word in an answer."""
+        return "".join(c for c in self.word if not c.islower())
+
+
+@dataclass(frozen=True)
+class Family:
+    """What the models of a family have in common, beside their rows.
+
+    Attributes:
+        waveforms: that it can make.
+        square: the limits of the duty cycle of a square wave [%] at a frequency [Hz].
+        arb: the word for arbitrary waveforms.
+        library: names of the arbitrary waveforms that it is made with.
+        least_vpp: smallest amplitude into 50 Ω [V].
+        shortest_pulse: width of it [s].
+        shortest_edge: of a pulse [s].
+        longest_burst: period of bursts, at most [s].
+        burst_rest: the pause between two bursts, at least [s].
+        points: fewest and most samples of an arbitrary waveform.
+        room: samples in the memory for them.
+        edge_part: an edge is no longer than this part of the shorter half of a pulse.
+    """
+
+    waveforms: tuple[Waveform, ...]
+    square: Callable[[float], tuple[float, float]]
+    arb: str
+    library: tuple[str, ...]
+    least_vpp: float
+    shortest_pulse: float
+    shortest_edge: float
+    longest_burst: float
+    burst_rest: float
+    points: tuple[int, int]
+    room: int
+    edge_part: float = 0.625
+
+    def waveform(self, short: str) -> Waveform:
+        """Return the waveform with this short name."""
+        return next(waveform for waveform in self.waveforms if waveform.short == short)
 
 
 @dataclass(frozen=True)
@@ -174,11 +237,6 @@ class Channel:
         return self.family.waveform(str(self["waveform"]))
 
     @property
-    def sampled(self) -> bool:
-        """Whether the frequency is that of samples: the 33500's arbitrary waveforms."""
-        return self.waveform.short == "ARB"
-
-    @property
     def points(self) -> int:
         """Samples of the arbitrary waveform that is selected."""
         return int(self.samples.size)
@@ -192,12 +250,12 @@ class Channel:
 
     @property
     def frequency(self) -> float:
-        """Of the waveform that is selected [Hz]."""
-        return self.number("arb_rate") / self.points if self.sampled else self.number("frequency")
+        """Of the waveform that is selected [Hz]; the 33500's arbitrary waveforms have that of their samples."""
+        return self.number("arb_rate") / self.points if self["waveform"] == "ARB" else self.number("frequency")
 
     def set_frequency(self, value: float) -> None:
         """Set the frequency of the selected waveform [Hz]."""
-        if self.sampled:
+        if self["waveform"] == "ARB":
             self["arb_rate"] = value * self.points
         else:
             self["frequency"] = value
@@ -209,7 +267,7 @@ class Channel:
     def frequency_limits(self) -> tuple[float, float]:
         """Return the limits of the frequency of the selected waveform [Hz]."""
         top = self.waveform.top
-        return self.waveform.bottom, top / self.points if self.sampled else top
+        return self.waveform.bottom, top / self.points if self["waveform"] == "ARB" else top
 
     def period(self) -> float:
         """Return the period, of all waveforms but samples [s]."""
@@ -368,10 +426,6 @@ class Channel:
         self["pulse_leading"] = self["pulse_trailing"] = time
 
     # --- triggers ---
-
-    def set_burst_cycles(self, cycles: float) -> None:
-        """Set the number of cycles of a burst, a whole number."""
-        self["burst_cycles"] = float(round(cycles))
 
     def burst_periods(self) -> tuple[float, float]:
         """Return the limits of the time between bursts that start by themselves [s]."""

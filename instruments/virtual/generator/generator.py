@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from instruments.clock import Clock
-    from instruments.virtual.generator.family import Family
+    from instruments.virtual.generator.channel import Family
 
 #: How many characters of a text the display shows.
 _LONGEST_TEXT = 64

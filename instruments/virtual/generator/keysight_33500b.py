@@ -9,8 +9,7 @@ from instruments.virtual.core.parameters import parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Own, Row, Switch, Word
 from instruments.virtual.generator.arbitrary import DeviceError, plain_name
-from instruments.virtual.generator.channel import Channel
-from instruments.virtual.generator.family import Family, Waveform
+from instruments.virtual.generator.channel import Channel, Family, Waveform
 from instruments.virtual.generator.generator import VirtualGenerator
 from instruments.virtual.generator.rows import CHANNEL, INNER, SHARED, Quantity, burst_cycles, pulses, waveforms
 

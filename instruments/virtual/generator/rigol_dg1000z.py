@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Both, Row, Switch
-from instruments.virtual.generator.channel import INFINITE
-from instruments.virtual.generator.family import Family, Waveform
+from instruments.virtual.generator.channel import INFINITE, Family, Waveform
 from instruments.virtual.generator.generator import VirtualGenerator
 from instruments.virtual.generator.rows import CHANNEL, Quantity, pulses, waveforms
 

@@ -10,13 +10,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Word
-from instruments.virtual.generator.channel import INFINITE, Channel, quantity_of
+from instruments.virtual.generator.channel import INFINITE, Channel, Family, quantity_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from instruments.virtual.core.parser import Value
-    from instruments.virtual.generator.family import Family
     from instruments.virtual.generator.generator import VirtualGenerator
 
 
@@ -247,5 +246,7 @@ def pulses(periods: tuple[float, float], edges: tuple[float, float], edge: float
 def burst_cycles(most: float) -> Row:
     """Return the row of the cycles of a burst."""
     return Quantity(
-        *("[SOURce[n]:]BURSt:NCYCles", "{n}:burst_cycles", 1.0, (1, most)), keep=Channel.set_burst_cycles, endless=True
+        *("[SOURce[n]:]BURSt:NCYCles", "{n}:burst_cycles", 1.0, (1, most)),
+        rounded=lambda v: float(round(v)),
+        endless=True,
     )

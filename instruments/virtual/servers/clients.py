@@ -69,7 +69,7 @@ class Job:
     link: Link
     messages: Iterator[str]
     message: str | None = None
-    work: Work[None] | None = None
+    work: Work | None = None
 
     def next_message(self) -> bool:
         """Go on to the next message.  Returns whether there is one."""
