@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from instruments.virtual.core.trigger import find_firings
+from instruments.virtual.core.signal import find_firings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -62,11 +62,6 @@ class TriggerInput:
     lower: float = 0.5
     alternating: bool = False
     falling: bool = False
-
-    @property
-    def ages(self) -> bool:
-        """Whether the thresholds follow the signal."""
-        return self.level is None or self.alternating
 
     def thresholds(self, signal: Signal, instant: float) -> Thresholds:
         """Return the trigger's voltages for the signal at this time [s].
@@ -128,7 +123,8 @@ class EdgeFinder:
 
     def refresh(self, instant: float) -> None:
         """Find a level that follows the signal again, where it is too old, at the beginning of a measurement [s]."""
-        if self._entry.ages and instant > self._found_at + _LEVEL_AGE:
+        follows = self._entry.level is None or self._entry.alternating
+        if follows and instant > self._found_at + _LEVEL_AGE:
             self._triggers, self._found_at = self._entry.thresholds(self._signal, instant), instant
 
     def look(self, wanted: float, until: float) -> bool:

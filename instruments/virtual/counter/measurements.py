@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from instruments.ieee488 import NOT_A_NUMBER
@@ -107,11 +107,6 @@ def period(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
     return found if found.value == NOT_A_NUMBER else Reading(1 / found.value, found.stamp, found.done)
 
 
-def single_period(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
-    """Measure one period [s]."""
-    return (yield from period(inputs, channel, GateTime(gate.begin, 0.0, gate.deadline)))
-
-
 def interval(inputs: Inputs, start: int, stop: int, gate: GateTime, *, slopes: tuple[bool, bool]) -> Measurement:
     """Measure the time from an edge of one input to the next edge of another, or of the same one [s].
 
@@ -163,7 +158,7 @@ def total(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
 _FUNCTIONS: dict[str, Callable[[Inputs, tuple[int, ...], GateTime, bool], Measurement]] = {
     "FREQ": lambda inputs, channels, gate, _: frequency(inputs, channels[0], gate),
     "PER": lambda inputs, channels, gate, _: period(inputs, channels[0], gate),
-    "SPER": lambda inputs, channels, gate, _: single_period(inputs, channels[0], gate),
+    "SPER": lambda inputs, channels, gate, _: period(inputs, channels[0], replace(gate, length=0.0)),
     "TINT": lambda inputs, channels, gate, _: interval(inputs, channels[0], channels[-1], gate, slopes=(False, False)),
     "PWID": lambda inputs, channels, gate, falling: interval(
         inputs, channels[0], channels[0], gate, slopes=(falling, not falling)

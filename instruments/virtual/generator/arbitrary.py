@@ -117,14 +117,6 @@ class Memory:
         """How many more samples the memory can hold."""
         return self.room - sum(values.size for values in self.held.values())
 
-    def names(self) -> str:
-        """Return the catalogue in the form of the answer.
-
-        >>> Memory(1000, {"A": np.zeros(8), "B": np.zeros(8)}).names()
-        '"A","B"'
-        """
-        return ",".join(f'"{name}"' for name in self.held)
-
 
 def attribute(values: Samples, which: str) -> float:
     """Return the property of a waveform that ``DATA:ATTRibute`` answers: AVERage, CFACtor, POINts or PTPeak.

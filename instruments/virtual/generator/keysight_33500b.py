@@ -95,7 +95,7 @@ _CHANNEL: tuple[Row, ...] = (
     Quantity("[SOURce[n]:]PHASe:ARBitrary", "{n}:arb_phase", 0.0, (-360, 360), "DEG"),
     Both("[SOURce[n]:]DATA:ARBitrary[1]", lambda s, n, p: s.keep(n, p)),
     Both("[SOURce[n]:]DATA:ARBitrary[1]:DAC", lambda s, n, p: s.keep(n, p, full_scale=32767.0)),
-    Ask("[SOURce[n]:]DATA:VOLatile:CATalog", lambda s, n: s.channel(n).memory.names()),
+    Ask("[SOURce[n]:]DATA:VOLatile:CATalog", lambda s, n: ",".join(f'"{name}"' for name in s.channel(n).memory.held)),
     Ask("[SOURce[n]:]DATA:VOLatile:FREE", lambda s, n: f"{s.channel(n).memory.free:+d}"),
     Do("[SOURce[n]:]DATA:VOLatile:CLEar", lambda s, n: s.clear_memory(n)),
     Both("MMEMory:LOAD:DATA[n]", lambda s, n, p: s.load(n, p)),

@@ -47,8 +47,9 @@ def voltage(output: Output, turns: Array, times: Array) -> Array:
 
 def fundamental(output: Output) -> float:
     """Return the amplitude of the first harmonic [V]; of bursts with pauses its mean over their period."""
-    one = _FUNDAMENTALS.get(output.waveform, _none)(output) if output.amplitude else 0.0
-    return output.amplitude * one * _busy(output)
+    if not output.amplitude or output.waveform not in _FUNDAMENTALS:
+        return 0.0
+    return output.amplitude * _FUNDAMENTALS[output.waveform](output) * _busy(output)
 
 
 def _busy(output: Output) -> float:
@@ -62,10 +63,6 @@ def _busy(output: Output) -> float:
 # --- waveforms of amplitude 1: turns, times [s], output → value ---
 
 
-def _sine(turns: Array, _: Array, _output: Output) -> Array:
-    return np.asarray(np.sin(2 * np.pi * turns))
-
-
 def _square(turns: Array, _: Array, output: Output) -> Array:
     return np.where(turns % 1.0 < output.duty, 1.0, -1.0)
 
@@ -76,14 +73,6 @@ def _slopes(turns: Array, rises: float) -> Array:
     up = 2 * place / (rises or 1.0) - 1
     down = 1 - 2 * (place - rises) / ((1 - rises) or 1.0)
     return np.where(place < rises, up, down)
-
-
-def _ramp(turns: Array, _: Array, output: Output) -> Array:
-    return _slopes(turns, output.symmetry)
-
-
-def _triangle(turns: Array, _: Array, _output: Output) -> Array:
-    return _slopes(turns, 0.5)
 
 
 def _hold_samples(turns: Array, _: Array, output: Output) -> Array:
@@ -126,11 +115,11 @@ def _pn7() -> Array:
 
 
 _SHAPES: dict[str, Callable[[Array, Array, Output], Array]] = {
-    "SIN": _sine,
+    "SIN": lambda turns, _, _output: np.asarray(np.sin(2 * np.pi * turns)),
     "SQU": _square,
     "PULS": _square,
-    "TRI": _triangle,
-    "RAMP": _ramp,
+    "TRI": lambda turns, _, _output: _slopes(turns, 0.5),
+    "RAMP": lambda turns, _, output: _slopes(turns, output.symmetry),
     "ARB": _hold_samples,
     "USER": _hold_samples,
     "NOIS": _noise,
@@ -139,10 +128,6 @@ _SHAPES: dict[str, Callable[[Array, Array, Output], Array]] = {
 
 
 # --- their first harmonics ---
-
-
-def _none(_: Output) -> float:
-    return 0.0
 
 
 def _of_square(output: Output) -> float:

@@ -176,8 +176,3 @@ class Acquisition:
         """Return whether the scope acquires or waits for a trigger."""
         self.follow(now)
         return self.armed is not None
-
-    @property
-    def runs_freely(self) -> bool:
-        """Whether the scope acquires over and over, so that a record comes by itself."""
-        return self.armed is not None and not self.once and not self.blocked

@@ -95,7 +95,7 @@ _CONTROL: tuple[Row, ...] = (
     Do("CDISplay"),
     Ask("TER", lambda s: s.trigger_event()),
     Ask("AER", lambda s: s.arm_event()),
-    Ask("ADER", lambda s: s.complete_event()),
+    Ask("ADER", lambda s: f"{int(not s.running() and s.acquisition.latest is not None):+d}"),  # a record is complete
     Ask("OPERegister:CONDition", lambda s: f"{s.condition():+d}"),
     Ask("OPERation:CONDition", lambda s: f"{s.condition():+d}"),
     Ask("OPERegister[:EVENt]", lambda s: f"{s.condition():+d}"),
@@ -232,10 +232,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
         acquisition.was_armed = acquisition.was_armed and not event
         return f"{int(event):+d}"
 
-    def complete_event(self) -> str:
-        """ADER?: whether a record is complete."""
-        return f"{int(not self.running() and self.acquisition.latest is not None):+d}"
-
     def condition(self) -> int:
         """Return the operation register: bit 3 while it runs, bit 5 while it waits for a trigger."""
         if not self.running():
@@ -265,11 +261,8 @@ class VirtualDSOX1000(VirtualOscilloscope):
     def whole_time(self) -> str:
         """Return the answer to ``:TIM?``."""
         s = self.settings
-        ten = 10 * self.value("time_scale")
-        return f":TIM:MODE {s['time_mode']};REF {s['time_reference']};MAIN:RANG {ten:+.5E};POS {self._position()}"
-
-    def _position(self) -> str:
-        return f"{self.value('time_offset'):+.6E}"
+        ten, position = 10 * self.value("time_scale"), self.value("time_offset")
+        return f":TIM:MODE {s['time_mode']};REF {s['time_reference']};MAIN:RANG {ten:+.5E};POS {position:+.6E}"
 
     def whole_trigger(self) -> str:
         """Return the answer to ``:TRIG?``."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from instruments.virtual.core.trigger import crossings
+from instruments.virtual.core.signal import crossings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -91,15 +91,9 @@ class Measured:
             raise NotMeasurable
         return self.volts[round(self.rises[0]) : round(self.rises[-1])]
 
-    def overshoot(self) -> float:
-        """Return the height of the trace above its top, in parts of the amplitude."""
-        return (float(self.volts.max()) - self.top) / self._amplitude()
-
-    def preshoot(self) -> float:
-        """Return the depth of the trace below its base, in parts of the amplitude."""
-        return (self.base - float(self.volts.min())) / self._amplitude()
-
-    def _amplitude(self) -> float:
+    @property
+    def amplitude(self) -> float:
+        """From base to top [V]; raises NotMeasurable where there is none."""
         if self.top == self.base:
             raise NotMeasurable
         return self.top - self.base
@@ -147,8 +141,8 @@ MEASUREMENTS: dict[str, Callable[[Measured], float]] = {
     "VUPPER": lambda t: t.base + 0.9 * (t.top - t.base),
     "VMID": lambda t: (t.top + t.base) / 2,
     "VLOWER": lambda t: t.base + 0.1 * (t.top - t.base),
-    "OVERSHOOT": lambda t: t.overshoot(),
-    "PRESHOOT": lambda t: t.preshoot(),
+    "OVERSHOOT": lambda t: (float(t.volts.max()) - t.top) / t.amplitude,
+    "PRESHOOT": lambda t: (t.base - float(t.volts.min())) / t.amplitude,
     "AREA": lambda t: float(t.volts.sum()) * t.step,
     "PERIODAREA": lambda t: float(t.whole_periods().sum()) * t.step / max(1, t.rises.size - 1),
     "PERIOD": lambda t: t.period,

@@ -16,8 +16,7 @@ from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import block_content, block_text, choice, number, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Both, short_header
-from instruments.virtual.core.signal import Signal, no_signal
-from instruments.virtual.core.trigger import crossings
+from instruments.virtual.core.signal import Signal, crossings, no_signal
 from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD, Acquisition, Plan
 from instruments.virtual.oscilloscope.measure import Measured, measure
 from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record
@@ -323,7 +322,8 @@ class VirtualOscilloscope(VirtualInstrument):
         """Return the latest record; the answer waits for it if one is under way.  Raises ScpiError if there is none."""
         acquisition = self.acquisition
         acquisition.follow(self.now)
-        if acquisition.latest is None and acquisition.runs_freely:
+        free = acquisition.armed is not None and not (acquisition.once or acquisition.blocked)
+        if acquisition.latest is None and free:
             under_way = acquisition.first(self.now + LOOK_AHEAD)
             if under_way is not None:
                 self.busy_until(under_way.done)

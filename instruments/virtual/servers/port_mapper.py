@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from instruments.virtual.servers.clients import ServedInstrument
-    from instruments.virtual.servers.rpc import Procedure
 
 #: Program number, version and the port at which it listens (RFC 1833, section 3); protocol numbers of TCP and UDP.
 PROGRAM, VERSION, PORT = 100000, 2, 111
@@ -42,14 +41,12 @@ class PortMapper:
 
     def __init__(self, instrument: ServedInstrument, programs: Mapping[tuple[int, int, int], int]) -> None:
         self._programs = dict(programs)
-        self._program = Program(PROGRAM, VERSION, self._procedures(), longest=_LONGEST)
+        procedures = {1: self._refuse, 2: self._refuse, 3: self._get_port, 4: self._dump}
+        self._program = Program(PROGRAM, VERSION, procedures, longest=_LONGEST)
         self._listener = Listener(instrument, self._talk)
         self._datagrams: socket.socket | None = None
         self._answering: asyncio.Task[None] | None = None
         self.port = 0
-
-    def _procedures(self) -> Mapping[int, Procedure]:
-        return {1: self._refuse, 2: self._refuse, 3: self._get_port, 4: self._dump}
 
     async def open(self, host: str, port: int) -> None:
         """Listen at this address of the machine; port 0: any free one.  Raises OSError."""

@@ -10,7 +10,7 @@ import struct
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from instruments.virtual.servers.clients import Disconnected, first_of
 
@@ -69,44 +69,13 @@ def pack(*values: int | bytes) -> bytes:
 
 
 class AcceptStatus(IntEnum):
-    """Why a call that was understood is not carried out (RFC 5531, accept_stat)."""
+    """What became of a call that was understood (RFC 5531, accept_stat)."""
 
+    SUCCESS = 0
     PROGRAM_UNAVAILABLE = 1
     PROGRAM_MISMATCH = 2
     PROCEDURE_UNAVAILABLE = 3
     GARBAGE_ARGUMENTS = 4
-
-
-class Call(NamedTuple):
-    """A remote procedure call, up to its parameters."""
-
-    number: int
-    program: int
-    version: int
-    procedure: int
-    parameters: Reader
-
-
-def read_call(record: bytes) -> Call:
-    """Parse the call in a record.  Raises Garbage."""
-    reader = Reader(record)
-    number, kind, rpc_version, program, version, procedure = reader.numbers(6)
-    if kind != 0 or rpc_version != 2:
-        raise Garbage
-    for _ in ("credentials", "verifier"):
-        reader.number()
-        reader.opaque()
-    return Call(number, program, version, procedure, reader)
-
-
-def reply(call: Call, results: bytes) -> bytes:
-    """Return the record that answers a call with its results: accepted, no verifier, success."""
-    return pack(call.number, 1, 0, 0, b"", 0) + results
-
-
-def refusal(call: Call, why: AcceptStatus, *versions: int) -> bytes:
-    """Return the record that refuses a call.  versions: the first and the last that the program has, for a mismatch."""
-    return pack(call.number, 1, 0, 0, b"", why, *versions)
 
 
 #: The results of a procedure, given its parameters.
@@ -166,19 +135,31 @@ async def serve(program: Program, reader: asyncio.StreamReader, writer: asyncio.
 
 async def answer(program: Program, record: bytes) -> bytes:
     """Carry out the call in a record.  Returns the record that answers it.  Raises Disconnected when it is no call."""
+    parameters = Reader(record)
     try:
-        call = read_call(record)
+        number, kind, rpc_version, called, version, procedure = parameters.numbers(6)
+        for _ in ("credentials", "verifier"):
+            parameters.number()
+            parameters.opaque()
     except Garbage:
         raise Disconnected from None
-    if call.program != program.number:
-        return refusal(call, AcceptStatus.PROGRAM_UNAVAILABLE)
-    if call.version != program.version:
-        return refusal(call, AcceptStatus.PROGRAM_MISMATCH, program.version, program.version)
-    if call.procedure == 0:  # by convention a ping
-        return reply(call, b"")
-    if call.procedure not in program.procedures:
-        return refusal(call, AcceptStatus.PROCEDURE_UNAVAILABLE)
+    if kind != 0 or rpc_version != 2:
+        raise Disconnected
     try:
-        return reply(call, await program.procedures[call.procedure](call.parameters))
+        results = await _carry_out(program, called, version, procedure, parameters)
     except Garbage:
-        return refusal(call, AcceptStatus.GARBAGE_ARGUMENTS)
+        results = pack(AcceptStatus.GARBAGE_ARGUMENTS)
+    return pack(number, 1, 0, 0, b"") + results  # a reply, accepted, without a verifier
+
+
+async def _carry_out(program: Program, called: int, version: int, procedure: int, parameters: Reader) -> bytes:
+    """Return the status of a call, and its results.  Raises Garbage."""
+    if called != program.number:
+        return pack(AcceptStatus.PROGRAM_UNAVAILABLE)
+    if version != program.version:  # the first and the last version that there is
+        return pack(AcceptStatus.PROGRAM_MISMATCH, program.version, program.version)
+    if procedure == 0:  # by convention a ping
+        return pack(AcceptStatus.SUCCESS)
+    if procedure not in program.procedures:
+        return pack(AcceptStatus.PROCEDURE_UNAVAILABLE)
+    return pack(AcceptStatus.SUCCESS) + await program.procedures[procedure](parameters)

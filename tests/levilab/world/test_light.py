@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import erf
 
-from instruments.virtual.core.trigger import crossings
+from instruments.virtual.core.signal import crossings
 from instruments.virtual.counter.edges import Thresholds
 from levilab.world.light import Laser, Tape, error_function, low_pass, noise
 

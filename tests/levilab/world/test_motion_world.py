@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
-from instruments.virtual.core.trigger import crossings
+from instruments.virtual.core.signal import crossings
 from instruments.virtual.counter.edges import Thresholds
 from instruments.virtual.generator.channel import Burst, Output
 from instruments.virtual.generator.voltage import fundamental

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from instruments.clock import VirtualClock
-from instruments.virtual.core.trigger import crossings
+from instruments.virtual.core.signal import crossings
 from instruments.virtual.counter.edges import Thresholds
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.generator.channel import Burst, Output

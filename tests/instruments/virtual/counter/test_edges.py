@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from instruments.virtual.core.trigger import crossings
+from instruments.virtual.core.signal import crossings
 from instruments.virtual.counter.edges import RATE, EdgeFinder, TriggerInput
 
 

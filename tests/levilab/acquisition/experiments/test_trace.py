@@ -9,7 +9,7 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.errors import OutOfRange
-from instruments.virtual.core.trigger import crossings
+from instruments.virtual.core.signal import crossings
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
