@@ -111,9 +111,7 @@ class Serial(SerialBase):
         with _use(self._open_line()) as line:
             line.discard()
 
-    def reset_output_buffer(self) -> None:
-        """Do nothing: `write` returns when all bytes have left."""
-        self._open_line()
+    reset_output_buffer = flush
 
     # --- the other wires: three-wire lines have none ---
 

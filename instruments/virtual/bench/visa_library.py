@@ -215,14 +215,12 @@ class LevilabVisaLibrary(VisaLibraryBase):
     ) -> tuple[str, StatusCode]:
         """ViLock; a shared lock with the same key lets its holders through."""
         link, attributes = self._sessions[session]
-        key = requested_key or f"levilab-{next(_numbers)}"
-        if not link.client_lock.acquire(link, key if lock_type == constants.Lock.shared else None):
+        shared, modes = lock_type == constants.Lock.shared, constants.AccessModes
+        key = (requested_key or f"levilab-{next(_numbers)}") if shared else None
+        if not link.client_lock.acquire(link, key):
             return "", self.handle_return_value(session, StatusCode.error_resource_locked)
-        shared = lock_type == constants.Lock.shared
-        attributes[ResourceAttribute.resource_lock_state] = (
-            constants.AccessModes.shared_lock if shared else constants.AccessModes.exclusive_lock
-        )
-        return key if shared else "", self.handle_return_value(session, StatusCode.success)
+        attributes[ResourceAttribute.resource_lock_state] = modes.shared_lock if shared else modes.exclusive_lock
+        return key or "", self.handle_return_value(session, StatusCode.success)
 
     def unlock(self, session: VISASession) -> StatusCode:
         """ViUnlock."""

@@ -29,17 +29,25 @@ class VirtualGenerator(VirtualInstrument):
         clock: of the bench.
         listener: called at each change with its time [s] and the new Output of channel 1.  The end of a triggered burst
             is announced when the burst begins; a later change replaces what was announced for the time after it.
+        family: of another model than that of the class.
         model: identity, numbered, lacks; see the base.
     """
 
-    family: ClassVar[Family]
+    family: Family
     numbered: Sequence[int] = (1,)
     #: Arbitrary waveforms that can be selected without being loaded first.
     BUILT_IN: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(self, clock: Clock, *, listener: Callable[[float, Output], None] | None = None, **model: Any) -> None:
+    def __init__(
+        self,
+        clock: Clock,
+        *,
+        listener: Callable[[float, Output], None] | None = None,
+        family: Family | None = None,
+        **model: Any,
+    ) -> None:
         super().__init__(clock, **model)
-        self._listener = listener
+        self._listener, self.family = listener, family or self.family
         self._text = ""
         self.channels = tuple(
             Channel(self.family, self.settings, index=n, report=self.parser.report, now=clock.now)

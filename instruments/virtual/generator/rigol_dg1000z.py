@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Both, Row, Switch
@@ -18,11 +18,7 @@ from instruments.virtual.generator.generator import VirtualGenerator
 from instruments.virtual.generator.rows import CHANNEL, Quantity, pulses, waveforms
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.clock import Clock
     from instruments.virtual.core.parser import Value
-    from instruments.virtual.generator.channel import Output
 
 
 def _family(sine: float, square: float, ramp: float) -> Family:
@@ -93,9 +89,10 @@ _OFF: dict[str, Value] = {
 
 
 class VirtualDG1000Z(VirtualGenerator):
-    """A DG1062Z: two channels, 60 MHz.  family: of another model; listener, model: see the base."""
+    """A DG1062Z: two channels, 60 MHz."""
 
     identity = "Rigol Technologies,DG1062Z,VIRTUAL,03.01.12"
+    family = DG1062Z
     no_error = '0,"No error"'
     numbered = (1, 2)
     CHANNEL_ROWS: ClassVar = _CHANNEL
@@ -103,17 +100,6 @@ class VirtualDG1000Z(VirtualGenerator):
         "angle_unit": "DEG",
         **{name.format(n=n): value for n in (1, 2) for name, value in _OFF.items()},
     }
-
-    def __init__(
-        self,
-        clock: Clock,
-        *,
-        listener: Callable[[float, Output], None] | None = None,
-        family: Family = DG1062Z,
-        **model: Any,
-    ) -> None:
-        self.family = family  # type: ignore[misc]
-        super().__init__(clock, listener=listener, **model)
 
     def spell(self, value: float) -> str:
         """Return a number with seven digits: 1.000000E+02."""
