@@ -17,7 +17,7 @@ import numpy as np
 from instruments.virtual.core.parameters import choice, number, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Text, Word, whole
-from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input
+from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input, levels
 
 if TYPE_CHECKING:
     from instruments.clock import Clock
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 #: The fastest rate [1/s].
 _FASTEST = 2e9
-_CODES_ON_SCREEN = 199
 #: Bits of the operation status register.
 _RUN, _WAIT_TRIGGER, _OVERLOAD = 8, 32, 2048
 #: Points of a record for the screen.
@@ -58,13 +57,6 @@ _PERCENT = {"PDUTY", "NDUTY", "OVERSHOOT", "PRESHOOT"}
 _INTERVALS = ("CYCLe", "DISPlay", "AC", "DC")
 #: Sources that a waveform may have beside the channels; this model has nothing in them.
 _EMPTY_SOURCES = ("FUNCtion", "MATH", "FFT", "WMEMory1", "WMEMory2", "EXTernal", "ABUS")
-
-
-def _levels(scope: VirtualDSOX1000) -> tuple[float, float]:
-    """Return the limits of the level: three quarters of the full scale from the middle of the screen."""
-    channel = scope.source_channel() or 1
-    reach, middle = 6 * scope.division(channel), scope.value(f"chan{channel}_offset")
-    return middle - reach, middle + reach
 
 
 _CHANNEL: tuple[Row, ...] = (
@@ -127,7 +119,7 @@ _TRIGGER: tuple[Row, ...] = (
     Word("TRIGger:MODE", "trigger_mode", "EDGE GLITch PATTern TV SHOLd TRANsition SBUS1"),
     Word("TRIGger[:EDGE]:SOURce", "trigger_source", lambda s: s.channel_words() + " EXTernal LINE WGEN", "CHAN1"),
     Word("TRIGger[:EDGE]:SLOPe", "trigger_slope", "NEGative *POSitive EITHer ALTernate"),
-    Number("TRIGger[:EDGE]:LEVel", "trigger_level", 0.0, _levels, "V"),
+    Number("TRIGger[:EDGE]:LEVel", "trigger_level", 0.0, levels(6), "V"),
     Do("TRIGger:LEVel:ASETup", lambda s: s.half_level()),
     Word("TRIGger:SWEep", "trigger_sweep", "AUTO NORMal"),
     Word("TRIGger[:EDGE]:COUPling", "trigger_coupling", "AC *DC LFReject"),
@@ -178,6 +170,7 @@ class VirtualDSOX1000(VirtualOscilloscope):
     identity = "KEYSIGHT TECHNOLOGIES,DSO-X 1102G,VIRTUAL,01.20.2019061038"
     queue_size = 30
     columns, lowest, digits = 10, 1, 8
+    codes_per_division = 199 / 8
     transfer = 5e6
     CHANNEL_ROWS: ClassVar = _CHANNEL
     DEFAULTS: ClassVar = {"wav_points": float(_FOR_SCREEN), "measure_source": "CHAN1"}
@@ -288,14 +281,9 @@ class VirtualDSOX1000(VirtualOscilloscope):
         before = {"LEFT": 1, "CENT": 5, "RIGH": 9}[str(self.settings["time_reference"])]
         return self.value("time_offset") - before * scale, 10 * scale
 
-    def scaling(self, channel: int) -> tuple[float, int]:
-        """Return volts per code (199 for eight divisions) and the code of 0 V: the offset is set to whole codes."""
-        volts_per_code = 8 * self.division(channel) / _CODES_ON_SCREEN
-        return volts_per_code, self.middle - round(self.value(f"chan{channel}_offset") / volts_per_code)
-
-    def codes_on_screen(self, channel: int) -> tuple[float, float]:
-        """Return the codes of eight divisions around the middle."""
-        return float(self.middle), float(_CODES_ON_SCREEN)
+    def centre(self, channel: int) -> float:
+        """See the base."""
+        return self.value(f"chan{channel}_offset")
 
     def fit(self, channel: int, middle: float, division: float) -> None:
         """Return the voltage in the middle of the screen: the offset."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 from instruments.virtual.core.parameters import boolean, choice, limit, number, optional_parameter, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Word, whole
-from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input, one_two_five
+from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input, levels, one_two_five
 
 if TYPE_CHECKING:
     from instruments.virtual.oscilloscope.record import Codes, Record
@@ -49,12 +49,6 @@ def _offsets(scope: VirtualDS1000Z, n: int) -> tuple[float, float]:
 
 def _times(scope: VirtualDS1000Z) -> tuple[float, float]:
     return -6 * scope.value("time_scale"), max(1.0, 100 * scope.value("time_scale"))
-
-
-def _levels(scope: VirtualDS1000Z) -> tuple[float, float]:
-    channel = scope.source_channel() or 1
-    reach, offset = 5 * scope.division(channel), scope.value(f"chan{channel}_offset")
-    return -reach - offset, reach - offset
 
 
 _CHANNEL: tuple[Row, ...] = (
@@ -100,7 +94,7 @@ _TRIGGER: tuple[Row, ...] = (
     Word("TRIGger:MODE", "trigger_mode", "EDGE PULSe SLOPe VIDeo TIMeout"),
     Word("TRIGger:EDGe:SOURce", "trigger_source", lambda s: s.channel_words() + " EXT EXT5 ACLine", "CHAN1"),
     Word("TRIGger:EDGe:SLOPe", "trigger_slope", "POSitive NEGative RFALl"),
-    Number("TRIGger[:EDGe]:LEVel", "trigger_level", 0.0, _levels, "V"),
+    Number("TRIGger[:EDGe]:LEVel", "trigger_level", 0.0, levels(5), "V"),
     Word("TRIGger:SWEep", "trigger_sweep", "AUTO NORMal SINGle"),
     Word("TRIGger:COUPling", "trigger_coupling", "AC *DC LFReject HFReject"),
     Number("TRIGger:HOLDoff", "holdoff", 16e-9, (16e-9, 10.0), "S"),

@@ -101,10 +101,14 @@ class VirtualOscilloscope(VirtualInstrument):
     def scaling(self, channel: int) -> tuple[float, int]:
         """Return volts per code and the code of 0 V, which may lie beyond the converter.
 
-        The offset is what is added to the trace: it lifts it by whole codes.
+        The offset lifts the trace by whole codes.
         """
         volts_per_code = self.division(channel) / self.codes_per_division
-        return volts_per_code, self.middle + round(self.value(f"chan{channel}_offset") / volts_per_code)
+        return volts_per_code, self.middle - round(self.centre(channel) / volts_per_code)
+
+    def centre(self, channel: int) -> float:
+        """Return the voltage in the middle of the screen [V]."""
+        return -self.value(f"chan{channel}_offset")
 
     def codes_on_screen(self, channel: int) -> tuple[float, float]:
         """Return the code in the middle of the screen, and how many codes it is high: eight divisions."""
@@ -418,6 +422,17 @@ PRESETS = (Both("*SAV", lambda s, p: s.keep(p)), Both("*RCL", lambda s, p: s.rec
 def at_input(lowest: float, highest: float) -> Callable[[VirtualOscilloscope, int], tuple[float, float]]:
     """Return limits that hold at a channel's input [V]: at the tip of its probe they are its factor larger."""
     return lambda scope, n: (lowest * scope.probe(n), highest * scope.probe(n))
+
+
+def levels(divisions: float) -> Callable[..., tuple[float, float]]:
+    """Return the limits of the level of a channel, or of the trigger's source: so far from the middle of the screen."""
+
+    def limits(scope: VirtualOscilloscope, n: int | None = None) -> tuple[float, float]:
+        channel = n or scope.source_channel() or 1
+        reach, middle = divisions * scope.division(channel), scope.centre(channel)
+        return middle - reach, middle + reach
+
+    return limits
 
 
 def one_two_five(value: float, *, up: bool = False) -> float:

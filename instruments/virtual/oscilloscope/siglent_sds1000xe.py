@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from instruments.virtual.core.parameters import choice, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Tell, Word, short_header
-from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, one_two_five
+from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, levels, one_two_five
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -58,17 +58,12 @@ def _reach(scope: VirtualSDS1000XE, n: int) -> tuple[float, float]:
     return -reach, reach
 
 
-def _levels(scope: VirtualSDS1000XE, n: int) -> tuple[float, float]:
-    reach, middle = 4.5 * scope.division(n), -scope.value(f"chan{n}_offset")
-    return middle - reach, middle + reach
-
-
 #: In CHDR SHORT, as it leaves the factory, an answer has its header and its unit: C1:VDIV 5.00E-01V.
 _CHANNEL: tuple[Row, ...] = (
     Number("C{n}:(ATTN|ATTENUATION)", "chan{n}_probe", 10.0, (0.1, 1e4), spell=lambda v: f"{v:g}"),
     Number("C{n}:(VDIV|VOLT_DIV)", "chan{n}_scale", 1.0, at_input(5e-4, 10), "V", clips=True),
     Number("C{n}:(OFST|OFFSET)", "chan{n}_offset", 0.0, _reach, "V", clips=True),
-    Number("C{n}:(TRLV|TRIG_LEVEL)", "chan{n}_level", 0.0, _levels, "V", clips=True),
+    Number("C{n}:(TRLV|TRIG_LEVEL)", "chan{n}_level", 0.0, levels(4.5), "V", clips=True),
     Word("C{n}:(TRSL|TRIG_SLOPE)", "chan{n}_slope", "NEG *POS WINDOW"),
     Word("C{n}:(TRCP|TRIG_COUPLING)", "chan{n}_trigger_coupling", "AC *DC HFREJ LFREJ"),
     Word("C{n}:(CPL|COUPLING)", "chan{n}_coupling", "A1M *D1M GND"),

@@ -17,7 +17,7 @@ from instruments.virtual.core.parameters import choice, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Number, Own, Row, Switch, Word, short_header, whole
 from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD
-from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input
+from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, levels
 
 if TYPE_CHECKING:
     from instruments.virtual.oscilloscope.record import Record
@@ -45,12 +45,6 @@ def _one_two_and_a_half_five(value: float) -> float:
     """Return the number of the series 1, 2.5, 5, 10 … nearest to a positive one."""
     decade = math.floor(math.log10(value))
     return min((float(f"{m}e{decade}") for m in (1, 2.5, 5, 10)), key=lambda s: abs(s - value))
-
-
-def _levels(scope: VirtualTDS2000) -> tuple[float, float]:
-    channel = scope.source_channel() or 1
-    reach, middle = 8 * scope.division(channel), -scope.value(f"chan{channel}_position") * scope.division(channel)
-    return middle - reach, middle + reach
 
 
 @dataclass(frozen=True)
@@ -115,7 +109,7 @@ _ROWS: tuple[Row, ...] = (
     LongWord("TRIGger:MAIn:EDGE:SOUrce", "trigger_source", lambda s: s.channel_words() + " EXT EXT5 LINE", "CH1"),
     LongWord("TRIGger:MAIn:EDGE:SLOpe", "trigger_slope", "*RISe FALL"),
     LongWord("TRIGger:MAIn:EDGE:COUPling", "trigger_coupling", "*DC AC NOISErej HFRej LFRej"),
-    Number("TRIGger:MAIn:LEVel", "trigger_level", 0.0, _levels, "V"),
+    Number("TRIGger:MAIn:LEVel", "trigger_level", 0.0, levels(8), "V"),
     Number("TRIGger:MAIn:HOLDOff:VALue", "holdoff", 5e-7, (5e-7, 10.0), "S"),
     # data
     Both("DATa", lambda s, p: s.set_data(p)),
@@ -189,6 +183,10 @@ class VirtualTDS2000(VirtualOscilloscope):
         """See the base; the trace is moved by divisions."""
         position = self.value(f"chan{channel}_position")
         return self.division(channel) / _CODES, self.middle + round(_CODES * position)
+
+    def centre(self, channel: int) -> float:
+        """See the base."""
+        return -self.value(f"chan{channel}_position") * self.division(channel)
 
     def fit(self, channel: int, middle: float, division: float) -> None:
         """See the base."""
