@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import socket
 import threading
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Self
 
@@ -157,19 +158,18 @@ class BenchServer:
     endpoints: tuple[Endpoints, ...] = ()
     _loop: asyncio.AbstractEventLoop | None = field(init=False, default=None)
     _end: asyncio.Event = field(init=False)
-    _failed: Exception | None = field(init=False, default=None)
 
     def __enter__(self) -> Self:
         """Start the thread, and return when every instrument can be reached."""
         self._end = asyncio.Event()
-        begun = threading.Event()
-        self._thread = threading.Thread(target=self._run, args=(begun,), name="virtual bench")
+        begun: Future[tuple[Endpoints, ...]] = Future()
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve(begun)), name="virtual bench")
         self._thread.start()
-        begun.wait()
-        if self._failed:
+        try:
+            self.endpoints = begun.result()
+        except OSError:
             self._thread.join()
-            failed, self._failed = self._failed, None
-            raise failed
+            raise
         return self
 
     def __exit__(
@@ -180,15 +180,13 @@ class BenchServer:
         self._loop.call_soon_threadsafe(self._end.set)
         self._thread.join()
 
-    def _run(self, begun: threading.Event) -> None:
-        asyncio.run(self._serve(begun))
-
-    async def _serve(self, begun: threading.Event) -> None:
+    async def _serve(self, begun: Future[tuple[Endpoints, ...]]) -> None:
         self._loop = asyncio.get_running_loop()
         try:
-            async with serve_bench(self.bench, self.listen_at) as self.endpoints:
-                begun.set()
+            async with serve_bench(self.bench, self.listen_at) as endpoints:
+                begun.set_result(endpoints)
                 await self._end.wait()
-        except Exception as error:  # noqa: BLE001 - raised by the thread that waits for this one
-            self._failed = error
-            begun.set()
+        except Exception as error:
+            if begun.done():
+                raise
+            begun.set_exception(error)
