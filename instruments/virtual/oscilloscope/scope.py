@@ -110,10 +110,6 @@ class VirtualOscilloscope(VirtualInstrument):
         """Return the voltage in the middle of the screen [V]."""
         return -self.value(f"chan{channel}_offset")
 
-    def codes_on_screen(self, channel: int) -> tuple[float, float]:
-        """Return the code in the middle of the screen, and how many codes it is high: eight divisions."""
-        return float(self.middle), 8.0 * self.codes_per_division
-
     def fit(self, channel: int, middle: float, division: float) -> None:
         """Show this voltage in the middle of the screen, with this scale [V per division]."""
         self.settings |= {f"chan{channel}_scale": division, f"chan{channel}_offset": -middle}
@@ -364,8 +360,7 @@ class VirtualOscilloscope(VirtualInstrument):
         start, length = record.screen
         for n in self.visible_channels():
             codes = record.codes(n, 0, 800, of=800, start=start, step=length / 800)
-            middle, span = self.codes_on_screen(n)
-            heights[n] = 0.5 + (codes.astype(np.float64) - middle) / span
+            heights[n] = 0.5 + (codes.astype(np.float64) - self.middle) / (8.0 * self.codes_per_division)
         return heights
 
     def screenshot(self, form: str = "BMP24", *, colour: bool = True, inverted: bool = False) -> bytes:
