@@ -20,7 +20,7 @@ class Later(typer.core.TyperCommand):
         @app.command(cls=Later, epilog="Example: levilab top sample_data/device.toml")
         def top() -> Callable[..., None]:
             '''Mass and moments of inertia of a top from its parts, taken as cylinders, with uncertainties.'''
-            from levilab.cli.top import top
+            from levilab.cli.report import top
             return top
     """
 

@@ -141,7 +141,7 @@ COMMANDS = {
         "--duration 5 --out map.zarr",
     ),
     "crosscheck": Row(
-        "crosscheck.crosscheck",
+        "checks.crosscheck",
         """Check the analyses: simulate, acquire through the real drivers, analyze, compare with the truth, many times.
 
         A pull is (estimate − truth)/u.  Where estimates and uncertainties are right, pulls have the mean 0 and the
@@ -149,7 +149,7 @@ COMMANDS = {
         "levilab crosscheck spindown --trials 100",
     ),
     "reproduce": Row(
-        "reproduce.reproduce",
+        "checks.reproduce",
         """Compute the tables and figures of the Levitron thesis and of two papers again: published value beside ours.
 
         Prints published, ours and agreement, and writes all with figures as a report.  A minute on two cores.  Ends
@@ -157,7 +157,7 @@ COMMANDS = {
         'levilab reproduce --only "limits,errata" -o reproduce.html',
     ),
     "top": Row(
-        "top.top",
+        "report.top",
         "Calculate mass and moments of inertia of a top from its parts, taken as cylinders, with uncertainties.",
         "levilab top sample_data/device.toml",
     ),

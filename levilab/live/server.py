@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from levilab.live.desk import Desk
     from levilab.live.practice.commands import PracticeEvent
     from levilab.live.running import Running
-    from levilab.live.watch import FitTask
 
 #: Frames a second at most, so that 20 come to the page; and the longest wait of a page without news [s].
 FRAMES_PER_S, PATIENCE_S = 22, 1.0
@@ -144,7 +143,7 @@ class Hall:
                 with watch.failing_alone():
                     watch.step()
                 if not fitting and (task := watch.fit_task()):
-                    job = asyncio.create_task(self._fit(watch, task))
+                    job = asyncio.create_task(self._fit(watch, *task))
                     fitting.add(job)
                     job.add_done_callback(fitting.discard)
             if (now := self._ticks()) != before:  # also by what came since the last round, as a fit
@@ -175,9 +174,9 @@ class Hall:
     def _ticks(self) -> list[int]:
         return [*(watch.tick for watch in self.watches.values()), self.desk.count if self.desk else 0]
 
-    async def _fit(self, watch: Watch, task: FitTask) -> None:
+    async def _fit(self, watch: Watch, folder: Path, compute: Callable[[], Running | None]) -> None:
         with watch.failing_alone():
-            watch.take_fit(task.folder, *await asyncio.to_thread(_time_task, task.compute))
+            watch.take_fit(folder, *await asyncio.to_thread(_time_task, compute))
 
     def _announce(self) -> None:
         self.new.set()

@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import time
 from collections import deque
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,19 +41,6 @@ LATEST = 200
 _LONGEST_FAILURE = 300
 _INSTRUMENT = {"identity", "driver", "address"}
 _SETTINGS = {"frequency_hz", "amplitude_vpp", "waveform", "offset_v", "gate_s", "trigger_level_v"}
-
-
-@dataclass(frozen=True)
-class FitTask:
-    """A running fit that is to be computed.
-
-    Attributes:
-        folder: of the run.
-        compute: returns the fit; None for an experiment without one.
-    """
-
-    folder: Path
-    compute: Callable[[], Running | None]
 
 
 class Watch:
@@ -176,8 +164,8 @@ class Watch:
 
     # --- the running fit, which the server computes beside the frames ---
 
-    def fit_task(self) -> FitTask | None:
-        """Return the fit to compute in a thread, if it is time; `take_fit` takes the result."""
+    def fit_task(self) -> tuple[Path, Callable[[], Running | None]] | None:
+        """Return a run and the function that fits it, for a thread, if it is time; `take_fit` takes the result."""
         followed = self.followed
         ended = followed is not None and followed.status != "running"
         if (
@@ -192,11 +180,7 @@ class Watch:
         experiment, columns, groups = followed.record.experiment, followed.columns, followed.readings.groups()
         settings = followed.record.configuration.get(experiment)
         settings = settings if isinstance(settings, dict) else {}
-
-        def compute() -> Running | None:
-            return fit_so_far(experiment, columns, groups, settings, ended=ended)
-
-        return FitTask(followed.folder, compute)
+        return followed.folder, partial(fit_so_far, experiment, columns, groups, settings, ended=ended)
 
     def take_fit(self, folder: Path, found: Running | None, took_s: float) -> None:
         """Take in the fit of a run, and its processor time [s].

@@ -4,7 +4,7 @@ import {command, connect, read, takeToken} from "./connection.js";
 import {takeDrops} from "./drop.js";
 import {drawReadings, drawRecords, saidOf, sheet} from "./plot.js";
 import {openPractice, watchPractice} from "./practice.js";
-import {between, by, fixed, lapse, make, short, typeset, write} from "./words.js";
+import {between, by, fixed, lapse, make, option, short, typeset, write} from "./words.js";
 
 /** Least time between spoken news [ms]. */
 const NEWS_EVERY_MS = 6000;
@@ -491,17 +491,13 @@ async function listRuns(chosen) {
   const select = by("run");
   select.replaceChildren(...listed.runs.map((run) => {
     const when = run.started_utc.slice(0, 16).replace("T", " ");
-    const option = make("option", `${when} ${run.experiment || run.name}${run.status === "finished" ? "" : `, ${run.status}`}`);
-    option.value = run.name;
-    return option;
+    return option(`${when} ${run.experiment || run.name}${run.status === "finished" ? "" : `, ${run.status}`}`, run.name);
   }));
   if (listed.practice && !listed.practice.runs.length && listed.runs.length) {  // the runs are older than this bench
-    const option = make("option", "no run of this bench yet");
-    option.value = OWN_BENCH;
-    select.prepend(option);
+    select.prepend(option("no run of this bench yet", OWN_BENCH));
     select.value = OWN_BENCH;
   }
-  if (!listed.runs.length) select.append(make("option", "none yet"));
+  if (!listed.runs.length) select.append(option("none yet"));
   select.value = chosen || select.value;
   return listed;
 }

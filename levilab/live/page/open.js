@@ -4,7 +4,7 @@ import {ask, takeToken} from "./connection.js";
 import {takeDrops, takeFiles} from "./drop.js";
 import {drawReadings, sheet} from "./plot.js";
 import {showResult} from "./result.js";
-import {by, make, numberIn, write} from "./words.js";
+import {by, make, numberIn, option, write} from "./words.js";
 
 /** Least height of a small plot [px]. */
 const PLOT_PX = 240;
@@ -30,11 +30,7 @@ async function begin() {
 
 function listFiles(files) {
   by("choose").hidden = files.length < 2;
-  by("files").replaceChildren(...files.map(({file, name}) => {
-    const option = make("option", name);
-    option.value = file;
-    return option;
-  }));
+  by("files").replaceChildren(...files.map(({file, name}) => option(name, file)));
 }
 
 /** Open a file by its id, with the options that it has. */
@@ -75,7 +71,7 @@ function show() {
   by("runs").replaceChildren(...look.runs.map(runOf));
   look.runs.forEach((_, k) => draw(k));
   by("record").hidden = !look.channels.length && look.rate === null;
-  by("channel").replaceChildren(...look.channels.map((name) => make("option", name)));
+  by("channel").replaceChildren(...look.channels.map((name) => option(name)));
   by("channel").closest("label").hidden = look.channels.length < 2;
   by("channel").selectedIndex = Math.max(0, look.runs[0]?.columns.findIndex(({quantity}) => quantity === "signal") ?? 0);
   by("rate").value = look.rate === null ? "" : String(Number(look.rate.toPrecision(9)));
@@ -171,7 +167,7 @@ function rowOf(column, run) {
 function selectOf(name, options, value) {
   const select = make("select");
   select.setAttribute("aria-label", name);
-  for (const [key, text] of Object.entries(options)) select.append(Object.assign(make("option", text), {value: key}));
+  select.append(...Object.entries(options).map(([key, text]) => option(text, key)));
   select.value = value;
   return select;
 }

@@ -1,7 +1,7 @@
 // The bench for practice: controls that send commands, and the guide that shows how far one is.
 
 import {showResult} from "./result.js";
-import {by, make, numberIn, write} from "./words.js";
+import {by, numberIn, option, write} from "./words.js";
 
 /** Least time between two messages of a slider [ms]. */
 const SENDS_EVERY_MS = 120;
@@ -21,7 +21,7 @@ export function watchPractice() {
 export function openPractice(about, command, run, isOwn, allowed) {
   document.body.classList.add("practice");
   by("practice").hidden = false;
-  for (const experiment of about.experiments) by("experiment").append(make("option", experiment));
+  for (const experiment of about.experiments) by("experiment").append(option(experiment));
   const now = {drive: false, busy: false, paused: false, analyzed: "", ended: false, elsewhere: false, bench: null};
 
   by("controls").disabled = !allowed;
@@ -177,10 +177,6 @@ export function openPractice(about, command, run, isOwn, allowed) {
 /** Choose the option nearest to a value; one that is not there is added. */
 function choose(select, value) {
   const text = String(value);
-  if (![...select.options].some((option) => option.value === text)) {
-    const option = make("option", `${text} ×`);
-    option.value = text;
-    select.append(option);
-  }
+  if (![...select.options].some(({value: there}) => there === text)) select.append(option(`${text} ×`, text));
   select.value = text;
 }

@@ -58,6 +58,9 @@ export function make(tag, text = "", className = "") {
   return element;
 }
 
+/** A row of a list to choose from. */
+export const option = (text, value = text) => Object.assign(make("option", text), {value});
+
 /** The colours of the style sheet, by their names; read again when the day turns to night. */
 export function colours() {
   const style = getComputedStyle(document.documentElement);

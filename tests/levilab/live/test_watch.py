@@ -81,12 +81,11 @@ def test_a_fit_under_way_is_dropped_when_the_next_run_begins(tmp_path: Path) -> 
     one, two = (GrowingRun(tmp_path, name) for name in ("one", "two"))
     watch = Watch(one.folder, lambda: None, lambda: 0.0)
     one.readings(spin_down(3))
-    task = looking(watch).fit_task()
-    assert task
+    assert looking(watch).fit_task()
     with two.running():
         publish(watch, State(0.0, folder=str(two.folder)))
         two.readings(spin_down(3))
-        watch.take_fit(task.folder, LINE, 0.4)
+        watch.take_fit(one.folder, LINE, 0.4)
         assert watch.fit is None
         assert looking(watch).fit_task()  # at once
 
