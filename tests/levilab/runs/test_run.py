@@ -6,6 +6,7 @@ import json
 import os
 import re
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -47,23 +48,25 @@ def written(out: Path, rows: int = 4) -> Path:
     return writer.folder
 
 
-def test_a_run_that_was_written_loads_as_it_was(tmp_path: Path) -> None:
+def failing(number: int) -> Callable[..., None]:
+    """Stands for a function of the system that fails."""
+
+    def fail(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    return fail
+
+
+def test_a_run_that_was_written_loads_as_it_was_and_with_numpy_alone(tmp_path: Path) -> None:
     run = Run.load(written(tmp_path))
     assert (run.status, run.record.experiment) == ("finished", "spin")
     frame = run.readings().frame
     assert frame["time_s"].tolist() == [0, 10, 20, 30]
     assert frame["spin_frequency_hz"].tolist() == [40.0, 40 - 1 / 3, 40 - 2 / 3, 39.0]
     assert [event["kind"] for event in run.events()] == ["drive off"]
-
-
-def test_the_folder_can_be_read_with_numpy_alone(tmp_path: Path) -> None:
-    table = np.genfromtxt(written(tmp_path) / "readings.csv", delimiter=",", names=True)
+    table = np.genfromtxt(run.folder / "readings.csv", delimiter=",", names=True)
     assert table.dtype.names == ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
     assert table["spin_frequency_hz"][3] == 39.0
-
-
-def test_the_name_says_when_and_what(tmp_path: Path) -> None:
-    assert re.fullmatch(r"\d{8}T\d{6}Z-spin-[0-9a-f]{4}", written(tmp_path).name)
 
 
 def test_the_datapackage_holds_units_and_hashes(tmp_path: Path) -> None:
@@ -129,11 +132,7 @@ def test_replacing_a_file_leaves_the_old_one_whole_when_writing_fails(
 ) -> None:
     path = tmp_path / "run.json"
     replace_atomically(path, "old")
-
-    def no_space(_: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("levilab.runs.writer.os.fsync", no_space)
+    monkeypatch.setattr("levilab.runs.writer.os.fsync", failing(errno.ENOSPC))
     with pytest.raises(OSError, match="No space"):
         replace_atomically(path, "new")
     assert path.read_text(encoding="utf-8") == "old"
@@ -147,11 +146,7 @@ def test_when_the_disk_is_full_every_earlier_reading_is_kept(
     with RunWriter.create(tmp_path, record()) as writer:
         for k in range(rows_until_full):
             writer.reading({"time_s": k, "spin_frequency_hz": 40 - k, "spin_frequency_u_hz": 0.03})
-
-        def no_space(_: int) -> None:
-            raise OSError(28, "No space left on device")
-
-        monkeypatch.setattr("levilab.runs.writer.os.fsync", no_space)
+        monkeypatch.setattr("levilab.runs.writer.os.fsync", failing(errno.ENOSPC))
         with pytest.raises(CannotWrite, match=r"77\.5,21\.5.*No space left on device.*earlier readings are kept"):
             writer.reading({"time_s": 77.5, "spin_frequency_hz": 21.5, "spin_frequency_u_hz": 0.03})
     run = Run.load(writer.folder)
@@ -160,9 +155,11 @@ def test_when_the_disk_is_full_every_earlier_reading_is_kept(
 
 
 def test_a_folder_that_cannot_be_made_is_reported_in_one_line(tmp_path: Path) -> None:
-    (tmp_path / "runs").write_text("a file in the way", encoding="utf-8")
-    with pytest.raises(CannotWrite, match="`out`"):
-        RunWriter.create(tmp_path / "runs", record())
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    (tmp_path / "link").symlink_to(tmp_path / "gone" / "away")
+    for name in ("file", "link"):
+        with pytest.raises(CannotWrite, match="`out`"):
+            RunWriter.create(tmp_path / name, record())
 
 
 def test_runs_are_found_below_a_folder_and_listed_oldest_first(tmp_path: Path) -> None:
@@ -193,6 +190,7 @@ def test_the_length_of_a_run_is_from_time_zero_or_not_known(tmp_path: Path) -> N
 
 def test_a_run_is_found_by_its_name_below_a_folder(tmp_path: Path) -> None:
     folder = written(tmp_path)
+    assert re.fullmatch(r"\d{8}T\d{6}Z-spin-[0-9a-f]{4}", folder.name)  # when and what
     short = folder.name.split("Z-")[1]
     assert find_run(Path(short), tmp_path) == folder
     assert find_run(Path(folder.name), tmp_path) == folder
@@ -232,12 +230,6 @@ def test_a_clock_that_was_set_back_is_found_before_a_run_is_gone_on_with(tmp_pat
     changed = run.record.model_copy(update={"time_zero_utc": past.isoformat()})
     elapsed = Run(run.folder, changed, "interrupted").elapsed()
     assert 100 <= elapsed <= (datetime.now(UTC) - past).total_seconds()
-
-
-def test_a_link_that_leads_nowhere_is_no_place_for_runs(tmp_path: Path) -> None:
-    (tmp_path / "runs").symlink_to(tmp_path / "gone" / "away")
-    with pytest.raises(CannotWrite):
-        RunWriter.create(tmp_path / "runs", record())
 
 
 def test_a_linked_run_is_found_once(tmp_path: Path) -> None:
@@ -326,20 +318,14 @@ def test_every_new_folder_above_a_run_is_on_the_disk(tmp_path: Path, monkeypatch
 def test_a_disk_that_fails_is_no_full_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, advice: str
 ) -> None:
-    def fail(_: int) -> None:
-        raise OSError(number, "no")
-
     with RunWriter.create(tmp_path, record()) as writer:
-        monkeypatch.setattr("os.fsync", fail)
+        monkeypatch.setattr("os.fsync", failing(number))
         with pytest.raises(CannotWrite, match=advice):
             writer.reading(row(0))
 
 
 def test_a_run_folder_that_cannot_be_filled_is_taken_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: object) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr("levilab.runs.writer.replace_atomically", fail)
+    monkeypatch.setattr("levilab.runs.writer.replace_atomically", failing(errno.ENOSPC))
     with pytest.raises(CannotWrite):
         RunWriter.create(tmp_path / "runs", record())
     assert not [*(tmp_path / "runs").iterdir()]
