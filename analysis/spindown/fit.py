@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import AnalysisError
-from analysis.residuals import Change, gross_errors, gross_limit, largest_change, studentise
+from analysis.residuals import Change, gross_errors, gross_limit, largest_change
 from analysis.spindown.drag import LAWS
 from analysis.spindown.lawfit import LawFit, Solution, fit_law, solution
 from analysis.spindown.posterior import INDEPENDENT, RHO
@@ -217,11 +217,9 @@ def _search_outliers(readings: Readings, model: _Model) -> NDArray[np.intp]:
     while True:
         kept = np.delete(np.arange(n), left_out)
         found = model.fit("power", readings.without(left_out) if len(left_out) else readings, INDEPENDENT)
-        most, worst = min(allowed - len(left_out), max(1, n // 100)), kept[:0]
-        if found.degrees_of_freedom > 1 and found.posterior is not None:
-            floor = 1.0 if readings.sigma_known else ROUNDING  # a stated uncertainty is a scatter to be expected
-            t = studentise(found.residuals, found.leverage, len(found.law.parameters), floor)
-            worst = gross_errors(t, len(found.law.parameters))[:most]
+        most = min(allowed - len(left_out), max(1, n // 100))
+        floor = 1.0 if readings.sigma_known else ROUNDING  # a stated uncertainty is a scatter to be expected
+        worst = gross_errors(found.studentise(floor), len(found.law.parameters))[:most]
         if not len(worst):
             return np.sort(left_out)
         left_out = np.append(left_out, kept[worst])

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.budget import gate_bias
 from analysis.least_squares import solve
-from analysis.residuals import durbin_watson, runs_test_p
+from analysis.residuals import durbin_watson, runs_test_p, studentise
 from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.posterior import RHO, Posterior, posterior
 from analysis.spindown.readings import Readings
@@ -28,7 +28,7 @@ _SHORTER = 0.5
 #: Of more readings means over neighbours are fitted, for which a spin-down is straight within the noise.
 _MOST = 3000
 #: Of a step: the longest in a, and in A in units of its prior u.  The tilt bends more than linearly beyond.
-_LONGEST_GAP, _LONGEST_TILT = 0.5, 2.0
+_LONGEST_GAP, _LONGEST_TILT = 0.25, 0.5
 MAX_STATED_FACTOR = 3.0  # u(ln c) above which "known to a factor" says nothing
 
 
@@ -206,15 +206,27 @@ class Solution:
         """Readings beyond the parameters of the law."""
         return len(self.readings) - len(self.law.parameters)
 
-    @cached_property
-    def leverage(self) -> Array:
-        """How far each fitted value follows its own reading, what is known of the tilt allowed for, shape (n,)."""
+    def studentise(self, floor: float) -> Array:
+        """Return each residual in units of the scatter of the others, shape (n,).
+
+        What is expected of the tilt counts as more readings: the last one alone may determine the tilt.
+
+        Args:
+            floor: the scatter is taken to be no smaller than this.
+        """
         found = self.posterior
-        if found is None:
+        if found is None or self.degrees_of_freedom < 2:
             return np.zeros(len(self.readings))
-        j = self.slopes
-        own = np.einsum("pn,pq,qn->n", j, found.independent, j) / found.variance
-        return np.asarray(np.clip(own, 0.0, 1.0))
+        expected, u = self.counted.expected if self.counted else (np.empty(0), np.empty(0))
+        p, sigma = len(self.q) - len(u), np.sqrt(found.variance)
+        moved = np.zeros(len(self.q))
+        moved[p + MORE :] = found.step[p + MORE :]  # κ and β, which the fit itself keeps
+        left = np.append(self.residuals - moved @ self.slopes, sigma * ((self.q + moved)[p:] - expected) / u)
+        own = np.append(
+            np.einsum("pn,pq,qn->n", self.slopes, found.covariance, self.slopes) / found.variance,
+            np.diagonal(found.covariance)[p:] / u**2,
+        )
+        return studentise(left, np.clip(own, 0.0, 1.0), len(self.q), floor)[: len(self.readings)]
 
 
 def solution(
@@ -287,9 +299,10 @@ def _search(
                 break
             step, own = found.step.copy(), np.sqrt(np.diagonal(found.covariance))
             step[p + MORE :] = 0.0  # κ and β stay as they were given
-            close = bool((np.abs(step) <= _CLOSE * own).all())
-            if close or not np.isfinite(step).all():
-                return q, close, found
+            if not np.isfinite(step).all():
+                return q, False, found
+            if (np.abs(step) <= _CLOSE * own).all():
+                return q + step, True, found
             if len(expected):
                 step *= min(
                     1.0,
