@@ -138,6 +138,7 @@ def analyze(
     free_radii: bool = False,
     clock_u: float | None = None,
     near: float | None = None,
+    drive: float | None = None,
     distance_m: float | None = None,
     distance_u_m: float | None = None,
     below_m: float | None = None,
@@ -165,7 +166,8 @@ def analyze(
         height_u_m: standard uncertainty of it [m]; by default that of the scan's heights (field).
         free_radii: let the scan move the radii, within what the calliper says (field).
         clock_u: relative standard uncertainty of the clock that counts or samples, for the budgets (all but field).
-        near: about where the spin of a magnetometer's record is, to 10 % [Hz] (spin).
+        near: about where the spin of a magnetometer's record is at first, to 10 % [Hz] (spindown, spin, limit).
+        drive: frequency of the drive meanwhile, for whether the top is locked to it [Hz] (spin).
         distance_m: of a magnetometer from the top's axis, horizontally [m]; the moment's tilt follows (spin).
         distance_u_m: standard uncertainty of distance_m and below_m [m] (spin).
         below_m: height of the top above the magnetometer [m] (spin).

@@ -32,8 +32,8 @@ _WEIGHED = 12
 #: Length of the pieces in which a line is seen to begin or to end, least length of what is left of a window then, and
 #: what is cut off beside that moment, as a hand or the fall moves the field [s].
 _PIECE_S, _SHORTEST_S, _MARGIN_S = 0.5, 3.0, 0.5
-#: A line ends within the record if that is as much more probable [twice a natural logarithm].
-_CLEAR = 12.0
+#: A line ends within the record if that is as much more probable [natural logarithm].
+_CLEAR = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,8 @@ class Flight:
 
     Attributes:
         first, last: its windows, the last one not included.
-        start, end: between which it is seen, to half a second [s].
+        start, end: between which it is seen [s].
+        u_end: standard uncertainty of the end [s].
         began, ended: whether it is absent before, and after, though the record goes on.
     """
 
@@ -50,6 +51,7 @@ class Flight:
     last: int
     start: float
     end: float
+    u_end: float
     began: bool
     ended: bool
 
@@ -184,12 +186,12 @@ def _follow(t: Array, b: Array, cut: slice, before: _Window) -> _Window | None:
 def _trim(t: Array, b: Array, windows: list[_Window], first: int) -> tuple[list[_Window], Flight]:
     """Return the windows of a flight as far as the line lasts, and the flight; the first window's number is given.
 
-    The line's power is added up over short pieces, less half of what the line has: the sum is greatest where it ends.
+    The likelihood of a line's power over that of noise is multiplied up over short pieces: it is greatest at the end.
     """
     inner = windows[len(windows) // 2]  # a window that has the line from end to end, if any
-    from_, to = _extent(t, b, windows, inner)
-    start, end = float(t[from_]), float(t[min(to, t.size) - 1])
+    from_, to, end, u_end = _extent(t, b, windows, inner)
     began, ended = from_ > 0, to < t.size
+    start, end = float(t[from_]), end if ended else float(t[-1])
     kept = []
     lowest = int(np.searchsorted(t, start + _MARGIN_S)) if began else 0
     highest = int(np.searchsorted(t, end - _MARGIN_S)) if ended else t.size
@@ -210,11 +212,16 @@ def _trim(t: Array, b: Array, windows: list[_Window], first: int) -> tuple[list[
             fit = fit_line(record, near.fit.frequency + near.fit.chirp * later, near.fit.chirp)
             if fit.gain > LEAST_GAIN / 2:  # where it lies is known
                 kept.append(_Window(part, record, fit, follows=True))
-    return kept, Flight(first, first + len(kept), start, end, began, ended)
+    return kept, Flight(first, first + len(kept), start, end, u_end, began, ended)
 
 
-def _extent(t: Array, b: Array, windows: list[_Window], inner: _Window) -> tuple[int, int]:
-    """Return the samples from and to which a line is seen, at most a window before and behind those of a flight."""
+def _extent(t: Array, b: Array, windows: list[_Window], inner: _Window) -> tuple[int, int, float, float]:
+    """Return the samples from and to which a line is seen, and the time of its end with its u [s].
+
+    They are at most a window before and behind those of a flight.
+    """
+    from scipy.special import i0e
+
     first, last = windows[0], windows[-1]
     size = inner.cut.stop - inner.cut.start
     expected = np.sum(inner.fit.amplitudes**2, axis=0) * inner.record.unit**2
@@ -229,23 +236,36 @@ def _extent(t: Array, b: Array, windows: list[_Window], inner: _Window) -> tuple
         sizes = np.diff(np.append(starts, late.size))
         # mains stay: a piece resolves them, and at a fold of theirs they would take the line
         sums = np.abs(np.add.reduceat(record.without_drift() * record.unit * wave[:, None], starts)) ** 2
-        power = np.sum(2 * sums / sizes[:, None] / noise, axis=1)
-        half = 0.25 * sizes * np.sum(expected / noise)
+        # of the piece's power, whatever its phase: the line's is χ² about its own, that of noise about none
+        line = sizes[:, None] * expected / (2 * noise)
+        argument = np.sqrt(line * 2 * sums / sizes[:, None] / noise)
+        ratio = np.sum(np.log(i0e(argument)) + argument - line / 2, axis=1)
         # no piece counts for more than the line, so that a jolt of the field is no line
-        return np.clip(power - 2 * noise.size - half, -half, half), starts + cut.start
+        half = 0.5 * line.sum(axis=1)
+        return np.clip(ratio, -half, half), starts + cut.start
 
-    score, at = scores(last, slice(last.cut.start, min(last.cut.stop + size, t.size)))
-    stop = _edge(score, np.append(at, min(last.cut.stop + size, t.size)))
+    stop = min(last.cut.stop + size, t.size)
+    score, at = scores(last, slice(last.cut.start, stop))
+    edges, sums = np.append(at, stop), _sums(score)
+    times = t[np.minimum(edges, t.size - 1)]
+    chance = np.exp(sums - sums.max())
+    chance /= chance.sum()
+    end = float(chance @ times)
+    u_end = math.sqrt(float(chance @ (times - end) ** 2) + _PIECE_S**2 / 12)
     score, at = scores(first, slice(max(first.cut.start - size, 0), first.cut.stop))
-    start = _edge(score[::-1], np.append(first.cut.stop, at[::-1]))
-    return start, max(stop, start + 1)
+    from_ = int(np.append(first.cut.stop, at[::-1])[_edge(_sums(score[::-1]))])
+    return from_, max(int(edges[_edge(sums)]), from_ + 1), end, u_end
 
 
-def _edge(score: Array, at: NDArray[np.int64]) -> int:
-    """Return the sample at which the sum of scores is greatest, which is the last one but for good reason."""
-    whole = np.concatenate([[0.0], np.cumsum(score)])
-    best = int(whole.argmax())
-    return int(at[best if whole[best] - whole[-1] > _CLEAR else -1])
+def _sums(score: Array) -> Array:
+    """Return the natural logarithms of the likelihoods that a line ends before each piece, and behind the last one."""
+    return np.concatenate([[0.0], np.cumsum(score)])
+
+
+def _edge(sums: Array) -> int:
+    """Return the number of the piece before which a line ends, which is the last one but for good reason."""
+    best = int(sums.argmax())
+    return best if sums[best] - sums[-1] > _CLEAR else sums.size - 1
 
 
 # --- folds ---

@@ -102,6 +102,10 @@ _DEVICE = _about(
     "Describes base and top, as sample_data/device.toml does; see levilab top.",
     kind=Path, metavar="FILE", read=_read_device,
 )  # fmt: skip
+_NEAR = _about(
+    "About where the spin of a magnetometer's record is at first, to 10 %, where its samples leave a choice.",
+    kind=float, metavar="HZ", unit="Hz", above=0.0,
+)  # fmt: skip
 _CLOCK_U = _about(
     "Relative standard uncertainty of the clock that counts or samples, as 2e-6, from its manual; the budgets show "
     "what it does, it is in no u.",
@@ -124,6 +128,7 @@ class InputOptions:
     channel: str | None = None
     rate: float | None = None
     guess: bool = True
+    near: float | None = None
 
 
 @dataclass(frozen=True)
@@ -152,6 +157,7 @@ class SpinDownOptions(RecordOptions):
     ))  # fmt: skip
     device: Device | None = field(default=None, metadata=_DEVICE)
     clock_u: float | None = field(default=None, metadata=_CLOCK_U)
+    near: float | None = field(default=None, metadata=_NEAR)
 
 
 @dataclass(frozen=True)
@@ -162,8 +168,9 @@ class SpinOptions(RecordOptions):
         "How pulses are found: edges is the fastest, likelihood for weak ones.", choices=get_args(Method),
     ))  # fmt: skip
     clock_u: float | None = field(default=None, metadata=_CLOCK_U)
-    near: float | None = field(default=None, metadata=_about(
-        "About where the spin of a magnetometer's record is, to 10 %, where its samples leave a choice.",
+    near: float | None = field(default=None, metadata=_NEAR)
+    drive: float | None = field(default=None, metadata=_about(
+        "Frequency of the drive meanwhile: is the top locked to it?",
         kind=float, metavar="HZ", unit="Hz", above=0.0,
     ))  # fmt: skip
     distance_m: float | None = field(default=None, metadata=_about(
@@ -220,6 +227,7 @@ class LimitOptions(InputOptions):
 
     reading_u: float | None = field(default=None, metadata=_READING_U)
     clock_u: float | None = field(default=None, metadata=_CLOCK_U)
+    near: float | None = field(default=None, metadata=_NEAR)
 
 
 def options_of(kind: type[InputOptions]) -> dict[str, Option]:

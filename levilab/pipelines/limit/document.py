@@ -32,6 +32,7 @@ class SettingsPart(Settings):
 
     reading_u: float | None = Field(gt=0, alias="reading_u_hz")
     clock_u: float | None = Field(default=None, gt=0)
+    near: float | None = Field(default=None, gt=0, alias="near_hz")
 
 
 class LimitResult(Result):

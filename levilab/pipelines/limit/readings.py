@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -37,8 +38,6 @@ _MOST_SPREAD = 0.25
 _FEWEST_STEPS = 4
 #: A number on a line of its own, with a decimal point or comma, and what is read of a file that holds nothing else.
 _NUMBER, _MOST_BYTES = re.compile(r"[+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?"), 1 << 20
-#: A line is seen to end to three pieces of half a second of a magnetometer's record, to either side [s].
-END_S = 1.5
 #: Relative: units and printed digits round in about the tenth digit.
 _SAME = 1e-9
 
@@ -74,7 +73,7 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
     """Return the limits in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
     field = read_field_record(path, options)
     if field:
-        return limits_in_field(path, field)
+        return limits_in_field(path, field, options.near)
     try:
         table = read_table(
             path, columns=options.columns, quantities=QUANTITIES, needed=QUANTITIES[:1], guess=options.guess
@@ -96,14 +95,16 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
     return readings
 
 
-def limits_in_field(path: Path, record: FieldRecord) -> LimitReadings:
+def limits_in_field(path: Path, record: FieldRecord, near: float | None) -> LimitReadings:
     """Return the spins at which tops fell in a magnetometer's record, each continued from its last windows.
+
+    near: about where the spin is at first, to 10 % [Hz].
 
     Raises:
         DoesNotSuit: in the record no top falls after three windows or more, or its folds cannot be distinguished.
     """
     try:
-        track = track_of_field(record.times, record.field)
+        track = track_of_field(record.times, record.field, near=near)
     except AnalysisError as error:
         raise DoesNotSuit(f"{path}: {error}") from error
     falls = []
@@ -111,9 +112,9 @@ def limits_in_field(path: Path, record: FieldRecord) -> LimitReadings:
         part = slice(one.first, one.last)
         known = not any(spin.doubtful for spin in track.spins[part])
         if one.ended and known and one.last - one.first >= FEWEST:
-            between = (one.end - END_S, one.end + END_S)
+            reach = math.sqrt(3) * one.u_end  # of an even distribution of this u
             u = float(np.median(track.u[part]))
-            falls.append(spin_at_fall(track.time[part], track.frequency[part], u, between))
+            falls.append(spin_at_fall(track.time[part], track.frequency[part], u, (one.end - reach, one.end + reach)))
     if not falls:
         raise DoesNotSuit(f"{path}: no top falls in it after {FEWEST} windows whose spin is certain")
     notes = (*record.warnings, f"{path.name}: {len(falls)} of {len(track.flights)} tops fall in this record")

@@ -61,6 +61,8 @@ NEEDS = Needs(
 LONGEST_WHOLE_S = 12.0
 #: Length of a window of a longer record [s].
 WINDOW_S = 2.0
+#: A spin this multiple of u beside the drive's frequency is not locked to it.
+NOT_LOCKED = 3.0
 #: Standard uncertainty of the place of a phone's sensor [m]: where it sits in the phone is seldom known better.
 DISTANCE_U_M = 0.005
 
@@ -115,6 +117,7 @@ class SpinRun:
         line: of a magnetometer, the same with what its axes tell.
         transverse: the part of the moment that turns, where the magnetometer's distance is given [A m²].
         tilt: of the moment, where that is given, too [rad].
+        drive_offset: spin less the frequency of the drive, where that is given [Hz].
     """
 
     spin: SpinFrequency
@@ -125,6 +128,7 @@ class SpinRun:
     line: FieldSpin | None = None
     transverse: Estimate | None = None
     tilt: Estimate | None = None
+    drive_offset: Estimate | None = None
 
     @property
     def which(self) -> str:
@@ -192,6 +196,24 @@ MOST_SENTENCES, MOST_DRAWN = 4, 3
 
 def spin_of_source(source: Source[Records], options: SpinOptions) -> SpinRun:
     """Return the spin of one input.  Raises DataError, which names the file."""
+    run = _spin_of(source, options)
+    return run if options.drive is None else replace(run, drive_offset=drive_offset(run.series, options.drive))
+
+
+def drive_offset(series: Series, drive: float) -> Estimate:
+    """Return the mean of the spin less the drive's frequency [Hz], while the spin is held; where it never is, at all.
+
+    Where the values scatter by more than their u, u grows by as much.
+    """
+    held = [(start <= series.time) & (series.time <= end) for kind, start, end in series.phases if kind == "held"]
+    chosen = np.any(held, axis=0) if held else np.ones(len(series), dtype=bool)
+    off, weight = series.frequency[chosen] - drive, series.u[chosen] ** -2
+    mean, u = float(np.average(off, weights=weight)), float(weight.sum()) ** -0.5
+    scatter = math.sqrt(float(weight @ (off - mean) ** 2) / max(off.size - 1, 1))
+    return Estimate(mean, u * max(1.0, scatter), "Hz")
+
+
+def _spin_of(source: Source[Records], options: SpinOptions) -> SpinRun:
     records = source.readings
     try:
         if records.field:
@@ -350,12 +372,24 @@ def in_a_sentence(run: SpinRun) -> str:
     other = "".join(f" or {fold.frequency:.2f} Hz" for fold in folds)
     at = f"{with_uncertainty(spin.frequency)}{other} at {spin.reference_time:.4g} s"
     if len(series) == 1:
-        return f"The spin is {at}, its slope {with_uncertainty(spin.chirp)}."
+        return f"The spin is {at}, its slope {with_uncertainty(spin.chirp)}.{_about_drive(run)}"
     ends = f"{series.frequency[0]:.3f} Hz at {series.time[0]:.1f} s to {series.frequency[-1]:.3f} Hz"
     phases = ", ".join(f"{kind} {round(start, 1) + 0.0:.1f} to {end:.1f} s" for kind, start, end in series.phases[:6])
     in_phases = f"; {phases}" if phases else ""
     slope = f" Its slope through all {series.of}s is {with_uncertainty(run.trend)}." if run.trend else ""
     return (
         f"The spin goes from {ends} at {series.time[-1]:.1f} s ({len(series)} {series.of}s{in_phases}); {at}, "
-        f"{run.which}.{slope}"
+        f"{run.which}.{slope}{_about_drive(run)}"
     )
+
+
+def _about_drive(run: SpinRun) -> str:
+    """Return whether the top is locked to a drive whose frequency is given, as a sentence behind others."""
+    off = run.drive_offset
+    if off is None or off.value is None or not off.u:
+        return ""
+    away = f"while it is held, the spin less the drive's frequency is {with_uncertainty(off)}"
+    if abs(off.value) > NOT_LOCKED * off.u:
+        return f" The top is not locked to the drive: {away}."
+    beware = " (if it is the spin: the drive's coil has a field of this frequency, too)" if run.line else ""
+    return f" The top is locked to the drive: {away}{beware}."

@@ -14,7 +14,7 @@ from levilab.pipelines.result import Result, RunPart
 from levilab.pipelines.row import find_all
 from levilab.pipelines.spin.analysis import METHOD, SpinAnalysis, SpinRun
 from levilab.pipelines.spin.budget import budget_of_run
-from levilab.pipelines.spin.quantities import OF_A_LINE, QUANTITIES
+from levilab.pipelines.spin.quantities import OF_A_RUN, QUANTITIES
 
 
 class SpinPart(RunPart):
@@ -31,6 +31,7 @@ class SettingsPart(Settings):
     method: Method
     clock_u: float | None = Field(default=None, gt=0)
     near: float | None = Field(default=None, gt=0, alias="near_hz")
+    drive: float | None = Field(default=None, gt=0, alias="drive_hz")
     distance_m: float | None = Field(default=None, gt=0)
     distance_u_m: float | None = Field(default=None, gt=0)
     below_m: float | None = None
@@ -50,7 +51,7 @@ def _entries(analysis: SpinAnalysis) -> dict[str, Any]:
 
 
 def _run_entries(run: SpinRun) -> dict[str, Any]:
-    found = find_all(QUANTITIES, run.spin) | find_all(OF_A_LINE, run)
+    found = find_all(QUANTITIES, run.spin) | find_all(OF_A_RUN, run)
     return {"values": values_of(found), "method": run.spin.method}
 
 

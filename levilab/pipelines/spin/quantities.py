@@ -48,8 +48,8 @@ def _axis(k: int) -> Callable[[SpinRun], Estimate | None]:
     return amplitude
 
 
-#: Of a run of a magnetometer.
-OF_A_LINE = (
+#: Of a run; all but the last of a magnetometer.
+OF_A_RUN = (
     *(
         Quantity(
             f"amplitude_{k}",
@@ -63,6 +63,7 @@ OF_A_LINE = (
     ),
     Quantity("transverse_moment", "A m^2", "the part of the moment that turns", "μ_t", of="transverse", optional=True),
     Quantity("moment_tilt", "rad", "angle between moment and axis", "tilt", of="tilt", optional=True),
+    Quantity("drive_offset", "Hz", "spin less the frequency of the drive, while it is held", "ν − ν_d", optional=True),
 )
 
 SPIN_ROW = (

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from levilab.pipelines.part import title_of
 from levilab.pipelines.row import cells_of
-from levilab.pipelines.spin.quantities import OF_A_LINE
+from levilab.pipelines.spin.quantities import OF_A_RUN
 from levilab.present.clock import with_clock
 from levilab.present.numbers import column, plain, short_name, with_decimals
 from levilab.present.tables import Table, table
@@ -63,7 +63,7 @@ def line_table(analysis: SpinAnalysis) -> Table:
     """Return a table of the lines of magnetometers: amplitude and noise of each axis, and the moment that turns."""
     of_lines = [(source, run) for source, run in zip(analysis.sources, analysis.runs, strict=True) if run.line]
     several = any(run.which for _, run in of_lines)
-    quantities = [one for one in OF_A_LINE if any(one.find(run) for _, run in of_lines)]
+    quantities = [one for one in OF_A_RUN if any(one.find(run) for _, run in of_lines)]
     cells = zip(*cells_of(quantities, [run for _, run in of_lines]), strict=True)
     rows = [
         (

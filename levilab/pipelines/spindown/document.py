@@ -45,6 +45,7 @@ class SettingsPart(Settings):
     tilt: Tilt = "auto"
     device: Device | None = None
     clock_u: float | None = Field(default=None, gt=0)
+    near: float | None = Field(default=None, gt=0, alias="near_hz")
 
 
 class SpinDownResult(Result):

@@ -147,12 +147,13 @@ def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions")
     """Return the frequency in each window of a magnetometer's record, while the top coasts.  Raises as above."""
     _must_last(path, record.duration, FIELD_WINDOW_S)
     try:
-        track = track_of_field(record.times, record.field)
+        track = track_of_field(record.times, record.field, near=options.near)
     except AnalysisError as error:
         raise (DataError if options.guess else DoesNotSuit)(f"{path}: {error}") from error
     notes = [f"{path.name}: {finding_text(note)}" for note in findings_of(track.spins)]
     what = f"magnetometer's record of {digits(record.duration, 3)} s"
-    readings = _of_track(path, track, FIELD_WINDOW_S, what, (record.warnings, notes))
+    window = record.duration / round(record.duration / FIELD_WINDOW_S)
+    readings = _of_track(path, track, window, what, (record.warnings, notes))
     return replace(readings, doubtful=any(spin.doubtful for spin in track.spins))
 
 
@@ -169,10 +170,10 @@ def _of_track(
     first, last = _coasting(track)
     start, end = track.frequency[first], track.frequency[last - 1]
     if last - first < FEWEST or end > (1 - LEAST_FALL) * start:
-        seen = f"the spin in it goes from {start:.6g} Hz to {end:.6g} Hz in {last - first} windows of {window:g} s"
+        seen = f"the spin in it goes from {start:.6g} Hz to {end:.6g} Hz in {last - first} windows of {window:.3g} s"
         expected = "a falling spin is expected: is the drive still on?"
         raise DoesNotSuit(f"{path}: {seen}, {expected}")
-    how_read = [f"{path.name}: a {what}: each reading is the frequency in a window of {window:g} s"]
+    how_read = [f"{path.name}: a {what}: each reading is the frequency in a window of {window:.3g} s"]
     if last - first < len(track.time):
         span = f"{track.time[first]:.1f} s to {track.time[last - 1]:.1f} s"
         how_read.append(f"{path.name}: the top coasts from {span}; the windows before and after are left out")

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 #: u of an exponent, or of an angle [rad], that no measurement has.
 TOO_SMALL = 5e-10
 #: A tilt of the moment is mentioned from this multiple of its u on.
-SEEN = 2.0
+SEEN = 3.0
 
 
 def verdict_of_run(run: SpinDown) -> str:
@@ -91,11 +91,19 @@ def _verdict(
         if weak
         else "",
         _needless(said, names(said.needless)) if said.needless and said.decided else "",
-        f"The counter sees the wobble of the top: its moment is tilted against its axis by {_value(tilt)} rad"
-        if tilt is not None and is_seen(tilt)
-        else "",
+        _wobble(tilt),
     ]
     return " ".join(f"{text}." for text in sentences if text)
+
+
+def _wobble(tilt: Estimate | None) -> str:
+    """Return what the readings say of the tilt of the moment; of one that they do not show, where it ends (95 %)."""
+    if tilt is None or tilt.value is None or not tilt.u:
+        return ""
+    if is_seen(tilt):
+        return f"The counter sees the wobble of the top: its moment is tilted against its axis by {_value(tilt)} rad"
+    most = digits(max(tilt.value, 0.0) + 2 * tilt.u, 2)
+    return f"The readings show no wobble of the top: its moment is tilted against its axis by less than {most} rad"
 
 
 def _needless(said: Verdict, names: str) -> str:

@@ -74,6 +74,28 @@ def test_a_long_record_gives_the_drag_law_and_the_limit(long):
     assert limit.sources[0].readings.limit == pytest.approx([truth], abs=4 * limit.sources[0].readings.u[0])
 
 
+def test_a_spin_that_is_held_is_compared_with_the_drive(tmp_path):
+    times, field, _ = synthetic_flight(np.random.default_rng(57), duration=60.0, start_hz=31.0, loss=1e-9)
+    path = phone(tmp_path / "held.csv", times, field)
+    found, other = (ANALYSES["spin"].analyze([path], SpinOptions(drive=hertz)) for hertz in (31.0, 31.03))
+    off = ANALYSES["spin"].document(found, tmp_path)["values"]["drive_offset"]
+    assert abs(off["value"]) < 3 * off["u"] < 0.006  # six windows of 3.4 mHz
+    assert "The top is locked to the drive" in found.text
+    assert "The top is not locked to the drive" in other.text
+
+
+def test_a_tilt_that_the_readings_do_not_show_is_given_as_a_bound(long):
+    text = ANALYSES["spindown"].analyze([long], SpinDownOptions()).text
+    assert "no wobble of the top: its moment is tilted against its axis by less than" in text
+
+
+@pytest.mark.parametrize(("name", "options"), [("spindown", SpinDownOptions), ("limit", LimitOptions)])
+def test_the_spin_that_is_searched_can_be_chosen_in_each_analysis(name, options, long):
+    assert ANALYSES[name].analyze([long], options(near=36.0)).runs
+    with pytest.raises(DataError, match=r"from 49\.5 to 60\.5 Hz"):
+        ANALYSES[name].analyze([long], options(near=55.0))
+
+
 def test_a_record_suits_the_analyses_that_find_something_in_it(long, short):
     assert [analysis.name for analysis, _ in analyze_suiting([long], {})] == ["spindown", "spin", "limit"]
     assert [analysis.name for analysis, _ in analyze_suiting([short], {})] == ["spin"]
