@@ -39,6 +39,8 @@ _LABELS = {
 }
 #: Separator and decimal point of the formats of an export from 1 on; 0 is Excel's.
 _FORMATS = ((",", "."), ("\t", "."), (";", "."), ("\t", ","), (";", ","))
+#: The same → their names in the sensor's input.
+_AXES = dict(zip(_BUFFERS, ("t", "x", "y", "z", "abs", "accuracy"), strict=True))
 _CONFIG: dict[str, Any] = {
     "crc32": "e04c0bfa",
     "title": "Magnetometer",
@@ -46,19 +48,7 @@ _CONFIG: dict[str, Any] = {
     "category": "Raw Sensors",
     "localCategory": "Raw Sensors",
     "buffers": [{"name": name, "size": 0} for name in _BUFFERS],
-    "inputs": [
-        {
-            "source": "magnetic_field",
-            "outputs": [
-                {"x": "magX"},
-                {"y": "magY"},
-                {"z": "magZ"},
-                {"abs": "mag"},
-                {"t": "mag_time"},
-                {"accuracy": "magAccuracy"},
-            ],
-        }
-    ],
+    "inputs": [{"source": "magnetic_field", "outputs": [{axis: name} for name, axis in _AXES.items()]}],
     "export": [{"set": "Raw Data", "sources": [{"label": _LABELS[name], "buffer": name} for name in _LABELS]}],
 }
 #: Seconds since 1970 at the start of the bench's clock; samples that are kept [s]; parameters of one request.

@@ -109,14 +109,6 @@ def test_numbers_have_eight_digits_as_the_app_prints_them():
     assert b"e" not in body.partition(b"[")[2].partition(b"]")[0]
 
 
-def test_config_names_the_buffers_of_each_axis():
-    (one,) = App().get("/config")["inputs"]
-    names = {key: name for pair in one["outputs"] for key, name in pair.items()}
-    assert names == {
-        "x": "magX", "y": "magY", "z": "magZ", "abs": "mag", "t": "mag_time", "accuracy": "magAccuracy",
-    }  # fmt: skip
-
-
 @pytest.mark.parametrize(
     ("number", "separator", "point"), [(1, ",", "."), (2, "\t", "."), (3, ";", "."), (4, "\t", ","), (5, ";", ",")]
 )

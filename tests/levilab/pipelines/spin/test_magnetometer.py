@@ -133,12 +133,6 @@ def test_the_figure_of_a_phones_record_has_no_faults(name, request):
     assert not faults(spin_figure(ANALYSES["spin"].analyze([request.getfixturevalue(name)], SpinOptions())))
 
 
-def test_a_record_without_a_line_is_refused(tmp_path):
-    times, field = synthetic_field(np.random.default_rng(56), snr_db=-60.0)
-    with pytest.raises(DataError, match="stands out"):
-        ANALYSES["spin"].analyze([phone(tmp_path / "empty.csv", times, field)], SpinOptions())
-
-
 def test_the_sample_record_is_made_by_its_script_and_gives_the_tilt(sample_data):
     path = sample_data / "phone" / "magnetometer.csv"
     made = importlib.util.spec_from_file_location("phone", ROOT / "sample_data" / "phone.py")
