@@ -251,7 +251,7 @@ def _extent(t: Array, b: Array, windows: list[_Window], inner: _Window) -> tuple
     chance = np.exp(sums - sums.max())
     chance /= chance.sum()
     end = float(chance @ times)
-    # the end lies anywhere in its piece, and the jolt of the fall, which may count for or against it, adds as much again
+    # the end lies anywhere in its piece, and the jolt of the fall, which may count for it or not, adds as much again
     u_end = math.sqrt(float(chance @ (times - end) ** 2) + 2 * _PIECE_S**2 / 12)
     score, at = scores(first, slice(max(first.cut.start - size, 0), first.cut.stop))
     from_ = int(np.append(first.cut.stop, at[::-1])[_edge(_sums(score[::-1]))])
