@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Annotated, Any, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar, get_type_hints
 
-from pydantic import BeforeValidator, PlainSerializer
+from pydantic import BeforeValidator, Field, PlainSerializer, create_model
 
 from levilab.errors import DataError, unquote
 from levilab.files import finite
 from levilab.pipelines.analyzed import FOR_THIS_PAGE, A, Method, Opt, Origin, R, S
 from levilab.pipelines.correction import read_correction
-from levilab.pipelines.result import AGAIN, SCHEMA, Archive, Earlier, Part, Result, relative
+from levilab.pipelines.dump import Dump
+from levilab.pipelines.options import options_of
+from levilab.pipelines.result import AGAIN, SCHEMA, Archive, Earlier, Part, Result, RunPart, relative
 from levilab.pipelines.sources import collect
+from levilab.present.units import name_with_unit, split
 from levilab.runs.run import find_run
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from analysis.budget import Budget
@@ -32,24 +36,43 @@ Columns = Annotated[
 ]
 
 
-class Settings(Part):
-    """How inputs were analyzed: the options by their names, which in the file end in the unit."""
-
-    columns: Columns
-
-    @classmethod
-    def of(cls, options: InputOptions, **more: Any) -> Self:
-        """Make the settings from options; those in `more` go before."""
-        return cls.model_validate(
-            {name: getattr(options, name) for name in cls.model_fields if name not in more} | more
-        )
-
-    def arguments(self) -> dict[str, Any]:
-        """Return the options by their names."""
-        return {name: getattr(self, name) for name in type(self).model_fields}
-
-
 D = TypeVar("D", bound=Result)
+
+
+def settings_model(options: type[InputOptions]) -> type[Part]:
+    """Return the model of how inputs were analyzed: the options by their names, which in the file end in the unit."""
+    from levilab.formats.device import Device
+
+    types = get_type_hints(options, localns={"Device": Device, "Mapping": Mapping}) | {"columns": Columns}
+    given: dict[str, Any] = {}
+    for name, option in options_of(options).items():
+        typed = name if split(name)[1] else name_with_unit(name, option.unit)
+        given[name] = types[name], Field(default=getattr(options, name), alias=typed, gt=option.above)
+    return create_model("Settings", __base__=Part, **given)
+
+
+def result_model(
+    method: Method[Any, Any, Any, Any], run: Any, combined: Any = None, base: type[Result] = Result
+) -> type[Result]:
+    """Return the model of an analysis's result.json.
+
+    Args:
+        method: of the analysis.
+        run: type of what is found of one input, a frozen dataclass.
+        combined: likewise of all inputs together; None: as the base has it.
+        base: with what no other analysis has.
+    """
+    name = method.needs.analysis
+    part = create_model("RunPart", __base__=RunPart, result=(Annotated[run, Dump()], ...))
+    more: dict[str, Any] = {"combined": (Annotated[combined, Dump()], ...)} if combined else {}
+    return create_model(
+        f"{name}Result",
+        __base__=base,
+        analysis=(Literal[name], name),  # type: ignore[arg-type]
+        settings=(settings_model(method.options), ...),
+        runs=(tuple[part, ...], ...),  # type: ignore[valid-type]
+        **more,
+    )
 
 
 @dataclass(frozen=True)
@@ -103,10 +126,10 @@ class Document(Generic[S, R, Opt, A, D]):
         }
         return self.result.model_validate(finite(document | _budget(found.budget) | self.entries(found)))
 
-    def settings(self, options: Opt) -> Settings:
+    def settings(self, options: Opt) -> Part:
         """Return the options as they stand in the file."""
-        kind: type[Settings] = self.result.model_fields["settings"].annotation  # type: ignore[assignment]
-        return kind.of(options)
+        kind: type[Part] = self.result.model_fields["settings"].annotation  # type: ignore[assignment]
+        return kind.model_validate({name: getattr(options, name) for name in kind.model_fields})
 
     # --- reading ---
 
@@ -154,8 +177,7 @@ class Document(Generic[S, R, Opt, A, D]):
         return self.method.gather(paths, found, options, lambda source: self._recall_one(source, archive, given))
 
     def _options(self, earlier: Earlier[D]) -> Opt:
-        settings: Settings = earlier.result.settings
-        return self.method.options(**settings.arguments())
+        return self.method.options(**dict(earlier.result.settings))
 
     def _problem(self, earlier: Earlier[D], given: Mapping[str, Any], source: Source[S]) -> str:
         """Return why an input has to be analyzed again; empty where its result holds."""

@@ -3,41 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from levilab.errors import unquote
-from levilab.formats.device import Device  # noqa: TC001 - pydantic reads it
-from levilab.pipelines.document import Document, Settings, statistics_of, value_of, values_of
-from levilab.pipelines.dump import Dump
+from levilab.pipelines.document import Document, result_model, statistics_of, value_of, values_of
 from levilab.pipelines.field.analysis import METHOD, FieldAnalysis, FieldRun, Mean
 from levilab.pipelines.field.budget import budget_of_all, budget_of_run
-from levilab.pipelines.result import Result, RunPart
 
 if TYPE_CHECKING:
     from analysis.uncertainty import Estimate
-
-
-class ScanPart(RunPart):
-    """One scan."""
-
-    result: Annotated[FieldRun, Dump()]
-
-
-class SettingsPart(Settings):
-    """How the scans were analyzed."""
-
-    device: Device | None
-    height_m: float | None
-    height_u_m: float | None
-    free_radii: bool
-
-
-class FieldResult(Result):
-    """result.json of scans."""
-
-    analysis: Literal["field"] = "field"
-    settings: SettingsPart
-    runs: tuple[ScanPart, ...]
 
 
 def _entries(analysis: FieldAnalysis) -> dict[str, Any]:
@@ -70,7 +44,7 @@ def _model(run: FieldRun) -> dict[str, Any]:
 
 DOCUMENT = Document(
     method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
-    result=FieldResult,
+    result=result_model(METHOD, FieldRun),
     entries=_entries,
     run_entries=_run_entries,
 )

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from levilab.pipelines.document import Document, Settings, values_of
+from levilab.pipelines.document import Document, result_model, values_of
 from levilab.pipelines.dump import Dump
 from levilab.pipelines.limit.analysis import METHOD, LimitAnalysis, Limits
 from levilab.pipelines.limit.budget import budget_of_all, budget_of_run
 from levilab.pipelines.limit.quantities import QUANTITIES
-from levilab.pipelines.result import Result, RunPart
+from levilab.pipelines.result import Result
 from levilab.pipelines.row import find_all
 
 if TYPE_CHECKING:
@@ -21,29 +21,12 @@ if TYPE_CHECKING:
     from analysis.limits import Statistics
 
 
-class LimitPart(RunPart):
-    """One run."""
-
-    result: Annotated[Limits, Dump()]
-
-
-class SettingsPart(Settings):
-    """How the limits were analyzed."""
-
-    reading_u: float | None = Field(gt=0, alias="reading_u_hz")
-    clock_u: float | None = Field(default=None, gt=0)
-    near: float | None = Field(default=None, gt=0, alias="near_hz")
-
-
 class LimitResult(Result):
     """result.json of limits.
 
     combined: a group for each of the conditions, called `groups` in the file.
     """
 
-    analysis: Literal["limit"] = "limit"
-    settings: SettingsPart
-    runs: tuple[LimitPart, ...]
     combined: Annotated[tuple[Limits, ...], Dump()] = Field(alias="groups")
 
     @model_validator(mode="after")
@@ -80,7 +63,7 @@ def _renumber(groups: tuple[Limits, ...], order: Sequence[int]) -> tuple[Limits,
 
 DOCUMENT = Document(
     method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
-    result=LimitResult,
+    result=result_model(METHOD, Limits, base=LimitResult),
     entries=_entries,
     run_entries=_run_entries,
     renumber=_renumber,

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import Field
 
-from analysis.precession.sweep import SweepFit  # noqa: TC001 - pydantic reads the type when it runs
-from levilab.pipelines.document import Document, Settings, number, values_of
-from levilab.pipelines.dump import Dump
+from analysis.precession.sweep import SweepFit
+from levilab.pipelines.document import Document, number, result_model, values_of
 from levilab.pipelines.precession.analysis import (
     METHOD,
     PrecessionAnalysis,
@@ -21,35 +19,10 @@ from levilab.pipelines.precession.analysis import (
 )
 from levilab.pipelines.precession.budget import budget_of_all, budget_of_run
 from levilab.pipelines.precession.quantities import QUANTITIES
-from levilab.pipelines.result import Result, RunPart
 from levilab.pipelines.row import find_all
 
 if TYPE_CHECKING:
     from analysis.precession.line import Line
-
-
-class PrecessionPart(RunPart):
-    """One sweep."""
-
-    result: Annotated[PrecessionRun, Dump()]
-
-
-class SettingsPart(Settings):
-    """How the points were analyzed."""
-
-    reading_u: float | None = Field(gt=0, alias="reading_u_hz")
-    orthogonal: bool
-    keep_outliers: bool
-    clock_u: float | None = Field(default=None, gt=0)
-
-
-class PrecessionResult(Result):
-    """result.json of sweeps."""
-
-    analysis: Literal["precession"] = "precession"
-    settings: SettingsPart
-    runs: tuple[PrecessionPart, ...]
-    combined: Annotated[SweepFit, Dump()]
 
 
 def _entries(analysis: PrecessionAnalysis) -> dict[str, Any]:
@@ -116,7 +89,7 @@ def _covariance(u: float | None, v: float | None, correlation: float | None) -> 
 
 DOCUMENT = Document(
     method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
-    result=PrecessionResult,
+    result=result_model(METHOD, PrecessionRun, SweepFit),
     entries=_entries,
     run_entries=_run_entries,
 )

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import Field
 
-from analysis.spindown.combine import Combined  # noqa: TC001 - pydantic reads the type when it runs
+from analysis.spindown.combine import Combined
 from analysis.spindown.drag import LAWS
-from analysis.spindown.fit import SpinDown  # noqa: TC001 - as above
-from levilab.formats.device import Device  # noqa: TC001 - as above
-from levilab.pipelines.document import Document, Settings, number, statistics_of, value_of, values_of
-from levilab.pipelines.dump import Dump
-from levilab.pipelines.options import Tilt  # noqa: TC001 - as above
-from levilab.pipelines.result import Result, RunPart
+from analysis.spindown.fit import SpinDown
+from levilab.pipelines.document import Document, number, result_model, statistics_of, value_of, values_of
 from levilab.pipelines.row import find_all
 from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
 from levilab.pipelines.spindown.budget import budget_of_all, budget_of_run
@@ -27,34 +22,6 @@ if TYPE_CHECKING:
 
     from analysis.spindown.combine import CombinedLaw, Mean
     from analysis.spindown.verdict import Verdict
-
-
-class SpinDownPart(RunPart):
-    """One spin-down."""
-
-    result: Annotated[SpinDown, Dump()]
-
-
-class SettingsPart(Settings):
-    """How the readings were analyzed."""
-
-    channel: str | None = None
-    rate: float | None = Field(default=None, gt=0, alias="rate_hz")
-    reading_u: float | None = Field(gt=0, alias="reading_u_hz")
-    keep_outliers: bool
-    tilt: Tilt = "auto"
-    device: Device | None = None
-    clock_u: float | None = Field(default=None, gt=0)
-    near: float | None = Field(default=None, gt=0, alias="near_hz")
-
-
-class SpinDownResult(Result):
-    """result.json of spin-downs."""
-
-    analysis: Literal["spindown"] = "spindown"
-    settings: SettingsPart
-    runs: tuple[SpinDownPart, ...]
-    combined: Annotated[Combined, Dump()]
 
 
 def _entries(analysis: SpinDownAnalysis) -> dict[str, Any]:
@@ -144,7 +111,7 @@ def _check_models(run: SpinDown) -> str:
 
 DOCUMENT = Document(
     method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
-    result=SpinDownResult,
+    result=result_model(METHOD, SpinDown, Combined),
     entries=_entries,
     run_entries=_run_entries,
     check=_check,

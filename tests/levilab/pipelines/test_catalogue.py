@@ -6,17 +6,19 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import pytest
 
+from analysis.spindown.combine import Combined
+from analysis.spindown.fit import SpinDown
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines import catalogue
 from levilab.pipelines.catalogue import ANALYSES, Analysis
+from levilab.pipelines.document import result_model
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Archive
 from levilab.pipelines.spindown.analysis import METHOD
-from levilab.pipelines.spindown.document import SpinDownResult
 from levilab.pipelines.suits import analyze_suiting, recall_suiting, suiting
 from levilab.pipelines.suits import save as save_found
 from support.spin_downs import spin_down_csv
@@ -24,16 +26,11 @@ from support.spin_downs import spin_down_csv
 SPINDOWN = ANALYSES["spindown"]
 
 
-class SecondResult(SpinDownResult):
-    """The result of another analysis."""
-
-    analysis: Literal["second"] = "second"  # type: ignore[assignment]
-
-
 def second_row(*experiments: str) -> Analysis[Any]:
     """Another analysis that reads spin-downs."""
     needs = replace(SPINDOWN.needs, analysis="second", experiments=frozenset(experiments))
-    result = replace(SPINDOWN.result, result=SecondResult, method=replace(SPINDOWN.result.method, needs=needs))
+    method = replace(SPINDOWN.result.method, needs=needs)
+    result = replace(SPINDOWN.result, result=result_model(method, SpinDown, Combined), method=method)
     return replace(SPINDOWN, result=result)
 
 
@@ -106,12 +103,12 @@ def test_each_analysis_finds_its_own_result_again(tmp_path: Path, runs: Path, na
     (row, recalled), (second, _) = recall_suiting([path], {})
     assert (row.name, second.name) == ("spindown", "second")
     assert all(origin.text.startswith("as levilab analyze found it") for origin in recalled.origins)
-    archive = Archive([path], SecondResult)
+    archive = Archive([path], second.result.result)
     whole = archive.whole(recalled.sources)
     assert whole
     assert whole.file.name.endswith("result.second.json")
     source = recalled.sources[-1]
-    earlier = Archive([source.path], SecondResult).earlier(source.path, source.data, source.sha256)
+    earlier = Archive([source.path], second.result.result).earlier(source.path, source.data, source.sha256)
     assert earlier
     assert earlier.file.name.endswith("result.second.json")
 

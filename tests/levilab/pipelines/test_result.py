@@ -18,7 +18,7 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Place, beside, read_result, save
 from levilab.pipelines.spindown.analysis import METHOD
-from levilab.pipelines.spindown.document import DOCUMENT, SpinDownResult
+from levilab.pipelines.spindown.document import DOCUMENT
 from levilab.pipelines.suits import save as save_found
 from support.spin_downs import spin_down_csv
 
@@ -131,7 +131,7 @@ def test_a_damaged_result_is_refused_with_what_is_wrong(tmp_path: Path, keys: An
     file = write_result(tmp_path)
     file.write_text(damaged(json.loads(file.read_text(encoding="utf-8")), *keys, value=value), encoding="utf-8")
     with pytest.raises(DataError) as caught:
-        read_result(file, SpinDownResult)
+        read_result(file, DOCUMENT.result)
     text = str(caught.value)
     assert text.startswith(f"{file}: ")
     assert says in text
@@ -144,31 +144,31 @@ def test_what_is_no_result_is_refused_in_one_line(tmp_path: Path, text: str) -> 
     file = tmp_path / "result.json"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(DataError, match=r"cut off or not JSON|schema is"):
-        read_result(file, SpinDownResult)
+        read_result(file, DOCUMENT.result)
 
 
 def test_bytes_that_are_no_text_are_refused_too(tmp_path: Path) -> None:
     file = tmp_path / "result.json"
     file.write_bytes(b"\xff\xfe\x00{")
     with pytest.raises(DataError, match="not JSON"):
-        read_result(file, SpinDownResult)
+        read_result(file, DOCUMENT.result)
 
 
 def test_a_result_of_another_analysis_is_none_of_this_one(tmp_path: Path) -> None:
     file = write_result(tmp_path)
     file.write_text(damaged(json.loads(file.read_text(encoding="utf-8")), "analysis", value="field"), encoding="utf-8")
-    assert read_result(file, SpinDownResult) is None
-    assert read_result(tmp_path / "nowhere.json", SpinDownResult) is None
+    assert read_result(file, DOCUMENT.result) is None
+    assert read_result(tmp_path / "nowhere.json", DOCUMENT.result) is None
 
 
 def test_keys_of_a_newer_version_are_passed_over(tmp_path: Path) -> None:
     file = write_result(tmp_path)
     file.write_text(damaged(json.loads(file.read_text(encoding="utf-8")), "new", value=1), encoding="utf-8")
-    assert read_result(file, SpinDownResult)
+    assert read_result(file, DOCUMENT.result)
 
 
 def test_a_result_read_and_written_again_is_the_same_text(tmp_path: Path) -> None:
     file = write_result(tmp_path)
-    result = read_result(file, SpinDownResult)
+    result = read_result(file, DOCUMENT.result)
     assert result
     assert result.as_dict() == json.loads(file.read_text(encoding="utf-8"))
