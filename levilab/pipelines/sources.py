@@ -12,7 +12,9 @@ from collections import Counter
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
+
+import numpy as np
 
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
 from levilab.formats.columns import NoSuchColumn
@@ -38,21 +40,38 @@ if TYPE_CHECKING:
 SKIP = ".levilab-skip"
 
 
-class Readings(Protocol):
-    """What an analysis reads from a run or a file."""
+#: Relative: units and printed digits round in about the tenth digit, but no two runs agree so far in all readings.
+SAME = 1e-9
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What to know before using them."""
+
+class Readings:
+    """What an analysis reads from a run or a file: a dataclass of arrays of equal length.
+
+    Attributes:
+        warnings: what to know before using them.
+        compared: names of the arrays by which the same readings are found again; the last has the fingerprint.
+    """
+
+    warnings: tuple[str, ...]
+    compared: ClassVar[tuple[str, ...]]
+
+    def _compared(self) -> list[np.ndarray]:
+        return [getattr(self, name) for name in self.compared]
+
+    def __len__(self) -> int:
+        return len(self._compared()[-1])
 
     @property
     def fingerprint(self) -> float:
         """A number that the same readings share but for 1e-8 of it, and few others."""
-
-    def __len__(self) -> int: ...
+        return float(np.abs(self._compared()[-1]).max())
 
     def same_as(self, other: Self) -> bool:
-        """Return whether these are the same readings, written in another way perhaps."""
+        """Return whether these are the same readings, but for the rounding of another unit in the file."""
+        return len(self) == len(other) and all(
+            np.allclose(one, theirs, rtol=SAME, atol=SAME * float(np.abs(theirs).max()))
+            for one, theirs in zip(self._compared(), other._compared(), strict=True)
+        )
 
 
 R = TypeVar("R", bound=Readings)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from analysis.field.fit import FEWEST_HEIGHTS, SAME_HEIGHT_M
 from analysis.numbers import digits
 from levilab.formats.columns import TableError
 from levilab.formats.table import read_table
+from levilab.pipelines.sources import Readings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,14 +29,12 @@ if TYPE_CHECKING:
 _HIGHEST_M, _STRONGEST_T = 2.0, 35.0
 #: No permanent magnet makes more [T]: beyond, the unit is most likely another one.
 _STRONGEST_MAGNET_T = 2.0
-#: Relative: units and printed digits round in about the tenth digit.
-_SAME = 1e-9
 #: The column of the uncertainty that is each reading's own, which runs of levilab have.
 OWN_U = "flux_density_mean_u_t"
 
 
 @dataclass(frozen=True, eq=False)
-class FieldReadings:
+class FieldReadings(Readings):
     """Flux density against height, each array of shape (n,).
 
     Attributes:
@@ -54,20 +53,7 @@ class FieldReadings:
     has_own_u: bool
     warnings: tuple[str, ...]
 
-    def __len__(self) -> int:
-        return len(self.height)
-
-    @property
-    def fingerprint(self) -> float:
-        """The greatest flux density [T]."""
-        return float(np.abs(self.flux_density).max())
-
-    def same_as(self, other: FieldReadings) -> bool:
-        """Return whether heights and flux densities are the same, but for the rounding of another unit in the file."""
-        pairs = ((self.height, other.height), (self.flux_density, other.flux_density))
-        return len(self) == len(other) and all(
-            bool(np.allclose(a, b, rtol=_SAME, atol=_SAME * float(np.abs(b).max()))) for a, b in pairs
-        )
+    compared: ClassVar[tuple[str, ...]] = ("height", "flux_density")
 
 
 def field_readings(table: Table) -> FieldReadings:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from levilab.formats.columns import NoSuchColumn, NoTable, TableError
 from levilab.formats.table import FEWEST, Table, must_be_positive, read_table
 from levilab.formats.texts import locate, texts_of
 from levilab.formats.titles import read_title, unit_factor
+from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import read_field_record
 
 if TYPE_CHECKING:
@@ -38,12 +39,10 @@ _MOST_SPREAD = 0.25
 _FEWEST_STEPS = 4
 #: A number on a line of its own, with a decimal point or comma, and what is read of a file that holds nothing else.
 _NUMBER, _MOST_BYTES = re.compile(r"[+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?"), 1 << 20
-#: Relative: units and printed digits round in about the tenth digit.
-_SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class LimitReadings:
+class LimitReadings(Readings):
     """Limits of the spin, one a repetition, each array of shape (n,).
 
     Attributes:
@@ -56,17 +55,7 @@ class LimitReadings:
     u: Array | None
     warnings: tuple[str, ...]
 
-    def __len__(self) -> int:
-        return len(self.limit)
-
-    @property
-    def fingerprint(self) -> float:
-        """The greatest limit [Hz]."""
-        return float(np.abs(self.limit).max())
-
-    def same_as(self, other: LimitReadings) -> bool:
-        """Return whether these are the same limits, but for the rounding of another unit in the file."""
-        return len(self) == len(other) and bool(np.allclose(self.limit, other.limit, rtol=_SAME, atol=0))
+    compared: ClassVar[tuple[str, ...]] = ("limit",)
 
 
 def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:

@@ -18,7 +18,7 @@ from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.options import PrecessionOptions
-from levilab.pipelines.precession.readings import Readings, read_sweep_file, read_sweep_run
+from levilab.pipelines.precession.readings import SweepReadings, read_sweep_file, read_sweep_run
 from levilab.pipelines.sources import Needs
 from levilab.present.numbers import plain, with_uncertainty
 
@@ -74,7 +74,7 @@ class PrecessionRun:
     warnings: tuple[str, ...] = ()
 
 
-class PrecessionAnalysis(Analyzed[Readings, PrecessionRun, SweepFit, PrecessionOptions]):
+class PrecessionAnalysis(Analyzed[SweepReadings, PrecessionRun, SweepFit, PrecessionOptions]):
     """Sweeps, each by itself and together: the line through the points of all of them."""
 
     @property
@@ -91,7 +91,7 @@ class PrecessionAnalysis(Analyzed[Readings, PrecessionRun, SweepFit, PrecessionO
         return (*run.fit.warnings, *run.warnings)
 
 
-def fit_source(source: Source[Readings], options: PrecessionOptions) -> PrecessionRun:
+def fit_source(source: Source[SweepReadings], options: PrecessionOptions) -> PrecessionRun:
     """Return the line through one sweep, and the coherence of its records.  Raises DataError, which names the file."""
     readings = source.readings
     u = readings.u if options.reading_u is None else np.full(len(readings), options.reading_u)
@@ -163,7 +163,7 @@ METHOD = Method(
 # --- phase lock ----------------------------------------------------------------------------------------
 
 
-def _coherences(source: Source[Readings]) -> tuple[tuple[PointCoherence, ...], tuple[str, ...]]:
+def _coherences(source: Source[SweepReadings]) -> tuple[tuple[PointCoherence, ...], tuple[str, ...]]:
     """Return how firmly the pulses follow the drive in each pair of records of a run, laser and drive."""
     if source.run is None or source.readings.time is None:
         return (), ()

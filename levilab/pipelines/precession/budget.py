@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from analysis.precession.sweep import SweepFit
     from levilab.pipelines.options import PrecessionOptions
     from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
-    from levilab.pipelines.precession.readings import Readings
+    from levilab.pipelines.precession.readings import SweepReadings
     from levilab.pipelines.sources import Source
 
     Array = np.ndarray[tuple[int], np.dtype[np.float64]]
@@ -28,7 +28,7 @@ _ONE_CLOCK = 1e-3
 _TO_HALVE = 4
 
 
-def budget_of_run(source: Source[Readings], run: PrecessionRun, options: PrecessionOptions) -> tuple[Budget, ...]:
+def budget_of_run(source: Source[SweepReadings], run: PrecessionRun, options: PrecessionOptions) -> tuple[Budget, ...]:
     """Return the budgets of slope and intercept of one sweep."""
     return _budgets(source, run.fit, options)
 
@@ -38,7 +38,7 @@ def budget_of_all(analysis: PrecessionAnalysis) -> tuple[Budget, ...]:
     return _budgets(analysis.sources[0], analysis.combined, analysis.options)
 
 
-def _budgets(source: Source[Readings], fit: SweepFit, options: PrecessionOptions) -> tuple[Budget, ...]:
+def _budgets(source: Source[SweepReadings], fit: SweepFit, options: PrecessionOptions) -> tuple[Budget, ...]:
     line = fit.line
     if not line.u_slope or not line.u_intercept or not line.u_height:
         return ()
@@ -70,7 +70,7 @@ def _budgets(source: Source[Readings], fit: SweepFit, options: PrecessionOptions
 
 
 def _of_points(
-    source: Source[Readings],
+    source: Source[SweepReadings],
     fit: SweepFit,
     options: PrecessionOptions,
     whole: float,
@@ -128,7 +128,7 @@ def _what_points(options: PrecessionOptions, *, stated: bool) -> tuple[str, Lite
     return "points, by their own u", "A", "of a run: what its gates leave beside the swing of the locked top"
 
 
-def _better(source: Source[Readings], fit: SweepFit) -> str:
+def _better(source: Source[SweepReadings], fit: SweepFit) -> str:
     counts, gate = setting_of(source, EXPERIMENT, "counts"), gate_of(source, EXPERIMENT)
     n = fit.line.n
     text = f"a wider range of drive frequencies (u falls with it), or {_TO_HALVE * n} points instead of {n} to halve it"
@@ -137,7 +137,9 @@ def _better(source: Source[Readings], fit: SweepFit) -> str:
     return text
 
 
-def _of_clocks(source: Source[Readings], fit: SweepFit, options: PrecessionOptions, name: str) -> Iterator[Component]:
+def _of_clocks(
+    source: Source[SweepReadings], fit: SweepFit, options: PrecessionOptions, name: str
+) -> Iterator[Component]:
     """Yield the clocks of counter and generator: their ratio is a factor of the slope, and common to all points."""
     line = fit.line
     value = line.slope if name == "slope" else line.intercept

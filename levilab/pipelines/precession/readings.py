@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from analysis.numbers import digits
 from analysis.precession.gates import pulses_too_many, rates_at_point, shared_scatter
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, read_table
+from levilab.pipelines.sources import SAME, Readings
 from levilab.runs.gates import gates_of
 
 if TYPE_CHECKING:
@@ -33,8 +34,6 @@ QUANTITIES = (
 )
 #: Those without which a table is no sweep.
 NEEDED = ("drive_frequency_hz", "precession_frequency_hz")
-#: Relative: units and printed digits round in about the tenth digit, but no two sweeps agree so far in all points.
-SAME = 1e-9
 #: Relative: a reading is that of its gates, but for rounding.
 _SAME_RATE = 1e-6
 #: Beyond these a number is no measurement, and its powers would leave the range of floating point [Hz].
@@ -47,7 +46,7 @@ _OF = {"precession_frequency_hz": "precession", "drive_frequency_hz": "drive", "
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class SweepReadings(Readings):
     """The points of a sweep, each array of shape (n,) [Hz], None where the table has no such column.
 
     Attributes:
@@ -64,27 +63,16 @@ class Readings:
     warnings: tuple[str, ...]
     laser: tuple[Gates, ...] | None = None
 
-    def __len__(self) -> int:
-        return len(self.drive)
-
-    @property
-    def fingerprint(self) -> float:
-        """The fastest precession [Hz]."""
-        return float(np.abs(self.precession).max())
-
-    def same_as(self, other: Readings) -> bool:
-        """Return whether these are the same points, but for the rounding of another unit in the file."""
-        pairs = ((self.drive, other.drive), (self.precession, other.precession))
-        return len(self) == len(other) and all(bool(np.allclose(a, b, rtol=SAME, atol=0)) for a, b in pairs)
+    compared: ClassVar[tuple[str, ...]] = ("drive", "precession")
 
 
-def read_sweep_file(path: Path, options: InputOptions) -> Readings:
+def read_sweep_file(path: Path, options: InputOptions) -> SweepReadings:
     """Return the sweep in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
     table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=options.guess)
     return sweep_readings(table)
 
 
-def read_sweep_run(run: Run, _: InputOptions) -> Readings:
+def read_sweep_run(run: Run, _: InputOptions) -> SweepReadings:
     """Return the sweep of a run; where it holds the gates, rates and uncertainties come from all of them."""
     readings = sweep_readings(run.readings())
     if readings.time is None:
@@ -100,7 +88,7 @@ def _given_u(run: Run) -> float | None:
     return float(u) if isinstance(u, int | float) else None
 
 
-def _from_gates(readings: Readings, gates: Sequence[tuple[Gates, Gates]], given_u: float | None) -> Readings:
+def _from_gates(readings: SweepReadings, gates: Sequence[tuple[Gates, Gates]], given_u: float | None) -> SweepReadings:
     """Return the points with the rates of their gates.  given_u: if the points keep the u that follows from it [Hz]."""
     spins, lasers = zip(*(rates_at_point(spin, laser) for spin, laser in gates), strict=True)
     counted = np.array([rate.value for rate in lasers])
@@ -122,7 +110,7 @@ def _from_gates(readings: Readings, gates: Sequence[tuple[Gates, Gates]], given_
     )
 
 
-def _about_gates(readings: Readings, lasers: Sequence[Rate]) -> Iterable[str]:
+def _about_gates(readings: SweepReadings, lasers: Sequence[Rate]) -> Iterable[str]:
     """Return a remark on the gates that were left out."""
     for k, (rate, drive) in enumerate(zip(lasers, readings.drive.tolist(), strict=True), 1):
         for gate, pulses in rate.wrong:
@@ -131,7 +119,7 @@ def _about_gates(readings: Readings, lasers: Sequence[Rate]) -> Iterable[str]:
             yield f"point {k}, at {drive:.5g} Hz: {rate.missing} of its gates have no count"
 
 
-def sweep_readings(table: Table) -> Readings:
+def sweep_readings(table: Table) -> SweepReadings:
     """Return the points of a sweep.
 
     Args:
@@ -168,7 +156,7 @@ def sweep_readings(table: Table) -> Readings:
     for name, values in u.items():
         _check_u(table, values, _OF_U[name], precession)
     has_spin = "spin_frequency_hz" in table.columns
-    return Readings(
+    return SweepReadings(
         drive=drive,
         precession=precession,
         u=u.get("precession_frequency_u_hz"),

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from analysis.precession.sweep import Point
     from levilab.pipelines.options import PrecessionOptions
     from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
-    from levilab.pipelines.precession.readings import Readings
+    from levilab.pipelines.precession.readings import SweepReadings
     from levilab.pipelines.sources import Source
     from levilab.present.document.blocks import Block
 
@@ -103,7 +103,7 @@ def _phases(analysis: PrecessionAnalysis) -> tuple[Block, ...]:
     return *tables, Note(_PHASES)
 
 
-def _readings(source: Source[Readings], run: PrecessionRun, _: PrecessionOptions) -> tuple[Block, ...]:
+def _readings(source: Source[SweepReadings], run: PrecessionRun, _: PrecessionOptions) -> tuple[Block, ...]:
     count = len(run.fit.points)
     time = source.readings.time
     clock = with_clock(source.time_zero, None if time is None else time.tolist(), ())
@@ -129,13 +129,13 @@ def _point(name: str, point: Point) -> str:
     return "\n".join(filter(None, lines))
 
 
-def _in_words(source: Source[Readings], run: PrecessionRun, options: PrecessionOptions) -> tuple[str, ...]:
+def _in_words(source: Source[SweepReadings], run: PrecessionRun, options: PrecessionOptions) -> tuple[str, ...]:
     drive, out = run.fit.column("drive"), sum(not point.used for point in run.fit.points)
     text = f"{len(drive)} points, {drive.min():.4g} Hz to {drive.max():.4g} Hz"
     return text + (f", {out} left out as miscounts" if out else ""), _uncertainty(source, run, options)
 
 
-def _uncertainty(source: Source[Readings], run: PrecessionRun, options: PrecessionOptions) -> str:
+def _uncertainty(source: Source[SweepReadings], run: PrecessionRun, options: PrecessionOptions) -> str:
     """Return how large u of a point is, and where it comes from."""
     u = run.fit.column("u")
     if not np.isfinite(u).all():

@@ -13,6 +13,7 @@ from analysis.rotation.record import FEWEST
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
+from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
 from levilab.runs.traces import INDEX, undescribed_codes
 from levilab.runs.waveforms import run_waveforms
@@ -30,7 +31,7 @@ NO_SPIN = {"laser": "how often the stem cuts the laser: its precession", "drive"
 
 
 @dataclass(frozen=True, eq=False)
-class Records:
+class Records(Readings):
     """One input.
 
     Attributes:

@@ -16,7 +16,7 @@ from levilab.pipelines.budget import gate_of
 from levilab.pipelines.field.device import THESIS, inertias
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.sources import Needs
-from levilab.pipelines.spindown.readings import Readings, read_run_readings, read_spin_file
+from levilab.pipelines.spindown.readings import SpinReadings, read_run_readings, read_spin_file
 from levilab.pipelines.spindown.words import remark, verdict_of_all
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ NEEDS = Needs(
 )
 
 
-class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
+class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOptions]):
     """Spin-downs, each by itself and together."""
 
     @property
@@ -66,7 +66,7 @@ class SpinDownAnalysis(Analyzed[Readings, SpinDown, Combined, SpinDownOptions]):
         return (remark(each) for fit in fits if fit.name not in excluded for each in fit.remarks)
 
 
-def fit_source(source: Source[Readings], options: SpinDownOptions) -> SpinDown:
+def fit_source(source: Source[SpinReadings], options: SpinDownOptions) -> SpinDown:
     """Fit all laws to one input.  Raises DataError, with the name of the file."""
     readings = source.readings
     try:
@@ -107,7 +107,7 @@ def top_of_device(device: Device | None) -> Top:
     )
 
 
-def _without_doubtful(sources: Sequence[Source[Readings]], runs: Sequence[SpinDown]) -> Sequence[SpinDown]:
+def _without_doubtful(sources: Sequence[Source[SpinReadings]], runs: Sequence[SpinDown]) -> Sequence[SpinDown]:
     """Return the runs whose unit is not in doubt; all of them where every unit is."""
     return [run for source, run in zip(sources, runs, strict=True) if not source.readings.doubtful] or runs
 

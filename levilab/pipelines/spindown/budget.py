@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.options import SpinDownOptions
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
-    from levilab.pipelines.spindown.readings import Readings
+    from levilab.pipelines.spindown.readings import SpinReadings
 
 #: The law whose exponent is a result beside the constants of the best one.
 _POWER, _EXPONENT = "power", "exponent"
@@ -40,7 +40,7 @@ _TO_HALVE = 4
 # --- one run -------------------------------------------------------------------------------------------
 
 
-def budget_of_run(source: Source[Readings], run: SpinDown, options: SpinDownOptions) -> tuple[Budget, ...]:
+def budget_of_run(source: Source[SpinReadings], run: SpinDown, options: SpinDownOptions) -> tuple[Budget, ...]:
     """Return the budgets of the best law, of laws that fit as well with no more constants, and of the exponent."""
     return tuple(
         Budget(name, estimate.value, estimate.u, estimate.unit, tuple(_rows(source, run, fit, name, options)), fit.name)
@@ -70,7 +70,7 @@ def _is_determined(fit: LawFit, name: str) -> bool:
 
 
 def _rows(
-    source: Source[Readings], run: SpinDown, fit: LawFit, name: str, options: SpinDownOptions
+    source: Source[SpinReadings], run: SpinDown, fit: LawFit, name: str, options: SpinDownOptions
 ) -> Iterator[Component]:
     estimate, parts = fit.parameters[name], fit.parts[name]
     yield from _of_readings(source, run, fit, name, options)
@@ -97,7 +97,7 @@ def _rows(
 
 
 def _of_readings(
-    source: Source[Readings], run: SpinDown, fit: LawFit, name: str, options: SpinDownOptions
+    source: Source[SpinReadings], run: SpinDown, fit: LawFit, name: str, options: SpinDownOptions
 ) -> Iterator[Component]:
     """Yield the parts by the readings: their scatter, their digits, and the correlation of neighbours."""
     parts, unit, stated = fit.parts[name], fit.parameters[name].unit, run.u is not None
@@ -157,7 +157,7 @@ def _by_clocks(fit: LawFit, name: str) -> tuple[float, float]:
     return -order, -1.0
 
 
-def _better_readings(source: Source[Readings]) -> str:
+def _better_readings(source: Source[SpinReadings]) -> str:
     """Return advice for better readings, as the end of a sentence."""
     gate, interval = gate_of(source, EXPERIMENT), setting_of(source, EXPERIMENT, "interval_s")
     if gate is None or not interval:

@@ -2,7 +2,7 @@
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from levilab.formats.understanding import FASTEST_SPIN_HZ, SLOWEST_SPIN_HZ, poss
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes
+from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import findings_of, read_field_record
 from levilab.pipelines.spin.readings import track_of_record
 from levilab.pipelines.spin.words import finding_text
@@ -45,7 +46,7 @@ LEAST_FALL = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class SpinReadings(Readings):
     """Spin readings, each array of shape (n,): increasing `time` [s], positive `frequency` and its `u` [Hz].
 
     driven: whether a drive is known to have brought the top to its spin.
@@ -61,32 +62,15 @@ class Readings:
     upright: bool = False
     doubtful: bool = False
 
-    def __len__(self) -> int:
-        return len(self.time)
-
-    @property
-    def fingerprint(self) -> float:
-        """The greatest spin frequency [Hz]."""
-        return float(np.abs(self.frequency).max())
-
-    def same_as(self, other: "Readings") -> bool:
-        """Return whether time and frequency are the same, but for the rounding of another unit in the file."""
-        pairs = ((self.time, other.time), (self.frequency, other.frequency))
-        return len(self) == len(other) and all(
-            abs(a[0] - b[0]) <= SAME * abs(b[0]) and bool(np.allclose(a, b, rtol=SAME, atol=0)) for a, b in pairs
-        )
+    compared: ClassVar[tuple[str, ...]] = ("time", "frequency")
 
 
-#: Relative: units and printed digits round in about the tenth digit, but no two runs agree so far in all readings.
-SAME = 1e-9
-
-
-def read_run_readings(run: "Run", _: "InputOptions") -> Readings:
+def read_run_readings(run: "Run", _: "InputOptions") -> SpinReadings:
     """Return the readings of a run of the experiment `spin`, which drives the top up."""
     return replace(spin_readings(run.readings()), driven=True, upright=run.record.world == "spin")
 
 
-def read_spin_file(path: "Path", options: "InputOptions") -> Readings:
+def read_spin_file(path: "Path", options: "InputOptions") -> SpinReadings:
     """Return the readings in a data file: a table of them, or a long record of a signal or of pulse times.
 
     Raises:
@@ -100,7 +84,7 @@ def read_spin_file(path: "Path", options: "InputOptions") -> Readings:
     return field_readings(path, field, options) if field else _read_pulses_or_table(path, options)
 
 
-def _read_pulses_or_table(path: "Path", options: "InputOptions") -> Readings:
+def _read_pulses_or_table(path: "Path", options: "InputOptions") -> SpinReadings:
     try:
         record = read_record(path, columns=options.columns, rate=options.rate, guess=options.guess)
     except NoRate as error:
@@ -120,7 +104,7 @@ def _read_pulses_or_table(path: "Path", options: "InputOptions") -> Readings:
     return spin_readings(table)
 
 
-def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") -> Readings:
+def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") -> SpinReadings:
     """Return the frequency in each window of a long record, while the top coasts.
 
     Raises:
@@ -143,7 +127,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
     return _of_track(path, track, WINDOW_S, what, (record.warnings, notes))
 
 
-def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions") -> Readings:
+def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions") -> SpinReadings:
     """Return the frequency in each window of a magnetometer's record, while the top coasts.  Raises as above."""
     _must_last(path, record.duration, FIELD_WINDOW_S)
     try:
@@ -165,7 +149,7 @@ def _must_last(path: "Path", duration: float, window: float) -> None:
 
 def _of_track(
     path: "Path", track: "Track | FieldTrack", window: float, what: str, notes: "tuple[Iterable[str], Iterable[str]]"
-) -> Readings:
+) -> SpinReadings:
     """Return the windows in which the top coasts.  notes: of the record, and of what was found in it."""
     first, last = _coasting(track)
     start, end = track.frequency[first], track.frequency[last - 1]
@@ -179,7 +163,7 @@ def _of_track(
         how_read.append(f"{path.name}: the top coasts from {span}; the windows before and after are left out")
     part = slice(first, last)
     of_record, of_track = notes
-    return Readings(track.time[part], track.frequency[part], track.u[part], (*of_record, *how_read, *of_track))
+    return SpinReadings(track.time[part], track.frequency[part], track.u[part], (*of_record, *how_read, *of_track))
 
 
 def _coasting(track: "Track | FieldTrack") -> tuple[int, int]:
@@ -189,7 +173,7 @@ def _coasting(track: "Track | FieldTrack") -> tuple[int, int]:
     return (first, last) if last - first >= FEWEST else (0, len(track.time))
 
 
-def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
+def spin_readings(table: Table, *, fewest: int = FEWEST) -> SpinReadings:
     """Return the readings of a spin-down: time, spin frequency and, if the table has it, its standard uncertainty.
 
     Args:
@@ -213,7 +197,7 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> Readings:
     except AnalysisError as error:
         raise _in_the_file(table, error) from error
     doubts = _doubts(table, time, frequency)
-    return Readings(time, frequency, u, (*table.warnings, *doubts), doubtful=bool(doubts))
+    return SpinReadings(time, frequency, u, (*table.warnings, *doubts), doubtful=bool(doubts))
 
 
 #: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, times in ms

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.options import SpinDownOptions
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
-    from levilab.pipelines.spindown.readings import Readings
+    from levilab.pipelines.spindown.readings import SpinReadings
     from levilab.present.document.blocks import Block
 
 #: Readings printed in the page; more stay in the run folder.
@@ -249,7 +249,7 @@ def scatter(mean: Mean) -> Estimate | None:
 # --- one input -----------------------------------------------------------------------------------------
 
 
-def _in_words(source: Source[Readings], fit: SpinDown, options: SpinDownOptions) -> tuple[str, ...]:
+def _in_words(source: Source[SpinReadings], fit: SpinDown, options: SpinDownOptions) -> tuple[str, ...]:
     count, outliers = len(source.readings), len(fit.outliers)
     text = f"{count} readings"
     if outliers:
@@ -259,21 +259,21 @@ def _in_words(source: Source[Readings], fit: SpinDown, options: SpinDownOptions)
     return f"{text}; {span}", _uncertainty(source, fit, options)
 
 
-def _uncertainty(source: Source[Readings], fit: SpinDown, options: SpinDownOptions) -> str:
+def _uncertainty(source: Source[SpinReadings], fit: SpinDown, options: SpinDownOptions) -> str:
     """Return how large u of a reading is, and where it comes from."""
     if fit.u is None:
         return "u of a reading: not known, taken from the scatter about each law"
     return f"u of a reading: {size_of_u(fit.u)}, {origin_of_u(source, 'spin_frequency_u_hz', options)}"
 
 
-def _residuals(source: Source[Readings], fit: SpinDown, law: str) -> dict[int, float]:
+def _residuals(source: Source[SpinReadings], fit: SpinDown, law: str) -> dict[int, float]:
     """Return number of a reading → its residual from the law [Hz]; of those that were fitted."""
     out = frozenset(fit.outliers)
     used = [i for i in range(len(source.readings)) if i not in out or len(fit.time) == len(source.readings)]
     return dict(zip(used, fit.fit(law).residuals.tolist(), strict=True))
 
 
-def _readings(source: Source[Readings], fit: SpinDown, options: SpinDownOptions, best: str) -> Listing:
+def _readings(source: Source[SpinReadings], fit: SpinDown, options: SpinDownOptions, best: str) -> Listing:
     """Return the first readings; rows of clock time, if it is known, time [s], spin [Hz], u and residual [Hz]."""
     readings, given_u = source.readings, options.reading_u
     shown = min(len(readings), MOST_READINGS)
@@ -317,7 +317,7 @@ def _points_of_run(k: int, name: str, run: SpinDown, analysis: SpinDownAnalysis)
             yield Points(f"residuals-best-{k}", texts)
 
 
-def _fall(source: Source[Readings], fit: SpinDown) -> str:
+def _fall(source: Source[SpinReadings], fit: SpinDown) -> str:
     """Return the facts of the fall."""
     events = source.run.events() if source.run else []
     text = next((str(event["text"]) for event in reversed(events) if event["kind"] == RunEvent.FELL), None)

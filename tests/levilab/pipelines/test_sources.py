@@ -15,9 +15,8 @@ import pytest
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.sources import Skipped, SkippedRuns, collect, sha256_of
+from levilab.pipelines.sources import Readings, Skipped, SkippedRuns, collect, sha256_of
 from levilab.pipelines.spindown.analysis import METHOD, NEEDS
-from levilab.pipelines.spindown.readings import Readings
 from levilab.pipelines.suits import analyze_suiting, left_out_of, remarks, save, texts_of
 from support.spin_downs import spin_down_csv
 
