@@ -66,7 +66,7 @@ def as_pdf(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def as_svg(figure: Figure, prefix: str = "", title: str = "", description: str = "") -> str:
+def as_svg(figure: Figure, prefix: str = "", title: str = "") -> str:
     """Return a figure as one <svg> element, for a page that may hold others, or as a file of its own.
 
     An artist whose points answer to the pointer has ``set_gid("readings-NAME")``.  Matplotlib writes each marker of a
@@ -78,12 +78,11 @@ def as_svg(figure: Figure, prefix: str = "", title: str = "", description: str =
         prefix: put before every id with a hyphen, so that no two figures of a page share one: matplotlib gives the same
             ids in every figure.  Letters, digits, hyphens; empty for a file of its own.
         title: the figure's name for screen readers.
-        description: what the figure shows, for screen readers.
     """
     buffer = io.StringIO()
     with mpl.rc_context(STYLE):
         figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
-    return _for_a_page(buffer.getvalue(), prefix, title, description)
+    return _for_a_page(buffer.getvalue(), prefix, title)
 
 
 #: Of matplotlib's SVG: texts as comments, a rule for all elements of the page, and the places where an id stands.
@@ -96,7 +95,7 @@ _DIGITS = re.compile(r"(\.\d\d)\d+")
 _PREFIX = re.compile(r"[A-Za-z][A-Za-z0-9_-]*|")
 
 
-def _for_a_page(svg: str, prefix: str, title: str, description: str) -> str:
+def _for_a_page(svg: str, prefix: str, title: str) -> str:
     if not _PREFIX.fullmatch(prefix):
         raise ValueError(f"{prefix!r} is no prefix of ids: it begins with a letter and has letters, digits and hyphens")
     svg = svg[svg.index("<svg") :]
@@ -105,10 +104,9 @@ def _for_a_page(svg: str, prefix: str, title: str, description: str) -> str:
     if prefix:
         svg = _IDS.sub(rf"\g<1>{prefix}-", svg)
     about = f' aria-label="{escape(title)}"' if title else ""
-    inside = f"<desc>{escape(description)}</desc>" if description else ""
     own = f'<svg role="img"{about} stroke-linejoin="round" stroke-linecap="butt"'
     head, body = svg.split(">", 1)
-    return f"{head.replace('<svg', own, 1)}>{inside}{body}"
+    return f"{head.replace('<svg', own, 1)}>{body}"
 
 
 def for_notebooks(figure: Figure) -> Figure:

@@ -45,5 +45,5 @@ def of_all_blocks(text: str, **changes: Any) -> Document:
         Tabular("t", shown, text, wraps=(text,)), Listing("l", shown, text), Picture("p", text, text, text, drawn),
         Details(text, (Paragraph(text),), text), Details(text, (Paragraph("left out"),), on_paper="out"),
     )  # fmt: skip
-    whole = Document(text, text, (Section(text, blocks, "a", text),), Banner(text, text), footer=text)
+    whole = Document(text, text, (Section(text, blocks, "a", text),), Banner(text, text))
     return Document(**(vars(whole) | changes))

@@ -240,14 +240,12 @@ class Details:
         more: quieter text after the summary in its line; empty for none.
         blocks: what it opens.
         on_paper: "whole": printed, the summary as a small heading; "summary": the summary alone; "out": nothing is.
-        opened: whether it is open at first.
     """
 
     summary: str
     blocks: tuple[Block, ...]
     more: str = ""
     on_paper: Literal["whole", "summary", "out"] = "whole"
-    opened: bool = False
 
 
 Block: TypeAlias = (
@@ -277,7 +275,6 @@ class Document:
         blocks: in their order; mostly sections.
         banner: stands directly below title and lead; None where nothing is synthetic.
         contents: whether links to the sections of the first depth stand before the blocks (HTML), or an outline (PDF).
-        footer: one line of small print at its end, such as versions.
         subject: the name of the file's window or in its metadata; empty for the title.
         date: when the newest of the data were taken, in the file's properties; None where that is not known.
     """
@@ -287,6 +284,5 @@ class Document:
     blocks: tuple[Block, ...]
     banner: Banner | None = None
     contents: bool = False
-    footer: str = ""
     subject: str = ""
     date: datetime | None = None

@@ -221,7 +221,7 @@ def _details(writer: Writer, block: Details, level: int) -> Html:
     writer.is_alive = True  # browsers print what is folded only where the script opens it
     summary = element("summary", element("strong", words(block.summary)), more)
     body = element("div", writer.blocks(block.blocks, level), class_="body")
-    return element("details", summary, body, class_=f"on-paper-{block.on_paper}", open=block.opened)
+    return element("details", summary, body, class_=f"on-paper-{block.on_paper}")
 
 
 _RENDERERS: Mapping[type, Callable[[Writer, Any, int], Html]] = MappingProxyType({

@@ -22,14 +22,7 @@ if TYPE_CHECKING:
 def page_of(document: Document) -> str:
     """Return the whole page; the same document always has the same text."""
     writer = Writer()
-    body = join(
-        [
-            element("header", _head(document, writer)),
-            "\n",
-            writer.blocks(document.blocks, level=2),
-            element("footer", words(document.footer)) if document.footer else "",
-        ]
-    )
+    body = join([element("header", _head(document, writer)), "\n", writer.blocks(document.blocks, level=2)])
     head = join([
         element("meta", charset="utf-8"),
         element("meta", name="viewport", content="width=device-width, initial-scale=1"),

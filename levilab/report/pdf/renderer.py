@@ -191,7 +191,6 @@ def _content(document: Document, drawing: _Drawing) -> Drawn:
         "chapters": [*_in_short(rest)],
         "outline": _outline_depth(document),
         "blocks": drawing.blocks(rest),
-        "footer": _text(document.footer),
     }
 
 

@@ -55,7 +55,7 @@ def blocks(text: str) -> tuple[Any, ...]:
 
 def document(text: str) -> Document:
     sections = tuple(Section(text, blocks(text), anchor="result", lead=text) for _ in range(2))
-    return Document(text, text, sections, Banner(text, text), contents=True, footer=text, subject=text)
+    return Document(text, text, sections, Banner(text, text), contents=True, subject=text)
 
 
 def test_cells_of_a_table_that_stacks_have_their_heads() -> None:
