@@ -5,15 +5,21 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from analysis.field.ring import on_axis
+from analysis.numbers import digits
 from analysis.uncertainty import Estimate
-from levilab.pipelines.field.meaning import meaning
+from levilab.pipelines.field.quantities import QUANTITIES
 from levilab.pipelines.field.table import base_table, by_run_table, follows_table, scans_table
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, first_of, input_parts, labels_of
 from levilab.present.document.blocks import Listing, Note, Paragraph, Points, Section, Tabular
-from levilab.present.numbers import off, with_decimals, with_sign, with_uncertainty
+from levilab.present.numbers import off, plain, with_decimals, with_sign, with_uncertainty
 from levilab.present.tables import table
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun
     from levilab.pipelines.field.readings import FieldReadings
     from levilab.pipelines.sources import Source
@@ -33,7 +39,7 @@ def field_part(analysis: FieldAnalysis) -> ReportPart:
         lead=f"{sum(run.scan.statistics.n for run in analysis.runs)} heights measured",
         verdict=analysis.text,
         result=(
-            Paragraph(" ".join(meaning(analysis)), "What it means."),
+            Paragraph(" ".join(_meaning(analysis)), "What it means."),
             Tabular("field-follows", follows_table(analysis.values), f"{_FOLLOWS}{means}"),
             Tabular("field-scans", scans_table(analysis), _SCANS, first_column_wraps=True),
         ),
@@ -122,3 +128,34 @@ def _point(name: str, run: FieldRun, i: int) -> str:
         f"B − fit = {off(1e3 * residual, u)} mT",
     ]
     return "\n".join(filter(None, lines))
+
+
+# --- what it means ---
+
+#: Where the thesis's top floats [m].
+_HEIGHT_M = 0.073
+
+
+def _meaning(analysis: FieldAnalysis) -> Iterator[str]:
+    """Yield the meaning of the first scan in sentences that a student understands."""
+    scan = analysis.runs[0].scan
+    strength = analysis.values["strength"]
+    if not strength.value or not strength.u:
+        return
+    b, slope = (float(each[0]) for each in on_axis(scan.ring, np.array([_HEIGHT_M]))[:2])
+    yield (
+        f"The base is as strong as ρ = {with_uncertainty(QUANTITIES['strength'].show(strength))}, known to "
+        f"{digits(100 * strength.u / abs(strength.value))} %; {1e2 * _HEIGHT_M:g} cm up that is "
+        f"{plain(abs(1e3 * b))} mT, and {plain(abs(10 * slope))} mT less for each centimetre higher."
+    )
+    yield "What the base holds up is in proportion to its strength: 1 % stronger, and the top weighs 1 % more."
+    reduced = scan.statistics.reduced_chi_square
+    if reduced is None:
+        yield "No uncertainty of the readings is given, so whether a ring describes the field is not tested."
+    elif reduced < 1.5:
+        yield f"A uniform ring describes the readings to their uncertainties (χ²/dof = {digits(reduced)})."
+    else:
+        yield (
+            f"A uniform ring leaves more than the uncertainties explain (χ²/dof = {digits(reduced)}): the magnet is "
+            "not uniform, or the probe was off the axis, or a size is wrong."
+        )

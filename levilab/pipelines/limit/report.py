@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import math
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from analysis.numbers import digits
 from analysis.uncertainty import Estimate
-from levilab.pipelines.limit.meaning import meaning
 from levilab.pipelines.limit.table import runs_table, theory_table
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, first_of, input_parts, labels_of, size_of_u
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
 from levilab.present.numbers import off, reading, with_uncertainty
 from levilab.present.tables import Row, table
+from levilab.stability.thesis import MEASURED_HZ, MEASURED_U_HZ
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
     from levilab.pipelines.limit.readings import LimitReadings
     from levilab.pipelines.sources import Source
@@ -30,7 +35,7 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
         lead=f"{n} tops",
         verdict=analysis.text,
         result=(
-            Paragraph(" ".join(meaning(analysis)), "What it means."),
+            Paragraph(" ".join(text for group in analysis.groups for text in _meaning(group)), "What it means."),
             Tabular("limit-statistics", runs_table(analysis), _STATISTICS, first_column_wraps=True),
         ),
         figure=FigureText(
@@ -105,3 +110,35 @@ def _point(name: str, readings: LimitReadings, run: Limits, i: int) -> str:
     lines = [name, f"top {i + 1}", f"limit = {with_uncertainty(Estimate(limit, u, 'Hz'))}"]
     lines += [] if mean is None else [f"limit − mean = {off(limit - mean, u)} Hz"]
     return "\n".join(filter(None, lines))
+
+
+# --- what it means ---
+
+#: The limit → why there is one.
+_WHY = MappingProxyType({
+    "lower": "below it the top spins too slowly to be upright, and the field turns it over",
+    "upper": "above it the top is so stiff that its axis no longer follows the field, or the drive "
+    "cannot take it along",
+})  # fmt: skip
+
+
+def _meaning(group: Limits) -> Iterator[str]:
+    """Yield the meaning of a limit in sentences that a student understands."""
+    found = group.statistics
+    mean = found.mean
+    if mean.value is None:
+        return
+    yield f"The {group.which} limit is {with_uncertainty(mean)}: {_WHY[group.which]}."
+    if found.scatter is None or not found.scatter.value or not mean.u:
+        yield "How far another top's limit lies from that one top does not say."
+        return
+    ratio = found.scatter.value / mean.u
+    yield (
+        f"One top is lost {digits(found.scatter.value)} Hz from another, so a single one may be off by that much; the "
+        f"mean of {found.n} is {digits(ratio)} times as good."
+    )
+    if group.which == "lower":
+        value, u = MEASURED_HZ, MEASURED_U_HZ
+        away = abs(mean.value - value) / math.hypot(mean.u, u)
+        said = "which agrees" if away < 2 else f"{digits(away)} u from it: another top, or mass"
+        yield f"The thesis's ten tops have {with_uncertainty(Estimate(value, u, 'Hz'))}, {said}."

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import (
     VALUE_U,
@@ -18,15 +19,17 @@ from levilab.pipelines.part import (
     origin_of_u,
     size_of_u,
 )
-from levilab.pipelines.precession.analysis import verdict
-from levilab.pipelines.precession.meaning import meaning
+from levilab.pipelines.precession.analysis import slope_of, verdict
 from levilab.pipelines.precession.table import coherence_table, lines_table, points_table, power_table
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Note, Paragraph, Points, Tabular
-from levilab.present.numbers import off, with_uncertainty
+from levilab.present.numbers import off, plain, with_uncertainty
+from levilab.simulator.published.printed import published
 
 if TYPE_CHECKING:
-    from analysis.precession.sweep import Point
+    from collections.abc import Iterator
+
+    from analysis.precession.sweep import Point, SweepFit
     from levilab.pipelines.options import PrecessionOptions
     from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
     from levilab.pipelines.precession.readings import SweepReadings
@@ -45,7 +48,7 @@ def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
         lead=f"{analysis.combined.line.n} points used",
         verdict=analysis.text,
         result=(
-            Paragraph(" ".join(meaning(analysis)), "What it means."),
+            Paragraph(" ".join(_meaning(analysis.combined)), "What it means."),
             Tabular("precession-lines", lines_table(analysis), _LINES, first_column_wraps=True),
             *_power(analysis),
         ),
@@ -143,3 +146,46 @@ def _uncertainty(source: Source[SweepReadings], run: PrecessionRun, options: Pre
     if options.reading_u is None and source.readings.laser is not None:
         return f"u of a point: {size_of_u(u)}, from the gates of all points, the swing about the drive taken off"
     return f"u of a point: {size_of_u(u)}, {origin_of_u(source, 'precession_frequency_u_hz', options)}"
+
+
+# --- what it means ---
+
+#: A difference of so many u is one.
+_DIFFERS = 2.0
+
+
+def _meaning(fit: SweepFit) -> Iterator[str]:
+    """Yield the meaning of the line through all points in sentences that a student understands."""
+    line = fit.line
+    slope = with_uncertainty(slope_of(fit))
+    if fit.p_locked is None or not line.u_slope:
+        yield f"The line rises by {slope}; how far that may be off these points do not say, so nothing is tested."
+        return
+    if fit.locked:
+        yield (
+            f"Each time the drive turns, the stem cuts the beam once: slope {slope} and intercept agree with 1 and 0, "
+            f"as of a top that is locked to its drive (p = {plain(fit.p_locked, 2)})."
+        )
+    else:
+        yield (
+            f"The stem does not cut the beam once in each period of the drive: slope {slope} and intercept together "
+            f"exclude 1 and 0 (p = {plain(fit.p_locked, 1)}). A top that is not locked, or a counter that misses or "
+            "doubles pulses, does that; the free precession does not follow the drive at all."
+        )
+    theirs = published("thesis")["measured.slope"]  # printed without an uncertainty
+    away = abs(line.slope - theirs.value) / line.u_slope
+    if away > _DIFFERS:
+        yield f"The slope of {theirs.text} that the thesis gives lies {digits(away)} u away from this one."
+    else:
+        yield (
+            f"The slope of {theirs.text} that the thesis gives lies within {digits(away)} u: these points cannot "
+            "distinguish it from a locked top's."
+        )
+    if fit.spin_offset is not None and fit.u_spin_offset:
+        off = abs(fit.spin_offset)
+        follows = off < _DIFFERS * fit.u_spin_offset
+        why = (
+            "the tape turns with the top." if follows else "is the tape on a washer that slips, or does the top swing?"
+        )
+        size = digits(1e3 * max(off, fit.u_spin_offset))
+        yield f"The spin that was counted is the drive's frequency to {size} mHz: {why}"
