@@ -121,8 +121,7 @@ def gate_of(source: Source[Any], experiment: str) -> float | None:
 
 def setting_of(source: Source[Any], experiment: str, name: str) -> float | None:
     """Return a setting of the run's experiment, where that is a number."""
-    settings = source.run.record.configuration.get(experiment) if source.run else None
-    value = settings.get(name) if isinstance(settings, dict) else None
+    value = source.settings(experiment).get(name)
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 

@@ -139,6 +139,11 @@ class Source(Generic[R]):
         """Whether any of it is known to be simulated or made up."""
         return bool(self.run and self.run.record.synthetic)
 
+    def settings(self, experiment: str) -> dict[str, Any]:
+        """Return the settings of the run's experiment; empty where none are recorded."""
+        table = self.run.record.configuration.get(experiment) if self.run else None
+        return table if isinstance(table, dict) else {}
+
     @property
     def time_zero(self) -> datetime | None:
         """When the clock of the readings was zero, in local time; None where that is not known."""

@@ -11,6 +11,7 @@ from analysis.top import Cylinder, Top, top_of
 from levilab.errors import DataError
 from levilab.files import finite
 from levilab.formats.device import read_device
+from levilab.pipelines.document import values_of
 from levilab.pipelines.field.device import parts_of
 from levilab.pipelines.row import Quantity
 from levilab.present.numbers import with_uncertainty
@@ -89,16 +90,12 @@ def top_text(found: Calculated) -> str:
 
 def top_document(found: Calculated) -> dict[str, Any]:
     """Return the same in SI; covariance: of mass, inertia_transverse and inertia_axial."""
-
-    def values(estimates: dict[str, Estimate]) -> dict[str, Any]:
-        return {name: {"value": one.value, "u": one.u, "unit": one.unit} for name, one in estimates.items()}
-
     document: dict[str, Any] = finite({
         "schema": SCHEMA,
-        "values": values(found.values),
+        "values": values_of(found.values),
         "covariance": found.top.covariance.tolist(),
         "parts": [
-            {"name": part.name, "values": values(Calculated((part,), (alone,), alone).values)}
+            {"name": part.name, "values": values_of(Calculated((part,), (alone,), alone).values)}
             for part, alone in zip(found.parts, found.alone, strict=True)
         ],
     })  # fmt: skip

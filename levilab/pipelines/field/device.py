@@ -31,8 +31,7 @@ _OF_BASE = "base_"
 
 def known_of(source: Source[FieldReadings], device: Device | None) -> Known:
     """Return what is known of the base and the instrument: what the file says, else the run.  Raises DataError."""
-    run = source.run.record.configuration.get("field", {}) if source.run else {}
-    of_run = run if isinstance(run, dict) else {}
+    of_run = source.settings("field")
     base = _base(source, of_run, device)
     if base.inner_radius_m is None or base.outer_radius_m is None:
         raise DataError(

@@ -276,7 +276,7 @@ def _sample(source: Source[LimitReadings], which: Which, options: LimitOptions) 
 
 def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> Conditions:
     """Return the conditions by the run's configuration and its record."""
-    said = _settings_of(source)
+    said = source.settings(LIMIT)
     if which == "lower" or not said:
         return Conditions(which, device.name, synthetic=synthetic_source(source))
     creep, interval = (_number(said.get(name)) for name in ("creep_hz_per_s", "interval_s"))
@@ -292,12 +292,6 @@ def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> 
     )
 
 
-def _settings_of(source: Source[LimitReadings]) -> Mapping[str, Any]:
-    """Return the settings of the experiment, empty of a file."""
-    table = source.run.record.configuration.get(LIMIT) if source.run else None
-    return table if isinstance(table, dict) else {}
-
-
 def _number(value: object) -> float | None:
     return float(value) if isinstance(value, int | float) else None
 
@@ -308,7 +302,7 @@ def _comparisons(statistics: Statistics, device: Device, which: Which) -> tuple[
 
 def _which(source: Source[LimitReadings], device: Device) -> Which:
     """Return the limit that the run names; else the limit whose edge is nearer."""
-    said = _settings_of(source).get("which")
+    said = source.settings(LIMIT).get("which")
     if said in {"lower", "upper"}:
         return "upper" if said == "upper" else "lower"
     mean = float(source.readings.limit.mean())

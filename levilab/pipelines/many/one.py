@@ -10,7 +10,7 @@ from levilab.files import CannotWrite
 from levilab.formats.waveforms.header import NoRate
 from levilab.pipelines.catalogue import ANALYSES, Analysis
 from levilab.pipelines.result import relative
-from levilab.pipelines.row import Cell, Column, Kind, plain
+from levilab.pipelines.row import Cell, Column, entry, plain
 from levilab.pipelines.suits import save
 from levilab.runs.run import Run
 
@@ -69,22 +69,18 @@ class PassedOver:
     why: str
 
 
-def _input_column(name: str, kind: Kind, meaning: str) -> Column:
-    return Column(name, kind, meaning, lambda about: about.get(name))
-
-
 #: The columns of the input itself, before and after those of the analysis.
 HEAD = (
-    _input_column("path", "text", "run folder or data file, from the table's folder"),
-    _input_column("started_utc", "text", "when the run began, as in run.json"),
-    _input_column("experiment", "text", "of the run"),
-    _input_column("status", "text", "finished, interrupted, failed, or running when it was analyzed"),
-    _input_column("synthetic", "truth", "whether any of it was simulated or made up; empty for a data file"),
-    _input_column("readings_sha256", "text", "of the file with the readings"),
+    entry("path", "text", "run folder or data file, from the table's folder"),
+    entry("started_utc", "text", "when the run began, as in run.json"),
+    entry("experiment", "text", "of the run"),
+    entry("status", "text", "finished, interrupted, failed, or running when it was analyzed"),
+    entry("synthetic", "truth", "whether any of it was simulated or made up; empty for a data file"),
+    entry("readings_sha256", "text", "of the file with the readings"),
 )
 TAIL = (
-    _input_column("warnings", "count", "warnings that levilab analyze gives for the input by itself"),
-    _input_column("problem", "text", "why it could not be analyzed; the analysis's columns are empty then"),
+    entry("warnings", "count", "warnings that levilab analyze gives for the input by itself"),
+    entry("problem", "text", "why it could not be analyzed; the analysis's columns are empty then"),
 )
 
 

@@ -20,7 +20,7 @@ from levilab.pipelines.part import (
     size_of_u,
 )
 from levilab.pipelines.precession.analysis import slope_of, verdict
-from levilab.pipelines.precession.table import coherence_table, lines_table, points_table, power_table
+from levilab.pipelines.precession.table import coherence_table, lines_table, named_runs, points_table, power_table
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Note, Paragraph, Points, Tabular
 from levilab.present.numbers import off, plain, with_uncertainty
@@ -93,12 +93,8 @@ def _power(analysis: PrecessionAnalysis) -> tuple[Block, ...]:
 
 def _phases(analysis: PrecessionAnalysis) -> tuple[Block, ...]:
     """Return how firmly the laser's pulses follow the drive, run by run."""
-    several = len(analysis.runs) > 1
-    names = [f" of {source.name}" if several else "" for source in analysis.sources]
     tables = [
-        Tabular("precession-phases", coherence_table(run, name))
-        for run, name in zip(analysis.runs, names, strict=True)
-        if run.coherences
+        Tabular("precession-phases", coherence_table(run, name)) for run, name in named_runs(analysis) if run.coherences
     ]
     if not tables:
         text = "No records of the oscilloscope were kept: the phase of the laser's pulses on the drive is not known."

@@ -28,12 +28,13 @@ POINT_HEADS = ("ν_d [Hz]", "ν_p [Hz]", "spin [Hz]", "ν_p − ν_d [Hz]", "lev
 def precession_tables(analysis: PrecessionAnalysis) -> tuple[Table, ...]:
     """Return tables of the lines, of the power of the test, and of the points.  Each fits a terminal of 80 columns."""
     tables = [lines_table(analysis), power_table(analysis.combined)]
-    tables += [points_table(run, name) for run, name in _names(analysis)]
-    tables += [coherence_table(run, name) for run, name in _names(analysis)]
+    tables += [points_table(run, name) for run, name in named_runs(analysis)]
+    tables += [coherence_table(run, name) for run, name in named_runs(analysis)]
     return tuple(one for one in tables if one.rows)
 
 
-def _names(analysis: PrecessionAnalysis) -> list[tuple[PrecessionRun, str]]:
+def named_runs(analysis: PrecessionAnalysis) -> list[tuple[PrecessionRun, str]]:
+    """Return each sweep with the end of its tables' titles."""
     several = len(analysis.runs) > 1
     return [
         (run, f" of {source.name}" if several else "")
