@@ -16,34 +16,40 @@ from levilab.present.document.blocks import (
     Note,
     Paragraph,
     Picture,
+    Points,
     Section,
     Tabular,
     Verdict,
     Warnings,
 )
-from levilab.present.tables import table
+from levilab.present.tables import Row, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 def drawn() -> Figure:
-    """A figure with one line."""
+    """A figure with one line of two points."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7, 2))
-    figure.add_axes((0.1, 0.2, 0.8, 0.7)).plot([0, 1], [1, 0])
+    figure.add_axes((0.1, 0.2, 0.8, 0.7)).plot([0, 1], [1, 0], "o-", gid="readings-0")
     return figure
 
 
-def of_all_blocks(text: str, **changes: Any) -> Document:
-    """A document with every kind of block, all texts of which are this one."""
-    shown = table(text, (text, "n"), [(text, "1"), (f"{text}\n{text}", "2")], numbers=["n"])
-    blocks = (
+def all_blocks(text: str) -> tuple[Any, ...]:
+    """Every kind of block, with a text wherever one can stand."""
+    shown = table(text, (text, "n"), [Row((text, "1"), "best"), Row((f"{text}\n{text}", "2"))], numbers=["n"])
+    picture = Picture("figure", text, text, text, drawn, (Points("readings-0", (text, text)),))
+    return (
         Verdict(text), Banner(text, text), Warnings(((text,), (text,) * 5)), Paragraph(text, text), Note(text),
         Bullets((text,)), Code(f"{text}\n{text}"), Facts((Fact(text, (text, text)), Fact(text, (text,), code=True))),
-        Tabular("t", shown, text, wraps=(text,)), Listing("l", shown, text), Picture("p", text, text, text, drawn),
+        Tabular("t", shown, text, wraps=(text,), narrow="stack"), Listing("l", shown, text), picture,
         Details(text, (Paragraph(text),), text), Details(text, (Paragraph("left out"),), on_paper="out"),
     )  # fmt: skip
-    whole = Document(text, text, (Section(text, blocks, "a", text),), Banner(text, text))
-    return Document(**(vars(whole) | changes))
+
+
+def of_all_blocks(text: str, *, sections: int = 1, **more: Any) -> Document:
+    """A document with every kind of block, all texts of which are this one."""
+    found = tuple(Section(text, all_blocks(text), "result", text) for _ in range(sections))
+    return Document(text, text, found, Banner(text, text), **more)

@@ -7,16 +7,11 @@ import re
 from typing import Any
 
 import pytest
-from matplotlib.figure import Figure
 
 from levilab.present.document.blocks import (
-    Banner,
-    Bullets,
     Code,
     Details,
     Document,
-    Fact,
-    Facts,
     Listing,
     Note,
     Paragraph,
@@ -24,38 +19,18 @@ from levilab.present.document.blocks import (
     Points,
     Section,
     Tabular,
-    Verdict,
-    Warnings,
 )
-from levilab.present.tables import Row, table
+from levilab.present.tables import table
 from levilab.report.html.page import fragment_of, page_of
+from support.documents import all_blocks, drawn, of_all_blocks
 from support.pages import Page
 
 EVIL = "</script></style></svg><b onclick=x>{{7*7}}${x}\"'&"
 NAMES = ("a", EVIL)
 
 
-def drawn() -> Figure:
-    figure = Figure((2, 2))
-    figure.subplots().plot([1, 2], [3, 4], "o", gid="readings-0")
-    return figure
-
-
-def blocks(text: str) -> tuple[Any, ...]:
-    """One block of each kind, with a text wherever one can stand."""
-    cells = table(text, (text, "n"), [Row((text, "1"), "best"), Row((f"{text}\n{text}", "2"))], numbers=["n"])
-    picture = Picture("figure", text, text, text, drawn, (Points("readings-0", (text, text)),))
-    return (
-        Paragraph(text, lead=text), Note(text), Verdict(text), Banner(text, text), Bullets((text,)), Code(text),
-        Warnings(((text,) * 5, (text,))), Facts((Fact(text, (text, text)), Fact(text, (text,), code=True))),
-        Tabular("table", cells, text, first_column_wraps=True, wraps=("n",), narrow="stack"),
-        Listing("listing", cells, text), picture, Details(text, (Paragraph(text),), more=text),
-    )  # fmt: skip
-
-
 def document(text: str) -> Document:
-    sections = tuple(Section(text, blocks(text), anchor="result", lead=text) for _ in range(2))
-    return Document(text, text, sections, Banner(text, text), contents=True, subject=text)
+    return of_all_blocks(text, sections=2, contents=True, subject=text)
 
 
 def test_cells_of_a_table_that_stacks_have_their_heads() -> None:
@@ -113,7 +88,7 @@ def test_a_listing_is_folded_into_pieces_that_lose_no_row() -> None:
 
 
 def test_a_fragment_keeps_its_style_and_ids_to_itself_and_has_no_script() -> None:
-    fragment = fragment_of(blocks("word"), prefix="one-")
+    fragment = fragment_of(all_blocks("word"), prefix="one-")
     assert fragment.startswith('<div class="levilab-part"><style>.levilab-part {')
     assert "<script" not in fragment
     assert all(str(given["id"]).startswith("one-") for _, given in Page(fragment).tags if "id" in given)
