@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, create_model
 
 from levilab.errors import DataError, unquote
 from levilab.files import finite
+from levilab.formats.device import Device
 from levilab.pipelines.analyzed import FOR_THIS_PAGE, A, Method, Opt, Origin, R, S
 from levilab.pipelines.correction import read_correction
 from levilab.pipelines.dump import Dump
@@ -41,8 +42,6 @@ D = TypeVar("D", bound=Result)
 
 def settings_model(options: type[InputOptions]) -> type[Part]:
     """Return the model of how inputs were analyzed: the options by their names, which in the file end in the unit."""
-    from levilab.formats.device import Device
-
     types = get_type_hints(options, localns={"Device": Device, "Mapping": Mapping}) | {"columns": Columns}
     given: dict[str, Any] = {}
     for name, option in options_of(options).items():
