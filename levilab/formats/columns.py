@@ -186,6 +186,10 @@ def choose_columns(
             continue
         # An uncertainty without a unit has that of its quantity: "rpm,u" gives both in 1/min.
         unit = written[name] or written.get(quantity)
+        if unit == "%" or (unit and dimension(name) == "frequency" and unit_factor(unit, "frequency") is None):
+            factor = 0.01 if unit == "%" else unit_factor(unit, "time") or 1
+            columns.append(Column(name, index, header[index], factor, inverse=unit != "%", unit=unit, written=True))
+            continue
         if titles[index].counts_radians(unit) or period.counts_radians(unit):
             warnings += [_angular(path, header[index])] * (name == quantity)
             unit = "rad/s"
@@ -251,12 +255,17 @@ def _offered_columns(
             continue
         if title.column in chosen or index in chosen.values():
             continue
-        known = title.inverse or title.unit is None or unit_factor(title.unit, dimension(title.column)) is not None
+        known = title.inverse or title.unit is None or _is_unit_of(title.unit, title.column)
         if not known and not _is_of_a_period(title, titles):
             warnings.append(_unknown_unit(path, header[index], title))
         else:
             offered.setdefault(title.column, []).append(index)
     return offered, warnings
+
+
+def _is_unit_of(unit: str, name: str) -> bool:
+    """Return whether a unit is one of a canonical column; an uncertainty may be in % of its quantity."""
+    return unit_factor(unit, dimension(name)) is not None or (unit == "%" and name in COMPANIONS)
 
 
 def _with_periods(header: Sequence[str]) -> list[Title]:
@@ -327,7 +336,8 @@ def _wanted_columns(
 
 def _stated_unit(path: Path, name: str, unit: str) -> str:
     kind = dimension(name)
-    if unit_factor(unit, kind) is None:
+    of_a_turn = kind == "frequency" and name in QUANTITIES and unit_factor(unit, "time")
+    if not (_is_unit_of(unit, name) or of_a_turn):
         raise TableError(path, f"`columns`: '{shorten(unit)}' is no unit of {kind}; known are {', '.join(UNITS[kind])}")
     return unit
 
@@ -365,8 +375,8 @@ def _written_unit(path: Path, name: str, titles: tuple[str, str], units: Sequenc
     label, meant = titles
     title = read_title(meant)
     kind = dimension(name)
-    in_title = title.unit if title.unit and unit_factor(title.unit, kind) is not None else None
-    beneath = next((unit for unit in units if unit_factor(unit, kind) is not None), None)
+    in_title = title.unit if title.unit and _is_unit_of(title.unit, name) else None
+    beneath = next((unit for unit in units if _is_unit_of(unit, name)), None)
     implied = implied_unit(meant) is not None
     if in_title and beneath and not implied and unit_factor(in_title, kind) != unit_factor(beneath, kind):
         raise TableError(

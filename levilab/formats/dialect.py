@@ -24,16 +24,17 @@ MISSING_WORDS = (
     "-", "--", "---", "n/a", "na", "n.a.", "nan", "#n/a", "#nv", "#num!", "#wert!", "#value!", "null", "none"
 )  # fmt: skip
 MISSING = frozenset(("", *MISSING_WORDS))
-#: Thousands set apart by points before a decimal comma, as 2.394,0 has them; 2.394 alone could be either.
-THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+,\d+")
-#: What a stopwatch or a clock shows: minutes and seconds, hours before them.
-CLOCK = re.compile(r"(?:(\d{1,3}):)?(\d{1,3}):(\d\d(?:[.,]\d+)?)")
-#: Date and time: ISO 8601, or day, month and year with points.
-_GERMAN = re.compile(r"(\d\d?)\.(\d\d?)\.(\d{4}),?[T ]+(\d\d?)(:\d\d(?::\d\d(?:[.,]\d+)?)?)")
-DATED = re.compile(
-    r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?|" + _GERMAN.pattern.replace("(", "(?:")
-    .replace("(?:?:", "(?:")
-)  # fmt: skip
+#: Decimal mark → (mark of thousands, numbers that have both, as 2.394,0 and 2,394.0); 2.394 alone could be either.
+_THOUSANDS = {
+    ",": (".", re.compile(r"[+-]?\d{1,3}(\.\d{3})+,\d+")),
+    ".": (",", re.compile(r"[+-]?\d{1,3}(,\d{3})+\.\d+")),
+}
+_HALF = r"(?:\s?([AaPp])\.?[Mm]\.?)?"
+#: What a stopwatch or a clock shows: minutes and seconds, hours before them; of half a day hours and minutes, too.
+CLOCK = re.compile(rf"(?:(\d{{1,3}}):)?(\d{{1,3}}):(\d\d(?:[.,]\d+)?){_HALF}")
+#: Date and time: ISO 8601, or day, month and year with points or slashes.
+_ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
+_DATE = re.compile(r"(\d\d?)([./])(\d\d?)\2(\d{4}),?[T ]+(\d\d?:\d\d)(:\d\d(?:[.,]\d+)?)?" + _HALF)
 #: What phyphox writes for a cell that a spreadsheet would take for a formula: '-1.5.
 GUARDED = re.compile(r"'[=+@-]")
 #: A number and the unit behind it.
@@ -43,10 +44,11 @@ Kind = Literal["number", "clock", "missing", "text"]
 
 @dataclass(frozen=True)
 class Dialect:
-    """Separator of the fields (None: any blanks) and decimal mark of the numbers."""
+    """Separator of the fields (None: any blanks), decimal mark of the numbers, and whether 1/2/2026 is in January."""
 
     separator: str | None
     decimal: str
+    month_first: bool = False
 
     @property
     def comments(self) -> tuple[str, ...]:
@@ -80,8 +82,9 @@ class Dialect:
         Raises:
             ValueError: the field is no number, or has the other decimal mark.
         """
-        if self.decimal == "," and THOUSANDS.fullmatch(text):
-            text = text.replace(".", "")
+        thousands, with_both = _THOUSANDS[self.decimal]
+        if thousands in text and with_both.fullmatch(text):
+            text = text.replace(thousands, "")
         if "_" in text or (self.decimal == "," and "." in text):
             raise ValueError(text)
         return float(text.replace(",", ".") if self.decimal == "," else text)
@@ -93,7 +96,7 @@ class Dialect:
         try:
             self.number(_without_unit(text))
         except ValueError:
-            return "clock" if CLOCK.fullmatch(text) or DATED.fullmatch(text) else "text"
+            return "clock" if CLOCK.fullmatch(text) or is_dated(text) else "text"
         return "number"
 
 
@@ -112,11 +115,26 @@ def _without_unit(text: str) -> str:
     return found["number"] if found and is_unit(found["unit"]) else text
 
 
-def clock_time(text: str) -> float:
+def is_dated(text: str) -> bool:
+    """Return whether a field is a date with its time."""
+    return bool(_ISO.fullmatch(text) or _DATE.fullmatch(text))
+
+
+def slashed_date(text: str) -> tuple[int, int, int] | None:
+    """Return the numbers of a date whose slashes leave the order of day and month open.
+
+    >>> slashed_date("12/31/2025 10:00 PM")
+    (12, 31, 2025)
+    """
+    found = _DATE.fullmatch(text)
+    return (int(found[1]), int(found[3]), int(found[4])) if found and found[2] == "/" else None
+
+
+def clock_time(text: str, *, month_first: bool = False) -> float:
     """Return the seconds that a clock, a stopwatch or a date stands for; a date's count from 1970.
 
-    >>> clock_time("0:10"), clock_time("14:05:12.5")
-    (10.0, 50712.5)
+    >>> clock_time("0:10"), clock_time("14:05:12.5"), clock_time("2:05 PM")
+    (10.0, 50712.5, 50700.0)
     >>> clock_time("24.11.2026 9:05:12,5") - clock_time("2026-11-23 09:05:12")
     86400.5
 
@@ -124,13 +142,18 @@ def clock_time(text: str) -> float:
         ValueError: it is none of the three.
     """
     if found := CLOCK.fullmatch(text):
-        hours, minutes, seconds = int(found[1] or 0), int(found[2]), float(found[3].replace(",", "."))
-        if seconds < 60 and (minutes < 60 or not found[1]):
+        parts = [float(part.replace(",", ".")) for part in found.groups()[:3] if part]
+        half = found[4]
+        hours, minutes, seconds = [*parts, 0.0] if half and len(parts) == 2 else [*[0.0] * (3 - len(parts)), *parts]
+        if seconds < 60 and (minutes < 60 or not (found[1] or half)) and (not half or hours <= 12):
+            hours = hours % 12 + 12 * (half in {"P", "p"}) if half else hours
             return 3600 * hours + 60 * minutes + seconds
-    if german := _GERMAN.fullmatch(text):
-        day, month, year, hour, rest = german.groups()
-        text = f"{year}-{month:0>2}-{day:0>2} {hour:0>2}{rest}"
-    if DATED.fullmatch(text):
+    if found := _DATE.fullmatch(text):
+        first, _, second, year, minute, rest, half = found.groups()
+        month, day = (first, second) if month_first and found[2] == "/" else (second, first)
+        start = datetime(int(year), int(month), int(day), tzinfo=UTC).timestamp()
+        return start + clock_time(f"{minute}{rest or ('' if half else ':00')}{half + 'm' if half else ''}")
+    if _ISO.fullmatch(text):
         moment = datetime.fromisoformat(text)
         return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
     raise ValueError(text)

@@ -6,6 +6,7 @@ Each is rewritten line by line, so that the n-th line stays the n-th, with tabs 
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 #: Lines that are looked at, and the part of them that has to be in a dress: a log may begin in the middle of a line.
 _LINES, _MOST = 100, 0.8
@@ -73,18 +74,23 @@ def _markdown(lines: Sequence[str]) -> Dressed:
 # --- Arduino -------------------------------------------------------------------------------------------
 
 _STAMP = re.compile(r"\s*(\d\d?:\d\d:\d\d(?:[.,]\d+)?)\s*->\s*(.*)")
-_NAME, _VALUE = r"[^\W\d][^:;,\t]*?", r"[+-]?[\d.]+(?:[eE][+-]?\d+)?(?:\s?[^\d\s,;:][^\s,;:]*)?"
-_PAIR, _PAIR_PARTS = rf"{_NAME}\s*:\s*{_VALUE}", rf"({_NAME})\s*:\s*({_VALUE})"
-_PAIRS = re.compile(rf"\s*(?:\d\d?:\d\d:\d\d(?:[.,]\d+)?\s*->\s*)?{_PAIR}(?:[,;\t ]\s*{_PAIR})*[,;\s]*$")
-_EACH = re.compile(_PAIR_PARTS + r"(?:[,;\t ]\s*|$)")
+_VALUE = r"[+-]?[\d.]+(?:[eE][+-]?\d+)?(?:\s?[^\d\s,;:=][^\s,;:=]*)?"
+#: A label before its number: t:123 or t=123, how many there are; and in words, "time 123", at least two of them.
+_COLON, _WORD = (r"([^\W\d][^:=;,\t]*?)\s*[:=]\s*", "*"), (r"([^\W\d]+)\s+", "+")
 
 
-def _plotter(lines: Sequence[str]) -> Dressed:
+def _pairs(label: str, more: str) -> re.Pattern[str]:
+    pair = f"{label}{_VALUE}".replace("(", "(?:", 1)
+    return re.compile(rf"\s*(?:\d\d?:\d\d:\d\d(?:[.,]\d+)?\s*->\s*)?{pair}(?:[,;\t ]\s*{pair}){more}[,;\s]*$")
+
+
+def _plotter(lines: Sequence[str], label: str, more: str) -> Dressed:
     """t:123, f:38.01 in each line: the labels become titles, and a unit stays behind its number."""
+    pairs, each = _pairs(label, more), re.compile(rf"{label}({_VALUE})(?:[,;\t ]\s*|$)")
     rows, titles = [], dict[str, None]()
     for line in lines:
         stamp = _STAMP.fullmatch(line)
-        values = dict(_EACH.findall(stamp[2] if stamp else line)) if _PAIRS.match(line) else {}
+        values = dict(each.findall(stamp[2] if stamp else line)) if pairs.match(line) else {}
         values |= {"time": stamp[1]} if stamp and values and not {"t", "time"} & {v.casefold() for v in values} else {}
         titles |= dict.fromkeys(values)
         rows.append(values)
@@ -144,6 +150,6 @@ _DRESSES: Sequence[tuple[Callable[[Sequence[str]], Dressed], Callable[[Sequence[
     (_labview, lambda lines: any(line.startswith(_END) for line in lines)),
     (_cassy, lambda lines: any(_DEFINITION.match(line) for line in lines)),
     (_markdown, _mostly(re.compile(r"\s*\|.*\|\s*$"))),
-    (_plotter, _mostly(_PAIRS)),
+    *((partial(_plotter, label=label, more=more), _mostly(_pairs(label, more))) for label, more in (_COLON, _WORD)),
     (_monitor, _mostly(_STAMP)),
 )

@@ -106,6 +106,7 @@ KINDS = (
     Kind("a database", "export its table as CSV", (".db", ".sqlite"), ((0, b"SQLite format 3"),)),
 )
 OTHER = Kind("a file of another kind", plural="other files")
+EMPTY = Kind("an empty file", "record again")
 #: Bytes at the beginning that tell the kind.
 _BYTES = 64
 
@@ -113,7 +114,8 @@ _BYTES = 64
 def kind_of(path: Path) -> Kind:
     """Return the kind of a file by the end of its name and its first bytes.  Raises OSError."""
     with path.open("rb") as stream:
-        return kind_of_bytes(stream.read(_BYTES), path.suffix)
+        head = stream.read(_BYTES)
+    return kind_of_bytes(head, path.suffix) if head.strip() or len(head) == _BYTES else EMPTY
 
 
 def kind_of_bytes(head: bytes, suffix: str = "") -> Kind:

@@ -11,15 +11,16 @@ import io
 import re
 import warnings
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from levilab.formats.columns import Column, TableError, shorten
-from levilab.formats.dialect import DATED, MISSING, clock_time, unit_behind
+from levilab.formats.dialect import CLOCK, MISSING, clock_time, is_dated, slashed_date, unit_behind
 from levilab.formats.layout import Layout
 from levilab.formats.texts import Text
 from levilab.formats.titles import dimension, unit_factor
@@ -40,14 +41,13 @@ class Rows:
     """Numbers as they stand in the file.
 
     `values` has one array, shape (rows,), for each column that is used, NaN where a reading is missed; `lines`,
-    shape (rows,), holds their 1-based lines; `torn` is about a last line that was cut off and is left out, `doubt`
-    about times that may be meant otherwise.
+    shape (rows,), holds their 1-based lines; `notes` are about last lines that are left out, and about times that may
+    be meant otherwise.
     """
 
     values: "tuple[NDArray[np.float64], ...]"
     lines: "NDArray[np.int64]"
-    torn: str | None = None
-    doubt: str | None = None
+    notes: tuple[str, ...] = ()
 
 
 def read_rows(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool = False) -> Rows:
@@ -154,59 +154,110 @@ def _with_last(
     line = layout.first_line + rows.lines.size
     last = None if drop_unended else _row_or_none(path, layout, chosen, line, rest)
     if last is None:
-        return replace(rows, torn=_torn(line, rest))
+        return replace(rows, notes=(_left_out(line, rest, "was cut off"),))
     values = tuple(np.append(column, number) for column, number in zip(rows.values, last, strict=True))
     return Rows(values, np.append(rows.lines, line))
 
 
 def _read_lines(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows:
     """Read all rows line by line; some 2 µs a number."""
-    lines, values, torn = array("q"), [array("d") for _ in chosen], None
-    time, path = "", text.path
-    with io.TextIOWrapper(text.open(), layout.encoding, errors="replace", newline=None) as stream:
-        for number, line in enumerate(stream, 1):
-            if number < layout.first_line or _skips(layout, line):
-                continue
-            row: list[float] | None
-            if line.endswith("\n"):
-                row = _row(path, layout, chosen, number, line)
-            else:
-                row = None if drop_unended else _row_or_none(path, layout, chosen, number, line)
+    lines, values = array("q"), [array("d") for _ in chosen]
+    time, path, notes = "", text.path, list[str]()
+    layout = _with_order_of_dates(text, layout, chosen, notes)
+    below: list[tuple[TableError, str]] = []  # lines that may be means below the readings
+    for number, line in _lines(text, layout):
+        if not line.endswith("\n"):
+            row = None if drop_unended else _row_or_none(path, layout, chosen, number, line)
             if row is None:
-                torn = _torn(number, line)
+                notes.append(_left_out(number, line, "was cut off"))
                 break
-            time = time or _time_in(layout, chosen, line)
-            lines.append(number)
-            for column, value in zip(values, row, strict=True):
-                column.append(value)
+        try:
+            row = _row(path, layout, chosen, number, line)
+        except TableError as error:
+            below.append((error, _left_out(number, line, "is no reading")))
+            if not lines or not _begins_with_words(layout, line):
+                raise below[0][0] from None
+            continue
+        if below:
+            raise below[0][0]
+        time = time or _time_in(layout, chosen, line)
+        lines.append(number)
+        for column, value in zip(values, row, strict=True):
+            column.append(value)
     numbers = tuple(
-        _from_first_date(np.array(found, np.float64))
-        if column.name == "time_s" and DATED.fullmatch(time)
-        else np.array(found, np.float64)
+        _clocks(np.array(found, np.float64), column, time) if column.name == "time_s" else np.array(found, np.float64)
         for column, found in zip(chosen, values, strict=True)
     )
-    return Rows(numbers, np.array(lines, np.int64), torn, _doubt_about(time))
+    notes += [note for _, note in below]
+    return Rows(numbers, np.array(lines, np.int64), (*notes, *_doubts_about(time)))
+
+
+def _lines(text: Text, layout: Layout) -> Iterator[tuple[int, str]]:
+    """Yield the lines that should be rows, with their numbers."""
+    with io.TextIOWrapper(text.open(), layout.encoding, errors="replace", newline=None) as stream:
+        for number, line in enumerate(stream, 1):
+            if number >= layout.first_line and not _skips(layout, line):
+                yield number, line
+
+
+def _begins_with_words(layout: Layout, line: str) -> bool:
+    """Return whether a line is a text, or a text beside numbers, as Mittelwert; 30.1."""
+    return re.match(r"[^\W\d][^\d]*$", next(filter(None, layout.dialect.split(line)), "")) is not None
+
+
+def _with_order_of_dates(text: Text, layout: Layout, chosen: Sequence[Column], notes: list[str]) -> Layout:
+    """Return a layout that knows whether months come first in dates with slashes; if no value tells, with a note.
+
+    Where no number is above 12, the order in which the file lasts less is taken: a record of a top passes midnight.
+    """
+    column = next((column for column in chosen if column.name == "time_s"), None)
+    if column is None or not any("/" in "".join(row[column.index : column.index + 1]) for row in layout.sample):
+        return layout
+    dates = {found for _, line in _lines(text, layout) if (found := slashed_date(_time_in(layout, chosen, line)))}
+    months_first = replace(layout, dialect=replace(layout.dialect, month_first=True))
+    if any(first > 12 for first, _, _ in dates) or len(dates) < 2:
+        return layout if any(first > 12 for first, _, _ in dates) or all(b <= 12 for _, b, _ in dates) else months_first
+    if any(second > 12 for _, second, _ in dates):
+        return months_first
+    days = [(date(y, b, a).toordinal(), date(y, a, b).toordinal()) for a, b, y in dates]
+    by_day, by_month = (max(order) - min(order) for order in zip(*days, strict=True))
+    name = "month/day" if by_month < by_day else "day/month"
+    notes.append(f"its dates are taken for {name}/year, in which it lasts less: write 2026-12-31 if they are not")
+    return months_first if by_month < by_day else layout
 
 
 def _time_in(layout: Layout, chosen: Sequence[Column], line: str) -> str:
     """Return the text for the time in a row, empty where it is missed."""
-    fields = layout.dialect.split(line)
-    found = next((fields[column.index] for column in chosen if column.name == "time_s"), "")
+    fields = dict(enumerate(layout.dialect.split(line)))
+    found = next((fields.get(column.index, "") for column in chosen if column.name == "time_s"), "")
     return "" if found.casefold() in MISSING else found
 
 
-def _from_first_date(times: "NDArray[np.float64]") -> "NDArray[np.float64]":
-    """Count dates from the first one on, not from 1970.  times: shape (n,), NaN where one is missed [s]."""
-    first: float = times[np.isfinite(times)][0]
-    return np.asarray(times - first)
+_DAY_S = 86400
 
 
-def _doubt_about(time: str) -> str | None:
-    """Return the doubt about a first time: a stopwatch begins at 0:00 or so, hours and minutes of a clock do not."""
+def _clocks(times: "NDArray[np.float64]", column: Column, first: str) -> "NDArray[np.float64]":
+    """Count dates from the first one on, not from 1970, and the time of a day beyond midnight.
+
+    Args:
+        times: shape (n,), NaN where one is missed [units of the column].
+        column: that of the times.
+        first: text of the first one.
+    """
+    there = np.isfinite(times)
+    if is_dated(first):
+        return np.asarray(times - times[there][0])
+    day = _DAY_S / column.factor
+    if CLOCK.fullmatch(first) and float(times[there].max()) < day:
+        times[there] += day * np.cumsum(np.diff(times[there], prepend=times[there][0]) < -day / 2)
+    return times
+
+
+def _doubts_about(time: str) -> Iterator[str]:
+    """Yield the doubt about a first time: a stopwatch begins at 0:00 or so, hours and minutes of a clock do not."""
     minutes = re.fullmatch(r"(\d{1,2}):\d\d", time)
-    if minutes is None or int(minutes[1]) == 0:
-        return None
-    return f"the times, as {time}, are taken for minutes and seconds; of a clock write the seconds, too: {time}:00"
+    if minutes and int(minutes[1]):
+        yield f"the times, as {time}, are taken for minutes and seconds; of a clock write the seconds, too: {time}:00"
 
 
 def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: str) -> list[float]:
@@ -241,7 +292,7 @@ def _number(path: Path, layout: Layout, column: Column, line: int, text: str) ->
         return _number_with_unit(path, layout, column, line, text)
     if column.name == "time_s":
         with contextlib.suppress(ValueError):
-            return clock_time(text) / column.factor
+            return clock_time(text, month_first=layout.dialect.month_first) / column.factor
     mark = "comma" if layout.dialect.decimal == "," else "point"
     combined = "±" in text or "+/-" in text
     do = _ITS_OWN_COLUMN if combined else "correct it, or leave it empty if the reading was missed"
@@ -267,5 +318,5 @@ def _number_with_unit(path: Path, layout: Layout, column: Column, line: int, tex
         raise TableError(path, f"{what}: correct it", line=line) from None
 
 
-def _torn(line: int, text: str) -> str:
-    return f"line {line}: '{shorten(text.strip())}' was cut off"
+def _left_out(line: int, text: str, why: str) -> str:
+    return f"line {line}: '{shorten(text.strip())}' {why} and is left out"

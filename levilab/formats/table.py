@@ -141,7 +141,8 @@ def read_run_readings(path: Path, channels: Collection[str] = ()) -> Table:
         if header and not (chosen and "".join(header).isprintable()):
             raise TableError(path, f"'{shorten(title.strip())}' is no header of a run, as time_s,… is", line=1)
         layout = Layout("utf-8-sig", Dialect(",", "."), header, 1, (), 2, len(first), len(header))
-        nothing = Rows((), np.zeros(0, np.int64), f"line 1: '{shorten(title)}' was cut off" if title else None)
+        cut = (f"line 1: '{shorten(title)}' was cut off and is left out",) if title else ()
+        nothing = Rows((), np.zeros(0, np.int64), cut)
         rows = read_rows(Text(path), layout, chosen, drop_unended=True) if header else nothing
     return _table(path, header, chosen, rows, ())
 
@@ -201,8 +202,7 @@ def _table(
 ) -> Table:
     """Leave out missed readings, and columns of uncertainties with gaps; then convert to SI."""
     name = shorten(str(path), 200)
-    notes = [*warnings, *([f"{name}, {rows.torn} and is left out"] if rows.torn else [])]
-    notes += [f"{name}: {rows.doubt}"] if rows.doubt else []
+    notes = [*warnings, *(f"{name}: {note}" for note in rows.notes)]
     numbers = dict(zip(chosen, rows.values, strict=False))
     # The comparison is false for NaN, too.
     present = {column: np.abs(values) < NO_READING for column, values in numbers.items()}
@@ -227,6 +227,9 @@ def _table(
         columns[name] = 1 / columns[name]
         if any(c.inverse and c.name == companion(name) for c in kept):
             columns[companion(name)] = columns[companion(name)] * columns[name] ** 2  # u(1/T) = u(T)/T²
+    for c in kept:
+        if c.unit == "%":
+            columns[c.name] = columns[c.name] * np.abs(columns[COMPANIONS[c.name]])
     return Table(path, columns, tuple(notes), header, lines, {c.name: c.factor for c in kept if not c.inverse})
 
 

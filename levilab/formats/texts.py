@@ -225,6 +225,10 @@ def _blocks(file: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, most:
 _ADDRESS = re.compile(rb"r=[\"']([A-Z]{1,3})(\d{1,7})")
 #: The address of a cell right of column Z or below row 999 999; without any such a sheet is of an allowed size.
 _FAR = re.compile(rb"r=[\"'](?:[A-Z]{2}|[A-Z]\d{7})")
+#: A formula of Excel whose number was never worked out; a text may be empty.
+_WITHOUT_VALUE = re.compile(
+    rb"""<c (?![^<>]*t="str")[^<>]*>\s*<f[^<>]*(?:/>|>[^<]*</f>)\s*(?:<v ?/>|<v></v>)?\s*</c>"""
+)
 _OPENED = re.compile(rb"<table:(table|table-row|table-cell|covered-table-cell)(?![\w-])([^<>]*)>")
 _REPEATED = re.compile(rb"number-(?:rows|columns)-repeated=[\"'](\d+)")
 
@@ -242,6 +246,8 @@ def _check(file: Path, archive: zipfile.ZipFile, members: Sequence[zipfile.ZipIn
             if b"</si>" in rest:
                 longest = max(longest, *map(len, rest.split(b"</si>")))
             far = far or _FAR.search(rest) is not None
+            if b"<f" in rest and _WITHOUT_VALUE.search(rest):
+                raise TableError(file, "holds formulas without their values: open it in Excel or LibreOffice, save it")
             texts += rest.count(b't="s"') + rest.count(b"t='s'")
             rest = rest[max(rest.rfind(b"<"), 0) :]
         rows, columns = (
@@ -340,7 +346,7 @@ _NUMBERS = frozenset({float, int})
 
 
 #: Numbers typed as text, with a decimal point, with a decimal comma and perhaps a unit.
-_POINTED = re.compile(r"[+-]?\d*\.\d+\b.*", re.DOTALL)
+_POINTED = re.compile(r"[+-]?[\d,]*\.\d+\b.*", re.DOTALL)
 _COMMA = re.compile(r"([+-]?\d+),(\d+(?:[eE][+-]?\d+)?(?:\s*[^\d\s,].*)?)")
 
 

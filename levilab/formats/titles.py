@@ -193,6 +193,12 @@ def dimension(column: str) -> str:
     return QUANTITIES[COMPANIONS.get(column, column)][0]
 
 
+#: Units of a phone's other sensors.
+OTHER_SENSORS: Mapping[str, str] = {
+    "lx": "the light sensor", "m/s2": "the accelerometer", "hPa": "the barometer", "dB": "the microphone's level",
+}  # fmt: skip
+
+
 def plain_unit(text: str) -> str:
     """Return a unit as the table spells it: µ as μ, ⁻¹ as -1, without blanks, dots, carets and brackets."""
     return re.sub(r"[\s^·*()\[\]]", "", unicodedata.normalize("NFKC", text).replace("−", "-"))

@@ -34,10 +34,12 @@ from levilab.formats.titles import (
     EXAMPLES,
     LISTED,
     NEED_UNITS,
+    OTHER_SENSORS,
     QUANTITIES,
     dimension,
     nearly_a_frequency,
     plain_name,
+    plain_unit,
     read_title,
     unit_factor,
 )
@@ -191,6 +193,11 @@ def _column(k: int, layout: Layout, used: Column | None) -> UnderstoodColumn:
 # --- questions about units -----------------------------------------------------------------------------
 
 
+def is_possible_spin(frequency: float) -> bool:
+    """Return whether a top floats at a spin [Hz]; else its unit is in doubt."""
+    return SLOWEST_SPIN_HZ <= frequency <= FASTEST_SPIN_HZ
+
+
 def possible_spins(number: float) -> dict[str, float]:
     """Return the spin [Hz] that a number of a file means in each unit in which a top can have it.
 
@@ -198,7 +205,7 @@ def possible_spins(number: float) -> dict[str, float]:
     {'rad/s': 38.03}
     """
     spins = {unit: number * (unit_factor(unit, "frequency") or 1.0) for unit in _UNITS}
-    return {unit: spin for unit, spin in spins.items() if SLOWEST_SPIN_HZ <= spin <= FASTEST_SPIN_HZ}
+    return {unit: spin for unit, spin in spins.items() if is_possible_spin(spin)}
 
 
 def _numbers(layout: Layout, index: int) -> list[float]:
@@ -248,7 +255,7 @@ def _unit_doubt(layout: Layout, column: Column, used: Iterable[Column]) -> Doubt
     if column.name != _SPIN or column.inverse:
         return None
     numbers = _numbers(layout, column.index)
-    if not numbers or SLOWEST_SPIN_HZ <= median(numbers) * column.factor <= FASTEST_SPIN_HZ:
+    if not numbers or is_possible_spin(median(numbers) * column.factor):
         return None
     time = next((one for one in used if one.name == "time_s"), None)
     what = f"the unit {column.unit}" if column.written else f"no unit, and would be in {column.unit}"
@@ -446,7 +453,12 @@ def _which_columns(layout: Layout, names: Collection[str]) -> Doubt:
         for name in names
         for k in numeric
     )
-    return Doubt("titles", f"which column is {' and which '.join(names)}?", None, choices)
+    return Doubt("titles", f"which column is {' and which '.join(map(_in_words, names))}?", None, choices)
+
+
+def _in_words(name: str) -> str:
+    """Return a canonical name for people: the time, the spin frequency."""
+    return f"the {name.rpartition('_')[0].replace('_', ' ')}"
 
 
 def _in_one_word(columns: Iterable[str]) -> str:
@@ -471,6 +483,12 @@ def no_column(path: Path, name: str, header: Sequence[str], doubt: Doubt | None 
         text = f"{what}: {how_else(foreign, name)}"
     elif nearly:
         text = f"no column is known to be {name}; '{shorten(nearly)}' could become one: {how_else(nearly, name)}"
+    else:
+        sensors = {title: OTHER_SENSORS.get(plain_unit(read_title(title).unit or "")) for title in header}
+        title, sensor = next((pair for pair in sensors.items() if pair[1]), ("", None))
+        if sensor:
+            text = f"'{shorten(title)}' is of {sensor}, which shows no turns: record with the magnetometer, or name its"
+            text += f" sheet or file; no column is known to be {name}"
     return NoSuchColumn(path, text, doubt=doubt)
 
 

@@ -15,7 +15,7 @@ from analysis.spindown.readings import check_readings
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, Table, read_table
-from levilab.formats.understanding import FASTEST_SPIN_HZ, SLOWEST_SPIN_HZ, possible_spins
+from levilab.formats.understanding import is_possible_spin, possible_spins
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes
@@ -208,7 +208,7 @@ FASTEST_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 1e-5
 def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[str]:
     """Return doubts about units: a spin that no such top has, readings closer than a turn."""
     middle, step = float(np.median(frequency)), float(np.median(np.diff(time)))
-    if not SLOWEST_SPIN_HZ <= middle <= FASTEST_SPIN_HZ:
+    if not is_possible_spin(middle):
         doubt = f"{table.path.name}: the spin is about {middle:.4g} Hz, a Levitron spins at 20 to 60 Hz"
         meant = [
             f"f=NAME [{unit}] ({digits(spin, 3)} Hz)"

@@ -325,6 +325,16 @@ def test_a_number_in_a_cell_keeps_its_last_bit(tmp_path):
     assert read_table(path, quantities=SPIN).column("spin_frequency_hz").tolist() == [value] * 4
 
 
+@pytest.mark.parametrize("value", ["", "<v/>", "<v></v>"])
+def test_formulas_that_were_never_worked_out_say_what_to_do(tmp_path, value):
+    rows = "".join(
+        f'<row r="{k}"><c r="A{k}"><v>{k}</v></c><c r="B{k}"><f>38-A{k}</f>{value}</c></row>' for k in (1, 2, 3)
+    )
+    sheet = f'<worksheet xmlns="{MAIN}"><sheetData>{rows}</sheetData></worksheet>'
+    with pytest.raises(TableError, match="holds formulas without their values: open it in Excel or LibreOffice"):
+        read_table(workbook(tmp_path / "formulas.xlsx", sheet), quantities=SPIN)
+
+
 def test_a_path_into_no_file_stays_a_path():
     assert texts.locate(Path("no/such/file.csv")) == (Path("no/such/file.csv"), "")
     assert texts.locate(FILES / "excel.xlsx" / "Messung") == (FILES / "excel.xlsx", "Messung")

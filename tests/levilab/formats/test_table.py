@@ -23,6 +23,7 @@ from levilab.formats.titles import read_title, unit_factor
 
 T, F, U = "time_s", "spin_frequency_hz", "spin_frequency_u_hz"
 PLAIN = {T: [0, 0.5, 1], F: [61.5, 61.25, 61]}
+SECONDS = PLAIN | {T: [0, 1, 2]}
 WITH_U = PLAIN | {U: [0.25, 0.5, 0.125]}
 SLOW = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -88,6 +89,28 @@ TABLES = {
     "clock": ("Uhrzeit;f\n14:05:12;61,5\n14:05:12,5;61,25\n14:05:13;61\n", PLAIN | {T: [50712, 50712.5, 50713]}),
     "dates": ("t,f\n2026-11-20T14:05:12Z,61.5\n2026-11-20T14:05:12.5Z,61.25\n2026-11-20T15:05:13+01:00,61\n", PLAIN),
     "thousands with points": ("Temps (s);vitesse (tr/min)\n0;3.690,0\n0,5;3.675,0\n1;3.660,0\n", PLAIN),
+    "thousands with commas": ("t;rpm\n0;3,690.0\n0.5;3,675.0\n1;3,660.0\n", PLAIN),
+    "clock with half days": (
+        "Time,f\n2:05:12 PM,61.5\n2:05:12.5 PM,61.25\n2:05:13 p.m.,61\n",
+        PLAIN | {T: [50712, 50712.5, 50713]},
+    ),
+    "clock at midnight": (
+        "Time,f\n23:59:59.5,61.5\n00:00:00,61.25\n0:00:00.5,61\n",
+        PLAIN | {T: [86399.5, 86400, 86400.5]},
+    ),
+    "noon of half days": ("Time,f\n11:59 am,61.5\n12:00 PM,61.25\n12:01 PM,61\n", PLAIN | {T: [43140, 43200, 43260]}),
+    "month first": ("t,f\n12/31/2025 11:59:59 PM,61.5\n1/1/2026 12:00:00 AM,61.25\n1/1/2026 12:00:01 AM,61\n", SECONDS),
+    "day first": ("t,f\n31/12/2025 23:59:59,61.5\n01/01/2026 0:00:00,61.25\n01/01/2026 0:00:01,61\n", SECONDS),
+    "one day": ("t,f\n1/2/2026 9:59:59,61.5\n1/2/2026 10:00,61.25\n1/2/2026 10:00:01,61\n", SECONDS),
+    "uncertainty in percent": (
+        "t,f,u [%]\n0,50,1\n1,40,1\n2,20,5\n",
+        {T: [0, 1, 2], F: [50, 40, 20], U: [0.5, 0.4, 1]},
+    ),
+    "labels with =": ("t=0.0 f=61.5\nt=0.5 f=61.25\nt=1 f=61\n", PLAIN),
+    "labels in words": (
+        "Time 0 ms, Freq 61.5 Hz\nTime 500 ms, Freq 61.25 Hz\nTime 1000 ms, Freq 61 Hz\n",
+        PLAIN,
+    ),
     "LabVIEW's title of the times": ("X_Value,f [Hz]\n0,61.5\n0.5,61.25\n1,61\n", PLAIN),
     "field scan": (
         "z/mm;u_z/mm;B [mT]\n10;0,5;20\n20;0,5;10\n30;0,5;5\n",
@@ -148,6 +171,21 @@ def test_times_of_hours_and_minutes_are_doubted(table_file):
     np.testing.assert_allclose(table.column(T), [845, 846, 847])
     (warning,) = table.warnings
     assert "the times, as 14:05, are taken for minutes and seconds" in warning
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("t,f\n01/02/2026 23:59:59,61.5\n02/02/2026 0:00:00,61.25\n02/02/2026 0:00:01,61\n", "for day/month/year"),
+        ("t,f\n1/2/2026 23:59:59,61.5\n1/3/2026 0:00:00,61.25\n1/3/2026 0:00:01,61\n", "for month/day/year"),
+        ("t,f\n0,61.5\n1,61.25\n2,61\nMittelwert,61.25\n", "line 5: 'Mittelwert,61.25' is no reading and is left out"),
+        ("t,f\n0,61.5\n1,61.25\n2,61\nmean,61.25\nEnd of data\n", "line 5: 'mean,61.25' is no reading"),
+    ],
+)
+def test_what_is_taken_for_what_it_looks_like_has_a_note(table_file, text, says):
+    table = read_table(table_file(text))
+    assert {name: values.tolist() for name, values in table.columns.items()} == SECONDS
+    assert says in table.warnings[0]
 
 
 def test_dates_count_from_the_first_that_is_written(table_file):
@@ -246,6 +284,12 @@ def test_numbers_without_header_are_time_frequency_and_uncertainty_with_a_warnin
         ("t,CH1 [kHz]\n0,.0615\n0.5,.06125\n1,.061\n", {"f": "CH1"}, PLAIN),
         ("t,CH1 (top)\n0,61.5\n0.5,61.25\n1,61\n", {"f": "CH1 (top)"}, PLAIN),
         ("t,rpm\n0,3690\n0.5,3675\n1,3660\n", {"f": "rpm"}, PLAIN),
+        ("t,x,y\n0,20,2\n0.5,25,0.5\n1,40,1\n", {"f": "2 [ms]"}, {T: PLAIN[T], F: [50, 40, 25]}),
+        (
+            "t,x,y\n0,20,2\n0.5,25,5\n1,40,1\n",
+            {"f": "2 [ms]", "u": "y [%]"},
+            {T: PLAIN[T], F: [50, 40, 25], U: [1, 2, 0.25]},
+        ),
     ],
 )
 def test_columns_can_be_named(text, columns, expected, table_file):
@@ -358,6 +402,8 @@ def test_an_unreadable_file_is_reported(error, words, table_file, monkeypatch):
         ("t [V],f\n0,25\n1,26\n2,27\n", {"t": "1"}, "V, which is none of time: say which unit it is, as NAME [s]"),
         ("t,f\n0,61.5 ± 0.1\n1,61.2 ± 0.1\n2,61\n", {}, "into a column of its own, with the title u"),
         ("t,f\n0:00,61.5\n0:99,61.2\n0:10,61\n", {}, "line 3: '0:99' stands in column 't'"),
+        ("t,Illuminance (lx)\n0,25\n1,26\n2,27\n", {}, "is of the light sensor, which shows no turns"),
+        ("t,f\n0,61.5\nmean,61.2\n2,61\n", {}, "line 3: 'mean' stands in column 't'"),
         ("t,f\n0,0:10\n1,61.2\n2,61\n", {}, "'0:10' stands in column 'f'"),
     ],
 )
