@@ -192,12 +192,6 @@ def test_a_column_without_name_and_unit_is_asked_about(tmp_path):
         read_table(file, quantities=SPIN, needed=SPIN[:2], guess=False)
 
 
-def test_a_cell_that_is_guarded_against_formulas_is_its_number(tmp_path):
-    file = tmp_path / "guarded.csv"
-    file.write_text('"Time (s)","f (Hz)"\n\'-1.5,38\n\'-0.5,37\n0.5,36\n', encoding="utf-8")
-    assert read_table(file, quantities=SPIN).column("time_s").tolist() == [-1.5, -0.5, 0.5]
-
-
 def test_limits_in_one_column_of_a_spreadsheet_are_read(tmp_path):
     rows = "".join(f'<row r="{k}"><c r="A{k}"><v>{23 + 0.1 * k}</v></c></row>' for k in range(1, 6))
     sheet = f'<worksheet xmlns="{MAIN}"><sheetData>{rows}</sheetData></worksheet>'
@@ -205,12 +199,6 @@ def test_limits_in_one_column_of_a_spreadsheet_are_read(tmp_path):
     row = ANALYSES["limit"]
     found = row.analyze([workbook(tmp_path / "limits.xlsx", sheet, **empty)], row.options_from({}))
     assert len(found.sources[0].readings) == 5
-
-
-def test_numbered_columns_beside_a_known_spin_are_no_runs(tmp_path):
-    file = tmp_path / "beside.csv"
-    file.write_text("t,f,x1,x2\n0,38,1,2\n1,37,1,2\n2,36,1,2\n", encoding="utf-8")
-    assert read_table(file, quantities=SPIN).column("spin_frequency_hz")[0] == 38
 
 
 @pytest.mark.parametrize(
