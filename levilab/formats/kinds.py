@@ -115,7 +115,8 @@ def kind_of(path: Path) -> Kind:
     """Return the kind of a file by the end of its name and its first bytes.  Raises OSError."""
     with path.open("rb") as stream:
         head = stream.read(_BYTES)
-    return kind_of_bytes(head, path.suffix) if head.strip() or len(head) == _BYTES else EMPTY
+    kind = kind_of_bytes(head, path.suffix)
+    return EMPTY if kind is OTHER and not head.strip() and len(head) < _BYTES else kind
 
 
 def kind_of_bytes(head: bytes, suffix: str = "") -> Kind:
