@@ -222,8 +222,7 @@ def learn(trials: Sequence[Trial], prior: Prior) -> Posterior:
             ends = [_narrow(axis, log, k) for k, axis in enumerate(axes)]
     weight = np.exp(log)
     kept = weight > _WEIGHTLESS
-    points = (np.asarray(values[kept]) for values in (weight / weight[kept].sum(), middle, width, per_k))
-    return Posterior(*points, reference)
+    return Posterior(weight[kept] / weight[kept].sum(), middle[kept], width[kept], per_k[kept], reference)
 
 
 def _log_prior(prior: Prior, middle: Array, log_width: Array, per_k: Array) -> Array:

@@ -132,12 +132,13 @@ class Owner:
         masses = self.top + WASHERS
         for shown in temperatures:
             real = shown + self.rng.normal(0, tuning.TEMPERATURE_U)
-            for number in range(1, most + 1):
+            before = len(trials)
+            while len(trials) < before + most:
                 mass = float(masses[learn(trials, prior).next_trial(masses, shown)])
                 trials.append(Trial(mass, shown, self.lets_go(mass, real)))
                 if trials[-1].outcome is Outcome.FLOATS:
                     break
-            numbers.append(number)
+            numbers.append(len(trials) - before)
         return trials, numbers
 
 
