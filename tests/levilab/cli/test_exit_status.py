@@ -103,7 +103,7 @@ FAILURES = {
     "analyze spindown nowhere": "nowhere: there is no such file or folder in ",
     "analyze spindown bench.tml": "did you mean bench.toml?",
     f"report {SAMPLE} -o file/page.html": "could not be written",
-    "analyze spindown .": "holds no run and no data file",
+    "analyze spindown .": "an empty file (file: record again)",
     "analyze spindown file": "file: is empty",
     "report nowhere": "nowhere: there is no such file or folder",
     "runs nowhere": "nowhere: there is no such folder",
