@@ -194,12 +194,12 @@ class ScpiInstrument:
             raise
 
     def settings(self) -> dict[str, bool | float | str]:
-        """Ask the instrument for all declared settings, with the unit at the end of each name.
+        """Ask the instrument for its declared settings, with the unit at the end of each name.
 
         Where it joins answers, all are asked for in one message: one exchange instead of a dozen.  An instrument that
         gives another number of answers is asked one by one, then and from then on.
         """
-        rows = self.declared_settings()
+        rows = [row for row in self.declared_settings() if not row.on_demand or row.name_with_unit in self.last_set]
         questions = [row.question(self) for row in rows]
         if self.ANSWERS_JOINED and self._joins is not False and (answers := self._ask_joined(questions)):
             self._joins = True

@@ -72,6 +72,7 @@ class Setting(Generic[T]):
         values: the only numbers that the instrument has.
         span: the lowest and the highest number that it may answer, where these are not low and high: with a probe, an
             attenuator or a load other than the driver's.
+        on_demand: whether `settings` asks for it only once it was set, as for a mode that is mostly off.
         name: of the attribute; Python sets it.
     """
 
@@ -89,6 +90,7 @@ class Setting(Generic[T]):
     suffix: str = ""
     values: tuple[float, ...] = ()
     span: tuple[float, float] | None = None
+    on_demand: bool = False
     name: str = ""
 
     def __post_init__(self) -> None:

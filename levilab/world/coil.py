@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from instruments.virtual.generator.channel import Output
 from instruments.virtual.generator.voltage import voltage
+from levilab.world.bursts import burst_starts
 from levilab.world.timeline import Timeline
 
 Array = NDArray[np.float64]
+Edges = Callable[[float, float, bool], Array]
 
 
 @dataclass(frozen=True)
@@ -23,8 +26,10 @@ class _Stretch:
     origin: float
     turns: float
 
-    def field(self, times: Array) -> Array:
+    def field(self, times: Array, edges: Edges | None) -> Array:
         """Return the field at times within it [T]."""
+        if self.output.triggered and edges:
+            return self._triggered_field(times, edges)
         since, burst = times - self.origin, self.output.burst
         if burst is None or burst.period is None:
             return voltage(self.output, self.turns + self.output.frequency * since, times)
@@ -33,11 +38,30 @@ class _Stretch:
         playing = turns < burst.cycles - 1e-9
         return np.where(playing, voltage(self.output, turns, times), self.output.offset)
 
+    def _triggered_field(self, times: Array, edges: Edges) -> Array:
+        """Return the field of the bursts that edges at the trigger input start."""
+        bursts = self.output.triggered
+        assert bursts
+        length = bursts.delay + bursts.cycles / self.output.frequency
+        first = max(self.origin, float(times[0]) - 4 * length) if length < math.inf else self.origin
+        starts = burst_starts(edges(first, float(times[-1]), bursts.rising), length) + bursts.delay
+        if not starts.size:
+            return np.full_like(times, self.output.offset)
+        since = times - starts[np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)]
+        turns = self.output.frequency * since
+        playing = (turns >= 0) & (turns < bursts.cycles)
+        signal = voltage(replace(self.output, amplitude=bursts.amplitude), turns, times)
+        return np.where(playing, signal, self.output.offset)
+
 
 class Coil:
     """The field of a coil that is driven.
 
     Where the frequency changes the phase runs on; a signal begins at its start where there was none, and bursts do.
+
+    Args:
+        edges: (start [s], stop [s], rising) → the edges at the generator's trigger input, shape (m,) [s]; None: nothing
+            is plugged in.
 
     >>> coil = Coil()
     >>> coil.change(1.0, Output("SQU", 2.0, 4e-4, 0.0))
@@ -45,7 +69,8 @@ class Coil:
     [0.0, 0.0004, -0.0004]
     """
 
-    def __init__(self) -> None:
+    def __init__(self, edges: Edges | None = None) -> None:
+        self._edges = edges
         self.history = Timeline(-math.inf, _Stretch(Output("DC", 0.0, 0.0, 0.0), 0.0, 0.0))
 
     def change(self, time: float, output: Output) -> None:
@@ -80,5 +105,5 @@ class Coil:
         """Return the field at these times, shape (n,) [T]."""
         field = np.empty_like(times)
         for stretch, part in self.history.pieces(times):
-            field[part] = stretch.field(times[part])
+            field[part] = stretch.field(times[part], self._edges)
         return field

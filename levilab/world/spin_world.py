@@ -20,6 +20,7 @@ from levilab.simulator.parts import Top
 from levilab.simulator.published.printed import published
 from levilab.simulator.spin import DECAYS
 from levilab.world.base import Base, Stand, random_base
+from levilab.world.bursts import TriggerWire, mean_pull
 from levilab.world.coil import Coil
 from levilab.world.light import Laser, Tape
 from levilab.world.magnetic_field import MOMENT_A_M2, MOMENT_TILT, field_beside, moment_of
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
     from levilab.telemetry.messages import Poses
 
 Array = NDArray[np.float64]
+
+#: Step in which a top that triggers its drive is computed [s]; its pull and drag change in it by a per cent.
+BURST_STEP_S = 0.5
 
 #: How long history is kept [s]: counters look 12 000 s ahead and skip 2500 s, oscilloscopes look 600 s back.
 KEPT_S = 15_000.0
@@ -122,6 +126,9 @@ class SpinScene:
             over I₃, halved because only half of a field along one line turns with the top.
         tape: what the phototransistor sees.
         laser: the beam beside the stem.
+        trigger: the wire from the phototransistor to the generator's trigger input; None: there is none.
+        moment_turns: angle of the moment's transverse part from the coil's axis when the tape is opposite to the lens,
+            as somebody stuck it on [turns].
         jitter: scatter of a pulse's place, 1σ [turns]; 0.0212 scatters a reading over 1 s by 0.03 Hz.
         base: the magnet below it.
         stand: where the probe is at first, about where a top floats.
@@ -137,6 +144,8 @@ class SpinScene:
     lock_torque: float = MOMENT_TILT[0] * abs(MOMENT_A_M2) / 2 / Top().inertia_axial_kg_m2
     tape: Tape = field(default_factory=Tape)
     laser: Laser = field(default_factory=Laser)
+    trigger: TriggerWire | None = field(default_factory=TriggerWire)
+    moment_turns: float = 0.0
     jitter: float = 0.03 / math.sqrt(2)
     base: Base = field(default_factory=Base)
     stand: Stand = field(default_factory=Stand)
@@ -161,7 +170,7 @@ def random_scene(seed: int, scene: SpinScene | None = None) -> SpinScene:
     """Return the scene of one run: the constants and the falls scatter as between the thesis's runs.
 
     The four published constants scatter by 2 %; the ten published lower limits scatter by 0.25 Hz, here alike
-    within a run and between runs.  The base is `random_base`'s, and the probe is placed to 0.2 mm.
+    within a run and between runs.  The base is `random_base`'s, the probe is placed to 0.2 mm, and the tape anywhere.
 
     Args:
         seed: of the random numbers.
@@ -176,14 +185,20 @@ def random_scene(seed: int, scene: SpinScene | None = None) -> SpinScene:
         later_falls_hz=tuple((scene.fall_hz + 0.25 * scatter[2:]).tolist()),
         base=random_base(seed),
         stand=replace(scene.stand, scatter_m=2e-4, seed=seed),
+        moment_turns=float(np.random.default_rng((seed, 3)).uniform()),
         seed=seed,
     )
 
 
 class Phase(enum.Enum):
-    """What a top does: coast under drag alone, be pulled to the drive's frequency, be locked to it, or lie fallen."""
+    """What a top does.
+
+    It coasts under drag alone, is pulled to the drive's frequency, is locked to it, is turned by bursts that it
+    triggers itself, or lies fallen.
+    """
 
     COASTING = enum.auto()
+    TRIGGERING = enum.auto()
     PULLED = enum.auto()
     LOCKED = enum.auto()
     FALLEN = enum.auto()
@@ -198,7 +213,7 @@ class _Stretch:
         spin: at the start [rad/s].
         angle: at the start [rad].
         phase: of the top.
-        acceleration: of a top that is pulled, constant [rad/s²].
+        acceleration: of a top that is pulled or triggers its drive, constant [rad/s²].
         number: of tops before this one.
     """
 
@@ -215,14 +230,17 @@ class SpinWorld:
 
     The lock is idealised.  Within the capture range of a pendulum, |ω − ω_d| < 2√α with α the greatest acceleration by
     the drive, the top is pulled to the drive's frequency at a constant rate, α less drag or with it, and then stays
-    there: it does not swing about the drive.
+    there: it does not swing about the drive.  Bursts that the top triggers turn it by their mean torque over a turn,
+    in steps of BURST_STEP_S with the acceleration in their middle; see `mean_pull`.
     """
 
     def __init__(self, scene: SpinScene, clock: Clock) -> None:
         self.scene, self.clock, self.seed = scene, clock, scene.seed
         self._decay = DECAYS[scene.drag]
         self._jitter = np.random.default_rng((scene.seed, 1)).standard_normal(1 << 16) * scene.jitter
-        self._coil, self._stand, self._probe_t = Coil(), scene.stand, scene.stand.flux_density(scene.base)
+        self._coil = Coil(self._trigger_edges if scene.trigger else None)
+        self._stand, self._probe_t = scene.stand, scene.stand.flux_density(scene.base)
+        self._bursts: Output | None = None  # that the top triggers
         self._drive_spin, self._hold = 0.0, 0.0  # [rad/s], [rad/s²]
         self._last_change = 0.0  # the time of the last change of the drive [s]
         first = _Stretch(0.0, 2 * math.pi * scene.start_hz, 0.0, Phase.COASTING)
@@ -240,21 +258,23 @@ class SpinWorld:
         self._drop_history()
         self._coil.change(time, output)
         hold = fundamental(output) * self.scene.lock_torque
-        if hold == self._hold == 0 and time >= self._last_change:
+        bursts = output if output.triggered and self.scene.trigger else None
+        if hold == self._hold == 0 and bursts == self._bursts and time >= self._last_change:
             return  # the top notices no difference
-        self._put_back_until(time)
+        self._plan_until(time)
         now = self._stretch_at(time)
         fallen = now.phase is Phase.FALLEN
         # drop the future as it was before this change; a fall at this moment stays
         self._stretches.cut(math.nextafter(time, math.inf) if fallen else time)
         self._last_change, self._drive_spin, self._hold = time, 2 * math.pi * output.frequency, hold
+        self._bursts = bursts
         if not fallen:
             self._plan_future(now)
 
     def float_top(self, number: int) -> None:
         """Spin the top by hand; see :class:`World`."""
         time = self.clock.now()
-        self._put_back_until(time)
+        self._plan_until(time)
         now = self._stretches.at(time)
         if now.phase is Phase.FALLEN:
             self._stretches.cut(math.nextafter(time, math.inf))
@@ -264,7 +284,7 @@ class SpinWorld:
     def take_top(self) -> None:
         """Take the top out of the air; see :class:`World`."""
         time = self.clock.now()
-        self._put_back_until(time)
+        self._plan_until(time)
         now = self._stretch_at(time)
         if now.phase is not Phase.FALLEN:
             self._stretches.cut(time)
@@ -278,6 +298,18 @@ class SpinWorld:
         horizon = self.clock.now() - KEPT_S
         self._coil.history.forget(horizon)
         self._stretches.forget(horizon)
+
+    def _plan_until(self, time: float) -> None:
+        """Plan, up to this time, the stretches that have no end in sight: of triggered bursts, and of later tops."""
+        while True:
+            while (last := self._stretches.last).phase is Phase.TRIGGERING and last.start + BURST_STEP_S <= time:
+                spin = last.spin + last.acceleration * BURST_STEP_S
+                angle = last.angle + (last.spin + spin) / 2 * BURST_STEP_S
+                self._plan_future(replace(last, start=last.start + BURST_STEP_S, spin=spin, angle=angle))
+            before = len(self._stretches)
+            self._put_back_until(time)
+            if len(self._stretches) == before:
+                return
 
     def _put_back_until(self, time: float) -> None:
         """Plan, up to this time, the stretches of each top that is put back after a fall."""
@@ -302,6 +334,9 @@ class SpinWorld:
         if now.spin <= fall:
             self._append(replace(now, phase=Phase.FALLEN, spin=0.0))
             return
+        if self._bursts is not None:
+            self._trigger(now, fall)
+            return
         # deceleration by drag: the change of spin over 1 ms, which is short against 1/C ~ 300 s
         drag = (now.spin - float(self._decay.after(now.spin, 1e-3, *self.scene.constants))) / 1e-3
         captured = hold > drag and abs(now.spin - drive_spin) < 2 * math.sqrt(hold) and drive_spin > fall
@@ -322,6 +357,35 @@ class SpinWorld:
             self._append(replace(now, phase=Phase.PULLED, acceleration=acceleration))
         self._append(_Stretch(now.start + lasts, drive_spin, angle, Phase.LOCKED, number=now.number))
 
+    def _trigger(self, now: _Stretch, fall: float) -> None:
+        """Append a step of a top that triggers its drive, and its fall where it ends so."""
+        half = now.spin + self._triggered_acceleration(now.spin) * BURST_STEP_S / 2
+        acceleration = self._triggered_acceleration(half)
+        self._append(replace(now, phase=Phase.TRIGGERING, acceleration=acceleration))
+        if now.spin + acceleration * BURST_STEP_S <= fall:
+            lasts = (fall - now.spin) / acceleration
+            angle = now.angle + (now.spin + fall) / 2 * lasts
+            self._append(_Stretch(now.start + lasts, 0.0, angle, Phase.FALLEN, number=now.number))
+
+    def _triggered_acceleration(self, spin: float) -> float:
+        """Return the mean angular acceleration of a top that triggers its drive [rad/s²]."""
+        wire, output, rate = self.scene.trigger, self._bursts, spin / (2 * math.pi)
+        drag = spin * float(self._decay.damping(spin, *self.scene.constants))
+        if wire is None or output is None or output.triggered is None:
+            return -drag
+        edge = self.scene.tape.offset(wire.thresholds(rising=output.triggered.rising), rate)
+        if edge is None:  # the comparator sees no pulses, or chatters
+            return -drag
+        place = self.scene.moment_turns + edge
+        pull = mean_pull(output, rate, place, jitter=self.scene.jitter, lost=wire.lost)
+        return self.scene.lock_torque * pull - drag
+
+    def _trigger_edges(self, start: float, stop: float, rising: bool) -> Array:  # noqa: FBT001 - as Coil calls it
+        """Return the edges at the generator's trigger input."""
+        wire = self.scene.trigger
+        edges = self.crossings(start, stop, wire.thresholds(rising=rising)) if wire else None
+        return np.empty(0) if edges is None else edges
+
     def _append(self, stretch: _Stretch) -> None:
         self._stretches.append(stretch.start, stretch)
 
@@ -338,7 +402,7 @@ class SpinWorld:
 
     def motion(self, times: Array) -> tuple[Array, Array]:
         """Spin [rad/s], 0 once fallen, and angle turned [rad] at the given times, shape (n,) each."""
-        self._put_back_until(float(times.max(initial=0.0)))
+        self._plan_until(float(times.max(initial=0.0)))
         spin, angle = np.empty_like(times), np.empty_like(times)
         for stretch, part in self._stretches.pieces(times):
             spin[part], angle[part] = self._motion(stretch, times[part])

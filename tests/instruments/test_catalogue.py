@@ -69,7 +69,7 @@ def test_settings_survive_a_round_trip(name):
     opened = Opened(name)
     driver = opened.driver
     PREPARE[KIND_OF[name]](driver)
-    rows = [row.name for row in driver.declared_settings()]
+    rows = [row.name for row in driver.declared_settings() if not row.on_demand]
     before = {row: getattr(driver, row) for row in rows}
     opened.twin.execute("*RST")
     for _ in range(2):  # a load changes the amplitude that was set before it

@@ -156,7 +156,7 @@ QUEUE = {"an empty error queue": _errors(_report_none), "an error in the queue":
 def _operations(driver, of_its_kind):
     """Those of every driver, those of its kind, and asking for each of its settings."""
     operations = ANY | (QUEUE if driver.raise_errors is ScpiInstrument.raise_errors else {}) | of_its_kind
-    found = {f"setting {row.name}": _setting(row.name) for row in driver.declared_settings()}
+    found = {f"setting {row.name}": _setting(row.name) for row in driver.declared_settings() if not row.on_demand}
     for row in driver.CHANNEL.declared_settings() if hasattr(driver, "CHANNEL") else ():
         found[f"setting channel1_{row.name}"] = _channel_setting(row.name)
     return operations | found

@@ -78,7 +78,8 @@ class Generator(Instrument, Protocol):
     """What every generator offers.
 
     waveform: a short word; frequency [Hz]; amplitude, peak to peak, and offset of the open terminals [V]; output:
-    whether the signal is on the terminals; limits: what the coil stands.
+    whether the signal is on the terminals; burst_phase: where a burst starts in its cycle [°]; limits: what the coil
+    stands.
     """
 
     waveform: str
@@ -86,10 +87,36 @@ class Generator(Instrument, Protocol):
     amplitude: float
     offset: float
     output: bool
+    burst_phase: float
     limits: Limits
 
     def prepare(self, *, waveform: str, frequency_hz: float, amplitude_vpp: float, offset_v: float = 0.0) -> None:
         """Set the signal; the output is off afterwards.  Raises OutOfRange beyond the limits, with nothing sent."""
+
+    def prepare_triggered(
+        self,
+        *,
+        waveform: str,
+        frequency_hz: float,
+        amplitude_vpp: float,
+        phase_deg: float,
+        cycles: int = 1,
+        rising: bool = True,
+        delay_s: float = 0.0,
+    ) -> None:
+        """Set bursts, each started by an edge at the trigger input; the output is off afterwards.
+
+        Args:
+            waveform: of the cycles, as of `prepare`.
+            frequency_hz: of the cycles.
+            amplitude_vpp: of the cycles.
+            phase_deg: where in its cycle a burst starts; 0 is where a sine rises through its middle.
+            cycles: of a burst.  Edges that come before it has ended are ignored.
+            rising: whether rising edges start it, or falling ones.
+            delay_s: from the edge to the start.
+
+        Raises OutOfRange beyond the limits, with nothing sent.
+        """
 
     def off(self) -> None:
         """Switch all outputs off, and see that they are."""

@@ -9,6 +9,8 @@ from instruments.drivers.generator.drive import (
     LoadSetting,
     OutputSwitch,
     amplitude_setting,
+    burst_setting,
+    burst_word,
     frequency_setting,
     offset_setting,
 )
@@ -36,3 +38,7 @@ class Agilent33220A(DriveGenerator):
     offset = offset_setting(digits=14)
     load = LoadSetting("OUTP:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
     output = OutputSwitch("OUTP", bool)
+    burst_cycles = burst_setting("BURS:NCYC", 1.0, 50_000.0)
+    trigger_source = burst_word("TRIG:SOUR", "IMMediate", "EXTernal", "BUS")
+    trigger_slope = burst_word("TRIG:SLOP", "POSitive", "NEGative")
+    trigger_delay = burst_setting("TRIG:DEL", 0.0, 85.0, unit="s")

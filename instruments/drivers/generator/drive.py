@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from instruments.drivers.generator import NO_LIMITS, OPEN_V, Limits, check_peak
 from instruments.drivers.scpi import ScpiInstrument
@@ -93,13 +93,25 @@ def offset_setting(digits: int) -> LimitedSetting:
     )
 
 
+def burst_setting(header: str, low: float, high: float, *, unit: str = "", **more: Any) -> Setting[float]:
+    """Return a number of a burst, which `settings` asks for once it was set."""
+    return Setting(header, float, unit, low, high, resolution=1e-6, on_demand=True, **more)
+
+
+def burst_word(header: str, *choices: str, **more: Any) -> Setting[str]:
+    """Return a word of a burst, which `settings` asks for once it was set."""
+    return Setting(header, str, choices=choices, on_demand=True, **more)
+
+
 class DriveGenerator(ScpiInstrument):
     """What both families do with their settings.
 
+    BURST: the words for bursts of cycles, for a trigger from outside, for its falling and for its rising edge;
     OUTPUT: how the headers of the output begin; TWO_OUTPUTS: the models that have a second one, which nothing here
     drives (regular expression); TRIANGLE_IS_RAMP: whether it has no triangle, but a symmetry of ramps.
     """
 
+    BURST: ClassVar[tuple[str, str, str, str]] = ("TRIG", "EXT", "NEG", "POS")
     OUTPUT: ClassVar[str]
     TWO_OUTPUTS: ClassVar[str] = ""
     TRIANGLE_IS_RAMP: ClassVar[bool] = False
@@ -110,6 +122,13 @@ class DriveGenerator(ScpiInstrument):
     offset: Setting[float]
     output: Setting[bool]
     symmetry: Setting[float]
+    burst: Setting[bool] = Setting("BURS:STAT", bool, on_demand=True)
+    burst_mode: Setting[str] = burst_word("BURS:MODE", "TRIGgered", "GATed")
+    burst_phase: Setting[float] = burst_setting("BURS:PHAS", -360.0, 360.0, unit="deg")
+    burst_cycles: Setting[float]
+    trigger_source: Setting[str]
+    trigger_slope: Setting[str]
+    trigger_delay: Setting[float]
     #: Whether the signal that is set is one of :meth:`prepare`, under the limits as they are.
     prepared_here: bool
 
@@ -158,6 +177,35 @@ class DriveGenerator(ScpiInstrument):
         self.frequency = frequency_hz
         self._level(amplitude_vpp, offset_v)
         self.prepared_here = True
+
+    def prepare_triggered(
+        self,
+        *,
+        waveform: str,
+        frequency_hz: float,
+        amplitude_vpp: float,
+        phase_deg: float,
+        cycles: int = 1,
+        rising: bool = True,
+        delay_s: float = 0.0,
+    ) -> None:
+        """Set bursts that an edge at the trigger input starts, from a reset as `prepare`; see :class:`Generator`."""
+        address, rows = self.transport.address, type(self)
+        asked = ((rows.burst_phase, phase_deg), (rows.burst_cycles, cycles), (rows.trigger_delay, delay_s))
+        for row, value in asked:
+            if not row.low <= value <= row.high:
+                raise OutOfRange(address, row.name, value, f"{row.low:g} to {row.high:g} {row.unit}".rstrip())
+        self.prepare(waveform=waveform, frequency_hz=frequency_hz, amplitude_vpp=amplitude_vpp)
+        self.prepared_here = False
+        self._set_burst(phase_deg=phase_deg, cycles=cycles, rising=rising, delay_s=delay_s)
+        self.prepared_here = True
+
+    def _set_burst(self, *, phase_deg: float, cycles: int, rising: bool, delay_s: float) -> None:
+        """Set what a burst is like and what starts it, and then choose bursts."""
+        self.burst_mode, self.trigger_source = self.BURST[:2]
+        self.burst_cycles, self.burst_phase = float(cycles), phase_deg
+        self.trigger_slope, self.trigger_delay = self.BURST[2 + rising], delay_s
+        self.burst = True
 
     def _reset(self) -> None:
         """Switch all outputs off, and choose a plain signal and voltages peak to peak at the open terminals."""

@@ -9,6 +9,8 @@ from instruments.drivers.generator.drive import (
     LoadSetting,
     OutputSwitch,
     amplitude_setting,
+    burst_setting,
+    burst_word,
     frequency_setting,
     offset_setting,
 )
@@ -40,3 +42,7 @@ class Keysight33500B(DriveGenerator):
     offset = offset_setting(digits=16)
     load = LoadSetting("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
     output = OutputSwitch("OUTP1", bool)
+    burst_cycles = burst_setting("BURS:NCYC", 1.0, 1e8)
+    trigger_source = burst_word("TRIG:SOUR", "IMMediate", "EXTernal", "TIMer", "BUS")
+    trigger_slope = burst_word("TRIG:SLOP", "POSitive", "NEGative")
+    trigger_delay = burst_setting("TRIG:DEL", 0.0, 1000.0, unit="s")

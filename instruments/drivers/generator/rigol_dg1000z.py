@@ -9,6 +9,8 @@ from instruments.drivers.generator.drive import (
     LoadSetting,
     OutputSwitch,
     amplitude_setting,
+    burst_setting,
+    burst_word,
     frequency_setting,
     offset_setting,
 )
@@ -21,7 +23,8 @@ class RigolDG1000Z(DriveGenerator):
 
     Sources: DG800 Programming Guide, pages 2-43 (``:OUTPut``) and 2-72 (numbers with seven digits, ``1.000000E+02``),
     DG1000Z Programming Guide; PyMeasure's DG800.  Headers are those of Agilent's 33220A, a triangle is a ramp of 50 %
-    here, too; a switch is answered with ON or OFF, and a model of one channel has no ``OUTP2``.
+    here, too, but the trigger of a burst is set with the burst (page 2-64); a switch is answered with ON or OFF, and a
+    model of one channel has no ``OUTP2``.
     """
 
     MODELS: ClassVar[str] = r"DG8[123][12]|DG10[236]2Z"
@@ -41,6 +44,13 @@ class RigolDG1000Z(DriveGenerator):
     offset = offset_setting(digits=7)
     load = LoadSetting("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
     output = OutputSwitch("OUTP1", bool)
+    burst_mode = burst_word("BURS:MODE", "TRIGgered", "INFinity", "GATed")
+    burst_phase = burst_setting("BURS:PHAS", 0.0, 360.0, unit="deg")
+    #: The guides print an answer of this one in either form.
+    burst_cycles = burst_setting("BURS:NCYC", 1.0, 1e6, form=Form(r"\d+|\d\.\d{6}E[+-]\d{2}", "10"))
+    trigger_source = burst_word("BURS:TRIG:SOUR", "INTernal", "EXTernal", "MANual")
+    trigger_slope = burst_word("BURS:TRIG:SLOP", "POSitive", "NEGative")
+    trigger_delay = burst_setting("BURS:TDEL", 0.0, 85.0, unit="s")
 
     def field_of(self, answer: str, header: str, key: str) -> str:
         """Return the answer, ON and OFF as 1 and 0."""

@@ -6,7 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from instruments.drivers.generator import OPEN_V
-from instruments.drivers.generator.drive import DriveGenerator, LimitedSetting, LoadSetting, OutputSwitch
+from instruments.drivers.generator.drive import (
+    DriveGenerator,
+    LimitedSetting,
+    LoadSetting,
+    OutputSwitch,
+    burst_setting,
+    burst_word,
+)
 from instruments.drivers.setting import Setting
 from instruments.errors import CommandRefused
 from instruments.ieee488 import INFINITY, Form
@@ -16,7 +23,7 @@ if TYPE_CHECKING:
 
 #: "1000HZ", "4V", "-1.999V", "1e-06HZ": as the C language's %g, no zero that need not be (measured on an SDG2042X).
 _DIGITS = r"-?(0|[1-9]\d{0,11})(\.\d{0,14}[1-9])?(e[+-]\d{2})?"
-_NUMBER, _HERTZ, _VOLTS = (Form(_DIGITS, f"1000{unit}", suffix=unit) for unit in ("", "HZ", "V"))
+_NUMBER, _HERTZ, _VOLTS, _SECONDS = (Form(_DIGITS, f"1000{unit}", suffix=unit) for unit in ("", "HZ", "V", "S"))
 #: The only word that is no number: the load of an open circuit.
 _OPEN = "HZ"
 #: A reset, and so the answer to *OPC?, may take this long [s] (assumed).
@@ -44,6 +51,14 @@ class _Load(LoadSetting):
         return _OPEN if value >= INFINITY else super()._spell(value)
 
 
+@dataclass(eq=False)
+class _Whole(Setting[float]):
+    """A whole number."""
+
+    def _spell(self, value: float) -> str:
+        return f"{value:.0f}"
+
+
 class SiglentSDG1000X(DriveGenerator):
     """Siglent SDG1000X: SDG1032X, SDG1062X; two channels, of which the first drives the coil.
 
@@ -56,12 +71,16 @@ class SiglentSDG1000X(DriveGenerator):
     - A number beyond its limits becomes the limit without a word, and the guide has no error queue: each setting is
       asked for after it was sent.
     - It prints six digits of a number, ten of a frequency, and none that are zero at the end (measured on an SDG2042X).
+    - A burst has its fields only while it is on: ``C1:BTWV?`` answers ``STATE,OFF``, or all of them, then ``CARR`` and
+      those of the waveform; with a trigger from outside ``EDGE`` is among them.  No delay is shorter than the latency,
+      2.4e-07 s or 5.2e-07 s in two public records.
     - A triangle is a ramp of 50 % symmetry; so `waveform` answers RAMP for it.
     """
 
     MODELS: ClassVar[str] = r"SDG1\d{3}X( Plus)?"
     NUMBER: ClassVar[Form] = _NUMBER
     OUTPUT: ClassVar[str] = "C1:OUTP"
+    BURST = ("NCYC", "EXT", "FALL", "RISE")
     #: The first field of an output's answer, and the switch that it stands for.
     _STATES: ClassVar[Mapping[str, str]] = {"ON": "1", "OFF": "0"}
 
@@ -99,11 +118,18 @@ class SiglentSDG1000X(DriveGenerator):
     #: Whole ohms; a fraction is cut off.
     load = _Load("C1:OUTP", float, unit="ohm", low=50.0, high=INFINITY, key="LOAD", resolution=1.0, digits=6)
     output = OutputSwitch("C1:OUTP", bool)
+    burst = Setting("C1:BTWV", bool, key="STATE", on_demand=True)
+    burst_mode = burst_word("C1:BTWV", "GATE", "NCYC", key="GATE_NCYC")
+    burst_cycles = _Whole("C1:BTWV", float, low=1.0, high=1e6, key="TIME", on_demand=True)
+    burst_phase = burst_setting("C1:BTWV", 0.0, 360.0, unit="deg", key="STPS")
+    trigger_source = burst_word("C1:BTWV", "EXT", "INT", "MAN", key="TRSR")
+    trigger_slope = burst_word("C1:BTWV", "RISE", "FALL", key="EDGE")
+    trigger_delay = burst_setting("C1:BTWV", 0.0, 100.0, unit="s", key="DLAY", form=_SECONDS)
 
     def field_of(self, answer: str, header: str, key: str) -> str:
         """Return the value behind its name; that of an output, which has none, is the first field."""
         head, _, rest = answer.partition(" ")
-        fields = rest.split(",")
+        fields = rest.partition(",CARR,")[0].split(",")
         if head != header:
             raise ValueError(answer)
         if not key:
@@ -112,7 +138,8 @@ class SiglentSDG1000X(DriveGenerator):
         pairs = dict(zip(named[::2], named[1::2], strict=True))
         if 2 * len(pairs) != len(named):
             raise ValueError(answer)  # a name that comes twice
-        return pairs.get(key, answer)
+        value = pairs.get(key, answer)
+        return self._STATES.get(value, value)
 
     def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
         """Ask for it: there is no error queue."""
@@ -124,6 +151,11 @@ class SiglentSDG1000X(DriveGenerator):
 
     def raise_errors(self, after: str) -> None:
         """Do nothing: there is no error queue."""
+
+    def _set_burst(self, **burst: Any) -> None:
+        """Choose bursts first: before, the instrument takes none of their fields."""
+        self.burst = True
+        super()._set_burst(**burst)
 
     def _reset(self) -> None:
         self.command("*RST")

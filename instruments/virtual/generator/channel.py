@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 #: The generator's own resistance [Ω], its greatest voltage without a load [V], and SCPI's infinity.
 SOURCE_OHM, OPEN_V, INFINITE = 50.0, 10.0, 9.9e37
+#: The sources of triggers that need nothing from outside.
+_BY_ITSELF = {"IMM", "TIM", "INT"}
 _WORDS = {"MIN", "MINIMUM", "MAX", "MAXIMUM", "DEF", "DEFAULT"}
 
 
@@ -89,6 +91,8 @@ class Family:
         points: fewest and most samples of an arbitrary waveform.
         room: samples in the memory for them.
         edge_part: an edge is no longer than this part of the shorter half of a pulse.
+        latency: from an edge at the trigger input to the start of a burst [s]; the data sheets' order.
+        trigger_jitter: its scatter, 1σ [s].
     """
 
     waveforms: tuple[Waveform, ...]
@@ -103,6 +107,8 @@ class Family:
     points: tuple[int, int]
     room: int
     edge_part: float = 0.625
+    latency: float = 500e-9
+    trigger_jitter: float = 6e-9
 
     def waveform(self, short: str) -> Waveform:
         """Return the waveform with this short name."""
@@ -123,6 +129,27 @@ class Burst:
 
 
 @dataclass(frozen=True)
+class Triggered:
+    """The bursts that edges at the trigger input start, where the output waits for these.
+
+    An edge that comes before a burst has ended is ignored.
+
+    Attributes:
+        amplitude: of a burst, half of peak to peak [V].
+        cycles: of a burst; inf for no end.
+        rising: whether rising edges start it, or falling ones.
+        delay: from an edge to the start of a burst, with the latency [s].
+        jitter: scatter of the delay, 1σ [s].
+    """
+
+    amplitude: float
+    cycles: float
+    rising: bool
+    delay: float
+    jitter: float
+
+
+@dataclass(frozen=True)
 class Output:
     """The signal at the open terminals from a time on.
 
@@ -132,7 +159,7 @@ class Output:
     Attributes:
         waveform: in its short form.
         frequency: of the waveform [Hz].
-        amplitude: half of peak to peak [V]; 0 when the output is off.
+        amplitude: half of peak to peak [V]; 0 when the output is off, or waits for a trigger.
         offset: mean voltage [V].
         phase: at the start [°]; of bursts, at the start of each.
         duty: part of a period in which a SQU or PULS is high.
@@ -140,6 +167,7 @@ class Output:
         inverted: by OUTPut:POLarity.
         burst: None where the waveform runs on.
         samples: of an arbitrary waveform, −1 to 1, shape (n,).
+        triggered: the bursts that an edge at the trigger input would start, of this waveform, frequency and phase.
     """
 
     waveform: str
@@ -152,10 +180,12 @@ class Output:
     inverted: bool = False
     burst: Burst | None = None
     samples: NDArray[np.float64] | None = field(default=None, compare=False, repr=False)
+    triggered: Triggered | None = None
 
     def times(self, factor: float) -> Output:
         """Return the output in another unit, of a quantity that is `factor` per volt."""
-        return replace(self, amplitude=factor * self.amplitude, offset=factor * self.offset)
+        bursts = self.triggered and replace(self.triggered, amplitude=factor * self.triggered.amplitude)
+        return replace(self, amplitude=factor * self.amplitude, offset=factor * self.offset, triggered=bursts)
 
 
 class Channel:
@@ -434,13 +464,13 @@ class Channel:
     @property
     def repeats(self) -> bool:
         """Whether bursts start by themselves."""
-        return bool(self["burst"]) and self["burst_mode"] == "TRIG" and self["trigger_source"] in {"IMM", "TIM"}
+        return bool(self["burst"]) and self["burst_mode"] == "TRIG" and self["trigger_source"] in _BY_ITSELF
 
     @property
     def waits(self) -> bool:
         """Whether it needs a trigger to put something out."""
         armed = (self["burst"] and self["burst_mode"] == "TRIG") or self["sweep"]
-        return bool(armed) and self["trigger_source"] not in {"IMM", "TIM"}
+        return bool(armed) and self["trigger_source"] not in _BY_ITSELF
 
     def trigger(self) -> None:
         """Take a trigger that comes now."""
@@ -474,6 +504,20 @@ class Channel:
             inverted=inverted,
             burst=self._burst(),
             samples=self.samples if short == self.family.arb else None,
+            triggered=self._triggered() if on and silent else None,
+        )
+
+    def _triggered(self) -> Triggered | None:
+        """Return the bursts that wait for an edge at the trigger input."""
+        if not self.waits or self["trigger_source"] != "EXT":
+            return None
+        cycles = self.number("burst_cycles")
+        return Triggered(
+            amplitude=self.number("amplitude_vpp") / 2 / self.load_factor,
+            cycles=math.inf if cycles >= INFINITE else cycles,
+            rising=self["trigger_slope"] == "POS",
+            delay=self.number("trigger_delay") + self.family.latency,
+            jitter=self.family.trigger_jitter,
         )
 
     def _is_gated(self) -> bool:

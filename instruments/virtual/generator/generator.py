@@ -192,7 +192,8 @@ class VirtualGenerator(VirtualInstrument):
             for mode in MODES:
                 if channel.prefix + mode in self.settings:
                     channel[mode] = False
-            channel["trigger_source"], channel["waveform"] = "IMM", waveform
+            source = self.commands.defaults[f"{channel.prefix}trigger_source"]
+            channel["trigger_source"], channel["waveform"] = source, waveform
             frequency = channel.read(wanted.get("frequency", "DEF"), *channel.frequency_limits(), 1e3, "HZ")
             if waveform == "PRBS":
                 channel["prbs_rate"] = frequency

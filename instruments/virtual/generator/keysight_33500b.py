@@ -54,6 +54,8 @@ _FAMILY = Family(
     burst_rest=1e-6,
     points=(8, 1_000_000),
     room=1_000_000,
+    latency=185e-9,
+    trigger_jitter=2.5e-9,
 )
 
 

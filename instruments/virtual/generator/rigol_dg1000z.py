@@ -2,7 +2,8 @@
 
 Sources: see the driver; answers of ``APPLy?`` as in PyMeasure's tests of its DG800; after ``*RST`` a sine of 1 kHz and
 5 Vpp at high impedance.  Assumed: a number beyond its limits becomes the limit, with an entry in the error queue, and
-``APPLy`` leaves the output as it is.  Modulation, sweeps, bursts and arbitrary waveforms are missing.
+``APPLy`` leaves the output as it is; DG800 Programming Guide, pages 2-60 to 2-65 (``:BURSt``).  Modulation, sweeps,
+endless bursts and arbitrary waveforms are missing.
 """
 
 from __future__ import annotations
@@ -12,10 +13,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.core.rows import Both, Row, Switch
+from instruments.virtual.core.rows import Both, Row, Switch, Word
 from instruments.virtual.generator.channel import INFINITE, Family, Waveform
 from instruments.virtual.generator.generator import VirtualGenerator
-from instruments.virtual.generator.rows import CHANNEL, Quantity, pulses, waveforms
+from instruments.virtual.generator.rows import CHANNEL, Quantity, burst_cycles, pulses, waveforms
 
 if TYPE_CHECKING:
     from instruments.virtual.core.parser import Value
@@ -47,11 +48,13 @@ def _family(sine: float, square: float, ramp: float) -> Family:
 
 DG1062Z, DG832 = _family(60e6, 25e6, 1e6), _family(35e6, 10e6, 1e6)
 
+_BURST, _SOURCES = "[SOURce[n]:]BURSt", "INTernal EXTernal MANual"
+
 #: The rows that this language shares with Keysight's; the settings of the others stay as they are after ``*RST``.
 _SHARED = (
     *("FREQuency[:CW|:FIXed]", "SQUare:PERiod", "PHASe[:ADJust]", "SQUare:DCYCle", "RAMP:SYMMetry", "[:AMPLitude]"),
     *("VOLTage:UNIT", "[:IMMediate]:OFFSet", "[:IMMediate]:HIGH", "[:IMMediate]:LOW", "APPLy", "[FUNCtion:]PULSe"),
-    *("OUTPut[n][:STATe]", "OUTPut[n]:LOAD", "OUTPut[n]:POLarity"),
+    *("OUTPut[n][:STATe]", "OUTPut[n]:LOAD", "OUTPut[n]:POLarity", "BURSt:STATe", "BURSt:INTernal:PERiod"),
 )
 
 
@@ -77,12 +80,15 @@ _CHANNEL: tuple[Row, ...] = (
         if isinstance(row, Quantity) and row.name == "{n}:load"
     ),
     Switch("OUTPut[n]:SYNC[:STATe]", "{n}:sync", default=True, words=("OFF", "ON")),
+    Word(f"{_BURST}:MODE", "{n}:burst_mode", "TRIGgered GATed"),
+    Quantity(f"{_BURST}:PHASe", "{n}:burst_phase", 0.0, (0.0, 360.0), angle=True),
+    burst_cycles(1e6),
+    Word(f"{_BURST}:TRIGger:SOURce", "{n}:trigger_source", _SOURCES, default="INT"),
+    Word(f"{_BURST}:TRIGger:SLOPe", "{n}:trigger_slope", "POSitive NEGative"),
+    Quantity(f"{_BURST}:TDELay", "{n}:trigger_delay", 0.0, (0.0, 85.0), "S"),
 )
 #: What the language of the other rows is about, off.
 _OFF: dict[str, Value] = {
-    "{n}:trigger_source": "IMM",
-    "{n}:trigger_delay": 0.0,
-    "{n}:burst_cycles": 1.0,
     "{n}:sweep_time": 1.0,
     **{name: value for row in CHANNEL if _as_rigol(row) not in _OWN for name, value in row.defaults().items()},
 }

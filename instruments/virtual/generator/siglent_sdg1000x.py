@@ -6,7 +6,9 @@ what the authors of a public driver measured on an SDG2042X (the answer to ``C1:
 number, ten of a frequency; volts r.m.s. of a sine are 0.3535 of its peak to peak, of a ramp 1/3.464; the fraction of a
 load is cut off).  Inferred: which field gives way where amplitude and offset together go beyond 10 V (the one that is
 set), that a message has no path memory and changes nothing where one of its fields is unknown, limits of the ramp.
-Modulation, sweep and burst are always off, arbitrary waveforms are missing.
+The fields of a burst and their order are those of public records of ``C1:BTWV?``, the latency among them; inferred: a
+burst that is off takes no other field (guide), one that waits for an edge has EDGE in the place of TRMD (as a public
+record of SWWV has it).  Modulation and sweep are always off, arbitrary waveforms are missing.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import boolean, choice, number, optional_parameter, parameter
 from instruments.virtual.core.parser import ScpiError, Value
 from instruments.virtual.core.rows import Ask, Both, Own, Row, Switch, Word, short_header
-from instruments.virtual.generator.channel import INFINITE, OPEN_V, SOURCE_OHM, Output
+from instruments.virtual.generator.channel import INFINITE, OPEN_V, SOURCE_OHM, Burst, Output, Triggered
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -74,9 +76,24 @@ _FIELDS = {
         Field("SYM", "symmetry", 50.0, only=("RAMP",)),
     )
 }
+#: The fields of BTWV: name on the wire → setting, value after ``*RST``, its limits or words, unit.
+_BURST: dict[str, tuple[str, float | str, tuple[float, float] | tuple[str, ...], str]] = {
+    "PRD": ("burst_period", 0.01, (1e-6, 1000.0), "S"),
+    "STPS": ("burst_phase", 0.0, (0.0, 360.0), ""),
+    "TRSR": ("trigger_source", "INT", ("EXT", "INT", "MAN"), ""),
+    "TRMD": ("trigger_out", "OFF", ("RISE", "FALL", "OFF"), ""),
+    "EDGE": ("trigger_edge", "RISE", ("RISE", "FALL"), ""),
+    "TIME": ("burst_cycles", 1.0, (1.0, 1e6), ""),
+    "DLAY": ("trigger_delay", 0.0, (0.0, 100.0), "S"),
+    "GATE_NCYC": ("burst_mode", "NCYC", ("GATE", "NCYC"), ""),
+}
+#: From an edge at the trigger input to the burst, which no delay is shorter than, and its scatter, 1σ (assumed) [s].
+_LATENCY, _JITTER = 2.4e-7, 5e-9
 #: The settings of a channel, with their values after ``*RST``.
 _DEFAULTS: dict[str, Value] = {
     **{field.name: field.default for field in _FIELDS.values() if not field.name.startswith("_")},
+    **{name: value for name, value, _, _ in _BURST.values()},
+    "burst": False,
     "waveform": "SINE",
     "output": False,
     "load": INFINITE,
@@ -87,8 +104,9 @@ _CHANNEL: tuple[Row, ...] = (
     Both("C{n}:(OUTP|OUTPUT)", lambda s, n, p: s.set_output(n, p), lambda s, n, p: s.output(n, p)),
     *(
         Own(f"C{{n}}:({short}|{long})", lambda _s, _n, p: _only_off(p), lambda s, n, w=short: s.off(f"C{n}:{w}"))
-        for short, long in (("MDWV", "MODULATEWAVE"), ("SWWV", "SWEEPWAVE"), ("BTWV", "BURSTWAVE"))
+        for short, long in (("MDWV", "MODULATEWAVE"), ("SWWV", "SWEEPWAVE"))
     ),
+    Own("C{n}:(BTWV|BURSTWAVE)", lambda s, n, p: s.set_burst(n, p), lambda s, n: s.burst(n)),
     Switch("C{n}:SYNC", "{n}:sync", words=("OFF", "ON")),
     Own("C{n}:(INVT|INVERT)", lambda s, n, p: s.invert(n, p), lambda s, n: s.ask_invert(n)),
     Ask("C{n}:(ARWV|ARBWAVE)", lambda s, n: s.reply(f"C{n}:ARWV", "INDEX,2,NAME,StairUp")),
@@ -98,7 +116,7 @@ _BUILT_IN = (*("Sine", "Noise", "StairUp", "StairDn", "Stairud", "Ppulse", "Npul
 
 
 def _only_off(parameters: list[str]) -> None:
-    """STATE,OFF: modulation, sweep and burst are missing here.  Raises ScpiError for all else."""
+    """STATE,OFF: modulation and sweep are missing here.  Raises ScpiError for all else."""
     if [word.upper() for word in parameters] != ["STATE", "OFF"]:
         raise ScpiError(-224)
 
@@ -113,6 +131,16 @@ def _pairs(parameters: list[str]) -> list[tuple[str, str]]:
     if not parameters or len(parameters) % 2:
         raise ScpiError(-109)
     return [(name.upper(), value) for name, value in zip(parameters[::2], parameters[1::2], strict=True)]
+
+
+def _parameter(
+    text: str, default: float | str, allowed: tuple[float, float] | tuple[str, ...], unit: str
+) -> float | str:
+    """Return a parameter of a burst: one of the words, or a number, at most at its limits.  Raises ScpiError."""
+    if isinstance(default, str):
+        return choice(text, tuple(str(word) for word in allowed))
+    low, high = (float(limit) for limit in allowed)
+    return min(max(number(text, low=-1e99, high=1e99, default=default, unit=unit), low), high)
 
 
 class VirtualSDG1000X(VirtualInstrument):
@@ -253,6 +281,39 @@ class VirtualSDG1000X(VirtualInstrument):
         fields |= {field.key: self.spell(self._number(n, field.name)) for field in own}
         return self.reply(f"C{n}:BSWV", ",".join(f"{key},{value}" for key, value in fields.items()))
 
+    # --- BTWV ---
+
+    def set_burst(self, n: int, parameters: list[str]) -> None:
+        """BTWV: its state, and its fields where it is on.  Raises ScpiError."""
+        with self.all_or_none():
+            for key, text in _pairs(parameters):
+                if key == "STATE":
+                    self.settings[_key(n, "burst")] = boolean(text)
+                elif key not in _BURST or not self.settings[_key(n, "burst")]:
+                    raise ScpiError(-224, key[:20])
+                else:
+                    name, default, allowed, unit = _BURST[key]
+                    self.settings[_key(n, name)] = _parameter(text, default, allowed, unit)
+        self.on_change(_key(n, "burst"))
+
+    def burst(self, n: int) -> str:
+        """BTWV?: all fields, and those of the waveform behind them; STATE alone where it is off."""
+        if not self.settings[_key(n, "burst")]:
+            return self.off(f"C{n}:BTWV")
+        values = {key: self.settings[_key(n, name)] for key, (name, *_) in _BURST.items()}
+        values["DLAY"] = self._delay(n)
+        del values["TRMD" if values["TRSR"] == "EXT" else "EDGE"]
+        fields = (
+            f"{key},{self.spell(value) + _BURST[key][3] if isinstance(value, float) else value}"
+            for key, value in values.items()
+        )
+        wave = self.wave(n, []).partition("WVTP,")[2]
+        return self.reply(f"C{n}:BTWV", f"STATE,ON,{','.join(fields)},CARR,WVTP,{wave}")
+
+    def _delay(self, n: int) -> float:
+        """Return the time from an edge at the trigger input to the burst [s]."""
+        return max(self._number(n, "trigger_delay"), _LATENCY)
+
     # --- OUTP ---
 
     def set_output(self, n: int, parameters: list[str]) -> None:
@@ -300,13 +361,21 @@ class VirtualSDG1000X(VirtualInstrument):
     def signal(self, n: int = 1) -> Output:
         """Return the signal at the open terminals of a channel."""
         on, short = bool(self.settings[_key(n, "output")]), _WAVEFORMS[str(self.settings[_key(n, "waveform")])][0]
+        amplitude = self._number(n, "amplitude") / 2 if on and short != "DC" else 0.0
+        bursts = bool(self.settings[_key(n, "burst")]) and short != "DC"
+        source, gated = self.settings[_key(n, "trigger_source")], self.settings[_key(n, "burst_mode")] == "GATE"
+        cycles, waits = self._number(n, "burst_cycles"), bursts and (gated or source != "INT")
+        rising, delay = self.settings[_key(n, "trigger_edge")] == "RISE", self._delay(n)
+        armed = amplitude and waits and source == "EXT" and not gated
         return Output(
             waveform=short,
             frequency=self._number(n, "frequency"),
-            amplitude=self._number(n, "amplitude") / 2 if on and short != "DC" else 0.0,
+            amplitude=0.0 if waits else amplitude,
             offset=self._number(n, "offset") if on else 0.0,
-            phase=self._number(n, "phase"),
+            phase=self._number(n, "burst_phase" if bursts else "phase"),
             duty=self._number(n, "duty") / 100,
             symmetry=self._number(n, "symmetry") / 100 if short == "RAMP" else 1.0,
             inverted=self.settings[_key(n, "polarity")] == "INVT",
+            burst=Burst(cycles, None if waits else self._number(n, "burst_period")) if bursts else None,
+            triggered=Triggered(amplitude, cycles, rising, delay, _JITTER) if armed else None,
         )

@@ -140,7 +140,7 @@ def test_the_buzzer_is_switched_and_asked_for(device):
     assert "SHORT" in ask(device, "CHDR?")
 
 
-@pytest.mark.parametrize("header", ["MDWV", "SWWV", "BTWV"])
+@pytest.mark.parametrize("header", ["MDWV", "SWWV"])
 def test_what_a_generator_lacks_is_off(header):
     device = VirtualSDG1000X(VirtualClock())
     assert ask(device, f"C1:{header} STATE,OFF;C1:{header}?") == f"C1:{header} STATE,OFF"
