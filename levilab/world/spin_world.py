@@ -128,7 +128,7 @@ class SpinScene:
         laser: the beam beside the stem.
         trigger: the wire from the phototransistor to the generator's trigger input; None: there is none.
         moment_turns: angle of the moment's transverse part from the coil's axis when the tape is opposite to the lens,
-            as somebody stuck it on [turns].
+            [turns].
         jitter: scatter of a pulse's place, 1σ [turns]; 0.0212 scatters a reading over 1 s by 0.03 Hz.
         base: the magnet below it.
         stand: where the probe is at first, about where a top floats.
