@@ -173,21 +173,25 @@ class Posterior:
         """Return the probability to float for each mass [kg] at a temperature [°C], shape (masses,)."""
         return np.array([self.outcomes(masses[k : k + 1], temperature)[1, 0] @ self.weight for k in range(masses.size)])
 
-    def next_trial(self, masses: Array, temperature: float) -> int:
-        """Return the index of the mass to try next: with the most chances to float at it or at the trial after it.
+    def promise(self, masses: Array, temperature: float) -> Array:
+        """Return the chances to float at a trial, plus those to float at it or at the best one after it.
 
-        The trial after it is the best one after what this one will have shown.
+        The best one after it is the best after what it will have shown.  The mass to try next has the most of both.
 
         Args:
             masses: that can be set, shape (n,) [kg].
             temperature: [°C].
+
+        Returns:
+            From 0 to 2, shape (n,); 0 for masses beyond the _COMPARED ones with the best chances.
         """
         first = self.chances(masses, temperature)
         best = np.argsort(-first, kind="stable")[:_COMPARED]
         rises, floats, sinks = self.outcomes(masses[best], temperature)
         second = sum((weighted @ floats.T).max(axis=1) for weighted in (rises * self.weight, sinks * self.weight))
-        # floats at the first, and at one of both
-        return int(best[np.argmax(2 * first[best] + second)])
+        both = np.zeros(masses.size)
+        both[best] = 2 * first[best] + second
+        return both
 
 
 def learn(trials: Sequence[Trial], prior: Prior) -> Posterior:

@@ -161,6 +161,13 @@ COMMANDS = {
         "Calculate mass and moments of inertia of a top from its parts, taken as cylinders, with uncertainties.",
         "levilab top sample_data/device.toml",
     ),
+    "tune": Row(
+        "tune.tune",
+        """Say which washers to put on today: by your trials, the temperature, and a Hall scan if there is one.
+
+        Asks what it needs to know, and keeps it in tune.toml: with each trial it knows your top better.""",
+        'levilab tune --temperature 21.5 --top 24.9 --washers "0.06,0.06,0.1,0.2" --trial "0.1 g, 20.5 C, rises"',
+    ),
     "acquire": Row("acquire.acquire_app", "Run an experiment on the bench and write a run folder."),
     "analyze": Row(
         "analyze.analyze_app",

@@ -81,6 +81,8 @@ UNITS = (
     _row("A", "a"),
     _row("ohm", "ohm", "Ω"),
     _row("K", "k"),
+    _row("1/K", "per_k", "K⁻¹", shown=("%/K", 1e2)),
+    _row("kg/K", "kg_per_k", shown=("g/K", 1e3)),
 )
 _BY_SI = {one.si: one for one in UNITS}
 _BY_ENDING = {one.ending: one for one in UNITS if one.ending}
@@ -89,7 +91,7 @@ _OF_DRAG = re.compile(r"\(rad/s\)\^[-−](\d+)/(\d+)/s")
 #: Texts of units that are shown; no other text behind a number is a unit.
 KNOWN = frozenset({
     *filter(None, (text for one in UNITS for text in (one.text, one.shown.unit, one.fine.unit))), "%", "°", "ms", "µs",
-    "min", "h", "kHz", "MHz", "mHz", "µHz", "mHz/s", "µm", "mg", "µT", "mV", "µV", "kΩ", "MΩ", "J",
+    "°C", "min", "h", "kHz", "MHz", "mHz", "µHz", "mHz/s", "µm", "mg", "µT", "mV", "µV", "kΩ", "MΩ", "J",
 })  # fmt: skip
 
 

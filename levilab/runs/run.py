@@ -67,6 +67,9 @@ class RunRecord(BaseModel):
     software: dict[str, str] = {}
     seed: int | None = Field(default=None, ge=0)
     note: str = ""
+    #: Of the magnets [°C], and the washers on the top [kg], as a person said; None: nothing was said.
+    temperature_c: float | None = None
+    washers_kg: list[float] | None = None
     synthetic: bool = False
     synthetic_how: str | None = None
     #: Of a virtual bench, if its top only spins.

@@ -91,7 +91,7 @@ def test_a_top_that_slides_sideways_says_nothing_of_its_mass() -> None:
 def test_what_rises_is_made_heavier_and_what_sinks_lighter(outcome: Outcome, sign: int) -> None:
     masses = 24.4 * G + WASHERS
     posterior = learn([Trial(25 * G, 20, outcome)], Prior(24 * G, 26 * G))
-    assert sign * (masses[posterior.next_trial(masses, 20.0)] - 25 * G) > 0
+    assert sign * (masses[posterior.promise(masses, 20.0).argmax()] - 25 * G) > 0
 
 
 def test_washers_combine_and_too_many_are_refused() -> None:
@@ -128,13 +128,13 @@ class Owner:
 
     def days(self, temperatures: list[float], most: int = 6) -> tuple[list[Trial], list[int]]:
         """Follow the proposals until the top floats, day after day.  Returns all trials, and the number of each day."""
-        prior, trials, numbers = Prior(self.top * 0.98, self.top * 1.02 + self.span), list[Trial](), list[int]()
+        prior, trials, numbers = Prior(self.top * 0.99, self.top * 1.01 + self.span), list[Trial](), list[int]()
         masses = self.top + WASHERS
         for shown in temperatures:
             real = shown + self.rng.normal(0, tuning.TEMPERATURE_U)
             before = len(trials)
             while len(trials) < before + most:
-                mass = float(masses[learn(trials, prior).next_trial(masses, shown)])
+                mass = float(masses[learn(trials, prior).promise(masses, shown).argmax()])
                 trials.append(Trial(mass, shown, self.lets_go(mass, real)))
                 if trials[-1].outcome is Outcome.FLOATS:
                     break
@@ -149,7 +149,7 @@ def test_owners_who_follow_the_proposals_float_and_learn_the_truth() -> None:
         owner = Owner(seed)
         trials, numbers = owner.days([19.0, 23.0])
         days.append(numbers)
-        values = learn(trials, Prior(owner.top * 0.98, owner.top * 1.02 + owner.span)).values(21.0)
+        values = learn(trials, Prior(owner.top * 0.99, owner.top * 1.01 + owner.span)).values(21.0)
         pulls.append((values["mass_to_set"].value - owner.middle_at(21.0)) / values["mass_to_set"].u)
         slopes.append((values["relative_change"].value - owner.per_k) / values["relative_change"].u)
     second = np.array(days)[:, 1]

@@ -1,0 +1,158 @@
+"""Tune: which washers today, a question at a time.  Heavy imports happen inside."""
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeVar
+
+import typer
+
+from levilab.cli.options import Json
+from levilab.cli.output import message, print_json, result
+from levilab.errors import UsageError
+
+if TYPE_CHECKING:
+    from levilab.pipelines.tune.advice import Advice
+    from levilab.pipelines.tune.owner import Owner
+
+T = TypeVar("T")
+_RESULT = "What did it do: floats, rises, sinks, sideways?  A new temperature, as 22 C?  [Enter ends]"
+
+
+def tune(
+    temperature: Annotated[
+        str | None, typer.Option(metavar="T", help="Of the magnets today, by a thermometer beside them, as 21.5.")
+    ] = None,
+    top: Annotated[str | None, typer.Option(metavar="MASS", help="The top without washers, as 24.9 g.")] = None,
+    washers: Annotated[
+        str | None, typer.Option(metavar="MASSES", help="All washers that you have, as 0.06,0.06,0.1 in g.")
+    ] = None,
+    trial: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="TRIAL",
+            help="A top that you let go: its mass or its washers, the temperature, and whether it floats, rises, sinks "
+            "or slides sideways; repeatable.",
+        ),
+    ] = None,
+    scan: Annotated[Path | None, typer.Option(metavar="PATH", readable=False, help="A Hall scan of the base.")] = None,
+    device: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", readable=False, help="Describes base and top for the scan, as in analyze field."),
+    ] = None,
+    scan_temperature: Annotated[
+        str | None, typer.Option(metavar="T", help="Of the base at the scan.", show_default="the run's")
+    ] = None,
+    file: Annotated[Path, typer.Option(metavar="FILE", readable=False, help="Keeps what you say.")] = Path("tune.toml"),
+    ask: Annotated[
+        bool | None, typer.Option("--ask/--no-ask", help="Ask for what is missing.", show_default="at a terminal")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Say which washers to take, ask how the top did, and say it again."""
+    from levilab.formats.typed import read_temperature
+    from levilab.pipelines.tune.advice import advise
+    from levilab.pipelines.tune.owner import read_owner, write_owner
+
+    asks = sys.stdin.isatty() and sys.stdout.isatty() and not as_json if ask is None else ask
+    kept = read_owner(file)
+    owner = _with_bench(kept, top, washers, file, asks=asks)
+    owner = _with_scan(owner, scan, scan_temperature, device)
+    for text in trial or ():
+        owner = _told("trial", text, owner.with_trial)
+    prompt = "How warm are the magnets, by a thermometer beside them?  [°C]"
+    degrees, ends = _told("temperature", temperature, read_temperature, prompt, asks=asks), False
+    while not ends:
+        advice = advise(owner, degrees)
+        if owner != kept:
+            write_owner(file, owner)
+            message(f"kept in {file}: {len(owner.attempts)} trial{'s' * (len(owner.attempts) != 1)}")
+        kept = owner
+        if as_json:
+            print_json(advice.as_dict())
+        else:
+            result(f"{advice.text}\n{advice.why}")
+            for text in advice.warnings:
+                message(f"note: {text}")
+        owner, degrees, ends = _next(advice) if asks else (owner, degrees, True)
+    if not as_json:
+        _print_chances(advice)
+
+
+def _with_bench(owner: "Owner", top: str | None, washers: str | None, file: Path, *, asks: bool) -> "Owner":
+    """Return the owner with top and washers.  Raises UsageError for a top that is not the one of the trials."""
+    from levilab.formats.typed import read_mass, read_masses
+
+    mass = owner.top
+    if top is not None or mass is None:
+        mass = _told("top", top, read_mass, "How heavy is the top without washers?  [g]", asks=asks)
+    if mass != owner.top and owner.attempts:
+        raise UsageError("top", f"{file} has the trials of another top: name another `file` for this one", value=top)
+    of_top = owner.washers
+    if washers is not None or (asks and not of_top):
+        prompt = "Which washers have you, each by its mass, as 0.06, 0.06, 0.1?  [g]"
+        of_top = tuple(sorted(_told("washers", washers, read_masses, prompt, asks=asks)))
+    return replace(owner, top=mass, washers=of_top)
+
+
+def _with_scan(owner: "Owner", scan: Path | None, temperature: str | None, device: Path | None) -> "Owner":
+    from levilab.formats.typed import read_temperature
+    from levilab.pipelines.tune.owner import read_scan
+
+    for name, value in (("scan_temperature", temperature), ("device", device)):
+        if scan is None and value is not None:
+            raise UsageError(name, "goes with `scan`")
+    if scan is None:
+        return owner
+    given = None if temperature is None else _told("scan_temperature", temperature, read_temperature)
+    return replace(owner, scan=read_scan(scan, given, device, message))
+
+
+def _next(advice: "Advice") -> "tuple[Owner, float, bool]":
+    """Ask how the top did.  Returns the owner with that trial, the temperature, and whether the person ends."""
+    from levilab.formats.typed import read_temperature
+    from levilab.pipelines.tune.owner import washers_text
+
+    def read(text: str) -> "tuple[Owner, float, bool]":
+        if not text:
+            return advice.owner, advice.temperature, True
+        if text[:1].isdigit() and "," not in text:
+            return advice.owner, read_temperature(text), False
+        whole = text if "," in text else f"{washers_text(advice.best.washers)}, {advice.temperature:g} C, {text}"
+        return advice.owner.with_trial(whole), advice.temperature, False
+
+    return _told("trial", None, read, _RESULT, asks=True, at_end="")
+
+
+def _told(
+    name: str, given: str | None, read: Callable[[str], T], prompt: str = "", *, asks: bool = False,
+    at_end: str | None = None,
+) -> T:  # fmt: skip
+    """Return what an option says, or a person at the terminal, who is asked again after a wrong answer.
+
+    at_end: the answer where standard input ends.  Raises UsageError.
+    """
+    if given is not None:
+        try:
+            return read(given)
+        except ValueError as error:
+            raise UsageError(name, str(error), value=given) from error
+    if not asks:
+        raise UsageError(name, "is needed, or `ask` = True to be asked for it")
+    while True:
+        message(prompt)
+        line = sys.stdin.readline()
+        if not line and at_end is None:
+            raise UsageError(name, "is needed, and standard input is closed")
+        try:
+            return read(line.strip() if line else at_end or "")
+        except ValueError as error:
+            message(str(error))
+
+
+def _print_chances(advice: "Advice") -> None:
+    from levilab.present.terminal import draw, terminal  # with rich
+
+    result(advice.window)
+    terminal().print("", draw(advice.table))

@@ -1,0 +1,269 @@
+"""Which washers to take next, with what chances, and why: for people and for programs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from analysis.numbers import digits, with_minus
+from analysis.tuning import MASS_U, Outcome, Posterior, Prior, TooManyWashers, combinations, learn
+from analysis.uncertainty import Estimate
+from levilab.errors import UsageError
+from levilab.files import finite
+from levilab.pipelines.document import values_of
+from levilab.pipelines.row import Quantity
+from levilab.pipelines.tune.owner import in_grams, washers_text
+from levilab.present.numbers import enumeration, with_uncertainty
+from levilab.present.tables import Row, Table, table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from levilab.pipelines.tune.owner import Owner
+
+SCHEMA = "levilab-tune/1"
+#: Without a scan the middle lies within the reach of the washers, and this share of the mass beyond.
+_BEYOND = 0.01
+#: Fewer changes of washers are taken for this much less promise, which is from 0 to 2.
+_SAME = 0.02
+#: Rows of the table of chances; and the chance of failing the same way beyond which no washers will do.
+_ROWS, _OUT_OF_REACH = 5, 0.8
+#: Chance of a trial's outcome below which it is named: lapses have 0.02, and leave up to some 0.1.
+_UNLIKELY = 0.1
+#: A difference of temperature that is worth a word [K].
+_NOTABLE_K = 0.3
+_MET = {Outcome.RISES: "rose", Outcome.FLOATS: "floated", Outcome.SINKS: "sank", Outcome.SIDEWAYS: "slid off sideways"}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Some of the owner's washers.
+
+    Attributes:
+        washers: their masses [kg].
+        mass: of the top with them [kg].
+        rises, floats, sinks: probabilities.
+    """
+
+    washers: tuple[float, ...]
+    mass: float
+    rises: float
+    floats: float
+    sinks: float
+
+
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """What to try next.
+
+    Attributes:
+        owner: and all that they have told.
+        temperature: today's [°C].
+        posterior: what is known of the window.
+        best: to try next.
+        choices: the likeliest to float, the lightest first.
+    """
+
+    owner: Owner
+    temperature: float
+    posterior: Posterior
+    best: Choice
+    choices: tuple[Choice, ...]
+
+    @cached_property
+    def values(self) -> dict[str, Estimate]:
+        """The numbers at today's temperature."""
+        return self.posterior.values(self.temperature)
+
+    def _show(self, name: str) -> str:
+        return _in_people_units(self.values[name])
+
+    @property
+    def text(self) -> str:
+        """The next step, in a sentence."""
+        weighs, chance = in_grams(self.best.mass), _percent(self.best.floats)
+        return f"{self._step}: the top then weighs {weighs} and floats with a chance of {chance}."
+
+    @property
+    def _step(self) -> str:
+        last = self.owner.attempts[-1] if self.owner.attempts else None
+        if last and last.outcome is Outcome.SIDEWAYS and last.washers == self.best.washers:
+            return "Raise the base on the side to which the top slid, and leave the washers as they are"
+        if last is None or last.washers is None:
+            return f"Put on {_named(self.best.washers)}" if self.best.washers else "Take no washers"
+        on, wanted = Counter(last.washers), Counter(self.best.washers)
+        changes = [("take off", on - wanted), ("add", wanted - on)]
+        steps = [f"{verb} {_named(sorted(some.elements()))}" for verb, some in changes if some]
+        text = " and ".join(steps) or "leave the washers as they are"
+        return text[0].upper() + text[1:]
+
+    @property
+    def why(self) -> str:
+        """The reason, in one or two sentences."""
+        parts = [*self._reasons, f"the middle of the window is now estimated at {self._show('mass_to_set')}."]
+        text = "; ".join(parts)
+        return f"{text[0].upper()}{text[1:]}{self._beyond_reach}"
+
+    @property
+    def _reasons(self) -> Iterator[str]:
+        """Yield what is known."""
+        scan, last = self.owner.scan, self.owner.attempts[-1] if self.owner.attempts else None
+        if last:
+            yield f"it {_MET[last.outcome]} at {in_grams(last.mass)} and {last.temperature:g} °C"
+            if abs(warmer := self.temperature - last.temperature) >= _NOTABLE_K:
+                change = with_minus(f"{1e3 * warmer * (self.values['mass_per_kelvin'].value or 0.0):+.2f}")
+                word = "warmer" if warmer > 0 else "colder"
+                yield f"today is {digits(abs(warmer))} K {word}, which moves the window by {change} g"
+        if scan:
+            middle = _in_people_units(Estimate(scan.mass_to_set, scan.mass_to_set_u, "kg"))
+            yield f"by the scan the middle was {middle} at {scan.temperature:g} °C"
+        elif not last:
+            yield "nothing is known yet, and a mass in the middle of the washers' reach tells most"
+
+    @property
+    def _beyond_reach(self) -> str:
+        """Return what to do where no washers will do, as a sentence behind a blank; empty elsewhere."""
+        middle, top = self.values["mass_to_set"].value or 0.0, self.owner.top or 0.0
+        if self.best.rises > _OUT_OF_REACH:
+            more = digits(1e3 * (middle - top - sum(self.owner.washers)))
+            return f" Even with all washers it would rise: {more} g more are needed."
+        if self.best.sinks > _OUT_OF_REACH:
+            return f" Even without washers it would sink: it is {digits(1e3 * (top - middle))} g too heavy today."
+        return ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Trials that the others, the scan and the temperature make unlikely."""
+        texts = []
+        for number, one in enumerate(self.owner.attempts, 1):
+            if one.outcome is Outcome.SIDEWAYS:
+                continue
+            chances = self.posterior.outcomes(np.array([one.mass]), one.temperature)[:, 0] @ self.posterior.weight
+            if chances[list(Outcome).index(one.outcome)] < _UNLIKELY:
+                texts.append(
+                    f"trial {number} ({one.text}) does not go with what else is known: was it let go badly, or is a "
+                    "mass, a temperature or the scan wrong?"
+                )
+        return tuple(texts)
+
+    @property
+    def window(self) -> str:
+        """The window, in numbers."""
+        width, smallest = self.values["window_width"], min(self.owner.washers, default=0.0)
+        of_washers = ""
+        if smallest:
+            n = Estimate((width.value or 0.0) / smallest, (width.u or 0.0) / smallest, "1")
+            of_washers = f" ({with_uncertainty(n)} washers of {in_grams(smallest)})"
+        mass, wide, moves = map(self._show, ("mass_to_set", "window_width", "mass_per_kelvin"))
+        at = f"Mass to set at {self.temperature:g} °C: {mass}"
+        return f"{at}; the window is {wide} wide{of_washers} and moves by {moves}."
+
+    @property
+    def table(self) -> Table:
+        """The chances of the best choices."""
+        heads = ("washers", "mass", "rises", "floats", "sinks")
+        rows = [
+            Row((
+                washers_text(one.washers), in_grams(one.mass),
+                *map(_percent, (one.rises, one.floats, one.sinks)),
+            ), "best" * (one is self.best))
+            for one in self.choices
+        ]  # fmt: skip
+        return table(f"Which washers at {self.temperature:g} °C", heads, rows, numbers=heads[1:])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all of it in SI, for JSON."""
+        owner = self.owner
+        document: dict[str, Any] = finite({
+            "schema": SCHEMA,
+            "temperature_c": self.temperature,
+            "top_kg": owner.top,
+            "washers_kg": list(owner.washers),
+            "trials": [
+                {"mass_kg": one.mass, "temperature_c": one.temperature, "outcome": one.outcome.value}
+                for one in owner.attempts
+            ],
+            "scan": vars(owner.scan) if owner.scan else None,
+            "values": values_of(self.values),
+            "best": _choice_as_dict(self.best),
+            "choices": [_choice_as_dict(one) for one in self.choices],
+            "text": self.text,
+            "why": self.why,
+            "warnings": list(self.warnings),
+        })  # fmt: skip
+        return document
+
+
+def advise(owner: Owner, temperature: float) -> Advice:
+    """Return what to try next at a temperature [°C].
+
+    Raises:
+        UsageError: the top's mass is not known, or the washers are too many.
+    """
+    if owner.top is None:
+        raise UsageError("top", "the mass of the top without washers is needed, such as 24.9 g")
+    try:
+        choices = combinations(owner.washers)
+    except TooManyWashers as error:
+        raise UsageError("washers", str(error)) from error
+    on = owner.attempts[-1].washers if owner.attempts else None
+    # of choices that the balance cannot distinguish the one with the fewest changes
+    alike: dict[int, tuple[float, ...]] = {}
+    for one in sorted(choices, key=lambda one: _changes(on, one)):
+        alike.setdefault(round(sum(one) / MASS_U), one)
+    different = sorted(alike.values(), key=sum)
+    masses = owner.top + np.array([sum(one) for one in different])
+    posterior = learn([one.trial for one in owner.attempts], _prior(owner, masses, temperature))
+    promise = posterior.promise(masses, temperature)
+    best = min(
+        np.flatnonzero(promise >= promise.max() - _SAME), key=lambda k: (_changes(on, different[k]), -promise[k])
+    )
+    shown = sorted({int(best), *np.argsort(-promise, kind="stable")[: _ROWS - 1].tolist()})
+    chances = posterior.outcomes(masses[shown], temperature) @ posterior.weight
+    rows = tuple(
+        Choice(different[k], float(masses[k]), *map(float, of)) for k, of in zip(shown, chances.T, strict=True)
+    )
+    return Advice(owner, temperature, posterior, rows[shown.index(best)], rows)
+
+
+def _prior(owner: Owner, masses: np.ndarray, temperature: float) -> Prior:
+    if owner.scan:
+        return owner.scan.prior
+    reach = [*masses[[0, -1]], *(one.mass for one in owner.attempts)]
+    return Prior(min(reach) * (1 - _BEYOND), max(reach) * (1 + _BEYOND), temperature=temperature)
+
+
+def _changes(on: tuple[float, ...] | None, wanted: Sequence[float]) -> int:
+    """Return the number of washers to put on and to take off."""
+    now, then = Counter(on or ()), Counter(wanted)
+    return (now - then).total() + (then - now).total()
+
+
+def _named(washers: Sequence[float]) -> str:
+    """Return washers with their article.
+
+    >>> _named([6e-5, 6e-5, 1e-4]), _named([1e-4])
+    ('2 washers of 0.06 g and the 0.1 g washer', 'the 0.1 g washer')
+    """
+    counts = sorted(Counter(washers).items())
+    names = [f"{n} washers of {in_grams(one)}" if n > 1 else f"the {in_grams(one)} washer" for one, n in counts]
+    return enumeration(names)
+
+
+def _percent(chance: float) -> str:
+    return f"{100 * chance:.0f} %"
+
+
+def _in_people_units(one: Estimate) -> str:
+    return with_uncertainty(Quantity("", one.unit, "").show(one))
+
+
+def _choice_as_dict(one: Choice) -> dict[str, Any]:
+    return {
+        "washers_kg": list(one.washers), "mass_kg": one.mass,
+        "rises": one.rises, "floats": one.floats, "sinks": one.sinks,
+    }  # fmt: skip

@@ -1,0 +1,251 @@
+"""The owner's file, tune.toml: the top, the washers, the trials, and what a scan of the base says.
+
+It is read and written as a person would write it: "24.98 g", "0.06 + 0.1 g, 20.5 °C, rises".
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from pydantic import ValidationError
+
+from analysis.tuning import Outcome, Prior, Trial
+from analysis.uncertainty import Estimate
+from levilab.errors import DataError, UsageError
+from levilab.files import parse_toml, replace_atomically, writing
+from levilab.formats.typed import read_mass, read_masses, read_temperature
+from levilab.pipelines.options import read_options
+from levilab.pipelines.suits import recall_suiting
+from levilab.runs.run import find_run
+from levilab.settings import Settings, in_one_line
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+_HEAD = "# Kept by levilab tune; a trial that is wrong may be corrected here, or its line deleted.\n"
+_TRIAL = 'a mass or washers, a temperature and an outcome, such as "0.06 + 0.1 g, 20.5 C, rises", are expected'
+#: A lone mass is that of the whole top from this share of the bare top's on, and else that of a washer.
+_WHOLE = 0.5
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A trial as its owner tells it.
+
+    Attributes:
+        mass: of the top with its washers [kg].
+        temperature: [°C].
+        outcome: what it did.
+        washers: on it [kg]; None: not told.
+    """
+
+    mass: float
+    temperature: float
+    outcome: Outcome
+    washers: tuple[float, ...] | None = None
+
+    @property
+    def text(self) -> str:
+        """The trial as it is typed."""
+        what = in_grams(self.mass) if self.washers is None else washers_text(self.washers)
+        return f"{what}, {self.temperature:g} °C, {self.outcome.value}"
+
+    @property
+    def trial(self) -> Trial:
+        """The trial for the analysis."""
+        return Trial(self.mass, self.temperature, self.outcome)
+
+
+@dataclass(frozen=True)
+class Scan:
+    """The window of small motions above the base.  Masses [kg], temperature [°C].
+
+    Attributes:
+        path: of the scan.
+        temperature: of the base during the scan.
+        mass_to_set, mass_to_set_u: the middle.
+        lightest, heaviest: its ends.
+    """
+
+    path: str
+    temperature: float
+    mass_to_set: float
+    mass_to_set_u: float
+    lightest: float
+    heaviest: float
+
+    @property
+    def prior(self) -> Prior:
+        """What it says before any trial."""
+        middle = Estimate(self.mass_to_set, self.mass_to_set_u, "kg")
+        return Prior.of_scan(middle, self.lightest, self.heaviest, self.temperature)
+
+
+@dataclass(frozen=True)
+class Owner:
+    """All that an owner has told.
+
+    Attributes:
+        top: mass without washers [kg]; None: not told.
+        washers: masses of all washers [kg].
+        attempts: in their order.
+        scan: of the base.
+    """
+
+    top: float | None = None
+    washers: tuple[float, ...] = ()
+    attempts: tuple[Attempt, ...] = ()
+    scan: Scan | None = None
+
+    def with_trial(self, text: str) -> Owner:
+        """Return the owner with one more trial.  Raises ValueError."""
+        return replace(self, attempts=(*self.attempts, self._attempt(text)))
+
+    def _attempt(self, text: str) -> Attempt:
+        *masses, temperature, did = (piece.strip() for piece in ("," * (2 - text.count(",")) + text).split(","))
+        outcomes = [one for one in Outcome if did and one.value.startswith(did.casefold())]
+        if len(outcomes) != 1 or not masses[0]:
+            names = ", ".join(one.value for one in Outcome)
+            raise ValueError(f"{_TRIAL}; the outcome is one of {names}")
+        told, degrees = read_masses(",".join(masses)), read_temperature(temperature)
+        if self.top is None:
+            raise ValueError("the mass of the top without washers is needed first: `top`")
+        if len(told) == 1 and told[0] >= _WHOLE * self.top:
+            return Attempt(told[0], degrees, outcomes[0])
+        if sum(told) >= _WHOLE * self.top:
+            raise ValueError(f"washers of {in_grams(sum(told))} on a top of {in_grams(self.top)}? {_TRIAL}")
+        return Attempt(self.top + sum(told), degrees, outcomes[0], tuple(sorted(told)))
+
+
+def in_grams(mass: float) -> str:
+    """Return a mass [kg] as text, to 0.1 mg.
+
+    >>> in_grams(0.02498), in_grams(0.0001)
+    ('24.98 g', '0.1 g')
+    """
+    return f"{round(1e3 * mass, 4):.7g} g"
+
+
+def washers_text(washers: Sequence[float]) -> str:
+    """Return washers [kg] as a sum.
+
+    >>> washers_text([6e-5, 1e-4]), washers_text([])
+    ('0.06 + 0.1 g', 'none')
+    """
+    return " + ".join(in_grams(one).removesuffix(" g") for one in washers) + " g" if washers else "none"
+
+
+# --- the file ---
+
+
+class _ScanTable(Settings):
+    path: str
+    mass_to_set: str
+    mass_to_set_u: str
+    lightest: str
+    heaviest: str
+    temperature: str
+
+
+class _Table(Settings):
+    top: str | None = None
+    washers: tuple[str, ...] = ()
+    trials: tuple[str, ...] = ()
+    scan: _ScanTable | None = None
+
+
+def read_owner(path: Path) -> Owner:
+    """Return what a file says; without one, an owner who has told nothing.  Raises DataError."""
+    if not path.exists():
+        return Owner()
+    where = ""
+    try:
+        table = _Table.model_validate(parse_toml(path.read_text(encoding="utf-8")))
+        where = "top: "
+        owner = Owner(read_mass(table.top) if table.top else None, _masses(table.washers))
+        for number, text in enumerate(table.trials, 1):
+            where = f"trials, number {number} ({text[:60]!r}): "
+            owner = owner.with_trial(text)
+        where = "scan: "
+        return replace(owner, scan=_scan(table.scan) if table.scan else None)
+    except ValidationError as error:
+        raise DataError(f'{path}: {in_one_line(error, _Table)}; values are texts, as "24.98 g"') from error
+    except ValueError as error:
+        raise DataError(f"{path}: {where}{error}: correct it, or delete the file and begin again") from error
+
+
+def _masses(texts: Sequence[str]) -> tuple[float, ...]:
+    return tuple(sorted(read_mass(text) for text in texts))
+
+
+def _scan(table: _ScanTable) -> Scan:
+    masses = (read_mass(getattr(table, name)) for name in ("mass_to_set", "mass_to_set_u", "lightest", "heaviest"))
+    return Scan(table.path, read_temperature(table.temperature), *masses)
+
+
+def write_owner(path: Path, owner: Owner) -> None:
+    """Write the file, whole or not at all.  Raises CannotWrite."""
+    lines = [_HEAD]
+    if owner.top is not None:
+        lines.append(f"top = {_quoted(in_grams(owner.top))}  # without washers\n")
+    lines.append(f"washers = [{', '.join(_quoted(in_grams(one)) for one in owner.washers)}]\n")
+    lines.append("trials = [\n" + "".join(f"  {_quoted(one.text)},\n" for one in owner.attempts) + "]\n")
+    if scan := owner.scan:
+        masses = ("mass_to_set", "mass_to_set_u", "lightest", "heaviest")
+        lines.append(f"\n[scan]\npath = {_quoted(scan.path)}\n")
+        lines += [f"{name} = {_quoted(in_grams(getattr(scan, name)))}\n" for name in masses]
+        lines.append(f"temperature = {_quoted(f'{scan.temperature:g} °C')}\n")
+    with writing(f"{path}: could not be written", "choose another place with `file`"):
+        replace_atomically(path, "".join(lines))
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+# --- the scan ---
+
+
+#: What a magnet that is taken for a point moves the mass by, relative: 0 to 4 % (`analysis.field.magnet`).
+_POINT_U = 0.02
+
+
+def read_scan(path: Path, temperature: float | None, device: Path | None, tell: Callable[[str], None]) -> Scan:
+    """Return what a Hall scan says, by its result beside it or analyzed now.
+
+    Args:
+        path: of the run or the data file.
+        temperature: of the base at the time [°C]; None: as the run recorded it.
+        device: file that describes base and top; None: as the result has it.
+        tell: called with what to know before using it.
+
+    Raises:
+        DataError: it is no scan, or says nothing of this top.
+        UsageError: the temperature is not known.
+    """
+    results = recall_suiting([path], read_options({"device": device}, typed=True))
+    found = next((result for one, result in results if one.name == "field"), None)
+    if found is None:
+        raise DataError(f"{path}: is no Hall scan: one of levilab acquire field, or a table of heights and field")
+    if "mass_to_set" not in found.values:
+        raise DataError(f"{path}: no top floats above this base, see levilab analyze field")
+    (source, *_), (run, *_) = found.sources, found.runs
+    if not run.top.weighed and not run.top.moment.u:
+        raise DataError(
+            f"{path}: the moment of your top and its u are not known, so no mass follows: give them with `device`, or "
+            "first levilab analyze field with --device and --height, where a top floats"
+        )
+    noted = source.run.record.temperature_c if source.run else None
+    if temperature is None and noted is None:
+        raise UsageError("scan_temperature", "is needed with `scan`: the temperature of the base at the scan")
+    for text in run.warnings:
+        tell(f"note: {text}")
+    mass, *ends = (found.values[name] for name in ("mass_to_set", "lightest_mass", "heaviest_mass"))
+    value = float(mass.value or 0.0)
+    u = math.hypot(mass.u or 0.0, 0.0 if run.top.weighed or run.top.magnet else _POINT_U * value)
+    warmth = float(noted or 0.0) if temperature is None else temperature
+    return Scan(str(find_run(path)), warmth, value, u, *(float(end.value or 0.0) for end in ends))
