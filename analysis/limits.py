@@ -370,7 +370,7 @@ def outliers_of(limits: Array) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A mean beside a spin that theory names.
+    """A mean beside a spin that theory names, or that another experiment reached.
 
     Attributes:
         name: of what theory names.
@@ -390,11 +390,11 @@ class Comparison:
         return None if self.p is None else self.p >= AGREES_P
 
 
-def compare(found: Statistics, name: str, expected: float) -> Comparison:
-    """Return the mean of repeated limits beside a spin that theory names [Hz]."""
+def compare(found: Statistics, name: str, expected: float, u_expected: float = 0.0) -> Comparison:
+    """Return the mean of repeated limits beside a spin that theory or another experiment names, with its u [Hz]."""
     assert found.mean.value is not None  # as summarized
     difference = found.mean.value - expected
-    u = found.mean.u
+    u = None if found.mean.u is None else math.hypot(found.mean.u, u_expected)
     p = None
     if found.n >= FEWEST and u:
         p = _by_chance(difference / u, found.freedom)

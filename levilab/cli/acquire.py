@@ -1,8 +1,11 @@
 """Acquire: experiments on the bench.  Heavy imports happen inside the commands that need them."""
 
 import sys
+from collections.abc import Callable
+from functools import wraps
+from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -24,12 +27,11 @@ EXPERIMENT_HELP = {
     "spin": "Spin-down: drive the top up, switch the drive off, count its spin until it falls.",
     "trace": "Records of the oscilloscope: raw codes into the run folder, written as they come.",
     "field": "Hall scan: the base's flux density on its axis, at one height after the other.",
-    "limit": (
-        "Limits of the spin, top after top: where a free top falls, or with --set limit.which=upper where a driven one "
-        "is lost."
-    ),
+    "limit": "Limits of the spin, top after top: where a free top falls, or with --upper where a driven one is lost.",
     "precession": "Precession: sweep the drive, and count at each frequency how often the stem cuts a laser beam.",
 }
+#: Option → the setting that it stands for, as --set takes it; only this experiment has the option.
+SHORT = {"upper": "limit.which=upper"}
 _ENDING = "Ctrl-C ends the run after the reading under way; outputs go off and the run is kept."
 
 
@@ -73,10 +75,13 @@ def acquire_experiment(
     yes: Annotated[
         bool, typer.Option("--yes", help="Ask no questions: the bench is as the experiment needs it.")
     ] = False,
+    upper: Annotated[
+        bool, typer.Option("--upper", help="The upper limit, of a driven top, with the cause of each loss.")
+    ] = False,
     settings: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="KEY=VALUE", help="Change a setting of the experiment, as limit.which=upper; repeatable."
+            "--set", metavar="KEY=VALUE", help="Change a setting of the experiment, as limit.repetitions=3; repeatable."
         ),
     ] = None,
     list_settings: Annotated[
@@ -107,7 +112,7 @@ def acquire_experiment(
         wire_log=wire_log,
         person=ask_no_person if yes else _ask,
         tell=message,
-        settings=tuple(settings or ()),
+        settings=(*(settings or ()), *[SHORT["upper"]] * upper),
     )
     experiment = str(context.info_name)
     if list_settings:
@@ -140,13 +145,29 @@ def _print_settings(config: "BenchConfig", experiment: str, *, as_json: bool) ->
     terminal().print(draw(keys_table(keys, experiment)))
 
 
+def _command_of(experiment: str) -> Callable[[], Callable[..., None]]:
+    """Return what makes the command of an experiment, without the options that only others have."""
+
+    def make() -> Callable[..., None]:
+        @wraps(acquire_experiment)
+        def command(**given: Any) -> None:
+            acquire_experiment(**given)
+
+        shared = signature(acquire_experiment)
+        own = [one for one in shared.parameters.values() if SHORT.get(one.name, experiment).startswith(experiment)]
+        command.__signature__ = shared.replace(parameters=own)  # type: ignore[attr-defined]
+        return command
+
+    return make
+
+
 for _name, _help in EXPERIMENT_HELP.items():
     acquire_app.command(
         _name,
         cls=Later,
         help=f"{_help}\n\n{_ENDING}",
         epilog=f"Example: levilab acquire {_name} --mock --note 'first try'",
-    )(lambda: acquire_experiment)
+    )(_command_of(_name))
 
 
 def _ask(task: "Task") -> str:

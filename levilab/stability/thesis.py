@@ -28,8 +28,11 @@ WITH_DRAG_HZ = {name: _THESIS[f"limits.drag.{name}"].value for name in STARTS}
 MEASURED_HZ = _THESIS["measured.mean"].value
 _TEN = [one.value for one in several("thesis", "measured.limits")]
 MEASURED_U_HZ = round(statistics.stdev(_TEN) / math.sqrt(len(_TEN)), 2)
-#: About the highest spin that the drive could hold [Hz].
-HIGHEST_HZ = _THESIS["measured.highest"].value
+#: About the highest spin that the drive could hold, and the one that it reached with loose washers [Hz].
+HIGHEST_HZ, LOOSE_HZ = _THESIS["measured.highest"].value, _THESIS["measured.loose"].value
+#: Between these spins simulated tops without a drive are up or lost by their start: there are islands
+#: (docs/reproduce.md) [Hz].
+ISLANDS_HZ = (56.0, 81.0)
 
 
 def is_thesis_device(scene: Scene) -> bool:

@@ -1,12 +1,14 @@
-"""The tape of a held top beside its drive."""
+"""The tape of a held top beside its drive, and how a drive loses a top."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
 
 from analysis.errors import TooFewReadings
-from analysis.locked import slip_of
+from analysis.locked import Cause, cause_of_loss, lag_before_loss, slip_of
 
 
 def test_a_tape_that_turns_with_the_drive_is_not_warned_of() -> None:
@@ -33,3 +35,49 @@ def test_the_drive_may_creep_meanwhile() -> None:
     assert slip_of((drives - 0.2).tolist(), drives.tolist()).difference == pytest.approx(-0.2)
     with pytest.raises(TooFewReadings):
         slip_of([30.0], 30.0)
+
+
+def counts_of_a_pendulum(load: float, swing_hz: float, random: np.random.Generator) -> tuple[list[float], list[float]]:
+    """Return ends of gates [s] and counts less the drive [Hz] of a moment under a pull of 2.5 rad/s²; to 1 Hz behind.
+
+    load: of drag, as a part of the pull at the end; it grows by 0.2 % a second.
+    """
+    step, gate, pull = 0.01, 0.5, 2.5
+    lag, rate, ends, offs = math.asin(min(load - 0.1, 0.99)), 2 * np.pi * swing_hz * random.choice([-1, 1]), [], []
+    for k in range(1, round(60 / gate) + 1):
+        before = lag
+        for j in range(round(gate / step)):
+            part = min(load - 0.1 + 0.002 * ((k - 1) * gate + j * step), load)
+            rate += step * pull * (part - math.sin(lag))
+            lag += step * rate
+        ends.append(k * gate)
+        offs.append(-(lag - before) / (2 * np.pi * gate) + 0.06 * random.standard_normal())
+        if offs[-1] < -1:
+            break
+    return ends, offs
+
+
+def test_the_lag_before_a_loss_tells_a_lost_lock_from_one_that_held() -> None:
+    """A phototransistor that scatters by 0.03 turns a count, and a swing of up to 0.15 Hz about the drive."""
+    random = np.random.default_rng(5)
+    for fell, load, cause in ((True, 0.7, Cause.OUT_OF_WINDOW), (False, 1.08, Cause.LEFT_BEHIND)):
+        found = []
+        for _ in range(100):
+            ends, offs = counts_of_a_pendulum(load, random.uniform(0, 0.15), random)
+            assert (offs[-1] < -1) is not fell  # the pendulum itself knows which it was
+            lag = lag_before_loss(ends, (60 + np.array(offs)).tolist(), [60.0] * len(ends))
+            found.append(cause_of_loss(lag, fell=fell))
+        assert found.count(cause) >= 99, cause
+
+
+def test_a_tape_that_slips_all_the_time_is_not_left_behind() -> None:
+    ends = np.arange(0.5, 40.0, 0.5)
+    spins = 60.0 - 0.25 + 0.03 * np.random.default_rng(6).standard_normal(ends.size)
+    assert lag_before_loss(ends.tolist(), spins.tolist(), [60.0] * ends.size) < 0.3  # it slips by 2.5 turns in 10 s
+
+
+def test_of_a_time_without_counts_no_lag_is_known() -> None:
+    ends = [0.5, 1.0, 1.5, 2.0, 9.0, 9.5]
+    assert math.isnan(lag_before_loss(ends, [60.0] * 6, [60.0] * 6))
+    assert cause_of_loss(math.nan, fell=True) is Cause.NOT_KNOWN
+    assert math.isnan(lag_before_loss([0.5], [60.0], [60.0]))

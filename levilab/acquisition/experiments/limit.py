@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import itertools
+import math
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 
 from analysis.limits import spin_at_fall
-from analysis.locked import slip_of
+from analysis.locked import cause_of_loss, lag_before_loss, slip_of
 from levilab.acquisition.counting import NO_TOP, AnotherTop, Missed, free_top, prepare_counter, spin_now
 from levilab.acquisition.driving import (
+    HELD_WITHIN_HZ,
     RAMP_STEP_S,
     DidNotFollow,
     DriveSettings,
@@ -234,20 +236,24 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
     every, longest_step_s = max(1, round(settings.interval_s / settings.gate_s)), 2 * settings.gate_s
     held = start
     seen: list[tuple[float, float]] = []
+    counts: list[tuple[float, float, float]] = []  # end [s], spin, drive [Hz] of each step: their sum is the phase
     for k in itertools.count(1):
-        if k % every:
-            session.wait(settings.gate_s)
-        else:
+        spin = spin_now(session) if k % every else None
+        if spin is None or abs(spin - drive) > HELD_WITHIN_HZ:
             try:
-                seen.append((held_spin(session, drive), drive))
+                spin = held_spin(session, drive)
             except NotHeld as lost:
                 limit = _limit_of_loss(settings, (held, drive), seen)
                 keep({"time_s": session.now()} | limit)
-                _say_how_it_was_lost(session, lost, limit, seen)
+                if lost.spin is not None:
+                    counts.append((session.now(), lost.spin, drive))
+                _say_how_it_was_lost(session, lost, limit, seen, counts)
                 return
+            seen.append((spin, drive))
             held = drive
             if is_over(session):
                 return
+        counts.append((session.now(), spin, drive))
         before, at = at, session.now()
         drive += settings.creep_hz_per_s * min(at - before, longest_step_s)
         if drive > settings.highest_hz:
@@ -279,14 +285,25 @@ def _limit_of_loss(settings: LimitSettings, between: tuple[float, float], seen: 
 
 
 def _say_how_it_was_lost(
-    session: Session[LimitSettings], lost: NotHeld, limit: Row, seen: list[tuple[float, float]]
+    session: Session[LimitSettings],
+    lost: NotHeld,
+    limit: Row,
+    seen: list[tuple[float, float]],
+    counts: list[tuple[float, float, float]],
 ) -> None:
-    """Return whether the top is still up, and whether its tape slipped on the way; once the limit is kept."""
+    """Record whether the top is still up, why it was lost, and whether its tape slipped; once the limit is kept."""
     top = free_top(session)
     is_up = lost.spin is not None or top.read() is not None or top.missed[-1] is Missed.UNSTEADY
     kind, what = (RunEvent.LOCK_LOST, "the drive lost the top") if is_up else (RunEvent.TOP_LOST, "the top fell")
     spin, held = limit["spin_frequency_hz"], limit["drive_frequency_hz"]
-    session.event(kind, f"{what} at {spin:.2f} Hz: {lost}", spin_frequency_hz=spin, drive_frequency_hz=lost.drive)
+    lag = lag_before_loss(*zip(*counts, strict=True)) if counts else math.nan
+    cause = cause_of_loss(lag, fell=not is_up)
+    known = {} if math.isnan(lag) else {"lag_turns": lag}
+    behind = f", the lag behind the drive grew by {lag:.2f} turns in the end" if known else ""
+    session.event(
+        kind, f"{what} at {spin:.2f} Hz: {lost}; {cause}{behind}",
+        spin_frequency_hz=spin, drive_frequency_hz=lost.drive, top=len(session.rows), cause=cause, **known,
+    )  # fmt: skip
     safely_held = [(spin, drive) for spin, drive in seen if drive < held - _BELOW_HZ][-_COMPARED:]
     if len(safely_held) > 1:
         spins, drives = zip(*safely_held, strict=True)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping  # noqa: TC003 - pydantic reads the types of a result when it runs
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -21,7 +22,9 @@ from levilab.pipelines.sources import Needs
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.events import RunEvent
 from levilab.simulator.keys import SceneError
+from levilab.simulator.published.printed import published
 from levilab.simulator.scene import Scene, scene_of
+from levilab.stability.thesis import is_thesis_device
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -49,6 +52,14 @@ _WAVEFORMS = {"SIN": "sine", "SQU": "square", "TRI": "triangle"}
 #: Names of what theory says, of each limit.
 LOWER_EDGE, UPPER_EDGE = "lower edge of the linear window", "upper edge of the linear window"
 RESONANCE = "resonance of the wobble"
+#: Names of what other experiments reached.  Simon's top is another one: it is compared as a part of its own edge.
+THESIS_HIGHEST, THESIS_LOOSE = "thesis's highest spin", "the same with loose washers"
+SIMON = "Simon's top 3, as a part of its upper edge"
+#: Name → spin that the thesis's device reached, as printed.
+_REACHED = {
+    THESIS_HIGHEST: published("thesis")["measured.highest"],
+    THESIS_LOOSE: published("thesis")["measured.loose"],
+}
 
 
 @dataclass(frozen=True)
@@ -59,19 +70,35 @@ class Device:
         name: where its parameters come from, in words.
         linear_lower_hz, linear_upper_hz: edges of the linear window of its spin.
         resonance_hz: of its wobble; None where there is none.
+        is_thesis: whether base and top are the thesis's, but for the mass.
     """
 
     name: str
     linear_lower_hz: float
     linear_upper_hz: float
     resonance_hz: float | None
+    is_thesis: bool = False
 
-    def expected_spins(self, which: Which) -> dict[str, float]:
-        """Name → spin [Hz] that a limit is compared with."""
+    def expected_spins(self, which: Which) -> dict[str, tuple[float, float]]:
+        """Name → spin that a limit is compared with, and its standard uncertainty [Hz]."""
         if which == "upper":
-            return {UPPER_EDGE: self.linear_upper_hz}
-        resonance = {} if self.resonance_hz is None else {RESONANCE: self.resonance_hz}
-        return {LOWER_EDGE: self.linear_lower_hz} | resonance
+            reached = {name: (one.value, one.rounding / 3**0.5) for name, one in _REACHED.items() if self.is_thesis}
+            return {
+                UPPER_EDGE: (self.linear_upper_hz, 0.0),
+                SIMON: (_simon_share() * self.linear_upper_hz, 0.0),
+            } | reached
+        resonance = {} if self.resonance_hz is None else {RESONANCE: (self.resonance_hz, 0.0)}
+        return {LOWER_EDGE: (self.linear_lower_hz, 0.0)} | resonance
+
+
+def _simon_share() -> float:
+    """Return the measured upper limit of Simon's top 3 as a part of the upper edge of its linear window.
+
+    >>> round(_simon_share(), 3)
+    0.893
+    """
+    simon = published("simon-1997")
+    return simon["abstract.upper_measured"].value * 2 * math.pi / 60 / simon["top.3.upper_quartic"].value
 
 
 @dataclass(frozen=True)
@@ -118,6 +145,7 @@ class Limits:
         device: that theory is of.
         ends: kind of event → how often a top was lost so.
         runs: of a group, the numbers of the inputs, from 0.
+        causes: cause of a loss, told by the phase before it → number of tops; of runs that recorded it.
         told_apart: whether another group differs from this one only in what is SYNTHETIC, so that the text says it.
     """
 
@@ -128,6 +156,7 @@ class Limits:
     device: Device
     ends: Mapping[str, int]
     runs: tuple[int, ...] = ()
+    causes: Mapping[str, int] = field(default_factory=dict)
     told_apart: bool = False
 
     @property
@@ -200,7 +229,9 @@ def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
         statistics = summarize(_sample(source, which, options))
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error
-    kinds = Counter(str(event["kind"]) for event in source.run.events()) if source.run else Counter[str]()
+    events = source.run.events() if source.run else []
+    kinds = Counter(str(event["kind"]) for event in events)
+    causes = Counter(str(event["cause"]) for event in events if event.get("cause"))
     ends = {str(kind): kinds[kind] for kind in ENDS if kinds[kind]}
     return Limits(
         which,
@@ -209,6 +240,7 @@ def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
         _comparisons(statistics, device, which),
         device,
         ends,
+        causes=dict(causes),
     )
 
 
@@ -258,10 +290,12 @@ def _combine(
     first = runs[numbers[0]]
     which, device = first.which, first.device
     statistics = combine([_sample(sources[k], which, options) for k in numbers])
-    ends = sum((Counter(runs[k].ends) for k in numbers), Counter[str]())
+    ends, causes = (
+        sum((Counter(getattr(runs[k], name)) for k in numbers), Counter[str]()) for name in ("ends", "causes")
+    )
     comparisons = _comparisons(statistics, device, which)
     conditions = replace(first.conditions, synthetic=synthetic_runs(runs[k] for k in numbers))
-    return Limits(which, conditions, statistics, comparisons, device, dict(ends), numbers)
+    return Limits(which, conditions, statistics, comparisons, device, dict(ends), numbers, dict(causes))
 
 
 def _sample(source: Source[LimitReadings], which: Which, options: LimitOptions) -> Sample:
@@ -297,7 +331,7 @@ def _number(value: object) -> float | None:
 
 
 def _comparisons(statistics: Statistics, device: Device, which: Which) -> tuple[Comparison, ...]:
-    return tuple(compare(statistics, name, spin) for name, spin in device.expected_spins(which).items())
+    return tuple(compare(statistics, name, *spin) for name, spin in device.expected_spins(which).items())
 
 
 def _which(source: Source[LimitReadings], device: Device) -> Which:
@@ -330,7 +364,7 @@ def described_device(scene: Scene, name: str) -> Device:
     low, high = spins_of_window(windows, scene.start.spin_hz)
     assert found.floating is not None  # else there would be no window
     resonance = stability.wobble_resonance(found.field, found.top, found.floating.height)
-    return Device(name, low, high, None if np.isnan(resonance) else resonance)
+    return Device(name, low, high, None if np.isnan(resonance) else resonance, is_thesis_device(scene))
 
 
 def warnings_of(statistics: Statistics) -> list[str]:
@@ -381,8 +415,12 @@ def _sentences(limits: Limits) -> Iterable[str]:
         yield f"They are of {found.runs} runs, which differ by {beyond}."
     if limits.ends:
         yield "The top " + ", ".join(f"{ENDS[kind]} {_times(n)}" for kind, n in limits.ends.items()) + "."
+    if limits.causes:
+        told = ", ".join(f"{cause} {_times(n)}" for cause, n in sorted(limits.causes.items()))
+        yield f"The phase before each loss tells why: {told}."
     for one in limits.comparisons:
-        yield _compare(one)
+        if one.name not in {SIMON, *_REACHED}:
+            yield _compare(one)
 
 
 def _times(n: int) -> str:

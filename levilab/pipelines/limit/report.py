@@ -6,6 +6,7 @@ import math
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from analysis.locked import Cause
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.limit.table import runs_table, theory_table
@@ -13,7 +14,7 @@ from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, first_of, in
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
 from levilab.present.numbers import off, reading, with_uncertainty
 from levilab.present.tables import Row, table
-from levilab.stability.thesis import MEASURED_HZ, MEASURED_U_HZ
+from levilab.stability.thesis import ISLANDS_HZ, MEASURED_HZ, MEASURED_U_HZ
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -122,6 +123,14 @@ _WHY = MappingProxyType({
 })  # fmt: skip
 
 
+#: Cause of a loss → what it says of drive and top.
+_CAUSES = MappingProxyType({
+    Cause.LEFT_BEHIND: "Where a top was left behind, its lag behind the drive grew past a quarter turn and ran away: "
+    "drag, the creep and the swing about the drive took more than the drive gives; a stronger drive gets higher.",
+    Cause.OUT_OF_WINDOW: "Where a top left the window, the drive held it until it fell: no drive gets much higher.",
+})  # fmt: skip
+
+
 def _meaning(group: Limits) -> Iterator[str]:
     """Yield the meaning of a limit in sentences that a student understands."""
     found = group.statistics
@@ -129,6 +138,12 @@ def _meaning(group: Limits) -> Iterator[str]:
     if mean.value is None:
         return
     yield f"The {group.which} limit is {with_uncertainty(mean)}: {_WHY[group.which]}."
+    yield from (_CAUSES[cause] for cause in _CAUSES if group.causes.get(cause))
+    if group.which == "upper" and group.device.is_thesis and ISLANDS_HZ[0] < mean.value < ISLANDS_HZ[1]:
+        yield (
+            f"From {ISLANDS_HZ[0]:g} to {ISLANDS_HZ[1]:g} Hz a simulated top without a drive is up or lost by its "
+            "start (islands), so a top that falls there has met no edge."
+        )
     if found.scatter is None or not found.scatter.value or not mean.u:
         yield "How far another top's limit lies from that one top does not say."
         return

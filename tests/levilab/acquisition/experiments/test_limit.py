@@ -21,6 +21,8 @@ from levilab.errors import UsageError
 from levilab.pipelines.limit.analysis import METHOD
 from levilab.pipelines.options import LimitOptions, SpinDownOptions
 from levilab.pipelines.spindown.analysis import METHOD as SPINDOWN
+from levilab.simulator.scene import preset
+from levilab.world.motion_world import MotionWorld
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 from support.acquisitions import Impatient, Silent, in_world
 
@@ -37,6 +39,10 @@ def mock(out, *settings, seed=1, **changes):
 
 def kinds(run):
     return [event["kind"] for event in run.events()]
+
+
+def causes(run):
+    return [event["cause"] for event in run.events() if "cause" in event]
 
 
 def test_the_lower_limits_are_those_of_the_world_within_their_uncertainty(tmp_path):
@@ -69,6 +75,7 @@ def test_the_upper_limit_is_where_drag_takes_all_that_the_drive_can_give(tmp_pat
     assert ends[0] - 0.5 < limit < ends[1]
     assert kinds(run)[-1] == "held"
     assert "lock lost" in kinds(run)
+    assert causes(run) == ["left behind by the drive"]
     assert "warning" not in kinds(run)
 
 
@@ -200,6 +207,24 @@ def test_a_top_that_falls_under_the_drive_is_said_to_have_fallen(tmp_path):
     assert limit == pytest.approx(36, abs=0.5)  # looked at each 2 s, 0.4 Hz
     assert "top lost" in kinds(run)
     assert "lock lost" not in kinds(run)
+    assert causes(run) == ["out of the window"]
+
+
+@pytest.mark.parametrize(
+    ("drag", "begins", "cause"), [(3.6e-4, 54.0, "left behind by the drive"), (5e-5, 79.0, "out of the window")]
+)
+def test_the_cause_of_a_loss_in_full_motion_is_the_only_possible_one(tmp_path, drag, begins, cause):
+    """Much drag takes all that 0.4 mT give near 58 Hz, far below the window's edge at 80; little drag never does."""
+    scene = preset("spindown").changed({"drag.coefficient": drag, "start.spin_hz": begins})
+    settings = ("limit.which=upper", f"limit.drive_frequency_hz={begins}", "limit.creep_hz_per_s=0.1", "limit.hold_s=0")
+    request = mock(tmp_path, *settings, "limit.drive_waveform=SQU", "limit.repetitions=1")
+    run = acquire(in_world(request, MotionWorld(scene, VirtualClock(), seed=1)), Silent())
+    (group,) = METHOD.analyze([run.folder], LimitOptions()).groups
+    assert causes(run) == [cause]
+    assert group.causes == {cause: 1}
+    assert f"The phase before each loss tells why: {cause} once." in group.text
+    (lag,) = (event["lag_turns"] for event in run.events() if "cause" in event)
+    assert lag > 0.8 or lag < 0.35  # nowhere near half a turn
 
 
 def test_a_top_that_the_drive_does_not_take_up_is_floated_again(tmp_path):
