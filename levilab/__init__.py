@@ -43,6 +43,8 @@ def acquire(
     seed: int | None = None,
     scene: str | PathLike[str] | None = None,
     note: str = "",
+    temperature: float | str | None = None,
+    washers: str | None = None,
     realtime: bool = False,
     resume: str | PathLike[str] | Run | None = None,
     settings: Mapping[str, Any] | None = None,
@@ -65,6 +67,8 @@ def acquire(
         seed: makes a virtual run repeatable.
         scene: with `mock`, a top in full motion: the name of a scene, such as "spindown", or its TOML file.
         note: kept with the run.
+        temperature: of the magnets [°C], or with its unit: "70 F"; kept with the run.
+        washers: on the top, as "0.06+0.1 g"; kept with the run.
         realtime: keeps the virtual bench to the wall clock.
         resume: an interrupted run to go on with, with the settings that it was begun with.
         settings: of the experiment, by dotted keys, as {"limit.which": "upper"}; `levilab acquire NAME --settings`
@@ -94,6 +98,8 @@ def acquire(
         seed=seed,
         scene=None if scene is None else str(scene),
         note=note,
+        temperature=None if temperature is None else str(temperature),
+        washers=washers,
         realtime=realtime,
         resume=as_path(resume),
         wire_log=wire_log,

@@ -52,6 +52,8 @@ class AcquisitionRequest:
         scene: of the full motion, as a table.
         seed: of what is drawn by chance on a virtual bench.
         note: kept with the run.
+        temperature_c: of the magnets [°C]; None: not known.
+        washers_kg: on the top [kg]; None: not known.
         wire_log: whether all bytes on the wire are kept.
         resume: the run to go on with.
         named: kind → model or address of the instruments that a person named in place of the bench's.
@@ -66,6 +68,8 @@ class AcquisitionRequest:
     scene: dict[str, Any] | None = None
     seed: int | None = None
     note: str = ""
+    temperature_c: float | None = None
+    washers_kg: tuple[float, ...] | None = None
     wire_log: bool = False
     resume: Run | None = None
     named: Mapping[str, str] = field(default_factory=dict)
@@ -216,6 +220,8 @@ def _record(request: AcquisitionRequest) -> RunRecord:
         software=software_versions(),
         seed=request.seed,
         note=request.note,
+        temperature_c=request.temperature_c,
+        washers_kg=request.washers_kg,
         synthetic=request.synthetic_how is not None,
         synthetic_how=request.synthetic_how,
         world=request.world,

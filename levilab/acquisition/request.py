@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import ValidationError
 
@@ -19,6 +19,7 @@ from levilab.bench.kinds import COUNTER, KINDS, estimates_u
 from levilab.bench.person import ask_no_person
 from levilab.bench.wiring import described_wiring
 from levilab.errors import DataError, LevilabError, UsageError
+from levilab.formats.typed import read_masses, read_temperature
 from levilab.runs.run import Run, find_run, runs_named
 from levilab.settings import in_one_line
 from levilab.simulator.keys import parse_setting
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
     from levilab.bench.person import Person
     from levilab.bench.wiring import Wiring
     from levilab.simulator.scene import Scene
+
+T = TypeVar("T")
 
 HOW = (
     "acquired on the virtual bench: the drivers are the real ones, the instruments wire-level models, {what}, "
@@ -68,6 +71,7 @@ class AcquisitionOptions:
         seed: makes a virtual run repeatable.
         scene: with mock, the name or file of a scene in full motion; by default the top only spins.
         note: kept with the run.
+        temperature, washers: of the magnets and on the top, as a person types them; kept with the run.
         realtime: keeps the virtual bench to the wall clock.
         resume: the run to go on with.
         wire_log: keeps all bytes on the wire.
@@ -84,6 +88,8 @@ class AcquisitionOptions:
     seed: int | None = None
     scene: str | None = None
     note: str = ""
+    temperature: str | None = None
+    washers: str | None = None
     realtime: bool = False
     resume: Path | None = None
     wire_log: bool = False
@@ -112,6 +118,8 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
         lambda: described_wiring(config, options.person),
         out=options.out,
         note=options.note,
+        temperature_c=_typed("temperature", options.temperature, read_temperature),
+        washers_kg=_typed("washers", options.washers, read_masses),
         wire_log=options.wire_log,
         resume=run,
         named=named,
@@ -145,10 +153,18 @@ def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: boo
     for name in ("seed", "scene"):
         if getattr(options, name) is not None and (run or not options.mock):
             raise UsageError(name, f"goes with `mock`, and not with `resume`: a run keeps its {name}")
-    if options.settings and run:
-        raise UsageError("settings", "goes with a new run: a resumed run keeps its settings")
+    for name in ("settings", "temperature", "washers"):
+        if getattr(options, name) and run:
+            raise UsageError(name, f"goes with a new run: a resumed run keeps its {name}")
     if options.realtime and not virtual:
         raise UsageError("realtime", "goes with `mock`: a real bench always keeps to the wall clock")
+
+
+def _typed(name: str, text: str | None, read: Callable[[str], T]) -> T | None:
+    try:
+        return None if text is None else read(text)
+    except ValueError as error:
+        raise UsageError(name, str(error), value=text) from error
 
 
 def _configuration(

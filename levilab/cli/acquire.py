@@ -66,6 +66,12 @@ def acquire_experiment(
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Makes a virtual run repeatable.")] = None,
     note: Annotated[str, typer.Option(help="Kept with the run.")] = "",
+    temperature: Annotated[
+        str | None, typer.Option(metavar="T", help="Of the magnets, as 21.5 C; kept with the run.")
+    ] = None,
+    washers: Annotated[
+        str | None, typer.Option(metavar="MASSES", help="On the top, as 0.06+0.1 g; kept with the run.")
+    ] = None,
     realtime: Annotated[bool, typer.Option("--realtime", help="Run the virtual bench in real time.")] = False,
     resume: Annotated[
         Path | None,
@@ -107,6 +113,8 @@ def acquire_experiment(
         seed=seed,
         scene=scene,
         note=note,
+        temperature=temperature,
+        washers=washers,
         realtime=realtime,
         resume=resume,
         wire_log=wire_log,

@@ -7,6 +7,7 @@ from datetime import UTC
 from typing import TYPE_CHECKING, Any
 
 from levilab.pipelines.sources import mark_of
+from levilab.pipelines.tune.owner import washers_text
 from levilab.present.clock import local, moment
 from levilab.present.document.blocks import Details, Fact, Facts, Note, Section, Tabular
 from levilab.present.document.marks import with_marks
@@ -109,6 +110,8 @@ def _facts(source: Source[Any], parts: Sequence[About]) -> list[Fact]:
     return [
         Fact("Synthetic", made_up),
         Fact("Note", (record.note,) if record.note else ()),
+        Fact("Temperature", () if record.temperature_c is None else (f"{record.temperature_c:g} °C",)),
+        Fact("Washers", () if record.washers_kg is None else (washers_text(record.washers_kg),)),
         Fact("When", (*_when(record), *_local_start(source))),
         Fact("Status", (source.run.status,)),
         *about_readings,

@@ -69,7 +69,7 @@ class RunRecord(BaseModel):
     note: str = ""
     #: Of the magnets [°C], and the washers on the top [kg], as a person said; None: nothing was said.
     temperature_c: float | None = None
-    washers_kg: list[float] | None = None
+    washers_kg: tuple[float, ...] | None = None
     synthetic: bool = False
     synthetic_how: str | None = None
     #: Of a virtual bench, if its top only spins.

@@ -14,7 +14,11 @@ from levilab.acquisition.table import EXPERIMENTS
 from levilab.bench.person import Task, ask_no_person
 from levilab.cli.acquire import _ask
 from levilab.cli.main import app
+from levilab.pipelines.tune.owner import read_scan
+from levilab.runs.run import Run
 from support.commands import command
+from support.figures import without_drawing
+from support.paths import ROOT
 
 
 def test_the_person_is_asked_on_the_terminal(monkeypatch, capsys):
@@ -68,3 +72,26 @@ def test_the_command_hands_the_person_over(monkeypatch, tmp_path, words, person)
             app, ["acquire", "spin", "--bench", str(bench), "--out", str(tmp_path), *words], catch_exceptions=False
         )
     assert asked == [person]
+
+
+def test_a_run_keeps_temperature_and_washers_and_its_report_shows_them(tmp_path):
+    words = ("acquire", "field", "--mock", "--yes", "--seed", "3", "--temperature", "68 F", "--washers", "0.06+0.1 g")
+    assert command(*words, cwd=tmp_path).status == 0
+    (folder,) = (tmp_path / "runs").iterdir()
+    record = Run.load(folder).record
+    assert (record.temperature_c, record.washers_kg) == (20.0, (6e-5, 1e-4))
+    with without_drawing():
+        assert command("report", folder, "--no-crosscheck", "-o", "r.html", cwd=tmp_path).status == 0
+    page = (tmp_path / "r.html").read_text("utf-8")
+    assert all(text in page for text in ("Temperature", "20 °C", "Washers", "0.06 + 0.1 g"))
+    # and the scan is at that temperature for levilab tune
+    assert read_scan(folder, None, ROOT / "sample_data" / "device.toml", lambda _: None).temperature == 20.0
+
+
+@pytest.mark.parametrize(("words", "says"), [
+    (("--temperature", "294"), "levilab: --temperature 294: a temperature of a room such as 21.5 °C is expected"),
+    (("--washers", "0,06"), "levilab: --washers 0,06: a decimal point is expected, and a comma between two masses"),
+])  # fmt: skip
+def test_a_wrong_condition_is_refused_before_a_run_is_made(tmp_path, words, says):
+    ended = command("acquire", "spin", "--mock", *words, cwd=tmp_path)
+    assert (ended.status, ended.err, list(tmp_path.iterdir())) == (2, f"{says}\n", [])
