@@ -34,10 +34,13 @@ RATE_HZ = 50.0
 
 
 def can_lock(scene: Scene, until: float = math.inf) -> bool:
-    """Return whether there is a drive up to a time [s], and a moment across the axis that it can turn the top by."""
+    """Return whether there is a drive up to a time [s], and a moment across the axis that it can turn the top by.
+
+    A drive that the top triggers goes with the top, and not the top with it.
+    """
     drive = scene.drive
     lasts = drive.off_s is None or drive.off_s >= until
-    on = drive.waveform != "off" and drive.amplitude_t > 0 and lasts
+    on = drive.waveform not in {"off", "triggered"} and drive.amplitude_t > 0 and lasts
     return scene.observed == "motion" and on and not scene.top.aligned
 
 

@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from levilab.errors import SimulationError
+from levilab.errors import LeftRange, SimulationError
 from levilab.simulator.accuracy import NODES_ORDER, comes_near_zero, estimate, has_kink
 from levilab.simulator.energy import both_spins, core_spin
 from levilab.simulator.escape import at_the_crossing, crossed_height, exit_speeds
 from levilab.simulator.kernels.columns import LANES
 from levilab.simulator.kernels.lanes import advance_many
+from levilab.simulator.kernels.loads import Bursts
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, L, N, R, V
 from levilab.simulator.kernels.pieces import DURATION, FIRST, HEIGHT, OFF, RADIUS, RATE, STEEP, STEP
 from levilab.simulator.keys import SceneError
-from levilab.simulator.single import MIN_STEPS_FOR_DOUBLING, check, simulate
+from levilab.simulator.single import MIN_STEPS_FOR_DOUBLING, check, simulate, simulate_at_step
 from levilab.simulator.stops import MOST_KINKS, MOST_STEPS
 from levilab.simulator.varied import Batch, batches, broadcast, scene_at
 
@@ -152,6 +153,10 @@ def simulate_many(
 
     def advance(part: Batch) -> None:
         steps = np.full(part.longest.shape, step) if step else part.longest * (step_share or 1.0)
+        if isinstance(part.model.drive, Bursts):
+            alone = lambda where: scene_at(scene, values, where)  # noqa: E731
+            _advance_one_by_one(alone, part, duration, steps, sampling=sampling, ends=ends, errors=errors)
+            return
         _advance(part, duration, steps, sampling, ends, errors=errors)
 
     with ThreadPoolExecutor(threads) as pool:
@@ -350,6 +355,24 @@ def _advance(some: Batch, duration: float, steps: Array, sampling: _Sampling, en
     ends.states[some.where], ends.survived[some.where] = states, passed.survived
     if not together:
         sampling.samples[some.where] = samples
+
+
+def _advance_one_by_one(
+    scene_of: Callable[[int], Scene], some: Batch, duration: float, steps: Array, *, sampling: _Sampling, ends: _Ends,
+    errors: bool,
+) -> None:  # fmt: skip
+    """Simulate tops that trigger their drive, as `_advance` does: each has pieces of its own, and no use for lanes."""
+    for where, step in zip(some.where.tolist(), steps.tolist(), strict=True):
+        try:
+            run, found = simulate_at_step(scene_of(where), duration, step, sampling.rate or None, errors=errors)
+        except LeftRange:  # as in lanes, where a state that is no number counts as outside
+            ends.states[where] = np.nan
+            continue
+        ends.states[where], ends.survived[where] = run.states[-1], run.fell is None
+        ends.position_error[where], ends.axis_error[where] = found
+        samples = sampling.samples[where]
+        kept = run.states[: len(samples) if run.fell is None else len(run.states) - 1, sampling.columns]
+        samples[: len(kept)] = kept
 
 
 def _check_counts(some: Batch, duration: float, steps: Array) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from levilab.simulator.disc import distance_to, nodes_of, rule_for
 from levilab.simulator.field import field_of
 from levilab.simulator.kernels import braking
-from levilab.simulator.kernels.loads import Aligned, Disc, Leaning, PiecewiseLinear, Sine, Tilted, Upright
+from levilab.simulator.kernels.loads import Aligned, Bursts, Disc, Leaning, PiecewiseLinear, Sine, Tilted, Upright
 from levilab.simulator.kernels.motion import Body, Loose, Model, Rigid
 from levilab.simulator.numbers import cos, hypot, largest, sin
 
@@ -67,7 +67,9 @@ def gravity(scene: Scene) -> tuple[float, float, float]:
 
 def has_attitude(scene: Scene) -> bool:
     """Return whether the motion depends on how far the top has turned about its own axis."""
-    return bool(scene.top.moment_tilt[0] != 0 or scene.top.magnet == "disc" or scene.washers.inertia_kg_m2 > 0)
+    top = scene.top
+    turned = top.moment_tilt[0] != 0 or top.magnet == "disc" or scene.drive.waveform == "triggered"
+    return bool(turned or scene.washers.inertia_kg_m2 > 0)
 
 
 #: The transverse part that makes the simulator integrate the turn of an aligned moment: less than the rounding of the
@@ -140,4 +142,6 @@ def _drive(scene: Scene) -> Any:
     x, y, z = (_moment(scene) * drive.amplitude_t * part for part in unit_vector(drive.direction))
     if drive.waveform == "sine":
         return Sine((x, y, z), drive.frequency_hz, drive.phase_rad / (2 * math.pi))
+    if drive.waveform == "triggered":
+        return Bursts((x, y, z))
     return PiecewiseLinear((x, y, z))

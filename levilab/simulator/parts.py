@@ -160,15 +160,24 @@ class Drag(Part):
 class Drive(Part):
     """A uniform field, amplitude_t · s(2π frequency_hz t + phase_rad) along direction, until off_s (None: always).
 
-    s is 0 at phase 0 and 1 at π/2 (sine, triangle), the sine's sign (square), or 1 and 0 in turn (unipolar).
+    s is 0 at phase 0 and 1 at π/2 (sine, triangle), the sine's sign (square), or 1 and 0 in turn (unipolar).  With
+    "triggered" it is one cycle of a sine from phase_rad on, each time the top's tape has passed a light, and else 0.
+
+    Attributes:
+        light_rad: of a triggered drive: the body's angle φ + ψ about the vertical when its tape passes the light.
+        latency_s: from then to the burst; a tape that passes during a burst is not seen.
+        cycle_turns: 0, or the burst's period in turns of the top as it passes, in place of 1/frequency_hz.
     """
 
-    waveform: Literal["off", "sine", "triangle", "square", "unipolar"] = "off"
+    waveform: Literal["off", "sine", "triangle", "square", "unipolar", "triggered"] = "off"
     amplitude_t: float = Field(default=4e-4, ge=0, lt=1e6)
     frequency_hz: Frequency = 30.0
     phase_rad: float = math.pi / 2
     direction: Direction = (0.0, 1.0, 0.0)
     off_s: Never = None
+    light_rad: float = -math.pi / 2
+    latency_s: float = Field(default=2e-5, ge=0, lt=1e3)
+    cycle_turns: float = Field(default=0.0, ge=0, lt=1e3)
 
 
 class Start(Part):

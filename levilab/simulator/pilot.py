@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from levilab.simulator.accuracy import SAFETY_FACTOR
 from levilab.simulator.kernels.motion import TIME, N, R
-from levilab.simulator.stops import stops_between
 
 if TYPE_CHECKING:
     from levilab.simulator.problem import Problem
@@ -100,7 +99,7 @@ def _trend(problem: Problem, duration: float, step: float) -> tuple[float, float
     elapsed: Array = duration / COMPARISONS * np.arange(1, COMPARISONS + 1, dtype=np.float64)
     runs, powers = [], []
     for length in (step, 2 * step):
-        stops = stops_between(begin, begin + duration, length, problem.scene.drive, begin + elapsed)
+        stops = problem.stops(begin + duration, length, begin + elapsed, escape=problem.escape)
         states, through = problem.advance_to_stops(problem.start, stops, problem.escape)
         if not through:
             return None

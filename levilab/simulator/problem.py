@@ -11,19 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levilab.errors import LeftRange, SimulationError
+from levilab.simulator.energy import spin_of
 from levilab.simulator.escape import locate_escape
 from levilab.simulator.kernels.braking import DragFlow, WasherDragFlow
+from levilab.simulator.kernels.bursts import NO_BURST, Trigger, advance_triggered
+from levilab.simulator.kernels.loads import Bursts
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
 from levilab.simulator.kernels.splitting import advance
 from levilab.simulator.model import model_of
 from levilab.simulator.schemes import SCHEMES, Scheme
-from levilab.simulator.stops import stop_after_each_step
+from levilab.simulator.stops import Stops, check_count, stop_after_each_step, stops_between
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from levilab.simulator.scene import Scene
-    from levilab.simulator.stops import Stops
     from levilab.simulator.trajectory import Event
 
 Array = NDArray[np.float64]
@@ -33,6 +35,10 @@ NO_LIMITS = (math.inf, -math.inf)
 
 #: Steps in one call of a kernel, about 50 ms; between calls progress is reported, and Ctrl-C takes effect.
 STEPS_IN_A_CALL = 100_000
+#: A triggered drive takes the steps that suit the spin at the start, and shorter ones above it; but this spin at least.
+SLOWEST_HZ = 5.0
+#: Pieces of a triggered drive in one call, of some five steps each.
+PIECES_IN_A_CALL = 20_000
 
 
 @dataclass(frozen=True)
@@ -62,6 +68,44 @@ class Problem:
         """
         return replace(self, model=model_of(self.scene, self.start[R], more))
 
+    @property
+    def triggered(self) -> bool:
+        """Whether the kinks of the drive depend on the motion."""
+        return isinstance(self.model.drive, Bursts)
+
+    def stops(
+        self,
+        until: float,
+        step: float,
+        samples: Array | None = None,
+        *,
+        escape: tuple[float, float] = NO_LIMITS,
+        progress: Callable[[float], None] | None = None,
+    ) -> Stops:
+        """Return the stops from the start to a time; those of a drive that the top triggers are found on the way.
+
+        Args:
+            until: the last stop [s].
+            step: no step is longer [s].
+            samples: further stops [s].
+            escape: radius and height [m] outside of which a motion that has to be followed ends.
+            progress: called with the share of the time that a motion was followed.
+
+        Raises:
+            SimulationError: as `stops_between`; a triggered drive goes forwards only.
+        """
+        begin = float(self.start[TIME])
+        if not self.triggered:
+            return stops_between(begin, until, step, self.scene.drive, samples)
+        check_count(abs(until - begin), step)
+        if until < begin:
+            raise SimulationError(
+                f"duration = {until - begin:g} s: a triggered drive goes forwards only, since its bursts follow from "
+                "the motion before them; a duration above 0 is expected"
+            )
+        inside = np.empty(0) if samples is None else samples[(samples > begin) & (samples < until)]
+        return _follow(self, step, np.append(inside, until), escape, progress)
+
     def advance_to_stops(self, start: Array, stops: Stops, escape: tuple[float, float]) -> tuple[Array, bool]:
         """Integrate from stop to stop, by one call of the kernel.
 
@@ -73,6 +117,8 @@ class Problem:
         Returns:
             The states at the stops that were reached, shape (n, 18), the start first; and whether all were reached.
         """
+        if stops.states is not None:
+            return stops.states, len(stops.states) == stops.times.size
         states = np.empty((stops.times.size, STATE_SIZE))
         a, b = self.coefficients
         reached = advance(
@@ -104,6 +150,69 @@ def scheme_for(name: str | None, model: Any) -> Scheme:
             f"scheme {name}: with drag on a top whose spin the field changes it loses its order: take one of {fitting}"
         )
     return SCHEMES[name]
+
+
+def _follow(
+    problem: Problem,
+    step: float,
+    wanted: Array,
+    escape: tuple[float, float],
+    progress: Callable[[float], None] | None,
+) -> Stops:
+    """Follow a motion with a drive that it triggers, and return the stops with the states there."""
+    start, trigger = problem.start, trigger_of(problem)
+    memory, state, at = np.array(NO_BURST), start, 0
+    found: list[Stops] = []
+    while at < wanted.size:
+        # no array is larger than the steps need: most runs are short
+        most = int(min(PIECES_IN_A_CALL, 8 + wanted.size - at + 4 * (wanted[-1] - state[TIME]) / step))
+        some = Stops(np.empty(most + 1), np.empty(most, dtype=np.int64), np.empty(most), np.empty(most))
+        states = np.empty((most + 1, STATE_SIZE))
+        done, reached, through = advance_triggered(
+            problem.model, trigger, memory, state, wanted[at:], step, *problem.coefficients, escape,
+            some.times, some.counts, some.levels, some.slopes, states,
+        )  # fmt: skip
+        states = states[: done + 1]
+        if not through:
+            interval = some.part(done, done + 1)
+            passed, fell = _escape(problem, states[-1], interval) if escape != NO_LIMITS else (states[-1], True)
+            some = some.part(0, done + 1)
+            if fell:
+                found.append(replace(some, states=states))
+                break
+            done, states = done + 1, np.concatenate([states, passed[None]])
+            reached += bool(some.times[-1] == wanted[at + reached])
+        found.append(replace(some.part(0, done), states=states))
+        state, at = states[-1], at + reached
+        if progress is not None:
+            progress(float((state[TIME] - start[TIME]) / (wanted[-1] - start[TIME])))
+    return Stops(
+        np.concatenate([found[0].times[:1], *(part.times[1:] for part in found)]),
+        np.concatenate([part.counts for part in found]),
+        np.concatenate([part.levels for part in found]),
+        np.concatenate([part.slopes for part in found]),
+        np.concatenate([start[None], *(part.states[1:] for part in found if part.states is not None)]),
+    )
+
+
+def trigger_of(problem: Problem) -> Trigger:
+    """Return what sets the bursts of a triggered drive off."""
+    drive, turn = problem.scene.drive, 2 * math.pi
+    return Trigger(
+        mark=drive.light_rad / turn,
+        latency=drive.latency_s,
+        frequency=drive.frequency_hz,
+        cycle=drive.cycle_turns,
+        phase=drive.phase_rad / turn,
+        off=math.inf if drive.off_s is None else drive.off_s,
+        rate=max(abs(float(spin_of(problem.scene, problem.start)[0])) / turn, SLOWEST_HZ),
+    )
+
+
+def fall_after(problem: Problem, states: Array, stops: Stops) -> Event | None:
+    """Return the escape in the interval after the last of these states; None if they are those of all stops."""
+    at = len(states) - 1
+    return _escape(problem, states[-1], stops.part(at, at + 1))[1] if at < stops.counts.size else None
 
 
 def integrate(
@@ -153,6 +262,8 @@ def integrate_to_end(problem: Problem, stops: Stops) -> Array:
         The state there, shape (18,); NaN if the numbers left their range on the way.
     """
     state = problem.start
+    if stops.states is not None:
+        return stops.states[-1] if len(stops.states) == stops.times.size else np.full_like(state, math.nan)
     for first, last in stops.pieces(STEPS_IN_A_CALL):
         states, through = problem.advance_to_stops(state, stops.part(first, last), NO_LIMITS)
         if not through:

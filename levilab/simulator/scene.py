@@ -197,7 +197,7 @@ class Switch(NamedTuple):
         table: of the part.
         is_off: whether the scene has it switched off.
         keys: of the table, that have no effect then.
-        why: the value that switches it off, and what switches it on.
+        why: the value that switches it off, and what switches it on, a format in which s is the scene.
     """
 
     table: str
@@ -211,7 +211,19 @@ SWITCHES: tuple[Switch, ...] = (
         "drive",
         lambda s: s.drive.waveform == "off",
         ("amplitude_t", "frequency_hz", "phase_rad", "direction", "off_s"),
-        "drive.waveform = off; sine, triangle, square or unipolar switches the drive on",
+        "drive.waveform = off; sine, triangle, square, unipolar or triggered switches the drive on",
+    ),
+    Switch(
+        "drive",
+        lambda s: s.drive.waveform != "triggered",
+        ("light_rad", "latency_s", "cycle_turns"),
+        "drive.waveform = {s.drive.waveform}; triggered lets the tape set off bursts",
+    ),
+    Switch(
+        "drive",
+        lambda s: s.drive.waveform == "triggered" and s.drive.cycle_turns > 0,
+        ("frequency_hz",),
+        "drive.cycle_turns = {s.drive.cycle_turns:g} gives the bursts their length; 0 leaves it to the frequency",
     ),
     Switch(
         "drag",
@@ -239,7 +251,7 @@ def _without_effect(scene: Scene, switch: Switch) -> str:
     part, usual = getattr(scene, switch.table), getattr(Scene(), switch.table)
     keys = [key for key in switch.keys if getattr(part, key) != getattr(usual, key)]
     named = " and ".join(f"{switch.table}.{key} = {short_text(getattr(part, key))}" for key in keys)
-    return f"{named} {'do' if len(keys) > 1 else 'does'} nothing: {switch.why}" if keys else ""
+    return f"{named} {'do' if len(keys) > 1 else 'does'} nothing: {switch.why.format(s=scene)}" if keys else ""
 
 
 def scene_of(table: Mapping[str, Any]) -> Scene:

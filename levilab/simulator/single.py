@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +28,7 @@ from levilab.simulator.model import model_of
 from levilab.simulator.pilot import Pilot, pilot_of, step_power
 from levilab.simulator.problem import (
     Problem,
+    fall_after,
     integrate,
     integrate_each_step,
     integrate_to_end,
@@ -36,7 +37,7 @@ from levilab.simulator.problem import (
 )
 from levilab.simulator.spin import DECAYS, since_infinity
 from levilab.simulator.start import start_of
-from levilab.simulator.stops import NO_TIMES, kinks, stop_after_each_step, stops_between
+from levilab.simulator.stops import NO_TIMES, kinks, stop_after_each_step
 from levilab.simulator.trajectory import Accuracy, Event, Trajectory
 
 if TYPE_CHECKING:
@@ -95,6 +96,7 @@ class Run:
         events: on the way.
         steps: how many were taken.
         step_power: mean of stepᵖ over the time [sᵖ], p the scheme's order.
+        stops: that it was integrated between.
     """
 
     states: Array
@@ -102,6 +104,7 @@ class Run:
     events: tuple[Event, ...]
     steps: int
     step_power: float
+    stops: Stops
 
 
 def simulate(
@@ -164,6 +167,21 @@ def simulate(
     return Trajectory(scene, run.states, model, accuracy, run.fell, run.events)
 
 
+def simulate_at_step(
+    scene: Scene, duration: float, step: float, rate: float | None, *, errors: bool
+) -> tuple[Run, Array]:
+    """Simulate a scene once, at one step [s]; return the motion and its estimated errors of place [m] and axis [rad].
+
+    Raises:
+        LeftRange: the motion leaves the numbers' range.
+    """
+    start = start_of(scene)
+    model = model_of(scene, start[R])
+    problem = Problem(scene, model, start, scheme_for(None, model))
+    run = _run(problem, _Wanted(duration, rate, None, None), step)
+    return run, np.sum(_errors(problem, run, step), axis=0) if errors else np.full(2, math.nan)
+
+
 def check(*, duration: float, **positive: float | None) -> None:
     """Raise SimulationError, with the quantity's name, for a number that makes no sense; None is none."""
     if not 0 < abs(duration) <= LONGEST_S:
@@ -188,7 +206,7 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
     while True:
         tries += 1
         run = _run(problem, wanted, h)
-        found = None if with_three else _errors_by_two(problem, run, pilot, longest)
+        found = None if with_three else _errors_by_two(problem, run, h, pilot, longest)
         if found is None:
             if not with_three and h > longest * LONGEST_SHARE_OF_THREE:
                 with_three, h = True, longest * LONGEST_SHARE_OF_THREE
@@ -211,7 +229,9 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
         h *= min(max(0.9 * (tolerance / worst) ** (1 / order), 0.1), 0.7)
 
 
-def _errors_by_two(problem: Problem, run: Run, pilot: Pilot | None, longest: float) -> tuple[Array, Array] | None:
+def _errors_by_two(
+    problem: Problem, run: Run, step: float, pilot: Pilot | None, longest: float
+) -> tuple[Array, Array] | None:
     """Estimate the error of the last state from a second run, with longer steps where these are short enough.
 
     Returns:
@@ -220,11 +240,12 @@ def _errors_by_two(problem: Problem, run: Run, pilot: Pilot | None, longest: flo
     if run.fell is not None or isinstance(problem.model.magnet, Disc):
         return None
     begin, end, order = float(problem.start[TIME]), run.states[-1], problem.scheme.order
-    mean_step = run.step_power ** (1 / order)
+    # the steps that a triggered drive takes are shorter than the one that they are made from
+    mean_step = step if problem.triggered else run.step_power ** (1 / order)
     if _crosses_kink(problem, run, mean_step):
         return None
-    for step in (min(2 * mean_step, longest), mean_step / 2):
-        stops = stops_between(begin, end[TIME], step, problem.scene.drive)
+    for length in (min(2 * mean_step, longest), mean_step / 2):
+        stops = problem.stops(end[TIME], length)
         ratio = step_power(stops, order) / run.step_power
         if ratio >= LEAST_RATIO:
             break
@@ -271,8 +292,8 @@ def _crosses_kink(problem: Problem, run: Run, step: float) -> bool:
         return False
     states = run.states
     if np.abs(np.diff(states[:, TIME])).max() > _CLOSE_S:
-        until = states[-1, TIME]
-        states = integrate_each_step(problem, stops_between(problem.start[TIME], until, step, problem.scene.drive))
+        stops = run.stops if run.fell is None else problem.stops(states[-1, TIME], step)
+        states = integrate_each_step(problem, stops)
     scene = problem.scene
     spins = both_spins(states, scene.top.inertia_axial_kg_m2, scene.washers.inertia_kg_m2)
     return bool(np.any(comes_near_zero(spins)))
@@ -289,7 +310,7 @@ def _coarser_ends(problem: Problem, until: float, step: float) -> tuple[Array, A
     begin = float(problem.start[TIME])
     lasted = abs(until - begin)
     pieces = 1 + kinks(problem.scene.drive, min(begin, until), max(begin, until)).size
-    if lasted / pieces > MIN_STEPS_FOR_DOUBLING * step:
+    if not problem.triggered and lasted / pieces > MIN_STEPS_FOR_DOUBLING * step:
         return _state_with_steps(problem, until, 2 * step), _state_with_steps(problem, until, 4 * step), 2 * step
     length = min(step, lasted) / 2
     half = _state_with_steps(problem, until, length)
@@ -298,8 +319,7 @@ def _coarser_ends(problem: Problem, until: float, step: float) -> tuple[Array, A
 
 def _state_with_steps(problem: Problem, until: float, step: float) -> Array:
     """Return the state at a time, shape (18,), integrated with steps of this length [s] and without an escape."""
-    stops = stops_between(problem.start[TIME], until, step, problem.scene.drive)
-    return integrate_to_end(problem, stops)
+    return integrate_to_end(problem, problem.stops(until, step))
 
 
 # --- one run at one step ---
@@ -309,15 +329,18 @@ def _run(problem: Problem, wanted: _Wanted, step: float) -> Run:
     """Integrate once, with steps no longer than `step` [s]."""
     begin = float(problem.start[TIME])
     samples = _samples(begin, wanted.duration, wanted.rate)
-    stops = stops_between(begin, begin + wanted.duration, step, problem.scene.drive, samples)
+    stops = problem.stops(begin + wanted.duration, step, samples, escape=problem.escape, progress=wanted.progress)
     if wanted.events:
         stops = stop_after_each_step(stops)
-    states, fell, steps = integrate(problem, stops, wanted.progress)
+    if stops.states is None:
+        states, fell, steps = integrate(problem, stops, wanted.progress)
+    else:  # found by following the motion
+        states, fell, steps = stops.states, fall_after(problem, stops.states, stops), int(stops.counts.sum())
     if fell is not None:
         states = np.concatenate([states, fell.state[None]])
     found = _events(problem, states, stops, wanted.events) if wanted.events else ()
     kept = states[_are_wanted(states[:, TIME], samples, abs(wanted.duration) * 1e-11)]
-    return Run(kept, fell, found, steps, step_power(stops, problem.scheme.order))
+    return Run(kept, fell, found, steps, step_power(stops, problem.scheme.order), replace(stops, states=None))
 
 
 def _are_wanted(times: Array, samples: Array, apart: float) -> NDArray[np.bool_]:

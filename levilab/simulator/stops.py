@@ -33,15 +33,18 @@ class Stops:
         times: of the stops, shape (n + 1,) [s].
         counts: steps from each stop to the next, shape (n,).
         levels, slopes: of the drive in each interval, shape (n,); see below.
+        states: of the motion at the first of the stops, shape (m, 18), where the stops were found by following it;
+            fewer than n + 1 if it left the limits of the escape in the interval after them.
 
-    Within an interval the drive's field is (level + slope·t) × its carrier, which is smooth: no step crosses a kink,
-    so the order of the integrator is kept.
+    Within an interval the drive's field is (level + slope·t) × its carrier, or with bursts a sine of frequency level
+    and phase slope; this is smooth: no step crosses a kink, so the order of the integrator is kept.
     """
 
     times: Array
     counts: NDArray[np.int64]
     levels: Array
     slopes: Array
+    states: Array | None = None
 
     def pieces(self, steps: int) -> Iterator[tuple[int, int]]:
         """Yield the first and last interval, exclusive, of successive pieces with about so many steps each."""
@@ -73,6 +76,15 @@ def stop_after_each_step(stops: Stops) -> Stops:
 MOST_STEPS, MOST_KINKS = 10**11, 10**7
 
 
+def check_count(duration: float, step: float) -> None:
+    """Raise SimulationError if a duration would take too many steps of this length [s]."""
+    if not duration / step < MOST_STEPS:
+        raise SimulationError(
+            f"{duration / step:.2g} steps of {step:.2g} s would be needed, at most {MOST_STEPS:.0e} are taken: a "
+            "shorter duration, a slower spin or heavier inertias are expected"
+        )
+
+
 def stops_between(start: float, end: float, step: float, drive: Drive, samples: Array | None = None) -> Stops:
     """Return the stops from one time to another.
 
@@ -87,11 +99,7 @@ def stops_between(start: float, end: float, step: float, drive: Drive, samples: 
         SimulationError: it would take too many steps, or the drive has too many kinks.
     """
     low, high = min(start, end), max(start, end)
-    if not (high - low) / step < MOST_STEPS:
-        raise SimulationError(
-            f"{(high - low) / step:.2g} steps of {step:.2g} s would be needed, at most {MOST_STEPS:.0e} are taken: a "
-            "shorter duration, a slower spin or heavier inertias are expected"
-        )
+    check_count(high - low, step)
     corners = kinks(drive, low, high)
     if corners is NO_TIMES and (samples is None or samples.size == 0):
         count = max(math.ceil((high - low) / step * (1 - 1e-12)), 1)

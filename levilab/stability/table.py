@@ -41,8 +41,12 @@ LEFT_OUT: tuple[tuple[Callable[[Scene], bool], str], ...] = (
         "the drag is left out here; it slows the spin, in the end below the slowest one, and the top is lost",
     ),
     (
-        lambda s: s.drive.waveform != "off" and s.drive.amplitude_t > 0,
+        lambda s: s.drive.waveform not in {"off", "triggered"} and s.drive.amplitude_t > 0,
         "the drive is left out here; it tilts the top and may hold its spin",
+    ),
+    (
+        lambda s: s.drive.waveform == "triggered" and s.drive.amplitude_t > 0,
+        "the drive is left out here; it tilts the top, and takes it as fast as the drag allows, or brakes it",
     ),
     (
         lambda s: s.washers.inertia_kg_m2 > 0,

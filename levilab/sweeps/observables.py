@@ -319,8 +319,9 @@ def _line_columns(found: AxisLines) -> dict[str, float]:
 
 #: Seconds of motion that one core does in a second, with samples on the way.
 SAMPLED = 4e4
-#: Factors of the time: for an estimate of the error, in a field of higher order, in the exact one, for a disc.
-ERRORS, HIGHER_FIELD, EXACT_FIELD, DISC = 1.8, 2.5, 8.0, 400.0
+#: Factors of the time: for an estimate of the error, in a field of higher order, in the exact one, for a disc, for a
+#: drive that each top triggers for itself.
+ERRORS, HIGHER_FIELD, EXACT_FIELD, DISC, TRIGGERED = 1.8, 2.5, 8.0, 400.0, 20.0
 #: Time to find the lines of a top [s], and seconds of motion in which they are found in a second.
 LINES_S, SEARCHED = 1.2e-3, 5e3
 #: Time for each top before its motion begins [s].
@@ -339,6 +340,7 @@ def seconds_per_point(plan: Plan) -> float:
     rate /= ERRORS if "errors" in needs else 1.0
     rate /= {"paraxial-2": 1.0, "exact": EXACT_FIELD}.get(plan.scene.base.field, HIGHER_FIELD)
     rate /= DISC if plan.scene.top.magnet == "disc" else 1.0
+    rate /= TRIGGERED if plan.scene.drive.waveform == "triggered" else 1.0
     has_lines = {column.name for column in columns} & set(GROUPS["lines"])
     lines = LINES_S + plan.duration_s / SEARCHED if has_lines else 0.0
     return OVERHEAD_S + plan.duration_s / rate + lines

@@ -36,6 +36,15 @@ class PiecewiseLinear(NamedTuple):
     amplitude: Vector
 
 
+class Bursts(NamedTuple):
+    """A uniform field in bursts of a sine; frequency [Hz] and phase at time 0 [turns] come with each interval.
+
+    Between bursts both are 0, and so is the field.
+    """
+
+    amplitude: Vector
+
+
 def _no_drive(drive: Any, b: Any, at: Any) -> Any:
     return b
 
@@ -50,8 +59,13 @@ def _kinked_drive(drive: Any, b: Any, at: Any) -> Any:
     return plus(b, level + slope * t, drive.amplitude)
 
 
+def _burst_drive(drive: Any, b: Any, at: Any) -> Any:
+    t, frequency, turns = at
+    return plus(b, sine_of_turns(frequency * t + turns), drive.amplitude)
+
+
 #: The field b with the drive's added to it: (drive, b, (time, level, slope)).
-with_drive = by_type({type(None): _no_drive, Sine: _sine_drive, PiecewiseLinear: _kinked_drive})
+with_drive = by_type({type(None): _no_drive, Sine: _sine_drive, PiecewiseLinear: _kinked_drive, Bursts: _burst_drive})
 
 
 # --- magnets ---

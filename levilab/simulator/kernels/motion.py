@@ -81,25 +81,34 @@ class Model(NamedTuple):
 # --- drift ---
 
 
+def _no_turn(turning: Any, along: Any, loose: Any, inverse_i1: Any) -> Any:
+    return 0.0
+
+
+def _rigid_turn(turning: Any, along: Any, loose: Any, inverse_i1: Any) -> Any:
+    return turning.twist * along
+
+
+def _loose_turn(turning: Any, along: Any, loose: Any, inverse_i1: Any) -> Any:
+    return (along - loose) * turning.inverse_core - along * inverse_i1
+
+
+#: How fast the body turns about its axis, beside its turn about L [rad/s]: (turning, L·n, washers' part of it, 1/I₁).
+own_turn = by_type({type(None): _no_turn, Rigid: _rigid_turn, Loose: _loose_turn})
+
+
 def _no_twist(turning: Any, n: Any, arm: Any, along: Any, loose: Any, inverse_i1: Any, d: Any) -> Any:
     return arm
 
 
-def _rigid_twist(turning: Any, n: Any, arm: Any, along: Any, loose: Any, inverse_i1: Any, d: Any) -> Any:
-    angle = turning.twist * along * d
-    sinc, cosc = rotation(angle * angle)
-    return rotate(arm, n, angle * sinc, angle * angle * cosc)
-
-
-def _loose_twist(turning: Any, n: Any, arm: Any, along: Any, loose: Any, inverse_i1: Any, d: Any) -> Any:
-    spin = (along - loose) * turning.inverse_core
-    angle = (spin - along * inverse_i1) * d
+def _twist(turning: Any, n: Any, arm: Any, along: Any, loose: Any, inverse_i1: Any, d: Any) -> Any:
+    angle = own_turn(turning, along, loose, inverse_i1) * d
     sinc, cosc = rotation(angle * angle)
     return rotate(arm, n, angle * sinc, angle * angle * cosc)
 
 
 #: The arm after its turn about the axis itself: (turning, axis, arm, L·n, washers' part of it, 1/I₁, d).
-arm_about_axis = by_type({type(None): _no_twist, Rigid: _rigid_twist, Loose: _loose_twist})
+arm_about_axis = by_type({type(None): _no_twist, Rigid: _twist, Loose: _twist})
 
 
 def _no_arm(turning: Any, arm: Any, axis: Any, sine: Any, cosine: Any) -> Any:
