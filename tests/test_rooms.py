@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 #: What takes so long to load that it is imported where it is used: at least 10 ms, or not everywhere installed.
 HEAVY = {
-    "PIL", "RigolWFM", "dask", "distributed", "filelock", "grp", "heyoka", "imageio_ffmpeg", "jinja2", "llvmlite",
+    "PIL", "RigolWFM", "av", "dask", "distributed", "filelock", "grp", "heyoka", "imageio_ffmpeg", "jinja2", "llvmlite",
     "lmfit", "matplotlib", "nicegui", "numba", "pandas", "playwright", "pyarrow", "pyvisa", "rich", "scipy", "serial",
     "sounddevice", "starlette", "typst", "uncertainties", "uvicorn", "zarr",
 }  # fmt: skip

@@ -1,0 +1,67 @@
+"""What a film must show for a top to be followed."""
+
+from analysis.errors import AnalysisError
+
+
+class NoTop(AnalysisError):
+    """No circle with something that moves on it."""
+
+    def __init__(self, *, moving: float) -> None:
+        self.moving = moving
+        seen = (
+            "nothing moves"
+            if moving == 0
+            else f"{100 * moving:.1f} % of the picture changes, and no circle is round it"
+        )
+        super().__init__(
+            f"no top was found at the beginning: {seen}; a floating top seen from above is expected, its whole rim in "
+            "view and a mark on it: say from when on it floats by `start`"
+        )
+
+
+class HandInView(AnalysisError):
+    """A large part of the picture changes."""
+
+    def __init__(self, *, times: tuple[float, float], share: float) -> None:
+        self.times, self.share = times, share
+        super().__init__(
+            f"{100 * share:.0f} % of the picture beside the top changes from {times[0]:.2f} s to {times[1]:.2f} s, as "
+            "by a hand: choose a part without it by `start` and `stop`"
+        )
+
+
+class CameraMoved(AnalysisError):
+    """What should stand still is shifted."""
+
+    def __init__(self, *, time: float, shift: float, allowed: float) -> None:
+        self.time, self.shift, self.allowed = time, shift, allowed
+        super().__init__(
+            f"the background is shifted by {shift:.1f} pixels at {time:.2f} s ({allowed:.1f} are allowed), so the "
+            "camera moved: put it on a stand, or choose a part by `start` and `stop`"
+        )
+
+
+class NoMark(AnalysisError):
+    """Nothing on the top turns by which a phase is found."""
+
+    def __init__(self, *, coherence: float) -> None:
+        self.coherence = coherence
+        super().__init__(
+            f"no mark turns with the top (coherence {coherence:.2f} of 1): put a strip of white tape from the hub to "
+            "the rim on one side, with more light and a shorter exposure"
+        )
+
+
+class SlowMotion(AnalysisError):
+    """A film that is slower than the top was."""
+
+    def __init__(self, *, rate: float, captured: float | None, spin: float | None) -> None:
+        self.rate, self.captured, self.spin = rate, captured, spin
+        seen = f"its pictures follow at {rate:.4g} in a second"
+        if captured is not None:
+            seen += f" and were taken at {captured:.4g}, as the file says"
+        if spin is not None:
+            seen += f" and the top would turn {abs(spin):.3g} times in a second, too slowly to float"
+        super().__init__(
+            f"the film seems to play in slow motion: {seen}; say the true number of pictures in a second with `rate`"
+        )

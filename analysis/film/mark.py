@@ -1,0 +1,79 @@
+"""The mark on a top: its phase in each picture, by the pattern that turns with the top.
+
+The pattern is the mean of the pictures, each turned back by its phase, and the phase is where picture and pattern agree
+best: both are found in turn.  Light that stands still is the median over the pictures.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+#: Of one turn, where picture and pattern are compared; a parabola goes on from there.
+_FINE = 512
+#: Pattern and phases are found in turn.
+_ROUNDS = 3
+#: Samples that the noise of a picture is alike over: rays are closer than pixels.
+_CORRELATED = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Phases:
+    """Phase of the mark in each picture.
+
+    Attributes:
+        phase: from x towards y, downwards, 0 to 1, shape (n,) [turns].
+        u: standard uncertainty of each, shape (n,) [turns].
+        angle: of the mark's middle at phase 0, at which a row of the picture is read [turns].
+    """
+
+    phase: Array
+    u: Array
+    angle: float
+
+
+def phases_of(profiles: Array) -> Phases:
+    """Return the phases of a mark.
+
+    Args:
+        profiles: brightness along bands of the top, shape (n, bands, rays).
+    """
+    changing = profiles - np.median(profiles, axis=0)
+    changing -= changing.mean(axis=2, keepdims=True)
+    rays = profiles.shape[2]
+    waves = np.fft.rfft(changing, axis=2)
+    order = np.arange(waves.shape[2])
+    power = np.mean(np.abs(waves[:, :, 1]) ** 2, axis=0)
+    phase = -np.angle(waves[:, int(np.argmax(power)), 1]) / (2 * np.pi)
+    for _ in range(_ROUNDS):
+        pattern = np.mean(waves * np.exp(2j * np.pi * order * phase[:, None])[:, None], axis=0)
+        phase = _agreement(np.sum(waves * pattern.conj(), axis=1))
+    model = pattern * np.exp(-2j * np.pi * order * phase[:, None])[:, None]
+    rest = changing - np.fft.irfft(model, rays, axis=2)
+    slope = np.fft.irfft(2j * np.pi * order * pattern, rays, axis=1)
+    noise = np.sum(rest**2, axis=(1, 2)) / (rest[0].size / _CORRELATED - 3)
+    u = np.sqrt(noise / np.maximum(np.sum(slope**2), 1e-30))
+    shape = np.fft.irfft(pattern, rays, axis=1)[int(np.argmax(power))]
+    middle = np.sum(np.abs(shape) * shape**2 * np.exp(2j * np.pi * np.arange(rays) / rays))
+    return Phases(phase % 1, u, float(np.angle(middle)) / (2 * np.pi))
+
+
+def _agreement(waves: Array) -> Array:
+    """Return where the correlation of picture and pattern is greatest, shape (n,) [turns].
+
+    Args:
+        waves: its Fourier coefficients, shape (n, m).
+    """
+    seen = np.fft.irfft(waves, _FINE, axis=1)
+    best = np.argmax(seen, axis=1)
+    k = np.arange(len(seen))
+    left, middle, right = (seen[k, (best + by) % _FINE] for by in (-1, 0, 1))
+    bend = left - 2 * middle + right
+    return np.asarray((best + np.where(bend < 0, 0.5 * (left - right) / np.where(bend < 0, bend, 1), 0.0)) / _FINE % 1)

@@ -1,0 +1,228 @@
+"""Phases at the times of pictures → spin.
+
+Times at even distances fold it: the spins that describe the phases as well are choices, which the result names.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.errors import TooFewReadings
+from analysis.film.errors import NoMark
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+#: Spins with which a top floats, or is lost at, with room for a driven one [Hz].
+LOW, HIGH = 14.0, 75.0
+#: Length of the stretch in which the spin is first looked for [s]: a free top slows down by 0.1 Hz/s at most.
+_FIRST_S = 0.5
+_FEWEST = 12
+#: Least coherence of a mark that turns.
+_COHERENT = 0.6
+#: Another spin is excluded from this difference of χ² on.
+_EXCLUDED = 25.0
+#: Gain of the frequency in following the phase.
+_GAIN = 0.03
+#: Time from a row to the next one where it is not known, as a standard deviation [s]: 5 to 30 µs in phones.
+_LINE_TIME = 20e-6
+#: Harmonics of the angle in a phase, and how large they may be, as a standard deviation [turns]: a mark that turns
+#: about a point a twentieth of its radius off adds 0.01.
+_HARMONICS, _HARMONIC = 2, 0.01
+#: Means of residuals that show what neighbouring pictures share.
+_BLOCKS = 24
+#: Length of a reading of the spin [s], and the fewest pictures in it.
+WINDOW_S, _FEWEST_IN_WINDOW = 1.0, 12
+
+
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """How a top turned.
+
+    Attributes:
+        turns: since the first picture, by picture, shape (n,); rising: in the sense of the phase.
+        u_turns: standard uncertainty of a picture's phase from the residuals [turns].
+        time: middles of the readings of the spin, shape (m,) [s].
+        spin: shape (m,) [Hz].
+        u: shape (m,) [Hz].
+        middle: time of `frequency` [s].
+        frequency: spin at the middle of the film, with the sense of the phase [Hz].
+        u_frequency: [Hz].
+        chirp: its slope [Hz/s].
+        u_chirp: [Hz/s].
+        choices: spins that describe the pictures as well, the chosen one first [Hz].
+    """
+
+    turns: Array
+    u_turns: float
+    time: Array
+    spin: Array
+    u: Array
+    middle: float
+    frequency: float
+    u_frequency: float
+    chirp: float
+    u_chirp: float
+    choices: tuple[float, ...]
+
+
+def coherence(times: Array, phase: Array, frequencies: Array) -> Array:
+    """Return how well phases turn at each frequency, 0 to 1, shape (m,)."""
+    return np.asarray(np.abs(np.exp(2j * np.pi * (phase - frequencies[:, None] * times)).mean(axis=1)))
+
+
+def spins_of_start(times: Array, phase: Array, u: Array) -> list[tuple[float, float]]:
+    """Return spins, of either sense, that describe a stretch in the middle of the film, best first, with χ² [Hz].
+
+    Spins too slow to float are among them.
+
+    Raises:
+        NoMark: nothing turns.
+        TooFewReadings: too few pictures.
+    """
+    near = np.abs(times - np.median(times)) <= _FIRST_S / 2
+    if near.sum() < _FEWEST:
+        raise TooFewReadings(seen=int(near.sum()), needed=_FEWEST)
+    t, p, w = times[near] - times[near].mean(), phase[near], u[near]
+    raster = np.arange(-HIGH, HIGH, 0.1 / np.ptp(t))
+    height = coherence(t, p, raster)
+    peaks = np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:])) + 1
+    if not peaks.size or height[peaks].max() < _COHERENT:
+        raise NoMark(coherence=float(height.max()))
+    found = []
+    for k in peaks[height[peaks] > _COHERENT * height[peaks].max()]:
+        f, rest = _line(t, p, float(raster[k]))
+        found.append((f, float(np.sum((rest / w) ** 2))))
+    scale = max(min(chi for _, chi in found) / (t.size - 2), 1.0)
+    return sorted(((f, chi / scale) for f, chi in found), key=lambda one: one[1])
+
+
+def _line(t: Array, phase: Array, frequency: float) -> tuple[float, Array]:
+    """Return the frequency of phases near one, and their residuals [turns]."""
+    for _ in range(3):
+        rest = phase - frequency * t
+        rest = rest - np.angle(np.exp(2j * np.pi * rest).mean()) / (2 * np.pi)
+        rest -= np.rint(rest)
+        slope = float(t @ rest / (t @ t))
+        frequency += slope
+    return frequency, rest - slope * t
+
+
+def choices_of(found: list[tuple[float, float]], near: float | None) -> tuple[list[float], list[float]]:
+    """Return the spins that the pictures do not exclude, best first, of either sense [Hz].
+
+    First those with which a top floats, then slower ones, as of a film in slow motion.
+
+    Args:
+        found: spins and their χ².
+        near: about where the spin is, to 10 % [Hz].
+    """
+    least = found[0][1]
+    seen = [f for f, chi in found if chi < least + _EXCLUDED]
+    if near is not None:
+        return [f for f in seen if abs(abs(f) / near - 1) < 0.1], []
+    return [f for f in seen if abs(f) >= LOW], [f for f in seen if abs(f) < LOW]
+
+
+def turning_of(
+    times: Array, phase: Array, u: Array, rows: Array, *, start: float, choices: tuple[float, ...]
+) -> Turning:
+    """Follow the phase from the middle of the film to both ends, and fit the spin.
+
+    Args:
+        times: of the phases, increasing, shape (n,) [s].
+        phase: shape (n,) [turns].
+        u: standard uncertainties, shape (n,) [turns].
+        rows: of the mark, by which its time may be late, shape (n,); zeros: it is not [pixels].
+        start: spin in the middle [Hz].
+        choices: spins that describe the pictures as well [Hz].
+    """
+    middle = int(np.searchsorted(times, np.median(times)))
+    turns = np.empty_like(phase)
+    _follow(times[middle:], phase[middle:], turns[middle:], start, float(phase[middle]))
+    _follow(times[middle::-1], phase[middle::-1], turns[middle::-1], start, float(phase[middle]))
+    nuisance = _nuisance(turns, start * (rows - rows.mean()))
+    centre = float((times[0] + times[-1]) / 2)
+    value, covariance, rest = _fit(times - centre, turns, u, nuisance)
+    error = np.sqrt(np.diagonal(covariance))
+    straight = turns - value[2] * (times - centre) ** 2 - nuisance @ value[3:]
+    readings = [
+        _reading(times[part], straight[part], u[part], nuisance[part], covariance[3:, 3:]) for part in _windows(times)
+    ]
+    time, spin, u_spin = np.array(readings).reshape(-1, 3).T
+    return Turning(
+        turns=turns - turns[0],
+        u_turns=float(np.std(rest)),
+        time=time,
+        spin=spin + 2 * float(value[2]) * (time - centre),
+        u=u_spin,
+        middle=centre,
+        frequency=float(value[1]),
+        u_frequency=float(error[1]),
+        chirp=2 * float(value[2]),
+        u_chirp=2 * float(error[2]),
+        choices=choices,
+    )
+
+
+def _nuisance(turns: Array, late: Array) -> Array:
+    """Return what else is in a phase, in standard deviations of the priors, shape (n, p) [turns].
+
+    Rows that are read one after another; and harmonics of the angle, from a mark that does not turn about the middle of
+    the rim and a camera that looks from the side.
+    """
+    waves = [part(2 * np.pi * m * turns) for m in range(1, _HARMONICS + 1) for part in (np.cos, np.sin)]
+    return np.stack([_LINE_TIME * late, *(_HARMONIC * wave for wave in waves)], axis=1)
+
+
+def _follow(times: Array, phase: Array, turns: Array, frequency: float, start: float) -> None:
+    """Write the turns of phases, each the nearest to the one before going on at the spin so far."""
+    turns[0] = now = start
+    for k, step in enumerate(np.diff(times), 1):
+        expected = now + frequency * step
+        off = phase[k] - expected
+        off -= round(off)
+        turns[k] = now = expected + off
+        frequency += _GAIN * off / step * min(1.0, abs(step) / 0.01)
+
+
+def _fit(t: Array, turns: Array, u: Array, nuisance: Array) -> tuple[Array, Array, Array]:
+    """Return coefficients of 1, t, t² and of what else is in a phase, their covariance, and residuals.
+
+    Uncertainties are those of the phases, or of their scatter where that is greater; slow residuals, which many
+    pictures share, count by the scatter of their means.
+    """
+    length = float(np.abs(t).max())
+    scale = np.array([1.0, length, length**2] + [1.0] * nuisance.shape[1])
+    design = np.concatenate([t[:, None] ** np.arange(3), nuisance], axis=1) / scale
+    prior = np.diag([0.0] * 3 + [1.0] * nuisance.shape[1])
+    weighted = np.concatenate([design / u[:, None], prior])
+    found = np.linalg.lstsq(weighted, np.concatenate([turns / u, np.zeros(len(prior))]), rcond=None)[0]
+    rest = turns - design @ found
+    factor = max(float(np.sum((rest / u) ** 2)) / max(t.size - 3, 1), 1.0)
+    block = t.size // _BLOCKS
+    if block > 1:
+        means = (rest / u)[: t.size // block * block].reshape(-1, block).mean(axis=1)
+        factor = max(factor, block * float(np.sum(means**2)) / max(means.size - 3, 1))
+    information = weighted[: t.size].T @ weighted[: t.size] / factor + prior**2
+    return found / scale, np.linalg.inv(information) / np.outer(scale, scale), rest
+
+
+def _windows(times: Array) -> list[NDArray[np.intp]]:
+    """Return the pictures of readings of the spin, one after another."""
+    count = max(round(float(np.ptp(times)) / WINDOW_S), 1)
+    edges = np.searchsorted(times, np.linspace(times[0], times[-1], count + 1)[1:-1])
+    return [part for part in np.split(np.arange(times.size), edges) if part.size >= _FEWEST_IN_WINDOW]
+
+
+def _reading(times: Array, straight: Array, u: Array, nuisance: Array, covariance: Array) -> tuple[float, float, float]:
+    """Return time, spin and u of some pictures; slope and nuisance of the whole film are off their turns."""
+    at = float((times[0] + times[-1]) / 2)
+    value, own, _ = _fit(times - at, straight, u, np.empty((times.size, 0)))
+    slopes = np.polyfit(times - at, nuisance, 1)[0]
+    return at, float(value[1]), float(np.sqrt(own[1, 1] + slopes @ covariance @ slopes))

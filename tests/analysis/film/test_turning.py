@@ -1,0 +1,93 @@
+"""Phase of a mark, and spin by the times of pictures: scatter, folds, and what a camera adds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.errors import TooFewReadings
+from analysis.film.errors import NoMark
+from analysis.film.mark import phases_of
+from analysis.film.turning import Turning, choices_of, spins_of_start, turning_of
+from support.camera import even_times, phone_times
+
+NOISE = 1e-3  # of a phase [turns]
+
+
+def seen(random, times, spin, chirp=0.0, more=0.0):
+    """Phases of a top at some times."""
+    return (0.3 + spin * times + 0.5 * chirp * times**2 + more + random.normal(0, NOISE, times.size)) % 1
+
+
+def turning(times, phase, rows=None) -> Turning:
+    u = np.full(times.size, NOISE)
+    (start, *_), _ = choices_of(spins_of_start(times, phase, u), None)
+    return turning_of(times, phase, u, np.zeros(times.size) if rows is None else rows, start=start, choices=(start,))
+
+
+def test_spin_and_slope_scatter_as_u_says():
+    random = np.random.default_rng(11)
+    times = phone_times(2.0)
+    pulls = []
+    for _ in range(100):
+        spin, chirp = random.uniform(20, 60), random.uniform(-0.1, 0)
+        found = turning(times, seen(random, times, spin, chirp))
+        truth = spin + chirp * found.middle
+        each = (found.spin - spin - chirp * found.time) / found.u
+        pulls += [((found.frequency - truth) / found.u_frequency, (found.chirp - chirp) / found.u_chirp, each[0])]
+    assert np.abs(np.mean(pulls, axis=0)).max() < 0.4  # 4 standard errors of a mean of 100
+    assert np.std(pulls, axis=0) == pytest.approx([1, 1, 1], abs=0.3)  # 4 of a standard deviation
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_uneven_times_tell_a_spin_far_above_half_the_rate(sense):
+    random = np.random.default_rng(12)
+    times = even_times(2.0, 30.0) + random.uniform(-4e-3, 4e-3, 60)
+    found = spins_of_start(times, seen(random, times, 47.0 * sense), np.full(60, NOISE))
+    assert choices_of(found, None)[0] == [pytest.approx(47.0 * sense, abs=0.02)]
+
+
+def test_even_times_leave_choices():
+    random = np.random.default_rng(13)
+    times = even_times(2.0, 60.0)
+    found = spins_of_start(times, seen(random, times, 25.0), np.full(times.size, NOISE))
+    choices, slow = choices_of(found, None)
+    assert sorted(choices) == [pytest.approx(-35.0, abs=0.02), pytest.approx(25.0, abs=0.02)]
+    assert slow == []
+    assert choices_of(found, 24.0)[0] == [pytest.approx(25.0, abs=0.02)]
+
+
+def test_a_rolling_shutter_and_an_eccentric_mark_do_not_move_the_spin():
+    random = np.random.default_rng(14)
+    times, spin, line = phone_times(2.0), 31.3, 12e-6
+    sway, angle = 10 * np.sin(2 * np.pi * 1.2 * times), 2 * np.pi * (0.3 + spin * times)
+    rows = 120 + sway + 25 * np.sin(angle)
+    more = spin * line * rows + 0.01 * np.cos(angle + 1) + 0.003 * np.cos(2 * angle)
+    found = turning(times, seen(random, times, spin, more=more), rows)
+    assert found.frequency == pytest.approx(spin, abs=4 * found.u_frequency)
+    assert found.u_frequency < 1.1 * NOISE * np.sqrt(12 / times.size) / 2.0  # that of a straight line through 2 s
+
+
+def test_phases_without_a_turn_and_few_pictures_are_refused():
+    random = np.random.default_rng(15)
+    times = phone_times(1.0)
+    with pytest.raises(NoMark, match="no mark turns with the top"):
+        spins_of_start(times, random.uniform(size=times.size), np.full(times.size, NOISE))
+    with pytest.raises(TooFewReadings):
+        spins_of_start(times[:5], times[:5], times[:5])
+
+
+def test_the_phase_of_a_mark_scatters_as_its_u_says():
+    random = np.random.default_rng(16)
+    truth = random.uniform(size=300)
+    turn = np.arange(128) / 128
+    away = (turn - truth[:, None] + 0.5) % 1 - 0.5
+    smooth = random.normal(0, 8.0, (300, 3, 128))
+    # rays are closer than pixels, so that neighbours agree
+    noise = np.mean([np.roll(smooth, by, axis=2) for by in (-1, 0, 1)], axis=0)
+    profiles = 90 + 30 * np.cos(2 * np.pi * turn) + 80 * np.exp(-((away / 0.04) ** 2))[:, None] + noise
+    found = phases_of(profiles)
+    off = (found.phase - truth + 0.5) % 1
+    off -= np.median(off)
+    assert np.std(off / found.u) == pytest.approx(1, abs=0.3)
+    assert np.abs(off).max() < 0.01

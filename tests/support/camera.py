@@ -1,0 +1,217 @@
+"""A camera that films a simulated top from above: exposure, rolling shutter, blur, noise, codec, uneven times.
+
+It draws base and top as they are projected by one camera at a height; lenses are not modelled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.animation.poses import matrices, poses_of
+from levilab.simulator.single import simulate
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from levilab.simulator.scene import Scene
+
+    Array = NDArray[np.float64]
+
+#: Radius of the rim and of the base [m].
+RIM, BASE = 0.015, 0.046
+#: Brightness of table, base, top, its hub and its mark.
+TABLE, DARK, TOP, HUB, MARK = 190.0, 60.0, 140.0, 40.0, 235.0
+#: Angle of the mark, to either side [rad].
+MARK_HALF = 0.25
+#: Clock of a film's file.
+CLOCK = Fraction(1, 90000)
+
+
+@dataclass(frozen=True)
+class Camera:
+    """How a film is taken.
+
+    Attributes:
+        width, height: of a picture.
+        scale: at the height of the top [m a pixel].
+        exposure: [s].
+        line_time: from the reading of a row to that of the next one [s].
+        blur: of the lens [pixels].
+        noise: standard deviation of a pixel, of 255.
+        parts: of an exposure that are added up.
+        away: where the middle of the base is in the picture, from its middle [pixels].
+    """
+
+    width: int = 320
+    height: int = 240
+    scale: float = 0.42e-3
+    exposure: float = 1e-3
+    line_time: float = 0.0
+    blur: float = 1.2
+    noise: float = 2.5
+    parts: int = 2
+    away: tuple[float, float] = (5.3, -3.7)
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Where the axis of the base is [pixels]."""
+        return (self.width - 1) / 2 + self.away[0], (self.height - 1) / 2 + self.away[1]
+
+
+@dataclass(frozen=True)
+class Flight:
+    """Motion of a top as a camera needs it.
+
+    Attributes:
+        times: close enough for a straight line between neighbours, shape (n,) [s].
+        x, y: of the rim's centre [m].
+        yaw: of the mark, seen from above [rad].
+        tilt: of the body's plane, as seen from above, less the yaw, shape (n, 2, 2).
+    """
+
+    times: Array
+    x: Array
+    y: Array
+    yaw: Array
+    tilt: Array
+
+    def at(self, times: Array) -> tuple[Array, Array, Array, Array]:
+        """Return x, y, yaw and tilt at times."""
+        x, y, yaw = (np.interp(times, self.times, column) for column in (self.x, self.y, self.yaw))
+        rows = [np.interp(times, self.times, self.tilt[:, i, j]) for i in (0, 1) for j in (0, 1)]
+        return x, y, yaw, np.stack(rows, axis=-1).reshape(*times.shape, 2, 2)
+
+
+def flight_of(scene: Scene, duration: float) -> Flight:
+    """Simulate a top."""
+    motion = simulate(scene, duration + 0.02, tolerance=1e-6)
+    poses = poses_of(motion, 0.0, duration + 0.01, round(2000 * duration))
+    turn = matrices(poses.quaternions)[:, :2, :2]
+    yaw = np.unwrap(np.arctan2(turn[:, 1, 0] - turn[:, 0, 1], turn[:, 0, 0] + turn[:, 1, 1]))
+    back = np.stack([np.cos(yaw), np.sin(yaw), -np.sin(yaw), np.cos(yaw)], axis=-1).reshape(-1, 2, 2)
+    return Flight(poses.times, poses.positions[:, 0], poses.positions[:, 1], yaw, back @ turn)
+
+
+def level_flight(duration: float, spin: float, chirp: float = -0.05, swing: float = 1e-3) -> Flight:
+    """Return a top that stays level and swings along a rosette: a motion without a simulation."""
+    t = np.linspace(-0.02, duration + 0.02, round(2000 * (duration + 0.04)))
+    x, y = swing * np.cos(2 * np.pi * 1.1 * t), 0.7 * swing * np.sin(2 * np.pi * 0.9 * t)
+    yaw = 2 * np.pi * (0.123 + spin * t + 0.5 * chirp * t**2)
+    return Flight(t, x, y, yaw, np.broadcast_to(np.eye(2), (t.size, 2, 2)))
+
+
+class Picture:
+    """The pictures that a camera takes of a flight.
+
+    Args:
+        camera: that takes them.
+        flight: of the top.
+        seed: of the noise.
+    """
+
+    def __init__(self, camera: Camera, flight: Flight, seed: int = 1) -> None:
+        self._camera, self._flight = camera, flight
+        self._random = np.random.default_rng(seed)
+        size = 2 * camera.width * camera.height
+        self._noise = camera.noise * self._random.standard_normal(size, dtype=np.float32)
+        x0, y0 = camera.middle
+        rows, columns = np.ogrid[: camera.height, : camera.width]
+        away = np.hypot(columns - x0, rows - y0) - BASE / camera.scale
+        texture = 10 * np.sin(columns / 17.0) * np.cos(rows / 23.0)
+        self.background = TABLE + texture + (DARK - TABLE - 0.7 * texture) * _edge(-away / camera.blur)
+
+    def take(self, time: float) -> Array:
+        """Return the picture whose first row is read at a time, without noise."""
+        camera = self._camera
+        x0, y0 = camera.middle
+        at = self._flight.at(np.array([time]))
+        reach = RIM / camera.scale + 8
+        left, up = (round(v - reach) for v in (x0 + at[0][0] / camera.scale, y0 - at[1][0] / camera.scale))
+        size = round(2 * reach)
+        columns, rows = np.arange(left, left + size), np.arange(up, up + size)
+        picture = self.background.copy()
+        seen = picture[up : up + size, left : left + size]
+        seen[:] = sum(self._top(columns, rows, time + by, seen) for by in self._exposed()) / camera.parts
+        return picture
+
+    def _exposed(self) -> Array:
+        camera = self._camera
+        return camera.exposure * ((np.arange(camera.parts) + 0.5) / camera.parts - 0.5)
+
+    def _top(self, columns: Any, rows: Any, time: float, behind: Array) -> Array:
+        camera = self._camera
+        x0, y0 = camera.middle
+        x, y, yaw, tilt = self._flight.at(time + rows * camera.line_time)
+        c, s = np.cos(yaw), np.sin(yaw)
+        body = np.stack([c, -s, s, c], axis=-1).reshape(-1, 2, 2) @ tilt
+        inverse = np.linalg.inv(body)
+        inverse = inverse.astype(np.float32)
+        right = ((columns - x0) * camera.scale - x[:, None]).astype(np.float32)
+        forth = ((y0 - rows) * camera.scale - y)[:, None].astype(np.float32)
+        a = inverse[:, 0, 0, None] * right + inverse[:, 0, 1, None] * forth
+        b = inverse[:, 1, 0, None] * right + inverse[:, 1, 1, None] * forth
+        away = np.hypot(a, b)
+        soft = camera.blur * camera.scale
+        mark = _edge((a * np.sin(MARK_HALF) - np.abs(b) * np.cos(MARK_HALF)) / soft) * _edge((away - 0.35 * RIM) / soft)
+        mark *= _edge((0.93 * RIM - away) / soft)
+        hub = _edge((0.2 * RIM - away) / soft)
+        top = TOP + (MARK - TOP) * mark
+        top += (HUB - top) * hub
+        return behind + (top - behind) * _edge((RIM - away) / soft)
+
+    def noisy(self, picture: Array) -> NDArray[np.uint8]:
+        """Return a picture as a sensor has it."""
+        first = int(self._random.integers(self._noise.size - picture.size))
+        noise = self._noise[first : first + picture.size].reshape(picture.shape)
+        return np.clip(np.rint(picture + noise), 0, 255).astype(np.uint8)
+
+
+def _edge(distance: Any) -> Any:
+    """Return a soft edge: 1 within, 0 outside."""
+    near = np.clip(distance, -1, 1)
+    return 0.5 + 0.25 * near * (3 - near * near)
+
+
+def even_times(duration: float, rate: float) -> Array:
+    """Return the times of pictures at even distances [s]."""
+    return np.arange(round(duration * rate)) / rate
+
+
+def phone_times(duration: float) -> Array:
+    """Return the times of a phone at 240 pictures in a second: 3.33 and 5 ms apart, in turn."""
+    steps = np.tile([1 / 300, 1 / 200], round(120 * duration))
+    return np.concatenate([[0.0], np.cumsum(steps)])[:-1]
+
+
+def write_film(path: Path, pictures: Any, times: Array, *, codec: str = "libx264", metadata: Any = None) -> Path:
+    """Write pictures as a film with their times."""
+    import av
+
+    with av.open(str(path), "w", options={"movflags": "use_metadata_tags"}) as file:
+        file.metadata.update(metadata or {})
+        stream = None
+        for time, picture in zip(times, pictures, strict=True):
+            if stream is None:
+                options = {"crf": "18", "preset": "ultrafast"} if codec == "libx264" else {}
+                stream = file.add_stream(codec, rate=240, options=options)
+                stream.height, stream.width = picture.shape
+                stream.pix_fmt = "yuv420p" if codec == "libx264" else "yuvj420p"
+                stream.time_base = stream.codec_context.time_base = CLOCK
+            frame = av.VideoFrame.from_ndarray(picture, format="gray").reformat(format=stream.pix_fmt)
+            frame.pts, frame.time_base = round(time / CLOCK), CLOCK
+            file.mux(stream.encode(frame))
+        assert stream is not None
+        file.mux(stream.encode())
+    return path
+
+
+def film(path: Path, camera: Camera, flight: Flight, times: Array, **more: Any) -> Path:
+    """Film a flight."""
+    shown = Picture(camera, flight, more.pop("seed", 1))
+    return write_film(path, (shown.noisy(shown.take(t)) for t in times), times, **more)
