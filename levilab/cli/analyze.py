@@ -163,6 +163,18 @@ for _name, _text in COMMANDS.items():
     _add(_name, _text)
 
 
+@analyze_app.command(
+    "video",
+    cls=Later,
+    help="A film of the top from above: place and spin at the times of its pictures, as tables for other analyses.",
+    epilog="Example: levilab analyze video IMG_0042.MOV --rim 30",
+)
+def _video() -> Callable[..., None]:
+    from levilab.cli.video import video
+
+    return video
+
+
 def _analyze(
     context: typer.Context,
     paths: Sequence[Path],

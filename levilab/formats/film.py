@@ -1,0 +1,147 @@
+"""Films: the brightness of each picture with the time that the file gives it, through PyAV, an extra."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import util
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.errors import DataError
+from levilab.software import how_to_install
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    Picture = NDArray[np.uint8]
+
+#: Where phones write at how many pictures in a second a film was taken, whatever it plays at.
+_CAPTURED = ("com.android.capture.fps",)
+
+
+@dataclass(frozen=True)
+class Film:
+    """What a file says of its film.
+
+    Attributes:
+        path: the file.
+        width: of a picture [pixels].
+        height: [pixels].
+        nominal: pictures in a second as the head of the file says; no time is computed from it.
+        captured: pictures in a second when it was taken; None: not said.
+        duration: [s]; None: not said.
+        codec: its name.
+    """
+
+    path: Path
+    width: int
+    height: int
+    nominal: float | None
+    captured: float | None
+    duration: float | None
+    codec: str
+
+
+class NoFilm(DataError):
+    """A file whose pictures cannot be read."""
+
+
+def open_film(path: Path) -> Film:
+    """Read what a file says of its film.
+
+    Raises:
+        NoFilm: the extra is not installed, or the file holds no film.
+    """
+    with _Opened(path) as (container, stream):
+        said = next((container.metadata[key] for key in _CAPTURED if key in container.metadata), None)
+        return Film(
+            path,
+            stream.codec_context.width,
+            stream.codec_context.height,
+            float(stream.average_rate) if stream.average_rate else None,
+            _number(said),
+            container.duration / 1e6 if container.duration else None,
+            stream.codec_context.name,
+        )
+
+
+def pictures(film: Film, start: float = 0.0, stop: float = np.inf) -> Iterator[tuple[float, Picture]]:
+    """Yield the time of each picture [s] and its brightness, shape (height, width).
+
+    A picture may share its memory with the decoder's: it is valid until the next one.
+
+    Args:
+        film: of `open_film`.
+        start: of the first picture [s].
+        stop: of the last one [s].
+
+    Raises:
+        NoFilm: it is damaged, or has no times.
+    """
+    import av
+
+    with _Opened(film.path) as (container, stream):
+        stream.thread_type = "AUTO"
+        if start > 0:
+            container.seek(int(start / stream.time_base), stream=stream)
+        before = -np.inf
+        try:
+            for frame in container.decode(stream):
+                if frame.pts is None:
+                    raise NoFilm(
+                        f"{film.path}: its pictures have no times: take the phone's own file, not a raw stream"
+                    )
+                time = float(frame.pts * stream.time_base)
+                if time > stop:
+                    return
+                if time >= start and time > before:
+                    before = time
+                    yield time, _brightness(frame)
+        except av.FFmpegError as error:
+            raise NoFilm(f"{film.path}: is damaged after {max(before, 0):.2f} s ({error}): copy it again, or end "
+                         "before that by `stop`") from error  # fmt: skip
+
+
+def _brightness(frame: Any) -> Picture:
+    """Return the brightness of a picture: where it is stored by itself, as it is there."""
+    if frame.format.name in {"yuv420p", "yuvj420p", "nv12", "gray", "yuv422p", "yuvj422p", "yuv444p"}:
+        plane = frame.planes[0]
+        return np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size)[:, : plane.width]
+    return np.asarray(frame.to_ndarray(format="gray"), dtype=np.uint8)
+
+
+def _number(text: str | None) -> float | None:
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return None
+
+
+class _Opened:
+    """The container of a file and its first film."""
+
+    def __init__(self, path: Path) -> None:
+        if util.find_spec("av") is None:
+            raise NoFilm(f"{path}: films need the extra video (av, which is not installed): {how_to_install('video')}")
+        import av
+
+        try:
+            self._container: Any = av.open(str(path))
+        except (av.FFmpegError, OSError) as error:
+            why = getattr(error, "strerror", None) or error
+            raise NoFilm(
+                f"{path}: holds no film that can be read ({why}): give the file that the camera wrote"
+            ) from error
+        if not self._container.streams.video:
+            self._container.close()
+            raise NoFilm(f"{path}: holds no film: a film of the top from above is expected")
+
+    def __enter__(self) -> tuple[Any, Any]:
+        return self._container, self._container.streams.video[0]
+
+    def __exit__(self, *_: object) -> None:
+        self._container.close()

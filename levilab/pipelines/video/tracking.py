@@ -1,0 +1,241 @@
+"""A film → where the rim is in each picture, and the light along the bands of the top."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.film.circles import Circle, coarse, find_base, find_top
+from analysis.film.errors import CameraMoved, HandInView
+from analysis.film.rim import Rim, fit_rim
+from analysis.film.view import compare_views
+from levilab.errors import DataError
+from levilab.formats.film import pictures
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from levilab.formats.film import Film, Picture
+
+    Array = NDArray[np.float64]
+
+#: The top is looked for in the beginning of the film, in pictures at least so far apart [s].
+_FIRST_S, _APART_S = 0.6, 1 / 90
+#: Width of the pictures in which it is looked for [pixels].
+_COARSE = 320
+#: The view is compared with the first one each interval [s].
+_LOOK_S = 0.1
+#: Share of the background that a hand covers.
+_HAND = 0.04
+#: Shift of the background that is allowed [pixels], and in its standard uncertainties.
+_SHIFT, _SHIFT_U = 0.5, 6.0
+#: Beyond this number of radii is background, and there is at least such a share of it.
+_AROUND, _LEAST_BACKGROUND = 1.8, 0.05
+#: A rim has the same radius, but for its height, to this part.
+_SAME_RADIUS = 0.15
+#: Its edge has the same contrast, but for light and focus, at least to this part.
+_SAME_CONTRAST = 0.4
+#: A top that is not seen for longer is lost [s].
+_LOST_S = 0.25
+#: What is followed for a shorter time is of no use [s].
+_LEAST_S = 0.4
+#: What a codec adds to the place [pixels]: it leaves parts of a picture as they were in the one before.
+CODEC_U = 0.04
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """What was seen of a top.
+
+    Attributes:
+        times: of the pictures with a rim, as the file says, shape (n,) [s].
+        x: of the centre, from the left, shape (n,) [pixels].
+        y: from above, shape (n,) [pixels].
+        u: standard uncertainty of each, shape (n,) [pixels].
+        radius: of the rim, shape (n,) [pixels].
+        profiles: shape (n, bands, rays).
+        still: the first picture.
+        base: the circle of the base; None: not seen.
+        rate: pictures in a second, by their times.
+        missed: pictures in between in which no rim was seen.
+        ended: why it ends before the film does: "lost", "hand"; empty: it does not.
+    """
+
+    times: Array
+    x: Array
+    y: Array
+    u: Array
+    radius: Array
+    profiles: Array
+    still: Picture
+    base: Circle | None
+    rate: float
+    missed: int
+    ended: str
+
+
+def follow(film: Film, start: float, stop: float, progress: Callable[[float], None]) -> Followed:
+    """Follow the top through a film.
+
+    Args:
+        film: of `open_film`.
+        start: where it floats from [s].
+        stop: until when [s].
+        progress: called with the share that is done.
+
+    Raises:
+        NoFilm: it cannot be read.
+        DataError: too short a time is left.
+        AnalysisError: no top, a hand, a moving camera.
+    """
+    first, still, factor = _beginning(film, start, stop)
+    top = find_top(first)
+    background = np.median(first, axis=0)
+    base = _fit_base(still, background, top, factor)
+    watch = _Watch(background, top, factor)
+    if watch.share_of_background < _LEAST_BACKGROUND:
+        raise DataError(f"{film.path}: the top fills the picture: film it from farther away, with the base round it")
+    track = _Track(top.scaled(factor))
+    begin = None
+    for time, picture in pictures(film, start, stop):
+        begin = time if begin is None else begin
+        rim = track.add(time, picture)
+        if rim is None and time - track.last > _LOST_S:
+            track.ended = "lost"
+            break
+        if watch.is_due(time) and watch.sees_hand(time, picture):
+            track.forget_after(watch.clean)
+            track.ended = "hand"
+            break
+        last = min(stop, film.duration or stop)
+        progress(min((time - begin) / (last - begin), 1.0) if np.isfinite(last) and last > begin else 0.0)
+    return _followed(film, track, watch, still, base)
+
+
+def _beginning(film: Film, start: float, stop: float) -> tuple[Array, Picture, int]:
+    """Return small pictures of the beginning, the first picture, and by how much they are smaller."""
+    factor = max(round(film.width / _COARSE), 1) if film.width > 1.5 * _COARSE else 1
+    found: list[Array] = []
+    still: Picture | None = None
+    for time, picture in pictures(film, start, stop):
+        if still is None:
+            still, begin, before = picture.copy(), time, -np.inf
+        if time - begin > _FIRST_S:
+            break
+        if time - before >= _APART_S:
+            found.append(coarse(picture, factor))
+            before = time
+    if still is None or len(found) < 3:
+        raise DataError(
+            f"{film.path}: holds {len(found)} pictures from {start:g} s on: a second of film is needed at least"
+        )
+    return np.stack(found), still, factor
+
+
+def _fit_base(still: Picture, background: Array, top: Circle, factor: int) -> Circle | None:
+    base = find_base(background, top)
+    fitted = fit_rim(still, base.scaled(factor), width=0.4) if base else None
+    return fitted.circle if fitted else None
+
+
+class _Watch:
+    """Compares the view with that of the beginning."""
+
+    def __init__(self, background: Array, top: Circle, factor: int) -> None:
+        self._before, self._factor = background, factor
+        self._outside = top.distance(background.shape) > _AROUND * top.radius
+        self.share_of_background = float(self._outside.mean())
+        self.clean = self._next = -np.inf
+        self.share = 0.0
+
+    def is_due(self, time: float) -> bool:
+        """Return whether the view is to be compared now."""
+        if time < self._next:
+            return False
+        self._next = time + _LOOK_S
+        return True
+
+    def sees_hand(self, time: float, picture: Picture) -> bool:
+        """Return whether something covers the view.  Raises CameraMoved."""
+        view = compare_views(self._before, coarse(picture, self._factor), self._outside)
+        if view.covered > _HAND:
+            self.share = view.covered
+            return True
+        shift, u = view.shift * self._factor, view.u * self._factor
+        if shift > max(_SHIFT, _SHIFT_U * u):
+            raise CameraMoved(time=time, shift=shift, allowed=max(_SHIFT, _SHIFT_U * u))
+        self.clean = time
+        return False
+
+
+class _Track:
+    """The rim from picture to picture."""
+
+    def __init__(self, circle: Circle) -> None:
+        self._radius, self._contrast = circle.radius, 0.0
+        self._now, self._speed = circle, (0.0, 0.0)
+        self.last = np.nan
+        self.times: list[float] = []
+        self.rims: list[Rim] = []
+        self.ended = ""
+        self.missed = 0
+
+    def add(self, time: float, picture: Picture) -> Rim | None:
+        """Find the rim in the next picture, where it should be by its speed."""
+        step = 0.0 if np.isnan(self.last) else time - self.last
+        self.last = time if np.isnan(self.last) else self.last
+        expected = Circle(
+            self._now.x + step * self._speed[0], self._now.y + step * self._speed[1], self._now.radius
+        )  # fmt: skip
+        rim = self._same(fit_rim(picture, expected)) or self._same(fit_rim(picture, self._now, width=3.0, rounds=6))
+        if rim is None:
+            self.missed += 1
+            return None
+        if step > 0:
+            self._speed = (rim.circle.x - self._now.x) / step, (rim.circle.y - self._now.y) / step
+        if not self.times:
+            self._radius, self._contrast = rim.circle.radius, rim.contrast
+        self._now, self.last = rim.circle, time
+        self.times.append(time)
+        self.rims.append(rim)
+        return rim
+
+    def _same(self, rim: Rim | None) -> Rim | None:
+        limit = _SAME_RADIUS if self.times else 2 * _SAME_RADIUS
+        same = rim is not None and abs(rim.circle.radius / self._radius - 1) < limit
+        return rim if same and rim and rim.contrast > _SAME_CONTRAST * self._contrast else None
+
+    def forget_after(self, time: float) -> None:
+        """Leave out what was seen after a time."""
+        count = int(np.searchsorted(self.times, time, side="right"))
+        del self.times[count:], self.rims[count:]
+
+
+def _followed(film: Film, track: _Track, watch: _Watch, still: Picture, base: Circle | None) -> Followed:
+    span = track.times[-1] - track.times[0] if track.times else 0.0
+    if span < _LEAST_S:
+        if track.ended == "hand":
+            raise HandInView(times=(max(watch.clean, 0.0), track.last), share=watch.share)
+        raise DataError(
+            f"{film.path}: the top is seen for {span:.2f} s, {_LEAST_S:g} s are needed: name a part where it floats by "
+            "`start` and `stop`"
+        )
+    times = np.array(track.times)
+    x, y, radius = np.array([(rim.circle.x, rim.circle.y, rim.circle.radius) for rim in track.rims]).T
+    return Followed(
+        times,
+        x,
+        y,
+        radius=radius,
+        u=np.hypot([rim.u for rim in track.rims], CODEC_U),
+        profiles=np.stack([rim.profiles for rim in track.rims]),
+        still=still,
+        base=base,
+        rate=(times.size - 1 + track.missed * (track.ended != "lost")) / span,
+        missed=0 if track.ended == "lost" else track.missed,
+        ended=track.ended,
+    )

@@ -1,0 +1,204 @@
+"""Films of simulated tops, through a codec: place and spin against the simulator, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from importlib import util
+
+import numpy as np
+import pytest
+
+from levilab.errors import DataError, UsageError
+from levilab.pipelines.video.analysis import VideoOptions, analyze_film
+from levilab.simulator.scene import preset
+from support.camera import (
+    BASE,
+    RIM,
+    Camera,
+    Picture,
+    even_times,
+    film,
+    flight_of,
+    level_flight,
+    phone_times,
+    write_film,
+)
+from support.commands import command
+
+pytestmark = pytest.mark.skipif(util.find_spec("av") is None, reason="pip install 'levilab[video]'")
+
+CAMERA = Camera()
+LEVEL = level_flight(2.0, 31.0)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("films")
+
+
+@pytest.fixture(scope="module")
+def path(folder):
+    """A second of a phone."""
+    return film(folder / "IMG_0042.mp4", CAMERA, LEVEL, phone_times(1.0))
+
+
+def filmed(folder, name, take, times, **more):
+    """A film of what is taken at each time."""
+    shown = Picture(CAMERA, LEVEL)
+    return write_film(folder / name, (shown.noisy(take(shown, time)) for time in times), times, **more)
+
+
+def compare(found, flight):
+    """Errors of place [m], shape (2, n), less their means; and pulls of the readings of the spin."""
+    x, y, _, _ = flight.at(found.times)
+    errors = np.array([found.x - x, found.y - y])
+    pulls = []
+    for time, spin, u in zip(found.turning.time, found.turning.spin, found.turning.u, strict=True):
+        near = np.abs(flight.times - time) < 0.5
+        truth = np.polyfit(flight.times[near] - time, flight.yaw[near] / (2 * np.pi), 2)[1]
+        pulls += [(abs(spin) - abs(truth)) / u]
+    return errors - errors.mean(axis=1, keepdims=True), np.array(pulls)
+
+
+@pytest.mark.slow
+def test_ten_seconds_of_a_phone_give_place_and_spin_of_a_simulated_top(folder):
+    flight = flight_of(preset("friction"), 10.0)
+    path = film(folder / "ten.mp4", Camera(line_time=10e-6), flight, phone_times(10.0))
+    found = analyze_film(path, VideoOptions(rim=2 * RIM, line_time=10e-6))
+    errors, pulls = compare(found, flight)
+    assert np.abs(errors).max() < 1e-4
+    assert np.mean(errors / found.u) == pytest.approx(0, abs=0.1)
+    assert np.std(errors / found.u) == pytest.approx(1, abs=0.5)  # what a codec adds to a place is a constant of u
+    whole = (flight.times >= found.times[0]) & (flight.times <= found.times[-1])
+    truth = np.polyfit(flight.times[whole] - found.turning.middle, flight.yaw[whole] / (2 * np.pi), 2)[1]
+    assert found.spin.value == pytest.approx(abs(truth), abs=5e-3)
+    assert np.abs(pulls.mean()) < 1.3  # 4 standard errors of a mean of 10
+    assert np.std(pulls) < 1.9  # 4 of a standard deviation
+    assert np.abs(pulls * found.turning.u).max() < 5e-3
+
+
+def test_a_tilted_top_under_a_rolling_shutter_has_its_place_and_spin(folder):
+    flight = flight_of(preset("tilted"), 1.0)
+    path = film(folder / "tilted.mp4", Camera(line_time=10e-6), flight, phone_times(1.0))
+    for line_time in (0.0, 10e-6):  # not known and known
+        found = analyze_film(path, VideoOptions(rim=2 * RIM, line_time=line_time))
+        errors, pulls = compare(found, flight)
+        assert np.abs(errors).max() < 1e-4
+        assert np.std(errors / found.u) == pytest.approx(1, abs=0.5)
+        assert np.abs(pulls * found.turning.u).max() < 1e-3
+        assert found.spin.u < 1e-3
+
+
+def test_the_base_and_the_rim_give_the_scale(path):
+    for options in (
+        VideoOptions(rim=2 * RIM, stop=0.45),
+        VideoOptions(base=2 * BASE, stop=0.45),
+        VideoOptions(base=2 * BASE / 0.95, distance=0.6, height=0.03, stop=0.45),
+    ):
+        scale = analyze_film(path, options).scale
+        assert scale.value == pytest.approx(CAMERA.scale, abs=2 * scale.u)
+        assert 0 < scale.u < 0.01 * scale.value
+    assert any("nearer to the camera" in note for note in analyze_film(path, VideoOptions(base=0.1, stop=0.45)).notes)
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({}, "one scale is expected, none is given"),
+        ({"rim": 0.03, "scale": 1e-4}, "scale and rim are given"),
+        ({"base": 0.1, "distance": 0.5}, "goes with `height`"),
+        ({"rim": 0.03, "start": 2.0, "stop": 1.0}, "a time after `start` = 2"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(options, text):
+    with pytest.raises(UsageError, match=text):
+        VideoOptions(**options)
+
+
+def hand(shown, time):
+    picture = shown.take(time)
+    if time > 0.6:
+        picture[60:200, : int((time - 0.55) * 500)] = 150
+    return picture
+
+
+def moved(shown, time):
+    return np.roll(shown.take(time), int(time > 0.5), axis=1)
+
+
+def gone(shown, time):
+    return shown.take(time) if time < 0.6 else shown.background
+
+
+def test_a_hand_and_a_lost_top_end_the_track_where_they_are_seen(folder):
+    for name, take, text in (("hand.mp4", hand, "as by a hand, after 0.50 s"), ("gone.mp4", gone, "lost after 0.59 s")):
+        found = analyze_film(filmed(folder, name, take, phone_times(1.0)), VideoOptions(rim=0.03))
+        assert text in found.notes[0]
+        assert found.times[-1] == pytest.approx(0.6, abs=0.11)  # a hand is looked for each 0.1 s
+        assert found.spin.value == pytest.approx(31 - 0.05 * found.turning.middle, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("take", "text"),
+    [
+        (moved, r"background is shifted by \d\.\d pixels at 0\.[56]0 s .* the camera moved: put it on a stand"),
+        (lambda shown, _: shown.background, "no top was found at the beginning: nothing moves"),
+        (lambda shown, time: hand(shown, time + 0.35), "the top fills the picture|changes, and no circle|as by a hand"),
+    ],
+)
+def test_a_film_that_shows_no_lone_top_is_refused(folder, take, text):
+    with pytest.raises(DataError, match=rf"bad\.mp4: .*({text})"):
+        analyze_film(filmed(folder, "bad.mp4", take, phone_times(0.7)), VideoOptions(rim=0.03))
+
+
+def test_a_film_in_slow_motion_asks_for_its_rate(folder):
+    times, true = 8 * phone_times(0.5), phone_times(0.5)
+    take = iter(true)
+
+    def slowly(shown, _):
+        return shown.take(next(take))
+
+    said = filmed(folder, "slow.mp4", slowly, times, metadata={"com.android.capture.fps": "240.000000"})
+    with pytest.raises(DataError, match=r"slow motion: .* 30\.\d+ in a second .* taken at 240, .* say the true number"):
+        analyze_film(said, VideoOptions(rim=0.03))
+    found = analyze_film(said, VideoOptions(rim=0.03, rate=240.0))
+    assert found.spin.value == pytest.approx(31 - 0.05 * found.turning.middle, rel=2e-3)  # mean rate of a piece
+    take = iter(true)
+    unsaid = analyze_film(filmed(folder, "slow.mp4", slowly, times), VideoOptions(rim=0.03))
+    assert unsaid.spin is None
+    assert "if the film is in slow motion, the true `rate`" in unsaid.notes[0]
+
+
+def test_even_times_that_fold_the_spin_are_named_and_near_chooses(folder):
+    path = filmed(folder, "thirty.mp4", Picture.take, even_times(1.0, 30.0))
+    doubtful = analyze_film(path, VideoOptions(rim=0.03))
+    assert doubtful.spin is None
+    assert "30.97" in doubtful.notes[0]
+    assert analyze_film(path, VideoOptions(rim=0.03, near=31.0)).spin.value == pytest.approx(30.975, abs=5e-3)
+
+
+def test_the_command_writes_tables_that_other_analyses_read(path, tmp_path):
+    ended = command("analyze", "video", path, "--rim", 2000 * RIM, "--out", tmp_path, "--json", cwd=tmp_path)
+    assert ended.status == 0, ended.err
+    document = json.loads(ended.out)
+    assert document["values"]["frequency"]["value"] == pytest.approx(30.975, abs=1e-3)
+    assert document["pictures"] == 240
+    tracks = np.genfromtxt(tmp_path / "IMG_0042.tracks.csv", delimiter=",", names=True)
+    assert tracks.dtype.names == ("time_s", "x_m", "x_u_m", "y_m", "y_u_m")
+    assert np.diff(tracks["time_s"]) == pytest.approx(np.tile([1 / 300, 1 / 200], 120)[:-1], abs=2e-5)  # of the file
+    assert (tmp_path / "IMG_0042.tracks.png").read_bytes()[:4] == b"\x89PNG"
+    ended = command("analyze", "video", path, "--rim", 30, "--no-save", cwd=tmp_path)
+    assert "30.975" in ended.out
+    assert "240 pictures in 0.99 s, 3.33 to 5.00 ms apart" in ended.out
+
+
+def test_what_is_no_film_is_refused_in_one_line(path, tmp_path):
+    (tmp_path / "a.csv").write_text("t,f\n1,2\n", encoding="utf-8")
+    (tmp_path / "cut.mp4").write_bytes(path.read_bytes()[:3000])
+    for name, text in (
+        ("none.mp4", "there is no such file"),
+        ("a.csv", "holds no film that can be read"),
+        ("cut.mp4", "holds no film that can be read"),
+    ):
+        ended = command("analyze", "video", name, "--rim", 30, cwd=tmp_path)
+        assert (ended.status, text in ended.err, ended.err.count("\n")) == (1, True, 1), ended.err
