@@ -97,7 +97,7 @@ def poses_of(
     whole = min(len(found.time), count + 1)
     if whole > 1 and abs(found.time[whole - 1] - times[whole - 1]) > 1e-6 * (stop - start):
         whole -= 1  # the fall, between two poses
-    found = Trajectory(scene, found.states[:whole], found.model, found.accuracy)
+    bursts, found = found.bursts, Trajectory(scene, found.states[:whole], found.model, found.accuracy)
     return Poses(
         motion.scene,
         times[:whole],
@@ -105,7 +105,7 @@ def poses_of(
         quaternions_of(found.states[:, ARM], found.axis),
         found.spin_hz,
         2 * np.pi * found.slips,
-        drive_share(scene.drive, times[:whole]),
+        burst_share(bursts, times[:whole]) if len(bursts) else drive_share(scene.drive, times[:whole]),
         fell=motion.fell is not None and stop >= motion.time[-1],
     )
 
@@ -152,6 +152,7 @@ def quaternions_of(arms: Array, axes: Array) -> Array:
 #: The drive's waveforms at a phase [rad].
 _WAVES: dict[str, Callable[[Array], Array]] = {
     "off": np.zeros_like,
+    "triggered": np.zeros_like,  # without a burst
     "sine": np.sin,
     "triangle": lambda phase: 2 / np.pi * np.arcsin(np.sin(phase)),
     "square": lambda phase: np.where(np.sin(phase) >= 0, 1.0, -1.0),
@@ -163,6 +164,13 @@ def drive_share(drive: Drive, times: Array) -> Array:
     """Return the drive's field at times [s] as a part of its amplitude, shape (n,)."""
     share = _WAVES[drive.waveform](2 * np.pi * drive.frequency_hz * times + drive.phase_rad)
     return np.where(times < (math.inf if drive.off_s is None else drive.off_s), share, 0.0)
+
+
+def burst_share(bursts: Array, times: Array) -> Array:
+    """Return the field of bursts, as `Trajectory` has them, at times [s] as a part of its amplitude, shape (n,)."""
+    begin, end, frequency, turns = bursts[np.searchsorted(bursts[1:, 0], times, side="right")].T
+    there = (times >= begin) & (times <= end)
+    return np.where(there, np.sin(2 * np.pi * (frequency * times + turns)), 0.0)
 
 
 def height_for_camera(poses: Poses) -> float:

@@ -209,6 +209,12 @@ def trigger_of(problem: Problem) -> Trigger:
     )
 
 
+def bursts_of(stops: Stops, model: Any) -> Array:
+    """Return begin, end, frequency and phase of the pieces of bursts, shape (n, 4); none without such a drive."""
+    rows = np.stack([stops.times[:-1], stops.times[1:], stops.levels, stops.slopes], axis=1)
+    return rows[rows[:, 2] > 0] if isinstance(model.drive, Bursts) else np.empty((0, 4))
+
+
 def fall_after(problem: Problem, states: Array, stops: Stops) -> Event | None:
     """Return the escape in the interval after the last of these states; None if they are those of all stops."""
     at = len(states) - 1

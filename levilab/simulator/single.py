@@ -28,6 +28,7 @@ from levilab.simulator.model import model_of
 from levilab.simulator.pilot import Pilot, pilot_of, step_power
 from levilab.simulator.problem import (
     Problem,
+    bursts_of,
     fall_after,
     integrate,
     integrate_each_step,
@@ -129,7 +130,8 @@ def simulate(
         events: functions of a Trajectory, shape (n,), whose zeros are located.
         scheme: a name of SCHEMES; None: the best one for the scene.
         step: the longest step [s]; None: the tolerance decides it.
-        start: a state to start from instead of the scene's, shape (18,); its time stays.
+        start: a state to start from instead of the scene's, shape (18,); its time stays.  A burst that was under way
+            then, of a triggered drive, is not part of it.
         progress: called with the share of the work that is done.
 
     Returns:
@@ -164,7 +166,7 @@ def simulate(
     problem = Problem(scene, model, state, scheme_for(scheme, model))
     wanted = _Wanted(duration, rate, events, progress)
     run, accuracy = _to_tolerance(problem, wanted, tolerance, step)
-    return Trajectory(scene, run.states, model, accuracy, run.fell, run.events)
+    return Trajectory(scene, run.states, model, accuracy, run.fell, run.events, bursts_of(run.stops, model))
 
 
 def simulate_at_step(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -73,6 +73,8 @@ class Trajectory:
         model: what the kernels computed.
         fell: the escape that ended it, None if it stayed to the end.
         events: found on the way, in their order.
+        bursts: of a drive that the top triggers, in pieces, shape (n, 4): begin and end [s], frequency f [Hz] and phase
+            p [turns] of the field amplitude_t·sin(2π(f t + p)).
     """
 
     scene: Scene
@@ -81,6 +83,7 @@ class Trajectory:
     accuracy: Accuracy
     fell: Event | None = None
     events: tuple[Event, ...] = ()
+    bursts: Array = field(default_factory=lambda: np.empty((0, 4)))
 
     def __repr__(self) -> str:
         name, end = self.scene.name or "a scene", float(self.time[-1])

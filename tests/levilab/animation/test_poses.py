@@ -97,6 +97,13 @@ def test_the_drives_arrow_has_the_drives_waveform(waveform, values):
     assert drive_share(drive, np.array([0.125])) == 0
 
 
+def test_the_drives_arrow_shows_bursts_where_the_top_has_set_them_off():
+    scene = preset("motor").changed({"drive.cycle_turns": 0.0, "drive.frequency_hz": 60.0, "drive.phase_rad": 0.0})
+    drive = poses_of(simulate(scene, 0.5), 0.0, 0.5, 480).drive
+    assert np.mean(drive == 0) == pytest.approx(0.5, abs=0.06)  # half of each turn, and until the first pulse
+    assert [drive.min(), drive.max()] == pytest.approx([-1, 1], abs=0.03)
+
+
 @pytest.mark.parametrize("name", presets())
 def test_parts_stand_one_after_another_are_convex_and_go_into_json(name):
     parts = json.loads(json.dumps(parts_of(preset(name)), allow_nan=False))

@@ -7,11 +7,11 @@ import pytest
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 from scipy.spatial.transform import Rotation
 
+from levilab.animation.poses import burst_share
 from levilab.errors import SimulationError
+from levilab.simulator import problem
 from levilab.simulator.ensemble import simulate_many
-from levilab.simulator.kernels.motion import ARM, TIME, L, N, R, V
-from levilab.simulator.model import model_of
-from levilab.simulator.problem import Problem, scheme_for
+from levilab.simulator.kernels.motion import ARM, L, N, R, V
 from levilab.simulator.scene import preset, remarks
 from levilab.simulator.single import simulate
 from levilab.simulator.start import start_of
@@ -137,28 +137,17 @@ def test_the_scheme_keeps_its_order(law, order, latency):
         assert error <= end.accuracy.axis
 
 
-def drive_of(scene, duration):
-    """Return the stops of a motion, which say when the bursts were."""
-    start = start_of(scene)
-    model = model_of(scene, start[R])
-    return Problem(scene, model, start, scheme_for(None, model)).stops(start[TIME] + duration, 1e-3)
-
-
 def bursts_of(scene, duration):
     """Return begin and end of all bursts [s], shape (n, 2)."""
-    stops = drive_of(scene, duration)
-    on = np.concatenate([[False], stops.levels > 0, [False]])
-    new = np.concatenate([[True], np.diff(stops.slopes) != 0, [True]])
-    edge = lambda before, after: stops.times[np.flatnonzero(on[before] & (new | ~on[after]))]  # noqa: E731
-    return np.stack([edge(slice(1, None), slice(None, -1)), edge(slice(None, -1), slice(1, None))], axis=1)
+    pieces = simulate(scene, duration, rate=None).bursts
+    new = np.concatenate([[True], np.diff(pieces[:, 3]) != 0, [True]])
+    return np.stack([pieces[new[:-1], 0], pieces[new[1:], 1]], axis=1)
 
 
 def test_the_energy_changes_by_the_work_of_the_bursts():
     scene = MOTOR.changed({"drag.law": "none"})
     motion = simulate(scene, 1.0, tolerance=1e-9, rate=20_000)
-    stops = drive_of(scene, 1.0)
-    at = np.clip(np.searchsorted(stops.times, motion.time, side="right") - 1, 0, stops.counts.size - 1)
-    field = scene.drive.amplitude_t * np.sin(TURN * (stops.levels[at] * motion.time + stops.slopes[at]))
+    field = scene.drive.amplitude_t * burst_share(motion.bursts, motion.time)
     top, n, momentum = scene.top, motion.axis, motion.angular_momentum
     moment = top.moment_a_m2 * (top.moment_tilt[0] * motion.states[:, ARM] + top.moment_tilt[1] * n)
     along = np.sum(momentum * n, axis=1, keepdims=True)
@@ -238,6 +227,16 @@ def test_many_at_once_are_what_each_is():
         assert many.time[where] == pytest.approx(single.time[-1])
         assert 0 < many.position_error[where] < 1e-6
     assert simulate_many(MOTOR, {"drive.waveform": ["sine", "triggered"]}, 1.0).spin_hz[1] > 30.5
+
+
+def test_a_long_motion_in_many_calls_is_the_same(monkeypatch):
+    scene = MOTOR.changed({"drive.amplitude_t": 1e-3})
+    whole = simulate(scene, 2.0, step=3e-3)
+    monkeypatch.setattr(problem, "PIECES_IN_A_CALL", 7)
+    done = []
+    assert np.array_equal(simulate(scene, 2.0, step=3e-3, progress=done.append).states, whole.states)
+    assert done == sorted(done)
+    assert done[-1] == 1
 
 
 def test_events_are_found_within_the_bursts():
