@@ -71,7 +71,7 @@ def top_of(scene: Scene) -> stability.SymmetricTop:
         top.mass_kg,
         top.inertia_transverse_kg_m2,
         top.inertia_axial_kg_m2,
-        top.moment_a_m2 * top.moment_tilt[1],
+        scene.moment * top.moment_tilt[1],
         scene.gravity_m_s2,
         _disc_stiffnesses(scene) if top.magnet == "disc" else None,
     )
@@ -96,7 +96,7 @@ def _disc_stiffnesses(scene: Scene) -> Callable[[Array], Array]:
     """Return the stiffnesses of a magnet of finite size, from its energy when it is moved and tilted a little."""
     field = base_field(scene)
     nodes = _nodes(scene, angles=4)  # to the second order in x and θ no fourth harmonic of the angle is felt
-    moment = scene.top.moment_a_m2 * scene.top.moment_tilt[1]
+    moment = scene.moment * scene.top.moment_tilt[1]
 
     def energy(heights: Array, x: float, theta: float) -> Array:
         cos, sin = math.cos(theta), math.sin(theta)
@@ -226,7 +226,8 @@ def _for_all(scene: Scene) -> Scene:
         for name in ("base", "top")
     }
     start = scene.start.model_copy(update={"spin_hz": 0.0})
-    return scene.model_copy(update={**shared, "gravity_m_s2": uniform(scene.gravity_m_s2), "start": start})
+    conditions = {key: uniform(getattr(scene, key)) for key in ("gravity_m_s2", "temperature_rise_k")}
+    return scene.model_copy(update={**shared, **conditions, "start": start})
 
 
 # --- many masses ---

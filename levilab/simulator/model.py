@@ -47,15 +47,14 @@ def model_of(scene: Scene, place: Any = None, more_nodes: int = 0) -> Model:
 def base_field(scene: Scene, times: float = 1.0) -> Any:
     """Return the field of the scene's base, one of the kinds of `levilab.simulator.kernels.fields`, times a factor."""
     base = scene.base
-    strength = base.strength_t_m * times
+    strength = scene.strength * times
     radii = base.inner_radius_m, base.outer_radius_m
     return field_of(*radii, strength, base.field, thickness=base.thickness_m, origin=base.origin_m)
 
 
 def _moment(scene: Scene) -> float:
     """Return the factor of the fields [A m²]: the whole of an aligned dipole, else the fractions stay apart."""
-    top = scene.top
-    return top.moment_a_m2 if has_attitude(scene) else top.moment_a_m2 * top.moment_tilt[1]
+    return scene.moment if has_attitude(scene) else scene.moment * scene.top.moment_tilt[1]
 
 
 def gravity(scene: Scene) -> tuple[float, float, float]:

@@ -55,6 +55,9 @@ Inertia = Annotated[float, Field(gt=1e-18, lt=1e6)]
 Turns = Annotated[float, Field(gt=-1e6, lt=1e6)]
 Frequency = Annotated[float, Field(gt=0, lt=1e6)]
 Coordinate = Annotated[float, Field(gt=-1e6, lt=1e6)]
+#: So that no magnet turns over: a change below 1 at any TemperatureRise.
+PerKelvin = Annotated[float, Field(gt=-0.01, lt=0.01)]
+TemperatureRise = Annotated[float, Field(gt=-100, lt=100)]
 Vector = Annotated[tuple[Coordinate, Coordinate, Coordinate], _numbers(3)]
 Direction = Annotated[tuple[float, float, float], _numbers(3)]
 Pair = Annotated[tuple[float, float], _numbers(2)]
@@ -74,6 +77,7 @@ class Base(Part):
     Attributes:
         inner_radius_m, outer_radius_m: its radii.
         strength_t_m: dipole density integrated over the thickness [T m].
+        temperature_coefficient_per_k: relative change of the strength per kelvin; of ferrite, with u = 0.0007.
         field: how it is computed.
         thickness_m: 0 for a thin ring.
         origin_m: height of the middle of its thickness.
@@ -84,6 +88,7 @@ class Base(Part):
     inner_radius_m: Length = 0.030
     outer_radius_m: Length = 0.055
     strength_t_m: Coordinate = 1.40e-3
+    temperature_coefficient_per_k: PerKelvin = -0.002
     field: FieldKind = "paraxial-2"
     thickness_m: float = Field(default=0.0, ge=0, lt=1e3)
     origin_m: Coordinate = 0.0
@@ -98,6 +103,7 @@ class Top(Part):
         mass_kg: of the whole.
         inertia_transverse_kg_m2, inertia_axial_kg_m2: of the whole.
         moment_a_m2: signed along its axis, negative when it floats over the thesis's base.
+        temperature_coefficient_per_k: relative change of the moment per kelvin, as of the base.
         moment_tilt: transverse and axial part of the moment, as fractions of moment_a_m2.
         magnet: "disc": the moment is spread evenly over a disc of magnet_radius_m and magnet_height_m.
     """
@@ -106,6 +112,7 @@ class Top(Part):
     inertia_transverse_kg_m2: Inertia = 1.04e-6
     inertia_axial_kg_m2: Inertia = 1.731314e-6
     moment_a_m2: Coordinate = -0.714
+    temperature_coefficient_per_k: PerKelvin = -0.002
     moment_tilt: Pair = (0.0, 1.0)
     magnet: Literal["point", "disc"] = "point"
     magnet_radius_m: Length = 0.0144

@@ -18,7 +18,7 @@ from levilab.files import parse_toml
 from levilab.settings import in_one_line
 from levilab.simulator.keys import SceneError, Table, UnknownScene, as_toml, nearest, parse_setting, set_key, short_text
 from levilab.simulator.laws import LAWS
-from levilab.simulator.parts import Base, Drag, Drive, Escape, Part, Start, Top, Washers
+from levilab.simulator.parts import Base, Drag, Drive, Escape, Part, Start, TemperatureRise, Top, Washers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -33,6 +33,8 @@ __all__ = [
 class Scene(Part):
     """What is simulated; with observed "spin" only the spin is, in closed form.
 
+    Base and top are warmer by temperature_rise_k [K] than where their strength and moment are given.
+
     Raises pydantic's ValidationError for a value that its key does not allow, SceneError for values that do not
     go together; `scene_of`, `read_scene`, `with_settings` and `changed` raise SceneError for both.
     """
@@ -41,6 +43,7 @@ class Scene(Part):
     description: str = ""
     observed: Literal["motion", "spin"] = "motion"
     gravity_m_s2: NonNegativeFloat = 9.82
+    temperature_rise_k: TemperatureRise = 0.0
     base: Base = Base()
     top: Top = Top()
     washers: Washers = Washers()
@@ -56,6 +59,16 @@ class Scene(Part):
                 value = short_text(attrgetter(rule.key)(self))
                 raise SceneError(f"{rule.key} = {value}: {rule.expected.format(s=self)}")
         return self
+
+    @property
+    def strength(self) -> float:
+        """The base's strength at this temperature [T m]."""
+        return self.base.strength_t_m * (1 + self.base.temperature_coefficient_per_k * self.temperature_rise_k)
+
+    @property
+    def moment(self) -> float:
+        """The top's moment at this temperature, signed [A m²]."""
+        return self.top.moment_a_m2 * (1 + self.top.temperature_coefficient_per_k * self.temperature_rise_k)
 
     def changed(self, values: Mapping[str, Any]) -> Scene:
         """Return the scene with other values at dotted keys, checked anew.  Raises SceneError.

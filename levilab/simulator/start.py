@@ -64,7 +64,7 @@ def steady_rates(scene: Scene, spin: Any, place: Any) -> tuple[Any, Any]:
     """
     top = scene.top
     bz = flux_density(base_field(scene), row(*place))[..., 2]
-    restoring = -top.moment_a_m2 * top.moment_tilt[1] * bz
+    restoring = -scene.moment * top.moment_tilt[1] * bz
     a = top.inertia_transverse_kg_m2 * cos(scene.start.tilt_rad)
     b = top.inertia_axial_kg_m2 * spin
     square = b * b - 4 * a * restoring

@@ -38,6 +38,6 @@ ISLANDS_HZ = (56.0, 81.0)
 def is_thesis_device(scene: Scene) -> bool:
     """Return whether base and top are the thesis's, whatever the mass: it prints one that its own field cannot lift."""
     base, top = scene.base, scene.top
-    ring = (base.inner_radius_m, base.outer_radius_m, base.strength_t_m, base.thickness_m)
-    body = (top.inertia_transverse_kg_m2, top.inertia_axial_kg_m2, abs(top.moment_a_m2))
+    ring = (base.inner_radius_m, base.outer_radius_m, scene.strength, base.thickness_m)
+    body = (top.inertia_transverse_kg_m2, top.inertia_axial_kg_m2, abs(scene.moment))
     return ring == (0.030, 0.055, 1.40e-3, 0.0) and body == (1.04e-6, 1.731314e-6, 0.714)

@@ -194,8 +194,9 @@ class MotionWorld:
         position, axis, arm, up = self._flight.attitude(times)
         top = self._scene.top
         arm = np.where(up[:, None], arm, 1.0)  # of any length above 0
-        moment = moment_of(axis, arm, top.moment_a_m2, top.moment_tilt)
-        return field_beside(place, self._scene.base, position, moment, up)
+        moment = moment_of(axis, arm, self._scene.moment, top.moment_tilt)
+        ring = self._scene.base.model_copy(update={"strength_t_m": self._scene.strength})
+        return field_beside(place, ring, position, moment, up)
 
     def place_probe(self, height_m: float | None) -> None:
         """Put the probe at a height, exactly; see World."""

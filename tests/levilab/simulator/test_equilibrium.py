@@ -29,6 +29,18 @@ def test_a_magnet_of_finite_size_moves_the_window_as_computed_elsewhere():
     assert stability_of(DISC).windows[-1].low == pytest.approx(0.06704, abs=5e-6)
 
 
+def test_warmth_weakens_base_and_top_and_with_both_the_masses_that_float():
+    warm = UNDRIVEN.changed({"temperature_rise_k": 5.0})
+    weak = UNDRIVEN.changed({"base.strength_t_m": 1.40e-3 * 0.99, "top.moment_a_m2": -0.714 * 0.99})
+    window, by_hand, cold = (stability_of(scene).windows[-1] for scene in (warm, weak, UNDRIVEN))
+    assert (window.light, window.heavy) == pytest.approx((by_hand.light, by_hand.heavy), rel=1e-12)
+    # both are proportional to strength times moment; the heights are those of the field's shape
+    assert window.heavy / cold.heavy == pytest.approx(0.99**2, rel=1e-9)
+    assert window.low == pytest.approx(cold.low, abs=1e-9)
+    moved = [simulate(scene.changed({"top.mass_kg": 0.0247}), 0.5).states for scene in (warm, weak)]
+    assert moved[0] == pytest.approx(moved[1], rel=1e-9, abs=1e-12)
+
+
 def test_every_field_gives_the_same_axis():
     heights = [
         floating_height(UNDRIVEN.changed({"base.field": field})) for field in ("paraxial-2", "paraxial-8", "exact")

@@ -48,6 +48,11 @@ VARIED = {
         "top.mass_kg": RANDOM.uniform(0.0249, 0.0254, 20), "start.spin_hz": RANDOM.uniform(20, 40, 20),
         "base.strength_t_m": np.repeat([1.40e-3, 1.41e-3], 10),
     }),
+    "the temperature": (preset("undriven").changed({"start.precession": "steady"}), {
+        "temperature_rise_k": RANDOM.uniform(-20, 20, 20),
+        "base.temperature_coefficient_per_k": np.tile([-2e-3, 0], 10),
+        "top.temperature_coefficient_per_k": RANDOM.uniform(-3e-3, -1e-3, 20),
+    }),
     "a disc": (preset("undriven").changed({"top.magnet": "disc"}), {
         "start.position_m.2": np.linspace(0.05, 0.2, 20), "top.magnet_radius_m": np.tile([0.01, 0.014], 10),
     }),
