@@ -212,46 +212,44 @@ def vertical_mode(field: AxialField, top: SymmetricTop, height: float) -> float:
 def spin_windows(field: AxialField, top: SymmetricTop, height: float) -> tuple[tuple[float, float], ...]:
     """Return the windows of spin [Hz] with four real roots, between 0 and 20 times the sleeping top's limit.
 
-    Four real roots: two conditions that the discriminant alone does not tell apart, so the scan (SPINS steps) looks
-    at the roots, and each edge is then the zero of the discriminant.
+    Four real roots: looked for in SPINS steps; each edge is then the zero of the discriminant.
     """
     limit = sleeping_limit(field, top, height)
     if not math.isfinite(limit):
         return ()
+    at_zero, at_one = (quartic(field, top, height, spin) for spin in (0.0, 2 * math.pi))
     spins = np.linspace(0, 20 * limit, SPINS)
-    stable = _all_real(np.array([quartic(field, top, height, 2 * math.pi * spin) for spin in (0.0, 1.0)]), spins)
+    stable = _all_real(at_zero[:, None] + np.outer(at_one - at_zero, spins))  # the coefficients are linear in the spin
     change = np.flatnonzero(stable[1:] != stable[:-1])
 
     def discriminant(spin: float) -> float:
-        return _discriminant(quartic(field, top, height, 2 * math.pi * spin))
+        return float(_discriminant(at_zero + spin * (at_one - at_zero)))
 
     edges = [_zero(discriminant, spins[i], spins[i + 1], xtol=1e-13, rtol=1e-14) for i in change]
     edges = [0.0] * bool(stable[0]) + edges + [math.inf] * bool(stable[-1])
     return tuple(zip(edges[::2], edges[1::2], strict=True))
 
 
-def _all_real(at_zero_and_one: Array, spins: Array) -> NDArray[np.bool_]:
-    """Return whether the quartic has four real roots at each of the spins; its coefficients are linear in the spin.
+def _all_real(coefficients: Array) -> NDArray[np.bool_]:
+    """Return whether quartics have four real roots, from their coefficients, shape (5, n) (E. L. Rees 1922).
 
-    The roots are the eigenvalues of the companion matrices, all in one call.
+    A positive discriminant alone leaves four or none.
     """
-    at_zero, slope = at_zero_and_one[0], at_zero_and_one[1] - at_zero_and_one[0]
-    companion = np.zeros((spins.size, 4, 4))
-    companion[:, 0] = -(at_zero[1:] + spins[:, None] * slope[1:])
-    companion[:, [1, 2, 3], [0, 1, 2]] = 1
-    roots = np.linalg.eigvals(companion)
-    return np.asarray(np.abs(roots.imag).max(axis=1) < 1e-6 * np.abs(roots).max(axis=1))
+    a, b, c, d, e = coefficients
+    depressed = 8 * a * c - 3 * b**2
+    none = 64 * a**3 * e - 16 * a**2 * c**2 + 16 * a * b**2 * c - 16 * a**2 * b * d - 3 * b**4
+    return np.asarray((_discriminant(coefficients) > 0) & (depressed < 0) & (none < 0))
 
 
-def _discriminant(coefficients: Array) -> float:
-    """Return the discriminant of a x⁴ + b x³ + c x² + d x + e.
+def _discriminant(coefficients: Array) -> Array:
+    """Return the discriminant of a x⁴ + b x³ + c x² + d x + e, of coefficients of shape (5, …).
 
     It is (4(c² − 3bd + 12ae)³ − (2c³ − 9bcd + 27ad² + 27b²e − 72ace)²)/27.
     """
-    a, b, c, d, e = (float(x) for x in coefficients)
+    a, b, c, d, e = coefficients
     first = c * c - 3 * b * d + 12 * a * e
     second = 2 * c**3 - 9 * b * c * d + 27 * a * d * d + 27 * b * b * e - 72 * a * c * e
-    return (4 * first**3 - second**2) / 27
+    return np.asarray((4 * first**3 - second**2) / 27)
 
 
 def sleeping_limit(field: AxialField, top: SymmetricTop, height: float) -> float:
