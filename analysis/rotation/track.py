@@ -18,7 +18,7 @@ from analysis.rotation.search import other_lines, refine
 from analysis.rotation.spin import LEAST_GAIN, limits_near, result_of, strongest
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from analysis.rotation.record import Array
     from analysis.rotation.result import FieldSpin, Kind
@@ -29,11 +29,13 @@ WINDOW_S = 10.0
 _BY_HZ, _BY_SLOPE = 0.5, 0.06
 #: Number of windows of a flight, evenly distributed, in which the folds are weighed.
 _WEIGHED = 12
-#: Length of the pieces in which a line is seen to begin or to end, least length of what is left of a window then, and
-#: what is cut off beside that moment, as a hand or the fall moves the field [s].
+#: Length of the pieces in which a line that is seen to begin or to end keeps its phase, least length of what is left of
+#: a window then, and what is cut off beside that moment, as a hand or the fall moves the field [s].
 _PIECE_S, _SHORTEST_S, _MARGIN_S = 0.5, 3.0, 0.5
 #: A line ends within the record if that is as much more probable [natural logarithm].
 _CLEAR = 6.0
+#: A step of the field from sample to sample is at most this multiple of their median: 3σ of noise.
+_MOST_STEP = 4.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +139,8 @@ def track_of_field(
     spins: list[FieldSpin] = []
     flights: list[Flight] = []
     for k, end in pairwise(starts):
-        windows, flight = _trim(t, b, found[k:end], len(spins))
+        earliest = int(np.searchsorted(t, flights[-1].end)) if flights else 0
+        windows, flight = _trim(t, b, found[k:end], len(spins), earliest)
         if windows:
             spins += _unfold(windows, rate, low, high)
             flights.append(flight)
@@ -183,13 +186,14 @@ def _follow(t: Array, b: Array, cut: slice, before: _Window) -> _Window | None:
 # --- where the line begins and ends ---
 
 
-def _trim(t: Array, b: Array, windows: list[_Window], first: int) -> tuple[list[_Window], Flight]:
+def _trim(t: Array, b: Array, windows: list[_Window], first: int, earliest: int) -> tuple[list[_Window], Flight]:
     """Return the windows of a flight as far as the line lasts, and the flight; the first window's number is given.
 
-    The likelihood of a line's power over that of noise is multiplied up over short pieces: it is greatest at the end.
+    The flight before has the samples up to `earliest`, also those of a window in which its end hides the line.
+    The likelihood of a line over that of noise is multiplied up over short pieces: it is greatest at the end.
     """
     inner = windows[len(windows) // 2]  # a window that has the line from end to end, if any
-    from_, to, end, u_end = _extent(t, b, windows, inner)
+    from_, to, end, u_end = _extent(t, b, windows, inner, earliest)
     began, ended = from_ > 0, to < t.size
     start, end = float(t[from_]), end if ended else float(t[-1])
     kept = []
@@ -215,7 +219,7 @@ def _trim(t: Array, b: Array, windows: list[_Window], first: int) -> tuple[list[
     return kept, Flight(first, first + len(kept), start, end, u_end, began, ended)
 
 
-def _extent(t: Array, b: Array, windows: list[_Window], inner: _Window) -> tuple[int, int, float, float]:
+def _extent(t: Array, b: Array, windows: list[_Window], inner: _Window, earliest: int) -> tuple[int, int, float, float]:
     """Return the samples from and to which a line is seen, and the time of its end with its u [s].
 
     They are at most a window before and behind those of a flight.
@@ -226,45 +230,42 @@ def _extent(t: Array, b: Array, windows: list[_Window], inner: _Window) -> tuple
     size = inner.cut.stop - inner.cut.start
     expected = np.sum(inner.fit.amplitudes**2, axis=0) * inner.record.unit**2
     noise = inner.fit.variance * inner.record.unit**2
+    length = max(round(_PIECE_S * inner.record.rate), 1)
 
-    def scores(one: _Window, cut: slice) -> tuple[Array, NDArray[np.int64]]:
-        record = Record(t[cut], b[cut])
+    def likelihoods(one: _Window, cut: slice, way: int) -> Array:
+        """Return logarithms of the likelihoods that the line ends, in a way, before each sample and behind the last."""
         late = t[cut] - one.record.middle
         wave = np.exp(-2j * np.pi * (one.fit.frequency * late + 0.5 * one.fit.chirp * late**2))
-        count = max(round(2 * record.half / _PIECE_S), 2)
-        starts = np.unique(np.searchsorted(t[cut], np.linspace(t[cut][0], t[cut][-1], count + 1)[:-1]))
-        sizes = np.diff(np.append(starts, late.size))
+        # of differences of neighbours, in which the jolt of the fall is one that is too large
+        steps = np.diff(b[cut], axis=0, prepend=b[cut][:1])
+        most = _MOST_STEP * np.median(np.abs(steps), axis=0)
+        steps = np.clip(steps, -most, most) / abs(1 - np.exp(-2j * np.pi * one.fit.frequency / one.record.rate))
         # mains stay: a piece resolves them, and at a fold of theirs they would take the line
-        sums = np.abs(np.add.reduceat(record.without_drift() * record.unit * wave[:, None], starts)) ** 2
-        # of the piece's power, whatever its phase: the line's is χ² about its own, that of noise about none
-        line = sizes[:, None] * expected / (2 * noise)
-        argument = np.sqrt(line * 2 * sums / sizes[:, None] / noise)
+        sums = np.concatenate([np.zeros((1, b.shape[1])), np.cumsum((steps * wave[:, None])[::way], axis=0)])
+        piece, count = np.divmod(np.arange(late.size), length)
+        count += 1
+        power = np.abs(sums[1:] - sums[piece * length]) ** 2
+        # of the piece's power so far, whatever its phase: the line's is χ² about its own, that of noise about none
+        line = count[:, None] * expected / (2 * noise)
+        argument = np.sqrt(line * 2 * power / count[:, None] / noise)
         ratio = np.sum(np.log(i0e(argument)) + argument - line / 2, axis=1)
-        # no piece counts for more than the line, so that a jolt of the field is no line
-        half = 0.5 * line.sum(axis=1)
-        return np.clip(ratio, -half, half), starts + cut.start
+        before = np.append(0.0, np.cumsum(ratio[length - 1 :: length]))
+        return np.append(0.0, before[piece] + ratio)
 
     stop = min(last.cut.stop + size, t.size)
-    score, at = scores(last, slice(last.cut.start, stop))
-    edges, sums = np.append(at, stop), _sums(score)
-    times = t[np.minimum(edges, t.size - 1)]
+    sums = likelihoods(last, slice(last.cut.start, stop), 1)
+    times = t[np.minimum(np.arange(last.cut.start, stop + 1), t.size - 1)]
     chance = np.exp(sums - sums.max())
     chance /= chance.sum()
     end = float(chance @ times)
-    # the end lies anywhere in its piece, and the jolt of the fall, which may count for it or not, adds as much again
-    u_end = math.sqrt(float(chance @ (times - end) ** 2) + 2 * _PIECE_S**2 / 12)
-    score, at = scores(first, slice(max(first.cut.start - size, 0), first.cut.stop))
-    from_ = int(np.append(first.cut.stop, at[::-1])[_edge(_sums(score[::-1]))])
-    return from_, max(int(edges[_edge(sums)]), from_ + 1), end, u_end
-
-
-def _sums(score: Array) -> Array:
-    """Return the natural logarithms of the likelihoods that a line ends before each piece, and behind the last one."""
-    return np.concatenate([[0.0], np.cumsum(score)])
+    u_end = math.sqrt(float(chance @ (times - end) ** 2) + (times[1] - times[0]) ** 2 / 12)
+    cut = slice(min(max(first.cut.start - size, earliest), first.cut.stop - 1), first.cut.stop)
+    from_ = cut.stop - _edge(likelihoods(first, cut, -1))
+    return from_, max(last.cut.start + _edge(sums), from_ + 1), end, u_end
 
 
 def _edge(sums: Array) -> int:
-    """Return the number of the piece before which a line ends, which is the last one but for good reason."""
+    """Return the number of the sample before which a line ends, which is behind the last one but for good reason."""
     best = int(sums.argmax())
     return best if sums[best] - sums[-1] > _CLEAR else sums.size - 1
 
