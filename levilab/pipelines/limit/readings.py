@@ -33,10 +33,12 @@ if TYPE_CHECKING:
 
 #: Columns that an analysis of limits looks at.
 QUANTITIES = ("spin_frequency_hz", "spin_frequency_u_hz")
+#: Read where there is one, so that what is wrong in it is not passed over: it is most likely a spin-down's.
+_TIME = "time_s"
 #: Limits that differ by more than this part of their mean are none of one top: most likely a spin-down.
 _MOST_SPREAD = 0.25
-#: Least number of steps in a row that do not all go the same way by chance.
-_FEWEST_STEPS = 4
+#: Correlation with the time above which a spin is that of one top, which chance seldom makes of so many rows.
+_TREND, _FEWEST = 0.9, 5
 #: A number on a line of its own, with a decimal point or comma, and what is read of a file that holds nothing else.
 _NUMBER, _MOST_BYTES = re.compile(r"[+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?"), 1 << 20
 
@@ -65,7 +67,7 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
         return limits_in_field(path, field, options.near)
     try:
         table = read_table(
-            path, columns=options.columns, quantities=QUANTITIES, needed=QUANTITIES[:1], guess=options.guess
+            path, columns=options.columns, quantities=(_TIME, *QUANTITIES), needed=QUANTITIES[:1], guess=options.guess
         )
     except (NoTable, NoSuchColumn) as error:
         single = _single_column(path, guess=options.guess)
@@ -73,15 +75,20 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
             raise error from None
         table = single
     readings = limit_readings(table)
-    steps = np.diff(readings.limit)
-    timed = any(read_title(title).column == "time_s" for title in table.header)
-    if timed and len(steps) >= _FEWEST_STEPS and (np.all(steps < 0) or np.all(steps > 0)):
-        way = "falls" if steps[0] < 0 else "rises"
-        raise DoesNotSuit(
-            f"{path}: the spin {way} from row to row, as that of one top does; of limits one row a repetition is "
-            "expected (leave out the column of times if these are limits)"
-        )
+    if _TIME in table.columns:
+        _must_be_of_several(path, table.column(_TIME), readings.limit)
     return readings
+
+
+def _must_be_of_several(path: Path, time: Array, limit: Array) -> None:
+    """Raise DoesNotSuit for the spins of one top, or what may be meant for them."""
+    no_times = "of limits one row a repetition is expected (leave out the column of times if these are limits)"
+    if np.any(np.diff(time) <= 0):
+        raise DoesNotSuit(f"{path}: its times do not increase from row to row; {no_times}")
+    trend = float(np.corrcoef(np.arange(len(limit)), limit.argsort().argsort())[0, 1])  # by ranks
+    if len(limit) >= _FEWEST and abs(trend) > _TREND:
+        way = "falls" if trend < 0 else "rises"
+        raise DoesNotSuit(f"{path}: the spin {way} with time, as that of one top does; {no_times}")
 
 
 def limits_in_field(path: Path, record: FieldRecord, near: float | None) -> LimitReadings:

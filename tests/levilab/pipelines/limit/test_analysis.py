@@ -272,9 +272,16 @@ def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path: Path
     assert [row.name for row, _ in analyze_suiting([file], {})] == ["spindown"]
     with pytest.raises(DoesNotSuit, match="no limits of one top"):
         METHOD.analyze([file], LimitOptions())
-    file.write_text("t,f\n0,40\n10,39\n20,38\n30,37\n40,36\n", encoding="utf-8")  # not far down
-    with pytest.raises(DoesNotSuit, match="the spin falls from row to row"):
+    file.write_text("t,f\n0,40\n10,39\n20,37\n30,37.5\n40,36\n50,35\n", encoding="utf-8")  # not far down
+    with pytest.raises(DoesNotSuit, match="the spin falls with time"):
         METHOD.analyze([file], LimitOptions())
+    for wrong, says in (
+        ("0,40\nMittel,39\n20,40\n30,39.5\n", "'Mittel' stands in"),
+        ("0,40\n0,39\n9,40\n", "repeated"),
+    ):
+        file.write_text(f"t,f\n{wrong}", encoding="utf-8")
+        with pytest.raises(DataError, match=says):  # a damaged spin-down is no list of limits
+            analyze_suiting([file], {})
     empty = shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
     (empty / "readings.csv").write_text("spin_frequency_hz\n", encoding="utf-8")
     with pytest.raises(TableError, match="at least one repetition is needed"):
