@@ -8,10 +8,7 @@ with three angles between them.  The drive creeps up in steps of a second until 
 drive.  By then it has slipped for some seconds; but it only slows, so its limit lies between the spin a second before
 (or the drive then, if that was lower) and the drive now: the middle of these is given, as `levilab acquire limit` does.
 
-Against it stands the balance of torques.  A drive of amplitude B (of its first harmonic) accelerates the spin by no
-more than α = δ|μ|B/2I₃, half of it because half of a field along one line turns with the top, δ being the part of the
-moment across the axis.  The top leans in step with its moment, which adds δ/((ν/ν_r)² − 1) to δ, with the resonance
-ν_r = 22 Hz.  Drag takes C ω^(3/2), the creep 2π dν/dt.
+Against it stands the balance of torques (analysis/pull.py).
 
 Where the drive is strong enough, two things are left: the upper edge of the linear window, and below it a resonance of
 the slow motions.  Sideways the top has two slow modes that turn forwards; where their frequencies differ by that of the
@@ -34,6 +31,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import brentq
 
+from analysis.pull import Driven
 from analysis.stability import modes, wobble_resonance
 from levilab.simulator import preset, simulate
 from levilab.simulator.equilibrium import stability_of
@@ -59,6 +57,8 @@ HARMONIC = {"sine": 1.0, "square": 4 / math.pi}
 AMPLITUDES = (1.5e-4, 2e-4, 2.5e-4, 3e-4, 3.5e-4, 4e-4, 6e-4, 8e-4)
 CREEPS = (0.02, 0.05, 0.1, 0.2, 0.4)
 MASSES = (0.0240, 0.0241, 0.0242, 0.0243, 0.0244, 0.0245, 0.0246, 0.0247)
+#: Washers that slip: inertia [kg m²] and coupling [N m s], those of the scene loose-washers.
+LOOSE = (1.5e-7, 1e-6)
 FIELD_T, STRONG_T, CREEP, FAST = 4e-4, 8e-4, 0.05, 0.1
 
 
@@ -157,18 +157,15 @@ def balance(scene: Scene, waveform: str, field: float, rate: float) -> float:
     resonance = wobble_resonance(found.field, found.top, found.floating.height)
     across = top.moment_tilt[0] * abs(top.moment_a_m2)
     most = HARMONIC[waveform] * across * field / (2 * top.inertia_axial_kg_m2)
-
-    def left(spin: float) -> float:
-        wobble = 1 / ((spin / resonance) ** 2 - 1)
-        return most * (1 + wobble) - scene.drag.constants[0] * (2 * math.pi * spin) ** 1.5 - 2 * math.pi * rate
-
-    lowest = 1.2 * resonance  # nearer to it the wobble is no small addition
-    return float(brentq(left, lowest, 500.0)) if left(lowest) > 0 else math.nan
+    return Driven(most, scene.drag.constants[0], rate, resonance).highest()
 
 
 @dataclass(frozen=True)
 class Case:
-    """A creep that is tried: what it is tried for, and what differs from the usual one."""
+    """A creep that is tried: what it is tried for, and what differs from the usual one.
+
+    washers: inertia [kg m²] and coupling [N m s] of loose ones, which the air brakes.
+    """
 
     subject: str
     waveform: str
@@ -176,6 +173,7 @@ class Case:
     creep_hz_per_s: float
     mass_kg: float = TOP.top.mass_kg
     steps_s: tuple[float, ...] = (STEP_S,)
+    washers: tuple[float, float] | None = None
 
 
 CASES = (
@@ -187,12 +185,17 @@ CASES = (
     ),
     *(Case("mass", "square", STRONG_T, FAST, mass_kg=mass) for mass in MASSES),
     *(Case("steps", "sine", FIELD_T, FAST, steps_s=steps) for steps in STEPS),
+    Case("washers", "sine", FIELD_T, FAST, washers=LOOSE),
 )
 
 
 def entry(case: Case) -> dict[str, Any]:
     """Return a case as it is kept: with the limit and how it was lost for each angle, and what theory says."""
     scene = TOP.changed({"top.mass_kg": case.mass_kg})
+    if case.washers:
+        inertia, coupling = case.washers
+        keys = {"inertia_kg_m2": inertia, "coupling_n_m_s": coupling, "drag_share": 1.0}
+        scene = scene.changed({f"washers.{key}": value for key, value in keys.items()})
     drive = case.waveform, case.field_t, case.creep_hz_per_s
     losses = [creep_up(scene, *drive, turns=angle, steps=case.steps_s) for angle in ANGLES]
     found = vars(case) | {

@@ -13,18 +13,22 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from levilab.present.drawing import SMALL
 from levilab.present.looks import BLACK, BLUE, GREEN, GREY, LOOKS, ORANGE, SERIES, VERMILION
 from levilab.present.numbers import with_decimals
 from levilab.present.style import STYLE, WIDE
 from levilab.reproduce.tops import MASS_KG, known
-from levilab.stability.thesis import SIMULATED_HZ, WITH_DRAG_HZ
+from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.scene import preset
+from levilab.stability.thesis import HIGHEST_HZ, LOOSE_HZ, SIMULATED_HZ, WITH_DRAG_HZ
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from matplotlib.axes import Axes
 
     from analysis.limits import Statistics
+    from analysis.pull import Driven
     from analysis.spindown.fit import SpinDown
     from levilab.motion.lines import AxisLines
     from levilab.reproduce.tops import Array, Flags
@@ -391,6 +395,57 @@ def counter_figure(spin: Array, count: Array, cosine: Array) -> Figure:
     axes.plot(spin, 1e3 * (count - spin), **LOOKS["readings"].as_points, label="count − ω₃/2π")
     axes.set(xlabel="spin ω₃/2π  [Hz]", ylabel="count − spin  [mHz]", ylim=(0, None))
     axes.legend(loc="upper right")
+    return figure
+
+
+@mpl.rc_context(STYLE)
+def drive_figure(
+    driven: Callable[..., Driven],
+    *,
+    fields: Sequence[float],
+    ramps: Sequence[float],
+    spread: float,
+    swings: Sequence[float],
+    start: float,
+) -> Figure:
+    """Draw the pull of drives against drag and ramp, and the highest spin of a top that swings about its drive.
+
+    Args:
+        driven: amplitude and ramp, with `leans` → the top under it.
+        fields: amplitudes of the drives [T].
+        ramps: their rates [Hz/s].
+        spread: relative scatter of the drag.
+        swings: amplitudes of the spin about the drive, where a ramp begins [Hz].
+        start: spin at which it begins [Hz].
+    """
+    figure, (left, right) = _figure(3.6, (0.085, 0.14, 0.5, 0.8), (0.67, 0.14, 0.315, 0.8))
+    edge = known(stability_of(preset("undriven")).floating).spins[0][1]
+    spins, turn = np.linspace(30.0, 105.0, 151), 2 * math.pi
+    for field in fields:
+        pull = driven(field, 0.0).strongest / turn
+        left.axhline(pull, color=GREY, linewidth=1)
+        left.annotate(f"{1e3 * field:.1f} mT", (31, pull), va="bottom", fontsize=SMALL)
+    for ramp, colour in zip(ramps, (BLUE, GREEN, VERMILION), strict=True):
+        load = np.array([driven(fields[0], ramp).load(spin) for spin in spins]) / turn
+        left.plot(spins, load, color=colour, label=f"drag and ramp of {ramp:g} Hz/s" if ramp else "drag")
+        scatter = spread * (load - ramp)
+        left.fill_between(spins, load - scatter, load + scatter, color=colour, alpha=0.2, linewidth=0)
+        ends = [(driven(field, ramp).highest(), driven(field, ramp).strongest / turn) for field in fields]
+        left.plot(*zip(*ends, strict=True), "o", color=colour, markersize=4)
+        for leans, style in ((False, "-"), (True, "--")):
+            lost = [driven(4e-4, ramp, leans=leans).highest_with_swing(swing, start) for swing in swings]
+            if ramp:
+                name = f"{ramp:g} Hz/s" + ", with the lean" * leans
+                right.plot(swings, lost, color=colour, linestyle=style, label=name)
+    left.axvspan(edge, spins[-1], color=VERMILION, alpha=0.08, linewidth=0)
+    right.axhspan(edge, spins[-1], color=VERMILION, alpha=0.08, linewidth=0)
+    for spin in (HIGHEST_HZ, LOOSE_HZ):
+        left.axvline(spin, color=BLACK, linewidth=0.8, linestyle=":")
+        right.axhline(spin, color=BLACK, linewidth=0.8, linestyle=":")
+    left.set(xlabel="spin  [Hz]", ylabel="change of the spin  [Hz/s]", xlim=(30, 105), ylim=(0, 0.7))
+    right.set(xlabel=f"swing about the drive at {start:g} Hz  [Hz]", ylabel="spin at the loss  [Hz]", ylim=(40, 85))
+    left.legend(loc="lower right")
+    right.legend(loc="lower left")
     return figure
 
 

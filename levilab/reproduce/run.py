@@ -9,6 +9,7 @@ from levilab.errors import UsageError
 from levilab.reproduce import (
     beyond,
     dipole,
+    drive,
     driven,
     errata,
     gans,
@@ -52,6 +53,7 @@ CHAPTERS: dict[str, Chapter] = {
         Chapter("limits", "Limits of the spin", limits.make),
         Chapter("paths", "Paths, the fall, and a tilted moment", paths.make),
         Chapter("driven", "The driven top", driven.make),
+        Chapter("drive", "Why it stopped at 61 Hz", drive.make),
         Chapter("spindown", "Four spin-downs", spindown.make),
         Chapter("statistics", "Ten measured limits", statistics.make),
         Chapter("dipole", "The dipole approximation", dipole.make),

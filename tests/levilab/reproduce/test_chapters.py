@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 
@@ -11,7 +12,20 @@ import pytest
 from levilab.motion.lines import AxisLines, NamedLine
 from levilab.present.document.blocks import Picture
 from levilab.present.style import as_svg
-from levilab.reproduce import beyond, dipole, driven, errata, gans, limits, paths, simon, spindown, statistics, windows
+from levilab.reproduce import (
+    beyond,
+    dipole,
+    drive,
+    driven,
+    errata,
+    gans,
+    limits,
+    paths,
+    simon,
+    spindown,
+    statistics,
+    windows,
+)
 from levilab.reproduce.check import Because, Comparison, Kind, Verdict, check, counts
 from levilab.reproduce.table import numbers
 from levilab.reproduce.tops import THESIS, many, preset_at, scan
@@ -28,6 +42,7 @@ QUICK = {
     "statistics": (statistics, {Verdict.AGREES: 2, Verdict.ADDED: 2}),
     "dipole": (dipole, {Verdict.AGREES: 5, Verdict.DIFFERS: 1, Verdict.ADDED: 1}),
     "spindown": (spindown, {Verdict.AGREES: 16}),
+    "drive": (drive, {Verdict.AGREES: 8, Verdict.ADDED: 5}),
 }
 
 
@@ -234,3 +249,16 @@ def test_a_scan_has_limits_edges_and_gaps():
     assert math.isnan(all_up_until(spins, up))
     assert all_up_until(spins, ~up) == 0.0
     assert math.isnan(lower_limit(spins, ~up & False))
+
+
+def test_the_ends_in_full_motion_that_the_drives_chapter_quotes_are_the_kept_ones():
+    results = json.loads((ROOT / "benchmarks/results/upper_limit.json").read_text(encoding="utf-8"))["entries"]
+    fixed = next(
+        one for one in results
+        if (one["subject"], one["waveform"], one["field_t"], one["creep_hz_per_s"]) == ("creep", "sine", 4e-4, 0.1)
+    )  # fmt: skip
+    (loose,) = (one for one in results if one["subject"] == "washers")
+    texts = [", ".join(f"{limit:.1f}" for limit in sorted(one["limit_hz"])) for one in (fixed, loose)]
+    assert texts == ["64.0, 66.9, 69.1", "70.0, 70.0, 70.1"]
+    (said,) = (one.ours_text for one in drive.about_61() if "loose washers" in one.name)
+    assert "end at 64.0, 66.9 and 69.1 Hz with fixed washers, all at 70.0 to 70.1 Hz with loose ones" in said
