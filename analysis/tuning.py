@@ -9,9 +9,7 @@ on a grid that is narrowed to where it is not negligible.
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections import Counter
 from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING
@@ -19,7 +17,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.errors import AnalysisError
 from analysis.uncertainty import Estimate
 
 if TYPE_CHECKING:
@@ -50,8 +47,6 @@ _ROUNDS, _NEGLIGIBLE = 3, 12.0
 _REACH, _WEIGHTLESS = 4.0, 1e-4
 #: Masses that are compared for the next trial: those with the best chances.
 _COMPARED = 40
-#: Combinations of washers that are tried.
-_MOST_COMBINATIONS = 20_000
 
 
 class Outcome(Enum):
@@ -61,20 +56,6 @@ class Outcome(Enum):
     FLOATS = "floats"
     SINKS = "sinks"
     SIDEWAYS = "sideways"
-
-
-class TooManyWashers(AnalysisError):
-    """More combinations of washers than can be compared.
-
-    Attributes:
-        seen, most: numbers of combinations.
-    """
-
-    def __init__(self, *, seen: int, most: int) -> None:
-        self.seen, self.most = seen, most
-        super().__init__(
-            f"these washers have {seen} combinations, at most {most} are compared: leave out some of the smallest"
-        )
 
 
 @dataclass(frozen=True)
@@ -256,24 +237,19 @@ def _narrow(axis: Array, log: Array, k: int) -> tuple[float, float]:
     return float(axis[max(inside[0] - 1, 0)]), float(axis[min(inside[-1] + 1, axis.size - 1)])
 
 
-# --- washers ---
-
-
 def combinations(washers: Sequence[float]) -> list[tuple[float, ...]]:
-    """Return all choices from the washers, which differ by the masses in them; the lightest first, `()` among them.
+    """Return choices from the washers [kg], the lightest first, `()` among them.
 
-    Raises:
-        TooManyWashers: there are too many choices.
+    Of those that a balance cannot distinguish, one with few washers.
 
-    >>> combinations([0.2, 0.1, 0.1])
-    [(), (0.1,), (0.2,), (0.1, 0.1), (0.1, 0.2), (0.1, 0.1, 0.2)]
+    >>> combinations([1e-4, 1e-4, 2e-4])
+    [(), (0.0001,), (0.0002,), (0.0001, 0.0002), (0.0001, 0.0001, 0.0002)]
     """
-    counts = sorted(Counter(washers).items())
-    seen = math.prod(count + 1 for _, count in counts)
-    if seen > _MOST_COMBINATIONS:
-        raise TooManyWashers(seen=seen, most=_MOST_COMBINATIONS)
-    choices = [
-        tuple(mass for (mass, _), n in zip(counts, numbers, strict=True) for _ in range(n))
-        for numbers in itertools.product(*(range(count + 1) for _, count in counts))
-    ]
-    return sorted(choices, key=lambda one: (round(sum(one), 9), len(one)))
+    found: dict[int, tuple[float, ...]] = {0: ()}
+    for one in sorted(washers):
+        for chosen in [*found.values()]:
+            more = (*chosen, one)
+            key = round(sum(more) / MASS_U)
+            if key not in found or len(more) < len(found[key]):
+                found[key] = more
+    return sorted(found.values(), key=sum)

@@ -119,7 +119,7 @@ def _next(advice: "Advice") -> "tuple[Owner, float, bool]":
             return advice.owner, advice.temperature, True
         if text[:1].isdigit() and "," not in text:
             return advice.owner, read_temperature(text), False
-        whole = text if "," in text else f"{washers_text(advice.best.washers)}, {advice.temperature:g} C, {text}"
+        whole = text if "," in text else f"{washers_text(advice.best.washers_kg)}, {advice.temperature:g} C, {text}"
         return advice.owner.with_trial(whole), advice.temperature, False
 
     return _told("trial", None, read, _RESULT, asks=True, at_end="")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.numbers import digits, with_minus
-from analysis.tuning import MASS_U, Outcome, Posterior, Prior, TooManyWashers, combinations, learn
+from analysis.tuning import Outcome, Posterior, Prior, combinations, learn
 from analysis.uncertainty import Estimate
 from levilab.errors import UsageError
 from levilab.files import finite
@@ -41,16 +41,10 @@ _MET = {Outcome.RISES: "rose", Outcome.FLOATS: "floated", Outcome.SINKS: "sank",
 
 @dataclass(frozen=True)
 class Choice:
-    """Some of the owner's washers.
+    """Some of the owner's washers, the top's mass with them, and the probabilities of the outcomes."""
 
-    Attributes:
-        washers: their masses [kg].
-        mass: of the top with them [kg].
-        rises, floats, sinks: probabilities.
-    """
-
-    washers: tuple[float, ...]
-    mass: float
+    washers_kg: tuple[float, ...]
+    mass_kg: float
     rises: float
     floats: float
     sinks: float
@@ -85,17 +79,17 @@ class Advice:
     @property
     def text(self) -> str:
         """The next step, in a sentence."""
-        weighs, chance = in_grams(self.best.mass), _percent(self.best.floats)
+        weighs, chance = in_grams(self.best.mass_kg), _percent(self.best.floats)
         return f"{self._step}: the top then weighs {weighs} and floats with a chance of {chance}."
 
     @property
     def _step(self) -> str:
         last = self.owner.attempts[-1] if self.owner.attempts else None
-        if last and last.outcome is Outcome.SIDEWAYS and last.washers == self.best.washers:
+        if last and last.outcome is Outcome.SIDEWAYS and last.washers == self.best.washers_kg:
             return "Raise the base on the side to which the top slid, and leave the washers as they are"
         if last is None or last.washers is None:
-            return f"Put on {_named(self.best.washers)}" if self.best.washers else "Take no washers"
-        on, wanted = Counter(last.washers), Counter(self.best.washers)
+            return f"Put on {_named(self.best.washers_kg)}" if self.best.washers_kg else "Take no washers"
+        on, wanted = Counter(last.washers), Counter(self.best.washers_kg)
         changes = [("take off", on - wanted), ("add", wanted - on)]
         steps = [f"{verb} {_named(sorted(some.elements()))}" for verb, some in changes if some]
         text = " and ".join(steps) or "leave the washers as they are"
@@ -119,8 +113,7 @@ class Advice:
                 word = "warmer" if warmer > 0 else "colder"
                 yield f"today is {digits(abs(warmer))} K {word}, which moves the window by {change} g"
         if scan:
-            middle = _in_people_units(Estimate(scan.mass_to_set, scan.mass_to_set_u, "kg"))
-            yield f"by the scan the middle was {middle} at {scan.temperature:g} °C"
+            yield f"by the scan the middle was {_in_people_units(scan.middle)} at {scan.temperature_c:g} °C"
         elif not last:
             yield "nothing is known yet, and a mass in the middle of the washers' reach tells most"
 
@@ -168,7 +161,7 @@ class Advice:
         heads = ("washers", "mass", "rises", "floats", "sinks")
         rows = [
             Row((
-                washers_text(one.washers), in_grams(one.mass),
+                washers_text(one.washers_kg), in_grams(one.mass_kg),
                 *map(_percent, (one.rises, one.floats, one.sinks)),
             ), "best" * (one is self.best))
             for one in self.choices
@@ -187,10 +180,10 @@ class Advice:
                 {"mass_kg": one.mass, "temperature_c": one.temperature, "outcome": one.outcome.value}
                 for one in owner.attempts
             ],
-            "scan": vars(owner.scan) if owner.scan else None,
+            "scan": owner.scan.model_dump() if owner.scan else None,
             "values": values_of(self.values),
-            "best": _choice_as_dict(self.best),
-            "choices": [_choice_as_dict(one) for one in self.choices],
+            "best": vars(self.best),
+            "choices": [vars(one) for one in self.choices],
             "text": self.text,
             "why": self.why,
             "warnings": list(self.warnings),
@@ -202,22 +195,17 @@ def advise(owner: Owner, temperature: float) -> Advice:
     """Return what to try next at a temperature [°C].
 
     Raises:
-        UsageError: the top's mass is not known, or the washers are too many.
+        UsageError: the top's mass is not known.
     """
     if owner.top is None:
         raise UsageError("top", "the mass of the top without washers is needed, such as 24.9 g")
-    try:
-        choices = combinations(owner.washers)
-    except TooManyWashers as error:
-        raise UsageError("washers", str(error)) from error
     on = owner.attempts[-1].washers if owner.attempts else None
-    # of choices that the balance cannot distinguish the one with the fewest changes
-    alike: dict[int, tuple[float, ...]] = {}
-    for one in sorted(choices, key=lambda one: _changes(on, one)):
-        alike.setdefault(round(sum(one) / MASS_U), one)
-    different = sorted(alike.values(), key=sum)
+    different = combinations(owner.washers)
+    if on and not Counter(on) - Counter(owner.washers):  # before others of the same mass
+        same = min(range(len(different)), key=lambda k: abs(sum(different[k]) - sum(on)))
+        different[same] = on
     masses = owner.top + np.array([sum(one) for one in different])
-    posterior = learn([one.trial for one in owner.attempts], _prior(owner, masses, temperature))
+    posterior = learn(owner.attempts, _prior(owner, masses, temperature))
     promise = posterior.promise(masses, temperature)
     best = min(
         np.flatnonzero(promise >= promise.max() - _SAME), key=lambda k: (_changes(on, different[k]), -promise[k])
@@ -231,8 +219,8 @@ def advise(owner: Owner, temperature: float) -> Advice:
 
 
 def _prior(owner: Owner, masses: np.ndarray, temperature: float) -> Prior:
-    if owner.scan:
-        return owner.scan.prior
+    if scan := owner.scan:
+        return Prior.of_scan(scan.middle, scan.lightest_kg, scan.heaviest_kg, scan.temperature_c)
     reach = [*masses[[0, -1]], *(one.mass for one in owner.attempts)]
     return Prior(min(reach) * (1 - _BEYOND), max(reach) * (1 + _BEYOND), temperature=temperature)
 
@@ -260,10 +248,3 @@ def _percent(chance: float) -> str:
 
 def _in_people_units(one: Estimate) -> str:
     return with_uncertainty(Quantity("", one.unit, "").show(one))
-
-
-def _choice_as_dict(one: Choice) -> dict[str, Any]:
-    return {
-        "washers_kg": list(one.washers), "mass_kg": one.mass,
-        "rises": one.rises, "floats": one.floats, "sinks": one.sinks,
-    }  # fmt: skip

@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from pydantic import ValidationError
+from pydantic import PositiveFloat, ValidationError
 
-from analysis.tuning import Outcome, Prior, Trial
+from analysis.tuning import Outcome, Trial
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError, UsageError
 from levilab.files import parse_toml, replace_atomically, writing
@@ -33,19 +33,13 @@ _WHOLE = 0.5
 
 
 @dataclass(frozen=True)
-class Attempt:
+class Attempt(Trial):
     """A trial as its owner tells it.
 
     Attributes:
-        mass: of the top with its washers [kg].
-        temperature: [°C].
-        outcome: what it did.
         washers: on it [kg]; None: not told.
     """
 
-    mass: float
-    temperature: float
-    outcome: Outcome
     washers: tuple[float, ...] | None = None
 
     @property
@@ -54,35 +48,28 @@ class Attempt:
         what = in_grams(self.mass) if self.washers is None else washers_text(self.washers)
         return f"{what}, {self.temperature:g} °C, {self.outcome.value}"
 
-    @property
-    def trial(self) -> Trial:
-        """The trial for the analysis."""
-        return Trial(self.mass, self.temperature, self.outcome)
 
-
-@dataclass(frozen=True)
-class Scan:
-    """The window of small motions above the base.  Masses [kg], temperature [°C].
+class Scan(Settings):
+    """The window of small motions above the base.
 
     Attributes:
         path: of the scan.
-        temperature: of the base during the scan.
-        mass_to_set, mass_to_set_u: the middle.
-        lightest, heaviest: its ends.
+        temperature_c: of the base during the scan.
+        mass_to_set_kg, mass_to_set_u_kg: the middle.
+        lightest_kg, heaviest_kg: its ends.
     """
 
     path: str
-    temperature: float
-    mass_to_set: float
-    mass_to_set_u: float
-    lightest: float
-    heaviest: float
+    temperature_c: float
+    mass_to_set_kg: PositiveFloat
+    mass_to_set_u_kg: PositiveFloat
+    lightest_kg: PositiveFloat
+    heaviest_kg: PositiveFloat
 
     @property
-    def prior(self) -> Prior:
-        """What it says before any trial."""
-        middle = Estimate(self.mass_to_set, self.mass_to_set_u, "kg")
-        return Prior.of_scan(middle, self.lightest, self.heaviest, self.temperature)
+    def middle(self) -> Estimate:
+        """The middle with its u."""
+        return Estimate(self.mass_to_set_kg, self.mass_to_set_u_kg, "kg")
 
 
 @dataclass(frozen=True)
@@ -142,20 +129,11 @@ def washers_text(washers: Sequence[float]) -> str:
 # --- the file ---
 
 
-class _ScanTable(Settings):
-    path: str
-    mass_to_set: str
-    mass_to_set_u: str
-    lightest: str
-    heaviest: str
-    temperature: str
-
-
 class _Table(Settings):
     top: str | None = None
     washers: tuple[str, ...] = ()
     trials: tuple[str, ...] = ()
-    scan: _ScanTable | None = None
+    scan: Scan | None = None
 
 
 def read_owner(path: Path) -> Owner:
@@ -165,26 +143,19 @@ def read_owner(path: Path) -> Owner:
     where = ""
     try:
         table = _Table.model_validate(parse_toml(path.read_text(encoding="utf-8")))
-        where = "top: "
-        owner = Owner(read_mass(table.top) if table.top else None, _masses(table.washers))
+        where = "top, washers: "
+        washers = tuple(sorted(map(read_mass, table.washers)))
+        owner = Owner(read_mass(table.top) if table.top else None, washers, scan=table.scan)
         for number, text in enumerate(table.trials, 1):
             where = f"trials, number {number} ({text[:60]!r}): "
             owner = owner.with_trial(text)
-        where = "scan: "
-        return replace(owner, scan=_scan(table.scan) if table.scan else None)
     except ValidationError as error:
-        raise DataError(f'{path}: {in_one_line(error, _Table)}; values are texts, as "24.98 g"') from error
+        raise DataError(
+            f'{path}: {in_one_line(error, _Table)}; top, washers and trials are texts, as "24.98 g"'
+        ) from error
     except ValueError as error:
         raise DataError(f"{path}: {where}{error}: correct it, or delete the file and begin again") from error
-
-
-def _masses(texts: Sequence[str]) -> tuple[float, ...]:
-    return tuple(sorted(read_mass(text) for text in texts))
-
-
-def _scan(table: _ScanTable) -> Scan:
-    masses = (read_mass(getattr(table, name)) for name in ("mass_to_set", "mass_to_set_u", "lightest", "heaviest"))
-    return Scan(table.path, read_temperature(table.temperature), *masses)
+    return owner
 
 
 def write_owner(path: Path, owner: Owner) -> None:
@@ -194,17 +165,14 @@ def write_owner(path: Path, owner: Owner) -> None:
         lines.append(f"top = {_quoted(in_grams(owner.top))}  # without washers\n")
     lines.append(f"washers = [{', '.join(_quoted(in_grams(one)) for one in owner.washers)}]\n")
     lines.append("trials = [\n" + "".join(f"  {_quoted(one.text)},\n" for one in owner.attempts) + "]\n")
-    if scan := owner.scan:
-        masses = ("mass_to_set", "mass_to_set_u", "lightest", "heaviest")
-        lines.append(f"\n[scan]\npath = {_quoted(scan.path)}\n")
-        lines += [f"{name} = {_quoted(in_grams(getattr(scan, name)))}\n" for name in masses]
-        lines.append(f"temperature = {_quoted(f'{scan.temperature:g} °C')}\n")
+    if owner.scan:
+        lines += ["\n[scan]\n", *(f"{key} = {_quoted(value)}\n" for key, value in owner.scan)]
     with writing(f"{path}: could not be written", "choose another place with `file`"):
         replace_atomically(path, "".join(lines))
 
 
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+def _quoted(value: str | float) -> str:
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 # --- the scan ---
@@ -244,8 +212,14 @@ def read_scan(path: Path, temperature: float | None, device: Path | None, tell: 
         raise UsageError("scan_temperature", "is needed with `scan`: the temperature of the base at the scan")
     for text in run.warnings:
         tell(f"note: {text}")
-    mass, *ends = (found.values[name] for name in ("mass_to_set", "lightest_mass", "heaviest_mass"))
+    mass, lightest, heaviest = (found.values[name] for name in ("mass_to_set", "lightest_mass", "heaviest_mass"))
     value = float(mass.value or 0.0)
     u = math.hypot(mass.u or 0.0, 0.0 if run.top.weighed or run.top.magnet else _POINT_U * value)
-    warmth = float(noted or 0.0) if temperature is None else temperature
-    return Scan(str(find_run(path)), warmth, value, u, *(float(end.value or 0.0) for end in ends))
+    return Scan(
+        path=str(find_run(path)),
+        temperature_c=float(noted or 0.0) if temperature is None else temperature,
+        mass_to_set_kg=value,
+        mass_to_set_u_kg=u,
+        lightest_kg=lightest.value,
+        heaviest_kg=heaviest.value,
+    )

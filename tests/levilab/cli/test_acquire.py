@@ -85,7 +85,7 @@ def test_a_run_keeps_temperature_and_washers_and_its_report_shows_them(tmp_path)
     page = (tmp_path / "r.html").read_text("utf-8")
     assert all(text in page for text in ("Temperature", "20 °C", "Washers", "0.06 + 0.1 g"))
     # and the scan is at that temperature for levilab tune
-    assert read_scan(folder, None, ROOT / "sample_data" / "device.toml", lambda _: None).temperature == 20.0
+    assert read_scan(folder, None, ROOT / "sample_data" / "device.toml", lambda _: None).temperature_c == 20.0
 
 
 @pytest.mark.parametrize(("words", "says"), [
