@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar, cast
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
@@ -17,8 +17,9 @@ from analysis.locked import Slip, slip_of
 from instruments.errors import InstrumentError, OutOfRange
 from levilab.acquisition.counting import prepare_counter_again, spin_now
 from levilab.acquisition.experiment import CounterSettings
+from levilab.acquisition.failures import DidNotFollow, NoLight, NotHeld
 from levilab.acquisition.grip import COUNTS, GRIP_GATE_S, Grip
-from levilab.acquisition.session import ExperimentFailed
+from levilab.acquisition.triggering import CYCLE, Motor, spin_up
 from levilab.bench.config import ConfigError
 from levilab.bench.person import FloatTop
 from levilab.present.numbers import with_sign
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from levilab.acquisition.session import Session
-    from levilab.bench.config import Limits
+    from levilab.bench.config import BenchConfig, Limits
+    from levilab.simulator.scene import Scene
 
 #: The drive goes up in steps; each makes a held top swing a little about it [s].
 RAMP_STEP_S = 1.0
@@ -71,22 +73,58 @@ class DriveSettings(CounterSettings):
         default="SIN", description="SIN, SQU or TRI; NONE: spun by hand"
     )
     hold_s: NonNegativeFloat = Field(default=20.0, description="hold it there, and compare its spin with the drive")
+    drive: Literal["ramp", "triggered"] = Field(
+        default="ramp", description="triggered: the top's own pulse starts each cycle"
+    )
+    drive_phase_deg: float | None = Field(
+        default=None, ge=0, lt=360, description="start phase of a triggered cycle; by default found", examples=[160.0]
+    )
 
-    #: Whether a top that is spun by hand will do.
+    #: Whether a top that is spun by hand will do, and one that triggers its drive.
     by_hand: ClassVar[bool] = False
+    by_trigger: ClassVar[bool] = False
+
+    def for_bench(self, config: BenchConfig) -> Self:
+        """See the base.  Raises ConfigError for a triggered drive where no wire leads to the generator's trigger."""
+        if self.drive == "triggered" and config.generator and config.generator.trigger is None:
+            raise ConfigError(
+                "a triggered drive needs a wire from the tape's phototransistor to the generator's trigger input: say "
+                'in the bench file which edge of its pulse starts a cycle, generator.trigger = "rising" or "falling"'
+            )
+        return self
+
+    def for_scene(self, scene: Scene) -> Self:
+        """See the base.  Raises ConfigError for a triggered drive, which a top in full motion does not have here."""
+        if self.drive == "triggered":
+            raise ConfigError("a triggered drive is for a top that only spins here: leave out `scene`")
+        return self
 
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for a drive that the bench does not allow."""
         if self.drive_waveform == "NONE":
             if not self.by_hand:
                 raise ConfigError(f"{table}.drive_waveform = NONE: this experiment needs a drive, SIN, SQU or TRI")
+            if self.drive == "triggered":
+                raise ConfigError(f"{table}.drive_waveform = NONE: a triggered drive has cycles of SIN, SQU or TRI")
             return
+        if self.drive == "triggered":
+            self._check_triggered(table, limits)
         check_drive(table, limits, self.drive_amplitude_vpp, [("drive_frequency_hz", self.drive_frequency_hz)])
         slowest = self.drive_frequency_hz / _LONGEST_RAMP_S
         if self.ramp_hz_per_s < slowest:
             raise ConfigError(
                 f"{table}.ramp_hz_per_s = {self.ramp_hz_per_s:g} would raise the top for hours to "
                 f"{table}.drive_frequency_hz = {self.drive_frequency_hz:g}: at least {slowest:.2g} is expected"
+            )
+
+    def _check_triggered(self, table: str, limits: Limits) -> None:
+        if not self.by_trigger:
+            raise ConfigError(f"{table}.drive = triggered: the drive sets the frequency here, so ramp is expected")
+        fastest = limits.of_the_drive().beyond(frequency_hz=CYCLE * self.drive_frequency_hz)
+        if fastest and fastest.is_highest:
+            raise ConfigError(
+                f"{table}.drive_frequency_hz = {self.drive_frequency_hz:g}: the cycles of a triggered drive are "
+                f"{CYCLE:g} times as fast, more than this bench allows, limits.{fastest.name} = {fastest.limit:g}"
             )
 
 
@@ -116,28 +154,6 @@ def check_drive(table: str, limits: Limits, amplitude_vpp: float, frequencies: I
 
 
 D = TypeVar("D", bound=DriveSettings)
-
-
-class DidNotFollow(ExperimentFailed):
-    """The drive did not bring the top to where it should."""
-
-
-class NoLight(ExperimentFailed):
-    """The counter counts nothing."""
-
-
-class NotHeld(Exception):
-    """The top does not spin with the drive; what is seen instead.
-
-    Attributes:
-        spin: [Hz]; None where no top is seen.
-        drive: [Hz].
-    """
-
-    def __init__(self, spin: float | None, drive: float) -> None:
-        self.spin, self.drive = spin, drive
-        seen = "no top seen" if spin is None else f"a spin of {spin:.2f} Hz"
-        super().__init__(f"{seen} under a drive of {drive:.2f} Hz")
 
 
 class PointFailed(Exception):
@@ -189,8 +205,10 @@ def reach_generator_again(session: Session[D], error: InstrumentError) -> None:
     session.reconnect("generator", error, session.bench.outputs_off)
 
 
-def drive_up(session: Session[D], to: float | None = None) -> None:
+def drive_up(session: Session[D], to: float | None = None) -> Motor | None:
     """Let the drive take hold of the top at its own spin, bring it to a frequency, and hold it there.
+
+    A drive that the top triggers is returned.
 
     Args:
         session: the acquisition.
@@ -208,25 +226,35 @@ def drive_up(session: Session[D], to: float | None = None) -> None:
         if spin is None:
             raise _did_not_follow(session, target, f"{seen}; then it fell") if seen else _no_light(session)
         session.stop.check()  # the drive does not go on once the end was asked for
-        session.bench.generator.prepare(
-            waveform=settings.drive_waveform, frequency_hz=spin, amplitude_vpp=settings.drive_amplitude_vpp
-        )
-        session.event(RunEvent.DRIVE_ON, f"drive on at the top's spin, {spin:.2f} Hz", frequency_hz=spin)
-        session.bench.generator.output = True
         try:
-            held = _ramp(session, _take_hold(session, spin), target)
-            text = f"the top follows the drive at {target:.2f} Hz: {held:.2f} Hz counted"
-            session.event(RunEvent.LOCKED, text, frequency_hz=held)
-            _hold(session, target)
+            return _bring_up(session, spin, target)
+        except DidNotFollow:
+            session.bench.outputs_off()
+            raise
         except NotHeld as lost:
             session.bench.outputs_off()
             seen = str(lost)
             session.event(
                 RunEvent.NOT_HELD, f"try {tries} of {_TRIES_TO_HOLD}: the drive does not hold the top, {seen}"
             )
-        else:
-            return
     raise _did_not_follow(session, target, seen)
+
+
+def _bring_up(session: Session[D], spin: float, target: float) -> Motor | None:
+    """Bring a top of this spin to another one, and hold it there [Hz].  Raises NotHeld, DidNotFollow."""
+    settings = session.settings
+    if settings.drive == "triggered":
+        return spin_up(cast("Session[DriveSettings]", session), spin, target)
+    session.bench.generator.prepare(
+        waveform=settings.drive_waveform, frequency_hz=spin, amplitude_vpp=settings.drive_amplitude_vpp
+    )
+    session.event(RunEvent.DRIVE_ON, f"drive on at the top's spin, {spin:.2f} Hz", frequency_hz=spin)
+    session.bench.generator.output = True
+    held = _ramp(session, _take_hold(session, spin), target)
+    text = f"the top follows the drive at {target:.2f} Hz: {held:.2f} Hz counted"
+    session.event(RunEvent.LOCKED, text, frequency_hz=held)
+    _hold(session, target)
+    return None
 
 
 def _did_not_follow(session: Session[D], target: float, seen: str) -> DidNotFollow:

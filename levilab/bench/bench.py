@@ -44,6 +44,7 @@ class Bench:
     Attributes:
         clock: of the bench.
         instruments: the open ones by kind.
+        trigger: the edge that starts the generator's bursts, None: no wire leads to its trigger input.
         counter, generator, oscilloscope, magnetometer: the same, for the kinds that were opened.
     """
 
@@ -54,6 +55,8 @@ class Bench:
 
     def __init__(self, wiring: Wiring) -> None:
         self.clock = wiring.clock
+        generator = wiring.instruments.get(GENERATOR.name)
+        self.trigger = generator.trigger if generator else None
         self.instruments: dict[str, Instrument] = {}
         self._prepared: dict[str, dict[str, Value]] = {}
 

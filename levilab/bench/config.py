@@ -30,7 +30,8 @@ class InstrumentSettings(Settings):
 
     timeout_s: of one answer; baud_rate, data_bits, parity, stop_bits: of a serial line, where they are not those that
     the instrument leaves the factory with; clock_error: relative error of a sound card's clock, above 0 where it is
-    fast, by which its times are corrected; clock_u: relative standard uncertainty of the instrument's clock.
+    fast, by which its times are corrected; clock_u: relative standard uncertainty of the instrument's clock; trigger:
+    the edge of the tape's pulse at a generator's trigger input, where a wire leads there from the phototransistor.
     """
 
     model: str
@@ -42,6 +43,7 @@ class InstrumentSettings(Settings):
     stop_bits: float | None = Field(default=None, ge=1, le=2)
     clock_error: float | None = Field(default=None, gt=-1e-3, lt=1e-3)
     clock_u: PositiveFloat | None = None
+    trigger: Literal["rising", "falling"] | None = None
 
     @property
     def line(self) -> dict[str, Any]:

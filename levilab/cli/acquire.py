@@ -56,6 +56,10 @@ def acquire_experiment(
         typer.Option(metavar="MODEL|ADDRESS", help="Record with this oscilloscope instead of the bench's."),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the run folder is made.")] = Path("runs"),
+    drive: Annotated[
+        str | None,
+        typer.Option(metavar="ramp|triggered", help="How the coil drives the top: triggered by its own light pulse."),
+    ] = None,
     scene: Annotated[
         str | None,
         typer.Option(
@@ -120,7 +124,7 @@ def acquire_experiment(
         wire_log=wire_log,
         person=ask_no_person if yes else _ask,
         tell=message,
-        settings=(*(settings or ()), *[SHORT["upper"]] * upper),
+        settings=(*(f"drive={drive}" for _ in range(drive is not None)), *(settings or ()), *[SHORT["upper"]] * upper),
     )
     experiment = str(context.info_name)
     if list_settings:

@@ -39,6 +39,7 @@ class RunEvent(StrEnum):
     NOT_HELD = "not held"
     LOCK_LOST = "lock lost"
     HELD = "held"
+    PHASE_FOUND = "phase found"  # at which a cycle speeds a top up that triggers it
     CALMED = "calmed"
     # the top
     FELL = "fell"

@@ -44,7 +44,7 @@ def virtual_settings(kind: str, name: str) -> InstrumentSettings:
         address = f"{model.scheme}://{kind}.levilab"
     elif model.driver.SERIAL:
         address = f"ASRL{kind}.levilab::INSTR"
-    return InstrumentSettings(model=model.name, address=address)
+    return InstrumentSettings(model=model.name, address=address, trigger="rising" if kind == "generator" else None)
 
 
 #: Address and default model of the virtual instrument of each kind.
@@ -136,9 +136,10 @@ def _connect_phone(model: Model, world: World) -> VirtualInstrument:
 
 
 #: Kind, or scheme of a model's addresses → what connects a virtual instrument to the world: a counter's input 1 to the
-#: phototransistor that sees the tape and input 2 to the laser's, a generator's output to the coil, a sound card's left
-#: to the tape's phototransistor and right to a pickup coil beside the top, a gaussmeter's probe on the base's axis, a
-#: phone beside the base.
+#: phototransistor that sees the tape and input 2 to the laser's, a generator's output to the coil (and its trigger
+#: input, whose edges the world computes, to the tape's phototransistor), a sound card's left to the tape's
+#: phototransistor and right to a pickup coil beside the top, a gaussmeter's probe on the base's axis, a phone beside
+#: the base.
 _CONNECT: dict[str, Callable[[Model, World], VirtualInstrument]] = {
     "counter": _connect_counter,
     "generator": _connect_generator,

@@ -15,9 +15,7 @@ from levilab.acquisition.counting import NO_TOP, AnotherTop, Missed, free_top, p
 from levilab.acquisition.driving import (
     HELD_WITHIN_HZ,
     RAMP_STEP_S,
-    DidNotFollow,
     DriveSettings,
-    NotHeld,
     check_drive,
     compare_with_drive,
     drive_until,
@@ -28,6 +26,7 @@ from levilab.acquisition.driving import (
     is_over,
 )
 from levilab.acquisition.experiment import Experiment
+from levilab.acquisition.failures import DidNotFollow, NotHeld
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.present.numbers import with_uncertainty
@@ -52,6 +51,7 @@ class LimitSettings(DriveSettings):
 
     one_top: ClassVar[bool] = False
     by_hand: ClassVar[bool] = True
+    by_trigger: ClassVar[bool] = True
 
     which: Literal["lower", "upper"] = Field(default="lower", description="lower, or upper")
     repetitions: PositiveInt = Field(default=10, description="number of tops, one after another")
@@ -68,6 +68,8 @@ class LimitSettings(DriveSettings):
         super().check(table, limits)
         if self.which == "upper" and self.drive_waveform == "NONE":
             raise ConfigError(f"{table}.drive_waveform = NONE: the upper limit needs a drive, SIN, SQU or TRI")
+        if self.which == "upper" and self.drive == "triggered":
+            raise ConfigError(f"{table}.drive = triggered: the upper limit has a drive that creeps up, ramp")
         if self.which == "upper":
             check_drive(table, limits, self.drive_amplitude_vpp, [("highest_hz", self.highest_hz)])
         if self.which == "upper" and self.highest_hz <= self.drive_frequency_hz:

@@ -14,8 +14,9 @@ from analysis.precession.gates import FEWEST, Gates, Rate, Swing, pulses_too_man
 from instruments.drivers.counter import LIGHT
 from instruments.errors import InstrumentError
 from levilab.acquisition.counting import gate_began, prepare_counter, prepare_counter_again
-from levilab.acquisition.driving import DriveSettings, NotHeld, PointFailed, check_drive, held_spin, sweep_drive
+from levilab.acquisition.driving import DriveSettings, PointFailed, check_drive, held_spin, sweep_drive
 from levilab.acquisition.experiment import Experiment
+from levilab.acquisition.failures import NotHeld
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.bench.kinds import COUNTER

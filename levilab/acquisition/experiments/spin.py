@@ -35,6 +35,7 @@ class SpinSettings(DriveSettings):
     """Drive up to a frequency, switch off, read until the top falls."""
 
     by_hand: ClassVar[bool] = True
+    by_trigger: ClassVar[bool] = True
 
 
 def channels(settings: SpinSettings) -> tuple[Channel, ...]:

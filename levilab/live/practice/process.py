@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from instruments.clock import PacedClock
 from instruments.errors import InstrumentError
-from levilab.acquisition.driving import DidNotFollow, NoLight
+from levilab.acquisition.failures import DidNotFollow, NoLight
 from levilab.acquisition.grip import Grip
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.onlooker import Sent, counting_of, drive_of, state_of

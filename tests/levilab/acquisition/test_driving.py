@@ -12,7 +12,6 @@ from instruments.errors import NoAnswer
 from levilab.acquisition.counting import prepare_counter
 from levilab.acquisition.driving import (
     DriveSettings,
-    NotHeld,
     _hold,
     _ramp_end,
     has_drifted,
@@ -20,6 +19,7 @@ from levilab.acquisition.driving import (
     sweep_drive,
 )
 from levilab.acquisition.experiment import Experiment
+from levilab.acquisition.failures import NotHeld
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.table import EXPERIMENTS, Configuration, with_settings
 from levilab.interruption import Interrupted, Stop

@@ -10,8 +10,9 @@ from instruments.clock import VirtualClock
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.errors import NoAnswer
 from levilab.acquisition.counting import FreeTop
-from levilab.acquisition.driving import DidNotFollow, held_spin
+from levilab.acquisition.driving import held_spin
 from levilab.acquisition.experiments.limit import LimitSettings
+from levilab.acquisition.failures import DidNotFollow
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed

@@ -1,0 +1,257 @@
+"""A drive that the top triggers, on the virtual bench: to a spin from any other, and every way out."""
+
+import math
+import signal
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from instruments.clock import VirtualClock
+from instruments.errors import NoAnswer
+from instruments.virtual.generator.channel import Output, Triggered
+from levilab.acquisition import triggering
+from levilab.acquisition.experiments.spin import SpinSettings
+from levilab.acquisition.failures import DidNotFollow, NotHeld
+from levilab.acquisition.loop import acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.acquisition.triggering import CYCLE, Motor, response, slope_of
+from levilab.bench.bench import open_bench
+from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings, Limits
+from levilab.errors import UsageError
+from levilab.runs.run import Run
+from levilab.world.bench import virtual_wiring
+from levilab.world.bursts import TriggerWire, mean_pull
+from levilab.world.spin_world import SpinScene, SpinWorld
+from support.acquisitions import Silent, of_scene
+
+TRIGGERED = SpinSettings(drive="triggered", drive_frequency_hz=34.0, hold_s=10.0, longest_s=60.0)
+SCENE = SpinScene(moment_turns=0.3)
+
+
+class Watched(SpinWorld):
+    """Keeps what the generator has put out."""
+
+    def drive(self, time, output):
+        self.outputs = [*getattr(self, "outputs", []), output]
+        super().drive(time, output)
+
+    @property
+    def is_off(self):
+        return not (self.outputs[-1].triggered or self.outputs[-1].amplitude)
+
+
+def at(out, scene=SCENE, settings=TRIGGERED):
+    """The request for a spin-down after a triggered drive, and its world."""
+    world = Watched(scene, VirtualClock())
+    request = of_scene(out, scene, settings)
+    return replace(request, wiring=lambda: virtual_wiring(world, request.config.limits)), world
+
+
+def events(run, kind):
+    return [event for event in run.events() if event["kind"] == kind]
+
+
+def best_phase(scene, spin):
+    """The start phase with the greatest pull [°]."""
+    place = scene.moment_turns + scene.tape.offset(scene.trigger.thresholds(rising=True), spin)
+    bursts = Triggered(1.0, 1, rising=True, delay=0.0, jitter=0.0)
+    pulls = [
+        mean_pull(Output("SIN", CYCLE * spin, 0.0, 0.0, phase=phase, triggered=bursts), spin, place)
+        for phase in range(360)
+    ]
+    return int(np.argmax(pulls))
+
+
+@pytest.mark.parametrize("turns", [0.0, 0.3, 0.8])
+def test_the_top_is_driven_up_wherever_the_tape_is_and_spins_down_freely(tmp_path, turns):
+    scene = replace(SCENE, moment_turns=turns)
+    request, world = at(tmp_path, scene)
+    run = acquire(request, Silent())
+    assert run.status == "finished"
+    (found,) = events(run, "phase found")
+    off = (found["phase_deg"] - best_phase(scene, 30.0) + 180) % 360 - 180
+    assert abs(off) < 20.0  # 5° is its u, and the spin curves within a trial
+    assert events(run, "locked")[0]["frequency_hz"] == pytest.approx(34.0, abs=1.5)
+    spins = run.readings().column("spin_frequency_hz")
+    assert spins[0] == pytest.approx(34.0, abs=0.3)  # let go after 10 s of hold
+    assert np.all(np.diff(spins) < 0)
+    assert run.record.configuration["spin"]["drive"] == "triggered"
+    assert run.record.configuration["spin"]["drive_frequency_hz"] == 34.0
+    assert run.record.instruments["generator"]["settings_end"]["output"] is False
+    assert world.is_off
+
+
+def test_a_top_that_is_too_fast_is_braked_by_the_opposite_phase(tmp_path):
+    request, _ = at(tmp_path, replace(SCENE, start_hz=38.0), TRIGGERED.model_copy(update={"hold_s": 30.0}))
+    run = acquire(request, Silent())
+    assert run.readings().column("spin_frequency_hz")[0] == pytest.approx(34.0, abs=0.5)
+
+
+def test_a_slow_top_survives_the_search_for_the_phase(tmp_path):
+    request, _ = at(tmp_path, replace(SCENE, start_hz=25.5))
+    assert acquire(request, Silent()).status == "finished"
+
+
+def test_pulses_that_are_lost_cost_pull_and_nothing_else(tmp_path):
+    request, _ = at(tmp_path, replace(SCENE, trigger=TriggerWire(lost=0.2)))
+    run = acquire(request, Silent())
+    assert run.readings().column("spin_frequency_hz")[0] == pytest.approx(34.0, abs=0.3)
+    assert events(run, "phase found")[0]["pull_hz_per_s"] == pytest.approx(0.8 * 0.36, abs=0.12)
+
+
+@pytest.mark.parametrize(
+    ("scene", "settings", "says"),
+    [
+        (replace(SCENE, trigger=None), {}, "the bursts do not turn the top.*cable"),
+        (replace(SCENE, trigger=TriggerWire(level_v=2.5)), {}, "the bursts do not turn the top.*TTL"),
+        (SCENE, {"drive_frequency_hz": 60.0, "drive_amplitude_vpp": 5.0}, "gets no faster: pull and drag are equal"),
+    ],
+    ids=["cable off", "no edges", "too weak"],
+)
+def test_a_drive_that_cannot_says_why_with_the_output_off_and_the_run_kept(tmp_path, scene, settings, says):
+    request, world = at(tmp_path, scene, TRIGGERED.model_copy(update=settings))
+    with pytest.raises(DidNotFollow, match=says):
+        acquire(request, Silent())
+    assert world.is_off
+    (folder,) = tmp_path.iterdir()
+    assert Run.load(folder).status == "failed"
+
+
+def test_a_top_taken_away_is_noticed_and_the_output_goes_off(tmp_path):
+    request, world = at(tmp_path)
+    fall = replace(world.scene, fall_hz=31.0)  # on the way
+    world.scene = fall
+    with pytest.raises(DidNotFollow, match="no top seen under a drive"):
+        acquire(request, Silent())
+    assert world.is_off
+
+
+def test_ctrl_c_under_the_drive_leaves_the_output_off_and_the_run_whole(tmp_path):
+    class Impatient(Silent):
+        def preparing(self, text, share):
+            if text.startswith("held"):
+                signal.raise_signal(signal.SIGINT)
+
+    request, world = at(tmp_path)
+    run = acquire(request, Impatient())
+    assert (run.status, world.is_off) == ("interrupted", True)
+    assert run.record.instruments["generator"]["settings_end"]["output"] is False
+
+
+def test_a_generator_that_fails_under_the_drive_is_reached_again(tmp_path, monkeypatch):
+    lost = []
+
+    def fail(motor, share, before=Motor._set_share):
+        if not lost:
+            lost.append(share)
+            raise NoAnswer(motor.session.bench.address("generator"), "VOLT 5", 1.0)
+        before(motor, share)
+
+    monkeypatch.setattr(Motor, "_set_share", fail)
+    request, world = at(tmp_path)
+    run = acquire(request, Silent())
+    assert len(events(run, "found again")) == 1
+    assert run.readings().column("spin_frequency_hz")[0] == pytest.approx(34.0, abs=0.5)
+    assert world.is_off
+
+
+def test_bursts_that_a_killed_program_left_on_are_ended_by_the_next_one():
+    world = Watched(SCENE, VirtualClock())
+    wiring = virtual_wiring(world)
+    with open_bench(wiring, ("generator",)) as bench:
+        bench.generator.prepare_triggered(waveform="SIN", frequency_hz=33.0, amplitude_vpp=10.0, phase_deg=0.0)
+        bench.generator.output = True
+        assert bench.trigger == "rising"
+        bench.outputs_off = lambda: None  # killed
+    assert not world.is_off
+    with open_bench(wiring, ("generator",)):
+        assert world.is_off
+
+
+# --- the parts ---
+
+
+def test_the_answer_to_three_phases_is_a_cosine():
+    rng = np.random.default_rng(1)
+    truth, pull, drag, u = 77.0, 0.36, 0.1, 0.03
+    phases = np.radians([0.0, 120.0, 240.0])
+    found = [
+        response(pull * np.cos(phases - math.radians(truth)) - drag + u * rng.standard_normal(3), u) for _ in range(400)
+    ]
+    # 3 standard errors of a standard deviation from 400
+    assert np.std([(one.pull - pull) / one.u for one in found]) == pytest.approx(1.0, abs=0.12)
+    assert np.mean([one.phase for one in found]) == pytest.approx(truth, abs=1.0)
+    assert np.mean([one.drag for one in found]) == pytest.approx(drag, abs=0.005)
+
+
+def test_a_slope_has_the_scatter_about_its_line():
+    assert slope_of([0.0, 1.0, 2.0, 3.0], [1.0, 3.0, 5.0, 7.0]) == pytest.approx((2.0, 0.0), abs=1e-9)
+    assert slope_of([0.0, 1.0, 2.0, 3.0], [0.1, -0.1, -0.1, 0.1])[1] == pytest.approx(0.1 * math.sqrt(2))
+
+
+def counted(monkeypatch, *counts):
+    """A motor at 30 Hz whose counter counts this, and the frequencies of its cycles."""
+    set_to = []
+
+    class Generator:
+        def __setattr__(self, name, value):
+            set_to.append((name, value))
+
+    left = iter(counts)
+    monkeypatch.setattr(triggering, "spin_now", lambda *_: next(left))
+    session = SimpleNamespace(stop=SimpleNamespace(check=lambda: None), bench=SimpleNamespace(generator=Generator()))
+    return Motor(session, 30.0, phase=0.0, pull=0.36), set_to
+
+
+def test_a_doubled_count_does_not_move_the_cycle(monkeypatch):
+    motor, set_to = counted(monkeypatch, 60.1, None, 30.2, 15.1, 30.4)
+    assert [motor.count() for _ in range(5)] == [30.0, 30.0, 30.2, 30.2, 30.4]
+    assert set_to == [("frequency", pytest.approx(CYCLE * spin)) for spin in (30.2, 30.4)]
+
+
+def test_three_counts_of_no_such_top_end_the_drive(monkeypatch):
+    motor, _ = counted(monkeypatch, 60.0, 60.0, 60.0)
+    motor.count()
+    motor.count()
+    with pytest.raises(NotHeld, match=r"a spin of 60\.00 Hz"):
+        motor.count()
+
+
+# --- what a bench allows ---
+
+
+def test_a_bench_without_the_wire_has_no_triggered_drive():
+    generator = InstrumentSettings(model="33500B", address="TCPIP::1::INSTR")
+    with pytest.raises(ConfigError, match=r"wire.*trigger input.*generator\.trigger = \"rising\""):
+        TRIGGERED.for_bench(BenchConfig(generator=generator))
+    wired = generator.model_copy(update={"trigger": "falling"})
+    assert TRIGGERED.for_bench(BenchConfig(generator=wired)) == TRIGGERED
+
+
+@pytest.mark.parametrize(
+    ("experiment", "settings", "says"),
+    [
+        ("spin", ("spin.drive_frequency_hz=95",), r"1\.1 times as fast.*limits\.drive_frequency_hz = 100"),
+        ("spin", ("spin.drive_waveform=NONE",), "a triggered drive has cycles"),
+        ("limit", ("limit.which=upper",), "creeps up, ramp"),
+        ("precession", (), "ramp is expected"),
+    ],
+)
+def test_what_a_triggered_drive_cannot_do_is_refused_at_once(tmp_path, experiment, settings, says):
+    options = AcquisitionOptions(mock=True, out=tmp_path, settings=(f"{experiment}.drive=triggered", *settings))
+    with pytest.raises(UsageError, match=says):
+        request_for(experiment, options)
+
+
+def test_a_top_in_full_motion_does_not_trigger_its_drive_yet(tmp_path):
+    options = AcquisitionOptions(mock=True, out=tmp_path, scene="spindown", settings=("spin.drive=triggered",))
+    with pytest.raises(ConfigError, match="leave out `scene`"):
+        request_for("spin", options)
+
+
+def test_a_limit_of_the_bench_is_that_of_the_cycle():
+    TRIGGERED.check("spin", Limits(drive_frequency_hz=37.5))
+    with pytest.raises(ConfigError, match=r"1\.1 times as fast"):
+        TRIGGERED.check("spin", Limits(drive_frequency_hz=37.0))
