@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field, create_model
 
 from levilab.acquisition.experiment import CounterSettings, Experiment
-from levilab.acquisition.experiments import field, limit, precession, spin, trace
+from levilab.acquisition.experiments import field, hold, limit, precession, spin, trace
 from levilab.bench.config import BenchConfig
 from levilab.bench.template import Setting, SettingsTable
 
@@ -20,7 +20,14 @@ if TYPE_CHECKING:
 #: Name → experiment.
 EXPERIMENTS: dict[str, Experiment[Any]] = {
     experiment.name: experiment
-    for experiment in (spin.EXPERIMENT, trace.EXPERIMENT, field.EXPERIMENT, limit.EXPERIMENT, precession.EXPERIMENT)
+    for experiment in (
+        spin.EXPERIMENT,
+        trace.EXPERIMENT,
+        field.EXPERIMENT,
+        limit.EXPERIMENT,
+        precession.EXPERIMENT,
+        hold.EXPERIMENT,
+    )
 }
 
 _TABLES: dict[str, Any] = {

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.uncertainty import Estimate
 from levilab.acquisition.counting import prepare_counter_again, spin_now
 from levilab.acquisition.failures import DidNotFollow, NotHeld
 from levilab.runs.events import RunEvent
@@ -43,6 +44,9 @@ _BACK_S, _SUM_S = 5.0, 20.0
 _NEAR_S = 3.0
 #: A top that gains less than this [Hz] in so many counts has reached what the drive can do.
 _LEAST_GAIN_HZ, _GAINING = 0.15, 30
+#: Number of counts that show the gain at the full amplitude: 3 mHz/s of 0.2 Hz/s; a top that is held by more than this
+#: share of the amplitude gains too little for that.
+_GAIN_COUNTS, _MOST_SHARE = 10, 0.9
 #: Least amplitude of the drive, as a share: no generator is near its own lowest one.
 _LEAST_SHARE = 0.01
 #: Where the pull was not found by trial: that of 0.4 mT on the thesis's top [Hz/s]; a factor of 3 does not matter.
@@ -100,6 +104,7 @@ class Motor:
         share: of the full amplitude that holds it, as the loop has found.
         counts: while it was held [Hz].
         shares: of the full amplitude, at each of these.
+        gain: of its spin at the full amplitude, about the spin at which it is held; None where it was not measured.
     """
 
     session: Session[DriveSettings]
@@ -109,7 +114,9 @@ class Motor:
     share: float = 1.0
     counts: list[float] = field(default_factory=list)
     shares: list[float] = field(default_factory=list)
+    gain: Estimate | None = None
     _missed: int = 0
+    _trend: float = 0.0  # of the spin [Hz/s]
     _errors: float = 0.0  # summed [Hz s]
     _base: float = 1.0  # share of the amplitude without errors
 
@@ -140,7 +147,8 @@ class Motor:
                 raise NotHeld(seen, self.spin)
         else:
             self._missed, self.spin = 0, seen
-            session.bench.generator.frequency = round(CYCLE * seen, 6)
+            ahead = self._trend * (session.settings.gate_s if gate_s is None else gate_s)  # until the next count
+            session.bench.generator.frequency = round(CYCLE * (seen + ahead), 6)
         return self.spin
 
     def _turn_to(self, phase: float) -> None:
@@ -181,6 +189,32 @@ class Motor:
 
     # --- to a spin, and there ---
 
+    def measure_gain(self, target: float) -> None:
+        """Measure the gain at the full amplitude, evenly about a spin [Hz], and come back.  Raises NotHeld.
+
+        Where the top is held by nearly all of the amplitude there is too little left.
+        """
+        share, gain = self.share, self.pull * (1 - self.share)
+        if share > _MOST_SHARE:
+            return
+        self._set_share(_LEAST_SHARE)
+        while self.spin > target - gain * _GAIN_COUNTS / 2:
+            self.count()
+        self._set_share(1.0)
+        self._trend = gain
+        self.count()  # of a gate in which the amplitude may have changed
+        times, spins = [], []
+        for _ in range(_GAIN_COUNTS):
+            spins.append(self.count())
+            times.append(self.session.now())
+        slope, scatter = slope_of(times, spins)
+        self.gain = Estimate(slope, scatter / (float(np.std(times)) * math.sqrt(len(times))), "Hz/s")
+        self._trend = 0.0
+        self._set_share(_LEAST_SHARE)
+        while self.spin > target:
+            self.count()
+        self._set_share(share)
+
     def go_to(self, target: float) -> None:
         """Speed the top up to a spin [Hz], or brake it.  Raises DidNotFollow, NotHeld."""
         session, start = self.session, self.spin
@@ -193,7 +227,7 @@ class Motor:
             spins.append(self.count())
             times.append(session.now())
             recent = slice(-_GAINING, None)
-            gain = slope_of(times[recent], spins[recent])[0] if len(spins) > 2 else 0.0
+            gain = self._trend = slope_of(times[recent], spins[recent])[0] if len(spins) > 2 else 0.0
             share = min((self.spin - start) / (target - start), 1.0)
             session.progress(f"{'brakes' if brakes else 'speeds up'}, {self.spin:.2f} Hz", max(share, 0.0))
             if len(spins) > _GAINING and abs(spins[-1] - spins[-_GAINING]) < _LEAST_GAIN_HZ:
@@ -202,6 +236,7 @@ class Motor:
                     f"drag are equal there, {target:g} Hz were asked for",
                     f"drive harder ({session.writer.record.experiment}.drive_amplitude_vpp), or ask for less",
                 )
+        self._trend = 0.0
         if brakes:
             self._turn_to(self.phase)
             self._set_share(0.25)  # a guess of drag over pull, until the loop finds it

@@ -28,6 +28,7 @@ EXPERIMENT_HELP = {
     "trace": "Records of the oscilloscope: raw codes into the run folder, written as they come.",
     "field": "Hall scan: the base's flux density on its axis, at one height after the other.",
     "limit": "Limits of the spin, top after top: where a free top falls, or with --upper where a driven one is lost.",
+    "hold": "A held spin: a drive that the top triggers holds it for hours, and its amplitude shows the drag.",
     "precession": "Precession: sweep the drive, and count at each frequency how often the stem cuts a laser beam.",
 }
 #: Option → the setting that it stands for, as --set takes it; only this experiment has the option.
@@ -59,6 +60,9 @@ def acquire_experiment(
     drive: Annotated[
         str | None,
         typer.Option(metavar="ramp|triggered", help="How the coil drives the top: triggered by its own light pulse."),
+    ] = None,
+    spin: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Bring the top to this spin.", show_default="the settings'")
     ] = None,
     scene: Annotated[
         str | None,
@@ -108,6 +112,8 @@ def acquire_experiment(
         from levilab.interruption import watching_for_end
         from levilab.present.progress import to_stderr
 
+    shorthands = {"drive": drive, "drive_frequency_hz": spin}
+    given = [f"{key}={value}" for key, value in shorthands.items() if value is not None]
     options = AcquisitionOptions(
         mock=mock,
         bench=bench,
@@ -124,7 +130,7 @@ def acquire_experiment(
         wire_log=wire_log,
         person=ask_no_person if yes else _ask,
         tell=message,
-        settings=(*(f"drive={drive}" for _ in range(drive is not None)), *(settings or ()), *[SHORT["upper"]] * upper),
+        settings=(*given, *(settings or ()), *[SHORT["upper"]] * upper),
     )
     experiment = str(context.info_name)
     if list_settings:

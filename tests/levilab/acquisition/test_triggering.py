@@ -201,7 +201,11 @@ def counted(monkeypatch, *counts):
 
     left = iter(counts)
     monkeypatch.setattr(triggering, "spin_now", lambda *_: next(left))
-    session = SimpleNamespace(stop=SimpleNamespace(check=lambda: None), bench=SimpleNamespace(generator=Generator()))
+    session = SimpleNamespace(
+        stop=SimpleNamespace(check=lambda: None),
+        bench=SimpleNamespace(generator=Generator()),
+        settings=SimpleNamespace(gate_s=1.0),
+    )
     return Motor(session, 30.0, phase=0.0, pull=0.36), set_to
 
 

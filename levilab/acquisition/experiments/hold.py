@@ -1,0 +1,152 @@
+"""A spin held for as long as one likes: the amplitude of a triggered drive follows the counts, and shows the drag."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, PositiveFloat
+
+from analysis.uncertainty import Estimate
+from instruments.errors import InstrumentError
+from levilab.acquisition.counting import prepare_counter
+from levilab.acquisition.driving import DriveSettings, drive_off, drive_up, reach_generator_again
+from levilab.acquisition.experiment import Experiment
+from levilab.acquisition.failures import NotHeld
+from levilab.bench.config import ConfigError
+from levilab.present.numbers import with_uncertainty
+from levilab.runs.channel import Channel
+from levilab.runs.events import RunEvent
+
+if TYPE_CHECKING:
+    from levilab.acquisition.session import Row, Session
+    from levilab.acquisition.triggering import Motor
+    from levilab.bench.config import Limits
+
+#: Fewest readings from which a scatter and a drag are told.
+_FEWEST = 3
+
+
+class HoldSettings(DriveSettings):
+    """Drive to a spin by a triggered drive, and hold it there."""
+
+    one_top: ClassVar[bool] = True
+    by_trigger: ClassVar[bool] = True
+
+    drive_frequency_hz: PositiveFloat = Field(default=45.0, description="hold this spin")
+    drive: Literal["ramp", "triggered"] = Field(default="triggered", description="no other drive has a loop")
+    hold_s: float = Field(default=30.0, ge=0, description="let the loop settle before the first reading")
+    longest_s: PositiveFloat = Field(default=600.0, description="how long it is held")
+
+    def check(self, table: str, limits: Limits) -> None:
+        """Raise ConfigError for a drive that the bench does not allow."""
+        if self.drive != "triggered":
+            raise ConfigError(f"{table}.drive = {self.drive}: triggered is expected, no other drive has a loop")
+        super().check(table, limits)
+
+
+def channels(_: HoldSettings) -> tuple[Channel, ...]:
+    """Return the spin and the amplitude that held it."""
+    return (
+        Channel("time_s", "s", "bench clock, middle of the reading, from the moment the loop had settled"),
+        Channel("spin_frequency_hz", "Hz", "frequency counter on the phototransistor, mean of the counts of a reading"),
+        Channel("spin_frequency_u_hz", "Hz", "its standard uncertainty, from the scatter of these counts"),
+        Channel("drive_amplitude_v", "V", "generator, half of peak to peak, mean of a reading"),
+    )
+
+
+def run(session: Session[HoldSettings]) -> None:
+    """Bring the top to the spin, hold it there, and keep a reading of spin and amplitude at each interval."""
+    prepare_counter(session)
+    motors: list[Motor] = []
+
+    def drive() -> None:
+        motors.append(_motor(session))
+
+    session.begin(drive, resumed="the drive was brought back to the spin")
+    if not motors:  # a real top that has gone on without a drive
+        drive()
+    while session.now() < session.settings.longest_s:
+        session.last_request_time = session.now()
+        try:
+            session.keep(_reading(session, motors[-1]), max(0.0, session.settings.longest_s - session.now()))
+        except (NotHeld, InstrumentError) as lost:
+            if isinstance(lost, InstrumentError):
+                reach_generator_again(session, lost)
+            else:
+                session.event(RunEvent.NOT_HELD, f"the top was lost: {lost}")
+                drive_off(session)
+            drive()
+    drive_off(session)
+    _say_what_held_it(session, motors[-1])
+
+
+def _motor(session: Session[HoldSettings]) -> Motor:
+    motor = drive_up(session)
+    assert motor is not None, "a triggered drive is the only one"
+    motor.measure_gain(session.settings.drive_frequency_hz)
+    motor.hold(session.settings.drive_frequency_hz, session.settings.hold_s)
+    return motor
+
+
+def _reading(session: Session[HoldSettings], motor: Motor) -> Row:
+    """Hold the top for an interval.  Returns the means of its counts.  Raises NotHeld."""
+    settings, begin, first = session.settings, session.now(), len(motor.counts)
+    motor.hold(settings.drive_frequency_hz, settings.interval_s)
+    counts, shares = np.array(motor.counts[first:]), np.array(motor.shares[first:])
+    if counts.size < 2:
+        raise NotHeld(None, settings.drive_frequency_hz)
+    return {
+        "time_s": (begin + session.now()) / 2,
+        "spin_frequency_hz": float(counts.mean()),
+        "spin_frequency_u_hz": float(counts.std(ddof=1)) / math.sqrt(counts.size),
+        "drive_amplitude_v": float(shares.mean()) * settings.drive_amplitude_vpp / 2,
+    }
+
+
+def _say_what_held_it(session: Session[HoldSettings], motor: Motor) -> None:
+    """Record the scatter of the held spin, and the drag that the amplitude balanced."""
+    rows = session.rows
+    if len(rows) < _FEWEST:
+        return
+    spins = np.array([row["spin_frequency_hz"] for row in rows])
+    shares = np.array([row["drive_amplitude_v"] for row in rows]) / (session.settings.drive_amplitude_vpp / 2)
+    share, u_share = float(shares.mean()), float(shares.std(ddof=1)) / math.sqrt(len(rows))
+    drag = drag_of(share, u_share, motor.gain)
+    scatter = float(spins.std(ddof=1))
+    data = {"drag_hz_per_s": drag.value, "drag_u_hz_per_s": drag.u} if drag else {}
+    text = (
+        f"held at {spins.mean():.3f} Hz, s.d. of a reading {scatter:.3f} Hz; "
+        f"{100 * share:.1f} % of the amplitude balanced the drag{f', {with_uncertainty(drag)}' if drag else ''}"
+    )
+    session.event(RunEvent.HELD, text, spin_frequency_hz=float(spins.mean()), scatter_hz=scatter, **data)
+
+
+def drag_of(share: float, u_share: float, gain: Estimate | None) -> Estimate | None:
+    """Return the drag that a share of the amplitude balances [Hz/s].
+
+    The pull p goes with the amplitude: share · p = drag, and the full amplitude gains p − drag.
+
+    Args:
+        share: of the amplitude that holds the spin.
+        u_share: its standard uncertainty.
+        gain: of the spin at the full amplitude [Hz/s]; None where it was not measured.
+
+    >>> drag_of(0.4, 0.004, Estimate(0.24, 0.005, "Hz/s"))
+    Estimate(value=0.16, u=0.0042..., unit='Hz/s', interval=None)
+    """
+    if gain is None or gain.value is None or gain.u is None or not 0 < share < 1:
+        return None
+    value = share * gain.value / (1 - share)
+    return Estimate(value, math.hypot(share / (1 - share) * gain.u, gain.value / (1 - share) ** 2 * u_share), "Hz/s")
+
+
+EXPERIMENT = Experiment(
+    name="hold",
+    about="hold a spin by a drive that the top triggers, and see what amplitude that takes",
+    instruments=("counter", "generator"),
+    settings=HoldSettings,
+    channels=channels,
+    run=run,
+)
