@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rich.markup import escape
 
 from analysis.numbers import with_minus
@@ -65,6 +66,8 @@ def _motion_facts(summary: Summary) -> list[tuple[str, str]]:
         facts.append(("loose washers", f"{first} Hz at the start, {last} Hz at the end"))
     if (locked := is_locked(motion.scene, motion.states, survived=motion.survived)) is not None:
         facts.append(("drive", "holds the top, which is locked to it" if locked else "does not hold the top"))
+    if len(motion.bursts):
+        facts.append(("drive", f"in {np.unique(motion.bursts[:, 3]).size} bursts, which the tape set off"))
     facts.append(("tilt", f"up to {_angle(float(motion.tilt.max()))}"))
     return facts
 

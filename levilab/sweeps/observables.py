@@ -100,6 +100,7 @@ OBSERVABLES: dict[str, Observable] = {
         Observable(
             "fall_spin_hz", "Hz", "Spin at the moment of the fall; NaN of a top that is still up.", "float64", "ends"
         ),
+        Observable("end_spin_hz", "Hz", "Spin at the end, or at the fall.", "float64", "ends"),
         Observable(
             "energy_error",
             "1",
@@ -203,6 +204,7 @@ def _ends_of(plan: Plan, values: Values, names: set[str], rate: float | None = N
         "survived": ends.survived,
         "lifetime_s": np.where(ends.survived, np.nan, ends.time),
         "fall_spin_hz": np.where(ends.survived, np.nan, ends.spin_hz),
+        "end_spin_hz": ends.spin_hz,
         "position_error_m": ends.position_error,
     }
     shape = ends.survived.shape

@@ -51,6 +51,7 @@ _NAMES = {
     "drive.amplitude_t": "amplitude of the drive",
     "lifetime_s": "time until the fall",
     "fall_spin_hz": "spin at the fall",
+    "end_spin_hz": "spin at the end",
     "height_spread_m": "spread of the height",
     "energy_error": "relative change of the energy",
     "position_error_m": "estimated error of the place",

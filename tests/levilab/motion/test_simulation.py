@@ -140,6 +140,16 @@ def test_the_spin_is_reported_with_its_range_where_it_swings_and_as_constant_whe
     assert as_document(driven)["spin_max_hz"] == high
 
 
+def test_a_top_that_triggers_its_drive_has_bursts_and_no_lock(capsys):
+    found = summary(preset("motor"), 12.0)
+    print_motion(found)
+    said = capsys.readouterr().out
+    assert "bursts, which the tape set off" in said
+    assert "locked" not in said
+    assert as_document(found)["locked"] is None
+    assert "drive" not in {line.name for line in found.lines.lines}
+
+
 def test_the_table_says_what_its_numbers_are(capsys):
     found = summary(preset("undriven"), 5.0)
     unknown = replace(found.lines, lines=(replace(found.lines.lines[0], name="", frequency=-1e-4),))

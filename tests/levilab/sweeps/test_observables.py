@@ -32,9 +32,9 @@ def summary_of(scene: Scene, duration: float, rate: float) -> dict[str, Any]:
 
 
 def test_the_ends_are_those_of_single_simulations() -> None:
-    names = ("survived", "lifetime_s", "fall_spin_hz", "energy_error", "position_error_m")
+    names = ("survived", "lifetime_s", "fall_spin_hz", "end_spin_hz", "energy_error", "position_error_m")
     found = observe(plan(UNDRIVEN, names, 4.0), {"start.spin_hz": SPINS})
-    assert [found[name].dtype.kind for name in names] == list("bffff")
+    assert [found[name].dtype.kind for name in names] == list("bfffff")
     for i, spin in enumerate(SPINS):
         single = summary_of(UNDRIVEN.changed({"start.spin_hz": float(spin)}), 4.0, 100.0)
         assert found["survived"][i] == single["survived"]
@@ -45,6 +45,7 @@ def test_the_ends_are_those_of_single_simulations() -> None:
         else:  # both are within their tolerance of the truth, where the place says when the fall is
             assert lifetime == pytest.approx(single["end_s"], abs=1e-5)
             assert at_fall == pytest.approx(single["spin_end_hz"], abs=1e-5)
+        assert found["end_spin_hz"][i] == pytest.approx(single["spin_end_hz"], abs=1e-5)
         assert found["energy_error"][i] < 1e-6  # a symplectic scheme keeps it within the size of its steps' error
         assert 0 < found["position_error_m"][i] < 1e-5
 
