@@ -1,0 +1,256 @@
+"""The slow swings of a place over time: signed frequencies, amplitudes and uncertainties, window by window.
+
+In a window the place x + iy is a sum of waves: the backward and the forward slow swing and the precession, each with a
+frequency and a slope, and the four lines at the slow swings' frequencies plus and minus that of the vertical swing,
+since the field changes with height.  One of those four lies within 0.2 Hz of the backward swing: a fit without it is
+wrong by tens of millihertz.  Noise is white.  Amplitudes are linear; frequencies follow by Gauss and Newton from the
+peaks of a spectrum, from several starts, of which the one of the greatest likelihood is kept.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.errors import AnalysisError, NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewReadings
+from analysis.lines import spectral_lines
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from analysis.lines import Line
+
+Array = NDArray[np.float64]
+Places = NDArray[np.complex128]
+
+#: Length of a window [s]: in a longer one the precession's slope changes.  Least number of samples of a window.
+WINDOW_S, FEWEST = 20.0, 100
+#: Where the slow swings and the precession of a top are looked for [Hz]: the thesis's top has 0.3 to 1.1 and 4 to 12 Hz
+#: over its window of masses and spins.
+SLOW_HZ, PRECESSION_HZ = (0.15, 1.6), (2.5, 15.0)
+#: B′/2B [1/m] that the vertical swing follows from, unless that is given, and the swing's standard uncertainty [Hz].
+GRADIENT_PER_M, VERTICAL_U_HZ = 9.3, 0.03
+#: Prior of the slopes [Hz/s]: a spin that falls by up to 0.4 Hz/s changes the slow swings by up to 6 mHz per Hz and the
+#: precession by up to 0.5 Hz per Hz.
+_SLOPES_U = np.array([2e-3, 2e-3, 0.2])
+#: Slopes with which the precession is looked for [Hz/s].
+_SLOPES = (0.0, 0.03, 0.06, 0.1, 0.15)
+#: Peaks of the spectrum that are tried for either swing, and steps of Gauss and Newton at most.
+_TRIED, _STEPS = 3, 25
+
+
+class NoSwings(AnalysisError):
+    """A window without two slow swings; from and to which time [s]."""
+
+    def __init__(self, *, start: float, end: float) -> None:
+        self.start, self.end = start, end
+        super().__init__(
+            f"from {start:.4g} to {end:.4g} s no swing to either side stands out of the noise between "
+            f"{SLOW_HZ[0]:g} and {SLOW_HZ[1]:g} Hz: give the top a small push sideways, or look at a longer record"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Swings:
+    """The slow swings in one window.
+
+    Attributes:
+        time: middle of the window [s].
+        frequency: of the backward (negative) and the forward swing and, if seen, of the precession, shape (2 or 3,),
+            signed: positive in the sense of the spin [Hz].
+        u: standard uncertainties, same shape [Hz].
+        amplitude: same shape [m].
+        vertical: the vertical swing, as the combination lines have it [Hz].
+        noise: standard deviation of a coordinate [m].
+        misfit: −2 times the logarithm of the likelihood and the priors, but for a constant.
+        rest: the places without all lines, shape (n,) [m].
+    """
+
+    time: float
+    frequency: Array
+    u: Array
+    amplitude: Array
+    vertical: float
+    noise: float
+    misfit: float
+    rest: Places
+
+    @property
+    def split(self) -> float:
+        """By how much the forward swing is faster than the backward one [Hz]."""
+        return float(self.frequency[0] + self.frequency[1])
+
+    @property
+    def u_split(self) -> float:
+        """Its standard uncertainty [Hz]."""
+        return math.hypot(self.u[0], self.u[1])
+
+
+def swings_of(
+    times: Array, places: Places, *, window: float = WINDOW_S, vertical: tuple[float, float] | None = None
+) -> list[Swings]:
+    """Return the swings of all windows in which they stand out.
+
+    Args:
+        times: increasing, not necessarily evenly, shape (n,) [s].
+        places: x + iy, shape (n,) [m], seen so that the spin is positive.
+        window: [s].
+        vertical: frequency of the vertical swing and its standard uncertainty [Hz], if known.
+
+    Raises:
+        TooFewReadings, ShapesDiffer, NotFinite, TimesNotIncreasing: see `analysis.errors`.
+        NoSwings: they stand out in none.
+    """
+    t, s = _check(times, places)
+    borders = np.searchsorted(t, np.linspace(t[0], t[-1], max(round(float(t[-1] - t[0]) / window), 1) + 1))
+    borders[-1] = t.size
+    found: list[Swings] = []
+    for first, last in itertools.pairwise(borders.tolist()):
+        if last - first >= FEWEST and (one := swings_in_window(t[first:last], s[first:last], vertical, found[-1:])):
+            found.append(one)
+    if not found:
+        raise NoSwings(start=float(t[0]), end=float(t[-1]))
+    return found
+
+
+def _check(times: Array, places: Places) -> tuple[Array, Places]:
+    t, s = np.asarray(times, dtype=np.float64), np.asarray(places, dtype=np.complex128)
+    if t.ndim != 1 or s.shape != t.shape:
+        raise ShapesDiffer(quantity="the place", seen=s.shape, expected=(t.size,))
+    if t.size < FEWEST:
+        raise TooFewReadings(seen=t.size, needed=FEWEST)
+    for quantity, values in (("time", t), ("place", s)):
+        if (wrong := np.flatnonzero(~np.isfinite(values))).size:
+            raise NotFinite(quantity=quantity, index=int(wrong[0]), value=math.nan)
+    if (back := np.flatnonzero(np.diff(t) <= 0)).size:
+        k = int(back[0])
+        raise TimesNotIncreasing(index=k + 1, before=float(t[k]), after=float(t[k + 1]))
+    return t, s
+
+
+def vertical_swing(backward: float, forward: float, gradient: float = GRADIENT_PER_M, gravity: float = 9.82) -> float:
+    """Return the frequency of the vertical swing that goes with two slow ones [Hz].
+
+    A field without sources and currents has α_v² = g B′/2B − 2|α₋α₊|: what stiffens the swings sideways softens the
+    one up and down.
+
+    Args:
+        backward: slow swing, negative [Hz].
+        forward: slow swing, positive [Hz].
+        gradient: B′/2B at the top [1/m].
+        gravity: [m/s²].
+    """
+    return math.sqrt(max(gravity * gradient / (4 * math.pi**2) + 2 * backward * forward, 0.0))
+
+
+def swings_in_window(
+    t: Array, s: Places, vertical: tuple[float, float] | None = None, near: Sequence[Swings] = ()
+) -> Swings | None:
+    """Return the swings of one window; None where they do not stand out.
+
+    Args:
+        t: shape (n,) [s].
+        s: shape (n,) [m].
+        vertical: see `swings_of`.
+        near: swings at nearby times, from which the search starts, too.
+    """
+    lines = _spectrum(t, s)
+    starts = [one.frequency[:2] for one in near]
+    for forward in _peaks(lines, SLOW_HZ)[:1]:
+        seen = _peaks(lines, (-SLOW_HZ[1], -SLOW_HZ[0]))[:_TRIED]
+        # two lines that are nearer than the window resolves have one peak between them
+        apart = 0.6 / float(t[-1] - t[0])
+        starts += [
+            np.array([backward, forward]) for backward in {*seen, *(seen[0] + sign * apart for sign in (-1, 1) if seen)}
+        ]
+    fits = [_fit(t, s, start, np.zeros(2), vertical) for start in starts]
+    if not fits:
+        return None
+    slow = min(fits, key=lambda one: one.misfit)
+    late = t - t.mean()
+    straight = [
+        (line.amplitude, line.frequency, slope)
+        for slope in _SLOPES
+        for line in _spectrum(t, slow.rest * np.exp(-1j * np.pi * slope * late**2))
+        if PRECESSION_HZ[0] < line.frequency < PRECESSION_HZ[1]
+    ]
+    if not straight:
+        return slow
+    _, precession, slope = max(straight)
+    return _fit(t, s, np.append(slow.frequency, precession), np.array([0.0, 0.0, slope]), vertical)
+
+
+def _spectrum(t: Array, s: Places) -> Sequence[Line]:
+    even = np.linspace(t[0], t[-1], t.size)
+    regular = np.interp(even, t, s.real) + 1j * np.interp(even, t, s.imag)
+    return spectral_lines(regular - regular.mean(), (t.size - 1) / float(t[-1] - t[0])).lines
+
+
+def _peaks(lines: Sequence[Line], between: tuple[float, float]) -> list[float]:
+    """Return the frequencies of the lines between two [Hz], the strongest first."""
+    return [line.frequency for line in lines if between[0] < line.frequency < between[1]]
+
+
+#: The lines beside the slow swings: of which swing, and which times the vertical swing is added.
+_BESIDE = ((1, -1), (0, 1), (1, 1), (0, -1))
+
+
+def _fit(t: Array, s: Places, start: Array, slopes_start: Array, vertical: tuple[float, float] | None) -> Swings:
+    """Return the swings of greatest likelihood near a start [Hz] with slopes [Hz/s], shape (2 or 3,) each."""
+    late, half, count = t - t.mean(), float(t[-1] - t[0]) / 2, start.size
+    frequency, slope = start.copy(), slopes_start.copy()
+    rise = vertical[0] if vertical else vertical_swing(start[0], start[1])
+    still = np.stack([np.ones_like(late), late / half], axis=1)
+    prior = np.zeros((count + 1, 2 * count + 1))  # what is known of the slopes and the vertical swing, over its u
+    prior[:count, count:-1] = np.diag(1 / _SLOPES_U[:count])
+    prior[-1, -1] = 1 / (vertical[1] if vertical else VERTICAL_U_HZ)
+    most = np.concatenate([np.full(count, 0.3 / half), np.full(count, 0.3 / half**2), [0.1 / half]])
+    quarter = 2j * np.pi * late[:, None]
+    for _ in range(_STEPS):
+        waves = np.exp(quarter * (frequency + late[:, None] * slope / 2))
+        up = np.exp(quarter[:, 0] * rise)
+        beside = np.stack([waves[:, i] * (up if sign > 0 else up.conj()) for i, sign in _BESIDE], axis=1)
+        linear = np.concatenate([waves, beside, still], axis=1)
+        normal = linear.conj().T @ linear
+        amplitudes = np.linalg.solve(normal + 1e-9 * t.size * np.eye(linear.shape[1]), linear.conj().T @ s)
+        rest = s - linear @ amplitudes
+        noise = math.sqrt(float(np.sum(np.abs(rest) ** 2)) / (2 * (t.size - linear.shape[1] - count)))
+        moving = waves * amplitudes[:count]
+        turned = quarter[:, 0] * 0
+        for (i, sign), part in zip(_BESIDE, (beside * amplitudes[count:-2]).T, strict=True):
+            moving[:, i] += part
+            turned += sign * part
+        slopes = np.concatenate(
+            [quarter * moving, quarter * late[:, None] / 2 * moving, (quarter[:, 0] * turned)[:, None]], axis=1
+        )
+        across = np.linalg.solve(normal + 1e-9 * t.size * np.eye(linear.shape[1]), linear.conj().T @ slopes)
+        slopes = slopes - linear @ across
+        information = (slopes.conj().T @ slopes).real / noise**2
+        gradient = (slopes.conj().T @ rest).real / noise**2
+        expected = vertical[0] if vertical else vertical_swing(frequency[0], frequency[1])
+        if not vertical:
+            prior[-1, :2] = -prior[-1, -1] * frequency[1::-1] / expected
+        off = np.append(slope / _SLOPES_U[:count], (rise - expected) * prior[-1, -1])
+        information += prior.T @ prior
+        gradient -= prior.T @ off
+        scale = np.sqrt(np.diagonal(information))
+        covariance = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
+        step = np.clip(covariance @ gradient, -most, most)
+        frequency, slope, rise = frequency + step[:count], slope + step[count:-1], rise + float(step[-1])
+        if np.abs(step[:count]).max() < 1e-3 * np.sqrt(np.diagonal(covariance)[:count]).min():
+            break
+    return Swings(
+        time=float(t.mean()),
+        frequency=frequency,
+        u=np.sqrt(np.diagonal(covariance)[:count]),
+        amplitude=np.abs(amplitudes[:count]),
+        vertical=rise,
+        noise=noise,
+        misfit=2 * t.size * math.log(noise**2) + float(off @ off),
+        rest=rest,
+    )

@@ -1,0 +1,149 @@
+"""Slow swings in a place over time, their shift at finite amplitude, and geometric magnetism."""
+
+import numpy as np
+import pytest
+
+from analysis.errors import ShapesDiffer, TimesNotIncreasing, TooFewReadings
+from analysis.field.ring import Ring, on_axis
+from analysis.stability import SymmetricTop, modes
+from analysis.sway import Known, Swings, geometric_magnetism, slow_swings, swings_of
+from analysis.sway.lines import NoSwings
+from analysis.sway.orbit import NoSwing
+from levilab.simulator import preset, simulate
+
+RING = Ring(1.40e-3, 0.0, 0.0, 0.030, 0.055)
+HEIGHT = 0.0729913  # where 25.26 g float
+TOP = SymmetricTop(0.02526, 1.04e-6, 1.731314e-6, -0.714)
+FLOATING = (0.0702, 0.0756)
+
+
+def field(z):
+    return on_axis(RING, np.atleast_1d(z), 5)
+
+
+@pytest.fixture
+def fresh():
+    """Random numbers that no constant was chosen with."""
+    return np.random.default_rng(20261124)
+
+
+def swing(times, slow, amplitudes=(4e-4, 6e-4), precession=6.0):
+    backward, forward = slow
+    waves = zip((backward, forward, precession), (*amplitudes, 8e-5), (0.3, 1.1, 2.0), strict=True)
+    return sum(a * np.exp(2j * np.pi * f * times + 1j * phase) for f, a, phase in waves)
+
+
+# --- lines ---
+
+
+def test_errors_of_frequencies_are_as_large_as_u_says(fresh):
+    times = np.arange(2400) / 120
+    pulls = []
+    for _ in range(40):
+        slow = (fresh.uniform(-0.68, -0.4), fresh.uniform(0.55, 0.9))
+        noise = 1e-4 * (fresh.normal(size=times.size) + 1j * fresh.normal(size=times.size))
+        found = swings_of(times, swing(times, slow) + noise)[0]
+        pulls.append((found.frequency - [*slow, 6.0]) / found.u)
+    pulls = np.array(pulls)
+    assert np.abs(pulls.mean(axis=0)).max() < 4 / np.sqrt(40)  # 4 standard errors of 40
+    assert pulls.std(axis=0) == pytest.approx([1, 1, 1], abs=4 / np.sqrt(80))
+
+
+def test_times_may_be_uneven(fresh):
+    times = np.cumsum(fresh.choice([1 / 300, 1 / 200], size=4800))
+    found = swings_of(times, swing(times, (-0.59, 0.77)))[0]
+    assert found.frequency == pytest.approx([-0.59, 0.77, 6.0], abs=1e-6)
+
+
+def test_a_line_of_the_vertical_swing_beside_the_backward_one_is_none_of_it(fresh):
+    times = np.arange(2400) / 120
+    places = swing(times, (-0.5945, 0.7400), (1.1e-4, 9.4e-4)) + 1e-4 * np.exp(2j * np.pi * (0.74 - 1.196) * times)
+    places += 1e-4 * (fresh.normal(size=times.size) + 1j * fresh.normal(size=times.size))
+    found = swings_of(times, places)[0]
+    assert abs(found.frequency[0] + 0.5945) < 4 * found.u[0]
+
+
+def test_what_has_no_swings_is_refused(fresh):
+    times = np.arange(2400) / 120
+    with pytest.raises(NoSwings, match="push sideways"):
+        swings_of(times, np.zeros(2400) + 1e-3 * np.exp(2j * np.pi * 6 * times))
+    with pytest.raises(TooFewReadings):
+        swings_of(times[:50], np.ones(50))
+    with pytest.raises(ShapesDiffer):
+        swings_of(times, np.ones(50))
+    with pytest.raises(TimesNotIncreasing):
+        swings_of(times[::-1], np.ones(2400))
+
+
+# --- finite amplitude ---
+
+
+def test_small_swings_are_the_roots_of_the_quartic():
+    slow = sorted(sorted(modes(field, TOP, HEIGHT, 30.0).real, key=abs)[:2])
+    assert slow_swings(field, TOP, HEIGHT, 30.0, (1e-6, 1e-6)) == pytest.approx(slow, abs=1e-5)  # the height is rounded
+
+
+@pytest.mark.parametrize("amplitude", [5e-4, 1e-3])
+def test_the_shift_at_finite_amplitude_is_that_of_the_full_motion(amplitude):
+    start = {"start.position_m": [amplitude, 0.0, 0.07298], "start.velocity_m_s": [0, 0, 0], "start.spin_hz": 25.0}
+    scene = preset("undriven").changed(start | {"start.precession": "steady", "base.field": "paraxial-8"})
+    motion = simulate(scene, 40.0, rate=120.0, tolerance=1e-6)
+    places = motion.position[:-1, 0] + 1j * motion.position[:-1, 1]
+    seen = swings_of(motion.time[:-1], places, window=40.0)[0]
+    still = sum(slow_swings(field, TOP, HEIGHT, 25.0, (1e-6, 1e-6)))
+    moving = sum(slow_swings(field, TOP, HEIGHT, 25.0, tuple(seen.amplitude[:2])))
+    # the vertical swing, which the start sets off, too, is not in it: a tenth of the shift
+    assert seen.split - still == pytest.approx(moving - still, rel=0.1, abs=2e-4)
+
+
+def test_amplitudes_that_no_motion_has_are_refused():
+    with pytest.raises(NoSwing, match="smaller swings"):
+        slow_swings(field, TOP, HEIGHT, 25.0, (0.02, 0.02))
+
+
+# --- geometric magnetism ---
+
+
+def known(mass):
+    return Known(SymmetricTop(mass, 1.04e-6, 1.731314e-6, -0.714), 0.0, 0.0, field, FLOATING)
+
+
+@pytest.mark.slow
+def test_tops_in_full_motion_have_the_split_that_is_predicted(fresh):
+    pulls, u = [], []
+    for mass in (0.02502, 0.02508, 0.02526, 0.02530, 0.02534):
+        start = {"top.mass_kg": mass, "start.place": "equilibrium", "start.spin_hz": 40.0}
+        height = simulate(preset("undriven").changed(start), 0.01, rate=None).position[0, 2]
+        start |= {"start.place": "given", "start.position_m": [fresh.uniform(3e-4, 8e-4), 0.0, height]}
+        start |= {"start.velocity_m_s": fresh.uniform(-2e-3, 2e-3, 3).tolist(), "drag.law": "disc"}
+        motion = simulate(preset("undriven").changed(start), 80.0, rate=120.0, tolerance=1e-5)
+        places = motion.position[:-1, 0] + 1j * motion.position[:-1, 1]
+        places = places + 1e-4 * (fresh.normal(size=places.size) + 1j * fresh.normal(size=places.size))
+        swings = swings_of(motion.time[:-1], places)
+        spin = np.interp([one.time for one in swings], motion.time, motion.spin_hz)
+        found = geometric_magnetism(swings, spin, known(mass))
+        b, slope = field(height)[:2, 0]
+        truth = 1.731314e-6 * 30.0 / mass * (slope / (2 * b)) ** 2
+        pulls.append((found.measured.value - truth) / found.measured.u)
+        u.append(found.measured.u / truth)
+        assert found.against_null > 30
+    assert np.abs(pulls).max() < 3
+    assert max(u) < 0.03
+
+
+def lines(slow, u=3e-4):
+    return Swings(0.0, np.array(slow), np.full(2, u), np.full(2, 1e-5), 1.2, 1e-4, 0.0, np.empty(0))
+
+
+def test_without_a_split_nothing_stands_against_the_null():
+    found = geometric_magnetism([lines((-0.666, 0.666))] * 6, np.linspace(35, 25, 6), known(0.02526))
+    assert found.measured.value == pytest.approx(0, abs=1e-6)
+    assert abs(found.against_null) < 0.1
+
+
+def test_the_roots_of_the_quartic_give_back_its_gradient():
+    b, slope = field(HEIGHT)[:2, 0]
+    spins = np.array([25.0, 30.0, 40.0])
+    seen = [lines(sorted(sorted(modes(field, TOP, HEIGHT, spin).real, key=abs)[:2])) for spin in spins]
+    found = geometric_magnetism(seen, spins, known(0.02526))
+    assert found.gradients[0].value == pytest.approx(abs(slope / (2 * b)), rel=1e-4)
