@@ -240,16 +240,17 @@ def _narrow(axis: Array, log: Array, k: int) -> tuple[float, float]:
 def combinations(washers: Sequence[float]) -> list[tuple[float, ...]]:
     """Return choices from the washers [kg], the lightest first, `()` among them.
 
-    Of those that a balance cannot distinguish, one with few washers.
+    Of those that a balance cannot distinguish, or that are within a thousandth of all washers, one with few washers.
 
     >>> combinations([1e-4, 1e-4, 2e-4])
     [(), (0.0001,), (0.0002,), (0.0001, 0.0002), (0.0001, 0.0001, 0.0002)]
     """
+    step = max(MASS_U, sum(washers) / 1000)
     found: dict[int, tuple[float, ...]] = {0: ()}
     for one in sorted(washers):
         for chosen in [*found.values()]:
             more = (*chosen, one)
-            key = round(sum(more) / MASS_U)
+            key = round(sum(more) / step)
             if key not in found or len(more) < len(found[key]):
                 found[key] = more
     return sorted(found.values(), key=sum)

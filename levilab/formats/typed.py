@@ -12,8 +12,8 @@ _TEMPERATURES = {
     "°C": (1.0, 0.0), "C": (1.0, 0.0), "K": (1.0, -273.15), "°F": (5 / 9, -160 / 9), "F": (5 / 9, -160 / 9),
 }  # fmt: skip
 _TYPED = re.compile(r"([+-]?\d+\.?\d*|[+-]?\.\d+)\s*([^\d\s]*)")
-#: Magnets that people hold in their hands, and the heaviest top and washer.
-_COLDEST, _WARMEST, _HEAVIEST = -30.0, 60.0, 1.0
+#: Magnets that people hold in their hands, and the lightest washer and the heaviest top [kg].
+_COLDEST, _WARMEST, _LIGHTEST, _HEAVIEST = -30.0, 60.0, 1e-6, 1.0
 
 
 def read_mass(text: str) -> float:
@@ -22,7 +22,7 @@ def read_mass(text: str) -> float:
     >>> read_mass("24.98 g"), read_mass("60mg"), round(read_mass("0.06"), 9)
     (0.02498, 6e-05, 6e-05)
     """
-    return _read(text, _MASSES, 0.0, _HEAVIEST, "a mass such as 24.98 g")
+    return _read(text, _MASSES, _LIGHTEST, _HEAVIEST, "a mass such as 24.98 g")
 
 
 def read_temperature(text: str) -> float:

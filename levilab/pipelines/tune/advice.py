@@ -121,10 +121,10 @@ class Advice:
     def _beyond_reach(self) -> str:
         """Return what to do where no washers will do, as a sentence behind a blank; empty elsewhere."""
         middle, top = self.values["mass_to_set"].value or 0.0, self.owner.top or 0.0
-        if self.best.rises > _OUT_OF_REACH:
-            more = digits(1e3 * (middle - top - sum(self.owner.washers)))
-            return f" Even with all washers it would rise: {more} g more are needed."
-        if self.best.sinks > _OUT_OF_REACH:
+        heaviest = top + sum(self.owner.washers)
+        if self.best.rises > _OUT_OF_REACH and middle > heaviest:
+            return f" Even with all washers it would rise: {digits(1e3 * (middle - heaviest))} g more are needed."
+        if self.best.sinks > _OUT_OF_REACH and middle < top:
             return f" Even without washers it would sink: it is {digits(1e3 * (top - middle))} g too heavy today."
         return ""
 

@@ -41,7 +41,7 @@ def test_a_mass_is_read_with_its_unit_or_in_grams(text: str, value: float) -> No
     assert read_mass(text) == value
 
 
-@pytest.mark.parametrize("text", ["", "g", "24,98 g", "-1 g", "24.98 s", "25 25", "2 kg", "1e400 g"])
+@pytest.mark.parametrize("text", ["", "g", "24,98 g", "-1 g", "24.98 s", "25 25", "2 kg", "1e400 g", "0 g"])
 def test_what_is_no_mass_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r"24\.98 g is expected"):
         read_mass(text)
