@@ -128,7 +128,7 @@ def load(path: str | PathLike[str]) -> Run:
 
 def analyze(
     data: Run | str | PathLike[str] | pd.DataFrame | Sequence[Run | str | PathLike[str] | pd.DataFrame],
-    kind: Literal["spindown", "spin", "field", "limit", "precession"] | None = None,
+    kind: Literal["spindown", "spin", "field", "limit", "precession", "sway"] | None = None,
     *,
     columns: Mapping[str, str | int] | str | None = None,
     channel: str | None = None,
@@ -149,6 +149,8 @@ def analyze(
     distance_u_m: float | None = None,
     below_m: float | None = None,
     moment_a_m2: float | None = None,
+    scan: str | PathLike[str] | None = None,
+    spin_hz: float | None = None,
 ) -> AnalysisResult:
     """Analyze runs, data files or DataFrames.  Nothing is written; `save(folder)` of the result does.
 
@@ -167,17 +169,19 @@ def analyze(
             spins; "none" for a top that only spins (spindown).
         method: how pulses are found: edges is the fastest, likelihood for weak ones (spin).
         orthogonal: let the uncertainty of the drive's frequency count, too (precession).
-        device: file that describes base and top, as sample_data/device.toml (spindown, field).
+        device: file that describes base and top, as sample_data/device.toml (spindown, field, sway).
         height_m: where the top was seen to float [m]; its moment follows, if its mass is known (field).
         height_u_m: standard uncertainty of it [m]; by default that of the scan's heights (field).
         free_radii: let the scan move the radii, within what the calliper says (field).
-        clock_u: relative standard uncertainty of the clock that counts or samples, for the budgets (all but field).
+        clock_u: relative standard uncertainty of the clock that counts or samples, for the budgets (not field, sway).
         near: about where the spin of a magnetometer's record is at first, to 10 % [Hz] (spindown, spin, limit).
         drive: frequency of the drive meanwhile, for whether the top is locked to it [Hz] (spin).
         distance_m: of a magnetometer from the top's axis, horizontally [m]; the moment's tilt follows (spin).
         distance_u_m: standard uncertainty of distance_m and below_m [m] (spin).
         below_m: height of the top above the magnetometer [m] (spin).
         moment_a_m2: moment of the top [A m²]; the angle of its tilt follows (spin).
+        scan: a Hall scan of the base, a run or a file (sway).
+        spin_hz: spin of the top where no column has it [Hz] (sway).
 
     Returns:
         The result: `values`, `verdict`, `warnings`, `summary()`, `to_dataframe()`, `plot()`, `save(folder)`.

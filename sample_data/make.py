@@ -16,7 +16,8 @@ computers are left out.
 Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes each time.
 
 ``python sample_data/make.py --full-motion`` makes the sweep of the drive, too: ``levilab acquire precession --mock``
-with records of the phase, its top simulated in full motion.  Its last digits depend on the processor.
+with records of the phase, its top simulated in full motion, and the track of a swaying top.  Their last digits depend
+on the processor.
 
 ``python sample_data/make.py --sound`` makes phone.m4a, too; its bytes depend on the version of FFmpeg.
 """
@@ -42,7 +43,7 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.present.numbers import with_sign
 from levilab.present.progress import Display
 from levilab.reproduce.spindown import NOISE_HZ, READINGS, solve
-from levilab.simulator import preset
+from levilab.simulator import preset, simulate
 from levilab.simulator.published.printed import several
 
 HERE = Path(__file__).parent
@@ -513,6 +514,34 @@ def from_the_virtual_bench(experiment: str, folder: str, seed: int, note: str) -
     print(f"{folder}: {record.synthetic_how}")
 
 
+#: A film of 60 frames per second, with an error of each coordinate, of a top that was pushed.
+TRACK_S, FRAMES, FILM_NOISE_MM = 100.0, 60.0, 0.1
+TRACK_SCENE = {
+    "top.mass_kg": 0.0253,
+    "drag.law": "disc",
+    "start.place": "given",
+    "start.position_m": [4e-4, 0.0, 0.0727],
+    "start.velocity_m_s": [0.0, 1.5e-3, 0.0],
+    "start.spin_hz": 40.0,
+}
+
+
+def write_track() -> None:
+    """Make the places of a top as a film gives them, with its spin; its last digits depend on the processor."""
+    motion = simulate(preset("undriven").changed(TRACK_SCENE), TRACK_S, rate=FRAMES, tolerance=1e-6)
+    noise = np.random.default_rng(23).normal(0, FILM_NOISE_MM, (len(motion.time), 2))
+    places = 1e3 * motion.position[:, :2] + noise
+    rows = [
+        f"{t:.4f},{x:.2f},{y:.2f},{spin:.3f}"
+        for t, (x, y), spin in zip(motion.time[:-1], places, motion.spin_hz, strict=False)
+    ]
+    (HERE / "sway").mkdir(exist_ok=True)
+    (HERE / "sway" / ".levilab-skip").touch()
+    text = "\n".join(["# SYNTHETIC, made by sample_data/make.py", "t [s],x [mm],y [mm],spin [Hz]", *rows, ""])
+    (HERE / "sway" / "track.csv").write_text(text, encoding="utf-8", newline="\n")
+    print(f"sway: {len(rows)} frames")
+
+
 def main() -> None:
     """Write the run folders and the files of scopes."""
     write_scope_files(HERE / "scope-files")
@@ -562,5 +591,6 @@ if __name__ == "__main__":
     main()
     if "--full-motion" in sys.argv[1:]:
         precession_sweep()
+        write_track()
     if "--sound" in sys.argv[1:]:
         write_sound()

@@ -51,13 +51,13 @@ def _weights(disc: Disc | None) -> dict[int, float]:
     return weights
 
 
-def axial_field(ring: Ring, disc: Disc | None) -> AxialField:
-    """Return B, B′ and B″ as an upright magnet feels them at heights of shape (n,) [m]: shape (3, n)."""
+def axial_field(ring: Ring, disc: Disc | None, orders: int = 3) -> AxialField:
+    """Return B, B′, B″ … as an upright magnet feels them at heights of shape (n,) [m]: shape (orders, n)."""
     weights = _weights(disc)
 
     def field(z: Array) -> Array:
-        derivatives = on_axis(ring, z, max(weights) + 3)
-        return np.asarray(sum(weight * derivatives[order : order + 3] for order, weight in weights.items()))
+        derivatives = on_axis(ring, z, max(weights) + orders)
+        return np.asarray(sum(weight * derivatives[order : order + orders] for order, weight in weights.items()))
 
     return field
 

@@ -1,7 +1,16 @@
 """Slow swings of a floating top, and the geometric magnetism that splits them."""
 
 from analysis.sway.geometry import Geometry, Known, geometric_magnetism
-from analysis.sway.lines import Swings, swings_in_window, swings_of
+from analysis.sway.lines import Swings, mirrored, swings_in_window, swings_of
 from analysis.sway.orbit import slow_swings
 
-__all__ = ["Geometry", "Known", "Swings", "geometric_magnetism", "slow_swings", "swings_in_window", "swings_of"]
+__all__ = [
+    "Geometry",
+    "Known",
+    "Swings",
+    "geometric_magnetism",
+    "mirrored",
+    "slow_swings",
+    "swings_in_window",
+    "swings_of",
+]

@@ -3,8 +3,8 @@
 A moment that follows the field of the base takes the spin's angular momentum along, and a force across the velocity
 answers, as on a charge in a magnetic field.  To lowest order the slow swings obey α² − Ω_g α − α₀² = 0 with
 Ω_g = (I₃ω₃/m)(B′/2B)²; the quartic of `analysis.stability` has them exactly for small motions, `slow_swings` at finite
-amplitude.  The two slow swings alone determine Ω_g and α₀ at a known spin.  B′/2B of a scan of the field, or of the
-precession, predicts Ω_g.
+amplitude.  The two slow swings alone determine Ω_g and α₀ at a known spin.  The form of the
+base's field predicts Ω_g: B′/2B at the height at which α₀ is as seen.  Its strength and the top's moment drop out.
 
 Source: Berry, Proc. R. Soc. A 452, 1207 (1996).
 """
@@ -12,40 +12,58 @@ Source: Berry, Proc. R. Soc. A 452, 1207 (1996).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping  # noqa: TC003 - the types of a result are read when it runs
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import ShapesDiffer, TooFewReadings
-from analysis.stability import SymmetricTop, modes
+from analysis.field.errors import ImpossibleRing
+from analysis.field.magnet import axial_field, stiffnesses
+from analysis.stability import SymmetricTop, modes, windows
+from analysis.sway.lines import vertical_swing
 from analysis.sway.orbit import NoSwing, slow_swings
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate, propagate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from analysis.field.magnet import Disc
+    from analysis.field.ring import Ring
+    from analysis.stability import AxialField
     from analysis.sway.lines import Swings
-    from analysis.sway.orbit import Field
 
 Array = NDArray[np.float64]
 
 #: The shift at finite amplitude is known to this part of it: it is computed without a vertical swing of its own.
-SHIFT_U = 0.05
+SHIFT_U = 0.035
 #: Where the beat of the slow swings comes near the vertical swing, they exchange energy with it, and the shift's next
-#: order counts: relative standard uncertainty of the split, times A⁴ over the cube of the difference [Hz³/m⁴], as full
-#: motions of tops over the whole window of masses have it; differences below NEAREST_HZ count as that.
-RESONANCE_U, NEAREST_HZ = 2e8, 0.02
+#: orders count: relative standard uncertainty of the split, times A⁴ over the fourth power of the difference [Hz⁴/m⁴],
+#: as full motions of 120 tops over the whole window of masses have it; differences below NEAREST_HZ count as that.
+RESONANCE_U, NEAREST_HZ = 1.8e7, 0.04
 #: Tilt and height change within a window: relative standard uncertainty of Ω_g in a motion of small swings.
-MOTION_U = 1.5e-3
+MOTION_U = 6.5e-4
 #: The precession's frequency is that of small swings: relative standard uncertainty of B′/2B from it, per square of the
 #: swings' amplitudes [1/m²].
 PRECESSION_SHIFT_U = 1e3
 #: u of the lines is believed within a quarter of it: as of 8 degrees of freedom (GUM G.4.2).
 BELIEVED = 8.0
+#: A line that is so much weaker than a swing is not taken for it; the split over the spin scatters by this
+#: part in a spin-down.
+_WEAK, _BENT = 0.1, 0.05
+#: Standard uncertainty of the vertical swing that follows from the slow ones and the field [Hz].
+_VERTICAL_U_HZ = 0.015
 #: The spin at which Ω_g is given [Hz].
 REFERENCE_SPIN_HZ = 30.0
+#: Tops float between these heights above the upper face, in outer radii.
+_FLOATING = (0.05, 4.0)
+#: Step of the slopes by the ring's sizes, in their standard uncertainties.
+_STEP = 0.1
+#: Without a split the factor is that of this Ω_g/ω₃, a hundredth of the usual one.
+_SMALL = 1e-4
 #: Rounds in which Ω_g and the factor between split and Ω_g are computed from each other; each gains three digits.
 _ROUNDS = 4
 
@@ -55,19 +73,61 @@ class Known:
     """What is known of the top and of the base.
 
     Attributes:
-        top: the moment that of a point.
+        top: its moment counts for nothing: it is what carries the weight at the height at which the top floats.
         mass_u, axial_u: standard uncertainties of mass [kg] and I₃ [kg m²].
-        field: of the base on its axis.
-        heights: between which the top floats [m].
-        gradient: B′/2B where it floats, from a scan [1/m].
+        ring: of the base; of its strength the sign counts alone.
+        covariance: of thickness, inner and outer radius, shape (3, 3) [m²].
+        magnet: of the top, a disc; None: a point.
     """
 
     top: SymmetricTop
     mass_u: float
     axial_u: float
-    field: Field
-    heights: tuple[float, float]
-    gradient: Estimate | None = None
+    ring: Ring
+    covariance: Array
+    magnet: Disc | None = None
+
+    @cached_property
+    def field(self) -> AxialField:
+        """Heights, shape (n,) [m] → the field that the upright magnet feels and four derivatives, shape (5, n)."""
+        return axial_field(self.ring, self.magnet, 5)
+
+    @cached_property
+    def heights(self) -> tuple[float, float]:
+        """The heights at which a top floats, and half of them more below, for large swings [m].
+
+        Raises ImpossibleRing where it floats nowhere.
+        """
+        face = self.ring.origin + self.ring.thickness / 2
+        low, high = (face + share * self.ring.outer_radius for share in _FLOATING)
+        found = windows(self.field, replace(self.top, moment=-math.copysign(1.0, self.ring.strength)), low, high)
+        if not found:
+            raise ImpossibleRing(inner=self.ring.inner_radius, outer=self.ring.outer_radius)
+        return found[-1].low - (found[-1].high - found[-1].low) / 2, found[-1].high
+
+    def top_at(self, height: float) -> SymmetricTop:
+        """Return the top with the moment that carries its weight at a height [m]."""
+        moment = self.top.mass * self.top.gravity / float(self.field(np.array([height]))[1, 0])
+        stiffness = None if self.magnet is None else stiffnesses(self.ring, self.magnet, moment)
+        return replace(self.top, moment=moment, stiffnesses=stiffness)
+
+    def gradient(self, height: float) -> float:
+        """Return B′/2B at a height; of a disc what it turns by, over what moves it [1/m]."""
+        tilt, _, both = self.top_at(height).stiffness(self.field, np.array([height]))[:, 0]
+        return abs(float(both / tilt))
+
+    def height(self, swings: Swings, spin: float) -> float:
+        """Return the height at which α₋α₊ of small swings is as seen [m].  Raises NoSwing."""
+        from scipy.optimize import brentq
+
+        product = float(swings.frequency[0] * swings.frequency[1])
+        try:
+            found = brentq(
+                lambda z: math.prod(_slow(self.field, self.top_at(z), z, spin)) - product, *self.heights, xtol=1e-7
+            )
+        except ValueError:
+            raise NoSwing(amplitudes=(swings.amplitude[0], swings.amplitude[1]), spin=spin) from None
+        return float(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,25 +137,37 @@ class Geometry:
     Attributes:
         spin: at which Ω_g is given [Hz].
         measured: Ω_g/2π there, from the slow swings alone [Hz].
-        gradients: B′/2B [1/m] that goes with it, that of the precession, and that of the scan; None where not known.
-        predicted: Ω_g/2π from the scan, or from the precession [Hz]; None without either.
+        predicted: Ω_g/2π from the form of the base's field [Hz].
         ratio: measured over predicted.
+        gradient: B′/2B [1/m] that goes with Ω_g as measured.
+        of_precession: that of the precession; None where no window shows it.
+        of_base: that of the base's field.
         against_null: split over its standard uncertainty: so far from no splitting at all.
+        parts, parts_predicted: of u of `measured` and of `predicted`, by name [Hz].
         shares: Ω_g/2π of each window, brought to that spin, shape (n,) [Hz].
         u_shares: their standard uncertainties but for what is common to all, shape (n,) [Hz].
         shifts: of backward and forward swing at finite amplitude that were taken away, shape (n, 2) [Hz].
+        heights: at which α₋α₊ is as seen, shape (n,) [m].
+        splits, expected: of small swings, as seen and as `predicted` has them, shape (n,) [Hz].
         chi_square: Σ((share − measured)/u)².
     """
 
     spin: float
     measured: Estimate
-    gradients: tuple[Estimate, Estimate | None, Estimate | None]
-    predicted: Estimate | None
-    ratio: Estimate | None
+    predicted: Estimate
+    ratio: Estimate
+    gradient: Estimate
+    of_precession: Estimate | None
+    of_base: Estimate
     against_null: float
+    parts: Mapping[str, float]
+    parts_predicted: Mapping[str, float]
     shares: Array
     u_shares: Array
     shifts: Array
+    heights: Array
+    splits: Array
+    expected: Array
     chi_square: float
 
 
@@ -112,53 +184,104 @@ def geometric_magnetism(
 
     Raises:
         TooFewReadings, ShapesDiffer: see `analysis.errors`.
-        NoSwing: no top with this field swings at these frequencies.
+        ImpossibleRing: no top floats above such a base.
+        NoSwing: no top above this base swings at these frequencies.
     """
     spin = np.asarray(spin_hz, dtype=np.float64)
     if not swings:
         raise TooFewReadings(seen=0, needed=1)
     if spin.shape != (len(swings),):
         raise ShapesDiffer(quantity="the spin", seen=spin.shape, expected=(len(swings),))
-    shifts = np.array([_shift(one, nu, known) for one, nu in zip(swings, spin.tolist(), strict=True)])
+    swings, wrong = _assigned(swings, spin, known)
+    each = list(zip(swings, spin.tolist(), strict=True))
+    heights = np.array([known.height(one, nu) for one, nu in each])
+    shifts = np.array([_shift(one, nu, z, known) for (one, nu), z in zip(each, heights.tolist(), strict=True)])
     small = np.array([one.frequency[:2] for one in swings]) - shifts
     resonance = np.array([_doubt(one) for one in swings])
+    mistaken = wrong * np.array([_away(one) for one in swings])
+    upright = np.array([1 + _lean(one, nu, z, known) for (one, nu), z in zip(each, heights.tolist(), strict=True)])
     share, half = float(np.mean(small.sum(axis=1) / spin)), np.empty(0)
     for _ in range(_ROUNDS):  # Ω_g is the split but for some percent, which hardly depend on it
-        expected, half = np.array([_split(share, *row, known.top) for row in zip(spin, small, strict=True)]).T
-        factor = share * reference / expected
+        size = max(abs(share), _SMALL)
+        expected, half = np.array([_split(size, *row, known.top) for row in zip(spin, small, strict=True)]).T
+        factor = upright * size * reference / expected
         shares = factor * small.sum(axis=1)
         u_shares = np.abs(factor) * np.array([one.u_split for one in swings])
-        doubt = np.abs(shares) * resonance + SHIFT_U * np.abs(factor * shifts.sum(axis=1))
+        doubt = np.abs(shares) * resonance + np.abs(factor) * (mistaken + SHIFT_U * np.abs(shifts.sum(axis=1)))
         weight = 1 / (u_shares**2 + doubt**2)
         share = float(np.sum(weight * shares) / np.sum(weight)) / reference
     left = float(np.sum(weight * (shares - share * reference) ** 2))
     scale = math.sqrt((left + BELIEVED) / (spin.size - 1 + BELIEVED))
-    by_chance = scale / math.sqrt(float(np.sum(weight)))
-    by_shift = float(np.sum(weight * doubt) / np.sum(weight))
-    u = math.hypot(by_chance, by_shift, MOTION_U * share * reference)
-    measured = Estimate(share * reference, u, "Hz")
-    gradients = (_gradient_of(measured, reference, known), _precession(swings, spin, half, known), known.gradient)
-    predicted = _predict(gradients[2] or gradients[1], known, reference)
+    parts = {
+        "lines": scale / math.sqrt(float(np.sum(weight))),
+        "amplitude": float(np.sum(weight * doubt) / np.sum(weight)),
+        "motion": MOTION_U * abs(share) * reference,
+    }
+    measured = Estimate(share * reference, math.hypot(*parts.values()), "Hz")
+    of_base = _of_base(each, heights, known)
+    predicted, parts_predicted = _predict(of_base, known, reference)
     return Geometry(
         spin=reference,
         measured=measured,
-        gradients=gradients,
         predicted=predicted,
         ratio=_ratio(measured, predicted),
-        against_null=share * reference / u,
+        gradient=_gradient_of(measured, reference, known),
+        of_precession=_precession(swings, spin, half, known),
+        of_base=of_base,
+        against_null=share * reference / (measured.u or math.inf),
+        parts=parts,
+        parts_predicted=parts_predicted,
         shares=shares,
         u_shares=u_shares,
         shifts=shifts,
+        heights=heights,
+        splits=upright * small.sum(axis=1),
+        expected=np.array(
+            [_split((predicted.value or 0) / reference, *row, known.top)[0] for row in zip(spin, small, strict=True)]
+        ),
         chi_square=left,
     )
 
 
+def _assigned(swings: Sequence[Swings], spin: Array, known: Known) -> tuple[Sequence[Swings], float]:
+    """Return the swings, with the other lines for the backward or the forward ones where that fits better.
+
+    The split goes with the spin but for some percent, and the vertical swing with both swings and the field.  The
+    second value is the probability that they are taken for each other.
+    """
+    choices = [list(swings)]
+    for k in (0, 1):
+        turned = [one.turned(k) for one in swings]
+        if np.mean([one.amplitude[k] for one in turned]) > _WEAK * np.mean([one.amplitude[k] for one in swings]):
+            choices.append(turned)
+    misfits = np.array([_misfit(one, spin, known) for one in choices])
+    odds = np.exp(-(misfits - misfits.min()) / 2)
+    return choices[int(np.argmin(misfits))], float(1 - 1 / odds.sum())
+
+
+def _misfit(swings: Sequence[Swings], spin: Array, known: Known) -> float:
+    """Return χ² of split over spin, and of the vertical swing."""
+    share = np.array([one.split for one in swings]) / spin
+    middle = len(swings) // 2
+    one = swings[middle]
+    try:
+        slope = known.gradient(known.height(one, float(spin[middle])))
+    except NoSwing:
+        return math.inf
+    backward, forward = one.frequency[:2].tolist()
+    off = one.vertical - vertical_swing(backward, forward, slope, known.top.gravity)
+    return float((share.std() / (_BENT * (abs(share.mean()) + 1e-9))) ** 2 + (off / _VERTICAL_U_HZ) ** 2)
+
+
+def _away(swings: Swings) -> float:
+    """Return how far the beat of the slow swings is from the vertical swing [Hz]."""
+    return abs(float(swings.frequency[1] - swings.frequency[0]) - swings.vertical)
+
+
 def _doubt(swings: Swings) -> float:
     """Return the relative standard uncertainty of a split from the exchange of energy with the vertical swing."""
-    backward, forward = swings.frequency[:2]
-    away = max(abs(float(forward - backward) - swings.vertical), NEAREST_HZ)
     size = float(np.sum(swings.amplitude[:2] ** 2))
-    return float(min(RESONANCE_U * size**2 / away**3, 1.0))
+    return float(min(RESONANCE_U * size**2 / max(_away(swings), NEAREST_HZ) ** 4, 1.0))
 
 
 def _split(share: float, spin: float, small: Array, top: SymmetricTop) -> tuple[float, float]:
@@ -174,7 +297,7 @@ def _split(share: float, spin: float, small: Array, top: SymmetricTop) -> tuple[
 
 def _righting(share: float, top: SymmetricTop) -> float:
     """Return P [J] that belongs to Ω_g/ω₃ = (I₃/m)(mg/2P)²."""
-    return top.mass * top.gravity / 2 * math.sqrt(top.axial / (top.mass * max(share, 1e-12)))
+    return top.mass * top.gravity / 2 * math.sqrt(top.axial / (top.mass * share))
 
 
 def _slow_roots(p: float, half: float, omega: float, top: SymmetricTop) -> Array:
@@ -185,29 +308,46 @@ def _slow_roots(p: float, half: float, omega: float, top: SymmetricTop) -> Array
     return np.sort(roots[np.argsort(np.abs(roots))[:2]].real)
 
 
-def _shift(swings: Swings, spin: float, known: Known) -> tuple[float, float]:
-    """Return by how much finite amplitude shifts the slow swings of a top that floats where α₋α₊ is as seen [Hz]."""
-    from scipy.optimize import brentq
+def _slow(field: AxialField, top: SymmetricTop, height: float, spin: float) -> tuple[float, float]:
+    """Return the small slow swings, the backward one first [Hz]."""
+    backward, forward = sorted(sorted(modes(field, top, height, spin).real, key=abs)[:2])
+    return float(backward), float(forward)
 
-    product = float(swings.frequency[0] * swings.frequency[1])
-    moment, gravity = known.top.moment, known.top.gravity
 
-    def top_at(height: float) -> SymmetricTop:
-        return replace(known.top, mass=abs(moment * float(known.field(np.array([height]))[1, 0])) / gravity)
-
-    def missing(height: float) -> float:
-        first, second = sorted(modes(known.field, top_at(height), height, spin).real, key=abs)[:2]
-        return float(first * second) - product
-
-    low, high = known.heights
-    try:
-        height = float(brentq(missing, low, high, xtol=1e-7))
-    except ValueError:
-        raise NoSwing(amplitudes=(float(swings.amplitude[0]), float(swings.amplitude[1])), spin=spin) from None
-    still = sorted(sorted(modes(known.field, top_at(height), height, spin).real, key=abs)[:2])
+def _shift(swings: Swings, spin: float, height: float, known: Known) -> tuple[float, float]:
+    """Return by how much finite amplitude shifts the slow swings, of a point in the mean field of the magnet [Hz]."""
+    top = replace(known.top_at(height), stiffnesses=None)
+    still = _slow(known.field, top, height, spin)
     amplitudes = float(swings.amplitude[0]), float(swings.amplitude[1])
-    moving = slow_swings(known.field, top_at(height), height, spin, amplitudes)
+    moving = slow_swings(known.field, top, height, spin, amplitudes)
     return moving[0] - still[0], moving[1] - still[1]
+
+
+def _lean(swings: Swings, spin: float, height: float, known: Known) -> float:
+    """Return by which part the precession, of an angle θ, makes Ω_g smaller.
+
+    Its mean moment is μ cos θ, so that it floats lower, by θ²B′/2B″; its angular momentum along the mean axis is
+    I₃ω₃(1 − θ²/2) + I₁α_p θ².
+    """
+    if swings.frequency.size < 3:
+        return 0.0
+    top, alpha = known.top, 2 * math.pi * float(swings.frequency[2])
+    square = (2 * float(swings.amplitude[2]) * alpha**2 / top.gravity) ** 2
+    b, slope, bend = known.field(np.array([height]))[:3, 0]
+    turning = top.transverse * alpha / (top.axial * 2 * math.pi * spin)
+    return float(square * (0.5 - turning + slope**2 / (b * bend) - 1))
+
+
+def _of_base(each: Sequence[tuple[Swings, float]], heights: Array, known: Known) -> Estimate:
+    """Return B′/2B of the base's field where α₋α₊ is as seen."""
+    middle = len(each) // 2
+    seen, value = known.gradient(float(heights[middle])), float(np.mean([known.gradient(z) for z in heights]))
+    slopes = []
+    for k, name in enumerate(("thickness", "inner_radius", "outer_radius")):
+        step = _STEP * math.sqrt(float(known.covariance[k, k]))
+        other = replace(known, ring=replace(known.ring, **{name: getattr(known.ring, name) + step}))
+        slopes.append((other.gradient(other.height(*each[middle])) - seen) / step if step else 0.0)
+    return Estimate(value, float(propagate(known.covariance, np.array([slopes]))[1][0]), "1/m")
 
 
 def _gradient_of(measured: Estimate, reference: float, known: Known) -> Estimate:
@@ -242,17 +382,16 @@ def _precession(swings: Sequence[Swings], spin: Array, half: Array, known: Known
     return Estimate(value, value * math.hypot(*parts), "1/m")
 
 
-def _predict(gradient: Estimate | None, known: Known, reference: float) -> Estimate | None:
-    if gradient is None or gradient.value is None or gradient.u is None:
-        return None
-    top = known.top
-    value = top.axial * reference / top.mass * gradient.value**2
-    parts = (2 * gradient.u / gradient.value, known.mass_u / top.mass, known.axial_u / top.axial)
-    return Estimate(value, value * math.hypot(*parts), "Hz")
+def _predict(gradient: Estimate, known: Known, reference: float) -> tuple[Estimate, dict[str, float]]:
+    """Return (I₃ω₃/m)(B′/2B)² over 2π [Hz], and what its u is made of."""
+    top, slope = known.top, float(gradient.value or math.nan)
+    value = top.axial * reference / top.mass * slope**2
+    of_base = 2 * value * (gradient.u or 0.0) / slope
+    parts = {"base": of_base, "mass": value * known.mass_u / top.mass, "inertia": value * known.axial_u / top.axial}
+    return Estimate(value, math.hypot(*parts.values()) or None, "Hz"), parts
 
 
-def _ratio(measured: Estimate, predicted: Estimate | None) -> Estimate | None:
-    if predicted is None or not (measured.value and measured.u and predicted.value and predicted.u):
-        return None
-    value = measured.value / predicted.value
-    return Estimate(value, abs(value) * math.hypot(measured.u / measured.value, predicted.u / predicted.value), "1")
+def _ratio(measured: Estimate, predicted: Estimate) -> Estimate:
+    """Return the ratio of two independent estimates."""
+    above, below = float(measured.value or 0.0), float(predicted.value or math.nan)
+    return Estimate(above / below, math.hypot(measured.u or 0.0, above / below * (predicted.u or 0.0)) / below, "1")

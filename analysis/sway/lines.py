@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +35,15 @@ WINDOW_S, FEWEST = 20.0, 100
 SLOW_HZ, PRECESSION_HZ = (0.15, 1.6), (2.5, 15.0)
 #: B′/2B [1/m] that the vertical swing follows from, unless that is given, and the swing's standard uncertainty [Hz].
 GRADIENT_PER_M, VERTICAL_U_HZ = 9.3, 0.03
+#: No top floats whose vertical swing is slower [Hz].
+_SLOWEST_HZ = 0.2
 #: Prior of the slopes [Hz/s]: a spin that falls by up to 0.4 Hz/s changes the slow swings by up to 6 mHz per Hz and the
 #: precession by up to 0.5 Hz per Hz.
 _SLOPES_U = np.array([2e-3, 2e-3, 0.2])
 #: Slopes with which the precession is looked for [Hz/s].
 _SLOPES = (0.0, 0.03, 0.06, 0.1, 0.15)
+#: The slow swings of two windows in turn differ by less [Hz].
+_APART_HZ = 0.05
 #: Peaks of the spectrum that are tried for either swing, and steps of Gauss and Newton at most.
 _TRIED, _STEPS = 3, 25
 
@@ -66,9 +70,11 @@ class Swings:
         u: standard uncertainties, same shape [Hz].
         amplitude: same shape [m].
         vertical: the vertical swing, as the combination lines have it [Hz].
+        others: frequency, its u [Hz] and amplitude [m] of the lines at forward less vertical and at backward plus
+            vertical swing, shape (2, 3): they may be taken for the backward and for the forward swing that are near.
         noise: standard deviation of a coordinate [m].
         misfit: −2 times the logarithm of the likelihood and the priors, but for a constant.
-        rest: the places without all lines, shape (n,) [m].
+        backwards: amplitude of the strongest line where a precession would be that turns against the spin [m].
     """
 
     time: float
@@ -76,9 +82,26 @@ class Swings:
     u: Array
     amplitude: Array
     vertical: float
+    others: Array
     noise: float
     misfit: float
-    rest: Places
+    backwards: float = 0.0
+
+    def turned(self, k: int) -> Swings:
+        """Return the same with the other line for the backward swing, 0, or the forward one, 1.
+
+        Then their beat is the vertical swing.
+        """
+        frequency, u, amplitude, others = (
+            self.frequency.copy(),
+            self.u.copy(),
+            self.amplitude.copy(),
+            self.others.copy(),
+        )
+        others[k] = frequency[k], u[k], amplitude[k]
+        frequency[k], u[k], amplitude[k] = self.others[k]
+        beat = float(self.frequency[1] - self.frequency[0])
+        return replace(self, frequency=frequency, u=u, amplitude=amplitude, vertical=beat, others=others)
 
     @property
     def split(self) -> float:
@@ -109,12 +132,21 @@ def swings_of(
     t, s = _check(times, places)
     borders = np.searchsorted(t, np.linspace(t[0], t[-1], max(round(float(t[-1] - t[0]) / window), 1) + 1))
     borders[-1] = t.size
+    parts = [slice(*ends) for ends in itertools.pairwise(borders.tolist()) if ends[1] - ends[0] >= FEWEST]
     found: list[Swings] = []
-    for first, last in itertools.pairwise(borders.tolist()):
-        if last - first >= FEWEST and (one := swings_in_window(t[first:last], s[first:last], vertical, found[-1:])):
+    used = []
+    for part in parts:
+        if one := swings_in_window(t[part], s[part], vertical, found[-1:]):
             found.append(one)
+            used.append(part)
     if not found:
         raise NoSwings(start=float(t[0]), end=float(t[-1]))
+    for k, part in enumerate(used):  # a weak swing may be found in one window, and be missed in the next
+        near = [
+            one for one in found[max(k - 1, 0) : k + 2] if abs(one.frequency[0] - found[k].frequency[0]) > _APART_HZ
+        ]
+        if near and (one := swings_in_window(t[part], s[part], vertical, near)):
+            found[k] = one
     return found
 
 
@@ -145,7 +177,7 @@ def vertical_swing(backward: float, forward: float, gradient: float = GRADIENT_P
         gradient: B′/2B at the top [1/m].
         gravity: [m/s²].
     """
-    return math.sqrt(max(gravity * gradient / (4 * math.pi**2) + 2 * backward * forward, 0.0))
+    return math.sqrt(max(gravity * gradient / (4 * math.pi**2) + 2 * backward * forward, _SLOWEST_HZ**2))
 
 
 def swings_in_window(
@@ -160,29 +192,46 @@ def swings_in_window(
         near: swings at nearby times, from which the search starts, too.
     """
     lines = _spectrum(t, s)
-    starts = [one.frequency[:2] for one in near]
-    for forward in _peaks(lines, SLOW_HZ)[:1]:
-        seen = _peaks(lines, (-SLOW_HZ[1], -SLOW_HZ[0]))[:_TRIED]
-        # two lines that are nearer than the window resolves have one peak between them
-        apart = 0.6 / float(t[-1] - t[0])
-        starts += [
-            np.array([backward, forward]) for backward in {*seen, *(seen[0] + sign * apart for sign in (-1, 1) if seen)}
-        ]
-    fits = [_fit(t, s, start, np.zeros(2), vertical) for start in starts]
-    if not fits:
+    forward, seen = _peaks(lines, SLOW_HZ)[:1], _peaks(lines, (-SLOW_HZ[1], -SLOW_HZ[0]))[:_TRIED]
+    if not (forward and seen):
         return None
-    slow = min(fits, key=lambda one: one.misfit)
+    # two lines that are nearer than the window resolves have one peak between them
+    apart = 0.6 / float(t[-1] - t[0])
+    starts = [one.frequency[:2] for one in near]
+    starts += [np.array([backward, *forward]) for backward in {*seen, seen[0] - apart, seen[0] + apart}]
+    fits = [_fit(t, s, start, np.zeros(2), vertical) for start in starts]
+    slow, rest = min(fits, key=lambda one: one[0].misfit)
+    ahead, back = _precession(t, rest), _precession(t, rest.conj())
+    if ahead is not None:
+        slow, _ = _fit(t, s, np.append(slow.frequency, ahead.frequency), np.array([0, 0, ahead.slope]), vertical)
+    return replace(slow, backwards=0.0 if back is None else back.amplitude)
+
+
+class _Precession(NamedTuple):
+    """A line: amplitude [m], frequency [Hz] and slope [Hz/s]."""
+
+    amplitude: float
+    frequency: float
+    slope: float
+
+
+def _precession(t: Array, rest: Places) -> _Precession | None:
+    """Return the strongest line where the precession is looked for; None without one."""
     late = t - t.mean()
-    straight = [
-        (line.amplitude, line.frequency, slope)
+    found = [
+        _Precession(line.amplitude, line.frequency, slope)
         for slope in _SLOPES
-        for line in _spectrum(t, slow.rest * np.exp(-1j * np.pi * slope * late**2))
+        for line in _spectrum(t, rest * np.exp(-1j * np.pi * slope * late**2))
         if PRECESSION_HZ[0] < line.frequency < PRECESSION_HZ[1]
     ]
-    if not straight:
-        return slow
-    _, precession, slope = max(straight)
-    return _fit(t, s, np.append(slow.frequency, precession), np.array([0.0, 0.0, slope]), vertical)
+    return max(found, default=None)
+
+
+def mirrored(swings: Sequence[Swings]) -> bool | None:
+    """Return whether the precession turns backwards, as it does in a mirror or from below; None where none is seen."""
+    ahead = sum(float(one.amplitude[2]) for one in swings if one.frequency.size > 2)
+    back = sum(one.backwards for one in swings)
+    return back > ahead if max(ahead, back) else None
 
 
 def _spectrum(t: Array, s: Places) -> Sequence[Line]:
@@ -200,8 +249,10 @@ def _peaks(lines: Sequence[Line], between: tuple[float, float]) -> list[float]:
 _BESIDE = ((1, -1), (0, 1), (1, 1), (0, -1))
 
 
-def _fit(t: Array, s: Places, start: Array, slopes_start: Array, vertical: tuple[float, float] | None) -> Swings:
-    """Return the swings of greatest likelihood near a start [Hz] with slopes [Hz/s], shape (2 or 3,) each."""
+def _fit(
+    t: Array, s: Places, start: Array, slopes_start: Array, vertical: tuple[float, float] | None
+) -> tuple[Swings, Places]:
+    """Return the swings of greatest likelihood near a start [Hz] with slopes [Hz/s], shape (2 or 3,), and the rest."""
     late, half, count = t - t.mean(), float(t[-1] - t[0]) / 2, start.size
     frequency, slope = start.copy(), slopes_start.copy()
     rise = vertical[0] if vertical else vertical_swing(start[0], start[1])
@@ -244,13 +295,18 @@ def _fit(t: Array, s: Places, start: Array, slopes_start: Array, vertical: tuple
         frequency, slope, rise = frequency + step[:count], slope + step[count:-1], rise + float(step[-1])
         if np.abs(step[:count]).max() < 1e-3 * np.sqrt(np.diagonal(covariance)[:count]).min():
             break
-    return Swings(
+    of_others = np.zeros((2, 2 * count + 1))
+    of_others[[0, 1], [1, 0]], of_others[:, -1] = 1, (-1, 1)
+    u_others = np.sqrt(np.einsum("ij,jk,ik->i", of_others, covariance, of_others))
+    shifted = frequency[1::-1] + np.array([-rise, rise])
+    found = Swings(
         time=float(t.mean()),
         frequency=frequency,
         u=np.sqrt(np.diagonal(covariance)[:count]),
         amplitude=np.abs(amplitudes[:count]),
         vertical=rise,
+        others=np.stack([shifted, u_others, np.abs(amplitudes[count : count + 2])], axis=1),
         noise=noise,
         misfit=2 * t.size * math.log(noise**2) + float(off @ off),
-        rest=rest,
     )
+    return found, rest

@@ -67,6 +67,7 @@ COMMANDS = {
     "precession": "Precession against drive: slope and intercept, tested against a locked top, and what 1.05 would "
     "take.",
     "limit": "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
+    "sway": "Slow swings of a floating top from x and y over time: their split, beside Berry's geometric magnetism.",
     _EACH: "Each analysis that suits the runs or data files; --json prints a list where several suit.",
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from levilab.crosscheck.subjects import field, motion, phone, precession, spin, spindown
+from levilab.crosscheck.subjects import field, motion, phone, precession, spin, spindown, sway
 
 #: Name → subject.
 SUBJECTS = MappingProxyType(
@@ -18,6 +18,7 @@ SUBJECTS = MappingProxyType(
             motion.SUBJECT,
             precession.SUBJECT,
             field.SUBJECT,
+            sway.SUBJECT,
         )
     }
 )

@@ -34,6 +34,8 @@ SHORTHANDS = {
     "t": "time_s",
     "f": "spin_frequency_hz",
     "u": "spin_frequency_u_hz",
+    "x": "x_m",
+    "y": "y_m",
     "z": "height_m",
     "b": "flux_density_t",
     **{f"b{axis}": f"flux_density_{axis}_t" for axis in "xyz"},

@@ -69,6 +69,8 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "drive_frequency_hz": ("frequency", ("drive_frequency", "f_drive", "drive", "f_d", "antriebsfrequenz")),
     "drive_amplitude_v": ("voltage", ("drive_amplitude", "amplitude", "drive_voltage", "amplitude_drive")),
     "height_m": ("length", ("height", "z", "h", "höhe", "hoehe")),
+    "x_m": ("length", ("x", "x_position", "position_x")),
+    "y_m": ("length", ("y", "y_position", "position_y")),
     "flux_density_t": ("flux density", ("flux_density", "b", "bz", "b_z", "field", "flussdichte")),
     # along the axes of a phone; b_z alone is that of a Hall probe on the axis
     **{
@@ -170,7 +172,7 @@ CANONICAL = (*QUANTITIES, *COMPANIONS)
 #: Components of a field along a phone's axes.
 COMPONENTS = tuple(f"flux_density_{axis}_t" for axis in "xyz")
 #: Those that a message lists.
-LISTED = tuple(name for name in CANONICAL if COMPANIONS.get(name, name) not in COMPONENTS)
+LISTED = tuple(name for name in CANONICAL if COMPANIONS.get(name, name) not in {*COMPONENTS, "x_m", "y_m"})
 
 
 def _all_names() -> dict[str, str]:

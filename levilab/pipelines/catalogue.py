@@ -36,6 +36,11 @@ from levilab.pipelines.spindown.laws import SYMBOLS
 from levilab.pipelines.spindown.quantities import SPINDOWN_ROW
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_columns, spindown_tables
+from levilab.pipelines.sway.document import DOCUMENT as SWAY
+from levilab.pipelines.sway.quantities import QUANTITIES as SWAY_QUANTITIES
+from levilab.pipelines.sway.quantities import SWAY_ROW
+from levilab.pipelines.sway.report import sway_part
+from levilab.pipelines.sway.table import sway_columns, sway_tables
 from levilab.present.clock import moment
 from levilab.present.numbers import short_name
 
@@ -127,6 +132,7 @@ class Analysis(Generic[A]):
         from levilab.pipelines.precession.figure import precession_figure
         from levilab.pipelines.spin.figure import spin_figure
         from levilab.pipelines.spindown.figure import spindown_figure
+        from levilab.pipelines.sway.figure import sway_figure
 
         figures: dict[str, Callable[[Any], Figure]] = {
             "spindown": spindown_figure,
@@ -134,6 +140,7 @@ class Analysis(Generic[A]):
             "field": field_figure,
             "limit": limit_figure,
             "precession": precession_figure,
+            "sway": sway_figure,
         }
         return figures[self.name](found)
 
@@ -157,6 +164,7 @@ _TABLE: tuple[Analysis[Any], ...] = (
         PRECESSION_ROW,
         symbols_of(PRECESSION_QUANTITIES),
     ),
+    Analysis(SWAY, sway_tables, sway_part, sway_columns, SWAY_ROW, symbols_of(SWAY_QUANTITIES)),
 )
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 

@@ -230,6 +230,20 @@ class LimitOptions(InputOptions):
     near: float | None = field(default=None, metadata=_NEAR)
 
 
+@dataclass(frozen=True)
+class SwayOptions(InputOptions):
+    """Options of the slow swings of a top."""
+
+    device: Device | None = field(default=None, metadata=_DEVICE)
+    scan: Path | None = field(default=None, metadata=_about(
+        "A Hall scan of the base, a run or a file; without one the radii of --device count.", kind=Path, metavar="PATH",
+        read=Path,
+    ))  # fmt: skip
+    spin_hz: float | None = field(default=None, metadata=_about(
+        "Spin of the top, where no column has it.", kind=float, metavar="HZ", typed="spin", unit="Hz", above=0.0,
+    ))  # fmt: skip
+
+
 def options_of(kind: type[InputOptions]) -> dict[str, Option]:
     """Return the options of an analysis by the names of their fields."""
     return {one.name: one.metadata["option"] for one in fields(kind) if "option" in one.metadata}
@@ -238,7 +252,7 @@ def options_of(kind: type[InputOptions]) -> dict[str, Option]:
 #: Name of the analysis → its options.
 KINDS: Mapping[str, type[InputOptions]] = MappingProxyType({
     "spindown": SpinDownOptions, "spin": SpinOptions, "field": FieldOptions, "precession": PrecessionOptions,
-    "limit": LimitOptions,
+    "limit": LimitOptions, "sway": SwayOptions,
 })  # fmt: skip
 #: All options by the names of their fields.
 OPTIONS: Mapping[str, Option] = MappingProxyType(

@@ -58,6 +58,7 @@ UNITS = (
     _row("Hz/s", "hz_per_s"),
     _row("Hz/s^2", "hz_per_s2", "Hz/s²"),
     _row("1/s", "per_s", "s⁻¹"),
+    _row("1/m", "per_m", "m⁻¹"),
     _row("1/rad", "per_rad", "rad⁻¹"),
     _row("(rad/s)^-1/2/s", "per_sqrt_rad_s", "(rad/s)^−½/s"),
     _row("(rad/s)^(1-exponent)/s", "si", "(rad/s)^(1−n)/s"),

@@ -252,10 +252,10 @@ def test_numbers_without_header_are_time_frequency_and_uncertainty_with_a_warnin
         ("t,CH1 [kHz]\n0,.0615\n0.5,.06125\n1,.061\n", {"f": "CH1"}, PLAIN),
         ("t,CH1 (top)\n0,61.5\n0.5,61.25\n1,61\n", {"f": "CH1 (top)"}, PLAIN),
         ("t,rpm\n0,3690\n0.5,3675\n1,3660\n", {"f": "rpm"}, PLAIN),
-        ("t,x,y\n0,20,2\n0.5,25,0.5\n1,40,1\n", {"f": "2 [ms]"}, {T: PLAIN[T], F: [50, 40, 25]}),
+        ("t,x,w\n0,20,2\n0.5,25,0.5\n1,40,1\n", {"f": "2 [ms]"}, {T: PLAIN[T], F: [50, 40, 25]}),
         (
-            "t,x,y\n0,20,2\n0.5,25,5\n1,40,1\n",
-            {"f": "2 [ms]", "u": "y [%]"},
+            "t,x,w\n0,20,2\n0.5,25,5\n1,40,1\n",
+            {"f": "2 [ms]", "u": "w [%]"},
             {T: PLAIN[T], F: [50, 40, 25], U: [1, 2, 0.25]},
         ),
     ],
@@ -318,7 +318,7 @@ def test_an_error_is_one_line_that_names_file_and_place(name, table_file):
     message = str(caught.value)
     assert message.startswith(str(path))
     assert message.isprintable()
-    assert len(message) < len(str(path)) + 320
+    assert len(message) < len(str(path)) + 330
     assert all(word in message for word in words), message
     if any(word.startswith("line ") for word in words):
         assert f"line {caught.value.line}" in words

@@ -27,6 +27,7 @@ CASES = {
     "a sound": ("spin", ("scope-files/recording.wav",)),
     "rounded times": ("spin", ("scope-files/rigol-ds1000e.csv",)),
     "a sweep": ("precession", ("precession-sweep",)),
+    "a track": ("sway", ("sway/track.csv",)),
     "a scan": ("field", ("field-scan",)),
     "lower limits": ("limit", ("lower-limits",)),
     "upper limits": ("limit", ("upper-limits",)),

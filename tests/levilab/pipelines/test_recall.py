@@ -24,6 +24,7 @@ INPUTS = (
     ("limit", ["lower-limits"]),
     ("limit", ["lower-limits", "upper-limits"]),
     ("precession", ["precession-sweep"]),
+    ("sway", ["sway"]),
 )
 
 

@@ -1,0 +1,73 @@
+"""The slow swings of a top in full motion, filmed while it spins down: geometric magnetism."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
+from levilab.formats.device import read_device
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.scene import Scene, preset
+from levilab.simulator.single import simulate
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+#: Frames per second, error of a coordinate [m], and length of the film [s].
+RATE, NOISE_M, DURATION_S = 120.0, 1e-4, 110.0
+#: The mass is weighed to this [kg].
+_WEIGHED_U_KG = 1e-5
+
+
+def draw_scene(seed: int) -> Scene:
+    """Draw mass, place, velocity, tilt and drag of a top at 40 Hz, and what pushes it."""
+    by = np.random.default_rng((seed, 23))
+    resting = preset("undriven").changed({"top.mass_kg": float(by.uniform(0.02500, 0.02540)), "drag.law": "disc"})
+    floating = stability_of(resting).floating
+    if floating is None:
+        raise TrialFailed("the top that was drawn floats nowhere")
+    away, azimuth = float(by.uniform(2e-4, 1e-3)), float(by.uniform(0, 2 * np.pi))
+    height = floating.height + float(by.uniform(-5e-4, 5e-4))
+    return resting.changed(
+        {
+            "start.place": "given",
+            "start.spin_hz": 40.0,
+            "start.position_m": [away * np.cos(azimuth), away * np.sin(azimuth), height],
+            "start.velocity_m_s": by.uniform(-3e-3, 3e-3, 3).tolist(),
+            "start.tilt_rad": float(by.uniform(0.003, 0.02)),
+        }
+    )
+
+
+def trial(seed: int, folder: Path) -> list[Pull]:
+    """Try one film of a drawn top.  The truth is (I₃ω₃/m)(B′/2B)² where a top of its mass floats at rest."""
+    scene = draw_scene(seed)
+    place = stability_of(scene).floating
+    assert place is not None
+    motion = simulate(scene, DURATION_S, rate=RATE, tolerance=1e-5)
+    noise = NOISE_M * np.random.default_rng((seed, 24)).standard_normal((len(motion.time), 2))
+    table = np.column_stack([motion.time, motion.position[:, :2] + noise, motion.spin_hz])[:-1]
+    track, device = folder / "track.csv", folder / "device.toml"
+    np.savetxt(track, table, "%.6f", ",", header="time_s,x_m,y_m,spin_frequency_hz", comments="")
+    top, base = scene.top, scene.base
+    device.write_text(
+        f"[base]\ninner_radius_m = {base.inner_radius_m}\nouter_radius_m = {base.outer_radius_m}\n[top]\n"
+        f"mass_kg = {top.mass_kg}\nmass_u_kg = {_WEIGHED_U_KG}\n"
+        f"inertia_transverse_kg_m2 = {top.inertia_transverse_kg_m2}\ninertia_axial_kg_m2 = {top.inertia_axial_kg_m2}\n",
+        encoding="utf-8",
+    )
+    analysis = ANALYSES["sway"]
+    (found,) = analysis.analyze([track], analysis.options_from({"device": read_device(device)})).runs
+    b, slope, _ = stability_of(scene).field(np.array([place.height]))[:, 0]
+    truth = top.inertia_axial_kg_m2 / top.mass_kg * float(slope / (2 * b)) ** 2 * found.geometry.spin
+    return [pull_of("geometric magnetism", found.geometry.measured, truth)]
+
+
+SUBJECT = Subject(
+    "sway",
+    "the slow swings of a top in full motion, filmed while it spins down: geometric magnetism",
+    trial,
+)

@@ -1,0 +1,140 @@
+"""Tracks of a swaying top at some paths, each by itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray  # noqa: TC002 - pydantic reads it
+
+from analysis.errors import AnalysisError
+from analysis.numbers import digits
+from analysis.sway import Geometry, Swings, geometric_magnetism, mirrored, swings_of
+from levilab.errors import DataError
+from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.options import SwayOptions
+from levilab.pipelines.sources import Needs
+from levilab.pipelines.sway.device import known_of
+from levilab.pipelines.sway.readings import SwayReadings, read_motion_run, read_track_file
+from levilab.present.numbers import with_uncertainty
+from levilab.runs.run import STATES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from levilab.pipelines.sources import Source
+
+SWAY = "sway"
+NEEDS = Needs(
+    analysis=SWAY,
+    experiments=frozenset({"simulate"}),
+    read_file=read_track_file,
+    read_run=read_motion_run,
+    data=STATES,
+    particular=True,
+    wanted="track of x and y over time, or a simulated motion",
+)
+#: A split of fewer standard uncertainties excludes nothing; a ratio that is more of them from 1 disagrees.
+_ENOUGH = 3.0
+#: A relative u above this comes from the meeting of beat and vertical swing, and there is something to do about it.
+_LARGE_U = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class SwayRun:
+    """One track.
+
+    Attributes:
+        swings: of each window.
+        spin: in the middle of each, shape (n,) [Hz].
+        geometry: what they say.
+        mirrored: whether the view was mirrored; None where no precession is seen to tell it.
+        text: in a few sentences.
+        warnings: what to know before using the numbers.
+    """
+
+    swings: tuple[Swings, ...]
+    spin: NDArray[np.float64]
+    geometry: Geometry
+    mirrored: bool | None
+    text: str
+    warnings: tuple[str, ...]
+
+
+class SwayAnalysis(Analyzed[SwayReadings, SwayRun, None, SwayOptions]):
+    """Tracks, each by itself: another mass or another height has another split."""
+
+    @property
+    def text(self) -> str:
+        """What the data say, in a few sentences."""
+        if len(self.runs) == 1:
+            return self.runs[0].text
+        return "  ".join(f"{source.name}: {run.text}" for source, run in zip(self.sources, self.runs, strict=True))
+
+    def about_run(self, run: SwayRun) -> Iterable[str]:
+        """Return what to know of one track."""
+        return run.warnings
+
+
+def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRun:
+    """Find the swings of one input, and what they say.  Raises DataError, which names the file."""
+    readings = source.readings
+    spin = np.full(len(readings), options.spin_hz) if options.spin_hz is not None else readings.spin
+    if spin is None:
+        raise DataError(
+            f"{source.data}: the spin is not known: a column spin_frequency_hz, or the option `spin` where it is "
+            "nearly constant, is expected"
+        )
+    known, notes = known_of(source, options)
+    times, places = readings.time, readings.x + 1j * readings.y
+    try:
+        swings = swings_of(times, places)
+        view = mirrored(swings)
+        if view:
+            swings = swings_of(times, places.conj())
+        at = np.interp([one.time for one in swings], times, np.abs(spin))
+        geometry = geometric_magnetism(swings, at, known)
+    except AnalysisError as error:
+        raise DataError(f"{source.data}: {error}") from error
+    return SwayRun(
+        tuple(swings), at, geometry, view, _in_words(geometry), (*notes, *_doubts(swings, geometry, view=view))
+    )
+
+
+METHOD = Method(needs=NEEDS, kind=SwayAnalysis, options=SwayOptions, fit=analyze_source, skips=True)
+
+
+def _in_words(found: Geometry) -> str:
+    excluded = found.against_null > _ENOUGH
+    null = (
+        f"That swings do not split is excluded: the split is {digits(found.against_null)} standard uncertainties."
+        if excluded
+        else f"That swings do not split is not excluded: the split is {digits(found.against_null)} standard "
+        "uncertainties."
+    )
+    off = abs((found.ratio.value or 0.0) - 1) / (found.ratio.u or np.inf)
+    agrees = "agrees with" if off < _ENOUGH else "disagrees with"
+    predicted = replace(found.predicted, u=found.predicted.u or 0.0)
+    return (
+        f"The slow swings are split by geometric magnetism of {with_uncertainty(found.measured)} at a spin of "
+        f"{found.spin:g} Hz, which {agrees} the {with_uncertainty(predicted)} that follow from the field: ratio "
+        f"{with_uncertainty(found.ratio)}. {null}"
+    )
+
+
+def _doubts(swings: Sequence[Swings], found: Geometry, *, view: bool | None) -> Iterable[str]:
+    if view:
+        yield "the precession turns backwards: the view is from below, or in a mirror; y has got the other sign"
+    if view is None:
+        yield (
+            "no precession is seen, which would show whether the view is mirrored: a split of the other sign would be "
+            "one of a mirrored view"
+        )
+    if (found.measured.u or 0.0) > _LARGE_U * abs(found.measured.value or 0.0):
+        beat = float(np.mean([one.frequency[1] - one.frequency[0] for one in swings]))
+        vertical = float(np.mean([one.vertical for one in swings]))
+        yield (
+            f"u is large: the beat of the slow swings, {beat:.2f} Hz, is near the vertical swing, {vertical:.2f} Hz, "
+            "and they exchange energy; add or take off a washer of 0.1 g, or let the top swing less"
+        )

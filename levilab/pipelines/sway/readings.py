@@ -1,0 +1,74 @@
+"""Places of a top over time, seen from above: of a file, or of a simulated motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from levilab.formats.columns import TableError
+from levilab.formats.table import read_run_readings, read_table
+from levilab.pipelines.sources import Readings
+from levilab.runs.run import STATES
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from levilab.formats.table import Table
+    from levilab.pipelines.options import InputOptions
+    from levilab.runs.run import Run
+
+    Array = NDArray[np.float64]
+
+#: Columns of a table that are looked at, and those without which it is no track.
+QUANTITIES = ("time_s", "x_m", "y_m", "spin_frequency_hz")
+NEEDED = QUANTITIES[:3]
+#: A top that is farther from the axis has left the field [m]: beyond, the unit is most likely another one.
+_FARTHEST_M = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class SwayReadings(Readings):
+    """A track, each array of shape (n,).
+
+    Attributes:
+        time: [s].
+        x, y: across the axis, seen from above [m].
+        spin: [Hz]; None where the table has none.
+        warnings: about the file.
+    """
+
+    time: Array
+    x: Array
+    y: Array
+    spin: Array | None
+    warnings: tuple[str, ...]
+
+    compared: ClassVar[tuple[str, ...]] = ("time", "y", "x")
+
+
+def read_track_file(path: Path, options: InputOptions) -> SwayReadings:
+    """Return the track in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
+    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=False)
+    return _readings(table)
+
+
+def read_motion_run(run: Run, _: InputOptions) -> SwayReadings:
+    """Return the track of a simulated motion."""
+    return _readings(read_run_readings(run.folder / STATES, QUANTITIES))
+
+
+def _readings(table: Table) -> SwayReadings:
+    time, x, y = (table.column(name) for name in NEEDED)
+    far = np.flatnonzero(np.hypot(x - np.median(x), y - np.median(y)) > _FARTHEST_M)
+    if far.size:
+        raise TableError(
+            table.path,
+            f"the top is {np.hypot(x, y)[far[0]]:.3g} m off, less than {_FARTHEST_M:g} m is expected: if the unit is "
+            "another one, say so, as `columns` = x=NAME [mm],y=NAME [mm]",
+            line=int(table.lines[far[0]]),
+        )
+    return SwayReadings(time, x, y, table.columns.get("spin_frequency_hz"), table.warnings)

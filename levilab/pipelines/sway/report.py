@@ -1,0 +1,116 @@
+"""Slow swings → their part of a report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from analysis.numbers import digits
+from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, labels_of
+from levilab.pipelines.sway.table import quantities_table, windows_table
+from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
+from levilab.present.numbers import with_uncertainty
+
+if TYPE_CHECKING:
+    from levilab.pipelines.sources import Source
+    from levilab.pipelines.sway.analysis import SwayAnalysis, SwayRun
+    from levilab.pipelines.sway.readings import SwayReadings
+
+_VALUES = (
+    f"{VALUE_U} Ω_g/2π is what the split would be of small swings of a slow top, brought to a spin of 30 Hz: the "
+    "frequencies are corrected for the size of the swings and of the precession. Predicted: (I₃ω₃/m)(B′/2B)² with the "
+    "form of the base's field at the height at which the swings are as fast as seen; neither the strength of the base "
+    "nor the moment of the top is needed."
+)
+
+
+def sway_part(analysis: SwayAnalysis) -> ReportPart:
+    """Return what the swings say, and the windows."""
+    return ReportPart(
+        subject="slow swings",
+        heading="Slow swings of a floating top: geometric magnetism",
+        lead=f"{sum(len(run.swings) for run in analysis.runs)} windows",
+        verdict=analysis.text,
+        result=(
+            Paragraph(" ".join(_meaning(analysis)), "What it means."),
+            Tabular("sway-values", quantities_table(analysis), _VALUES, first_column_wraps=True),
+        ),
+        figure=FigureText(
+            title="Slow swings.",
+            caption=(
+                "How far the slow swings are split, against the spin, with the prediction and with no split at all; "
+                "and the spectrum of one window, whose negative frequencies turn against the spin."
+            ),
+            alt="Split of the slow swings against the spin, and the signed spectrum of a window",
+            points=_points(analysis),
+        ),
+        runs_title="Window by window",
+        runs=tuple(
+            Tabular(f"sway-windows-{k}", windows_table(run, source.name))
+            for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
+        ),
+        inputs=input_parts(analysis, _in_words, _readings),
+    )
+
+
+def _in_words(source: Source[SwayReadings], run: SwayRun, *_: object) -> tuple[str, ...]:
+    time = source.readings.time
+    noise = 1e3 * max(one.noise for one in run.swings)
+    rate = (len(time) - 1) / float(time[-1] - time[0])
+    return (
+        f"{len(time)} places from {time[0]:.1f} s to {time[-1]:.1f} s, {rate:.0f} a second",
+        f"what the lines leave of a coordinate: {noise:.2g} mm at most",
+    )
+
+
+def _readings(_: Source[SwayReadings], run: SwayRun, *__: object) -> tuple[Listing]:
+    return (Listing("sway-readings", replace(windows_table(run, ""), title="Windows")),)
+
+
+def _points(analysis: SwayAnalysis) -> tuple[Points, ...]:
+    """Return what each window of the figure answers."""
+    return tuple(
+        Points(f"readings-{k}", tuple("\n".join(filter(None, (name, *_point(run, i)))) for i in range(len(run.spin))))
+        for k, (name, run) in enumerate(zip(labels_of(analysis.sources), analysis.runs, strict=True))
+    )
+
+
+def _point(run: SwayRun, i: int) -> tuple[str, ...]:
+    found = run.geometry
+    return (
+        f"spin = {run.spin[i]:.2f} Hz",
+        f"split = {1e3 * found.splits[i]:.1f} mHz",
+        f"predicted = {1e3 * found.expected[i]:.1f} mHz",
+    )
+
+
+# --- what it means ---
+
+_WHY = (
+    "A top that floats sways to and fro in a second or two. If its moment kept its direction, it would sway equally "
+    "fast clockwise and counterclockwise; the moment follows the field instead, takes the angular momentum along, "
+    "and the top is pushed aside as a charge in a magnetic field."
+)
+
+
+def _meaning(analysis: SwayAnalysis) -> tuple[str, ...]:
+    """Return the meaning of the first track in sentences that a student understands."""
+    run = analysis.runs[0]
+    found, first, last = run.geometry, run.swings[0], run.swings[-1]
+    shift = 100 * abs(float(found.shifts.sum(axis=1).mean()) / float(found.splits.mean()))
+    sways = (
+        f"It sways at {abs(first.frequency[0]):.3f} Hz against and {first.frequency[1]:.3f} Hz with the spin while it "
+        f"spins at {run.spin[0]:.1f} Hz, and at {abs(last.frequency[0]):.3f} Hz and {last.frequency[1]:.3f} Hz at "
+        f"{run.spin[-1]:.1f} Hz."
+    )
+    said = [
+        _WHY,
+        sways,
+        f"Its swings are so large that the split is shifted by {digits(shift)} %, which is taken away.",
+    ]
+    if found.of_precession:
+        said.append(
+            f"The precession, another motion, gives B′/2B = {with_uncertainty(found.of_precession)}, the field "
+            f"{with_uncertainty(found.of_base)} and the slow swings {with_uncertainty(found.gradient)}."
+        )
+    return tuple(said)

@@ -1,0 +1,113 @@
+"""Tracks of a swaying top: what they are read from, what they say, and how people see it."""
+
+import csv
+import json
+
+import pytest
+
+from levilab.errors import DataError, DoesNotSuit
+from levilab.formats.device import Device, read_device
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.many.one import Row, Task, analyze_one
+from levilab.pipelines.suits import analyze_suiting
+from support.commands import command
+from support.paths import ROOT
+
+TRACK = ROOT / "sample_data/sway/track.csv"
+TRUE_HZ = 0.17490  # (I₃ω₃/m)(B′/2B)² of the thesis's base and inertias, 25.30 g, where it floats, at 30 Hz
+SWAY = ANALYSES["sway"]
+#: The top of the sample data.
+TOP = {"mass_kg": 0.0253, "inertia_transverse_kg_m2": 1.04e-6, "inertia_axial_kg_m2": 1.731314e-6}
+DEVICE = Device.model_validate({"base": {"inner_radius_m": 0.030, "outer_radius_m": 0.055}, "top": TOP})
+
+
+def analyze(path, **options):
+    return SWAY.analyze([path], SWAY.options_from(options))
+
+
+@pytest.fixture(scope="module")
+def found():
+    return analyze(TRACK, device=DEVICE)
+
+
+def rows_of(path):
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()[1:]))
+
+
+def write(path, titles, rows):
+    path.write_text("\n".join([",".join(titles), *(",".join(row) for row in rows)]) + "\n", encoding="utf-8")
+    return path
+
+
+def test_the_sample_has_the_geometric_magnetism_of_its_top(found):
+    geometry = found.runs[0].geometry
+    assert abs(geometry.measured.value - TRUE_HZ) < 3 * geometry.measured.u
+    assert geometry.measured.u < 0.03 * TRUE_HZ
+    assert geometry.predicted.value == pytest.approx(TRUE_HZ, rel=2e-3)  # it floats lower by its swings
+    assert abs(geometry.ratio.value - 1) < 3 * geometry.ratio.u
+    assert "excluded" in found.text
+    assert found.all_warnings == []
+    assert [one.frequency.size for one in found.runs[0].swings[:3]] == [3, 3, 3]
+
+
+def test_a_view_from_below_gives_the_same_with_a_note(found, tmp_path):
+    rows = [(r["t [s]"], str(-float(r["x [mm]"]) / 10), str(float(r["y [mm]"]) / 10), r["spin [Hz]"])
+            for r in rows_of(TRACK)]  # fmt: skip
+    below = analyze(write(tmp_path / "below.csv", ("Zeit [s]", "x (cm)", "y (cm)", "f [Hz]"), rows), device=DEVICE)
+    assert below.runs[0].geometry.measured.value == pytest.approx(found.runs[0].geometry.measured.value, rel=1e-6)
+    assert "backwards" in " ".join(below.all_warnings)
+
+
+def test_without_a_spin_nothing_is_said_and_an_option_gives_it(found, tmp_path):
+    rows = [(r["t [s]"], r["x [mm]"], r["y [mm]"]) for r in rows_of(TRACK)[:1200]]
+    path = write(tmp_path / "short.csv", ("t [s]", "x [mm]", "y [mm]"), rows)
+    with pytest.raises(DataError, match="the spin is not known"):
+        analyze(path, device=DEVICE)
+    geometry = analyze(path, device=DEVICE, spin_hz=38.56).runs[0].geometry
+    assert abs(geometry.measured.value - TRUE_HZ) < 3 * geometry.measured.u
+
+
+def test_the_base_is_the_calliper_s_or_that_of_a_scan():
+    of_file = analyze(TRACK, device=read_device(ROOT / "sample_data/device.toml")).runs[0]
+    assert of_file.warnings == ()
+    scanned = analyze(TRACK, scan=ROOT / "sample_data/field-scan").runs[0]
+    assert scanned.geometry.of_base.value == pytest.approx(9.21, rel=5e-3)
+    assert "radii" not in scanned.warnings[0]
+    assert "radii" in analyze(TRACK).runs[0].warnings[0]
+
+
+def test_a_simulated_motion_is_compared_with_its_own_scene(tmp_path):
+    keys = ("start.spin_hz=35", "drag.law=disc", "start.position_m=[0.0006,0,0.0729]", "top.mass_kg=0.0253")
+    made = command(
+        "simulate", "undriven", "--duration", "20", *(word for key in keys for word in ("--set", key)), "--out", "out",
+        cwd=tmp_path,
+    )  # fmt: skip
+    assert made.status == 0
+    ended = command("analyze", "sway", "out", "--no-save", "--json", cwd=tmp_path)
+    assert ended.status == 0, ended.err
+    document = json.loads(ended.out)
+    assert document["synthetic"]
+    # of a single window, whose swings are one part in a thousand
+    assert document["values"]["ratio"]["value"] == pytest.approx(1, abs=5 * document["values"]["ratio"]["u"])
+    assert document["values"]["windows"]["value"] == 1
+
+
+def test_a_track_is_for_this_analysis_alone_and_other_tables_are_not():
+    assert [row.name for row, _ in analyze_suiting([TRACK], {})] == ["sway"]
+    with pytest.raises(DoesNotSuit):
+        analyze(ROOT / "sample_data/spin-down-1/readings.csv")
+
+
+def test_places_in_a_wrong_unit_are_named(tmp_path):
+    rows = [(str(k / 60), str(3.0 * (k % 2)), "0", "30") for k in range(200)]
+    with pytest.raises(DataError, match=r"x=NAME \[mm\]"):
+        analyze(write(tmp_path / "metres.csv", ("t", "x", "y", "f"), rows))
+
+
+def test_report_figure_and_table_of_many_show_it(found):
+    part = SWAY.part(found)
+    assert "geometric magnetism" in part.verdict
+    assert SWAY.png(found)[:4] == b"\x89PNG"
+    row = analyze_one(Task(TRACK, False, True, "sway", SWAY.options_from({"device": DEVICE}), TRACK.parent))
+    assert isinstance(row, Row)
+    assert not row.problem
