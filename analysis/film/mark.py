@@ -15,11 +15,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
+    Waves = NDArray[np.complex128]
 
 #: Of one turn, where picture and pattern are compared; a parabola goes on from there.
 _FINE = 512
 #: Pattern and phases are found in turn.
 _ROUNDS = 3
+#: Pictures of which the pattern is made, and that are compared at a time.
+_MOST = 2000
 #: Samples that the noise of a picture is alike over: rays are closer than pixels.
 _CORRELATED = 3.0
 
@@ -45,27 +48,47 @@ def phases_of(profiles: Array) -> Phases:
     Args:
         profiles: brightness along bands of the top, shape (n, bands, rays).
     """
-    changing = profiles - np.median(profiles, axis=0)
-    changing -= changing.mean(axis=2, keepdims=True)
-    rays = profiles.shape[2]
-    waves = np.fft.rfft(changing, axis=2)
-    order = np.arange(waves.shape[2])
+    chosen = profiles[:: -(-len(profiles) // _MOST)]
+    still = np.median(chosen, axis=0)
+    waves, _ = _changes(chosen, still)
     power = np.mean(np.abs(waves[:, :, 1]) ** 2, axis=0)
-    phase = -np.angle(waves[:, int(np.argmax(power)), 1]) / (2 * np.pi)
+    best = int(np.argmax(power))
+    phase = -np.angle(waves[:, best, 1]) / (2 * np.pi)
     for _ in range(_ROUNDS):
-        pattern = np.mean(waves * np.exp(2j * np.pi * order * phase[:, None])[:, None], axis=0)
+        pattern = np.mean(waves * _turned(-phase, waves.shape[2]), axis=0)
         phase = _agreement(np.sum(waves * pattern.conj(), axis=1))
-    model = pattern * np.exp(-2j * np.pi * order * phase[:, None])[:, None]
-    rest = changing - np.fft.irfft(model, rays, axis=2)
-    slope = np.fft.irfft(2j * np.pi * order * pattern, rays, axis=1)
+    found = [_compare(part, still, pattern) for part in np.array_split(profiles, -(-len(profiles) // _MOST))]
+    phases, u = (np.concatenate(columns) for columns in zip(*found, strict=True))
+    rays = profiles.shape[2]
+    shape = np.fft.irfft(pattern, rays, axis=1)[best]
+    middle = np.sum(np.abs(shape) ** 3 * np.exp(2j * np.pi * np.arange(rays) / rays))
+    return Phases(phases % 1, u, float(np.angle(middle)) / (2 * np.pi))
+
+
+def _changes(profiles: Array, still: Array) -> tuple[Waves, Array]:
+    """Return what changes in pictures, as Fourier coefficients along the bands, and as it is."""
+    changing = profiles - still
+    changing -= changing.mean(axis=2, keepdims=True)
+    return np.fft.rfft(changing, axis=2), changing
+
+
+def _turned(phase: Array, count: int) -> Waves:
+    """Return factors that turn Fourier coefficients by phases, shape (n, 1, count)."""
+    return np.asarray(np.exp(-2j * np.pi * np.arange(count) * phase[:, None])[:, None])
+
+
+def _compare(profiles: Array, still: Array, pattern: Waves) -> tuple[Array, Array]:
+    """Return phases of pictures by the pattern, and their standard uncertainties [turns]."""
+    waves, changing = _changes(profiles, still)
+    rays = profiles.shape[2]
+    phase = _agreement(np.sum(waves * pattern.conj(), axis=1))
+    rest = changing - np.fft.irfft(pattern * _turned(phase, waves.shape[2]), rays, axis=2)
+    slope = np.fft.irfft(2j * np.pi * np.arange(waves.shape[2]) * pattern, rays, axis=1)
     noise = np.sum(rest**2, axis=(1, 2)) / (rest[0].size / _CORRELATED - 3)
-    u = np.sqrt(noise / np.maximum(np.sum(slope**2), 1e-30))
-    shape = np.fft.irfft(pattern, rays, axis=1)[int(np.argmax(power))]
-    middle = np.sum(np.abs(shape) * shape**2 * np.exp(2j * np.pi * np.arange(rays) / rays))
-    return Phases(phase % 1, u, float(np.angle(middle)) / (2 * np.pi))
+    return phase, np.sqrt(noise / max(float(np.sum(slope**2)), 1e-30))
 
 
-def _agreement(waves: Array) -> Array:
+def _agreement(waves: Waves) -> Array:
     """Return where the correlation of picture and pattern is greatest, shape (n,) [turns].
 
     Args:

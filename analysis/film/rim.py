@@ -96,7 +96,7 @@ def fit_rim(picture: Picture, start: Circle, *, width: float = 1.0, rounds: int 
             break
     pixels = min(kept, 2 * np.pi * circle.radius / _CORRELATED)
     inner = np.concatenate([np.linspace(*band, _IN_BAND) for band in _BANDS]) * circle.radius
-    profiles = _sample(picture, circle, inner).reshape(RAYS, len(_BANDS), _IN_BAND).mean(axis=2).T
+    profiles = _sample(picture, circle, inner).reshape(RAYS, len(_BANDS), _IN_BAND).mean(axis=2, dtype=np.float32).T
     contrast = float(np.ptp(np.median(rays, axis=0)))
     return Rim(circle, spread * math.sqrt(2 / pixels), contrast, profiles)
 

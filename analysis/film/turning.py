@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 
 from analysis.errors import TooFewReadings
 from analysis.film.errors import NoMark
@@ -36,6 +37,8 @@ _LINE_TIME = 20e-6
 _HARMONICS, _HARMONIC = 2, 0.01
 #: Means of residuals that show what neighbouring pictures share.
 _BLOCKS = 24
+#: Highest order of the polynomial (Chebyshev's) for the turns of a film: one more each two seconds.
+_MOST_BENDS = 12
 #: Length of a reading of the spin [s], and the fewest pictures in it.
 WINDOW_S, _FEWEST_IN_WINDOW = 1.0, 12
 
@@ -46,7 +49,6 @@ class Turning:
 
     Attributes:
         turns: since the first picture, by picture, shape (n,); rising: in the sense of the phase.
-        u_turns: standard uncertainty of a picture's phase from the residuals [turns].
         time: middles of the readings of the spin, shape (m,) [s].
         spin: shape (m,) [Hz].
         u: shape (m,) [Hz].
@@ -59,7 +61,6 @@ class Turning:
     """
 
     turns: Array
-    u_turns: float
     time: Array
     spin: Array
     u: Array
@@ -147,25 +148,27 @@ def turning_of(
     _follow(times[middle:], phase[middle:], turns[middle:], start, float(phase[middle]))
     _follow(times[middle::-1], phase[middle::-1], turns[middle::-1], start, float(phase[middle]))
     nuisance = _nuisance(turns, start * (rows - rows.mean()))
-    centre = float((times[0] + times[-1]) / 2)
-    value, covariance, rest = _fit(times - centre, turns, u, nuisance)
-    error = np.sqrt(np.diagonal(covariance))
-    straight = turns - value[2] * (times - centre) ** 2 - nuisance @ value[3:]
-    readings = [
-        _reading(times[part], straight[part], u[part], nuisance[part], covariance[3:, 3:]) for part in _windows(times)
-    ]
-    time, spin, u_spin = np.array(readings).reshape(-1, 3).T
+    centre, half = float((times[0] + times[-1]) / 2), float(np.ptp(times)) / 2
+    order = min(2 + int(half / WINDOW_S), _MOST_BENDS)
+    late = (times - centre) / half
+    value, covariance, rest = _fit(chebvander(late, order), turns, u, nuisance)
+    smooth, error = value[: order + 1], covariance[: order + 1, : order + 1]
+    slope, bend = (chebval(0.0, chebder(np.eye(order + 1), n)) / half**n for n in (1, 2))
+    speed = chebval(late, chebder(smooth)) / half
+    readings = np.array([
+        _reading(times[part], rest[part], u[part], nuisance[part], covariance[order + 1 :, order + 1 :])
+        for part in _windows(times)
+    ]).reshape(-1, 3)  # fmt: skip
     return Turning(
         turns=turns - turns[0],
-        u_turns=float(np.std(rest)),
-        time=time,
-        spin=spin + 2 * float(value[2]) * (time - centre),
-        u=u_spin,
+        time=readings[:, 0],
+        spin=readings[:, 1] + np.interp(readings[:, 0], times, speed),
+        u=readings[:, 2],
         middle=centre,
-        frequency=float(value[1]),
-        u_frequency=float(error[1]),
-        chirp=2 * float(value[2]),
-        u_chirp=2 * float(error[2]),
+        frequency=float(slope @ smooth),
+        u_frequency=float(np.sqrt(slope @ error @ slope)),
+        chirp=float(bend @ smooth),
+        u_chirp=float(np.sqrt(bend @ error @ bend)),
         choices=choices,
     )
 
@@ -191,26 +194,25 @@ def _follow(times: Array, phase: Array, turns: Array, frequency: float, start: f
         frequency += _GAIN * off / step * min(1.0, abs(step) / 0.01)
 
 
-def _fit(t: Array, turns: Array, u: Array, nuisance: Array) -> tuple[Array, Array, Array]:
-    """Return coefficients of 1, t, t² and of what else is in a phase, their covariance, and residuals.
+def _fit(basis: NDArray[np.floating], turns: Array, u: Array, nuisance: Array) -> tuple[Array, Array, Array]:
+    """Return coefficients of a basis, shape (n, m), and of the nuisance, their covariance, and residuals.
 
     Uncertainties are those of the phases, or of their scatter where that is greater; slow residuals, which many
     pictures share, count by the scatter of their means.
     """
-    length = float(np.abs(t).max())
-    scale = np.array([1.0, length, length**2] + [1.0] * nuisance.shape[1])
-    design = np.concatenate([t[:, None] ** np.arange(3), nuisance], axis=1) / scale
-    prior = np.diag([0.0] * 3 + [1.0] * nuisance.shape[1])
+    n, m = basis.shape
+    design = np.concatenate([basis, nuisance], axis=1)
+    prior = np.diag([0.0] * m + [1.0] * nuisance.shape[1])
     weighted = np.concatenate([design / u[:, None], prior])
     found = np.linalg.lstsq(weighted, np.concatenate([turns / u, np.zeros(len(prior))]), rcond=None)[0]
     rest = turns - design @ found
-    factor = max(float(np.sum((rest / u) ** 2)) / max(t.size - 3, 1), 1.0)
-    block = t.size // _BLOCKS
+    factor = max(float(np.sum((rest / u) ** 2)) / max(n - m, 1), 1.0)
+    block = n // _BLOCKS
     if block > 1:
-        means = (rest / u)[: t.size // block * block].reshape(-1, block).mean(axis=1)
-        factor = max(factor, block * float(np.sum(means**2)) / max(means.size - 3, 1))
-    information = weighted[: t.size].T @ weighted[: t.size] / factor + prior**2
-    return found / scale, np.linalg.inv(information) / np.outer(scale, scale), rest
+        means = (rest / u)[: n // block * block].reshape(-1, block).mean(axis=1)
+        factor = max(factor, block * float(np.sum(means**2)) / max(means.size - m, 1))
+    information = weighted[:n].T @ weighted[:n] / factor + prior**2
+    return found, np.linalg.inv(information), rest
 
 
 def _windows(times: Array) -> list[NDArray[np.intp]]:
@@ -220,9 +222,9 @@ def _windows(times: Array) -> list[NDArray[np.intp]]:
     return [part for part in np.split(np.arange(times.size), edges) if part.size >= _FEWEST_IN_WINDOW]
 
 
-def _reading(times: Array, straight: Array, u: Array, nuisance: Array, covariance: Array) -> tuple[float, float, float]:
-    """Return time, spin and u of some pictures; slope and nuisance of the whole film are off their turns."""
+def _reading(times: Array, rest: Array, u: Array, nuisance: Array, covariance: Array) -> tuple[float, float, float]:
+    """Return time and spin of some pictures beyond the smooth one of the film, by their residuals, and its u."""
     at = float((times[0] + times[-1]) / 2)
-    value, own, _ = _fit(times - at, straight, u, np.empty((times.size, 0)))
+    value, own, _ = _fit(np.vander(times - at, 2, increasing=True), rest, u, np.empty((times.size, 0)))
     slopes = np.polyfit(times - at, nuisance, 1)[0]
     return at, float(value[1]), float(np.sqrt(own[1, 1] + slopes @ covariance @ slopes))
