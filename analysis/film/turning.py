@@ -32,9 +32,12 @@ _EXCLUDED = 25.0
 _GAIN = 0.03
 #: Time from a row to the next one where it is not known, as a standard deviation [s]: 5 to 30 µs in phones.
 _LINE_TIME = 20e-6
-#: Harmonics of the angle in a phase, and how large they may be, as a standard deviation [turns]: a mark that turns
-#: about a point a twentieth of its radius off adds 0.01.
-_HARMONICS, _HARMONIC = 2, 0.01
+#: Harmonics of the angle in a phase, and how large they may be, as a standard deviation [turns]: a top of 30 mm
+#: that turns about a point 0.2 mm beside the middle of its rim adds 0.003.
+_HARMONICS, _HARMONIC = 2, 0.003
+#: How far the turns swing with the sway of the top, as a standard deviation [turns], and how fast at most [Hz].  Else
+#: they would be taken for rows that are late, since the rows of the mark sway, too; in a long film both average out.
+_SWING, _SWING_HZ, _MOST_SWINGS = 3e-4, 3.0, 24
 #: Means of residuals that show what neighbouring pictures share.
 _BLOCKS = 24
 #: Highest order of the polynomial (Chebyshev's) for the turns of a film: one more each two seconds.
@@ -147,11 +150,13 @@ def turning_of(
     turns = np.empty_like(phase)
     _follow(times[middle:], phase[middle:], turns[middle:], start, float(phase[middle]))
     _follow(times[middle::-1], phase[middle::-1], turns[middle::-1], start, float(phase[middle]))
-    nuisance = _nuisance(turns, start * (rows - rows.mean()))
     centre, half = float((times[0] + times[-1]) / 2), float(np.ptp(times)) / 2
     order = min(2 + int(half / WINDOW_S), _MOST_BENDS)
     late = (times - centre) / half
-    value, covariance, rest = _fit(chebvander(late, order), turns, u, nuisance)
+    swings = min(int(_SWING_HZ * 4 * half), _MOST_SWINGS) if np.any(rows) else 0
+    basis = chebvander(late, order + swings)
+    nuisance = np.concatenate([_nuisance(turns, start * (rows - rows.mean())), _SWING * basis[:, order + 1 :]], axis=1)
+    value, covariance, rest = _fit(basis[:, : order + 1], turns, u, nuisance)
     smooth, error = value[: order + 1], covariance[: order + 1, : order + 1]
     slope, bend = (chebval(0.0, chebder(np.eye(order + 1), n)) / half**n for n in (1, 2))
     speed = chebval(late, chebder(smooth)) / half

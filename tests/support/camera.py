@@ -48,9 +48,9 @@ class Camera:
         away: where the middle of the base is in the picture, from its middle [pixels].
     """
 
-    width: int = 320
-    height: int = 240
-    scale: float = 0.42e-3
+    width: int = 224
+    height: int = 208
+    scale: float = 0.5e-3
     exposure: float = 1e-3
     line_time: float = 0.0
     blur: float = 1.2

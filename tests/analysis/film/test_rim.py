@@ -81,4 +81,4 @@ def test_what_covers_the_background_is_measured(shown):
     now = shown.background.copy()
     now[:, :32] = 90.0
     view = compare_views(shown.background, now, np.ones(now.shape, dtype=bool))
-    assert view.covered == pytest.approx(0.1, abs=0.01)
+    assert view.covered == pytest.approx(32 / now.shape[1], abs=0.01)
