@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
     from levilab.acquisition.session import Session
     from levilab.bench.config import BenchConfig, Limits
-    from levilab.simulator.scene import Scene
 
 #: The drive goes up in steps; each makes a held top swing a little about it [s].
 RAMP_STEP_S = 1.0
@@ -91,12 +90,6 @@ class DriveSettings(CounterSettings):
                 "a triggered drive needs a wire from the tape's phototransistor to the generator's trigger input: say "
                 'in the bench file which edge of its pulse starts a cycle, generator.trigger = "rising" or "falling"'
             )
-        return self
-
-    def for_scene(self, scene: Scene) -> Self:
-        """See the base.  Raises ConfigError for a triggered drive, which a top in full motion does not have here."""
-        if self.drive == "triggered":
-            raise ConfigError("a triggered drive is for a top that only spins here: leave out `scene`")
         return self
 
     def check(self, table: str, limits: Limits) -> None:

@@ -8,6 +8,7 @@ cuts the laser's beam.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
+from levilab.world.bursts import TriggerWire
 from levilab.world.coil import Coil
 from levilab.world.flight import Flight
 from levilab.world.light import Laser, Tape
@@ -90,7 +92,8 @@ class MotionWorld:
         self.clock = clock
         self._tape, self._laser, self.seed = tape or Tape(), laser or Laser(), seed
         self._scene = scene
-        self._coil, self._flight = Coil(), Flight(scene, put_back_after_s, stem_height_m=self._laser.height_m)
+        self._wire, self._coil = TriggerWire(), Coil(self._trigger_edges)
+        self._flight = Flight(scene, put_back_after_s, stem_height_m=self._laser.height_m)
         self._tape_place = float(np.random.default_rng(seed).uniform()) if seed else 0.0
         self._last_change = 0.0  # the time of the last change of the drive [s]
         self._lens_height_m = self._flight.first_lift()  # where the lens looks
@@ -128,6 +131,8 @@ class MotionWorld:
     def _drive_keys(self, time: float, output: Output) -> dict[str, str | float]:
         """Return the keys of a scene's drive that make this output."""
         shape = "TRI" if (output.waveform, output.symmetry) == ("RAMP", 0.5) else output.waveform
+        if output.triggered:
+            return self._triggered_keys(output)
         whole = shape in _SHAPES and output.duty == 0.5 and output.burst is None
         amplitude = output.amplitude if whole else fundamental(output)
         if not (amplitude and 0 < output.frequency <= _FASTEST_HZ):
@@ -138,6 +143,23 @@ class MotionWorld:
             "amplitude_t": amplitude,
             "frequency_hz": output.frequency,
             "phase_rad": 2 * math.pi * (turns % 1.0),
+        }
+
+    def _triggered_keys(self, output: Output) -> dict[str, str | float]:
+        """Return the keys of bursts that the top triggers: one cycle of the first harmonic, where the edge comes."""
+        bursts = output.triggered
+        edges = self._wire.thresholds(rising=bursts.rising) if bursts and bursts.cycles == 1 else None
+        edge = self._tape.offset(edges, output.frequency) if edges else None
+        if bursts is None or edge is None:
+            return {"waveform": "off"}
+        return {
+            "waveform": "triggered",
+            "amplitude_t": fundamental(replace(output, amplitude=bursts.amplitude, burst=None)),
+            "frequency_hz": output.frequency,
+            "phase_rad": math.radians(output.phase + 180 * output.inverted),
+            "light_rad": 2 * math.pi * ((0.5 + edge - self._tape_place) % 1.0),
+            "latency_s": bursts.delay,
+            "cycle_turns": 0.0,
         }
 
     def light(self, start: float, step: float, n: int) -> Array:
@@ -170,6 +192,11 @@ class MotionWorld:
             return None
         found = self._tape.crossing_times(near, self._mean_voltage, triggers.fire, self.seed)
         return np.asarray(found[(found >= start) & (found < stop)])
+
+    def _trigger_edges(self, start: float, stop: float, rising: bool) -> Array:  # noqa: FBT001 - as Coil calls it
+        """Return the edges at the generator's trigger input."""
+        edges = self.crossings(start, stop, self._wire.thresholds(rising=rising))
+        return np.empty(0) if edges is None else edges
 
     def laser(self, start: float, step: float, n: int) -> Array:
         """Return the voltage of the laser's phototransistor; see World."""

@@ -249,10 +249,13 @@ def test_what_a_triggered_drive_cannot_do_is_refused_at_once(tmp_path, experimen
         request_for(experiment, options)
 
 
-def test_a_top_in_full_motion_does_not_trigger_its_drive_yet(tmp_path):
-    options = AcquisitionOptions(mock=True, out=tmp_path, scene="spindown", settings=("spin.drive=triggered",))
-    with pytest.raises(ConfigError, match="leave out `scene`"):
-        request_for("spin", options)
+def test_a_top_in_full_motion_triggers_its_drive_too(tmp_path):
+    settings = ("drive=triggered", "drive_frequency_hz=32", "hold_s=10", "longest_s=20")
+    options = AcquisitionOptions(mock=True, out=tmp_path, scene="spindown", seed=3, settings=settings)
+    run = acquire(request_for("spin", options), Silent())
+    assert run.status == "finished"
+    assert run.readings().column("spin_frequency_hz")[0] == pytest.approx(32.0, abs=0.4)  # the wobble scatters it
+    assert events(run, "phase found")[0]["pull_hz_per_s"] == pytest.approx(0.36, abs=0.36)
 
 
 def test_a_limit_of_the_bench_is_that_of_the_cycle():

@@ -10,12 +10,13 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.virtual.core.signal import crossings
 from instruments.virtual.counter.edges import Thresholds
-from instruments.virtual.generator.channel import Burst, Output
+from instruments.virtual.generator.channel import Burst, Output, Triggered
 from instruments.virtual.generator.voltage import fundamental
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator import SceneError, preset, simulate
 from levilab.simulator.parts import Top
 from levilab.world.base import Base
+from levilab.world.bursts import TriggerWire
 from levilab.world.flight import RATE, SAMPLED, Flight, _cubic
 from levilab.world.light import Tape
 from levilab.world.motion_world import MotionWorld
@@ -432,3 +433,21 @@ def test_without_a_top_the_beam_is_steady():
     fallen = world(FALLING)
     voltage = fallen.laser(10.0, 1e-4, 10_000)
     assert np.ptp(voltage) < 0.06  # twelve standard deviations of the noise
+
+
+def test_a_top_in_full_motion_triggers_its_bursts():
+    def spin_after(phase):
+        world = MotionWorld(preset("spindown").changed({"start.spin_hz": 30.0}), VirtualClock())
+        bursts = Triggered(4e-4, 1, rising=True, delay=5e-7, jitter=0.0)
+        world.drive(0.0, Output("SIN", 33.0, 0.0, 0.0, phase=phase, triggered=bursts))
+        edges = world.crossings(4.0, 5.0, TriggerWire().thresholds(rising=True))
+        field = world.coil_field(4.0, 1e-4, 10_000)
+        assert np.mean(field != 0.0) == pytest.approx(edges.size / 33, abs=0.06)  # two bursts are cut at the ends
+        return 1 / float(np.mean(np.diff(edges)))
+
+    spins = [spin_after(phase) for phase in (0.0, 90.0, 180.0, 270.0)]
+    # four phases of one cosine: its mean is that of a free top, which loses 0.45 Hz, and the pull is about 0.36 Hz/s;
+    # the wobble moves the edges, and so the phases
+    assert spins[0] + spins[2] == pytest.approx(spins[1] + spins[3], abs=1.2)
+    assert 0.7 < max(spins) - 29.55 < 2.2
+    assert 0.7 < 29.55 - min(spins) < 2.2
