@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
@@ -237,7 +237,7 @@ def _bring_up(session: Session[D], spin: float, target: float) -> Motor | None:
     """Bring a top of this spin to another one, and hold it there [Hz].  Raises NotHeld, DidNotFollow."""
     settings = session.settings
     if settings.drive == "triggered":
-        return spin_up(cast("Session[DriveSettings]", session), spin, target)
+        return spin_up(session, spin, target)
     session.bench.generator.prepare(
         waveform=settings.drive_waveform, frequency_hz=spin, amplitude_vpp=settings.drive_amplitude_vpp
     )

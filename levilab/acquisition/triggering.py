@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from levilab.runs.events import RunEvent
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from levilab.acquisition.driving import DriveSettings
     from levilab.acquisition.session import Session
 
 #: The frequency of the cycle over that of the top: a pulse comes up to 6 % of a turn early (2 % is its scatter), and
@@ -107,7 +106,7 @@ class Motor:
         gain: of its spin at the full amplitude, about the spin at which it is held; None where it was not measured.
     """
 
-    session: Session[DriveSettings]
+    session: Session[Any]
     spin: float
     phase: float
     pull: float
@@ -266,7 +265,7 @@ class Motor:
             self._set_share(wish)
 
 
-def _no_pull(session: Session[DriveSettings], found: Response) -> DidNotFollow:
+def _no_pull(session: Session[Any], found: Response) -> DidNotFollow:
     name = session.writer.record.experiment
     return DidNotFollow(
         f"the bursts do not turn the top: at each start phase its spin changes by {-found.drag:.2f} Hz/s, as without "
@@ -276,7 +275,7 @@ def _no_pull(session: Session[DriveSettings], found: Response) -> DidNotFollow:
     )
 
 
-def spin_up(session: Session[DriveSettings], spin: float, target: float) -> Motor:
+def spin_up(session: Session[Any], spin: float, target: float) -> Motor:
     """Let the top trigger its drive, bring it to a spin, and hold it there for the time in the settings.
 
     Args:
