@@ -52,6 +52,7 @@ class Turning:
 
     Attributes:
         turns: since the first picture, by picture, shape (n,); rising: in the sense of the phase.
+        smooth: spin in each picture, a polynomial through the film, shape (n,) [Hz].
         time: middles of the readings of the spin, shape (m,) [s].
         spin: shape (m,) [Hz].
         u: shape (m,) [Hz].
@@ -64,6 +65,7 @@ class Turning:
     """
 
     turns: Array
+    smooth: Array
     time: Array
     spin: Array
     u: Array
@@ -166,6 +168,7 @@ def turning_of(
     ]).reshape(-1, 3)  # fmt: skip
     return Turning(
         turns=turns - turns[0],
+        smooth=np.asarray(speed),
         time=readings[:, 0],
         spin=readings[:, 1] + np.interp(readings[:, 0], times, speed),
         u=readings[:, 2],

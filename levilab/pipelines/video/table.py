@@ -22,11 +22,17 @@ if TYPE_CHECKING:
     from levilab.pipelines.video.analysis import Video
 
 
+#: Titles of the track; the spin stands in the last column, where it is known.
+_HEADS = ("time_s", "x_m", "x_u_m", "y_m", "y_u_m", "spin_frequency_hz")
+
+
 def save_video(video: Video, folder: Path) -> list[Path]:
     """Write the track, the spin and a still into a folder, and return the files.  Raises CannotWrite."""
     name = video.film.path.stem
+    columns = [video.times, video.x, video.u, video.y, video.u]
+    columns += [np.abs(video.turning.smooth)] if video.turning else []
     contents: dict[str, str | bytes] = {f"{name}.tracks.csv": _csv(
-        ("time_s", "x_m", "x_u_m", "y_m", "y_u_m"), zip(video.times, video.x, video.u, video.y, video.u, strict=True)
+        _HEADS[: len(columns)], zip(*columns, strict=True)
     )}  # fmt: skip
     if (found := video.turning) is not None:
         rows = zip(found.time, np.abs(found.spin), found.u, strict=True)

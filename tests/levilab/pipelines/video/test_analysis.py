@@ -182,7 +182,7 @@ def test_the_command_writes_tables_that_other_analyses_read(path, tmp_path):
     assert document["values"]["frequency"]["value"] == pytest.approx(30.975, abs=1e-3)
     assert document["pictures"] == 240
     tracks = np.genfromtxt(tmp_path / "IMG_0042.tracks.csv", delimiter=",", names=True)
-    assert tracks.dtype.names == ("time_s", "x_m", "x_u_m", "y_m", "y_u_m")
+    assert tracks.dtype.names == ("time_s", "x_m", "x_u_m", "y_m", "y_u_m", "spin_frequency_hz")
     assert np.diff(tracks["time_s"]) == pytest.approx(np.tile([1 / 300, 1 / 200], 120)[:-1], abs=2e-5)  # of the file
     assert (tmp_path / "IMG_0042.tracks.png").read_bytes()[:4] == b"\x89PNG"
     ended = command("analyze", "video", path, "--rim", 30, "--no-save", cwd=tmp_path)
