@@ -17,7 +17,7 @@ from analysis.pulses.times import FEWEST, check_times, spin_of_times
 from analysis.pulses.trace import Choice, spin_of_trace
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
 Array = NDArray[np.float64]
 
@@ -97,22 +97,8 @@ def track_of_times(pulse_times: ArrayLike, *, window: float = WINDOW) -> Track:
         TooFewPulses: no window has enough of them.
         NotFinite, TimesNotIncreasing, ShapesDiffer, NotPositive.
     """
-    times = check_times(pulse_times)
-    _check_window(window)
-    count = max(round((times[-1] - times[0]) / window), 1)
-    ends = np.linspace(times[0], times[-1], count + 1)
-    cuts = np.searchsorted(times, ends)
-    cuts[-1] = times.size
-
-    def spins() -> Iterator[SpinFrequency | tuple[float, float]]:
-        for i in range(count):
-            piece = times[cuts[i] : cuts[i + 1]]
-            try:
-                yield spin_of_times(piece)
-            except TooFewPulses:
-                yield float(ends[i]), float(ends[i + 1])
-
-    return _connect(spins(), times.size, float(times[-1] - times[0]))
+    t = check_times(pulse_times)
+    return _connect(_in_windows(t, window, lambda inside: spin_of_times(t[inside])), t.size, float(t[-1] - t[0]))
 
 
 def track_of_samples(samples: ArrayLike, times: ArrayLike, *, window: float = WINDOW, method: Choice = "auto") -> Track:
@@ -129,21 +115,26 @@ def track_of_samples(samples: ArrayLike, times: ArrayLike, *, window: float = WI
         NotFinite, TimesNotIncreasing, ShapesDiffer, NotPositive.
     """
     x, t = np.asarray(samples, dtype=np.float64), check_times(times, increasing=False)
+
+    def spin(inside: slice) -> SpinFrequency:
+        return spin_of_trace(x[inside], usual_rate(t[inside]), times=t[inside], method=method)
+
+    return _connect(_in_windows(t, window, spin), 0, float(t[-1] - t[0]))
+
+
+def _in_windows(
+    t: Array, window: float, spin: Callable[[slice], SpinFrequency]
+) -> Iterator[SpinFrequency | tuple[float, float]]:
+    """Yield the spin in each window of some times, or from when to when there are hardly any pulses or samples."""
     _check_window(window)
-    count = max(round((t[-1] - t[0]) / window), 1)
-    ends = np.linspace(t[0], t[-1], count + 1)
+    ends = np.linspace(t[0], t[-1], max(round((t[-1] - t[0]) / window), 1) + 1)
     cuts = np.searchsorted(t, ends)
     cuts[-1] = t.size
-
-    def spins() -> Iterator[SpinFrequency | tuple[float, float]]:
-        for i in range(count):
-            inside = slice(cuts[i], cuts[i + 1])
-            try:
-                yield spin_of_trace(x[inside], usual_rate(t[inside]), times=t[inside], method=method)
-            except (TooFewPulses, NotPositive):  # hardly any samples
-                yield float(ends[i]), float(ends[i + 1])
-
-    return _connect(spins(), 0, float(t[-1] - t[0]))
+    for i, inside in enumerate(map(slice, cuts[:-1], cuts[1:])):
+        try:
+            yield spin(inside)
+        except (TooFewPulses, NotPositive):
+            yield float(ends[i]), float(ends[i + 1])
 
 
 def usual_rate(times: Array) -> float:
