@@ -55,8 +55,8 @@ def _content(lines: Sequence[str]) -> bytes:
 
 
 def _mostly(form: re.Pattern[str]) -> Callable[[Sequence[str]], bool]:
-    """Return whether nearly all of some lines have a form."""
-    return lambda lines: len(lines) > 1 and sum(bool(form.match(line)) for line in lines) >= _MOST * len(lines)
+    """Return whether nearly all of some lines have a form: all of two, of a few more all but one."""
+    return lambda lines: sum(map(bool, map(form.match, lines))) >= max(min(_MOST * len(lines), len(lines) - 1), 2)
 
 
 # --- Markdown ------------------------------------------------------------------------------------------

@@ -85,7 +85,7 @@ def sniff(source: Text) -> Layout:
         return words
     if dialect is None:
         at, line = next((n, line) for n, line in enumerate(lines, 1) if line.strip())
-        alone = "; number the rows in a column of their own if there is but one"
+        alone = "; if it holds one quantity alone, its times are needed, too: a column of them before it"
         seen = f"'{shorten(line.strip())}' begins no table of at least two columns"
         raise NoTable(path, f"{seen}; {EXPORT}{alone}", line=at)
     layout = lay_out(lines, encoding, dialect, head)
