@@ -9,6 +9,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import math
+import os
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -39,12 +41,15 @@ if TYPE_CHECKING:
     from starlette.routing import BaseRoute
     from starlette.websockets import WebSocket
 
+    from levilab.live.choice import Choice
     from levilab.live.desk import Desk
     from levilab.live.practice.commands import PracticeEvent
     from levilab.live.running import Running
 
 #: Frames a second at most, so that 20 come to the page; and the longest wait of a page without news [s].
 FRAMES_PER_S, PATIENCE_S = 22, 1.0
+#: The runs are listed for guests, who may ask without pause, once in this time [s].
+LISTED_EVERY_S = 1.0
 #: Of a guest at most; and guests at most, two classes of pupils: who measures is not to notice them.
 GUEST_FRAMES_PER_S, MOST_GUESTS = 10, 60
 #: Time between two looks for runs of other programs [s].
@@ -218,6 +223,8 @@ class Pages:
         self.hall, self.doors = hall, doors
         self.for_guests = doors is hall.guests
         self.sockets = 0
+        self._listed: tuple[float, list[Choice]] = (-math.inf, [])
+        self._lists = asyncio.Lock()
         top = Path(__file__).parents[1] / "animation" / "top.js"
         self.files = {path.name: path for path in PAGE.iterdir()} | {
             "three.js": three_js("the live view"),
@@ -246,7 +253,10 @@ class Pages:
     async def runs(self, _: Request) -> Response:
         """Return the runs to choose from, and the first data of the page."""
         hall = self.hall
-        found = await asyncio.to_thread(choices, hall.root)
+        async with self._lists:
+            if not self.for_guests or time.monotonic() > self._listed[0] + LISTED_EVERY_S:
+                self._listed = time.monotonic(), await asyncio.to_thread(choices, hall.root)
+        found = self._listed[1]
         first = hall.shown or newest(found) or ""
         practice = hall.desk.about | {"guest": self.for_guests} if hall.desk else None
         about = {"runs": [asdict(one) for one in found], "first": first, "practice": practice}
@@ -320,6 +330,8 @@ class Pages:
                 again = time.monotonic() + 1 / frames_per_s
                 await hall.wait_for_news(watch, ask.get("tick"))
                 said = hall.desk.events_after(ask.get("said")) if hall.desk else []
+                if self.for_guests:  # where the runs lie is no concern of theirs
+                    said = [one | {"text": one["text"].replace(f"{hall.root}{os.sep}", "")} for one in said]
                 await socket.send_bytes(watch.frame(ask, said))
             await socket.close(1003 if text is None else 1009)
 

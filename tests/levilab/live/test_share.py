@@ -54,6 +54,15 @@ def test_a_guest_sees_what_the_view_shows(hall: Hall, path: str) -> None:
     assert request(there, inside(hall, path), headers={"Host": "evil.example"})[0] == 421
 
 
+def test_guests_who_ask_without_pause_share_a_list(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+    listed: list[Path] = []
+    monkeypatch.setattr("levilab.live.server.choices", lambda root: listed.append(root) or [])
+    monkeypatch.setattr("levilab.live.server.LISTED_EVERY_S", 3600.0)
+    for _ in range(3):
+        request(address_for_guests(hall), inside(hall, "runs"))
+    assert len(listed) <= 1  # none where another test has just asked
+
+
 @pytest.mark.parametrize(
     "path",
     ["do", "run/one/analysis", "run/one/report.html", "run/one/spindown.png", "run/one/run.json", "file", "files",
