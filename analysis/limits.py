@@ -34,7 +34,7 @@ AGREES_P = 0.05
 # --- one fall ---
 
 #: Readings before the fall that a line is drawn through [s]: in ν^(−1/2), which is straight under the drag of a disc;
-#: under Stokes's or Newton's it bends by 1 mHz in that time.
+#: u holds by how much it bends under Stokes's or Newton's.
 _LINE_S = 20.0
 
 
@@ -50,7 +50,7 @@ def spin_at_fall(times: Array, spins: Array, u: float | None, between: tuple[flo
         between: the top was still seen at the first of these times, and no more at the second [s].
 
     Returns:
-        Value and u; u holds the line's and, as that of an even distribution, that of the moment.
+        Value and u; u holds the line's, that of the moment as of an even distribution, and that of the law of the drag.
 
     Raises:
         TooFewReadings: fewer than three.
@@ -65,7 +65,7 @@ def spin_at_fall(times: Array, spins: Array, u: float | None, between: tuple[flo
     last = times >= min(times[-1] - _LINE_S, times[-3])
     t, y = times[last] - (low + high) / 2, spins[last] ** -0.5
     columns = np.column_stack([np.ones_like(t), t])
-    (at_fall, slope), *_ = np.linalg.lstsq(columns, y, rcond=None)
+    (at_fall, bent), (slope, _) = np.linalg.lstsq(columns, np.stack([y, t**2], axis=1), rcond=None)[0]
     value = float(at_fall) ** -2
     per_hz = 2 * value**1.5  # dν = −2 ν^(3/2) dy
     if u is None:
@@ -73,7 +73,9 @@ def spin_at_fall(times: Array, spins: Array, u: float | None, between: tuple[flo
         u = per_hz * float(np.sqrt(np.sum(left**2) / max(t.size - 2, 1)))
     of_line = u * math.sqrt(float(np.linalg.inv(columns.T @ columns)[0, 0]))
     of_moment = per_hz * abs(float(slope)) * (high - low) / math.sqrt(12)
-    return Estimate(value, math.hypot(of_line, of_moment), "Hz")
+    # ν̇ ∝ ν^n with n from 1 to 2, evenly: ÿ = 2 (n − 3/2) ẏ²/y
+    of_law = per_hz * abs(float(bent)) * float(slope) ** 2 / float(at_fall) / math.sqrt(12)
+    return Estimate(value, math.hypot(of_line, of_moment, of_law), "Hz")
 
 
 # --- all of them ---

@@ -39,6 +39,16 @@ def test_the_uncertainty_of_a_fall_is_its_scatter() -> None:
     assert np.std(pulls) == pytest.approx(1, abs=0.12)  # 3 of a standard deviation
 
 
+@pytest.mark.parametrize("law", ["stokes", "newton"])
+def test_the_uncertainty_of_a_fall_holds_the_law_of_the_drag(law: str) -> None:
+    times, rate = np.array([-25.0, -15.0, -5.0]), 2.9e-3  # a phone's windows; loss a second
+    spins = 22 * (np.exp(-rate * times) if law == "stokes" else 1 / (1 + rate * times))
+    found = spin_at_fall(times, spins, 1e-9, (0.0, 0.0))
+    assert found.value is not None
+    # ends of an even distribution lie √3 u off; the spin changes by 7 % meanwhile, and with it the bend
+    assert abs(found.value - 22) == pytest.approx(math.sqrt(3) * (found.u or 0.0), rel=0.15)
+
+
 @pytest.mark.parametrize(("n", "critical"), [(5, 1.764), (10, 2.482), (20, 3.001)])
 def test_outliers_are_those_of_grubbs_table(n: int, critical: float) -> None:
     """Two-sided, 1 %: the printed critical value, a hundredth less and a hundredth more."""
