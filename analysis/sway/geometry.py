@@ -46,6 +46,9 @@ SHIFT_U = 0.035
 RESONANCE_U, NEAREST_HZ = 1.8e7, 0.04
 #: Tilt and height change within a window: relative standard uncertainty of Ω_g in a motion of small swings.
 MOTION_U = 6.5e-4
+#: The part by which the precession makes Ω_g smaller is known to this part of it: a mark beside the centre of mass
+#: moves more than that.
+LEAN_U = 0.3
 #: The precession's frequency is that of small swings: relative standard uncertainty of B′/2B from it, per square of the
 #: swings' amplitudes [1/m²].
 PRECESSION_SHIFT_U = 1e3
@@ -147,6 +150,7 @@ class Geometry:
         shares: Ω_g/2π of each window, brought to that spin, shape (n,) [Hz].
         u_shares: their standard uncertainties but for what is common to all, shape (n,) [Hz].
         shifts: of backward and forward swing at finite amplitude that were taken away, shape (n, 2) [Hz].
+        lean: part by which the precession makes Ω_g smaller, which was added, in the mean.
         heights: at which α₋α₊ is as seen, shape (n,) [m].
         splits, expected: of small swings, as seen and as `predicted` has them, shape (n,) [Hz].
         chi_square: Σ((share − measured)/u)².
@@ -165,6 +169,7 @@ class Geometry:
     shares: Array
     u_shares: Array
     shifts: Array
+    lean: float
     heights: Array
     splits: Array
     expected: Array
@@ -212,10 +217,12 @@ def geometric_magnetism(
         share = float(np.sum(weight * shares) / np.sum(weight)) / reference
     left = float(np.sum(weight * (shares - share * reference) ** 2))
     scale = math.sqrt((left + BELIEVED) / (spin.size - 1 + BELIEVED))
+    lean = float(np.mean(upright)) - 1
     parts = {
         "lines": scale / math.sqrt(float(np.sum(weight))),
         "amplitude": float(np.sum(weight * doubt) / np.sum(weight)),
         "motion": MOTION_U * abs(share) * reference,
+        "lean": LEAN_U * lean * abs(share) * reference,
     }
     measured = Estimate(share * reference, math.hypot(*parts.values()), "Hz")
     of_base = _of_base(each, heights, known)
@@ -234,6 +241,7 @@ def geometric_magnetism(
         shares=shares,
         u_shares=u_shares,
         shifts=shifts,
+        lean=lean,
         heights=heights,
         splits=upright * small.sum(axis=1),
         expected=np.array(

@@ -37,6 +37,8 @@ NEEDS = Needs(
 )
 #: A split of fewer standard uncertainties excludes nothing; a ratio that is more of them from 1 disagrees.
 _ENOUGH = 3.0
+#: A tilt of the precession that adds more to the split is most likely a mark far from the centre of mass.
+_LEANS = 0.01
 #: A relative u above this comes from the meeting of beat and vertical swing, and there is something to do about it.
 _LARGE_U = 0.03
 
@@ -130,6 +132,11 @@ def _doubts(swings: Sequence[Swings], found: Geometry, *, view: bool | None) -> 
         yield (
             "no precession is seen, which would show whether the view is mirrored: a split of the other sign would be "
             "one of a mirrored view"
+        )
+    if found.lean > _LEANS:
+        yield (
+            f"the precession is so large that {100 * found.lean:.0f} % are added to the split for its tilt: is the "
+            "place that of the top's middle?  The end of the stem moves more; follow its foot or the rim"
         )
     if (found.measured.u or 0.0) > _LARGE_U * abs(found.measured.value or 0.0):
         beat = float(np.mean([one.frequency[1] - one.frequency[0] for one in swings]))

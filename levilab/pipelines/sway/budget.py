@@ -20,6 +20,8 @@ _ROWS = {
     "amplitude": ("shift at finite amplitude", "B", "computed for a top without a vertical swing",
                   "smaller swings, or another washer"),
     "motion": ("changes within a window", "B", "as tops in full motion scatter", "a slower spin-down"),
+    "lean": ("tilt of the precession", "B", "by the size of its line, as of the centre of mass",
+             "a top that precesses less, or a mark nearer to the centre of mass"),
     "base": ("sizes of the base", "B", "calliper or Hall scan", "a Hall scan"),
     "mass": ("mass of the top", "B", "scales", "better scales"),
     "inertia": ("moment of inertia I₃", "B", "parts of the top", "each part weighed and measured"),

@@ -8,7 +8,7 @@ from levilab.pipelines.row import Quantity, columns_of, entry, statistic
 QUANTITIES = (
     Quantity("geometric_magnetism", "Hz", "geometric magnetism Ω_g/2π at a spin of 30 Hz, from the slow swings",
              "Ω_g/2π at 30 Hz", of="measured"),
-    Quantity("predicted", "Hz", "the same from the form of the base's field", "the same, predicted"),
+    Quantity("predicted", "Hz", "the same from the form of the base's field", "Ω_g/2π predicted"),
     Quantity("ratio", "1", "measured over predicted", "measured/predicted"),
     Quantity("gradient", "1/m", "B′/2B that goes with the slow swings", "B′/2B by the swings"),
     Quantity("gradient_of_precession", "1/m", "B′/2B that goes with the precession", "B′/2B by the precession",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 #: Columns of a table that are looked at, and those without which it is no track.
 QUANTITIES = ("time_s", "x_m", "y_m", "spin_frequency_hz")
 NEEDED = QUANTITIES[:3]
+#: How the names of a film's track and of its spin end.
+_TRACKS, _SPIN = ".tracks.csv", ".spin.csv"
 #: A top that is farther from the axis has left the field [m]: beyond, the unit is most likely another one.
 _FARTHEST_M = 0.5
 
@@ -53,7 +55,18 @@ class SwayReadings(Readings):
 def read_track_file(path: Path, options: InputOptions) -> SwayReadings:
     """Return the track in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
     table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=False)
-    return _readings(table)
+    readings = _readings(table)
+    return readings if readings.spin is not None else _with_spin_beside(path, readings)
+
+
+def _with_spin_beside(path: Path, readings: SwayReadings) -> SwayReadings:
+    """Return the track with the spin of the same film, where levilab analyze video wrote it beside the track."""
+    beside = path.with_name(f"{path.name.removesuffix(_TRACKS)}{_SPIN}")
+    if not (path.name.endswith(_TRACKS) and beside.exists()):
+        return readings
+    table = read_table(beside, quantities=("time_s", "spin_frequency_hz"), needed=("time_s", "spin_frequency_hz"))
+    spin = np.interp(readings.time, table.column("time_s"), table.column("spin_frequency_hz"))
+    return replace(readings, spin=spin, warnings=(*readings.warnings, *table.warnings))
 
 
 def read_motion_run(run: Run, _: InputOptions) -> SwayReadings:

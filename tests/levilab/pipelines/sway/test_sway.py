@@ -3,6 +3,7 @@
 import csv
 import json
 
+import numpy as np
 import pytest
 
 from levilab.errors import DataError, DoesNotSuit
@@ -67,6 +68,26 @@ def test_without_a_spin_nothing_is_said_and_an_option_gives_it(found, tmp_path):
     assert abs(geometry.measured.value - TRUE_HZ) < 3 * geometry.measured.u
 
 
+def test_a_mark_on_the_end_of_the_stem_is_noticed(tmp_path):
+    rows = rows_of(TRACK)[:1200]
+    t = np.array([float(r["t [s]"]) for r in rows])
+    leaning = 0.3 * np.exp(2j * np.pi * (5.05 + 0.0257 / 2 * t) * t)  # the tilt of its precession, 2 cm above
+    places = [(float(r["x [mm]"]) + p.real, float(r["y [mm]"]) + p.imag) for r, p in zip(rows, leaning, strict=True)]
+    moved = [(r["t [s]"], f"{x:.3f}", f"{y:.3f}", r["spin [Hz]"]) for r, (x, y) in zip(rows, places, strict=True)]
+    found = analyze(write(tmp_path / "stem.csv", ("t [s]", "x [mm]", "y [mm]", "f [Hz]"), moved), device=DEVICE)
+    assert "stem" in " ".join(found.all_warnings)
+    assert found.runs[0].geometry.parts["lean"] > 0.1 * found.runs[0].geometry.measured.u
+
+
+def test_the_spin_of_a_film_stands_beside_its_track(found, tmp_path):
+    rows = rows_of(TRACK)
+    metres = [(r["t [s]"], *(f"{float(r[axis]) / 1e3:.6f}" for axis in ("x [mm]", "y [mm]"))) for r in rows]
+    write(tmp_path / "a.spin.csv", ("time_s", "spin_frequency_hz"), [(r["t [s]"], r["spin [Hz]"]) for r in rows[::60]])
+    track = write(tmp_path / "a.tracks.csv", ("time_s", "x_m", "y_m"), metres)
+    measured = analyze(track, device=DEVICE).runs[0].geometry.measured
+    assert measured.value == pytest.approx(found.runs[0].geometry.measured.value, rel=1e-4)
+
+
 def test_the_base_is_the_calliper_s_or_that_of_a_scan():
     of_file = analyze(TRACK, device=read_device(ROOT / "sample_data/device.toml")).runs[0]
     assert of_file.warnings == ()
@@ -76,6 +97,7 @@ def test_the_base_is_the_calliper_s_or_that_of_a_scan():
     assert "radii" in analyze(TRACK).runs[0].warnings[0]
 
 
+@pytest.mark.slow
 def test_a_simulated_motion_is_compared_with_its_own_scene(tmp_path):
     keys = ("start.spin_hz=35", "drag.law=disc", "start.position_m=[0.0006,0,0.0729]", "top.mass_kg=0.0253")
     made = command(
