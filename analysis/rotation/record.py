@@ -153,10 +153,6 @@ class Record:
         lines = self._normal @ (self._lines.T @ field - self._on_fixed[:, :q].T @ by)
         return np.asarray(field - self._lines @ lines - self._spline @ (by - self._by_fixed[:, :q] @ lines))
 
-    def without_drift(self) -> Array:
-        """Return the field without the spline alone, shape (n, k) [unit]."""
-        return np.asarray(self.field - self._spline @ self._on_spline(self.field)[1])
-
 
 def deviation(columns: Array) -> Array:
     """Return the root mean square of each column, shape (k,): of what has no mean, five times as fast as `std`."""
