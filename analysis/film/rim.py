@@ -37,8 +37,8 @@ _OFF, _ROUNDS = 5.0, 4
 _LEAST_RAYS = 0.4
 #: Contrast of a ray that sees the rim, in that of the mean.
 _SIZES = (0.2, 5.0)
-#: A fit that moves the centre by less than this part of a ray's length is the last one: what is left is a hundredth.
-_CLOSE = 0.1
+#: A fit that moves the centre by less than this part of a ray's length is the last one: less is left.
+_CLOSE = 0.02
 #: A pixel is one reading: neighbouring rays that fall into it agree.  Pixels that the noise of a film is alike over.
 _CORRELATED = 1.5
 
@@ -68,7 +68,7 @@ def _rays() -> tuple[Array, Array, Array]:
     return np.cos(turn)[:, None], np.sin(turn)[:, None], np.stack(columns, axis=1)
 
 
-def fit_rim(picture: Picture, start: Circle, *, width: float = 1.0, rounds: int = 3) -> Rim | None:
+def fit_rim(picture: Picture, start: Circle, *, width: float = 1.0, rounds: int = 5) -> Rim | None:
     """Fit the rim near a circle.
 
     Args:
