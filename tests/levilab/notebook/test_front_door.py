@@ -130,7 +130,7 @@ def test_readings_stand_with_their_residuals(four: Any) -> None:
 
 @pytest.mark.parametrize("kind", ANALYSES)
 def test_every_analysis_has_readings_with_the_residuals_of_its_result(kind: str) -> None:
-    folder = {"spin": "trace-laser"} | {name: case[0] for name, case in CASES.items()}
+    folder = {"spin": "trace-laser", "sway": "sway"} | {name: case[0] for name, case in CASES.items()}
     result = levilab.analyze(SAMPLE_DATA / folder[kind])
     table = result.to_dataframe("readings")
     assert len(table) > 2
