@@ -9,7 +9,7 @@ class NoTop(AnalysisError):
     def __init__(self, *, moving: float) -> None:
         self.moving = moving
         seen = (
-            "nothing moves"
+            "nothing changes beyond the noise"
             if moving == 0
             else f"{100 * moving:.1f} % of the picture changes, and no circle is round it"
         )

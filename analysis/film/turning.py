@@ -61,7 +61,6 @@ class Turning:
         u_frequency: [Hz].
         chirp: its slope [Hz/s].
         u_chirp: [Hz/s].
-        choices: spins that describe the pictures as well, the chosen one first [Hz].
     """
 
     turns: Array
@@ -74,7 +73,6 @@ class Turning:
     u_frequency: float
     chirp: float
     u_chirp: float
-    choices: tuple[float, ...]
 
 
 def coherence(times: Array, phase: Array, frequencies: Array) -> Array:
@@ -135,9 +133,7 @@ def choices_of(found: list[tuple[float, float]], near: float | None) -> tuple[li
     return [f for f in seen if abs(f) >= LOW], [f for f in seen if abs(f) < LOW]
 
 
-def turning_of(
-    times: Array, phase: Array, u: Array, rows: Array, *, start: float, choices: tuple[float, ...]
-) -> Turning:
+def turning_of(times: Array, phase: Array, u: Array, rows: Array, *, start: float) -> Turning:
     """Follow the phase from the middle of the film to both ends, and fit the spin.
 
     Args:
@@ -146,7 +142,6 @@ def turning_of(
         u: standard uncertainties, shape (n,) [turns].
         rows: of the mark, by which its time may be late, shape (n,); zeros: it is not [pixels].
         start: spin in the middle [Hz].
-        choices: spins that describe the pictures as well [Hz].
     """
     middle = int(np.searchsorted(times, np.median(times)))
     turns = np.empty_like(phase)
@@ -177,7 +172,6 @@ def turning_of(
         u_frequency=float(np.sqrt(slope @ error @ slope)),
         chirp=float(bend @ smooth),
         u_chirp=float(np.sqrt(bend @ error @ bend)),
-        choices=choices,
     )
 
 

@@ -198,7 +198,7 @@ def _turn(
         if slow:
             raise SlowMotion(rate=rate, captured=None, spin=slow[0])
         return None, (), False, "no spin with which a top floats, or of `near`, describes its mark"
-    turning = turning_of(times, phases.phase, phases.u, rows, start=choices[0], choices=tuple(choices))
+    turning = turning_of(times, phases.phase, phases.u, rows, start=choices[0])
     if options.near is not None and len(choices) > 1:
         choices.sort(key=lambda f: abs(abs(f) - (options.near or 0.0)))
         off = [abs(abs(f) - options.near) for f in choices[:2]]
@@ -209,7 +209,7 @@ def _turn(
     if played_slowly or (len(choices) > 1 and len(falling) != 1):
         return None, tuple(-f for f in choices), False, ""
     chosen = falling[0] if falling else choices[0]
-    turning = turning_of(times, phases.phase, phases.u, rows, start=chosen, choices=tuple(choices))
+    turning = turning_of(times, phases.phase, phases.u, rows, start=chosen)
     return turning, tuple(-f for f in choices), bool(falling), ""
 
 

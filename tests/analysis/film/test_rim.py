@@ -55,7 +55,7 @@ def test_the_top_and_the_base_are_found_without_a_hint(shown):
 def test_a_film_without_a_top_is_refused(shown, kind):
     random = np.random.default_rng(1)
     picture = shown.background if kind == "the base alone" else np.full((240, 320), 120.0)
-    with pytest.raises(NoTop, match="no top was found at the beginning: nothing moves"):
+    with pytest.raises(NoTop, match="no top was found at the beginning: nothing changes beyond the noise"):
         find_top(picture + random.normal(0, 5, (30, *picture.shape)))
 
 

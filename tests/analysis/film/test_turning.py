@@ -22,7 +22,7 @@ def seen(random, times, spin, chirp=0.0, more=0.0):
 def turning(times, phase, rows=None) -> Turning:
     u = np.full(times.size, NOISE)
     (start, *_), _ = choices_of(spins_of_start(times, phase, u), None)
-    return turning_of(times, phase, u, np.zeros(times.size) if rows is None else rows, start=start, choices=(start,))
+    return turning_of(times, phase, u, np.zeros(times.size) if rows is None else rows, start=start)
 
 
 def test_spin_and_slope_scatter_as_u_says():

@@ -143,7 +143,7 @@ def test_a_hand_and_a_lost_top_end_the_track_where_they_are_seen(folder):
     ("take", "text"),
     [
         (moved, r"background is shifted by \d\.\d pixels at 0\.[56]0 s .* the camera moved: put it on a stand"),
-        (lambda shown, _: shown.background, "no top was found at the beginning: nothing moves"),
+        (lambda shown, _: shown.background, "no top was found at the beginning: nothing changes"),
         (lambda shown, time: hand(shown, time + 0.35), "the top fills the picture|changes, and no circle|as by a hand"),
     ],
 )
