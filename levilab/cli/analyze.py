@@ -154,8 +154,10 @@ def _command(options: Iterable[str]) -> Callable[..., None]:
 
 def _add(name: str, text: str) -> None:
     words = "levilab analyze" if name == _EACH else f"levilab analyze {name}"
+    # a search of sample_data leaves the folder of the track out
+    words += " sample_data/sway/" if name == "sway" else " sample_data/"
 
-    @analyze_app.command(name, cls=Later, help=text, epilog=f"Example: {words} sample_data/", hidden=name == _EACH)
+    @analyze_app.command(name, cls=Later, help=text, epilog=f"Example: {words}", hidden=name == _EACH)
     def command() -> Callable[..., None]:
         return _command(OPTIONS if name == _EACH else options_of(KINDS[name]))
 

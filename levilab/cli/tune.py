@@ -81,19 +81,29 @@ def tune(
 
 
 def _with_bench(owner: "Owner", top: str | None, washers: str | None, file: Path, *, asks: bool) -> "Owner":
-    """Return the owner with top and washers.  Raises UsageError for a top that is not the one of the trials."""
+    """Return the owner with top and washers, each kept once it is typed.
+
+    Raises:
+        UsageError: the top is not the one of the trials, or a washer is as heavy as a top.
+    """
     from levilab.formats.typed import read_mass, read_masses
+    from levilab.pipelines.tune.owner import write_owner
 
     mass = owner.top
     if top is not None or mass is None:
         mass = _told("top", top, read_mass, "How heavy is the top without washers?  [g]", asks=asks)
     if mass != owner.top and owner.attempts:
         raise UsageError("top", f"{file} has the trials of another top: name another `file` for this one", value=top)
-    of_top = owner.washers
-    if washers is not None or (asks and not of_top):
-        prompt = "Which washers have you, each by its mass, as 0.06, 0.06, 0.1?  [g]"
-        of_top = tuple(sorted(_told("washers", washers, read_masses, prompt, asks=asks)))
-    return replace(owner, top=mass, washers=of_top)
+    owner = replace(owner, top=mass)
+    if washers is None and (owner.washers or not asks):
+        return owner
+    if asks:
+        write_owner(file, owner)
+    prompt = "Which washers have you, each by its mass, as 0.06, 0.06, 0.1?  [g]"
+    owner = _told("washers", washers, lambda text: owner.with_washers(read_masses(text)), prompt, asks=asks)
+    if asks:
+        write_owner(file, owner)
+    return owner
 
 
 def _with_scan(owner: "Owner", scan: Path | None, temperature: str | None, device: Path | None) -> "Owner":
@@ -117,7 +127,7 @@ def _next(advice: "Advice") -> "tuple[Owner, float, bool]":
     def read(text: str) -> "tuple[Owner, float, bool]":
         if not text:
             return advice.owner, advice.temperature, True
-        if text[:1].isdigit() and "," not in text:
+        if text[:1].isdigit() and "," not in text and not text[-2:].isalpha():
             return advice.owner, read_temperature(text), False
         whole = text if "," in text else f"{washers_text(advice.best.washers_kg)}, {advice.temperature:g} C, {text}"
         return advice.owner.with_trial(whole), advice.temperature, False

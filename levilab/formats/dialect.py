@@ -29,12 +29,12 @@ _THOUSANDS = {
     ",": (".", re.compile(r"[+-]?\d{1,3}(\.\d{3})+,\d+")),
     ".": (",", re.compile(r"[+-]?\d{1,3}(,\d{3})+\.\d+")),
 }
-_HALF = r"(?:\s?([AaPp])\.?[Mm]\.?)?"
+_HALF = r"(?:\s?([AaPp])\.?\s?[Mm]\.?)?"
 #: What a stopwatch or a clock shows: minutes and seconds, hours before them; of half a day hours and minutes, too.
 CLOCK = re.compile(rf"(?:(\d{{1,3}}):)?(\d{{1,3}}):(\d\d(?:[.,]\d+)?){_HALF}")
 #: Date and time: ISO 8601, or day, month and year with points or slashes.
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
-_DATE = re.compile(r"(\d\d?)([./])(\d\d?)\2(\d{4}),?[T ]+(\d\d?:\d\d)(:\d\d(?:[.,]\d+)?)?" + _HALF)
+_DATE = re.compile(r"(\d\d?)([./])(\d\d?)\2(\d{4}|\d\d),?[T ]+(\d\d?:\d\d)(:\d\d(?:[.,]\d+)?)?" + _HALF)
 #: What phyphox writes for a cell that a spreadsheet would take for a formula: '-1.5.
 GUARDED = re.compile(r"'[=+@-]")
 #: A number and the unit behind it.
@@ -120,6 +120,10 @@ def is_dated(text: str) -> bool:
     return bool(_ISO.fullmatch(text) or _DATE.fullmatch(text))
 
 
+def _year(text: str) -> int:
+    return int(text) + 2000 * (len(text) == 2)
+
+
 def slashed_date(text: str) -> tuple[int, int, int] | None:
     """Return the numbers of a date whose slashes leave the order of day and month open.
 
@@ -127,7 +131,7 @@ def slashed_date(text: str) -> tuple[int, int, int] | None:
     (12, 31, 2025)
     """
     found = _DATE.fullmatch(text)
-    return (int(found[1]), int(found[3]), int(found[4])) if found and found[2] == "/" else None
+    return (int(found[1]), int(found[3]), _year(found[4])) if found and found[2] == "/" else None
 
 
 def clock_time(text: str, *, month_first: bool = False) -> float:
@@ -151,7 +155,7 @@ def clock_time(text: str, *, month_first: bool = False) -> float:
     if found := _DATE.fullmatch(text):
         first, _, second, year, minute, rest, half = found.groups()
         month, day = (first, second) if month_first and found[2] == "/" else (second, first)
-        start = datetime(int(year), int(month), int(day), tzinfo=UTC).timestamp()
+        start = datetime(_year(year), int(month), int(day), tzinfo=UTC).timestamp()
         return start + clock_time(f"{minute}{rest or ('' if half else ':00')}{half + 'm' if half else ''}")
     if _ISO.fullmatch(text):
         moment = datetime.fromisoformat(text)

@@ -48,6 +48,8 @@ def read_masses(text: str) -> tuple[float, ...]:
     # 0,06 are no washers of 0 g and 6 g
     if any(re.fullmatch(r"0+|0\d+", piece) for piece in pieces):
         raise ValueError("a decimal point is expected, and a comma between two masses")
+    if any(re.search(r"[\d.]\s+[\d.]", piece) for piece in pieces):
+        raise ValueError("a comma is expected between two masses, as 0.06, 0.1 g")
     last = _TYPED.fullmatch(pieces[-1])
     unit = last[2] if last else ""
     return tuple(read_mass(f"{piece} {unit}" if piece[-1:].isdigit() else piece) for piece in pieces)

@@ -214,7 +214,10 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
             f"f=NAME [{unit}] ({digits(spin, 3)} Hz)"
             for unit, spin in possible_spins(middle / table.factors.get("spin_frequency_hz", 1.0)).items()
         ]
-        return [f"{doubt}; say the unit with the column: {' or '.join(meant)}" if meant else doubt]
+        if meant:
+            return [f"{doubt}; say the unit with the column: {' or '.join(meant)}"]
+        thousands = "; if its point stands behind the thousands, write the numbers without it"
+        return [doubt + thousands * is_possible_spin(1e3 * middle)]
     if step * middle < 1:  # nor does a counter give a reading in less
         doubt = f"{table.path.name}: the readings lie {1e3 * step:.3g} ms apart, the top needs {1e3 / middle:.3g} ms"
         return [f"{doubt} for a turn; if the times are in seconds, say so with their column, as t=NAME [s]"]

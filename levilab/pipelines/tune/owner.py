@@ -88,6 +88,15 @@ class Owner:
     attempts: tuple[Attempt, ...] = ()
     scan: Scan | None = None
 
+    def with_washers(self, masses: Sequence[float]) -> Owner:
+        """Return the owner with these washers [kg].  Raises ValueError where one is as heavy as a top."""
+        heaviest = max(masses, default=0.0)
+        if self.top is not None and heaviest >= _WHOLE * self.top:
+            raise ValueError(
+                f"a washer of {in_grams(heaviest)} on a top of {in_grams(self.top)}? mg are typed as 60 mg"
+            )
+        return replace(self, washers=tuple(sorted(masses)))
+
     def with_trial(self, text: str) -> Owner:
         """Return the owner with one more trial.  Raises ValueError."""
         return replace(self, attempts=(*self.attempts, self._attempt(text)))

@@ -33,6 +33,10 @@ def test_every_command_has_help_and_the_ones_that_do_something_an_example(levila
         assert f"Example: levilab {command}" in text
 
 
+def test_the_example_of_sway_names_the_folder_that_a_search_leaves_out(levilab):
+    assert "Example: levilab analyze sway sample_data/sway/" in levilab("analyze", "sway", "--help").stdout
+
+
 def test_each_experiment_and_each_analysis_has_its_command():
     assert EXPERIMENT_HELP.keys() == EXPERIMENTS.keys()
     assert COMMANDS.keys() - {"each"} == ANALYSES.keys()

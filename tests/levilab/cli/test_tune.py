@@ -61,6 +61,25 @@ def test_a_person_is_asked_and_every_answer_is_kept_at_once(answers, tmp_path: P
     assert (again.status, again.out.startswith("Leave the washers as they are")) == (0, True)
 
 
+def test_what_was_typed_is_kept_where_a_later_question_ends_it(answers, tmp_path: Path) -> None:
+    assert answers("24.9").status == 2  # standard input ends, as a person would by Ctrl-C
+    assert answers("0.06, 0.1").err.startswith("Which washers have you")
+    assert answers().err.startswith("How warm are the magnets")
+    assert 'top = "24.9 g"' in (tmp_path / "tune.toml").read_text("utf-8")
+
+
+def test_washers_without_commas_or_as_heavy_as_a_top_are_asked_again(answers) -> None:
+    asked = answers("24.9", "0.06 0.1", "60", "60 mg", "21", "").err.splitlines()
+    assert asked[2] == "a comma is expected between two masses, as 0.06, 0.1 g"
+    assert asked[4] == "a washer of 60 g on a top of 24.9 g? mg are typed as 60 mg"
+
+
+def test_washers_with_an_outcome_are_no_temperature(answers) -> None:
+    ended = answers("0.06 floats", "", options=(*BENCH, "--temperature", "21"))
+    assert "a mass or washers, a temperature and an outcome" in ended.err
+    assert "temperature of a room" not in ended.err
+
+
 def test_the_end_of_input_ends_as_enter_does(answers) -> None:
     assert answers(options=(*BENCH, "--temperature", "21")).status == 0
     ended = answers(options=("--file", "other.toml"))

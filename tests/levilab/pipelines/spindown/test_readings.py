@@ -66,3 +66,9 @@ def test_readings_closer_than_a_turn_are_doubted(tmp_path):
     for unit, said in (("ms", ["the readings lie 10 ms apart, the top needs 25.9 ms for a turn"]), ("s", [])):
         warnings = spin_readings(table_of(tmp_path, f"T [{unit}],f [Hz]\n{rows}")).warnings
         assert [text.partition(";")[0].partition(": ")[2] for text in warnings] == said
+
+
+def test_points_behind_thousands_are_named_where_they_pass_for_decimals(tmp_path):
+    rows = "t [s];n [U/min]\n0;2.280\n10;2.206\n20;2.133\n30;2.061\n"
+    (warning,) = spin_readings(table_of(tmp_path, rows)).warnings
+    assert warning.endswith("if its point stands behind the thousands, write the numbers without it")
