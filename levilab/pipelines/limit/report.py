@@ -148,9 +148,11 @@ def _meaning(group: Limits) -> Iterator[str]:
         yield "How far another top's limit lies from that one top does not say."
         return
     ratio = found.scatter.value / mean.u
-    yield (
-        f"One top is lost {digits(found.scatter.value)} Hz from another, so a single one may be off by that much; the "
-        f"mean of {found.n} is {digits(ratio)} times as good."
+    yield f"One top is lost {digits(found.scatter.value)} Hz from another, so a single one may be off by that much" + (
+        f"; the mean of {found.n} is {digits(ratio)} times as good."
+        if ratio > 1
+        else f". The mean of {found.n} is known to {digits(mean.u)} Hz only: the drive's steps, or runs that differ, "
+        "add to u and do not become less by more tops."
     )
     if group.which == "lower":
         value, u = MEASURED_HZ, MEASURED_U_HZ

@@ -267,6 +267,18 @@ def test_upper_limits_that_do_not_scatter_are_no_better_than_a_step(sample_data:
     assert any("however often it is repeated: creep slower" in text for text in analysis.all_warnings)
 
 
+def test_a_mean_within_a_step_of_the_drive_is_not_called_better(sample_data: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(sample_data / "upper-limits", tmp_path / "run")
+    header, *rows = (folder / "readings.csv").read_text(encoding="utf-8").splitlines()
+    at = header.split(",").index("spin_frequency_hz")
+    cells = [[row.split(",")[0], *rows[0].split(",")[1:]] for row in rows]
+    cells[0][at] = str(float(cells[0][at]) + 0.01)
+    (folder / "readings.csv").write_text("\n".join([header, *map(",".join, cells), ""]), encoding="utf-8")
+    text = str(limit_part(METHOD.analyze([folder], LimitOptions())).result[0])
+    assert "times as good" not in text
+    assert "do not become less by more tops" in text
+
+
 def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path: Path, sample_data: Path) -> None:
     file = spin_down_csv(tmp_path / "my.csv")
     assert [row.name for row, _ in analyze_suiting([file], {})] == ["spindown"]
