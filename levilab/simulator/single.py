@@ -38,7 +38,7 @@ from levilab.simulator.problem import (
 )
 from levilab.simulator.spin import DECAYS, since_infinity
 from levilab.simulator.start import start_of
-from levilab.simulator.stops import NO_TIMES, kinks, stop_after_each_step
+from levilab.simulator.stops import NO_TIMES, corners, kinks, stop_after_each_step
 from levilab.simulator.trajectory import Accuracy, Event, Trajectory
 
 if TYPE_CHECKING:
@@ -162,6 +162,8 @@ def simulate(
             f"escape.height_m = {scene.escape.height_m}: the top starts at {state[R][2]:.4g} m, outside of the limits "
             "of the escape, where it would be lost before it began"
         )
+    begin = float(state[TIME])
+    corners(scene.drive, min(begin, begin + duration), max(begin, begin + duration))  # refused before anything is run
     model = model_of(scene, state[R])
     problem = Problem(scene, model, state, scheme_for(scheme, model))
     wanted = _Wanted(duration, rate, events, progress)

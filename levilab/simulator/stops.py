@@ -139,21 +139,31 @@ def kinks(drive: Drive, low: float, high: float) -> Array:
     """
     if drive.waveform == "off" or (drive.waveform == "sine" and drive.off_s is None):
         return NO_TIMES
-    found = []
-    if drive.off_s is not None and low < drive.off_s < high:
-        found.append(drive.off_s)
-    offset = {"square": 0.0, "unipolar": 0.0, "triangle": 0.25}.get(drive.waveform)
-    if offset is not None and drive.amplitude_t != 0:
-        f, turns = drive.frequency_hz, drive.phase_rad / (2 * math.pi)
-        first, last = math.ceil(2 * (f * low + turns - offset)), math.floor(2 * (f * high + turns - offset))
-        if last - first > MOST_KINKS:
-            raise SimulationError(
-                f"drive.frequency_hz = {f:g}: the {drive.waveform} has {last - first} corners in {high - low:g} s, at "
-                f"most {MOST_KINKS:.0e} are gone through: take a sine, a lower frequency or a shorter duration"
-            )
-        found.extend(((np.arange(first, last + 1) / 2 + offset - turns) / f).tolist())
+    found = [drive.off_s] if drive.off_s is not None and low < drive.off_s < high else []
+    offset, first, last = corners(drive, low, high)
+    turns = drive.phase_rad / (2 * math.pi)
+    found.extend(((np.arange(first, last + 1) / 2 + offset - turns) / drive.frequency_hz).tolist())
     times = np.array(found, dtype=np.float64)
     return np.asarray(times[(times > low) & (times < high)])
+
+
+def corners(drive: Drive, low: float, high: float) -> tuple[float, int, int]:
+    """Return the phase of the corners of the drive's waveform [turns], and which half turns they are, first to last.
+
+    Raises:
+        SimulationError: there are too many.
+    """
+    offset = {"square": 0.0, "unipolar": 0.0, "triangle": 0.25}.get(drive.waveform)
+    if offset is None or drive.amplitude_t == 0:
+        return 0.0, 0, -1
+    f, turns = drive.frequency_hz, drive.phase_rad / (2 * math.pi)
+    first, last = math.ceil(2 * (f * low + turns - offset)), math.floor(2 * (f * high + turns - offset))
+    if last - first > MOST_KINKS:
+        raise SimulationError(
+            f"drive.frequency_hz = {f:g}: the {drive.waveform} has {last - first} corners in {high - low:g} s, at "
+            f"most {MOST_KINKS:.0e} are gone through: take a sine, a lower frequency or a shorter duration"
+        )
+    return offset, first, last
 
 
 def _shape(drive: Drive, middles: Array) -> tuple[Array, Array]:
