@@ -37,7 +37,8 @@ QUANTITIES = ("spin_frequency_hz", "spin_frequency_u_hz")
 _TIME = "time_s"
 #: Limits that differ by more than this part of their mean are none of one top: most likely a spin-down.
 _MOST_SPREAD = 0.25
-#: Correlation with the time above which a spin is that of one top, which chance seldom makes of so many rows.
+#: Rank correlation with the time above which a spin is that of one top, and the number of rows from which chance
+#: seldom makes it.
 _TREND, _FEWEST = 0.9, 5
 #: A number on a line of its own, with a decimal point or comma, and what is read of a file that holds nothing else.
 _NUMBER, _MOST_BYTES = re.compile(r"[+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?"), 1 << 20
@@ -85,8 +86,12 @@ def _must_be_of_several(path: Path, time: Array, limit: Array) -> None:
     no_times = "of limits one row a repetition is expected (leave out the column of times if these are limits)"
     if np.any(np.diff(time) <= 0):
         raise DoesNotSuit(f"{path}: its times do not increase from row to row; {no_times}")
-    trend = float(np.corrcoef(np.arange(len(limit)), limit.argsort().argsort())[0, 1])  # by ranks
-    if len(limit) >= _FEWEST and abs(trend) > _TREND:
+    if len(limit) < _FEWEST or not np.ptp(limit):
+        return
+    ordered = np.sort(limit)
+    ranks = np.searchsorted(ordered, limit) + np.searchsorted(ordered, limit, "right")  # equal limits share one
+    trend = float(np.corrcoef(np.arange(len(limit)), ranks)[0, 1])
+    if abs(trend) > _TREND:
         way = "falls" if trend < 0 else "rises"
         raise DoesNotSuit(f"{path}: the spin {way} with time, as that of one top does; {no_times}")
 

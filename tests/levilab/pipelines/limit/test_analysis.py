@@ -287,6 +287,8 @@ def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path: Path
     file.write_text("t,f\n0,40\n10,39\n20,37\n30,37.5\n40,36\n50,35\n", encoding="utf-8")  # not far down
     with pytest.raises(DoesNotSuit, match="the spin falls with time"):
         METHOD.analyze([file], LimitOptions())
+    file.write_text("t,f\n" + "".join(f"{k},21.8\n" for k in range(6)), encoding="utf-8")  # as printed to 0.1 Hz
+    assert [row.name for row, _ in analyze_suiting([file], {})] == ["limit"]
     for wrong, says in (
         ("0,40\nMittel,39\n20,40\n30,39.5\n", "'Mittel' stands in"),
         ("0,40\n0,39\n9,40\n", "repeated"),
