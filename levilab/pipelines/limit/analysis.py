@@ -160,6 +160,11 @@ class Limits:
     told_apart: bool = False
 
     @property
+    def theory(self) -> tuple[Comparison, ...]:
+        """The comparisons with theory; those with what others reached stand in the table alone."""
+        return tuple(one for one in self.comparisons if one.name not in {SIMON, *_REACHED})
+
+    @property
     def conditions_text(self) -> str:
         """The conditions in words."""
         made_up = "SYNTHETIC" if self.conditions.synthetic else "not known to be SYNTHETIC"
@@ -418,9 +423,7 @@ def _sentences(limits: Limits) -> Iterable[str]:
     if limits.causes:
         told = ", ".join(f"{cause} {_times(n)}" for cause, n in sorted(limits.causes.items()))
         yield f"The phase before each loss tells why: {told}."
-    for one in limits.comparisons:
-        if one.name not in {SIMON, *_REACHED}:
-            yield _compare(one)
+    yield from map(_compare, limits.theory)
 
 
 def _times(n: int) -> str:

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from analysis.limits import Comparison
     from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
 
     Array = NDArray[np.float64]
@@ -64,16 +63,11 @@ def _finding(analysis: LimitAnalysis) -> str:
     return f"Limit{'s' if len(found) > 1 else ''} of levitation: {', '.join(found[:3])}{more}"
 
 
-def _theory(group: Limits) -> list[Comparison]:
-    """Return what theory says; what others reached stands in the table."""
-    return [one for one in group.comparisons if one.name in _THEORY]
-
-
 def _legend_lines(group: Limits) -> int:
     """Return the number of lines that a legend of two columns may take."""
     found = group.statistics
     runs = len(group.runs) if len(group.runs) <= len(MARKERS) else 1
-    entries = runs + bool(found.outliers) + 1 + 2 * bool(found.scatter) + len(_theory(group)) + 1
+    entries = runs + bool(found.outliers) + 1 + 2 * bool(found.scatter) + len(group.theory) + 1
     return (entries + 1) // 2
 
 
@@ -102,11 +96,11 @@ def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
             axes.axhline(mean + side * found.scatter.value, color=_MEAN, linewidth=0.6, alpha=0.7, label=label)
     reach = max(float(np.abs(every - mean).max()), 2 * (found.mean.u or 0.0), 0.05)
     low, high = mean - 1.25 * reach, mean + 1.25 * reach
-    for one in _theory(group):
+    for one in group.theory:
         if abs(one.expected - mean) <= _NEAR * reach:
             low, high = min(low, one.expected - 0.3 * reach), max(high, one.expected + 0.3 * reach)
     axes.set_ylim(low, high)
-    for one in _theory(group):
+    for one in group.theory:
         _draw_theory(axes, one.name, one.expected)
     _shade_beyond_window(axes, group)
     axes.set_xlim(0.4, len(every) + 0.6)

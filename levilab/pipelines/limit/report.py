@@ -123,7 +123,7 @@ _WHY = MappingProxyType({
 })  # fmt: skip
 
 
-#: Cause of a loss → what it says of drive and top.
+#: Cause of a loss → its meaning for drive and top.
 _CAUSES = MappingProxyType({
     Cause.LEFT_BEHIND: "Where a top was left behind, its lag behind the drive grew past a quarter turn and ran away: "
     "drag, the creep and the swing about the drive took more than the drive gives; a stronger drive gets higher.",
