@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -111,8 +112,8 @@ def action(load: float, energy: float) -> float:
     if energy <= 0 or most <= 0:
         return 0.0
 
-    def kinetic(lag: float) -> float:
-        return energy + load * (lag - rest) + math.cos(lag) - math.cos(rest)
+    def kinetic(lag: Any) -> Any:
+        return energy + load * (lag - rest) + np.cos(lag) - math.cos(rest)
 
     last = math.pi - rest
     over = last if energy >= most else float(brentq(kinetic, rest, last))
@@ -121,5 +122,5 @@ def action(load: float, energy: float) -> float:
     angle = np.linspace(-math.pi / 2, math.pi / 2, _POINTS)
     half = (over - back) / 2
     lag = (over + back) / 2 + half * np.sin(angle)
-    rate = np.sqrt(np.maximum(2 * (energy + load * (lag - rest) + np.cos(lag) - math.cos(rest)), 0.0))
+    rate = np.sqrt(np.maximum(2 * kinetic(lag), 0.0))
     return float(2 * np.trapezoid(rate * half * np.cos(angle), angle))

@@ -215,10 +215,12 @@ def _with_order_of_dates(text: Text, layout: Layout, chosen: Sequence[Column], n
         return layout
     dates = {found for _, line in _lines(text, layout) if (found := slashed_date(_time_in(layout, chosen, line)))}
     months_first = replace(layout, dialect=replace(layout.dialect, month_first=True))
-    if any(first > 12 for first, _, _ in dates) or len(dates) < 2:
-        return layout if any(first > 12 for first, _, _ in dates) or all(b <= 12 for _, b, _ in dates) else months_first
+    if any(first > 12 for first, _, _ in dates):
+        return layout
     if any(second > 12 for _, second, _ in dates):
         return months_first
+    if len(dates) < 2:
+        return layout
     days = [(date(y, b, a).toordinal(), date(y, a, b).toordinal()) for a, b, y in dates]
     by_day, by_month = (max(order) - min(order) for order in zip(*days, strict=True))
     name = "month/day" if by_month < by_day else "day/month"
