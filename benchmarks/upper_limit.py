@@ -162,7 +162,7 @@ def balance(scene: Scene, waveform: str, field: float, rate: float) -> float:
 
 @dataclass(frozen=True)
 class Case:
-    """A creep that is tried: what it is tried for, and what differs from the usual one.
+    """A creep: its subject, and the values that differ from the usual ones.
 
     washers: inertia [kg m²] and coupling [N m s] of loose ones, which the air brakes.
     """

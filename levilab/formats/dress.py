@@ -75,7 +75,7 @@ def _markdown(lines: Sequence[str]) -> Dressed:
 
 _STAMP = re.compile(r"\s*(\d\d?:\d\d:\d\d(?:[.,]\d+)?)\s*->\s*(.*)")
 _VALUE = r"[+-]?[\d.]+(?:[eE][+-]?\d+)?(?:\s?[^\d\s,;:=][^\s,;:=]*)?"
-#: A label before its number: t:123 or t=123, how many there are; and in words, "time 123", at least two of them.
+#: A label before its number, and how often more pairs follow: t:123 or t=123 any times, "time 123" at least once.
 _COLON, _WORD = (r"([^\W\d][^:=;,\t]*?)\s*[:=]\s*", "*"), (r"([^\W\d]+)\s+", "+")
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 #: Only programs of this machine reach it; a shared view has a second socket, for guests.
 HOST = "127.0.0.1"
-#: Pages that are open are given so long to close [s], and a connection has so long for its first request [s].
+#: Time that open pages have to close, and a connection for its first request [s].
 _GOODBYE_S, _FIRST_REQUEST_S = 1, 10.0
 #: Connections of guests at a time: 60 phones that look, and 15 that load the page; macOS allows a process 256 files.
 _MOST_OF_GUESTS = 150

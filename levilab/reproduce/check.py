@@ -137,7 +137,7 @@ class Found:
         findings: in their order.
         blocks: figures, and what is said about them.
         said: what the chapter says in a sentence or two, above its table.
-        synthetic: what in it was made up or simulated, and how; empty where nothing stands for a measurement.
+        synthetic: which measurements are synthetic or simulated, and how; empty where none is.
     """
 
     findings: tuple[Finding, ...]

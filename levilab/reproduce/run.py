@@ -67,7 +67,7 @@ CHAPTERS: dict[str, Chapter] = {
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What was made anew.
+    """All chapters that were computed.
 
     Attributes:
         chapters: each with what it found, in their order.

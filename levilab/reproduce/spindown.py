@@ -1,4 +1,4 @@
-"""The four spin-downs: the constants of the thesis, from readings made up to honour them, and which law they follow.
+"""The four spin-downs: the constants of the thesis, from synthetic readings that honour them, and their law.
 
 The thesis prints C₁ and C₂ of four runs and none of their readings.  The law of the readings is that of a laminar disc
 from about 40 Hz, a reading each 10 s, with noise; start and constant are solved for, so that straight lines through
@@ -33,13 +33,13 @@ if TYPE_CHECKING:
 NOISE_HZ, STEP_S = 0.03, 10.0
 #: Readings of each of the thesis's runs.
 READINGS = (20, 20, 19, 19)
-#: The start lies this near to 40 Hz, and so many seeds are tried at most.
+#: The start lies this near to 40 Hz; SEEDS seeds are tried at most.
 START_HZ, NEAR_HZ, SEEDS = 40.0, 0.25, 1000
 
 
 @dataclass(frozen=True)
-class MadeUp:
-    """A spin-down that was made up.
+class Synthetic:
+    """A synthetic spin-down.
 
     Attributes:
         time: shape (n,) [s].
@@ -72,7 +72,7 @@ def as_printed(c1: float, c2: float) -> tuple[str, str]:
     return f"{c1:.6f}", f"{c2:.3e}"
 
 
-def solve(c1: float, c2: float, n: int) -> MadeUp:
+def solve(c1: float, c2: float, n: int) -> Synthetic:
     """Find readings that give the published constants to every printed digit, after rounding.
 
     The first seed is taken for which rounding does not move a digit and the start lies within 0.25 Hz of 40.
@@ -95,7 +95,7 @@ def solve(c1: float, c2: float, n: int) -> MadeUp:
         nu = np.asarray(np.round(disc(t, start, c32) + noise, 2), dtype=np.float64)
         kept = as_printed(*straight_lines(t, nu)) == as_printed(c1, c2)
         if found.success and kept and abs(start - START_HZ) < NEAR_HZ:
-            return MadeUp(t, nu, start, c32, seed)
+            return Synthetic(t, nu, start, c32, seed)
     raise RuntimeError(f"no seed gives C1 = {c1}, C2 = {c2}")
 
 
@@ -116,13 +116,13 @@ def karman_disc() -> float:
     return KARMAN * math.pi * AIR_KG_M3 * top.magnet_radius_m**4 * math.sqrt(AIR_M2_S) / top.inertia_axial_kg_m2
 
 
-def readings() -> tuple[MadeUp, ...]:
+def readings() -> tuple[Synthetic, ...]:
     """Return the four synthetic runs."""
     constants = zip(several("thesis", "spindown.c1"), several("thesis", "spindown.c2"), READINGS, strict=True)
     return tuple(solve(c1.value, c2.value, n) for c1, c2, n in constants)
 
 
-def straight(runs: tuple[MadeUp, ...]) -> list[Finding]:
+def straight(runs: tuple[Synthetic, ...]) -> list[Finding]:
     """Compare the straight lines through ln ω and 1/ω."""
     found: list[Finding] = []
     for number, run in enumerate(runs):

@@ -75,7 +75,7 @@ HEAD = (
     entry("started_utc", "text", "when the run began, as in run.json"),
     entry("experiment", "text", "of the run"),
     entry("status", "text", "finished, interrupted, failed, or running when it was analyzed"),
-    entry("synthetic", "truth", "whether any of it was simulated or made up; empty for a data file"),
+    entry("synthetic", "truth", "whether any of it is simulated or synthetic; empty for a data file"),
     entry("readings_sha256", "text", "of the file with the readings"),
 )
 TAIL = (

@@ -146,7 +146,7 @@ def _uncertainty(source: Source[SweepReadings], run: PrecessionRun, options: Pre
 
 # --- what it means ---
 
-#: A difference of so many u is one.
+#: A difference counts from this multiple of its u on.
 _DIFFERS = 2.0
 
 
@@ -178,10 +178,10 @@ def _meaning(fit: SweepFit) -> Iterator[str]:
             "distinguish it from a locked top's."
         )
     if fit.spin_offset is not None and fit.u_spin_offset:
-        off = abs(fit.spin_offset)
-        follows = off < _DIFFERS * fit.u_spin_offset
+        offset = abs(fit.spin_offset)
+        follows = offset < _DIFFERS * fit.u_spin_offset
         why = (
             "the tape turns with the top." if follows else "is the tape on a washer that slips, or does the top swing?"
         )
-        size = digits(1e3 * max(off, fit.u_spin_offset))
+        size = digits(1e3 * max(offset, fit.u_spin_offset))
         yield f"The spin that was counted is the drive's frequency to {size} mHz: {why}"

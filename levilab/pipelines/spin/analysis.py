@@ -203,7 +203,7 @@ def spin_of_source(source: Source[Records], options: SpinOptions) -> SpinRun:
 def drive_offset(series: Series, drive: float) -> Estimate:
     """Return the mean of the spin less the drive's frequency [Hz], while the spin is held; where it never is, at all.
 
-    Where the values scatter by more than their u, u grows by as much.
+    Where the values scatter by more than their u, u grows by that ratio.
     """
     held = [(start <= series.time) & (series.time <= end) for kind, start, end in series.phases if kind == "held"]
     chosen = np.any(held, axis=0) if held else np.ones(len(series), dtype=bool)

@@ -112,7 +112,7 @@ TABLES = {
     "Arduino's greeting": ("= Start =\nt=0 f=61.5\nt=0.5 f=61.25\nt=1 f=61\n", PLAIN),
     "no end of the last line": ("t,f\n0,61.5\n0.5,61.25\n1,61", PLAIN),
     "labels with =": ("t=0.0 f=61.5\nt=0.5 f=61.25\nt=1 f=61\n", PLAIN),
-    "labels in words": ("Time 0, Freq 61.5\nTime .5, Freq 61.25\nTime 1, Freq 61\n", PLAIN),
+    "labels without marks": ("Time 0, Freq 61.5\nTime .5, Freq 61.25\nTime 1, Freq 61\n", PLAIN),
     "LabVIEW's title of the times": ("X_Value,f [Hz]\n0,61.5\n0.5,61.25\n1,61\n", PLAIN),
     "field scan": (
         "z/mm;u_z/mm;B [mT]\n10;0,5;20\n20;0,5;10\n30;0,5;5\n",
