@@ -71,6 +71,13 @@ def _finite_number(text: str) -> float:
     return number
 
 
+def toml_value(value: Any) -> str:
+    """Return a value as TOML: JSON's strings, finite numbers and lists but for DEL, or an inline table."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {toml_value(to)}" for key, to in value.items()) + "}"
+    return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")
+
+
 def parse_toml(text: str) -> dict[str, Any]:
     """Return the content of a TOML text.
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import difflib
-import json
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DataError, UsageError
-from levilab.files import parse_toml, replace_atomically, writing
+from levilab.files import parse_toml, replace_atomically, toml_value, writing
 from levilab.formats.columns import SHORTHANDS
 from levilab.formats.texts import locate
 from levilab.formats.titles import CANONICAL
@@ -96,19 +95,13 @@ def write_correction(file: Path, options: Mapping[str, Any]) -> Path:
         UsageError: there is nothing to keep.
         CannotWrite: of the file.
     """
-    lines = [f"{key} = {_as_toml(options[key])}\n" for key in OF_FILES if options.get(key) is not None]
+    lines = [f"{key} = {toml_value(options[key])}\n" for key in OF_FILES if options.get(key) is not None]
     if not lines:
         raise UsageError("keep", "goes with `columns`, `channel` or `rate`: without one the file is read as it is")
     path = place_of_correction(file)
     with writing(f"{path}: could not be written", "copy the data file to a folder of yours"):
         replace_atomically(path, _HEAD.format(name=path.name.removesuffix(ENDING)) + "".join(lines))
     return path
-
-
-def _as_toml(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{key} = {_as_toml(to)}" for key, to in value.items()) + "}"
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def describe(options: Mapping[str, Any]) -> str:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import difflib
-import json
 import tomllib
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError, RequestError
-from levilab.files import parse_toml
+from levilab.files import parse_toml, toml_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -229,5 +228,4 @@ def _lines(table: Mapping[str, Any]) -> Iterator[str]:
 def _assignments(table: Mapping[str, Any]) -> Iterator[str]:
     for key, value in table.items():
         if value is not None and not isinstance(value, dict):
-            # JSON's strings, floats and lists are TOML's, but for DEL, which TOML wants escaped
-            yield f"{key} = {json.dumps(value, ensure_ascii=False, allow_nan=False)}".replace("\x7f", "\\u007f")
+            yield f"{key} = {toml_value(value)}"

@@ -1,11 +1,10 @@
-"""The owner's file, tune.toml: the top, the washers, the trials, and what a scan of the base says.
+"""The owner's file, tune.toml: the top, the washers, the trials and a scan of the base.
 
 It is read and written as a person would write it: "24.98 g", "0.06 + 0.1 g, 20.5 °C, rises".
 """
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -15,7 +14,7 @@ from pydantic import PositiveFloat, ValidationError
 from analysis.tuning import Outcome, Trial
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError, UsageError
-from levilab.files import parse_toml, replace_atomically, writing
+from levilab.files import parse_toml, replace_atomically, toml_value, writing
 from levilab.formats.typed import read_mass, read_masses, read_temperature
 from levilab.pipelines.options import read_options
 from levilab.pipelines.suits import recall_suiting
@@ -34,10 +33,10 @@ _WHOLE = 0.5
 
 @dataclass(frozen=True)
 class Attempt(Trial):
-    """A trial as its owner tells it.
+    """A trial with its washers.
 
     Attributes:
-        washers: on it [kg]; None: not told.
+        washers: on it [kg]; None: not known.
     """
 
     washers: tuple[float, ...] | None = None
@@ -74,10 +73,10 @@ class Scan(Settings):
 
 @dataclass(frozen=True)
 class Owner:
-    """All that an owner has told.
+    """An owner's top, washers and trials.
 
     Attributes:
-        top: mass without washers [kg]; None: not told.
+        top: mass without washers [kg]; None: not known.
         washers: masses of all washers [kg].
         attempts: in their order.
         scan: of the base.
@@ -107,14 +106,14 @@ class Owner:
         if len(outcomes) != 1 or not masses[0]:
             names = ", ".join(one.value for one in Outcome)
             raise ValueError(f"{_TRIAL}; the outcome is one of {names}")
-        told, degrees = read_masses(",".join(masses)), read_temperature(temperature)
+        typed, degrees = read_masses(",".join(masses)), read_temperature(temperature)
         if self.top is None:
             raise ValueError("the mass of the top without washers is needed first: `top`")
-        if len(told) == 1 and told[0] >= _WHOLE * self.top:
-            return Attempt(told[0], degrees, outcomes[0])
-        if sum(told) >= _WHOLE * self.top:
-            raise ValueError(f"washers of {in_grams(sum(told))} on a top of {in_grams(self.top)}? {_TRIAL}")
-        return Attempt(self.top + sum(told), degrees, outcomes[0], tuple(sorted(told)))
+        if len(typed) == 1 and typed[0] >= _WHOLE * self.top:
+            return Attempt(typed[0], degrees, outcomes[0])
+        if sum(typed) >= _WHOLE * self.top:
+            raise ValueError(f"washers of {in_grams(sum(typed))} on a top of {in_grams(self.top)}? {_TRIAL}")
+        return Attempt(self.top + sum(typed), degrees, outcomes[0], tuple(sorted(typed)))
 
 
 def in_grams(mass: float) -> str:
@@ -146,7 +145,7 @@ class _Table(Settings):
 
 
 def read_owner(path: Path) -> Owner:
-    """Return what a file says; without one, an owner who has told nothing.  Raises DataError."""
+    """Return the owner in a file; without a file, one of whom nothing is known.  Raises DataError."""
     if not path.exists():
         return Owner()
     where = ""
@@ -171,34 +170,30 @@ def write_owner(path: Path, owner: Owner) -> None:
     """Write the file, whole or not at all.  Raises CannotWrite."""
     lines = [_HEAD]
     if owner.top is not None:
-        lines.append(f"top = {_quoted(in_grams(owner.top))}  # without washers\n")
-    lines.append(f"washers = [{', '.join(_quoted(in_grams(one)) for one in owner.washers)}]\n")
-    lines.append("trials = [\n" + "".join(f"  {_quoted(one.text)},\n" for one in owner.attempts) + "]\n")
+        lines.append(f"top = {toml_value(in_grams(owner.top))}  # without washers\n")
+    lines.append(f"washers = [{', '.join(toml_value(in_grams(one)) for one in owner.washers)}]\n")
+    lines.append("trials = [\n" + "".join(f"  {toml_value(one.text)},\n" for one in owner.attempts) + "]\n")
     if owner.scan:
-        lines += ["\n[scan]\n", *(f"{key} = {_quoted(value)}\n" for key, value in owner.scan)]
+        lines += ["\n[scan]\n", *(f"{key} = {toml_value(value)}\n" for key, value in owner.scan)]
     with writing(f"{path}: could not be written", "choose another place with `file`"):
         replace_atomically(path, "".join(lines))
-
-
-def _quoted(value: str | float) -> str:
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 # --- the scan ---
 
 
-#: What a magnet that is taken for a point moves the mass by, relative: 0 to 4 % (`analysis.field.magnet`).
+#: Relative error of the mass from taking a magnet for a point: 0 to 4 % (`analysis.field.magnet`).
 _POINT_U = 0.02
 
 
 def read_scan(path: Path, temperature: float | None, device: Path | None, tell: Callable[[str], None]) -> Scan:
-    """Return what a Hall scan says, by its result beside it or analyzed now.
+    """Return the window of a Hall scan, by its result beside it or analyzed now.
 
     Args:
         path: of the run or the data file.
         temperature: of the base at the time [°C]; None: as the run recorded it.
         device: file that describes base and top; None: as the result has it.
-        tell: called with what to know before using it.
+        tell: called with each warning of the analysis.
 
     Raises:
         DataError: it is no scan, or says nothing of this top.
