@@ -50,7 +50,7 @@ _COMPARED = 40
 
 
 class Outcome(Enum):
-    """The outcome of a trial.  A top that slides off sideways tells of the base's level, and nothing of its mass."""
+    """The outcome of a trial.  A top slides off sideways since the base is not level, whatever its mass."""
 
     RISES = "rises"
     FLOATS = "floats"
@@ -65,7 +65,7 @@ class Trial:
     Attributes:
         mass: with its washers [kg].
         temperature: of the magnets [°C].
-        outcome: what it did.
+        outcome: of it.
     """
 
     mass: float
@@ -75,7 +75,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of the window without trials.
+    """The window without trials.
 
     Attributes:
         low, high: the middle lies somewhere between these masses [kg], evenly without `middle`.
@@ -97,7 +97,7 @@ class Prior:
 
     @classmethod
     def of_scan(cls, middle: Estimate, lightest: float, heaviest: float, temperature: float) -> Prior:
-        """Return what a scan says: mass to set with its u, and the window of small motions [kg], at a temperature."""
+        """Return the prior by a scan: mass to set with its u, window of small motions [kg], and temperature [°C]."""
         value, theory = middle.value or 0.0, heaviest - lightest
         u = math.hypot(middle.u or 0.0, OFF_MIDDLE * theory)
         reach = _REACH * u
@@ -107,7 +107,7 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """What is known of the window: points with their weights, each of shape (n,).
+    """The window after trials: points with their weights, each of shape (n,).
 
     Attributes:
         weight: of a point; all sum to 1.
@@ -154,10 +154,18 @@ class Posterior:
         """Return the probability to float for each mass [kg] at a temperature [°C], shape (masses,)."""
         return np.array([self.outcomes(masses[k : k + 1], temperature)[1, 0] @ self.weight for k in range(masses.size)])
 
+    def chance_by_others(self, trial: Trial) -> float:
+        """Return the probability of a trial's outcome by prior and all other trials.
+
+        A harmonic mean takes the trial itself out of the posterior (Gelfand, Dey & Chang, Bayesian Statistics 4, 1992).
+        """
+        outcomes = self.outcomes(np.array([trial.mass]), trial.temperature)[:, 0]
+        return 1 / float(self.weight @ (1 / np.maximum(outcomes[list(Outcome).index(trial.outcome)], 1e-300)))
+
     def promise(self, masses: Array, temperature: float) -> Array:
         """Return the chances to float at a trial, plus those to float at it or at the best one after it.
 
-        The best one after it is the best after what it will have shown.  The mass to try next has the most of both.
+        The best one after it is chosen with its outcome known.  The mass to try next has the most of both.
 
         Args:
             masses: that can be set, shape (n,) [kg].
@@ -176,14 +184,14 @@ class Posterior:
 
 
 def learn(trials: Sequence[Trial], prior: Prior) -> Posterior:
-    """Return what prior and trials say of the window.
+    """Return the posterior of the window.
 
     Args:
         trials: in any order.
-        prior: what is known without them.
+        prior: without them.
     """
-    telling = [one for one in trials if one.outcome is not Outcome.SIDEWAYS]
-    reference = float(np.mean([one.temperature for one in telling])) if telling else prior.temperature
+    informative = [one for one in trials if one.outcome is not Outcome.SIDEWAYS]
+    reference = float(np.mean([one.temperature for one in informative])) if informative else prior.temperature
     reach = _REACH * prior.per_k_u * abs(reference - prior.temperature) * prior.high
     log_width, log_u = math.log(prior.width), _REACH * prior.width_log_u
     shift = math.exp(prior.per_k * (reference - prior.temperature))
@@ -198,7 +206,7 @@ def learn(trials: Sequence[Trial], prior: Prior) -> Posterior:
         middle, log_of_width, per_k = np.meshgrid(*axes, indexing="ij", copy=False)
         width = np.exp(log_of_width)
         log = _log_prior(prior, middle * np.exp(per_k * (prior.temperature - reference)), log_of_width, per_k)
-        for one in telling:
+        for one in informative:
             at = middle * np.exp(per_k * (one.temperature - reference))
             seen = _probabilities(one.mass, at, width, per_k)[list(Outcome).index(one.outcome)]
             log += np.log(np.maximum(seen, 1e-300))

@@ -44,7 +44,7 @@ def tune(
     scan_temperature: Annotated[
         str | None, typer.Option(metavar="T", help="Of the base at the scan.", show_default="the run's")
     ] = None,
-    file: Annotated[Path, typer.Option(metavar="FILE", readable=False, help="Keeps what you say.")] = Path("tune.toml"),
+    file: Annotated[Path, typer.Option(metavar="FILE", readable=False, help="Keeps your answers.")] = Path("tune.toml"),
     ask: Annotated[
         bool | None, typer.Option("--ask/--no-ask", help="Ask for what is missing.", show_default="at a terminal")
     ] = None,
@@ -60,9 +60,9 @@ def tune(
     owner = _with_bench(kept, top, washers, file, asks=asks)
     owner = _with_scan(owner, scan, scan_temperature, device)
     for text in trial or ():
-        owner = _told("trial", text, owner.with_trial)
+        owner = _answer("trial", text, owner.with_trial)
     prompt = "How warm are the magnets, by a thermometer beside them?  [°C]"
-    degrees, ends = _told("temperature", temperature, read_temperature, prompt, asks=asks), False
+    degrees, ends = _answer("temperature", temperature, read_temperature, prompt, asks=asks), False
     while not ends:
         advice = advise(owner, degrees)
         if owner != kept:
@@ -91,7 +91,7 @@ def _with_bench(owner: "Owner", top: str | None, washers: str | None, file: Path
 
     mass = owner.top
     if top is not None or mass is None:
-        mass = _told("top", top, read_mass, "How heavy is the top without washers?  [g]", asks=asks)
+        mass = _answer("top", top, read_mass, "How heavy is the top without washers?  [g]", asks=asks)
     if mass != owner.top and owner.attempts:
         raise UsageError("top", f"{file} has the trials of another top: name another `file` for this one", value=top)
     owner = replace(owner, top=mass)
@@ -100,7 +100,7 @@ def _with_bench(owner: "Owner", top: str | None, washers: str | None, file: Path
     if asks:
         write_owner(file, owner)
     prompt = "Which washers have you, each by its mass, as 0.06, 0.06, 0.1?  [g]"
-    owner = _told("washers", washers, lambda text: owner.with_washers(read_masses(text)), prompt, asks=asks)
+    owner = _answer("washers", washers, lambda text: owner.with_washers(read_masses(text)), prompt, asks=asks)
     if asks:
         write_owner(file, owner)
     return owner
@@ -115,7 +115,7 @@ def _with_scan(owner: "Owner", scan: Path | None, temperature: str | None, devic
             raise UsageError(name, "goes with `scan`")
     if scan is None:
         return owner
-    given = None if temperature is None else _told("scan_temperature", temperature, read_temperature)
+    given = None if temperature is None else _answer("scan_temperature", temperature, read_temperature)
     return replace(owner, scan=read_scan(scan, given, device, message))
 
 
@@ -132,14 +132,14 @@ def _next(advice: "Advice") -> "tuple[Owner, float, bool]":
         whole = text if "," in text else f"{washers_text(advice.best.washers_kg)}, {advice.temperature:g} C, {text}"
         return advice.owner.with_trial(whole), advice.temperature, False
 
-    return _told("trial", None, read, _RESULT, asks=True, at_end="")
+    return _answer("trial", None, read, _RESULT, asks=True, at_end="")
 
 
-def _told(
+def _answer(
     name: str, given: str | None, read: Callable[[str], T], prompt: str = "", *, asks: bool = False,
     at_end: str | None = None,
 ) -> T:  # fmt: skip
-    """Return what an option says, or a person at the terminal, who is asked again after a wrong answer.
+    """Return the value of an option, or the answer of a person, who is asked again after a wrong one.
 
     at_end: the answer where standard input ends.  Raises UsageError.
     """

@@ -87,6 +87,20 @@ def test_a_top_that_slides_sideways_says_nothing_of_its_mass() -> None:
     assert middle(learn([Trial(25 * G, 20, Outcome.SIDEWAYS)], prior)) == middle(learn([], prior))
 
 
+def test_the_chance_by_others_is_that_of_a_posterior_without_the_trial() -> None:
+    trials = [
+        Trial(24.9 * G, 21, Outcome.SINKS),
+        Trial(25.06 * G, 21, Outcome.RISES),
+        Trial(25.2 * G, 23, Outcome.RISES),
+    ]
+    prior = Prior(24.5 * G, 26 * G)
+    for k, one in enumerate(trials):
+        others = learn([*trials[:k], *trials[k + 1 :]], prior)
+        outcomes = others.outcomes(np.array([one.mass]), one.temperature)[:, 0] @ others.weight
+        chance = outcomes[list(Outcome).index(one.outcome)]
+        assert learn(trials, prior).chance_by_others(one) == pytest.approx(chance, rel=0.05)  # two grids
+
+
 @pytest.mark.parametrize(("outcome", "sign"), [(Outcome.RISES, 1), (Outcome.SINKS, -1)])
 def test_what_rises_is_made_heavier_and_what_sinks_lighter(outcome: Outcome, sign: int) -> None:
     masses = 24.4 * G + WASHERS

@@ -32,8 +32,9 @@ _BEYOND = 0.01
 _SAME = 0.02
 #: Rows of the table of chances; and the chance of failing the same way beyond which no washers will do.
 _ROWS, _OUT_OF_REACH = 5, 0.8
-#: Chance of a trial's outcome below which it is named: lapses have 0.02, and leave up to some 0.1.
-_UNLIKELY = 0.1
+#: Chance of a trial's outcome, by the other trials, below which it is named: that of a lapse is 0.02, and more beside
+#: soft edges.
+_UNLIKELY = 0.05
 #: A difference of temperature that is worth a word [K].
 _NOTABLE_K = 0.3
 _MET = {Outcome.RISES: "rose", Outcome.FLOATS: "floated", Outcome.SINKS: "sank", Outcome.SIDEWAYS: "slid off sideways"}
@@ -52,12 +53,12 @@ class Choice:
 
 @dataclass(frozen=True, eq=False)
 class Advice:
-    """What to try next.
+    """Washers to try next.
 
     Attributes:
-        owner: and all that they have told.
+        owner: of the top.
         temperature: today's [°C].
-        posterior: what is known of the window.
+        posterior: of the window.
         best: to try next.
         choices: the likeliest to float, the lightest first.
     """
@@ -104,7 +105,7 @@ class Advice:
 
     @property
     def _reasons(self) -> Iterator[str]:
-        """Yield what is known."""
+        """Yield the last trial, the change of temperature and the scan, as clauses."""
         scan, last = self.owner.scan, self.owner.attempts[-1] if self.owner.attempts else None
         if last:
             yield f"it {_MET[last.outcome]} at {in_grams(last.mass)} and {last.temperature:g} °C"
@@ -119,7 +120,7 @@ class Advice:
 
     @property
     def _beyond_reach(self) -> str:
-        """Return what to do where no washers will do, as a sentence behind a blank; empty elsewhere."""
+        """Return the mass beyond the reach of the washers, as a sentence behind a blank; empty within it."""
         middle, top = self.values["mass_to_set"].value or 0.0, self.owner.top or 0.0
         heaviest = top + sum(self.owner.washers)
         if self.best.rises > _OUT_OF_REACH and middle > heaviest:
@@ -133,13 +134,10 @@ class Advice:
         """Trials that the others, the scan and the temperature make unlikely."""
         texts = []
         for number, one in enumerate(self.owner.attempts, 1):
-            if one.outcome is Outcome.SIDEWAYS:
-                continue
-            chances = self.posterior.outcomes(np.array([one.mass]), one.temperature)[:, 0] @ self.posterior.weight
-            if chances[list(Outcome).index(one.outcome)] < _UNLIKELY:
+            if one.outcome is not Outcome.SIDEWAYS and self.posterior.chance_by_others(one) < _UNLIKELY:
                 texts.append(
-                    f"trial {number} ({one.text}) does not go with what else is known: was it let go badly, or is a "
-                    "mass, a temperature or the scan wrong?"
+                    f"trial {number} ({one.text}) does not go with the other trials or the scan: was it let go badly, "
+                    "or is a mass, a temperature or the scan wrong?"
                 )
         return tuple(texts)
 
@@ -192,7 +190,7 @@ class Advice:
 
 
 def advise(owner: Owner, temperature: float) -> Advice:
-    """Return what to try next at a temperature [°C].
+    """Return the washers to try next at a temperature [°C].
 
     Raises:
         UsageError: the top's mass is not known.

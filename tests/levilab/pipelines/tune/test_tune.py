@@ -152,6 +152,8 @@ def test_a_trial_against_all_others_is_named() -> None:
     assert advise(told(*rest), 21.0).warnings == ()
     (warning,) = advise(told(*rest, "0.06+0.1 g, 21 C, rises"), 21.0).warnings
     assert warning.startswith("trial 3 (0.06 + 0.1 g, 21 °C, rises) does not go with")
+    (warning,) = advise(told("none, 21 C, sinks", "0.06+0.1 g, 21 C, rises"), 21.0).warnings
+    assert warning.startswith("trial 1 (none, 21 °C, sinks) does not go with")
 
 
 def test_washers_on_the_top_are_not_changed_for_others_of_the_same_mass() -> None:
