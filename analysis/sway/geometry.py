@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from analysis.errors import ShapesDiffer, TooFewReadings
 from analysis.field.errors import ImpossibleRing
 from analysis.field.magnet import axial_field, stiffnesses
-from analysis.stability import SymmetricTop, modes, windows
+from analysis.stability import SymmetricTop, windows
 from analysis.sway.lines import vertical_swing
-from analysis.sway.orbit import NoSwing, slow_swings
+from analysis.sway.orbit import NoSwing, slow_swings, small_swings
 from analysis.uncertainty import Estimate, propagate
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class Known:
     """What is known of the top and of the base.
 
     Attributes:
-        top: its moment counts for nothing: it is what carries the weight at the height at which the top floats.
+        top: its moment is not used, but the one that carries the weight at the height at which the top floats.
         mass_u, axial_u: standard uncertainties of mass [kg] and I₃ [kg m²].
         ring: of the base; of its strength the sign counts alone.
         covariance: of thickness, inner and outer radius, shape (3, 3) [m²].
@@ -115,7 +115,7 @@ class Known:
         return replace(self.top, moment=moment, stiffnesses=stiffness)
 
     def gradient(self, height: float) -> float:
-        """Return B′/2B at a height; of a disc what it turns by, over what moves it [1/m]."""
+        """Return B′/2B at a height; of a disc E_xθ/E_θθ [1/m]."""
         tilt, _, both = self.top_at(height).stiffness(self.field, np.array([height]))[:, 0]
         return abs(float(both / tilt))
 
@@ -124,13 +124,15 @@ class Known:
         from scipy.optimize import brentq
 
         product = float(swings.frequency[0] * swings.frequency[1])
+
+        def excess(z: float) -> float:
+            return math.prod(small_swings(self.field, self.top_at(z), z, spin)) - product
+
         try:
-            found = brentq(
-                lambda z: math.prod(_slow(self.field, self.top_at(z), z, spin)) - product, *self.heights, xtol=1e-7
-            )
+            return float(brentq(excess, *self.heights, xtol=1e-7))
         except ValueError:
-            raise NoSwing(amplitudes=(swings.amplitude[0], swings.amplitude[1]), spin=spin) from None
-        return float(found)
+            amplitudes = float(swings.amplitude[0]), float(swings.amplitude[1])
+            raise NoSwing(amplitudes=amplitudes, spin=spin) from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,42 +202,43 @@ def geometric_magnetism(
     swings, wrong = _assigned(swings, spin, known)
     each = list(zip(swings, spin.tolist(), strict=True))
     heights = np.array([known.height(one, nu) for one, nu in each])
-    shifts = np.array([_shift(one, nu, z, known) for (one, nu), z in zip(each, heights.tolist(), strict=True)])
+    placed = [(one, nu, z) for (one, nu), z in zip(each, heights.tolist(), strict=True)]
+    shifts = np.array([_shift(*one, known) for one in placed])
     small = np.array([one.frequency[:2] for one in swings]) - shifts
+    seen, shift = small.sum(axis=1), np.abs(shifts.sum(axis=1))
     resonance = np.array([_doubt(one) for one in swings])
     mistaken = wrong * np.array([_away(one) for one in swings])
-    upright = np.array([1 + _lean(one, nu, z, known) for (one, nu), z in zip(each, heights.tolist(), strict=True)])
-    share, half = float(np.mean(small.sum(axis=1) / spin)), np.empty(0)
+    leans = np.array([_lean(*one, known) for one in placed])
+    value, half = reference * float(np.mean(seen / spin)), np.empty(0)
     for _ in range(_ROUNDS):  # Ω_g is the split but for some percent, which hardly depend on it
-        size = max(abs(share), _SMALL)
-        expected, half = np.array([_split(size, *row, known.top) for row in zip(spin, small, strict=True)]).T
-        factor = upright * size * reference / expected
-        shares = factor * small.sum(axis=1)
+        size = max(abs(value) / reference, _SMALL)
+        expected, half = np.array([_split(size, *row, known) for row in zip(spin, small, strict=True)]).T
+        factor = (1 + leans) * size * reference / expected
+        shares = factor * seen
         u_shares = np.abs(factor) * np.array([one.u_split for one in swings])
-        doubt = np.abs(shares) * resonance + np.abs(factor) * (mistaken + SHIFT_U * np.abs(shifts.sum(axis=1)))
-        weight = 1 / (u_shares**2 + doubt**2)
-        share = float(np.sum(weight * shares) / np.sum(weight)) / reference
-    left = float(np.sum(weight * (shares - share * reference) ** 2))
-    scale = math.sqrt((left + BELIEVED) / (spin.size - 1 + BELIEVED))
-    lean = float(np.mean(upright)) - 1
+        doubt = np.abs(shares) * resonance + np.abs(factor) * (mistaken + SHIFT_U * shift)
+        total = np.hypot(u_shares, doubt)
+        value, u_lines, chi_square = _mean(shares, total)
+    lean = float(np.mean(leans))
     parts = {
-        "lines": scale / math.sqrt(float(np.sum(weight))),
-        "amplitude": float(np.sum(weight * doubt) / np.sum(weight)),
-        "motion": MOTION_U * abs(share) * reference,
-        "lean": LEAN_U * lean * abs(share) * reference,
+        "lines": u_lines,
+        "amplitude": float(np.average(doubt, weights=1 / total**2)),
+        "motion": MOTION_U * abs(value),
+        "lean": LEAN_U * lean * abs(value),
     }
-    measured = Estimate(share * reference, math.hypot(*parts.values()), "Hz")
-    of_base = _of_base(each, heights, known)
-    predicted, parts_predicted = _predict(of_base, known, reference)
+    u = math.hypot(*parts.values())
+    measured = Estimate(value, u, "Hz")
+    of_base, predicted, parts_predicted = _predict(each, heights, known, reference)
+    share = (predicted.value or 0.0) / reference
     return Geometry(
         spin=reference,
         measured=measured,
         predicted=predicted,
         ratio=_ratio(measured, predicted),
-        gradient=_gradient_of(measured, reference, known),
+        gradient=_gradient_of(value / reference, u / reference, known),
         of_precession=_precession(swings, spin, half, known),
         of_base=of_base,
-        against_null=share * reference / (measured.u or math.inf),
+        against_null=value / (u or math.inf),
         parts=parts,
         parts_predicted=parts_predicted,
         shares=shares,
@@ -243,12 +246,19 @@ def geometric_magnetism(
         shifts=shifts,
         lean=lean,
         heights=heights,
-        splits=upright * small.sum(axis=1),
-        expected=np.array(
-            [_split((predicted.value or 0) / reference, *row, known.top)[0] for row in zip(spin, small, strict=True)]
-        ),
-        chi_square=left,
+        splits=(1 + leans) * seen,
+        expected=np.array([_split(share, *row, known)[0] for row in zip(spin, small, strict=True)]),
+        chi_square=chi_square,
     )
+
+
+def _mean(values: Array, u: Array) -> tuple[float, float, float]:
+    """Return the weighted mean, its standard uncertainty, for which u of the values is partly believed, and χ²."""
+    weight = 1 / u**2
+    mean = float(np.average(values, weights=weight))
+    chi_square = float(np.sum(weight * (values - mean) ** 2))
+    scale = math.sqrt((chi_square + BELIEVED) / (values.size - 1 + BELIEVED))
+    return mean, scale / math.sqrt(float(np.sum(weight))), chi_square
 
 
 def _assigned(swings: Sequence[Swings], spin: Array, known: Known) -> tuple[Sequence[Swings], float]:
@@ -292,40 +302,31 @@ def _doubt(swings: Swings) -> float:
     return float(min(RESONANCE_U * size**2 / max(_away(swings), NEAREST_HZ) ** 4, 1.0))
 
 
-def _split(share: float, spin: float, small: Array, top: SymmetricTop) -> tuple[float, float]:
-    """Return the split [Hz] of a top with this Ω_g/ω₃ and the product of slow swings that is seen, and its Ω_z²/2."""
-    p, omega = _righting(share, top), 2 * math.pi * spin
-    product = 4 * math.pi**2 * float(small[0] * small[1])
-    half = top.mass * top.gravity**2 / (4 * p) + product
+def _split(share: float, spin: float, small: Array, known: Known) -> tuple[float, float]:
+    """Return the split [Hz] of a top with this Ω_g/ω₃ and the product of slow swings that is seen, and its Ω²/2.
+
+    Ω_g/ω₃ = (I₃/m)(mg/2P)² gives P, and (I₁α² − I₃ω₃α + P)(α² + Ω²/2) = m g²/4 the swings.
+    """
+    top = known.top
+    both = top.mass * top.gravity / 2
+    p = both * math.sqrt(top.axial / (top.mass * share))
+    product = float(small[0] * small[1])
+    half, slow = both**2 / (top.mass * p) + 4 * math.pi**2 * product, (0.0, 0.0)
+
+    def stiffness(_: Array) -> Array:
+        return np.array([[-p], [-top.mass * half], [both]])
+
+    given = replace(top, stiffnesses=stiffness)
     for _ in range(_ROUNDS):
-        slow = _slow_roots(p, half, omega, top)
-        half += product - float(slow[0] * slow[1])
-    return float(slow.sum()) / (2 * math.pi), half
-
-
-def _righting(share: float, top: SymmetricTop) -> float:
-    """Return P [J] that belongs to Ω_g/ω₃ = (I₃/m)(mg/2P)²."""
-    return top.mass * top.gravity / 2 * math.sqrt(top.axial / (top.mass * share))
-
-
-def _slow_roots(p: float, half: float, omega: float, top: SymmetricTop) -> Array:
-    """Return the two slow roots of (I₁α² − I₃ω₃α + P)(α² + Ω²/2) = m g²/4, the backward one first [rad/s]."""
-    i1, turn = top.transverse, top.axial * omega
-    last = p * half - top.mass * top.gravity**2 / 4
-    roots = np.roots(np.array([i1, -turn, p + i1 * half, -turn * half, last]) / i1)
-    return np.sort(roots[np.argsort(np.abs(roots))[:2]].real)
-
-
-def _slow(field: AxialField, top: SymmetricTop, height: float, spin: float) -> tuple[float, float]:
-    """Return the small slow swings, the backward one first [Hz]."""
-    backward, forward = sorted(sorted(modes(field, top, height, spin).real, key=abs)[:2])
-    return float(backward), float(forward)
+        slow = small_swings(known.field, given, 0.0, spin)
+        half += 4 * math.pi**2 * (product - math.prod(slow))
+    return sum(slow), half
 
 
 def _shift(swings: Swings, spin: float, height: float, known: Known) -> tuple[float, float]:
     """Return by how much finite amplitude shifts the slow swings, of a point in the mean field of the magnet [Hz]."""
     top = replace(known.top_at(height), stiffnesses=None)
-    still = _slow(known.field, top, height, spin)
+    still = small_swings(known.field, top, height, spin)
     amplitudes = float(swings.amplitude[0]), float(swings.amplitude[1])
     moving = slow_swings(known.field, top, height, spin, amplitudes)
     return moving[0] - still[0], moving[1] - still[1]
@@ -346,21 +347,8 @@ def _lean(swings: Swings, spin: float, height: float, known: Known) -> float:
     return float(square * (0.5 - turning + slope**2 / (b * bend) - 1))
 
 
-def _of_base(each: Sequence[tuple[Swings, float]], heights: Array, known: Known) -> Estimate:
-    """Return B′/2B of the base's field where α₋α₊ is as seen."""
-    middle = len(each) // 2
-    seen, value = known.gradient(float(heights[middle])), float(np.mean([known.gradient(z) for z in heights]))
-    slopes = []
-    for k, name in enumerate(("thickness", "inner_radius", "outer_radius")):
-        step = _STEP * math.sqrt(float(known.covariance[k, k]))
-        other = replace(known, ring=replace(known.ring, **{name: getattr(known.ring, name) + step}))
-        slopes.append((other.gradient(other.height(*each[middle])) - seen) / step if step else 0.0)
-    return Estimate(value, float(propagate(known.covariance, np.array([slopes]))[1][0]), "1/m")
-
-
-def _gradient_of(measured: Estimate, reference: float, known: Known) -> Estimate:
-    """Return B′/2B of Ω_g = (I₃ω₃/m)(B′/2B)²."""
-    share, u = float(measured.value or 0.0) / reference, float(measured.u or 0.0) / reference
+def _gradient_of(share: float, u: float, known: Known) -> Estimate:
+    """Return B′/2B of Ω_g/ω₃ = (I₃/m)(B′/2B)²."""
     if share <= 0:
         return Estimate(None, None, "1/m")
     value = math.sqrt(share * known.top.mass / known.top.axial)
@@ -377,12 +365,10 @@ def _precession(swings: Sequence[Swings], spin: Array, half: Array, known: Known
     alpha, u = 2 * np.pi * np.array([(swings[k].frequency[2], swings[k].u[2]) for k in seen]).T
     turning = top.axial * 2 * np.pi * spin[seen]
     p = top.mass * top.gravity**2 / (4 * (alpha**2 + half[seen])) + turning * alpha - top.transverse * alpha**2
-    weight = 1 / ((turning - 2 * top.transverse * alpha) * u) ** 2
-    mean = float(np.sum(weight * p) / np.sum(weight))
-    scale = math.sqrt((float(np.sum(weight * (p - mean) ** 2)) + BELIEVED) / (p.size - 1 + BELIEVED))
+    mean, u_mean, _ = _mean(p, (turning - 2 * top.transverse * alpha) * u)
     value = top.mass * top.gravity / (2 * mean)
     parts = (
-        scale / math.sqrt(float(np.sum(weight))) / mean,
+        u_mean / mean,
         PRECESSION_SHIFT_U * float(np.mean([np.sum(one.amplitude[:2] ** 2) for one in swings])),
         known.mass_u / top.mass,
         known.axial_u / top.axial,
@@ -390,13 +376,22 @@ def _precession(swings: Sequence[Swings], spin: Array, half: Array, known: Known
     return Estimate(value, value * math.hypot(*parts), "1/m")
 
 
-def _predict(gradient: Estimate, known: Known, reference: float) -> tuple[Estimate, dict[str, float]]:
-    """Return (I₃ω₃/m)(B′/2B)² over 2π [Hz], and what its u is made of."""
-    top, slope = known.top, float(gradient.value or math.nan)
-    value = top.axial * reference / top.mass * slope**2
-    of_base = 2 * value * (gradient.u or 0.0) / slope
-    parts = {"base": of_base, "mass": value * known.mass_u / top.mass, "inertia": value * known.axial_u / top.axial}
-    return Estimate(value, math.hypot(*parts.values()) or None, "Hz"), parts
+def _predict(
+    each: Sequence[tuple[Swings, float]], heights: Array, known: Known, reference: float
+) -> tuple[Estimate, Estimate, dict[str, float]]:
+    """Return B′/2B of the base's field where α₋α₊ is as seen, (I₃ω₃/m)(B′/2B)² over 2π, and the parts of its u."""
+    gradients = [known.gradient(z) for z in heights.tolist()]
+    middle, top, gradient = len(each) // 2, known.top, float(np.mean(gradients))
+    slopes = []
+    for k, name in enumerate(("thickness", "inner_radius", "outer_radius")):
+        step = _STEP * math.sqrt(float(known.covariance[k, k]))
+        other = replace(known, ring=replace(known.ring, **{name: getattr(known.ring, name) + step}))
+        slopes.append((other.gradient(other.height(*each[middle])) - gradients[middle]) / step if step else 0.0)
+    u = float(propagate(known.covariance, np.array([slopes]))[1][0])
+    value = top.axial * reference / top.mass * gradient**2
+    relative = {"base": 2 * u / gradient, "mass": known.mass_u / top.mass, "inertia": known.axial_u / top.axial}
+    parts = {name: value * part for name, part in relative.items()}
+    return Estimate(gradient, u, "1/m"), Estimate(value, math.hypot(*parts.values()) or None, "Hz"), parts
 
 
 def _ratio(measured: Estimate, predicted: Estimate) -> Estimate:

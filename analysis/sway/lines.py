@@ -33,7 +33,7 @@ WINDOW_S, FEWEST = 20.0, 100
 #: Where the slow swings and the precession of a top are looked for [Hz]: the thesis's top has 0.3 to 1.1 and 4 to 12 Hz
 #: over its window of masses and spins.
 SLOW_HZ, PRECESSION_HZ = (0.15, 1.6), (2.5, 15.0)
-#: B′/2B [1/m] that the vertical swing follows from, unless that is given, and the swing's standard uncertainty [Hz].
+#: B′/2B [1/m] that the prior of the vertical swing follows from, and that swing's standard uncertainty [Hz].
 GRADIENT_PER_M, VERTICAL_U_HZ = 9.3, 0.03
 #: No top floats whose vertical swing is slower [Hz].
 _SLOWEST_HZ = 0.2
@@ -92,14 +92,9 @@ class Swings:
 
         Then their beat is the vertical swing.
         """
-        frequency, u, amplitude, others = (
-            self.frequency.copy(),
-            self.u.copy(),
-            self.amplitude.copy(),
-            self.others.copy(),
-        )
-        others[k] = frequency[k], u[k], amplitude[k]
-        frequency[k], u[k], amplitude[k] = self.others[k]
+        lines, others = np.array([self.frequency, self.u, self.amplitude]), self.others.copy()
+        others[k], lines[:, k] = lines[:, k], self.others[k]
+        frequency, u, amplitude = lines
         beat = float(self.frequency[1] - self.frequency[0])
         return replace(self, frequency=frequency, u=u, amplitude=amplitude, vertical=beat, others=others)
 
@@ -114,16 +109,13 @@ class Swings:
         return math.hypot(self.u[0], self.u[1])
 
 
-def swings_of(
-    times: Array, places: Places, *, window: float = WINDOW_S, vertical: tuple[float, float] | None = None
-) -> list[Swings]:
+def swings_of(times: Array, places: Places, *, window: float = WINDOW_S) -> list[Swings]:
     """Return the swings of all windows in which they stand out.
 
     Args:
         times: increasing, not necessarily evenly, shape (n,) [s].
         places: x + iy, shape (n,) [m], seen so that the spin is positive.
         window: [s].
-        vertical: frequency of the vertical swing and its standard uncertainty [Hz], if known.
 
     Raises:
         TooFewReadings, ShapesDiffer, NotFinite, TimesNotIncreasing: see `analysis.errors`.
@@ -136,7 +128,7 @@ def swings_of(
     found: list[Swings] = []
     used = []
     for part in parts:
-        if one := swings_in_window(t[part], s[part], vertical, found[-1:]):
+        if one := swings_in_window(t[part], s[part], found[-1:]):
             found.append(one)
             used.append(part)
     if not found:
@@ -145,7 +137,7 @@ def swings_of(
         near = [
             one for one in found[max(k - 1, 0) : k + 2] if abs(one.frequency[0] - found[k].frequency[0]) > _APART_HZ
         ]
-        if near and (one := swings_in_window(t[part], s[part], vertical, near)):
+        if near and (one := swings_in_window(t[part], s[part], near)):
             found[k] = one
     return found
 
@@ -180,15 +172,12 @@ def vertical_swing(backward: float, forward: float, gradient: float = GRADIENT_P
     return math.sqrt(max(gravity * gradient / (4 * math.pi**2) + 2 * backward * forward, _SLOWEST_HZ**2))
 
 
-def swings_in_window(
-    t: Array, s: Places, vertical: tuple[float, float] | None = None, near: Sequence[Swings] = ()
-) -> Swings | None:
+def swings_in_window(t: Array, s: Places, near: Sequence[Swings] = ()) -> Swings | None:
     """Return the swings of one window; None where they do not stand out.
 
     Args:
         t: shape (n,) [s].
         s: shape (n,) [m].
-        vertical: see `swings_of`.
         near: swings at nearby times, from which the search starts, too.
     """
     lines = _spectrum(t, s)
@@ -199,11 +188,11 @@ def swings_in_window(
     apart = 0.6 / float(t[-1] - t[0])
     starts = [one.frequency[:2] for one in near]
     starts += [np.array([backward, *forward]) for backward in {*seen, seen[0] - apart, seen[0] + apart}]
-    fits = [_fit(t, s, start, np.zeros(2), vertical) for start in starts]
+    fits = [_fit(t, s, start, np.zeros(2)) for start in starts]
     slow, rest = min(fits, key=lambda one: one[0].misfit)
     ahead, back = _precession(t, rest), _precession(t, rest.conj())
     if ahead is not None:
-        slow, _ = _fit(t, s, np.append(slow.frequency, ahead.frequency), np.array([0, 0, ahead.slope]), vertical)
+        slow, _ = _fit(t, s, np.append(slow.frequency, ahead.frequency), np.array([0, 0, ahead.slope]))
     return replace(slow, backwards=0.0 if back is None else back.amplitude)
 
 
@@ -249,17 +238,15 @@ def _peaks(lines: Sequence[Line], between: tuple[float, float]) -> list[float]:
 _BESIDE = ((1, -1), (0, 1), (1, 1), (0, -1))
 
 
-def _fit(
-    t: Array, s: Places, start: Array, slopes_start: Array, vertical: tuple[float, float] | None
-) -> tuple[Swings, Places]:
+def _fit(t: Array, s: Places, start: Array, slopes_start: Array) -> tuple[Swings, Places]:
     """Return the swings of greatest likelihood near a start [Hz] with slopes [Hz/s], shape (2 or 3,), and the rest."""
     late, half, count = t - t.mean(), float(t[-1] - t[0]) / 2, start.size
     frequency, slope = start.copy(), slopes_start.copy()
-    rise = vertical[0] if vertical else vertical_swing(start[0], start[1])
+    rise = vertical_swing(start[0], start[1])
     still = np.stack([np.ones_like(late), late / half], axis=1)
     prior = np.zeros((count + 1, 2 * count + 1))  # what is known of the slopes and the vertical swing, over its u
     prior[:count, count:-1] = np.diag(1 / _SLOPES_U[:count])
-    prior[-1, -1] = 1 / (vertical[1] if vertical else VERTICAL_U_HZ)
+    prior[-1, -1] = 1 / VERTICAL_U_HZ
     most = np.concatenate([np.full(count, 0.3 / half), np.full(count, 0.3 / half**2), [0.1 / half]])
     quarter = 2j * np.pi * late[:, None]
     for _ in range(_STEPS):
@@ -267,8 +254,8 @@ def _fit(
         up = np.exp(quarter[:, 0] * rise)
         beside = np.stack([waves[:, i] * (up if sign > 0 else up.conj()) for i, sign in _BESIDE], axis=1)
         linear = np.concatenate([waves, beside, still], axis=1)
-        normal = linear.conj().T @ linear
-        amplitudes = np.linalg.solve(normal + 1e-9 * t.size * np.eye(linear.shape[1]), linear.conj().T @ s)
+        normal = linear.conj().T @ linear + 1e-9 * t.size * np.eye(linear.shape[1])
+        amplitudes = np.linalg.solve(normal, linear.conj().T @ s)
         rest = s - linear @ amplitudes
         noise = math.sqrt(float(np.sum(np.abs(rest) ** 2)) / (2 * (t.size - linear.shape[1] - count)))
         moving = waves * amplitudes[:count]
@@ -279,13 +266,11 @@ def _fit(
         slopes = np.concatenate(
             [quarter * moving, quarter * late[:, None] / 2 * moving, (quarter[:, 0] * turned)[:, None]], axis=1
         )
-        across = np.linalg.solve(normal + 1e-9 * t.size * np.eye(linear.shape[1]), linear.conj().T @ slopes)
-        slopes = slopes - linear @ across
+        slopes -= linear @ np.linalg.solve(normal, linear.conj().T @ slopes)
         information = (slopes.conj().T @ slopes).real / noise**2
         gradient = (slopes.conj().T @ rest).real / noise**2
-        expected = vertical[0] if vertical else vertical_swing(frequency[0], frequency[1])
-        if not vertical:
-            prior[-1, :2] = -prior[-1, -1] * frequency[1::-1] / expected
+        expected = vertical_swing(frequency[0], frequency[1])
+        prior[-1, :2] = -prior[-1, -1] * frequency[1::-1] / expected
         off = np.append(slope / _SLOPES_U[:count], (rise - expected) * prior[-1, -1])
         information += prior.T @ prior
         gradient -= prior.T @ off

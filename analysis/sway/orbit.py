@@ -11,18 +11,13 @@ Source of the method: Krack & Gross, Harmonic Balance for Nonlinear Vibration Pr
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
-from analysis.stability import SymmetricTop, modes
+from analysis.stability import AxialField, SymmetricTop, modes
 
 Array = NDArray[np.float64]
-#: Heights, shape (n,) [m] → B_z on the axis and its first four derivatives, shape (5, n) [T/m^order].
-Field = Callable[[Array], Array]
 
 #: Harmonics of the beat, and phases of it at which the equations hold: the next would change no digit at 2 mm.
 _HARMONICS, _PHASES = 4, 20
@@ -41,13 +36,19 @@ class NoSwing(AnalysisError):
         )
 
 
+def small_swings(field: AxialField, top: SymmetricTop, height: float, spin_hz: float) -> tuple[float, float]:
+    """Return the frequencies of the backward and the forward slow swing of small motions [Hz]."""
+    backward, forward = sorted(sorted(modes(field, top, height, spin_hz).real.tolist(), key=abs)[:2])
+    return backward, forward
+
+
 def slow_swings(
-    field: Field, top: SymmetricTop, height: float, spin_hz: float, amplitudes: tuple[float, float]
+    field: AxialField, top: SymmetricTop, height: float, spin_hz: float, amplitudes: tuple[float, float]
 ) -> tuple[float, float]:
     """Return the frequencies of the backward and the forward slow swing [Hz], the backward one negative.
 
     Args:
-        field: on the axis.
+        field: on the axis, with four derivatives, shape (5, n).
         top: with the moment of a point; its mass is what floats at the height.
         height: at rest [m].
         spin_hz: turns about the axis per second, positive.
@@ -58,8 +59,7 @@ def slow_swings(
     """
     from scipy.optimize import root
 
-    slow = sorted(modes(field, top, height, spin_hz).real, key=abs)[:2]
-    backward, forward = sorted(2 * math.pi * rate for rate in slow)
+    small = 2 * np.pi * np.array(small_swings(field, top, height, spin_hz))
     k = np.arange(-_HARMONICS - 1, _HARMONICS + 1)  # −1 is the backward swing, 0 the forward one
     n, of_height = k.size, np.arange(_HARMONICS + 1)
     phase = 2 * np.pi * np.arange(_PHASES) / _PHASES
@@ -88,9 +88,9 @@ def slow_swings(
     start = np.zeros(2 * n + _HARMONICS + 3)
     start[swings] = np.array(amplitudes) / _MILLIMETRE
     _, stiffness, coupling = top.stiffness(field, np.array([height]))[:, 0]
-    for i, rate, amplitude in zip(swings, (backward, forward), amplitudes, strict=True):
+    for i, rate, amplitude in zip(swings, small, amplitudes, strict=True):
         start[n + i] = (stiffness + mass * rate**2) / -coupling * amplitude
-    start[-2:] = backward, forward
+    start[-2:] = small
     with np.errstate(invalid="ignore"):  # a search may step to where an axis is longer than 1
         found = root(missing, start, method="hybr", tol=1e-12)
     if not np.abs(found.fun).max() < _NONE:

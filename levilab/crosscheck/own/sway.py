@@ -36,8 +36,8 @@ def trials_of(found: SwayAnalysis) -> Own:
         return Trial([Pull(name, value, u, truth) for name, value, u, truth in each])
 
     return Own(
-        about="the middle window of the first track anew: its swings with other phases, and its noise",
+        about="the middle window of the first track: its swings with new phases, and new noise of the same size",
         trial=trial,
         cost_s=_COST_S,
-        more=("what the size of the swings does is tried by `levilab crosscheck sway`, with tops in full motion",),
+        more=("the shift by the size of the swings is tried by `levilab crosscheck sway`, with tops in full motion",),
     )
