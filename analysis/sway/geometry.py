@@ -60,7 +60,7 @@ _WEAK, _BENT = 0.1, 0.05
 #: Standard uncertainty of the vertical swing that follows from the slow ones and the field [Hz].
 _VERTICAL_U_HZ = 0.015
 #: The spin at which Ω_g is given [Hz].
-REFERENCE_SPIN_HZ = 30.0
+REFERENCE_HZ = 30.0
 #: Tops float between these heights above the upper face, in outer radii.
 _FLOATING = (0.05, 4.0)
 #: Step of the slopes by the ring's sizes, in their standard uncertainties.
@@ -178,16 +178,13 @@ class Geometry:
     chi_square: float
 
 
-def geometric_magnetism(
-    swings: Sequence[Swings], spin_hz: Array, known: Known, reference: float = REFERENCE_SPIN_HZ
-) -> Geometry:
+def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) -> Geometry:
     """Compare the split of the slow swings with geometric magnetism.
 
     Args:
         swings: of each window.
         spin_hz: in the middle of each, positive, shape (n,) [Hz].
         known: about top and base.
-        reference: spin at which Ω_g is given [Hz].
 
     Raises:
         TooFewReadings, ShapesDiffer: see `analysis.errors`.
@@ -209,11 +206,11 @@ def geometric_magnetism(
     resonance = np.array([_doubt(one) for one in swings])
     mistaken = wrong * np.array([_away(one) for one in swings])
     leans = np.array([_lean(*one, known) for one in placed])
-    value, half = reference * float(np.mean(seen / spin)), np.empty(0)
+    value, half = REFERENCE_HZ * float(np.mean(seen / spin)), np.empty(0)
     for _ in range(_ROUNDS):  # Ω_g is the split but for some percent, which hardly depend on it
-        size = max(abs(value) / reference, _SMALL)
+        size = max(abs(value) / REFERENCE_HZ, _SMALL)
         expected, half = np.array([_split(size, *row, known) for row in zip(spin, small, strict=True)]).T
-        factor = (1 + leans) * size * reference / expected
+        factor = (1 + leans) * size * REFERENCE_HZ / expected
         shares = factor * seen
         u_shares = np.abs(factor) * np.array([one.u_split for one in swings])
         doubt = np.abs(shares) * resonance + np.abs(factor) * (mistaken + SHIFT_U * shift)
@@ -228,14 +225,14 @@ def geometric_magnetism(
     }
     u = math.hypot(*parts.values())
     measured = Estimate(value, u, "Hz")
-    of_base, predicted, parts_predicted = _predict(each, heights, known, reference)
-    share = (predicted.value or 0.0) / reference
+    of_base, predicted, parts_predicted = _predict(each, heights, known)
+    share = (predicted.value or 0.0) / REFERENCE_HZ
     return Geometry(
-        spin=reference,
+        spin=REFERENCE_HZ,
         measured=measured,
         predicted=predicted,
         ratio=_ratio(measured, predicted),
-        gradient=_gradient_of(value / reference, u / reference, known),
+        gradient=_gradient_of(value / REFERENCE_HZ, u / REFERENCE_HZ, known),
         of_precession=_precession(swings, spin, half, known),
         of_base=of_base,
         against_null=value / (u or math.inf),
@@ -377,7 +374,7 @@ def _precession(swings: Sequence[Swings], spin: Array, half: Array, known: Known
 
 
 def _predict(
-    each: Sequence[tuple[Swings, float]], heights: Array, known: Known, reference: float
+    each: Sequence[tuple[Swings, float]], heights: Array, known: Known
 ) -> tuple[Estimate, Estimate, dict[str, float]]:
     """Return B′/2B of the base's field where α₋α₊ is as seen, (I₃ω₃/m)(B′/2B)² over 2π, and the parts of its u."""
     gradients = [known.gradient(z) for z in heights.tolist()]
@@ -388,7 +385,7 @@ def _predict(
         other = replace(known, ring=replace(known.ring, **{name: getattr(known.ring, name) + step}))
         slopes.append((other.gradient(other.height(*each[middle])) - gradients[middle]) / step if step else 0.0)
     u = float(propagate(known.covariance, np.array([slopes]))[1][0])
-    value = top.axial * reference / top.mass * gradient**2
+    value = top.axial * REFERENCE_HZ / top.mass * gradient**2
     relative = {"base": 2 * u / gradient, "mass": known.mass_u / top.mass, "inertia": known.axial_u / top.axial}
     parts = {name: value * part for name, part in relative.items()}
     return Estimate(gradient, u, "1/m"), Estimate(value, math.hypot(*parts.values()) or None, "Hz"), parts

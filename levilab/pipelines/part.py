@@ -6,17 +6,18 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from analysis.numbers import digits
+from levilab.present.document.blocks import Points
 from levilab.present.numbers import short_name
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
 
     from levilab.pipelines.analyzed import Analyzed
     from levilab.pipelines.sources import Source
-    from levilab.present.document.blocks import Block, Points
+    from levilab.present.document.blocks import Block
 
 #: How an estimate is written.
 VALUE_U = "value(u): the digits in parentheses are the standard uncertainty of the last digits."
@@ -122,6 +123,23 @@ def title_of(subject: str, sources: Sequence[Source[Any]], noun: str = "run") ->
 def labels_of(sources: Sequence[Source[Any]]) -> list[str]:
     """Return the names of several inputs; of a single one an empty text."""
     return [short_name(source.name) if len(sources) > 1 else "" for source in sources]
+
+
+def points_of(
+    analysis: Analyzed[Any, Any, Any, Any], lines: Callable[[Any], Iterable[Iterable[str]]], *panels: str
+) -> tuple[Points, ...]:
+    """Return the texts of the points of each run, of several runs with its name, once for each panel.
+
+    Args:
+        analysis: of all inputs.
+        lines: from what was found of an input, the lines of each of its points.
+        panels: of the figure, by the first part of the name of its points.
+    """
+    found = []
+    for k, (name, run) in enumerate(zip(labels_of(analysis.sources), analysis.runs, strict=True)):
+        texts = tuple("\n".join(filter(None, (name, *one))) for one in lines(run))
+        found += [Points(f"{panel}-{k}", texts) for panel in panels]
+    return tuple(found)
 
 
 def size_of_u(u: NDArray[np.float64]) -> str:

@@ -12,8 +12,8 @@ from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.field.quantities import QUANTITIES
 from levilab.pipelines.field.table import base_table, by_run_table, follows_table, scans_table
-from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, first_of, input_parts, labels_of
-from levilab.present.document.blocks import Listing, Note, Paragraph, Points, Section, Tabular
+from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, first_of, input_parts, points_of
+from levilab.present.document.blocks import Listing, Note, Paragraph, Section, Tabular
 from levilab.present.numbers import off, plain, with_decimals, with_sign, with_uncertainty
 from levilab.present.tables import table
 
@@ -50,7 +50,7 @@ def field_part(analysis: FieldAnalysis) -> ReportPart:
                 "of tops that float in this field."
             ),
             alt="Flux density against height with its fit, residuals, masses and spins of tops that float",
-            points=_points(analysis),
+            points=points_of(analysis, _points, "readings", "residuals"),
         ),
         runs_title="Scan by scan" if several else "The base",
         runs=_bases(analysis),
@@ -107,27 +107,13 @@ def _readings(_: Source[FieldReadings], run: FieldRun, *__: object) -> tuple[Lis
     return (Listing("field-readings", table("Readings", heads, rows, numbers=heads), note),)
 
 
-def _points(analysis: FieldAnalysis) -> tuple[Points, ...]:
-    """Return what each reading of the figure answers."""
-    found = []
-    for k, (name, run) in enumerate(zip(labels_of(analysis.sources), analysis.runs, strict=True)):
-        texts = tuple(_point(name, run, i) for i in range(len(run.scan.height)))
-        found += [Points(f"readings-{k}", texts), Points(f"residuals-{k}", texts)]
-    return tuple(found)
-
-
-def _point(name: str, run: FieldRun, i: int) -> str:
+def _points(run: FieldRun) -> Iterator[tuple[str, ...]]:
+    """Yield the lines of each reading of the figure."""
     scan = run.scan
-    u = 1e3 * float(scan.u[i])
-    field = with_uncertainty(Estimate(1e3 * float(scan.flux_density[i]), u, "mT"))
-    residual = float(scan.residuals[i])
-    lines = [
-        name,
-        f"z = {with_decimals(1e2 * scan.height[i], 3)} cm",
-        f"B = {field}",
-        f"B − fit = {off(1e3 * residual, u)} mT",
-    ]
-    return "\n".join(filter(None, lines))
+    for z, b, u, residual in zip(scan.height, scan.flux_density, 1e3 * scan.u, 1e3 * scan.residuals, strict=True):
+        field = Estimate(1e3 * float(b), float(u), "mT")
+        left = off(float(residual), float(u))
+        yield f"z = {with_decimals(1e2 * z, 3)} cm", f"B = {with_uncertainty(field)}", f"B − fit = {left} mT"
 
 
 # --- what it means ---

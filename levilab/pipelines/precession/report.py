@@ -15,21 +15,21 @@ from levilab.pipelines.part import (
     ReportPart,
     first_of,
     input_parts,
-    labels_of,
     origin_of_u,
+    points_of,
     size_of_u,
 )
 from levilab.pipelines.precession.analysis import slope_of, verdict
 from levilab.pipelines.precession.table import coherence_table, lines_table, named_runs, points_table, power_table
 from levilab.present.clock import with_clock
-from levilab.present.document.blocks import Note, Paragraph, Points, Tabular
+from levilab.present.document.blocks import Note, Paragraph, Tabular
 from levilab.present.numbers import off, plain, with_uncertainty
 from levilab.simulator.published.printed import published
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from analysis.precession.sweep import Point, SweepFit
+    from analysis.precession.sweep import SweepFit
     from levilab.pipelines.options import PrecessionOptions
     from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
     from levilab.pipelines.precession.readings import SweepReadings
@@ -59,7 +59,7 @@ def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
                 "each point, and what each does to the slope."
             ),
             alt="Precession against drive with the line, departures from the drive, influence of each point",
-            points=_figure_points(analysis),
+            points=points_of(analysis, _figure_points, "readings", "residuals"),
         ),
         runs_title="Phase of the laser's pulses",
         runs=_phases(analysis),
@@ -111,21 +111,16 @@ def _readings(source: Source[SweepReadings], run: PrecessionRun, _: PrecessionOp
     return (Tabular("precession-points", found, f"{_POINTS} {more}".rstrip()),)
 
 
-def _figure_points(analysis: PrecessionAnalysis) -> tuple[Points, ...]:
-    """Return what each point of the figure that the line goes through answers."""
-    found = []
-    for k, (name, run) in enumerate(zip(labels_of(analysis.sources), analysis.runs, strict=True)):
-        texts = tuple(_point(name, point) for point in run.fit.points if point.used)
-        found += [Points(f"readings-{k}", texts), Points(f"residuals-{k}", texts)]
-    return tuple(found)
-
-
-def _point(name: str, point: Point) -> str:
-    precession = with_uncertainty(Estimate(point.precession, point.u, "Hz"))
-    lines = [name, f"ν_d = {point.drive:.7g} Hz", f"ν_p = {precession}"]
-    lines += [f"ν_p − ν_d = {off(point.precession - point.drive, point.u)} Hz"]
-    lines += [f"ν_p − line = {off(point.residual, point.u)} Hz"]
-    return "\n".join(filter(None, lines))
+def _figure_points(run: PrecessionRun) -> Iterator[tuple[str, ...]]:
+    """Yield the lines of each point that the line goes through."""
+    for point in run.fit.points:
+        if point.used:
+            yield (
+                f"ν_d = {point.drive:.7g} Hz",
+                f"ν_p = {with_uncertainty(Estimate(point.precession, point.u, 'Hz'))}",
+                f"ν_p − ν_d = {off(point.precession - point.drive, point.u)} Hz",
+                f"ν_p − line = {off(point.residual, point.u)} Hz",
+            )
 
 
 def _in_words(source: Source[SweepReadings], run: PrecessionRun, options: PrecessionOptions) -> tuple[str, ...]:

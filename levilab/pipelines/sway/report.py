@@ -6,12 +6,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
-from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, labels_of
+from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, points_of
 from levilab.pipelines.sway.table import quantities_table, windows_table
-from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
+from levilab.present.document.blocks import Listing, Paragraph, Tabular
 from levilab.present.numbers import with_uncertainty
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from levilab.pipelines.sources import Source
     from levilab.pipelines.sway.analysis import SwayAnalysis, SwayRun
     from levilab.pipelines.sway.readings import SwayReadings
@@ -42,7 +44,7 @@ def sway_part(analysis: SwayAnalysis) -> ReportPart:
                 "and the spectrum of one window, whose negative frequencies turn against the spin."
             ),
             alt="Split of the slow swings against the spin, and the signed spectrum of a window",
-            points=_points(analysis),
+            points=points_of(analysis, _points, "readings"),
         ),
         runs_title="Window by window",
         runs=tuple(
@@ -59,7 +61,7 @@ def _in_words(source: Source[SwayReadings], run: SwayRun, *_: object) -> tuple[s
     rate = (len(time) - 1) / float(time[-1] - time[0])
     return (
         f"{len(time)} places from {time[0]:.1f} s to {time[-1]:.1f} s, {rate:.0f} a second",
-        f"what the lines leave of a coordinate: {noise:.2g} mm at most",
+        f"residuals of a coordinate: standard deviation {noise:.2g} mm at most",
     )
 
 
@@ -67,21 +69,10 @@ def _readings(_: Source[SwayReadings], run: SwayRun, *__: object) -> tuple[Listi
     return (Listing("sway-readings", replace(windows_table(run, ""), title="Windows")),)
 
 
-def _points(analysis: SwayAnalysis) -> tuple[Points, ...]:
-    """Return what each window of the figure answers."""
-    return tuple(
-        Points(f"readings-{k}", tuple("\n".join(filter(None, (name, *_point(run, i)))) for i in range(len(run.spin))))
-        for k, (name, run) in enumerate(zip(labels_of(analysis.sources), analysis.runs, strict=True))
-    )
-
-
-def _point(run: SwayRun, i: int) -> tuple[str, ...]:
-    found = run.geometry
-    return (
-        f"spin = {run.spin[i]:.2f} Hz",
-        f"split = {1e3 * found.splits[i]:.1f} mHz",
-        f"predicted = {1e3 * found.expected[i]:.1f} mHz",
-    )
+def _points(run: SwayRun) -> Iterator[tuple[str, ...]]:
+    """Yield the lines of each window of the figure."""
+    for spin, split, expected in zip(run.spin, run.geometry.splits, run.geometry.expected, strict=True):
+        yield f"spin = {spin:.2f} Hz", f"split = {1e3 * split:.1f} mHz", f"predicted = {1e3 * expected:.1f} mHz"
 
 
 # --- what it means ---
@@ -93,24 +84,20 @@ _WHY = (
 )
 
 
-def _meaning(analysis: SwayAnalysis) -> tuple[str, ...]:
-    """Return the meaning of the first track in sentences that a student understands."""
+def _meaning(analysis: SwayAnalysis) -> Iterator[str]:
+    """Yield the meaning of the first track in sentences that a student understands."""
     run = analysis.runs[0]
     found, first, last = run.geometry, run.swings[0], run.swings[-1]
     shift = 100 * abs(float(found.shifts.sum(axis=1).mean()) / float(found.splits.mean()))
-    sways = (
+    yield _WHY
+    yield (
         f"It sways at {abs(first.frequency[0]):.3f} Hz against and {first.frequency[1]:.3f} Hz with the spin while it "
         f"spins at {run.spin[0]:.1f} Hz, and at {abs(last.frequency[0]):.3f} Hz and {last.frequency[1]:.3f} Hz at "
         f"{run.spin[-1]:.1f} Hz."
     )
-    said = [
-        _WHY,
-        sways,
-        f"Its swings are so large that the split is shifted by {digits(shift)} %, which is taken away.",
-    ]
+    yield f"Its swings are so large that the split is shifted by {digits(shift)} %, which is taken away."
     if found.of_precession:
-        said.append(
+        yield (
             f"The precession, another motion, gives B′/2B = {with_uncertainty(found.of_precession)}, the field "
             f"{with_uncertainty(found.of_base)} and the slow swings {with_uncertainty(found.gradient)}."
         )
-    return tuple(said)
