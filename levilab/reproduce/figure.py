@@ -426,17 +426,18 @@ def drive_figure(
         left.axhline(pull, color=GREY, linewidth=1)
         left.annotate(f"{1e3 * field:.1f} mT", (31, pull), va="bottom", fontsize=SMALL)
     for ramp, colour in zip(ramps, (BLUE, GREEN, VERMILION), strict=True):
-        load = np.array([driven(fields[0], ramp).load(spin) for spin in spins]) / turn
+        tops = [driven(field, ramp) for field in fields]
+        load = np.array([tops[0].load(spin) for spin in spins]) / turn
         left.plot(spins, load, color=colour, label=f"drag and ramp of {ramp:g} Hz/s" if ramp else "drag")
         scatter = spread * (load - ramp)
         left.fill_between(spins, load - scatter, load + scatter, color=colour, alpha=0.2, linewidth=0)
-        ends = [(driven(field, ramp).highest(), driven(field, ramp).strongest / turn) for field in fields]
-        left.plot(*zip(*ends, strict=True), "o", color=colour, markersize=4)
-        for leans, style in ((False, "-"), (True, "--")):
+        left.plot(
+            [one.highest() for one in tops], [one.strongest / turn for one in tops], "o", color=colour, markersize=4
+        )
+        for leans, style in ((False, "-"), (True, "--")) if ramp else ():
             lost = [driven(4e-4, ramp, leans=leans).highest_with_swing(swing, start) for swing in swings]
-            if ramp:
-                name = f"{ramp:g} Hz/s" + ", with the lean" * leans
-                right.plot(swings, lost, color=colour, linestyle=style, label=name)
+            name = f"{ramp:g} Hz/s" + ", with the lean" * leans
+            right.plot(swings, lost, color=colour, linestyle=style, label=name)
     left.axvspan(edge, spins[-1], color=VERMILION, alpha=0.08, linewidth=0)
     right.axhspan(edge, spins[-1], color=VERMILION, alpha=0.08, linewidth=0)
     for spin in (HIGHEST_HZ, LOOSE_HZ):
