@@ -76,6 +76,13 @@ def test_a_tape_that_slips_all_the_time_is_not_left_behind() -> None:
     assert lag_before_loss(ends.tolist(), spins.tolist(), [60.0] * ends.size) < 0.3  # it slips by 2.5 turns in 10 s
 
 
+def test_a_lead_before_is_not_taken_off_the_lag() -> None:
+    ends, spins = np.arange(0.5, 40.5, 0.5), np.full(80, 60.0)
+    spins[-20:-10] += 0.2  # a turn ahead in 5 s, then a turn behind
+    spins[-10:] -= 0.2
+    assert lag_before_loss(ends.tolist(), spins.tolist(), [60.0] * 80) == pytest.approx(1.0)
+
+
 def test_of_a_time_without_counts_no_lag_is_known() -> None:
     ends = [0.5, 1.0, 1.5, 2.0, 9.0, 9.5]
     assert math.isnan(lag_before_loss(ends, [60.0] * 6, [60.0] * 6))

@@ -279,6 +279,24 @@ def test_a_mean_within_a_step_of_the_drive_is_not_called_better(sample_data: Pat
     assert "do not become less by more tops" in text
 
 
+def test_causes_of_losses_are_counted_over_runs_and_explained(sample_data: Path, tmp_path: Path) -> None:
+    folders = [shutil.copytree(sample_data / "upper-limits", tmp_path / name) for name in "ab"]
+    for folder in folders:
+        with (folder / "events.jsonl").open("a", encoding="utf-8") as file:
+            file.write('{"time_s": 5000.0, "kind": "note", "text": "", "cause": "left behind by the drive"}\n')
+    readings = folders[1] / "readings.csv"
+    readings.write_text(readings.read_text(encoding="utf-8").replace("69.", "68."), encoding="utf-8")
+    analysis = METHOD.analyze(folders, LimitOptions())
+    (group,) = analysis.groups
+    assert group.causes == {"left behind by the drive": 2}
+    assert "The phase before each loss tells why: left behind by the drive twice." in group.text
+    assert "Simon" not in group.text  # what others reached stands in the table alone
+    meaning = str(limit_part(analysis).result[0])
+    assert "a stronger drive gets higher" in meaning
+    assert "no drive gets much higher" not in meaning
+    assert "islands" in meaning
+
+
 def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path: Path, sample_data: Path) -> None:
     file = spin_down_csv(tmp_path / "my.csv")
     assert [row.name for row, _ in analyze_suiting([file], {})] == ["spindown"]

@@ -18,7 +18,7 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions, SpinOptions
 from levilab.pipelines.spin import words
-from levilab.pipelines.spin.analysis import METHOD, Series
+from levilab.pipelines.spin.analysis import METHOD, Series, drive_offset
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spin.meaning import meaning
 from levilab.pipelines.spin.report import spin_part
@@ -43,6 +43,13 @@ def true_frequency(name: str, time: float) -> float:
     others = ("recording", "samples", "phone", "pulseview", "owon", "hantek", "microcontroller")
     from_middle = time - 0.25 if name.startswith(others) else time
     return 30.0 - 0.095 * from_middle
+
+
+def test_the_offset_from_a_drive_is_of_the_held_part_and_its_u_of_the_scatter() -> None:
+    series = Series(np.arange(4.0), np.array([30.1, 29.9, 25.0, 20.0]), np.full(4, 0.02), (("held", 0.0, 1.0),))
+    off = drive_offset(series, 30.0)
+    assert (off.value, off.u) == pytest.approx((0.0, 0.1))  # ± 0.1 of two
+    assert drive_offset(replace(series, phases=()), 30.0).value == pytest.approx(-3.75)
 
 
 def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data: Path) -> None:
