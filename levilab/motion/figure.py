@@ -209,7 +209,7 @@ def _spin(summary: Summary) -> _Quantity:
         curves.append(("washers", "loose washers", motion.washer_spin_hz))
     return _Quantity(
         f"Spin: {summary.spin}", "ω₃/2π  [Hz]", tuple(curves),
-        drive=scene.drive.frequency_hz if scene.drive.waveform not in {"off", "triggered"} else None,
+        drive=scene.drive.frequency_hz if scene.drive.is_periodic else None,
         least=1e-6 * abs(float(motion.spin_hz[0])),
     )  # fmt: skip
 

@@ -81,7 +81,7 @@ class AxisLines:
 def rate_for(scene: Scene) -> Any:
     """Return the samples per second for a spectrum: four times nutation plus spin, which leaves room for sidebands."""
     spin = abs(scene.start.spin_hz)
-    turning = largest(spin, scene.drive.frequency_hz) if scene.drive.waveform not in {"off", "triggered"} else spin
+    turning = largest(spin, scene.drive.frequency_hz) if scene.drive.is_periodic else spin
     return 4 * (turning + spin * _flatness(scene)) + 40.0
 
 
@@ -180,7 +180,7 @@ def _name_lines(
 def _expected_lines(scene: Scene, states: Array, spin: Array) -> dict[str, float]:
     """Return name → frequency [Hz] by the theory of small motions: drive, wobble of a tilted moment, four modes."""
     places: dict[str, float] = {}
-    if scene.drive.waveform not in {"off", "triggered"} and scene.drive.amplitude_t > 0:
+    if scene.drive.is_periodic and scene.drive.amplitude_t > 0:
         places["drive"] = math.copysign(scene.drive.frequency_hz, scene.start.spin_hz)
     if not scene.top.aligned and not keeps_phase(scene, states):  # otherwise the wobble is the drive's line
         places["wobble, once a turn"] = float(spin.mean())

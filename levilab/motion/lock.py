@@ -40,7 +40,7 @@ def can_lock(scene: Scene, until: float = math.inf) -> bool:
     """
     drive = scene.drive
     lasts = drive.off_s is None or drive.off_s >= until
-    on = drive.waveform not in {"off", "triggered"} and drive.amplitude_t > 0 and lasts
+    on = drive.is_periodic and drive.amplitude_t > 0 and lasts
     return scene.observed == "motion" and on and not scene.top.aligned
 
 

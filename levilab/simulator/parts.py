@@ -186,6 +186,11 @@ class Drive(Part):
     latency_s: float = Field(default=2e-5, ge=0, lt=1e3)
     cycle_turns: float = Field(default=0.0, ge=0, lt=1e3)
 
+    @property
+    def is_periodic(self) -> bool:
+        """Whether the field repeats with frequency_hz, whatever the top does."""
+        return self.waveform not in {"off", "triggered"}
+
 
 class Start(Part):
     """How the motion begins: IC1 of the thesis.  place "equilibrium": at rest where the top floats.

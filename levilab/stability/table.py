@@ -41,7 +41,7 @@ LEFT_OUT: tuple[tuple[Callable[[Scene], bool], str], ...] = (
         "the drag is left out here; it slows the spin, in the end below the slowest one, and the top is lost",
     ),
     (
-        lambda s: s.drive.waveform not in {"off", "triggered"} and s.drive.amplitude_t > 0,
+        lambda s: s.drive.is_periodic and s.drive.amplitude_t > 0,
         "the drive is left out here; it tilts the top and may hold its spin",
     ),
     (
