@@ -22,7 +22,7 @@ def read_mass(text: str) -> float:
     >>> read_mass("24.98 g"), read_mass("60mg"), round(read_mass("0.06"), 9)
     (0.02498, 6e-05, 6e-05)
     """
-    return _read(text, _MASSES, _LIGHTEST, _HEAVIEST, "a mass such as 24.98 g")
+    return round(_read(text, _MASSES, _LIGHTEST, _HEAVIEST, "a mass such as 24.98 g"), 9)
 
 
 def read_temperature(text: str) -> float:
@@ -31,7 +31,7 @@ def read_temperature(text: str) -> float:
     >>> read_temperature("21.5 C"), read_temperature("70 °F"), read_temperature("294.15 K")
     (21.5, 21.11, 21.0)
     """
-    return _read(text, _TEMPERATURES, _COLDEST, _WARMEST, "a temperature of a room such as 21.5 °C")
+    return round(_read(text, _TEMPERATURES, _COLDEST, _WARMEST, "a temperature of a room such as 21.5 °C"), 2)
 
 
 def read_masses(text: str) -> tuple[float, ...]:
@@ -60,7 +60,7 @@ def _read(text: str, units: dict[str, tuple[float, float]], low: float, high: fl
     scale = units.get(found[2] or next(iter(units))) if found else None
     if found is None or scale is None:
         raise ValueError(f"{expected} is expected{hint_about(text) if ',' in text else ''}")
-    value = round(float(found[1]) * scale[0] + scale[1], 9 if high == _HEAVIEST else 2)
+    value = float(found[1]) * scale[0] + scale[1]
     if not low <= value <= high:
         raise ValueError(f"{expected} is expected")
     return value
