@@ -34,7 +34,7 @@ AGREES_P = 0.05
 # --- one fall ---
 
 #: Readings before the fall that a line is drawn through [s]: in ν^(−1/2), which is straight under the drag of a disc;
-#: u holds by how much it bends under Stokes's or Newton's.
+#: u contains its bend under Stokes's or Newton's.
 _LINE_S = 20.0
 
 

@@ -100,7 +100,7 @@ def slip_of(spins: Sequence[float], drives: float | Sequence[float], *, least: f
 
 #: Length of the record before the loss [s], about twice the time from a quarter turn of lag to 1 Hz behind the drive,
 #: and of the one before that, whose mean is the slip of the tape: a swing of a quarter turn changes it by 0.01 Hz.
-#: Fewest counts that tell anything.
+#: Fewest counts that give a lag.
 _LAST_S, _BEFORE_S, _FEWEST = 10.0, 30.0, 3
 #: A longer time between two counts than this multiple of the usual one is a gap: the lag of that time is not known.
 _GAP = 3.0
@@ -110,7 +110,7 @@ LEFT_BEHIND_TURNS = 0.75
 
 
 class Cause(StrEnum):
-    """Why a driven top was lost, told by its phase before that."""
+    """Why a driven top was lost, by its phase before the loss."""
 
     LEFT_BEHIND = "left behind by the drive"
     OUT_OF_WINDOW = "out of the window"

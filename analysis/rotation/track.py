@@ -32,7 +32,7 @@ _WEIGHED = 12
 #: Length of the pieces in which a line that is seen to begin or to end keeps its phase, least length of what is left of
 #: a window then, and what is cut off beside that moment, as a hand or the fall moves the field [s].
 _PIECE_S, _SHORTEST_S, _MARGIN_S = 0.5, 3.0, 0.5
-#: A line ends within the record if that is as much more probable [natural logarithm].
+#: A line ends within the record if that is more probable by this factor [natural logarithm].
 _CLEAR = 6.0
 #: A step of the field from sample to sample is at most this multiple of their median: 3σ of noise.
 _MOST_STEP = 4.5

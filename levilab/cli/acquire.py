@@ -164,7 +164,7 @@ def _print_settings(config: "BenchConfig", experiment: str, *, as_json: bool) ->
 
 
 def _command_of(experiment: str) -> Callable[[], Callable[..., None]]:
-    """Return what makes the command of an experiment, without the options that only others have."""
+    """Return the maker of an experiment's command, without the options that only others have."""
 
     def make() -> Callable[..., None]:
         @wraps(acquire_experiment)

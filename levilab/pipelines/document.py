@@ -57,9 +57,9 @@ def result_model(
 
     Args:
         method: of the analysis.
-        run: type of what is found of one input, a frozen dataclass.
+        run: type of the finding of one input, a frozen dataclass.
         combined: likewise of all inputs together; None: as the base has it.
-        base: with what no other analysis has.
+        base: model with the entries that no other analysis has.
     """
     name = method.needs.analysis
     part = create_model("RunPart", __base__=RunPart, result=(Annotated[run, Dump()], ...))

@@ -27,7 +27,7 @@ _FLOAT = 1e-9
 
 
 class Verdict(Enum):
-    """What a comparison says, in the words before its reason."""
+    """Outcome of a comparison, as it stands before its reason."""
 
     AGREES = "agrees"
     DIFFERS = "differs, because"

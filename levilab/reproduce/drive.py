@@ -56,21 +56,20 @@ def field_for(spin: float, ramp: float) -> float:
 
 
 def crossings() -> list[Finding]:
-    """Compare where the drive's pull and the load cross with what was computed apart."""
+    """Compare the crossings of the drive's pull and the load with those that were computed apart."""
     pull = driven(FIELD_T, 0.0)
     share = 2 / 3 * DRAG_U / DRAG  # ν goes with C^(−2/3); a top's constant is known as well as they scatter
     found = [check("pull of the drive on the spin, 0.4 mT", THESIS["drive.pull"], pull.strongest / (2 * math.pi))]
     for key, field, ramp in (
-        *(("still", field, 0.0) for field in FIELDS_T),
-        *(("ramp", FIELD_T, ramp) for ramp in RAMPS if ramp),
+        *((f"still_{1e4 * field:02.0f}", field, 0.0) for field in FIELDS_T),
+        *((f"ramp_{1e3 * ramp:03.0f}", FIELD_T, ramp) for ramp in RAMPS if ramp),
     ):
         spin = driven(field, ramp).highest()
-        name = f"{key}_{1e3 * field:.1f}".replace(".", "") if key == "still" else f"{key}_{1e3 * ramp:03.0f}"
         found.append(
             check(
                 f"spin at which {f'drag and a ramp of {ramp:g} Hz/s' if ramp else 'drag'} takes all of the pull of "
                 f"{1e3 * field:.1f} mT",
-                THESIS[f"drive.{name}"],
+                THESIS[f"drive.{key}"],
                 spin,
                 u=share * spin,
             )
@@ -79,7 +78,7 @@ def crossings() -> list[Finding]:
 
 
 def about_61() -> list[Finding]:
-    """Tell what 61 Hz and 66 Hz say of the drive."""
+    """State the consequences of 61 Hz and 66 Hz for the drive."""
     still, ramp = driven(FIELD_T, 0.0), driven(FIELD_T, 0.1)
     shares = [100 * one.load(HIGHEST_HZ) / one.pull(HIGHEST_HZ) for one in (still, driven(FIELD_T, 0.05), ramp)]
     swings = (0.1, 0.2)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: What a user would otherwise do knows that the frequency lies between these [Hz].
+#: Range of the frequency, which the other methods are given [Hz].
 LOW, HIGH = 20.0, 45.0
 
 
