@@ -1,4 +1,4 @@
-"""What a film must show for a top to be followed."""
+"""Errors of a film in which a top cannot be followed."""
 
 from analysis.errors import AnalysisError
 
@@ -31,7 +31,7 @@ class HandInView(AnalysisError):
 
 
 class CameraMoved(AnalysisError):
-    """What should stand still is shifted."""
+    """The background is shifted."""
 
     def __init__(self, *, time: float, shift: float, allowed: float) -> None:
         self.time, self.shift, self.allowed = time, shift, allowed

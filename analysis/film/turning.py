@@ -176,7 +176,7 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, *, start: floa
 
 
 def _nuisance(turns: Array, late: Array) -> Array:
-    """Return what else is in a phase, in standard deviations of the priors, shape (n, p) [turns].
+    """Return further terms of a phase, in standard deviations of the priors, shape (n, p) [turns].
 
     Rows that are read one after another; and harmonics of the angle, from a mark that does not turn about the middle of
     the rim and a camera that looks from the side.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import util
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,21 +20,21 @@ if TYPE_CHECKING:
 
     Picture = NDArray[np.uint8]
 
-#: Where phones write at how many pictures in a second a film was taken, whatever it plays at.
-_CAPTURED = ("com.android.capture.fps",)
+#: Key under which phones write at how many pictures in a second a film was taken, whatever it plays at.
+_CAPTURED = "com.android.capture.fps"
 
 
 @dataclass(frozen=True)
 class Film:
-    """What a file says of its film.
+    """Properties of a film, as its file states them.
 
     Attributes:
         path: the file.
         width: of a picture [pixels].
         height: [pixels].
-        nominal: pictures in a second as the head of the file says; no time is computed from it.
-        captured: pictures in a second when it was taken; None: not said.
-        duration: [s]; None: not said.
+        nominal: pictures in a second by the head of the file; no time is computed from it.
+        captured: pictures in a second when it was taken; None: not stated.
+        duration: [s]; None: not stated.
         codec: its name.
     """
 
@@ -51,19 +52,18 @@ class NoFilm(DataError):
 
 
 def open_film(path: Path) -> Film:
-    """Read what a file says of its film.
+    """Read the properties of a film.
 
     Raises:
         NoFilm: the extra is not installed, or the file holds no film.
     """
-    with _Opened(path) as (container, stream):
-        said = next((container.metadata[key] for key in _CAPTURED if key in container.metadata), None)
+    with _opened(path) as (container, stream):
         return Film(
             path,
             stream.codec_context.width,
             stream.codec_context.height,
             float(stream.average_rate) if stream.average_rate else None,
-            _number(said),
+            _number(container.metadata.get(_CAPTURED)),
             container.duration / 1e6 if container.duration else None,
             stream.codec_context.name,
         )
@@ -84,7 +84,7 @@ def pictures(film: Film, start: float = 0.0, stop: float = np.inf) -> Iterator[t
     """
     import av
 
-    with _Opened(film.path) as (container, stream):
+    with _opened(film.path) as (container, stream):
         stream.thread_type = "AUTO"
         if start > 0:
             container.seek(int(start / stream.time_base), stream=stream)
@@ -121,27 +121,19 @@ def _number(text: str | None) -> float | None:
         return None
 
 
-class _Opened:
-    """The container of a file and its first film."""
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
+    """Open a file; yields its container and its first film."""
+    if find_spec("av") is None:
+        raise NoFilm(f"{path}: films need the extra video (av, which is not installed): {how_to_install('video')}")
+    import av
 
-    def __init__(self, path: Path) -> None:
-        if util.find_spec("av") is None:
-            raise NoFilm(f"{path}: films need the extra video (av, which is not installed): {how_to_install('video')}")
-        import av
-
-        try:
-            self._container: Any = av.open(str(path))
-        except (av.FFmpegError, OSError) as error:
-            why = getattr(error, "strerror", None) or error
-            raise NoFilm(
-                f"{path}: holds no film that can be read ({why}): give the file that the camera wrote"
-            ) from error
-        if not self._container.streams.video:
-            self._container.close()
+    try:
+        container: Any = av.open(str(path))
+    except (av.FFmpegError, OSError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise NoFilm(f"{path}: holds no film that can be read ({why}): give the file that the camera wrote") from error
+    with container:
+        if not container.streams.video:
             raise NoFilm(f"{path}: holds no film: a film of the top from above is expected")
-
-    def __enter__(self) -> tuple[Any, Any]:
-        return self._container, self._container.streams.video[0]
-
-    def __exit__(self, *_: object) -> None:
-        self._container.close()
+        yield container, container.streams.video[0]

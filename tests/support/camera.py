@@ -150,8 +150,7 @@ class Picture:
         x, y, yaw, tilt = self._flight.at(time + rows * camera.line_time)
         c, s = np.cos(yaw), np.sin(yaw)
         body = np.stack([c, -s, s, c], axis=-1).reshape(-1, 2, 2) @ tilt
-        inverse = np.linalg.inv(body)
-        inverse = inverse.astype(np.float32)
+        inverse = np.linalg.inv(body).astype(np.float32)
         right = ((columns - x0) * camera.scale - x[:, None]).astype(np.float32)
         forth = ((y0 - rows) * camera.scale - y)[:, None].astype(np.float32)
         a = inverse[:, 0, 0, None] * right + inverse[:, 0, 1, None] * forth

@@ -1,1 +1,1 @@
-"""A film of a top from above → where it is, how fast it turns, and a still with what was followed."""
+"""A film of a top from above → its place and spin, and a still with rim, mark and path."""

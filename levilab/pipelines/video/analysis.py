@@ -1,4 +1,4 @@
-"""What is followed in a film → place and spin in SI, with a scale and what is in doubt."""
+"""Rim and mark in the pictures of a film → place and spin in SI, with a scale and notes on doubts."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class VideoOptions:
 
 @dataclass(frozen=True, eq=False)
 class Video:
-    """What was found in a film.
+    """Place and spin of a top in a film.
 
     Attributes:
         film: the file.
@@ -144,7 +144,7 @@ class Video:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What to know of the numbers."""
+        """Doubts about the numbers, and parts of the film that are left out."""
         return tuple(_notes(self))
 
 
@@ -157,7 +157,7 @@ def analyze_film(path: Path, options: VideoOptions, progress: Callable[[float], 
     """Follow the top in a film and find its spin.
 
     Raises:
-        DataError: the file, or what it shows, cannot be used.
+        DataError: the file cannot be read, or shows no top that can be followed.
     """
     if not path.exists():
         raise no_such_path(path)
@@ -198,18 +198,18 @@ def _turn(
         if slow:
             raise SlowMotion(rate=rate, captured=None, spin=slow[0])
         return None, (), False, "no spin with which a top floats, or of `near`, describes its mark"
-    turning = turning_of(times, phases.phase, phases.u, rows, start=choices[0])
     if options.near is not None and len(choices) > 1:
         choices.sort(key=lambda f: abs(abs(f) - (options.near or 0.0)))
         off = [abs(abs(f) - options.near) for f in choices[:2]]
         choices = choices[:1] if off[0] < _NEARER * off[1] else choices
+    turning = turning_of(times, phases.phase, phases.u, rows, start=choices[0])
     by_slope = len(choices) > 1 and abs(turning.chirp) > _FALLS * turning.u_chirp
     falling = [f for f in choices if f * turning.chirp < 0] if by_slope else []
     played_slowly = bool(slow) and options.rate is None
     if played_slowly or (len(choices) > 1 and len(falling) != 1):
         return None, tuple(-f for f in choices), False, ""
-    chosen = falling[0] if falling else choices[0]
-    turning = turning_of(times, phases.phase, phases.u, rows, start=chosen)
+    if falling and falling[0] != choices[0]:
+        turning = turning_of(times, phases.phase, phases.u, rows, start=falling[0])
     return turning, tuple(-f for f in choices), bool(falling), ""
 
 

@@ -17,7 +17,7 @@ _LEAST_WIDTH = 640
 
 
 def draw_still(video: Video) -> bytes:
-    """Draw what was followed over the first picture, as PNG."""
+    """Draw rim, mark, base and path over the first picture, as PNG."""
     from PIL import Image, ImageDraw
 
     seen = video.followed

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from analysis.uncertainty import Estimate
 from levilab.errors import unquote
 from levilab.files import replace_atomically, writing
+from levilab.pipelines.document import values_of
 from levilab.pipelines.video.still import draw_still
 from levilab.present.numbers import with_uncertainty
 
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from analysis.uncertainty import Estimate
     from levilab.pipelines.video.analysis import Video
 
 
@@ -54,7 +55,7 @@ def _csv(heads: tuple[str, ...], rows: Iterable[Any]) -> str:
 
 
 def summary(video: Video) -> list[tuple[str, str]]:
-    """Return what was found, as pairs of name and value for people."""
+    """Return film, scale, place and spin, as pairs of name and value for people."""
     seen, film, turning = video.followed, video.film, video.turning
     span = float(video.times[-1] - video.times[0])
     steps = np.diff(seen.times) * 1e3
@@ -84,19 +85,19 @@ def _span(place: Any) -> str:
 
 
 def document(video: Video, files: list[Path]) -> dict[str, Any]:
-    """Return what was found, for programs."""
+    """Return scale, spin, its choices and the files, for programs."""
     found, spin = video.turning, video.spin
-    values = {"scale": {"value": video.scale.value, "u": video.scale.u, "unit": "m"}}
+    values = {"scale": video.scale}
     if found is not None and spin is not None:
         sign = 1 if found.frequency > 0 else -1
-        values["frequency"] = {"value": spin.value, "u": spin.u, "unit": "Hz"}
-        values["chirp"] = {"value": sign * found.chirp, "u": found.u_chirp, "unit": "Hz/s"}
-        values["reference_time"] = {"value": found.middle, "u": None, "unit": "s"}
+        values["frequency"] = spin
+        values["chirp"] = Estimate(sign * found.chirp, found.u_chirp, "Hz/s")
+        values["reference_time"] = Estimate(found.middle, None, "s")
     return {
         "analysis": "video",
         "film": video.film.path.as_posix(),
         "pictures": int(video.times.size),
-        "values": values,
+        "values": values_of(values),
         "choices_hz": [abs(f) for f in video.choices],
         "files": [path.as_posix() for path in files],
         "warnings": [unquote(note) for note in video.notes],

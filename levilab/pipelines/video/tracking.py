@@ -41,18 +41,18 @@ _SAME_RADIUS = 0.15
 _SAME_CONTRAST = 0.4
 #: A top that is not seen for longer is lost [s].
 _LOST_S = 0.25
-#: What is followed for a shorter time is of no use [s].
+#: Least length of a track [s].
 _LEAST_S = 0.4
-#: What a codec adds to the place [pixels]: it leaves parts of a picture as they were in the one before.
+#: Uncertainty of a place by the codec [pixels], which leaves parts of a picture as they were in the one before.
 CODEC_U = 0.04
 
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """What was seen of a top.
+    """A top in the pictures of its film.
 
     Attributes:
-        times: of the pictures with a rim, as the file says, shape (n,) [s].
+        times: of the pictures with a rim, by the file, shape (n,) [s].
         x: of the centre, from the left, shape (n,) [pixels].
         y: from above, shape (n,) [pixels].
         u: standard uncertainty of each, shape (n,) [pixels].
@@ -100,24 +100,23 @@ def follow(film: Film, start: float, stop: float, progress: Callable[[float], No
     if watch.share_of_background < _LEAST_BACKGROUND:
         raise DataError(f"{film.path}: the top fills the picture: film it from farther away, with the base round it")
     track = _Track(top.scaled(factor))
-    begin = None
+    span = min(stop, film.duration or np.inf) - start
     for time, picture in pictures(film, start, stop):
-        begin = time if begin is None else begin
         rim = track.add(time, picture)
         if rim is None and time - track.last > _LOST_S:
             track.ended = "lost"
             break
-        if watch.is_due(time) and watch.sees_hand(time, picture):
+        if watch.sees_hand(time, picture):
             track.forget_after(watch.clean)
             track.ended = "hand"
             break
-        last = min(stop, film.duration or stop)
-        progress(min((time - begin) / (last - begin), 1.0) if np.isfinite(last) and last > begin else 0.0)
+        if 0 < span < np.inf:
+            progress(min((time - start) / span, 1.0))
     return _followed(film, track, watch, still, base)
 
 
 def _beginning(film: Film, start: float, stop: float) -> tuple[Array, Picture, int]:
-    """Return small pictures of the beginning, the first picture, and by how much they are smaller."""
+    """Return small pictures of the beginning, the first picture, and the factor between their sizes."""
     factor = max(round(film.width / _COARSE), 1) if film.width > 1.5 * _COARSE else 1
     found: list[Array] = []
     still: Picture | None = None
@@ -149,18 +148,13 @@ class _Watch:
         self._before, self._factor = background, factor
         self._outside = top.distance(background.shape) > _AROUND * top.radius
         self.share_of_background = float(self._outside.mean())
-        self.clean = self._next = -np.inf
+        self.clean = -np.inf
         self.share = 0.0
 
-    def is_due(self, time: float) -> bool:
-        """Return whether the view is to be compared now."""
-        if time < self._next:
-            return False
-        self._next = time + _LOOK_S
-        return True
-
     def sees_hand(self, time: float, picture: Picture) -> bool:
-        """Return whether something covers the view.  Raises CameraMoved."""
+        """Compare the view where it is due, and return whether something covers it.  Raises CameraMoved."""
+        if time < self.clean + _LOOK_S:
+            return False
         view = compare_views(self._before, coarse(picture, self._factor), self._outside)
         if view.covered > _HAND:
             self.share = view.covered
@@ -182,18 +176,16 @@ class _Track:
         self.times: list[float] = []
         self.rims: list[Rim] = []
         self.ended = ""
-        self.missed = 0
+        self.missed: list[float] = []
 
     def add(self, time: float, picture: Picture) -> Rim | None:
         """Find the rim in the next picture, where it should be by its speed."""
         step = 0.0 if np.isnan(self.last) else time - self.last
         self.last = time if np.isnan(self.last) else self.last
-        expected = Circle(
-            self._now.x + step * self._speed[0], self._now.y + step * self._speed[1], self._now.radius
-        )  # fmt: skip
+        expected = Circle(self._now.x + step * self._speed[0], self._now.y + step * self._speed[1], self._now.radius)
         rim = self._same(fit_rim(picture, expected)) or self._same(fit_rim(picture, self._now, width=3.0, rounds=6))
         if rim is None:
-            self.missed += 1
+            self.missed.append(time)
             return None
         if step > 0:
             self._speed = (rim.circle.x - self._now.x) / step, (rim.circle.y - self._now.y) / step
@@ -206,11 +198,12 @@ class _Track:
 
     def _same(self, rim: Rim | None) -> Rim | None:
         limit = _SAME_RADIUS if self.times else 2 * _SAME_RADIUS
-        same = rim is not None and abs(rim.circle.radius / self._radius - 1) < limit
-        return rim if same and rim and rim.contrast > _SAME_CONTRAST * self._contrast else None
+        if rim is None or abs(rim.circle.radius / self._radius - 1) >= limit:
+            return None
+        return rim if rim.contrast > _SAME_CONTRAST * self._contrast else None
 
     def forget_after(self, time: float) -> None:
-        """Leave out what was seen after a time."""
+        """Leave out the pictures after a time."""
         count = int(np.searchsorted(self.times, time, side="right"))
         del self.times[count:], self.rims[count:]
 
@@ -225,6 +218,7 @@ def _followed(film: Film, track: _Track, watch: _Watch, still: Picture, base: Ci
             "`start` and `stop`"
         )
     times = np.array(track.times)
+    missed = sum(time < times[-1] for time in track.missed)
     x, y, radius = np.array([(rim.circle.x, rim.circle.y, rim.circle.radius) for rim in track.rims]).T
     return Followed(
         times,
@@ -235,7 +229,7 @@ def _followed(film: Film, track: _Track, watch: _Watch, still: Picture, base: Ci
         profiles=np.stack([rim.profiles for rim in track.rims]),
         still=still,
         base=base,
-        rate=(times.size - 1 + track.missed * (track.ended != "lost")) / span,
-        missed=0 if track.ended == "lost" else track.missed,
+        rate=(times.size - 1 + missed) / span,
+        missed=missed,
         ended=track.ended,
     )

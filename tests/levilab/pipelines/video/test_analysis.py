@@ -128,15 +128,17 @@ def moved(shown, time):
 
 
 def gone(shown, time):
-    return shown.take(time) if time < 0.6 else shown.background
+    return shown.background if 0.3 < time < 0.32 or time > 0.6 else shown.take(time)
 
 
 def test_a_hand_and_a_lost_top_end_the_track_where_they_are_seen(folder):
     for name, take, text in (("hand.mp4", hand, "as by a hand, after 0.50 s"), ("gone.mp4", gone, "lost after 0.59 s")):
         found = analyze_film(filmed(folder, name, take, phone_times(1.0)), VideoOptions(rim=0.03))
         assert text in found.notes[0]
+        assert found.followed.rate == pytest.approx(240, abs=2)
         assert found.times[-1] == pytest.approx(0.6, abs=0.11)  # a hand is looked for each 0.1 s
         assert found.spin.value == pytest.approx(31 - 0.05 * found.turning.middle, abs=5e-3)
+    assert "no rim is seen in 5 pictures in between" in found.notes[1]
 
 
 @pytest.mark.parametrize(
