@@ -177,6 +177,15 @@ def test_even_times_that_fold_the_spin_are_named_and_near_chooses(folder):
     assert analyze_film(path, VideoOptions(rim=0.03, near=31.0)).spin.value == pytest.approx(30.975, abs=5e-3)
 
 
+def test_of_spins_that_look_the_same_the_one_that_slows_down_is_taken(folder):
+    flight = level_flight(1.2, 31.0, chirp=-0.6)
+    path = film(folder / "sixty.mp4", CAMERA, flight, even_times(1.2, 60.0))
+    found = analyze_film(path, VideoOptions(rim=0.03))
+    assert found.spin.value == pytest.approx(31 - 0.6 * found.turning.middle, abs=5e-3)
+    (note,) = (note for note in found.notes if "slows down" in note)
+    assert "30.6" in note
+
+
 def test_the_command_writes_tables_that_other_analyses_read(path, tmp_path):
     ended = command("analyze", "video", path, "--rim", 2000 * RIM, "--out", tmp_path, "--json", cwd=tmp_path)
     assert ended.status == 0, ended.err
