@@ -379,6 +379,7 @@ def test_an_unreadable_file_is_reported(error, words, table_file, monkeypatch):
         ("t [V],f\n0,25\n1,26\n2,27\n", {"t": "1"}, "V, which is none of time: say which unit it is, as NAME [s]"),
         ("t,f\n0,61.5 ± 0.1\n1,61.2 ± 0.1\n2,61\n", {}, "into a column of its own, with the title u"),
         ("t,f\n0:00,61.5\n0:99,61.2\n0:10,61\n", {}, "line 3: '0:99' stands in column 't'"),
+        ("t,f\n12:59 PM,61.5\n13:00 PM,61.2\n1:01 PM,61\n", {}, "line 3: '13:00 PM' stands in column 't'"),
         ("t,Illuminance (lx)\n0,25\n1,26\n2,27\n", {}, "is of the light sensor, which shows no turns"),
         ("t,f\n0,0:10\n1,61.2\n2,61\n", {}, "'0:10' stands in column 'f'"),
     ],

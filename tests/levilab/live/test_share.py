@@ -98,6 +98,16 @@ def test_what_a_guest_says_commands_nothing(hall: Hall, monkeypatch: pytest.Monk
     assert commands == []
 
 
+def test_a_guest_is_not_told_where_the_runs_lie(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+    said = [{"n": 1, "kind": "message", "text": f"writes {hall.root / 'one'}"}]
+    monkeypatch.setattr(Desk, "events_after", lambda *_: said)
+    with connect(address_for_guests(hall).replace("http", "ws") + "frames?run=one") as guest:
+        guest.send("{}")
+        frame = guest.recv(timeout=PATIENCE_S)
+    assert isinstance(frame, bytes)
+    assert b"writes one" in frame
+
+
 def test_more_guests_than_are_let_in_wait(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("levilab.live.server.MOST_GUESTS", 1)
     there = address_for_guests(hall).replace("http", "ws") + "frames?run=one"
