@@ -472,12 +472,17 @@ class Channel:
         armed = (self["burst"] and self["burst_mode"] == "TRIG") or self["sweep"]
         return bool(armed) and self["trigger_source"] not in _BY_ITSELF
 
+    @property
+    def cycles(self) -> float:
+        """Of a burst; inf for no end."""
+        cycles = self.number("burst_cycles")
+        return math.inf if cycles >= INFINITE else cycles
+
     def trigger(self) -> None:
         """Take a trigger that comes now."""
         start = self._now() + self.number("trigger_delay")
-        lasts = self.number("burst_cycles") / self.frequency if self["burst"] else self.number("sweep_time")
-        endless = self["burst"] and self.number("burst_cycles") >= INFINITE
-        self.under_way = (start, math.inf if endless else start + lasts)
+        lasts = self.cycles / self.frequency if self["burst"] else self.number("sweep_time")
+        self.under_way = (start, start + lasts)
 
     def stop(self) -> None:
         """ABORt: what is under way ends."""
@@ -511,10 +516,9 @@ class Channel:
         """Return the bursts that wait for an edge at the trigger input."""
         if not self.waits or self["trigger_source"] != "EXT":
             return None
-        cycles = self.number("burst_cycles")
         return Triggered(
             amplitude=self.number("amplitude_vpp") / 2 / self.load_factor,
-            cycles=math.inf if cycles >= INFINITE else cycles,
+            cycles=self.cycles,
             rising=self["trigger_slope"] == "POS",
             delay=self.number("trigger_delay") + self.family.latency,
             jitter=self.family.trigger_jitter,
@@ -527,6 +531,5 @@ class Channel:
     def _burst(self) -> Burst | None:
         if not self["burst"]:
             return None
-        cycles = self.number("burst_cycles")
         period = self.number("burst_period") if self.repeats else None
-        return Burst(math.inf if cycles >= INFINITE or self["burst_mode"] == "GAT" else cycles, period)
+        return Burst(math.inf if self["burst_mode"] == "GAT" else self.cycles, period)
