@@ -201,11 +201,12 @@ def reach_generator_again(session: Session[D], error: InstrumentError) -> None:
 def drive_up(session: Session[D], to: float | None = None) -> Motor | None:
     """Let the drive take hold of the top at its own spin, bring it to a frequency, and hold it there.
 
-    A drive that the top triggers is returned.
-
     Args:
         session: the acquisition.
         to: that frequency [Hz]; None: as the settings say.
+
+    Returns:
+        The motor of a triggered drive; None for a ramp.
 
     Raises:
         DidNotFollow: the drive is off.

@@ -41,7 +41,7 @@ _WITHIN_HZ, _MOST_MISSED = 2.0, 3
 _BACK_S, _SUM_S = 5.0, 20.0
 #: The spin nears the target when it would be there within this time [s].
 _NEAR_S = 3.0
-#: A top that gains less than this [Hz] in so many counts has reached what the drive can do.
+#: A top that gains less than this [Hz] within this number of counts has reached the greatest spin of the drive.
 _LEAST_GAIN_HZ, _GAINING = 0.15, 30
 #: Number of counts that show the gain at the full amplitude: 3 mHz/s of 0.2 Hz/s; a top that is held by more than this
 #: share of the amplitude gains too little for that.
@@ -56,8 +56,8 @@ _USUAL_PULL_HZ_PER_S = 0.36
 class Response:
     """The answer of a top to start phases.
 
-    phase: that speeds it up most [°]; pull, u: what a cycle at this phase adds to its spin, and its standard
-    uncertainty [Hz/s]; drag: what it loses meanwhile [Hz/s].
+    phase: that speeds it up most [°]; pull, u: rate that the cycles at this phase add to its spin, and its standard
+    uncertainty [Hz/s]; drag: rate of its loss without a drive [Hz/s].
     """
 
     phase: float
@@ -84,11 +84,15 @@ def response(slopes: Sequence[float], u: float) -> Response:
     return Response(phase, abs(vector), u * math.sqrt(2 / n), -float(np.mean(slopes)))
 
 
-def slope_of(times: Sequence[float], spins: Sequence[float]) -> tuple[float, float]:
-    """Return the slope of counts in time and their standard deviation about the line [Hz/s, Hz]."""
+def slope_of(times: Sequence[float], spins: Sequence[float]) -> tuple[float, float, float]:
+    """Return the slope of counts in time [Hz/s], their standard deviation about the line [Hz], and √Σ(t − mean)² [s].
+
+    The slope's standard uncertainty is the second over the third.
+    """
     slope, at = np.polyfit(times, spins, 1)
-    left = np.asarray(spins) - (slope * np.asarray(times) + at)
-    return float(slope), float(np.sqrt(np.sum(left**2) / max(len(spins) - 2, 1)))
+    residuals = np.asarray(spins) - (slope * np.asarray(times) + at)
+    scatter = np.sqrt(np.sum(residuals**2) / max(len(spins) - 2, 1))
+    return float(slope), float(scatter), float(np.std(times)) * math.sqrt(len(times))
 
 
 @dataclass
@@ -99,10 +103,10 @@ class Motor:
         session: the acquisition.
         spin: the last count [Hz].
         phase: the start phase that speeds it up [°].
-        pull: what the full amplitude adds to its spin [Hz/s].
+        pull: rate that the full amplitude adds to its spin [Hz/s].
         share: of the full amplitude that holds it, as the loop has found.
-        counts: while it was held [Hz].
-        shares: of the full amplitude, at each of these.
+        counts: its spin while it was held [Hz].
+        shares: of the full amplitude, at each of the counts.
         gain: of its spin at the full amplitude, about the spin at which it is held; None where it was not measured.
     """
 
@@ -119,7 +123,7 @@ class Motor:
     _errors: float = 0.0  # summed [Hz s]
     _base: float = 1.0  # share of the amplitude without errors
 
-    # --- what the generator does ---
+    # --- the generator ---
 
     def start(self) -> None:
         """Set the bursts up, and put them on the coil."""
@@ -163,7 +167,7 @@ class Motor:
         """Try start phases, and choose the one that speeds the top up.  Raises DidNotFollow, NotHeld."""
         session = self.session
         prepare_counter_again(session, GATE_S)
-        slopes, scatters, lasted = [], [], []
+        lines = []
         for k, phase in enumerate(_PHASES):
             session.progress(f"start phase {phase:g}°: how the spin answers", k / len(_PHASES))
             self._turn_to(phase)
@@ -172,13 +176,11 @@ class Motor:
             while len(spins) < _COUNTS and (len(spins) < 3 or spins[0] - spins[-1] < _MOST_LOST_HZ):
                 spins.append(self.count(GATE_S))
                 times.append(session.now())
-            slope, scatter = slope_of(times, spins)
-            slopes.append(slope)
-            scatters.append(scatter)
-            lasted.append(float(np.std(times)) * math.sqrt(len(times)))
+            lines.append(slope_of(times, spins))
         prepare_counter_again(session)
+        slopes, scatters, spreads = zip(*lines, strict=True)
         scatter = math.sqrt(float(np.mean(np.square(scatters))))
-        found = response(slopes, scatter / min(lasted))
+        found = response(slopes, scatter / min(spreads))
         self.phase, self.pull = found.phase, found.pull
         if found.pull < _CLEAR * found.u:
             raise _no_pull(session, found)
@@ -206,8 +208,8 @@ class Motor:
         for _ in range(_GAIN_COUNTS):
             spins.append(self.count())
             times.append(self.session.now())
-        slope, scatter = slope_of(times, spins)
-        self.gain = Estimate(slope, scatter / (float(np.std(times)) * math.sqrt(len(times))), "Hz/s")
+        slope, scatter, spread = slope_of(times, spins)
+        self.gain = Estimate(slope, scatter / spread, "Hz/s")
         self._trend = 0.0
         self._set_share(_LEAST_SHARE)
         while self.spin > target:
@@ -218,15 +220,18 @@ class Motor:
         """Speed the top up to a spin [Hz], or brake it.  Raises DidNotFollow, NotHeld."""
         session, start = self.session, self.spin
         brakes = start > target
+        sign = -1 if brakes else 1
         if brakes:
             self._turn_to(self.phase + 180)
         times, spins = [session.now()], [start]
-        gain = 0.0
-        while (target - self.spin - _NEAR_S * gain) * (-1 if brakes else 1) > 0:
+        gain = (sign - 0.25) * self.pull  # a guess: the drag is a quarter of the pull
+        while (target - self.spin - _NEAR_S * gain) * sign > 0:
             spins.append(self.count())
             times.append(session.now())
             recent = slice(-_GAINING, None)
-            gain = self._trend = slope_of(times[recent], spins[recent])[0] if len(spins) > 2 else 0.0
+            if len(spins) > 2:
+                gain, _, _ = slope_of(times[recent], spins[recent])
+            self._trend = gain
             share = min((self.spin - start) / (target - start), 1.0)
             session.progress(f"{'brakes' if brakes else 'speeds up'}, {self.spin:.2f} Hz", max(share, 0.0))
             if len(spins) > _GAINING and abs(spins[-1] - spins[-_GAINING]) < _LEAST_GAIN_HZ:
@@ -238,9 +243,7 @@ class Motor:
         self._trend = 0.0
         if brakes:
             self._turn_to(self.phase)
-            self._set_share(0.25)  # a guess of drag over pull, until the loop finds it
-        elif gain < self.pull:
-            self._set_share(1 - gain / self.pull)
+        self._set_share(sign - gain / self.pull)  # drag over pull, for gain = sign · pull − drag
 
     def hold(self, target: float, duration: float) -> None:
         """Hold the top at a spin [Hz] for a time [s]: the amplitude follows each count.  Raises NotHeld."""
