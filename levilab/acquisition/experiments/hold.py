@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from levilab.acquisition.triggering import Motor
     from levilab.bench.config import Limits
 
-#: Fewest readings from which a scatter and a drag are told.
+#: Fewest readings from which a scatter and a drag are estimated.
 _FEWEST = 3
 
 
@@ -79,7 +79,7 @@ def run(session: Session[HoldSettings]) -> None:
                 drive_off(session)
             drive()
     drive_off(session)
-    _say_what_held_it(session, motors[-1])
+    _report_drag(session, motors[-1])
 
 
 def _motor(session: Session[HoldSettings]) -> Motor:
@@ -105,7 +105,7 @@ def _reading(session: Session[HoldSettings], motor: Motor) -> Row:
     }
 
 
-def _say_what_held_it(session: Session[HoldSettings], motor: Motor) -> None:
+def _report_drag(session: Session[HoldSettings], motor: Motor) -> None:
     """Record the scatter of the held spin, and the drag that the amplitude balanced."""
     rows = session.rows
     if len(rows) < _FEWEST:
@@ -144,7 +144,7 @@ def drag_of(share: float, u_share: float, gain: Estimate | None) -> Estimate | N
 
 EXPERIMENT = Experiment(
     name="hold",
-    about="hold a spin by a drive that the top triggers, and see what amplitude that takes",
+    about="hold a spin by a drive that the top triggers, and measure the drag that its amplitude balances",
     instruments=("counter", "generator"),
     settings=HoldSettings,
     channels=channels,

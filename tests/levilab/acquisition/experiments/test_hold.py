@@ -32,6 +32,7 @@ def test_a_spin_is_held_and_its_amplitude_gives_the_drag(tmp_path):
         spins = run.readings().column("spin_frequency_hz")
         assert spins.size >= 15
         assert np.abs(spins - 45.0).max() < 0.06  # 0.01 Hz is the scatter of a reading
+        assert np.median(run.readings().column("spin_frequency_u_hz")) < 0.015  # 0.03 Hz of a count, ten counts
         (text,) = (event for event in run.events() if event["kind"] == "held")
         assert text["scatter_hz"] == pytest.approx(spins.std(ddof=1))
         assert text["drag_u_hz_per_s"] < 0.006
