@@ -69,9 +69,10 @@ def mean_pull(output: Output, rate: float, place: float, *, jitter: float = 0.0,
     lasts = bursts.cycles / output.frequency
     field = fundamental(replace(output, amplitude=bursts.amplitude, burst=None)) * (-1.0 if output.inverted else 1.0)
     moment, phase = 2 * math.pi * (place + rate * bursts.delay), math.radians(output.phase)
-    together, apart = (math.pi * lasts * (rate + sign * output.frequency) for sign in (-1.0, 1.0))
+    difference, total = (math.pi * lasts * (rate + sign * output.frequency) for sign in (-1.0, 1.0))
     # 2 ∫ sin(ψ + ωt) sin(φ + ω′t) dt over the burst
-    product = math.cos(moment - phase + together) * _sinc(together) - math.cos(moment + phase + apart) * _sinc(apart)
+    product = math.cos(moment - phase + difference) * _sinc(difference)
+    product -= math.cos(moment + phase + total) * _sinc(total)
     scatter = 2 * math.pi * math.hypot(jitter, rate * bursts.jitter)
     turns = _turns_per_burst(rate * (bursts.delay + lasts), jitter) + lost / (1 - lost)
     return -field * rate * lasts / turns * product * math.exp(-(scatter**2) / 2)

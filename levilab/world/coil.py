@@ -87,10 +87,9 @@ class Coil:
     def _next(last: _Stretch, time: float, output: Output) -> _Stretch:
         if not last.output.amplitude:
             return _Stretch(output, time, 0.0)
-        if (
-            output.burst is not None and output.burst.period is not None
-        ):  # bursts that start by themselves keep their rhythm
-            same = (last.output.burst, last.output.frequency) == (output.burst, output.frequency)
+        burst = output.burst
+        if burst is not None and burst.period is not None:  # bursts that start by themselves keep their rhythm
+            same = (last.output.burst, last.output.frequency) == (burst, output.frequency)
             return _Stretch(output, last.origin if same else time, 0.0)
         turns = last.turns + last.output.frequency * (time - last.origin)
         # the random bits repeat after 127 turns, all others after one

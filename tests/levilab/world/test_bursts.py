@@ -5,6 +5,7 @@ an edge of the tape's place starts, with scipy.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from instruments.clock import VirtualClock
 from instruments.virtual.generator.channel import Output, Triggered
-from levilab.world.bursts import TriggerWire, burst_starts
+from levilab.world.bursts import TriggerWire, burst_starts, mean_pull
 from levilab.world.spin_world import SpinScene, SpinWorld
 
 #: Pull of a sine of 0.4 mT in phase with the top [Hz/s] (PHYSICS, drive: μδB₀/2I₃).
@@ -35,7 +36,7 @@ def integrated(scene, output, duration):
     edge = 2 * math.pi * (0.5 + scene.tape.offset(scene.trigger.thresholds(rising=True), scene.start_hz))
     lasts, free_at, now = output.triggered.cycles / output.frequency, -1.0, 0.0
     state = np.array([0.0, 2 * math.pi * scene.start_hz])  # angle of the tape, and spin
-    pull = 2 * scene.lock_torque * output.triggered.amplitude
+    pull = 2 * scene.lock_torque * output.triggered.amplitude * (-1 if output.inverted else 1)
     (c,) = scene.constants
 
     def motion(on):
@@ -58,14 +59,17 @@ def integrated(scene, output, duration):
         passed = solve_ivp(motion(on), (now, duration), state, events=at_edge, rtol=1e-8, max_step=2e-3)
         now, state = passed.t[-1], passed.y[:, -1]
         if passed.status == 1 and now >= free_at:
-            on, free_at = now, now + lasts
+            free_at = (on := now + output.triggered.delay) + lasts
     return state[1] / (2 * math.pi)
 
 
 @pytest.mark.parametrize(
     ("output", "place"),
-    [(bursts(), 0.0), (bursts(phase=0.0), 0.0), (bursts(frequency=45.0), 0.1), (bursts(cycles=2, frequency=40.0), 0.3)],
-    ids=["drives", "brakes", "short", "every second turn"],
+    [
+        *((bursts(), 0.0), (bursts(phase=0.0), 0.0), (bursts(frequency=45.0), 0.1)),
+        *((bursts(cycles=2, frequency=40.0), 0.3), (replace(bursts(frequency=45.0, delay=5e-3), inverted=True), 0.5)),
+    ],
+    ids=["drives", "brakes", "short", "every second turn", "late and inverted"],
 )
 def test_the_mean_pull_moves_the_top_as_bursts_one_by_one_do(output, place):
     scene = SpinScene(jitter=0.0, moment_turns=place)
@@ -101,6 +105,14 @@ def test_the_angle_is_the_integral_of_the_spin_across_the_steps():
     spin, angle = world.motion(times)
     integral = np.concatenate(([0.0], np.cumsum((spin[1:] + spin[:-1]) / 2 * 1e-3)))
     assert angle == pytest.approx(integral, abs=1e-3)
+
+
+def test_scatter_of_the_edges_averages_the_pull_over_their_places():
+    points, weights = np.polynomial.hermite_e.hermegauss(20)
+    mean = np.average([mean_pull(bursts(frequency=45.0), 30.0, 0.1 + 0.05 * x) for x in points], weights=weights)
+    of_tape = mean_pull(bursts(frequency=45.0), 30.0, 0.1, jitter=0.05)
+    of_start = mean_pull(bursts(frequency=45.0, jitter=0.05 / 30), 30.0, 0.1)
+    assert [of_tape, of_start] == pytest.approx([mean, mean], rel=1e-4)  # 1e-6 of the edges come too early
 
 
 def test_lost_edges_take_their_share_of_the_pull():
