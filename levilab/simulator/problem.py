@@ -196,7 +196,7 @@ def _follow(
 
 
 def trigger_of(problem: Problem) -> Trigger:
-    """Return what sets the bursts of a triggered drive off."""
+    """Return the trigger and the bursts of a triggered drive."""
     drive, turn = problem.scene.drive, 2 * math.pi
     return Trigger(
         mark=drive.light_rad / turn,

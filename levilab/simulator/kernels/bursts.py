@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Trigger(NamedTuple):
-    """What sets the bursts off, and what they are.
+    """The trigger of the bursts, and their cycles.
 
     mark: φ + ψ where the tape passes the light [turns]; latency [s]; frequency: of the sine [Hz], unless cycle is above
     0: its period as a part of the time of the last turn; phase: at its start [turns]; off: when the drive ends [s];
@@ -39,7 +39,7 @@ class Trigger(NamedTuple):
     rate: float
 
 
-#: What the drive remembers between pieces: begin and end of the latest burst [s], its frequency [Hz], the passage that
+#: Memory of the drive between pieces: begin and end of the latest burst [s], its frequency [Hz], the passage that
 #: set it off [s], and whether less than half a turn was left to the light.
 BEGIN, END, FREQUENCY, PASSAGE, NEAR = range(5)
 #: Of a drive that has seen no pulse yet.
@@ -49,8 +49,7 @@ NO_BURST = (-math.inf, -math.inf, 0.0, -math.inf, 0.0)
 #: the passage is known to 1e-12 of a turn.  Where the rate itself serves, for want of a turn before, it has to be known
 #: as well.
 _CLOSE_TURNS, _CLOSER_TURNS = 1e-5, 1e-10
-#: A step before the light is made again so many times at most: the second one ends within 1e-9 of a turn, unless the
-#: top tumbles.
+#: Most repetitions of a step before the light: the second one ends within 1e-9 of a turn, unless the top tumbles.
 _MOST_TRIES = 8
 #: Steps of one piece at most, while the tape is looked for and else; over the first its rate hardly changes.
 _MOST_LOOKING, _MOST = 8.0, 1000.0
@@ -79,7 +78,7 @@ def _tape(model: Model, s: State, mark: float) -> tuple[float, float]:
 
 
 class _Piece(NamedTuple):
-    """What comes next: steps to an end [s] under sin(2π(frequency·t + turns)); aims: whether at the tape's passage."""
+    """The next steps, to an end [s], under sin(2π(frequency·t + turns)); aims: whether at the tape's passage."""
 
     end: float
     steps: float
