@@ -101,6 +101,15 @@ def test_the_chance_by_others_is_that_of_a_posterior_without_the_trial() -> None
         assert learn(trials, prior).chance_by_others(one) == pytest.approx(chance, rel=0.05)  # two grids
 
 
+def test_the_promise_counts_the_best_trial_after_each_outcome() -> None:
+    prior, masses = Prior(24.5 * G, 26 * G), np.linspace(24.6, 25.9, 7) * G
+    posterior = learn([], prior)
+    rises, floats, sinks = posterior.outcomes(masses[2:3], 20.0)[:, 0] @ posterior.weight
+    after = [learn([Trial(masses[2], 20, one)], prior).chances(masses, 20.0) for one in (Outcome.RISES, Outcome.SINKS)]
+    expected = 2 * floats + rises * after[0].max() + sinks * after[1].max()
+    assert posterior.promise(masses, 20.0)[2] == pytest.approx(expected, rel=0.02)  # two grids
+
+
 @pytest.mark.parametrize(("outcome", "sign"), [(Outcome.RISES, 1), (Outcome.SINKS, -1)])
 def test_what_rises_is_made_heavier_and_what_sinks_lighter(outcome: Outcome, sign: int) -> None:
     masses = 24.4 * G + WASHERS
