@@ -165,7 +165,7 @@ def test_a_split_of_either_sign_is_told_with_its_u(split):
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_a_swing_and_a_line_of_the_vertical_swing_are_told_apart_by_the_spin(which):
+def test_a_swing_and_a_line_of_the_vertical_swing_are_distinguished_by_the_spin(which):
     b, slope = field(HEIGHT)[:2, 0]
     spins, seen = np.array([40.0, 35.0, 30.0, 25.0]), []
     for spin in spins:

@@ -46,6 +46,7 @@ def test_the_sample_has_the_geometric_magnetism_of_its_top(found):
     assert geometry.measured.u < 0.03 * TRUE_HZ
     assert geometry.predicted.value == pytest.approx(TRUE_HZ, rel=2e-3)  # it floats lower by its swings
     assert abs(geometry.ratio.value - 1) < 3 * geometry.ratio.u
+    assert geometry.of_precession.value == pytest.approx(geometry.of_base.value, rel=2e-3)  # likewise
     assert "excluded" in found.text
     assert found.all_warnings == []
     assert [one.frequency.size for one in found.runs[0].swings[:3]] == [3, 3, 3]
@@ -94,7 +95,9 @@ def test_the_base_is_the_calliper_s_or_that_of_a_scan():
     scanned = analyze(TRACK, scan=ROOT / "sample_data/field-scan").runs[0]
     assert scanned.geometry.of_base.value == pytest.approx(9.21, rel=5e-3)
     assert "radii" not in scanned.warnings[0]
-    assert "radii" in analyze(TRACK).runs[0].warnings[0]
+    thesis = analyze(TRACK).runs[0]
+    assert scanned.geometry.of_base.u == pytest.approx(thesis.geometry.of_base.u, rel=0.1)  # the scan's calliper rules
+    assert "radii" in thesis.warnings[0]
 
 
 @pytest.mark.slow
