@@ -80,6 +80,14 @@ def test_a_mark_on_the_end_of_the_stem_is_noticed(tmp_path):
     assert found.runs[0].geometry.parts["lean"] > 0.1 * found.runs[0].geometry.measured.u
 
 
+def test_without_a_precession_the_view_is_doubted(tmp_path):
+    t = np.arange(1200) / 60
+    z = 0.11 * np.exp(-2j * np.pi * 0.617 * t) + 0.45 * np.exp(2j * np.pi * 0.852 * t)
+    rows = [(f"{one:.4f}", f"{place.real:.6f}", f"{place.imag:.6f}") for one, place in zip(t, z, strict=True)]
+    path = write(tmp_path / "two.csv", ("t [s]", "x [mm]", "y [mm]"), rows)
+    assert "no precession is seen" in " ".join(analyze(path, device=DEVICE, spin_hz=38.56).all_warnings)
+
+
 def test_the_spin_of_a_film_stands_beside_its_track(found, tmp_path):
     rows = rows_of(TRACK)
     metres = [(r["t [s]"], *(f"{float(r[axis]) / 1e3:.6f}" for axis in ("x [mm]", "y [mm]"))) for r in rows]
