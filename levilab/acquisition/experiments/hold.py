@@ -144,7 +144,7 @@ def drag_of(share: float, u_share: float, gain: Estimate | None) -> Estimate | N
 
 EXPERIMENT = Experiment(
     name="hold",
-    about="hold a spin by a drive that the top triggers, and measure the drag that its amplitude balances",
+    about="hold a spin by a drive that the top triggers; measure the drag by its amplitude",
     instruments=("counter", "generator"),
     settings=HoldSettings,
     channels=channels,
