@@ -43,12 +43,13 @@ PIECES_IN_A_CALL = 20_000
 
 @dataclass(frozen=True)
 class Problem:
-    """A scene made ready for its kernels."""
+    """A scene made ready for its kernels.  memory: of a triggered drive at the start; None: no burst yet."""
 
     scene: Scene
     model: Any
     start: Array
     scheme: Scheme
+    memory: Array | None = None
 
     @cached_property
     def coefficients(self) -> tuple[Array, Array]:
@@ -161,7 +162,7 @@ def _follow(
 ) -> Stops:
     """Follow a motion with a drive that it triggers, and return the stops with the states there."""
     start, trigger = problem.start, trigger_of(problem)
-    memory, state, at = np.array(NO_BURST), start, 0
+    memory, state, at = np.array(NO_BURST if problem.memory is None else problem.memory), start, 0
     found: list[Stops] = []
     while at < wanted.size:
         # no array is larger than the steps need: most runs are short
@@ -192,6 +193,7 @@ def _follow(
         np.concatenate([part.levels for part in found]),
         np.concatenate([part.slopes for part in found]),
         np.concatenate([start[None], *(part.states[1:] for part in found if part.states is not None)]),
+        memory,
     )
 
 

@@ -118,6 +118,7 @@ def simulate(
     scheme: str | None = None,
     step: float | None = None,
     start: Array | None = None,
+    memory: Array | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Simulate a scene, with an error at the end within the tolerance.
@@ -130,8 +131,8 @@ def simulate(
         events: functions of a Trajectory, shape (n,), whose zeros are located.
         scheme: a name of SCHEMES; None: the best one for the scene.
         step: the longest step [s]; None: the tolerance decides it.
-        start: a state to start from instead of the scene's, shape (18,); its time stays.  A burst that was under way
-            then, of a triggered drive, is not part of it.
+        start: a state to start from instead of the scene's, shape (18,); its time stays.
+        memory: of a triggered drive then, as the motion before has it; None: no burst is under way.
         progress: called with the share of the work that is done.
 
     Returns:
@@ -165,10 +166,11 @@ def simulate(
     begin = float(state[TIME])
     corners(scene.drive, min(begin, begin + duration), max(begin, begin + duration))  # refused before anything is run
     model = model_of(scene, state[R])
-    problem = Problem(scene, model, state, scheme_for(scheme, model))
+    problem = Problem(scene, model, state, scheme_for(scheme, model), memory)
     wanted = _Wanted(duration, rate, events, progress)
     run, accuracy = _to_tolerance(problem, wanted, tolerance, step)
-    return Trajectory(scene, run.states, model, accuracy, run.fell, run.events, bursts_of(run.stops, model))
+    bursts, memory = bursts_of(run.stops, model), run.stops.memory
+    return Trajectory(scene, run.states, model, accuracy, run.fell, run.events, bursts, memory)
 
 
 def simulate_at_step(

@@ -35,6 +35,7 @@ class Stops:
         levels, slopes: of the drive in each interval, shape (n,); see below.
         states: of the motion at the first of the stops, shape (m, 18), where the stops were found by following it;
             fewer than n + 1 if it left the limits of the escape in the interval after them.
+        memory: of a drive that the top triggers, at the last of these states, shape (5,).
 
     Within an interval the drive's field is (level + slope·t) × its carrier, or with bursts a sine of frequency level
     and phase slope; this is smooth: no step crosses a kink, so the order of the integrator is kept.
@@ -45,6 +46,7 @@ class Stops:
     levels: Array
     slopes: Array
     states: Array | None = None
+    memory: Array | None = None
 
     def pieces(self, steps: int) -> Iterator[tuple[int, int]]:
         """Yield the first and last interval, exclusive, of successive pieces with about so many steps each."""

@@ -75,6 +75,7 @@ class Trajectory:
         events: found on the way, in their order.
         bursts: of a drive that the top triggers, in pieces, shape (n, 4): begin and end [s], frequency f [Hz] and phase
             p [turns] of the field amplitude_t·sin(2π(f t + p)).
+        memory: of such a drive at the end, with the burst under way, for a motion that goes on from there.
     """
 
     scene: Scene
@@ -84,6 +85,7 @@ class Trajectory:
     fell: Event | None = None
     events: tuple[Event, ...] = ()
     bursts: Array = field(default_factory=lambda: np.empty((0, 4)))
+    memory: Array | None = None
 
     def __repr__(self) -> str:
         name, end = self.scene.name or "a scene", float(self.time[-1])

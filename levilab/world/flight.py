@@ -48,12 +48,14 @@ class _Flying:
         state: at the start, shape (18,).
         step: of the integration [s].
         slip: turns of loose washers relative to the top at the start.
+        memory: of bursts that the top triggers, at the start.
     """
 
     scene: Scene
     state: Array
     step: float
     slip: float
+    memory: Array | None
 
     @property
     def start(self) -> float:
@@ -122,6 +124,7 @@ class Flight:
         self._state: Array | None = self._start_state(0.0)
         self._known_until = 0.0
         self._slip = 0.0  # of the washers then [turns]
+        self._memory: Array | None = None  # of bursts that the top triggers, then
         self._samples: dict[_Flying, _Samples] = {}  # of the latest pieces
         self._states: dict[_Flying, tuple[Array, Array]] = {}  # of those that a view has looked at
 
@@ -149,7 +152,7 @@ class Flight:
             self._pieces.cut(time)
             samples = self._samples_of(now)
             self._slip = float(np.interp(time, samples.times, samples.slips))
-            self._state, self._known_until = _state_within(now, time), time
+            (self._state, self._memory), self._known_until = _state_within(now, time), time
         else:
             self._pieces.cut(math.nextafter(time, math.inf))
             self._wait(now.start)
@@ -291,7 +294,7 @@ class Flight:
         """Return the state of a top that starts at this time, shape (18,)."""
         state = start_of(self._scene)
         state[TIME] = time
-        self._slip = 0.0
+        self._slip, self._memory = 0.0, None
         return state
 
     def _advance(self, state: Array) -> None:
@@ -302,8 +305,9 @@ class Flight:
             self._fall(begin)
             return
         # a bench may run for hours: of all pieces only the first state is kept
-        piece, samples = _Flying(self._scene, state, motion.accuracy.step, self._slip), self._sample(motion, self._slip)
-        self._slip = float(samples.slips[-1])
+        piece = _Flying(self._scene, state, motion.accuracy.step, self._slip, self._memory)
+        samples = self._sample(motion, self._slip)
+        self._slip, self._memory = float(samples.slips[-1]), motion.memory
         self._pieces.append(begin, piece)
         _keep(self._samples, piece, samples, SAMPLED)
         if motion.fell is not None:
@@ -313,7 +317,7 @@ class Flight:
 
     def _motion(self, state: Array) -> Trajectory:
         """Simulate a piece with the step of the last one, or with a new one where that is too long."""
-        options: dict[str, Any] = {"tolerance": TOLERANCE, "rate": RATE, "start": state}
+        options: dict[str, Any] = {"tolerance": TOLERANCE, "rate": RATE, "start": state, "memory": self._memory}
         if self._step is not None:
             motion = simulate(self._scene, PIECE_S, step=self._step, **options)
             if motion.accuracy.reached:
@@ -335,7 +339,8 @@ class Flight:
 
 
 def _simulate_again(piece: _Flying) -> Trajectory:
-    return simulate(piece.scene, PIECE_S, step=piece.step, tolerance=TOLERANCE, rate=RATE, start=piece.state)
+    again: dict[str, Any] = {"step": piece.step, "start": piece.state, "memory": piece.memory}
+    return simulate(piece.scene, PIECE_S, tolerance=TOLERANCE, rate=RATE, **again)
 
 
 def _keep(kept: dict[_Flying, T], piece: _Flying, value: T, most: int) -> None:
@@ -345,14 +350,15 @@ def _keep(kept: dict[_Flying, T], piece: _Flying, value: T, most: int) -> None:
     kept[piece] = value
 
 
-def _state_within(piece: _Flying, time: float) -> Array:
-    """Return the state at a time within a piece, shape (18,)."""
-    state = piece.state.copy()
+def _state_within(piece: _Flying, time: float) -> tuple[Array, Array | None]:
+    """Return the state at a time within a piece, shape (18,), and the memory of its drive."""
+    state, memory = piece.state.copy(), piece.memory
     if time - piece.start > _AT_ONCE:
-        motion = simulate(piece.scene, time - piece.start, step=piece.step, rate=None, start=state)
-        state = motion.states[-1].copy()
+        again: dict[str, Any] = {"step": piece.step, "start": state, "memory": memory}
+        motion = simulate(piece.scene, time - piece.start, rate=None, **again)
+        state, memory = motion.states[-1].copy(), motion.memory
     state[TIME] = time
-    return state
+    return state, memory
 
 
 def _turns(motion: Trajectory) -> Array:

@@ -268,9 +268,9 @@ def test_what_a_triggered_drive_cannot_do_is_refused_at_once(tmp_path, experimen
 
 
 def test_a_top_in_full_motion_triggers_its_drive_too(tmp_path):
-    settings = ("drive=triggered", "drive_frequency_hz=32", "hold_s=10", "longest_s=20")
+    settings = ("drive=triggered", "drive_frequency_hz=32", "hold_s=30", "longest_s=20")
     options = AcquisitionOptions(mock=True, out=tmp_path, scene="spindown", seed=3, settings=settings)
     run = acquire(request_for("spin", options), Silent())
     assert run.status == "finished"
-    assert run.readings().column("spin_frequency_hz")[0] == pytest.approx(32.0, abs=0.4)  # the wobble scatters it
-    assert events(run, "phase found")[0]["pull_hz_per_s"] == pytest.approx(0.36, abs=0.36)
+    assert run.readings().column("spin_frequency_hz")[0] == pytest.approx(32.0, abs=0.4)  # 0.14 too fast still
+    assert events(run, "phase found")[0]["pull_hz_per_s"] == pytest.approx(0.71, abs=0.12)  # 4 u; 0.34 of a fixed axis

@@ -12,11 +12,16 @@ from instruments.virtual.core.signal import crossings
 from instruments.virtual.counter.edges import Thresholds
 from instruments.virtual.generator.channel import Burst, Output, Triggered
 from instruments.virtual.generator.voltage import fundamental
+from levilab.acquisition.triggering import response
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator import SceneError, preset, simulate
+from levilab.simulator.field import flux_density
+from levilab.simulator.kernels.motion import L, N, R
+from levilab.simulator.model import base_field
 from levilab.simulator.parts import Top
+from levilab.simulator.start import start_of
 from levilab.world.base import Base
-from levilab.world.bursts import TriggerWire
+from levilab.world.bursts import TriggerWire, mean_pull
 from levilab.world.flight import RATE, SAMPLED, Flight, _cubic
 from levilab.world.light import Tape
 from levilab.world.motion_world import MotionWorld
@@ -446,7 +451,49 @@ def test_a_top_in_full_motion_triggers_its_bursts():
         return 1 / float(np.mean(np.diff(edges)))
 
     spins = [spin_after(phase) for phase in (0.0, 90.0, 180.0, 270.0)]
-    # four phases of one cosine about the spin of a free top, which loses 0.4 Hz; the wobble moves the edges.  A fixed
-    # axis would have a pull of 0.36 Hz/s in 4.5 s; the synchronous wobble near its resonance at 22 Hz doubles it
+    # four phases of one cosine about the spin of a free top, which loses 0.4 Hz; the wobble moves the edges.  0.71 Hz/s
+    # in 4.5 s, see below
     assert spins[0] + spins[2] == pytest.approx(spins[1] + spins[3], abs=1.2)
     assert math.hypot(spins[0] - spins[2], spins[1] - spins[3]) / 2 == pytest.approx(3.2, abs=0.5)
+
+
+BURSTS = {"waveform": "triggered", "amplitude_t": 4e-4, "light_rad": 0.0, "latency_s": 5e-7, "cycle_turns": 0.0}
+
+
+def spin_of(scene, state):
+    return float(state[L] @ state[N]) / scene.top.inertia_axial_kg_m2 / (2 * math.pi)
+
+
+@pytest.mark.parametrize("every", [1.0, 0.1, 0.01])
+def test_a_burst_runs_on_across_steps_and_settings(every):
+    scene, drive = preset("spindown"), BURSTS | {"frequency_hz": 33.0, "phase_rad": 4.45}
+    flight = Flight(scene)
+    for k in range(round(2 / every) + 1):
+        flight.change(k * every, drive)
+    whole = simulate(scene.changed({f"drive.{key}": value for key, value in drive.items()}), 2.0, tolerance=1e-9)
+    # two hundred pieces, each to 1e-7; where bursts ended with the pieces, 0.07 with two of them, and 2 Hz with many
+    assert flight._state[N] == pytest.approx(whole.axis[-1], abs=3e-5)
+    assert spin_of(scene, flight._state) == pytest.approx(whole.spin_hz[-1], abs=3e-5)
+
+
+@pytest.mark.parametrize("spin", [28.0, 30.0, 40.0, 60.0])
+def test_the_pull_of_bursts_is_that_of_a_moment_that_leans_with_the_top(spin):
+    scene = preset("spindown").changed({"start.spin_hz": spin, "drag.law": "none", "start.tilt_rad": 1e-3})
+    top = scene.top
+    gained = []
+    for phase in (0.0, 120.0, 240.0):
+        flight = Flight(scene)
+        flight.change(0.0, BURSTS | {"frequency_hz": 1.1 * spin, "phase_rad": math.radians(phase)})
+        flight.change(1.0, OFF)
+        gained.append(spin_of(scene, flight._state) - spin)
+    bursts = Triggered(4e-4, 1, rising=True, delay=5e-7, jitter=0.0)
+    output = Output("SIN", 1.1 * spin, 0.0, 0.0, triggered=bursts)
+    pulls = [mean_pull(replace(output, phase=phase), spin, 0.25) for phase in (0.0, 120.0, 240.0)]
+    across = abs(top.moment_a_m2) * top.moment_tilt[0]
+    fixed = across / top.inertia_axial_kg_m2 / 2 / (2 * math.pi) * response(pulls, 0).pull
+    # the synchronous tilt, PHYSICS 4, resonant at ν_r² = μB/(I₁ − I₃)
+    place = start_of(scene)[R][None]
+    torque = top.moment_a_m2 * top.moment_tilt[1] * flux_density(base_field(scene), place)[0, 2]
+    resonance = math.sqrt(torque / (top.inertia_transverse_kg_m2 - top.inertia_axial_kg_m2)) / (2 * math.pi)
+    assert response(gained, 0).pull == pytest.approx(fixed / (1 - (resonance / spin) ** 2), rel=0.015)
+    # 1 %: the spin moves within the second, the more the nearer the resonance
