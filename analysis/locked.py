@@ -110,10 +110,11 @@ LEFT_BEHIND_TURNS = 0.75
 
 
 class Cause(StrEnum):
-    """Why a driven top was lost, by its phase before the loss."""
+    """Why a driven top was lost, by its phase before the loss, or got no faster: pull and drag are equal."""
 
     LEFT_BEHIND = "left behind by the drive"
     OUT_OF_WINDOW = "out of the window"
+    PULLS_NO_FURTHER = "the drive pulls no further"
     NOT_KNOWN = "not known"
 
 

@@ -156,16 +156,17 @@ class PointFailed(Exception):
 # --- up ---
 
 
-def drive_until(session: Session[D], steps: Callable[[Session[D]], None]) -> None:
+def drive_until(session: Session[D], steps: Callable[[Motor | None], None]) -> None:
     """Drive the top up, go through steps while it is held, and switch the drive off.
+
+    steps: called with the motor of a triggered drive, None of a ramp.
 
     If the generator fails meanwhile, all of it is done once more, from the top's new spin; but not if it fails when it
     is switched off after the steps: what they measured counts.
     """
     while True:
         try:
-            drive_up(session)
-            steps(session)
+            steps(drive_up(session))
         except InstrumentError as error:
             reach_generator_again(session, error)
         else:

@@ -16,12 +16,17 @@ import numpy as np
 from analysis.uncertainty import Estimate
 from levilab.acquisition.counting import prepare_counter_again, spin_now
 from levilab.acquisition.failures import DidNotFollow, NotHeld
+from levilab.acquisition.session import ExperimentFailed
 from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from levilab.acquisition.session import Session
+
+    Array = NDArray[np.float64]
 
 #: The frequency of the cycle over that of the top: a pulse comes up to 6 % of a turn early (2 % is its scatter), and
 #: the top gains 2 % until the next count is set.  The pull is 8 % less than that of a cycle as long as a turn.
@@ -93,6 +98,22 @@ def slope_of(times: Sequence[float], spins: Sequence[float]) -> tuple[float, flo
     residuals = np.asarray(spins) - (slope * np.asarray(times) + at)
     scatter = np.sqrt(np.sum(residuals**2) / max(len(spins) - 2, 1))
     return float(slope), float(scatter), float(np.std(times)) * math.sqrt(len(times))
+
+
+@dataclass(frozen=True, eq=False)
+class Climb:
+    """A way up under the full amplitude of the drive.
+
+    times, spins: ends of the counts [s], and counts [Hz], shape (n,); first_missed: end of the first count without the
+    top [s]; lost: what was seen in its place; levels_off_at: the spin at which pull and drag are equal, of a top that
+    was not lost [Hz].
+    """
+
+    times: Array
+    spins: Array
+    first_missed: float
+    lost: NotHeld | None = None
+    levels_off_at: Estimate | None = None
 
 
 @dataclass
@@ -245,6 +266,56 @@ class Motor:
             self._turn_to(self.phase)
         self._set_share(sign - gain / self.pull)  # drag over pull, for gain = sign · pull − drag
 
+    def climb(self, highest: float) -> Climb:
+        """Speed the top up at the full amplitude until it is lost, or gets no faster.
+
+        The gain nears zero at the rate 3/2 pull/spin, that of the drag C ω^(3/2), which the pull equals in the end: the
+        rest of the way is added.
+
+        Args:
+            highest: a spin that ends it, too [Hz].
+
+        Raises:
+            DidNotFollow: the top gets slower.
+            ExperimentFailed: it is faster than that.
+        """
+        session, start = self.session, self.spin
+        self._set_share(1.0)
+        times: list[float] = []
+        spins: list[float] = []
+        first_missed, level = math.nan, 0
+        while True:
+            missed = self._missed
+            try:
+                self.count()
+            except NotHeld as lost:
+                return Climb(np.array(times), np.array(spins), first_missed, lost=lost)
+            if self._missed > missed:
+                first_missed = session.now() if missed == 0 else first_missed
+                continue
+            times.append(session.now())
+            spins.append(self.spin)
+            if self.spin > highest:
+                raise _too_fast(session, highest)
+            session.progress(f"speeds up, {self.spin:.2f} Hz", (self.spin - start) / (highest - start))
+            recent = slice(-_GAINING, None)
+            if len(spins) < _GAINING:
+                continue
+            gain, scatter, spread = slope_of(times[recent], spins[recent])
+            self._trend = gain
+            gained = gain * (times[-1] - times[-_GAINING])
+            if gained < -_LEAST_GAIN_HZ:
+                raise DidNotFollow(
+                    f"the top gets slower under the drive, {self.spin:.2f} Hz after {max(spins):.2f} Hz",
+                    "does the cable lead from the phototransistor to the generator's trigger input, and to the coil?",
+                )
+            level = level + 1 if gained < _LEAST_GAIN_HZ else 0
+            if level == _GAINING:  # for as long: one that is about to get slower has shown it
+                rate = 1.5 * self.pull / self.spin
+                left = max(gain, 0.0) / rate
+                at = Estimate(self.spin + left, math.hypot(left / 2, scatter / spread / rate), "Hz")
+                return Climb(np.array(times), np.array(spins), math.nan, levels_off_at=at)
+
     def hold(self, target: float, duration: float) -> None:
         """Hold the top at a spin [Hz] for a time [s]: the amplitude follows each count.  Raises NotHeld."""
         session = self.session
@@ -266,6 +337,14 @@ class Motor:
             self.counts.append(self.spin)
             self.shares.append(self.share)
             self._set_share(wish)
+
+
+def _too_fast(session: Session[Any], highest: float) -> ExperimentFailed:
+    name = session.writer.record.experiment
+    return ExperimentFailed(
+        f"the top still gets faster at {highest:.1f} Hz ({name}.highest_hz, and limits.drive_frequency_hz over "
+        f"{CYCLE:g}, for the cycles are so much faster than the top): allow more there, or weaken the drive"
+    )
 
 
 def _no_pull(session: Session[Any], found: Response) -> DidNotFollow:

@@ -175,14 +175,16 @@ def mean_limit(columns: Mapping[str, Array], size: int, settings: Mapping[str, A
     if not len(spin):
         return Running("no limit yet")
     sample = Sample(spin)
+    triggered = settings.get("which") == "upper" and settings.get("drive") == "triggered"
     if u is not None:
-        stepped = settings.get("which") == "upper"
+        stepped = settings.get("which") == "upper" and not triggered
         sample = (Sample.within_steps if stepped else Sample)(spin, u[used] / np.sqrt(size))
     found = summarize(sample)
     students = float(stdtrit(np.inf if found.freedom is None else found.freedom, 0.975))
     band = np.empty(0) if found.mean.u is None else np.full(2, students * found.mean.u)
     curve = Curve(np.array([time[0], time[-1]]), np.full(2, found.mean.value), band)
-    return Running("mean so far", (with_uncertainty(found.mean),), curve)
+    note = ("with tops that level off, which are no limits",) * triggered
+    return Running("mean so far", (with_uncertainty(found.mean), *note), curve)
 
 
 def _value(value: float, u: float | None, unit: str = "") -> str:

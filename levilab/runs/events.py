@@ -44,6 +44,7 @@ class RunEvent(StrEnum):
     # the top
     FELL = "fell"
     TOP_LOST = "top lost"  # it fell under the drive
+    LEVELS_OFF = "levels off"  # it gets no faster under the drive
     DOES_NOT_FALL = "does not fall"
     COASTS = "coasts"
     ONCE_MORE = "once more"

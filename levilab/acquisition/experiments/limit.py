@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 
 from analysis.limits import spin_at_fall
-from analysis.locked import cause_of_loss, lag_before_loss, slip_of
+from analysis.locked import Cause, cause_of_loss, lag_before_loss, slip_of
 from levilab.acquisition.counting import NO_TOP, AnotherTop, Missed, free_top, prepare_counter, spin_now
 from levilab.acquisition.driving import (
     HELD_WITHIN_HZ,
@@ -28,6 +28,7 @@ from levilab.acquisition.driving import (
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.failures import DidNotFollow, NotHeld
 from levilab.acquisition.session import ExperimentFailed
+from levilab.acquisition.triggering import CYCLE
 from levilab.bench.config import ConfigError
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.channel import Channel
@@ -37,17 +38,20 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from levilab.acquisition.session import Row, Session
+    from levilab.acquisition.triggering import Motor
     from levilab.bench.config import Limits
 
 #: A top that the drive does not take up is given up after this many falls.
 _MOST_FALLS = 3
+#: Fewest counts that a line to the moment of a loss is drawn through.
+_FEWEST = 3
 #: Number of counts that compare the tape of a creeping top with the drive, and their distance below the limit [Hz]:
 #: nearer to it the top may already fall behind.
 _COMPARED, _BELOW_HZ = 20, 5.0
 
 
 class LimitSettings(DriveSettings):
-    """Drive up and hold, then let go (lower) or creep upwards (upper) until the top is lost; again and again."""
+    """Drive up and hold, then let go (lower) or on upwards (upper) until the top is lost; again and again."""
 
     one_top: ClassVar[bool] = False
     by_hand: ClassVar[bool] = True
@@ -68,8 +72,6 @@ class LimitSettings(DriveSettings):
         super().check(table, limits)
         if self.which == "upper" and self.drive_waveform == "NONE":
             raise ConfigError(f"{table}.drive_waveform = NONE: the upper limit needs a drive, SIN, SQU or TRI")
-        if self.which == "upper" and self.drive == "triggered":
-            raise ConfigError(f"{table}.drive = triggered: the upper limit has a drive that creeps up, ramp")
         if self.which == "upper":
             check_drive(table, limits, self.drive_amplitude_vpp, [("highest_hz", self.highest_hz)])
         if self.which == "upper" and self.highest_hz <= self.drive_frequency_hz:
@@ -189,9 +191,9 @@ def _lower(session: Session[LimitSettings], keep: Callable[[Row], None]) -> bool
 def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_since: float, text: str) -> Row:
     """Return the reading of a fall.  missed_since: when the first count was asked for that saw no top any more [s]."""
     settings = session.settings
-    if len(seen) < 3:
+    if len(seen) < _FEWEST:
         raise ExperimentFailed(
-            f"the top fell {len(seen)} readings after the drive went off, 3 are needed: drive it higher first "
+            f"the top fell {len(seen)} readings after the drive went off, {_FEWEST} are needed: drive it higher first "
             f"({session.writer.record.experiment}.drive_frequency_hz)"
         )
     times, spins = (np.array([row[name] for row in seen]) for name in ("time_s", "spin_frequency_hz"))
@@ -223,9 +225,16 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_sinc
 
 
 def _upper(session: Session[LimitSettings], keep: Callable[[Row], None]) -> bool:
-    """Drive the top up, creep on until it is lost, and keep its limit; False where the time is over."""
+    """Drive the top up, and on until it is lost, and keep its limit; False where the time is over."""
     before = len(session.rows)
-    drive_until(session, lambda session: _creep_up(session, keep))
+
+    def go_on(motor: Motor | None) -> None:
+        if motor is None:
+            _creep_up(session, keep)
+        else:
+            _climb(session, motor, keep)
+
+    drive_until(session, go_on)
     return len(session.rows) > before
 
 
@@ -268,6 +277,46 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
         session.progress(f"drive at {drive:.2f} Hz", (drive - start) / (settings.highest_hz - start))
 
 
+def _climb(session: Session[LimitSettings], motor: Motor, keep: Callable[[Row], None]) -> None:
+    """Let a top that triggers its drive get faster until it is lost or gets no faster, and keep that spin.
+
+    A limit is the spin of a line through the last counts, continued to the middle of the time in which it was lost.
+    """
+    settings = session.settings
+    climb = motor.climb(
+        min(settings.highest_hz, session.bench.generator.limits.drive_frequency_hz / CYCLE) - HELD_WITHIN_HZ
+    )
+    spin, lost = climb.levels_off_at, climb.lost
+    if spin is None:
+        if climb.spins.size < _FEWEST:
+            raise DidNotFollow(f"the top was lost {climb.spins.size} counts after the way up began", "float it again")
+        between = (float(climb.times[-1]), climb.first_missed)
+        spin = spin_at_fall(climb.times - settings.gate_s / 2, climb.spins, None, between)
+    assert spin.value is not None
+    assert spin.u is not None
+    amplitude, seen = settings.drive_amplitude_vpp / 2, float(climb.spins[-1])
+    keep(
+        {"time_s": session.now(), "spin_frequency_hz": spin.value, "spin_frequency_u_hz": spin.u, "spin_seen_hz": seen}
+        | {"drive_frequency_hz": CYCLE * seen, "drive_amplitude_v": amplitude}
+    )
+    if lost is None:
+        kind, what, cause = RunEvent.LEVELS_OFF, "the top gets no faster", Cause.PULLS_NO_FURTHER
+    else:
+        kind, what = _end_of(session, lost)
+        cause = cause_of_loss(0.0, fell=kind is RunEvent.TOP_LOST)  # no lag where the top itself triggers the drive
+    session.event(
+        kind, f"{what} at {with_uncertainty(spin)}{f': {lost}' if lost else ''}; {cause}",
+        spin_frequency_hz=spin.value, top=len(session.rows), cause=cause,
+    )  # fmt: skip
+
+
+def _end_of(session: Session[LimitSettings], lost: NotHeld) -> tuple[RunEvent, str]:
+    """Return whether a lost top is down, as an event and as text."""
+    top = free_top(session)
+    is_up = lost.spin is not None or top.read() is not None or top.missed[-1] is Missed.UNSTEADY
+    return (RunEvent.LOCK_LOST, "the drive lost the top") if is_up else (RunEvent.TOP_LOST, "the top fell")
+
+
 def _limit_of_loss(settings: LimitSettings, between: tuple[float, float], seen: list[tuple[float, float]]) -> Row:
     """Return the reading of a top that no longer follows, without its time.
 
@@ -294,12 +343,10 @@ def _say_how_it_was_lost(
     counts: list[tuple[float, float, float]],
 ) -> None:
     """Record whether the top is still up, why it was lost, and whether its tape slipped; once the limit is kept."""
-    top = free_top(session)
-    is_up = lost.spin is not None or top.read() is not None or top.missed[-1] is Missed.UNSTEADY
-    kind, what = (RunEvent.LOCK_LOST, "the drive lost the top") if is_up else (RunEvent.TOP_LOST, "the top fell")
+    kind, what = _end_of(session, lost)
     spin, held = limit["spin_frequency_hz"], limit["drive_frequency_hz"]
     lag = lag_before_loss(*zip(*counts, strict=True)) if counts else math.nan
-    cause = cause_of_loss(lag, fell=not is_up)
+    cause = cause_of_loss(lag, fell=kind is RunEvent.TOP_LOST)
     known = {} if math.isnan(lag) else {"lag_turns": lag}
     behind = f", the lag behind the drive grew by {lag:.2f} turns in the end" if known else ""
     session.event(

@@ -46,6 +46,7 @@ ENDS: Mapping[str, str] = {
     RunEvent.FELL: "fell freely",
     RunEvent.LOCK_LOST: "was lost by the drive",
     RunEvent.TOP_LOST: "fell under the drive",
+    RunEvent.LEVELS_OFF: "got no faster under the drive",
 }
 #: Waveforms of a drive in words.
 _WAVEFORMS = {"SIN": "sine", "SQU": "square", "TRI": "triangle"}
@@ -111,6 +112,8 @@ class Conditions:
         waveform, amplitude_vpp, creep_hz_per_s, step_hz: the drive of an upper limit, and how far it goes between two
             looks at the top; None where the data do not say, and of lower limits: a free top falls without a drive.
         synthetic: whether the runs were simulated or made up; None where that is not known, as of a data file.
+        triggered: whether the top triggered the drive, which then makes no steps.
+        levels_off: whether the spins are no limits, but those at which the pull of the drive equalled the drag.
     """
 
     which: Which
@@ -120,11 +123,19 @@ class Conditions:
     creep_hz_per_s: float | None = None
     step_hz: float | None = None
     synthetic: bool | None = None
+    triggered: bool = False
+    levels_off: bool = False
+
+    def name(self, count: int) -> str:
+        """Return the name of so many spins."""
+        plural = "s" * (count > 1)
+        return f"spin{plural} at which the drive pulls no further" if self.levels_off else f"{self.which} limit{plural}"
 
     @property
     def text(self) -> str:
         """In words, without whether they are SYNTHETIC."""
         drive = [
+            "triggered" * self.triggered,
             "" if self.waveform is None else _WAVEFORMS.get(self.waveform, self.waveform),
             "" if self.amplitude_vpp is None else f"{self.amplitude_vpp:g} Vpp",
             "" if self.creep_hz_per_s is None else f"{self.creep_hz_per_s:g} Hz/s",
@@ -308,7 +319,7 @@ def _sample(source: Source[LimitReadings], which: Which, options: LimitOptions) 
     readings = source.readings
     if options.reading_u is not None:
         return Sample(readings.limit, np.full(len(readings), options.reading_u))
-    if which == "upper" and source.run is not None and readings.u is not None:
+    if which == "upper" and source.run is not None and readings.u is not None and not _is_triggered(source):
         return Sample.within_steps(readings.limit, readings.u)
     return Sample(readings.limit, readings.u)
 
@@ -318,7 +329,8 @@ def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> 
     said = source.settings(LIMIT)
     if which == "lower" or not said:
         return Conditions(which, device.name, synthetic=synthetic_source(source))
-    creep, interval = (_number(said.get(name)) for name in ("creep_hz_per_s", "interval_s"))
+    triggered = _is_triggered(source)
+    creep, interval = (None if triggered else _number(said.get(name)) for name in ("creep_hz_per_s", "interval_s"))
     waveform = said.get("drive_waveform")
     return Conditions(
         which,
@@ -328,7 +340,13 @@ def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> 
         creep_hz_per_s=creep,
         step_hz=None if creep is None or interval is None else round(creep * interval, 9),
         synthetic=synthetic_source(source),
+        triggered=triggered,
+        levels_off=source.readings.levels_off,
     )
+
+
+def _is_triggered(source: Source[LimitReadings]) -> bool:
+    return (source.settings(LIMIT) or {}).get("drive") == "triggered"
 
 
 def _number(value: object) -> float | None:
@@ -411,7 +429,8 @@ METHOD = Method(
 
 def _sentences(limits: Limits) -> Iterable[str]:
     found = limits.statistics
-    many = f"{found.n} {limits.which} limits have the mean" if found.n > 1 else f"one {limits.which} limit,"
+    name = limits.conditions.name(found.n)
+    many = f"{found.n} {name} have the mean" if found.n > 1 else f"one {name},"
     scatter = f" and scatter by {with_uncertainty(found.scatter)}" if found.scatter and found.scatter.value else ""
     scatter = scatter or " and do not scatter" * (found.scatter is not None)
     yield f"{many} {with_uncertainty(found.mean)}{scatter} ({limits.conditions_text})."
@@ -420,9 +439,12 @@ def _sentences(limits: Limits) -> Iterable[str]:
         yield f"They are of {found.runs} runs, which differ by {beyond}."
     if limits.ends:
         yield "The top " + ", ".join(f"{ENDS[kind]} {_times(n)}" for kind, n in limits.ends.items()) + "."
+    if limits.conditions.levels_off:
+        yield "The pull of the drive equals the drag there: a stronger drive gets higher, this is no limit of the top."
+        return
     if limits.causes:
         told = ", ".join(f"{cause} {_times(n)}" for cause, n in sorted(limits.causes.items()))
-        yield f"The phase before each loss tells why: {told}."
+        yield f"{'Causes' if limits.conditions.triggered else 'The phase before each loss tells why'}: {told}."
     yield from map(_compare, limits.theory)
 
 

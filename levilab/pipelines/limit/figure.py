@@ -58,7 +58,11 @@ def limit_figure(analysis: LimitAnalysis) -> Figure:
 
 def _finding(analysis: LimitAnalysis) -> str:
     """Return the means of the groups, while there are few."""
-    found = [f"{group.which} {with_uncertainty(group.statistics.mean)}" for group in analysis.groups]
+    found = [
+        f"{'no limit, drag equals pull,' if group.conditions.levels_off else group.which} "
+        f"{with_uncertainty(group.statistics.mean)}"
+        for group in analysis.groups
+    ]
     more = f" and {len(found) - 3} more conditions" if len(found) > 3 else ""
     return f"Limit{'s' if len(found) > 1 else ''} of levitation: {', '.join(found[:3])}{more}"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -19,6 +19,7 @@ from levilab.formats.texts import locate, texts_of
 from levilab.formats.titles import read_title, unit_factor
 from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import read_field_record
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -52,11 +53,13 @@ class LimitReadings(Readings):
         limit: spin at which the top was lost [Hz].
         u: standard uncertainties [Hz], None where they are not known.
         warnings: about the table.
+        levels_off: whether these are no limits, but spins at which the pull of a drive equalled the drag.
     """
 
     limit: Array
     u: Array | None
     warnings: tuple[str, ...]
+    levels_off: bool = False
 
     compared: ClassVar[tuple[str, ...]] = ("limit",)
 
@@ -153,8 +156,19 @@ def _single_column(path: Path, *, guess: bool) -> Table | None:
 
 
 def read_limit_run(run: Run, _: InputOptions) -> LimitReadings:
-    """Return the limits of a run."""
-    return limit_readings(run.readings())
+    """Return the limits of a run; spins at which tops levelled off are none, and are left out if there are others."""
+    found = limit_readings(run.readings())
+    tops = [int(event["top"]) for event in run.events() if event["kind"] == RunEvent.LEVELS_OFF]
+    levels = np.isin(np.arange(1, len(found) + 1), tops)
+    if not levels.any() or levels.all():
+        return replace(found, levels_off=bool(levels.any()))
+    left_out = ", ".join(f"{spin:.2f} Hz" for spin in found.limit[levels])
+    note = (
+        f"{levels.sum()} of {levels.size} tops got no faster than {left_out}, where the pull of the drive equals the "
+        "drag: these are no limits, and left out"
+    )
+    u = None if found.u is None else found.u[~levels]
+    return LimitReadings(found.limit[~levels], u, (*found.warnings, note))
 
 
 def limit_readings(table: Table) -> LimitReadings:

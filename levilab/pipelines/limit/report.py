@@ -137,6 +137,12 @@ def _meaning(group: Limits) -> Iterator[str]:
     mean = found.mean
     if mean.value is None:
         return
+    if group.conditions.levels_off:
+        yield (
+            f"The drive pulls no further than {with_uncertainty(mean)}: there the drag of the air is as large as its "
+            "pull. This is no limit of the top; a stronger drive gets higher."
+        )
+        return
     yield f"The {group.which} limit is {with_uncertainty(mean)}: {_WHY[group.which]}."
     yield from (_CAUSES[cause] for cause in _CAUSES if group.causes.get(cause))
     if group.which == "upper" and group.device.is_thesis and ISLANDS_HZ[0] < mean.value < ISLANDS_HZ[1]:

@@ -257,7 +257,6 @@ def test_a_bench_without_the_wire_has_no_triggered_drive():
     [
         ("spin", ("spin.drive_frequency_hz=95",), r"1\.1 times as fast.*limits\.drive_frequency_hz = 100"),
         ("spin", ("spin.drive_waveform=NONE",), "a triggered drive has cycles"),
-        ("limit", ("limit.which=upper",), "creeps up, ramp"),
         ("precession", (), "ramp is expected"),
     ],
 )

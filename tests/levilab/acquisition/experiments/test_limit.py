@@ -2,6 +2,8 @@
 
 import json
 import math
+from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.errors import NoAnswer
+from instruments.virtual.generator.channel import Output, Triggered
 from levilab.acquisition.counting import FreeTop
 from levilab.acquisition.driving import held_spin
 from levilab.acquisition.experiments.limit import LimitSettings
@@ -17,12 +20,14 @@ from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration, settings_of, with_settings
+from levilab.acquisition.triggering import CYCLE
 from levilab.bench.config import ConfigError
 from levilab.errors import UsageError
 from levilab.pipelines.limit.analysis import METHOD
 from levilab.pipelines.options import LimitOptions, SpinDownOptions
 from levilab.pipelines.spindown.analysis import METHOD as SPINDOWN
 from levilab.simulator.scene import preset
+from levilab.world.bursts import mean_pull
 from levilab.world.motion_world import MotionWorld
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 from support.acquisitions import Impatient, Silent, in_world
@@ -367,3 +372,76 @@ def test_loose_washers_are_warned_of_in_the_run_and_in_its_result(tmp_path):
     assert "LOOSE WASHERS, the tape slips by 0.1" in warning
     assert warning in show.messages
     assert warning in json.loads(json.dumps(SPINDOWN.analyze([run.folder], SpinDownOptions()).all_warnings))
+
+
+# --- a drive that the top triggers ---
+
+TRIGGERED = ("limit.which=upper", "limit.drive=triggered", "limit.hold_s=1", "limit.drive_amplitude_vpp=6")
+
+
+def test_a_top_that_levels_off_shows_where_pull_and_drag_are_equal(tmp_path):
+    run = acquire(mock(tmp_path, *TRIGGERED, "limit.repetitions=4"), Silent())
+    assert causes(run) == ["the drive pulls no further"] * 4
+    frame, scene = run.readings().frame, random_scene(1)
+    place = scene.moment_turns + scene.tape.offset(scene.trigger.thresholds(rising=True), 50.0)
+    bursts = Triggered(2.4e-4, 1, rising=True, delay=0.0, jitter=0.0)
+    phases = [event["phase_deg"] for event in run.events() if event["kind"] == "phase found"]
+    sines = [Output("SIN", CYCLE * 50.0, 0.0, 0.0, phase=phase, triggered=bursts) for phase in phases]
+    pull = np.array([scene.lock_torque * mean_pull(sine, 50.0, place, jitter=scene.jitter) for sine in sines])
+    balance = (pull / scene.constants[0]) ** (2 / 3) / 2 / math.pi
+    pulls = (frame["spin_frequency_hz"] - balance) / frame["spin_frequency_u_hz"]
+    assert abs(pulls).max() < 3
+    assert frame["spin_frequency_u_hz"].max() < 0.02 * balance.min()
+    (found,) = METHOD.analyze([run.folder], LimitOptions()).groups
+    assert found.conditions.triggered
+    assert found.conditions.levels_off
+    assert found.statistics.step == 0
+    assert "this is no limit of the top" in found.text
+
+
+class Windowed(SpinWorld):
+    """The first two tops fall at 37 Hz, the third one nowhere."""
+
+    falls_hz: ClassVar = {0: 37.0, 1: 37.0}
+
+    def _plan_until(self, time):
+        super()._plan_until(time)
+        now = self._stretch_at(time)
+        if now.spin > 2 * math.pi * self.falls_hz.get(now.number, 99.0):
+            self.take_top()
+
+
+def test_a_top_that_leaves_the_window_has_its_limit_where_it_fell(tmp_path):
+    """And one that only levels off is no limit, and enters no mean."""
+    world = Windowed(replace(SpinScene(), put_back_after_s=60.0), VirtualClock())
+    settings = [*TRIGGERED[:-1], "limit.drive_amplitude_vpp=4.2", "limit.repetitions=4"]
+    run = acquire(in_world(mock(tmp_path, *settings), world), Silent())
+    assert causes(run) == ["out of the window"] * 2 + ["the drive pulls no further"] * 2
+    lost = run.readings().frame[:2]
+    pulls = (lost["spin_frequency_hz"] - 37) / lost["spin_frequency_u_hz"]
+    assert abs(pulls).max() < 3
+    assert lost["spin_frequency_u_hz"].max() < 0.05
+    analysis = METHOD.analyze([run.folder], LimitOptions())
+    (found,) = analysis.groups
+    assert found.statistics.n == 2
+    assert not found.conditions.levels_off
+    assert "The top fell under the drive twice, got no faster under the drive twice." in found.text
+    assert "2 of 4 tops got no faster than" in str(analysis.sources[0].warnings)
+
+
+def test_a_top_that_gets_slower_under_its_drive_is_no_limit(tmp_path):
+    """Its trigger's cable is off after the start phase was found."""
+
+    class Cut(SpinWorld):
+        is_cut = False
+
+        def _triggered_acceleration(self, spin):
+            self.is_cut |= spin > 2 * math.pi * 33
+            return -0.7 if self.is_cut else super()._triggered_acceleration(spin)
+
+    settings = [*TRIGGERED, "limit.repetitions=1", "limit.longest_s=300"]
+    run = acquire(in_world(mock(tmp_path, *settings), Cut(SpinScene(), VirtualClock())), Silent())
+    assert causes(run) == []
+    (once_more, *_) = [event["text"] for event in run.events() if event["kind"] == "once more"]
+    assert "the top gets slower under the drive" in once_more
+    assert "does the cable lead from the phototransistor" in once_more
