@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 #: Fewest readings from which a scatter and a drag are estimated.
 _FEWEST = 3
+#: A top further from its spin [Hz] is not held: the wobble of a full motion leaves 0.3 Hz after the loop has settled,
+#: and a top whose pulses no longer come loses 1 Hz in some 6 s.
+_HELD_WITHIN_HZ = 1.0
 
 
 class HoldSettings(DriveSettings):
@@ -62,7 +65,13 @@ def run(session: Session[HoldSettings]) -> None:
     motors: list[Motor] = []
 
     def drive() -> None:
-        motors.append(_motor(session))
+        while True:
+            try:
+                motors.append(_motor(session))
+            except (NotHeld, InstrumentError) as lost:
+                _let_go(session, lost)
+            else:
+                return
 
     session.begin(drive, resumed="the drive was brought back to the spin")
     if not motors:  # a real top that has gone on without a drive
@@ -72,14 +81,19 @@ def run(session: Session[HoldSettings]) -> None:
         try:
             session.keep(_reading(session, motors[-1]), max(0.0, session.settings.longest_s - session.now()))
         except (NotHeld, InstrumentError) as lost:
-            if isinstance(lost, InstrumentError):
-                reach_generator_again(session, lost)
-            else:
-                session.event(RunEvent.NOT_HELD, f"the top was lost: {lost}")
-                drive_off(session)
+            _let_go(session, lost)
             drive()
     drive_off(session)
     _report_drag(session, motors[-1])
+
+
+def _let_go(session: Session[HoldSettings], lost: NotHeld | InstrumentError) -> None:
+    """Switch the drive off after a loss.  Raises an error of another instrument."""
+    if isinstance(lost, InstrumentError):
+        reach_generator_again(session, lost)
+    else:
+        session.event(RunEvent.NOT_HELD, f"the top was lost: {lost}")
+        drive_off(session)
 
 
 def _motor(session: Session[HoldSettings]) -> Motor:
@@ -97,6 +111,8 @@ def _reading(session: Session[HoldSettings], motor: Motor) -> Row:
     counts, shares = np.array(motor.counts[first:]), np.array(motor.shares[first:])
     if counts.size < 2:
         raise NotHeld(None, settings.drive_frequency_hz)
+    if abs(counts.mean() - settings.drive_frequency_hz) > _HELD_WITHIN_HZ:
+        raise NotHeld(float(counts.mean()), settings.drive_frequency_hz)
     return {
         "time_s": (begin + session.now()) / 2,
         "spin_frequency_hz": float(counts.mean()),

@@ -23,7 +23,7 @@ from levilab.errors import UsageError
 from levilab.runs.run import Run
 from levilab.world.bench import virtual_wiring
 from levilab.world.bursts import TriggerWire, mean_pull
-from levilab.world.spin_world import SpinScene, SpinWorld
+from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 from support.acquisitions import Silent, of_scene
 
 TRIGGERED = SpinSettings(drive="triggered", drive_frequency_hz=34.0, hold_s=10.0, longest_s=60.0)
@@ -107,8 +107,9 @@ def test_pulses_that_are_lost_cost_pull_and_nothing_else(tmp_path):
         (replace(SCENE, trigger=None), {}, "the bursts do not turn the top.*cable"),
         (replace(SCENE, trigger=TriggerWire(level_v=2.5)), {}, "the bursts do not turn the top.*TTL"),
         (SCENE, {"drive_frequency_hz": 60.0, "drive_amplitude_vpp": 5.0}, "gets no faster: pull and drag are equal"),
+        (random_scene(3), {"drive_frequency_hz": 80.0}, r"spins at (69|70)\.\d\d Hz and gets no faster"),
     ],
-    ids=["cable off", "no edges", "too weak"],
+    ids=["cable off", "no edges", "too weak", "at its greatest spin"],
 )
 def test_a_drive_that_cannot_says_why_with_the_output_off_and_the_run_kept(tmp_path, scene, settings, says):
     request, world = at(tmp_path, scene, TRIGGERED.model_copy(update=settings))

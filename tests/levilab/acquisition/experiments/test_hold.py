@@ -1,17 +1,22 @@
 """A held spin on the virtual bench: its scatter, and the drag that the amplitude balances."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from analysis.uncertainty import Estimate
+from instruments.clock import VirtualClock
 from levilab.acquisition.experiments.hold import drag_of
+from levilab.acquisition.failures import DidNotFollow, NotHeld
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.acquisition.triggering import Motor
 from levilab.errors import UsageError
-from levilab.world.spin_world import random_scene
-from support.acquisitions import Impatient, Silent
+from levilab.runs.run import Run
+from levilab.world.spin_world import SpinWorld, random_scene
+from support.acquisitions import Impatient, Silent, in_world
 
 
 def held(out, seed, *settings, show=None, **more):
@@ -50,6 +55,104 @@ def test_an_interrupted_hold_goes_on(tmp_path):
     assert whole.status == "finished"
     assert np.all(np.diff(whole.readings().column("time_s")) > 0)
     assert whole.readings().column("spin_frequency_hz")[-1] == pytest.approx(45.0, abs=0.1)
+
+
+class Meanwhile(Silent):
+    """Does something at each reading."""
+
+    def __init__(self, do):
+        super().__init__()
+        self.do = do
+
+    def reading(self, text, elapsed, remaining):
+        super().reading(text, elapsed, remaining)
+        self.do(len(self.readings), elapsed)
+
+
+class Unplugged(SpinWorld):
+    """The cable to the trigger input is off from a time on, for a while; the generator's outputs are kept."""
+
+    off = (math.inf, math.inf)
+
+    def drive(self, time, output):
+        self.last = output
+        super().drive(time, output)
+
+    def _triggered_acceleration(self, spin):
+        begin, end = self.off
+        plugged = not begin <= self._stretches.last.start < end
+        return (
+            super()._triggered_acceleration(spin)
+            if plugged
+            else -spin * float(self._decay.damping(spin, *self.scene.constants))
+        )
+
+
+def unplugged(out, lasts):
+    world = Unplugged(replace(random_scene(3), start_hz=40.0), VirtualClock())
+
+    def pull_out(reading, _):
+        if reading == 3:
+            world.off = (world.clock.now(), world.clock.now() + lasts)
+
+    request = request_for("hold", AcquisitionOptions(mock=True, out=out, settings=("hold.longest_s=150",)))
+    return in_world(request, world), Meanwhile(pull_out), world
+
+
+@pytest.mark.parametrize(("lasts", "dips"), [(1.0, 0.0), (5.0, 0.2)])
+def test_pulses_that_do_not_come_for_seconds_cost_some_spin_alone(tmp_path, lasts, dips):
+    request, show, world = unplugged(tmp_path, lasts)
+    run = acquire(request, show)
+    assert run.status == "finished"
+    spins = run.readings().column("spin_frequency_hz")
+    assert spins[2:5].min() < 45.0 - dips  # mean over 10 s of a spin that falls by 0.18 Hz/s in between
+    assert spins[-1] == pytest.approx(45.0, abs=0.05)
+    assert not [event for event in run.events() if event["kind"] == "not held"]
+    assert not world.last.triggered
+
+
+def test_a_cable_that_comes_off_ends_a_hold_with_its_reason(tmp_path):
+    request, show, world = unplugged(tmp_path, 1e4)
+    with pytest.raises(DidNotFollow, match=r"the bursts do not turn the top.*cable"):
+        acquire(request, show)
+    (run,) = (Run.load(folder) for folder in tmp_path.iterdir())
+    assert (run.status, world.last.triggered, world.last.amplitude) == ("failed", None, 0.0)
+    spins = run.readings().column("spin_frequency_hz")
+    assert spins.size >= 3
+    assert np.abs(spins - 45.0).max() < 1.0  # none of a top that is held no more
+    assert next(event for event in run.events() if event["kind"] == "not held")["text"].startswith("the top was lost")
+
+
+def test_a_top_lost_while_the_loop_settles_is_brought_up_again(tmp_path, monkeypatch):
+    lost = []
+
+    def lose(motor, target, before=Motor.measure_gain):
+        if not lost:
+            lost.append(target)
+            raise NotHeld(None, target)
+        before(motor, target)
+
+    monkeypatch.setattr(Motor, "measure_gain", lose)
+    run = held(tmp_path, 3, "hold.longest_s=60")
+    assert (run.status, len(lost)) == ("finished", 1)
+    off = [event["kind"] for event in run.events()].index("not held")
+    assert "drive on" in [event["kind"] for event in run.events()][off:]
+
+
+def test_a_hold_of_hours_does_not_drift(tmp_path):
+    run = held(tmp_path, 3, "hold.longest_s=1800", "hold.interval_s=60")
+    spins, volts = run.readings().column("spin_frequency_hz"), run.readings().column("drive_amplitude_v")
+    # the sum of the errors is bounded: 0.03 Hz of a count, 10 s of the loop; in two hours 0.3 mHz
+    assert spins[15:].mean() == pytest.approx(45.0, abs=2e-3)
+    assert volts[15:].mean() == pytest.approx(volts[:15].mean(), rel=0.01)
+
+
+def test_a_faster_top_is_braked_to_its_spin_and_held(tmp_path):
+    world = SpinWorld(replace(random_scene(3), start_hz=40.0), VirtualClock())
+    settings = ("hold.longest_s=60", "hold.drive_frequency_hz=35")
+    request = request_for("hold", AcquisitionOptions(mock=True, out=tmp_path, settings=settings))
+    run = acquire(in_world(request, world), Silent())
+    assert run.readings().column("spin_frequency_hz") == pytest.approx(35.0, abs=0.1)
 
 
 def test_a_hold_is_triggered_and_nothing_else(tmp_path):
