@@ -39,6 +39,7 @@ class Agilent33220A(DriveGenerator):
     load = LoadSetting("OUTP:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
     output = OutputSwitch("OUTP", bool)
     burst_cycles = burst_setting("BURS:NCYC", 1.0, 50_000.0)
+    gate_polarity = burst_word("BURS:GATE:POL", "NORMal", "INVerted")
     trigger_source = burst_word("TRIG:SOUR", "IMMediate", "EXTernal", "BUS")
     trigger_slope = burst_word("TRIG:SLOP", "POSitive", "NEGative")
     trigger_delay = burst_setting("TRIG:DEL", 0.0, 85.0, unit="s")

@@ -43,6 +43,7 @@ class Keysight33500B(DriveGenerator):
     load = LoadSetting("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
     output = OutputSwitch("OUTP1", bool)
     burst_cycles = burst_setting("BURS:NCYC", 1.0, 1e8)
+    gate_polarity = burst_word("BURS:GATE:POL", "NORMal", "INVerted")
     trigger_source = burst_word("TRIG:SOUR", "IMMediate", "EXTernal", "TIMer", "BUS")
     trigger_slope = burst_word("TRIG:SLOP", "POSitive", "NEGative")
     trigger_delay = burst_setting("TRIG:DEL", 0.0, 1000.0, unit="s")

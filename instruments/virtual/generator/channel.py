@@ -513,19 +513,25 @@ class Channel:
         )
 
     def _triggered(self) -> Triggered | None:
-        """Return the bursts that wait for an edge at the trigger input."""
-        if not self.waits or self["trigger_source"] != "EXT":
+        """Return the bursts that wait for an edge at the trigger input.
+
+        A gate stops at the end of a cycle (33500 guide, page 177), so the tape's pulse, which is shorter than one,
+        leads to a whole cycle; the count of cycles and the trigger's source do not matter then.  A gate that is open
+        while there is no pulse does not see it.
+        """
+        gated = self._is_gated()
+        if not gated and (not self.waits or self["trigger_source"] != "EXT"):
             return None
         return Triggered(
             amplitude=self.number("amplitude_vpp") / 2 / self.load_factor,
-            cycles=self.cycles,
-            rising=self["trigger_slope"] == "POS",
-            delay=self.number("trigger_delay") + self.family.latency,
+            cycles=1.0 if gated else self.cycles,
+            rising=gated or self["trigger_slope"] == "POS",
+            delay=self.family.latency + (0.0 if gated else self.number("trigger_delay")),
             jitter=self.family.trigger_jitter,
         )
 
     def _is_gated(self) -> bool:
-        """Return whether a closed gate keeps the signal in: nothing is plugged into the virtual one's gate."""
+        """Return whether a gate keeps the signal in until a pulse opens it."""
         return self["burst_mode"] == "GAT" and self["gate_polarity"] == "NORM"
 
     def _burst(self) -> Burst | None:

@@ -365,8 +365,8 @@ class VirtualSDG1000X(VirtualInstrument):
         bursts = bool(self.settings[_key(n, "burst")]) and short != "DC"
         source, gated = self.settings[_key(n, "trigger_source")], self.settings[_key(n, "burst_mode")] == "GATE"
         cycles, waits = self._number(n, "burst_cycles"), bursts and (gated or source != "INT")
-        rising, delay = self.settings[_key(n, "trigger_edge")] == "RISE", self._delay(n)
-        armed = amplitude and waits and source == "EXT" and not gated
+        rising, delay = gated or self.settings[_key(n, "trigger_edge")] == "RISE", _LATENCY if gated else self._delay(n)
+        armed = amplitude and waits and source == "EXT"
         return Output(
             waveform=short,
             frequency=self._number(n, "frequency"),
@@ -377,5 +377,5 @@ class VirtualSDG1000X(VirtualInstrument):
             symmetry=self._number(n, "symmetry") / 100 if short == "RAMP" else 1.0,
             inverted=self.settings[_key(n, "polarity")] == "INVT",
             burst=Burst(cycles, None if waits else self._number(n, "burst_period")) if bursts else None,
-            triggered=Triggered(amplitude, cycles, rising, delay, _JITTER) if armed else None,
+            triggered=Triggered(amplitude, 1.0 if gated else cycles, rising, delay, _JITTER) if armed else None,
         )

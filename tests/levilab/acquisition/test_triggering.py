@@ -24,7 +24,7 @@ from levilab.runs.run import Run
 from levilab.world.bench import virtual_wiring
 from levilab.world.bursts import TriggerWire, mean_pull
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
-from support.acquisitions import Silent, of_scene
+from support.acquisitions import Impatient, Silent, of_scene
 
 TRIGGERED = SpinSettings(drive="triggered", drive_frequency_hz=34.0, hold_s=10.0, longest_s=60.0)
 SCENE = SpinScene(moment_turns=0.3)
@@ -220,11 +220,12 @@ def test_a_doubled_count_does_not_move_the_cycle_and_three_end_it(monkeypatch):
 def noiseless(monkeypatch, spin):
     """A motor whose top has neither noise nor wobble: a count is the mean over its gate, of 1 s."""
     session = counted(monkeypatch)[0].session
-    top = session.bench.generator = SimpleNamespace(spin=spin, time=0.0, amplitude=10.0, burst_phase=0.0)
+    top = session.bench.generator = SimpleNamespace(spin=spin, time=0.0, amplitude=10.0, before=10.0, burst_phase=0.0)
     session.now, session.progress, session.settings.drive_amplitude_vpp = lambda: top.time, lambda *_: None, 10.0
 
     def count(*_):
-        rate = 0.036 * top.amplitude * math.cos(math.radians(top.burst_phase)) - 0.184 * (top.spin / 45) ** 1.5
+        amplitude, top.before = (top.before + top.amplitude) / 2, top.amplitude  # it changes in the middle of a gate
+        rate = 0.036 * amplitude * math.cos(math.radians(top.burst_phase)) - 0.184 * (top.spin / 45) ** 1.5
         top.spin, top.time = top.spin + rate, top.time + 1
         return top.spin - rate / 2
 
@@ -240,6 +241,44 @@ def test_a_top_comes_to_its_spin_and_its_gain_is_that_there(monkeypatch, start):
     assert np.abs(np.array(motor.counts[20:]) - 45.0).max() < 0.2  # 0.33 from a guess of the share
     motor.measure_gain(45.0)
     assert motor.gain.value == pytest.approx(0.36 - 0.184, rel=0.01)  # 3 % less at 46 Hz
+
+
+def test_a_top_that_is_held_by_nearly_all_of_the_amplitude_shows_no_gain(monkeypatch):
+    motor = noiseless(monkeypatch, 45.0)
+    motor.share = 0.95
+    motor.measure_gain(45.0)
+    assert (motor.gain, motor.session.now()) == (None, 0.0)
+
+
+def test_the_cycle_is_set_for_the_spin_in_the_middle_of_the_next_count(monkeypatch):
+    motor, set_to = counted(monkeypatch, 30.2)
+    motor._trend = 0.4
+    motor.count()
+    assert set_to == [("frequency", pytest.approx(CYCLE * (30.2 + 0.4)))]
+
+
+def test_a_trial_that_brakes_ends_before_the_top_falls(monkeypatch):
+    motor, least = noiseless(monkeypatch, 30.0), []
+    monkeypatch.setattr(triggering, "prepare_counter_again", lambda *_: None)
+    motor.session.event = lambda *_, **__: None
+    motor.pull, motor.session.progress = 0.36, lambda *_: least.append(motor.session.bench.generator.spin)
+    motor.session.bench.generator.amplitude = motor.session.bench.generator.before = 30.0  # 1 Hz/s
+    motor.find_phase()
+    assert math.cos(math.radians(motor.phase)) == pytest.approx(1.0, abs=1e-3)
+    assert least[1] - motor.spin < 5.0  # two trials that brake by 0.67 Hz/s: three counts each; 8 Hz with six
+
+
+@pytest.mark.parametrize("edge", ["rising", "falling"])
+def test_the_bursts_start_at_the_edge_and_the_phase_that_were_stated(tmp_path, edge):
+    phase = float(best_phase(SCENE, 30.0))
+    request, world = at(tmp_path, SCENE, TRIGGERED.model_copy(update={"drive_phase_deg": phase, "hold_s": 0.0}))
+    wiring = request.wiring()
+    generator = wiring.instruments["generator"].model_copy(update={"trigger": edge})
+    wired = replace(wiring, instruments=wiring.instruments | {"generator": generator})
+    run = acquire(replace(request, wiring=lambda: wired), Impatient(1))
+    first = next(output for output in world.outputs if output.triggered)
+    assert (first.phase, first.triggered.rising) == (phase, edge == "rising")
+    assert not events(run, "phase found")
 
 
 # --- what a bench allows ---

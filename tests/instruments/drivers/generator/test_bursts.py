@@ -116,6 +116,13 @@ def test_every_model_waits_for_the_edges_that_its_driver_names(driver, twin, lat
     asked = generator.settings()
     assert (asked["burst"], asked["burst_phase_deg"], asked["trigger_source"]) == (True, 90.0, "EXT")
     assert generator.changed_settings() == {}
+    generator.burst_mode = "GATE" if driver is SiglentSDG1000X else "GATed"
+    gated = device.signal().triggered  # the pulse is shorter than a cycle, which is completed: 33500 guide, page 177
+    least = latency or 2.4e-7  # no delay
+    assert gated == Triggered(2.0, 1.0, rising=True, delay=pytest.approx(least), jitter=waits.triggered.jitter)
+    if driver in (Keysight33500B, Agilent33220A):
+        generator.gate_polarity = "INVerted"
+        assert (device.signal().amplitude, device.signal().triggered) == (2.0, None)
     generator.off()
     assert device.signal().triggered is None
     generator.prepare(waveform="SIN", frequency_hz=33.0, amplitude_vpp=10.0)  # a plain signal again

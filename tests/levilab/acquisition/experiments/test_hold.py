@@ -8,6 +8,8 @@ import pytest
 
 from analysis.uncertainty import Estimate
 from instruments.clock import VirtualClock
+from levilab.acquisition.driving import drive_off
+from levilab.acquisition.experiments import hold
 from levilab.acquisition.experiments.hold import drag_of
 from levilab.acquisition.failures import DidNotFollow, NotHeld
 from levilab.acquisition.loop import acquire
@@ -132,11 +134,20 @@ def test_a_top_lost_while_the_loop_settles_is_brought_up_again(tmp_path, monkeyp
             raise NotHeld(None, target)
         before(motor, target)
 
+    off = []
     monkeypatch.setattr(Motor, "measure_gain", lose)
+    monkeypatch.setattr(hold, "drive_off", lambda session: (off.append(session), drive_off(session)))
     run = held(tmp_path, 3, "hold.longest_s=60")
     assert (run.status, len(lost)) == ("finished", 1)
+    assert len(off) == 2  # after the loss, and at the end
     off = [event["kind"] for event in run.events()].index("not held")
     assert "drive on" in [event["kind"] for event in run.events()][off:]
+
+
+def test_two_readings_show_neither_a_scatter_nor_a_drag(tmp_path):
+    run = held(tmp_path, 3, "hold.longest_s=15")
+    assert (run.status, run.count()) == ("finished", 2)
+    assert not [event for event in run.events() if event["kind"] == "held"]
 
 
 def test_a_hold_of_hours_does_not_drift(tmp_path):
