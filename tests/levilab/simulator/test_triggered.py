@@ -41,6 +41,7 @@ class Peer:
         self.top, self.drive = scene.top, scene.drive
         self.drag = scene.drag.constants[0] if scene.drag.law == "disc" else 0.0
         self.burst = None  # begin, frequency
+        self.amplitude, self.loop = self.drive.amplitude_t, None  # the loop follows the spin at each full second
 
     def rate(self, t, y):
         r, v, q, momentum = y[:3], y[3:6], y[6:10] / np.linalg.norm(y[6:10]), y[10:]
@@ -57,7 +58,7 @@ class Peer:
         force = np.array([*(d2 * m[:2] / 2 + m[2] * d3 * x / 2), d3 * sideways / 2 + m[2] * (-d2 + d4 * square / 4)])
         if self.burst:
             begin, frequency = self.burst
-            along = self.drive.amplitude_t * math.sin(TURN * frequency * (t - begin) + self.drive.phase_rad)
+            along = self.amplitude * math.sin(TURN * frequency * (t - begin) + self.drive.phase_rad)
             field = field + along * np.array(self.drive.direction)
         i1, i3 = top.inertia_transverse_kg_m2, top.inertia_axial_kg_m2
         spin = momentum @ e3 / i3
@@ -95,9 +96,21 @@ class Peer:
             self.burst = None
         return y
 
+    def spin(self, y):
+        w, qx, qy, qz = y[6:10] / np.linalg.norm(y[6:10])
+        axis = [2 * (qx * qz + w * qy), 2 * (qy * qz - w * qx), 1 - 2 * (qx * qx + qy * qy)]
+        return y[10:] @ np.array(axis) / self.top.inertia_axial_kg_m2 / TURN
+
     def leg(self, t, y, until, event=None):
         if until <= t:
             return t, y, False
+        second = math.floor(t) + 1.0
+        if self.loop and second < until:
+            t, y, seen = self.leg(t, y, second, event)
+            if not seen:
+                self.amplitude = self.loop(self.spin(y))
+                t, y, seen = self.leg(t, y, until, event)
+            return t, y, seen
         found = solve_ivp(self.rate, (t, until), y, method="DOP853", rtol=1e-11, atol=1e-13, events=event)
         return found.t[-1], found.y[:, -1], bool(event and found.t_events[0].size)
 
@@ -124,6 +137,24 @@ def test_another_simulator_finds_the_same_motion(changes):
     spin = y[10:] @ np.array(axis) / scene.top.inertia_axial_kg_m2 / TURN
     assert spin == pytest.approx(motion.spin_hz[-1], abs=1e-7)
     assert abs(spin - 30) > 0.3  # the drive has done something
+
+
+@pytest.mark.slow
+def test_a_loop_on_the_amplitude_holds_the_spin_in_both_simulators():
+    def loop(spin):
+        return min(max(1.2e-4 + 8e-4 * (31.0 - spin), 0.0), 5e-4)
+
+    peer = Peer(MOTOR)
+    peer.loop = loop
+    other = peer.spin(peer.run(start_of(MOTOR), 3.0))
+    scene, state, memory, spins = MOTOR, None, None, []
+    for _ in range(3):
+        motion = simulate(scene, 1.0, rate=None, start=state, memory=memory, tolerance=1e-9)
+        state, memory = motion.states[-1], motion.memory
+        spins.append(motion.spin_hz[-1])
+        scene = MOTOR.changed({"drive.amplitude_t": loop(spins[-1])})
+    assert spins[-1] == pytest.approx(other, abs=1e-6)
+    assert spins[-1] == pytest.approx(31.0, abs=0.2)  # at 0.5 mT all the time it would be 32.5 Hz
 
 
 @pytest.mark.parametrize(("law", "order"), [("disc", 8), ("none", 6)])
