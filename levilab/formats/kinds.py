@@ -34,8 +34,8 @@ class Kind:
 
 
 AUDIO = Kind(
-    "a sound file",
-    "levilab analyze spin reads it",
+    "a sound file or film",
+    "levilab analyze spin reads its sound; levilab analyze video, with a length as --rim MM, follows a filmed top",
     suffixes=(
         ".m4a", ".mp3", ".mp4", ".ogg", ".oga", ".opus", ".flac", ".aac", ".mov", ".3gp", ".amr", ".aif", ".aiff",
         ".caf", ".webm", ".mkv", ".wma", ".avi",
@@ -46,6 +46,7 @@ AUDIO = Kind(
         (0, b"OggS"), (0, b"fLaC"), (0, b"#!AMR"), (8, b"AIFF"), (8, b"AIFC"), (0, b"caff\0"), (0, b"\x1aE\xdf\xa3"),
         (0, b"\x30\x26\xb2\x75\x8e\x66\xcf\x11"), (8, b"AVI "),
     ),
+    plural="sound files and films",
 )  # fmt: skip
 
 
@@ -123,7 +124,7 @@ def kind_of_bytes(head: bytes, suffix: str = "") -> Kind:
     """Return the kind of a file by its first bytes and the end of its name; the bytes go before.
 
     >>> kind_of_bytes(b"OggS").name, kind_of_bytes(b"t,f", ".csv").several
-    ('a sound file', 'other files')
+    ('a sound file or film', 'other files')
     """
     end = suffix.casefold()
     of_program = (kind for kind in KINDS if end and not kind.marks and end in kind.suffixes)

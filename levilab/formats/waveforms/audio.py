@@ -32,6 +32,8 @@ _FORMATS = "mov,mp4,m4a,3gp,3g2,mj2,mp3,ogg,flac,aac,amr,aiff,caf,matroska,webm,
 #: Sun's .au begins with marks, place of the samples, their bytes, kind, rate and channels, each of four bytes: a head
 #: that needs no length, so that it goes through a pipe.
 _AU_HEAD = 24
+#: Where there is no sound.
+_FILMED = "levilab analyze video follows the top in the pictures of a film"
 #: Bytes of a sample.
 _FLOAT = 4
 
@@ -57,7 +59,7 @@ def read_audio(path: Path) -> Waveform:
             size = _FLOAT * channels
             count = (sum(map(len, iter(lambda: stream.read(BLOCK), b""))) - (offset - _AU_HEAD)) // size
     if not rate:
-        raise TableError(path, "holds no sound: is it an empty recording, or a film without a sound track?")
+        raise TableError(path, f"holds no sound: {_FILMED}")
     check_count(path, count)
 
     def read(signal: int) -> Iterator[Array]:
@@ -129,5 +131,6 @@ def _decoded(path: Path, errors: list[str]) -> Iterator[IO[bytes]]:
         lines = said.read(2000).decode(errors="replace").strip().splitlines()
     if whole and decoder.returncode:
         why = shorten(lines[-1] if lines else f"it ended with {decoder.returncode}", 100)
-        raise TableError(path, f"holds no sound that FFmpeg reads ({why}): convert it to WAV with Audacity")
+        advice = f"{_FILMED}; convert a recording to WAV with Audacity"
+        raise TableError(path, f"holds no sound that FFmpeg reads ({why}): {advice}")
     errors += [shorten(line, 100) for line in lines[:1]] if whole else []

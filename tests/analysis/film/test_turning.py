@@ -91,3 +91,13 @@ def test_the_phase_of_a_mark_scatters_as_its_u_says():
     off -= np.median(off)
     assert np.std(off / found.u) == pytest.approx(1, abs=0.3)
     assert np.abs(off).max() < 0.01
+
+
+def test_what_neighbouring_pictures_share_is_in_the_u_of_the_spin():
+    random = np.random.default_rng(17)
+    times, pulls = phone_times(2.0), []
+    for _ in range(60):
+        shared = np.repeat(random.normal(0, 1.5 * NOISE, times.size // 10), 10)
+        found = turning(times, seen(random, times, 31.0, more=shared))
+        pulls += [(found.frequency - 31.0) / found.u_frequency]
+    assert np.std(pulls) < 1.6  # 1, and 6 of its standard errors; 2.3 to 2.7 if each picture counts alone

@@ -191,7 +191,7 @@ def test_sound_without_the_extra_is_counted_with_what_to_install(
         shutil.copy(sample_data / "scope-files" / "phone.m4a", tmp_path / name)
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
     (text,) = texts_of(remarks([found.remarks for _, found in analyze_suiting([tmp_path], {})]))
-    assert text.startswith("left out: 2 sound files (a.m4a, b.m4a: the extra video")
+    assert text.startswith("left out: 2 sound files and films (a.m4a, b.m4a: the extra video")
     assert "names all" not in text
     shutil.copy(tmp_path / "a.m4a", tmp_path / "c.m4a")
     (text,) = texts_of(remarks([found.remarks for _, found in analyze_suiting([tmp_path], {})]))

@@ -113,5 +113,5 @@ def test_sound_without_the_extra_is_refused_with_what_to_do(recording, monkeypat
     made = encode(recording, "a.flac", "")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
-    with pytest.raises(DoesNotSuit, match=r"is a sound file: the extra video .*\[video\].* or make it a WAV with"):
+    with pytest.raises(DoesNotSuit, match=r"is a sound file or film: the extra video .*\[video\].* or make it a WAV"):
         read_record(made)
