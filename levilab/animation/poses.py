@@ -162,7 +162,7 @@ _WAVES: dict[str, Callable[[Array], Array]] = {
 
 def drive_share(drive: Drive, times: Array) -> Array:
     """Return the drive's field at times [s] as a part of its amplitude, shape (n,)."""
-    share = _WAVES[drive.waveform](2 * np.pi * drive.frequency_hz * times + drive.phase_rad)
+    share = _WAVES[drive.waveform](2 * np.pi * drive.turns(times) + drive.phase_rad)
     return np.where(times < (math.inf if drive.off_s is None else drive.off_s), share, 0.0)
 
 

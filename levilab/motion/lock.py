@@ -64,12 +64,15 @@ def turns_behind(scene: Scene, states: Array) -> Array:
     a turn.  A drive that swings to and fro turns in either sense; the top goes with the one of its own spin.
     """
     time, sense = states[..., TIME], copysign(1.0, _align(scene.start.spin_hz))
-    turning = sense * _align(scene.drive.frequency_hz)
+    drive = scene.drive.model_copy(
+        update={name: _align(getattr(scene.drive, name)) for name in ("frequency_hz", "ramp_hz_per_s")}
+    )
+    turning = sense * (drive.frequency_hz + drive.ramp_hz_per_s * time)
     spin = core_spin(states, _align(scene.top.inertia_axial_kg_m2), _align(scene.washers.inertia_kg_m2))
     rate = spin / (2 * math.pi) - turning
     followed = np.zeros(time.shape)
     np.cumsum((rate[..., 1:] + rate[..., :-1]) / 2 * np.diff(time), axis=-1, out=followed[..., 1:])
-    seen = body_angle(states) / (2 * math.pi) - turning * time
+    seen = body_angle(states) / (2 * math.pi) - sense * drive.turns(time)
     # the angle that is seen is known up to whole turns, the angle that is followed up to small errors, which add up
     off = np.unwrap(seen - followed, period=1.0)
     return np.asarray(sense * (followed + off))

@@ -47,7 +47,8 @@ def longest_step(scene: Scene, model: Model, start: Array, scheme: Scheme) -> An
     """Return the longest step [s] for which the kernels' polynomials hold and no motion is skipped.
 
     It is that of each top, if there are many.  Three limits: a drift turns the axis by 2 rad, a kick slows the spin by
-    a fifth, a step takes half a period of the drive.
+    a fifth, a step takes half a period of the drive.  A drive that goes up takes the top along: all
+    are shorter by its ratio.
     """
     turning = turning_rate(model, start)
     drift, kick = (float(np.max(np.abs(c))) for c in (scheme.drifts, scheme.kicks))
@@ -57,7 +58,7 @@ def longest_step(scene: Scene, model: Model, start: Array, scheme: Scheme) -> An
     ]
     if model.drive is not None:
         limits.append(0.5 / scene.drive.frequency_hz)
-    return smallest(*limits)
+    return smallest(*limits) / (scene.drive.highest_hz / scene.drive.frequency_hz)
 
 
 def _strongest_damping(drag: Any, start: Array) -> Any:

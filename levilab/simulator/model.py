@@ -140,7 +140,7 @@ def _drive(scene: Scene) -> Any:
         return None
     x, y, z = (_moment(scene) * drive.amplitude_t * part for part in unit_vector(drive.direction))
     if drive.waveform == "sine":
-        return Sine((x, y, z), drive.frequency_hz, drive.phase_rad / (2 * math.pi))
+        return Sine((x, y, z), drive.frequency_hz, drive.ramp_hz_per_s / 2, drive.phase_rad / (2 * math.pi))
     if drive.waveform == "triggered":
         return Bursts((x, y, z))
     return PiecewiseLinear((x, y, z))

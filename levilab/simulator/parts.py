@@ -171,6 +171,7 @@ class Drive(Part):
     "triggered" it is one cycle of a sine from phase_rad on, each time the top's tape has passed a light, and else 0.
 
     Attributes:
+        ramp_hz_per_s: rate at which the frequency of a sine goes up, from frequency_hz at time 0 until off_s.
         light_rad: of a triggered drive: the body's angle φ + ψ about the vertical when its tape passes the light.
         latency_s: from then to the burst; a tape that passes during a burst is not seen.
         cycle_turns: 0, or the burst's period in turns of the top as it passes, in place of 1/frequency_hz.
@@ -182,6 +183,7 @@ class Drive(Part):
     phase_rad: float = math.pi / 2
     direction: Direction = (0.0, 1.0, 0.0)
     off_s: Never = None
+    ramp_hz_per_s: float = Field(default=0.0, ge=0, lt=1e3)
     light_rad: float = -math.pi / 2
     latency_s: float = Field(default=2e-5, ge=0, lt=1e3)
     cycle_turns: float = Field(default=0.0, ge=0, lt=1e3)
@@ -190,6 +192,15 @@ class Drive(Part):
     def is_periodic(self) -> bool:
         """Whether the field repeats with frequency_hz, whatever the top does."""
         return self.waveform not in {"off", "triggered"}
+
+    @property
+    def highest_hz(self) -> Any:
+        """The highest frequency of a drive that goes up [Hz]."""
+        return self.frequency_hz + self.ramp_hz_per_s * (self.off_s or 0.0)
+
+    def turns(self, times: Any) -> Any:
+        """Return the angle of a periodic drive since time 0 at some times [s], in turns."""
+        return (self.frequency_hz + self.ramp_hz_per_s / 2 * times) * times
 
 
 class Start(Part):

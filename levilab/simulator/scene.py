@@ -143,6 +143,11 @@ RULES: tuple[Rule, ...] = (
         "a direction is expected, such as [0, 1, 0]; for no drive set drive.waveform to off",
     ),
     Rule(
+        "drive.ramp_hz_per_s",
+        lambda s: s.drive.ramp_hz_per_s == 0 or (s.drive.waveform == "sine" and s.drive.off_s is not None),
+        "a drive with waveform = sine and an end, off_s, is expected with it: steps are made for the frequency there",
+    ),
+    Rule(
         "start.position_m",
         lambda s: s.start.place != "given" or s.start.position_m[2] > max(0.0, s.escape.height_m),
         "a height (the third number) above the base, 0, and above escape.height_m = {s.escape.height_m} is expected",

@@ -16,7 +16,7 @@ from levilab.errors import UsageError
 from levilab.motion.lines import lines_of_many, rate_for
 from levilab.motion.lock import LAST_SHARE, RATE_HZ, SHORTEST_S, can_lock, keeps_phase, shows_lock
 from levilab.motion.summary import changing_energy
-from levilab.simulator.energy import energy
+from levilab.simulator.energy import core_spin, energy
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
 from levilab.simulator.keys import nearest
@@ -42,6 +42,8 @@ Need = Literal["ends", "errors", "samples"]
 
 #: Samples per second for the height, whose fastest motion is some Hz: its turning points are met to 0.5 % of the swing.
 HEIGHT_RATE_HZ = 100.0
+#: Samples per second for the highest spin, which swings about a drive at some tenths of 1 Hz.
+SPIN_RATE_HZ = 10.0
 #: Rates for lines are rounded up to multiples of this [Hz].
 ROUND_HZ = 100.0
 #: Greatest count of numbers in the samples of one call, and least number of points in it, which fills the lanes.
@@ -110,6 +112,9 @@ OBSERVABLES: dict[str, Observable] = {
         ),
         Observable(
             "position_error_m", "m", "Estimated error of the place at the end, or at the fall.", "float64", "errors"
+        ),
+        Observable(
+            "highest_spin_hz", "Hz", "Highest spin on the way, with its swing about a drive.", "float64", "samples"
         ),
         Observable("height_spread_m", "m", "Highest less lowest place; NaN of a top that falls.", "float64", "samples"),
         Observable(
@@ -196,7 +201,7 @@ def _ends_of(plan: Plan, values: Values, names: set[str], rate: float | None = N
         tolerance=plan.tolerance,
         step_share=plan.step_share,
         rate=rate,
-        columns=slice(None) if names & {"locked", *GROUPS["lines"]} else [HEIGHT],
+        columns=slice(None) if names & {"locked", "highest_spin_hz", *GROUPS["lines"]} else [HEIGHT],
         cores=1,
         errors="position_error_m" in names,
     )
@@ -239,7 +244,7 @@ def _ends_and_samples_of(plan: Plan, values: Values, names: set[str]) -> dict[st
 
 def _rate_for(scene: Scene, names: set[str]) -> Any:
     """Return the samples per second that a point needs, rounded up so that many points have the same."""
-    rate = HEIGHT_RATE_HZ if "height_spread_m" in names else RATE_HZ
+    rate = HEIGHT_RATE_HZ if "height_spread_m" in names else RATE_HZ if "locked" in names else SPIN_RATE_HZ
     if names & set(GROUPS["lines"]):
         return largest(rate, ceil(rate_for(scene) / ROUND_HZ) * ROUND_HZ)
     return rate
@@ -272,6 +277,8 @@ def _columns_of_samples(ends: Ensemble, names: set[str]) -> dict[str, Any]:
         last = ends.states[..., HEIGHT].ravel()
         spread = np.maximum(heights.max(axis=1), last) - np.minimum(heights.min(axis=1), last)
         columns["height_spread_m"] = np.where(ends.survived.ravel(), spread, np.nan)
+    if "highest_spin_hz" in names:
+        columns["highest_spin_hz"] = _highest_spins(ends)
     if "locked" in names:
         columns["locked"] = _are_locked(ends)
     if names & set(GROUPS["lines"]):
@@ -279,6 +286,25 @@ def _columns_of_samples(ends: Ensemble, names: set[str]) -> dict[str, Any]:
         rows = [_line_columns(lines) for lines in lines_of_many(motions)]
         columns |= {name: [row[name] for row in rows] for name in GROUPS["lines"]}
     return columns
+
+
+def _highest_spins(ends: Ensemble) -> NDArray[np.float64]:
+    """Return the highest spin of each top, in the order of the flat map [Hz]."""
+    samples = ends.samples.reshape(-1, *ends.samples.shape[-2:])
+    highest = np.empty(len(samples))
+
+    def spins(scene: Scene, where: NDArray[np.intp]) -> Any:
+        axial, washers = (_column(one) for one in (scene.top.inertia_axial_kg_m2, scene.washers.inertia_kg_m2))
+        return np.nanmax(np.abs(core_spin(samples[where], axial, washers)), axis=-1) / (2 * math.pi)
+
+    for where, found in for_each(ends.scene, {key: column.ravel() for key, column in ends.values.items()}, spins):
+        highest[where] = found
+    return highest
+
+
+def _column(number: Any) -> Any:
+    """Return a number, or one of each top in a shape that goes with its samples."""
+    return number[..., None] if isinstance(number, np.ndarray) else number
 
 
 def _are_locked(ends: Ensemble) -> NDArray[np.bool_]:

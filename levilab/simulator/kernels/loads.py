@@ -23,10 +23,13 @@ Array = NDArray[np.float64]
 
 
 class Sine(NamedTuple):
-    """A uniform field: amplitude [J] along each axis; [Hz]; phase in turns."""
+    """A uniform field: amplitude [J] along each axis; frequency at time 0 [Hz]; half of its ramp [Hz/s]; phase
+    in turns.
+    """
 
     amplitude: Vector
     frequency: float
+    half_ramp: float
     phase: float
 
 
@@ -51,7 +54,7 @@ def _no_drive(drive: Any, b: Any, at: Any) -> Any:
 
 def _sine_drive(drive: Any, b: Any, at: Any) -> Any:
     t, level, _ = at
-    return plus(b, level * sine_of_turns(drive.frequency * t + drive.phase), drive.amplitude)
+    return plus(b, level * sine_of_turns((drive.frequency + drive.half_ramp * t) * t + drive.phase), drive.amplitude)
 
 
 def _kinked_drive(drive: Any, b: Any, at: Any) -> Any:

@@ -50,7 +50,18 @@ def refusal(*words, scene=None):
 
 
 def test_the_scenes_that_ship_are_known_by_name():
-    names = ["driven", "friction", "loose-washers", "motor", "practice", "precession", "spindown", "tilted", "undriven"]
+    names = [
+        "driven",
+        "friction",
+        "loose-washers",
+        "motor",
+        "practice",
+        "precession",
+        "ramp",
+        "spindown",
+        "tilted",
+        "undriven",
+    ]
     assert presets() == names
 
 

@@ -56,10 +56,7 @@ class Peer:
         field = np.array([*(d2 * x / 2), -d1 + d3 * square / 4])
         sideways = m[0] * x[0] + m[1] * x[1]
         force = np.array([*(d2 * m[:2] / 2 + m[2] * d3 * x / 2), d3 * sideways / 2 + m[2] * (-d2 + d4 * square / 4)])
-        if self.burst:
-            begin, frequency = self.burst
-            along = self.amplitude * math.sin(TURN * frequency * (t - begin) + self.drive.phase_rad)
-            field = field + along * np.array(self.drive.direction)
+        field = field + self.amplitude * self.level(t) * np.array(self.drive.direction)
         i1, i3 = top.inertia_transverse_kg_m2, top.inertia_axial_kg_m2
         spin = momentum @ e3 / i3
         turning = momentum / i1 + (spin - momentum @ e3 / i1) * e3
@@ -71,6 +68,15 @@ class Peer:
         twist = np.cross(m, field) - i3 * self.drag * abs(spin) ** 0.5 * spin * e3
         return np.concatenate([v, force / top.mass_kg - [0, 0, 9.82], dq, twist])
 
+    def level(self, t):
+        if self.drive.waveform == "sine":
+            phase = TURN * t * (self.drive.frequency_hz + t * self.drive.ramp_hz_per_s / 2)
+            return math.sin(phase + self.drive.phase_rad)
+        if not self.burst:
+            return 0.0
+        begin, frequency = self.burst
+        return math.sin(TURN * frequency * (t - begin) + self.drive.phase_rad)
+
     def run(self, state, until):
         n, arm = state[N], state[ARM]
         turned = Rotation.from_matrix(np.stack([arm, np.cross(n, arm), n], axis=1)).as_quat()
@@ -81,6 +87,8 @@ class Peer:
             return y[9] * math.cos(half) - y[6] * math.sin(half)
 
         passes.terminal, last = True, None
+        if self.drive.waveform == "sine":
+            return self.leg(t, y, until)[1]
         while t < until:
             t, y, seen = self.leg(t, y, until, passes)
             if not seen:
@@ -122,8 +130,10 @@ class Peer:
         {"drive.cycle_turns": 0.0, "drive.frequency_hz": 41.0, "drive.latency_s": 3e-3, "drive.phase_rad": 2.0},
         # longer than a turn: each second pulse is not seen
         {"drive.cycle_turns": 0.0, "drive.frequency_hz": 25.0, "drag.law": "none", "drive.light_rad": 1.0},
+        # no bursts, but a sine that goes up faster than the top can
+        {"drive.waveform": "sine", "drive.ramp_hz_per_s": 2.0, "drive.off_s": 2.0},
     ],
-    ids=["motor", "late and short", "slow"],
+    ids=["motor", "late and short", "slow", "ramp"],
 )
 def test_another_simulator_finds_the_same_motion(changes):
     scene = MOTOR.changed({"drive.amplitude_t": 8e-4, **changes})

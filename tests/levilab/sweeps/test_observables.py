@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis.pull import Driven
+from analysis.stability import wobble_resonance
 from levilab.errors import UsageError
 from levilab.motion.summary import as_document, summarise
+from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import Scene, preset
 from levilab.simulator.single import simulate
 from levilab.sweeps import observables
@@ -139,3 +142,27 @@ def test_an_observable_that_no_point_can_have_is_an_error(scene: Scene, name: st
 
 def _unknown(scene: Scene, name: str) -> Plan:
     return Plan(scene, (Axis("start.spin_hz", SPINS),), (name,), 10.0)
+
+
+def test_the_highest_spin_on_a_ramp_is_where_pull_equals_drag_and_ramp() -> None:
+    """In full motion, against the closed form: where a top leans in step with its moment, it is pulled more."""
+    scene = preset("ramp").changed({"drive.off_s": 1000.0})
+    values = {"drive.amplitude_t": np.repeat([3e-4, 4e-4], 2), "drive.ramp_hz_per_s": np.tile([0.05, 0.1], 2)}
+    made = Plan(scene, (), ("highest_spin_hz",), 1000.0, 1e-4, step_share=1.0)
+    found = observe(made, values)["highest_spin_hz"]
+    stability, top = stability_of(scene), scene.top
+    assert stability.floating is not None
+    resonance = wobble_resonance(stability.field, stability.top, stability.floating.height)
+    across = top.moment_tilt[0] * abs(top.moment_a_m2) / (2 * top.inertia_axial_kg_m2)
+    expected = [
+        Driven(across * amplitude, scene.drag.constants[0], ramp, resonance).highest()
+        for amplitude, ramp in zip(*values.values(), strict=True)
+    ]
+    assert found == pytest.approx(expected, abs=1.0)  # the swing about the drive takes the spin up to 0.7 Hz beside it
+    assert np.ptp(expected) > 15
+
+
+def test_the_highest_spin_of_a_top_that_falls_or_coasts_is_on_the_way() -> None:
+    values = {"start.spin_hz": np.array([19.0, 30.0])}
+    found = observe(plan(preset("friction"), ("highest_spin_hz",), 4.0), values)["highest_spin_hz"]
+    assert found == pytest.approx([19.0, 30.0], rel=1e-9)
