@@ -23,9 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Sine(NamedTuple):
-    """A uniform field: amplitude [J] along each axis; frequency at time 0 [Hz]; half of its ramp [Hz/s]; phase
-    in turns.
-    """
+    """A uniform field: amplitude [J] along each axis; [Hz] at time 0; half of the ramp [Hz/s]; phase in turns."""
 
     amplitude: Vector
     frequency: float
