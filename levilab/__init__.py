@@ -128,7 +128,7 @@ def load(path: str | PathLike[str]) -> Run:
 
 def analyze(
     data: Run | str | PathLike[str] | pd.DataFrame | Sequence[Run | str | PathLike[str] | pd.DataFrame],
-    kind: Literal["spindown", "spin", "field", "limit", "precession", "sway"] | None = None,
+    kind: Literal["spindown", "spin", "field", "limit", "precession", "sway", "hold"] | None = None,
     *,
     columns: Mapping[str, str | int] | str | None = None,
     channel: str | None = None,

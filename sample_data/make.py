@@ -10,8 +10,8 @@ second, written as several makers' oscilloscopes would.
 The upper limits are made up, too: a normal law about what the simulated bench gives (docs/experiments/limit.md), once
 of a sound top and once of one whose washers slip under the tape.
 
-The records and the scan are what `levilab acquire` writes on the virtual bench: their times and what differs between
-computers are left out.
+The records, the held spins and the scan are what `levilab acquire` writes on the virtual bench: their times and what
+differs between computers are left out.
 
 Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes each time.
 
@@ -43,6 +43,7 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.present.numbers import with_sign
 from levilab.present.progress import Display
 from levilab.reproduce.spindown import NOISE_HZ, READINGS, solve
+from levilab.runs.events import RunEvent
 from levilab.simulator import preset, simulate
 from levilab.simulator.published.printed import several
 
@@ -490,10 +491,12 @@ def write_traces(name: str, scene: str | None, settings: str, note: str) -> None
     print(f"{name}: {count} records")
 
 
-def from_the_virtual_bench(experiment: str, folder: str, seed: int, note: str) -> None:
+def from_the_virtual_bench(experiment: str, folder: str, seed: int, note: str, settings: tuple[str, ...] = ()) -> None:
     """Make a run of the virtual bench that is the same each time."""
     with tempfile.TemporaryDirectory() as out:
-        run = acquire(request_for(experiment, AcquisitionOptions(mock=True, out=Path(out), seed=seed)), Display())
+        options = AcquisitionOptions(mock=True, out=Path(out), seed=seed, settings=settings)
+        run = acquire(request_for(experiment, options), Display())
+        gains = [{k: v for k, v in one.items() if k != "utc"} for one in run.events() if one["kind"] == RunEvent.GAIN]
         header, *rows = (run.folder / "readings.csv").read_text(encoding="utf-8").splitlines()
     record = run.record
     write(
@@ -511,7 +514,23 @@ def from_the_virtual_bench(experiment: str, folder: str, seed: int, note: str) -
             "synthetic_how": f"SYNTHETIC: {record.synthetic_how}; made by sample_data/make.py",
         },
     )
+    if gains:
+        lines = [json.dumps(one, ensure_ascii=False) + "\n" for one in gains]
+        (HERE / folder / "events.jsonl").write_text("".join(lines), encoding="utf-8", newline="\n")
     print(f"{folder}: {record.synthetic_how}")
+
+
+#: Spins at which one top was held [Hz].
+HELD = (26, 32, 38, 45)
+
+
+def held_spins() -> None:
+    """Make runs of one top of the virtual bench that is held at several spins."""
+    (HERE / "hold").mkdir(exist_ok=True)
+    (HERE / "hold" / ".levilab-skip").touch()
+    for spin in HELD:
+        settings = (f"drive_frequency_hz={spin}", "longest_s=120")
+        from_the_virtual_bench("hold", f"hold/{spin}-hz", 3, f"a top held at {spin} Hz", settings)
 
 
 #: A film of 60 frames per second, with an error of each coordinate, of a top that was pushed.
@@ -585,6 +604,7 @@ def main() -> None:
     for name, how_made in TRACES.items():
         write_traces(name, *how_made)
     from_the_virtual_bench("field", "field-scan", 11, "a base as in device.toml, heights set by hand to 0.2 mm")
+    held_spins()
 
 
 if __name__ == "__main__":

@@ -271,6 +271,25 @@ def _path(log_eta: Array, s: Array, kappa: Array, beta: Array) -> _Path:
     return _Path(spin, slope, np.divide(1, axial, out=axial), momentum_slope)
 
 
+def slowing_by_tilt(spin: Array, resonance: float, delta: float, top: Top = THESIS_TOP) -> Array:
+    """Return the drag of a count over that of an upright top at the same spin, for a drag ω^(3/2), shape (n,).
+
+    Args:
+        spin: counted, shape (n,) [Hz]; near and below the fall the factor is that at the fall.
+        resonance: ν_r [Hz].
+        delta: tilt of the moment [rad].
+        top: whose count it is.
+
+    >>> slowing_by_tilt(np.array([45.0, 26.0]), 22.0, 0.03).round(3)
+    array([1.   , 0.951])
+    """
+    first = np.array([[1 / ((1.01 * float(spin.max()) / resonance) ** 2 - 1)]])
+    numbers = (np.array([[x]]) for x in (delta**2, top.kappa, top.beta))
+    _, path = _nodes(first, *numbers)
+    factor = path.axial[0] ** 2.5 * path.slope[0] / path.momentum_slope[0]
+    return np.asarray(np.interp(-spin / resonance, -path.spin[0], factor))
+
+
 def counts(law: DragLaw, tau: Array, q: Array, shapes: Array) -> Array:
     """Return what a counter counts of several tops, in the dimensionless numbers of `analysis.spindown.drag`.
 

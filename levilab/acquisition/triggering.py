@@ -128,7 +128,7 @@ class Motor:
         share: of the full amplitude that holds it, as the loop has found.
         counts: its spin while it was held [Hz].
         shares: of the full amplitude, at each of the counts.
-        gain: of its spin at the full amplitude, about the spin at which it is held; None where it was not measured.
+        gains: times [s] and counts [Hz] at the full amplitude, about the spin at which it is held, of each measurement.
     """
 
     session: Session[Any]
@@ -138,7 +138,7 @@ class Motor:
     share: float = 1.0
     counts: list[float] = field(default_factory=list)
     shares: list[float] = field(default_factory=list)
-    gain: Estimate | None = None
+    gains: list[tuple[list[float], list[float]]] = field(default_factory=list)
     _missed: int = 0
     _trend: float = 0.0  # of the spin [Hz/s]
     _errors: float = 0.0  # summed [Hz s]
@@ -229,8 +229,9 @@ class Motor:
         for _ in range(_GAIN_COUNTS):
             spins.append(self.count())
             times.append(self.session.now())
-        slope, scatter, spread = slope_of(times, spins)
-        self.gain = Estimate(slope, scatter / spread, "Hz/s")
+        self.gains.append((times, spins))
+        text = f"gains {slope_of(times, spins)[0]:.3f} Hz/s at the full amplitude, about {np.mean(spins):.2f} Hz"
+        self.session.event(RunEvent.GAIN, text, times_s=times, spins_hz=spins)
         self._trend = 0.0
         self._set_share(_LEAST_SHARE)
         while self.spin > target:

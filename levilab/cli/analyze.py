@@ -68,6 +68,7 @@ COMMANDS = {
     "take.",
     "limit": "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
     "sway": "Slow swings of a floating top from x and y over time: their split, beside Berry's geometric magnetism.",
+    "hold": "Held spins: the drag that the amplitude balances, drag laws through several, beside a spin-down's.",
     _EACH: "Each analysis that suits the runs or data files; --json prints a list where several suit.",
 }
 
@@ -154,8 +155,8 @@ def _command(options: Iterable[str]) -> Callable[..., None]:
 
 def _add(name: str, text: str) -> None:
     words = "levilab analyze" if name == _EACH else f"levilab analyze {name}"
-    # a search of sample_data leaves the folder of the track out
-    words += " sample_data/sway/" if name == "sway" else " sample_data/"
+    # a search of sample_data leaves these folders out
+    words += f" sample_data/{name}/" if name in {"sway", "hold"} else " sample_data/"
 
     @analyze_app.command(name, cls=Later, help=text, epilog=f"Example: {words}", hidden=name == _EACH)
     def command() -> Callable[..., None]:

@@ -14,6 +14,11 @@ from levilab.pipelines.field.quantities import FIELD_ROW
 from levilab.pipelines.field.quantities import QUANTITIES as FIELD_QUANTITIES
 from levilab.pipelines.field.report import field_part
 from levilab.pipelines.field.table import field_columns, field_tables
+from levilab.pipelines.hold.document import DOCUMENT as HOLD
+from levilab.pipelines.hold.quantities import HOLD_ROW
+from levilab.pipelines.hold.quantities import QUANTITIES as HOLD_QUANTITIES
+from levilab.pipelines.hold.report import hold_part
+from levilab.pipelines.hold.table import hold_columns, hold_tables
 from levilab.pipelines.limit.document import DOCUMENT as LIMIT
 from levilab.pipelines.limit.quantities import LIMIT_ROW
 from levilab.pipelines.limit.quantities import QUANTITIES as LIMIT_QUANTITIES
@@ -128,6 +133,7 @@ class Analysis(Generic[A]):
         """Draw the figure."""
         # with matplotlib
         from levilab.pipelines.field.figure import field_figure
+        from levilab.pipelines.hold.figure import hold_figure
         from levilab.pipelines.limit.figure import limit_figure
         from levilab.pipelines.precession.figure import precession_figure
         from levilab.pipelines.spin.figure import spin_figure
@@ -141,6 +147,7 @@ class Analysis(Generic[A]):
             "limit": limit_figure,
             "precession": precession_figure,
             "sway": sway_figure,
+            "hold": hold_figure,
         }
         return figures[self.name](found)
 
@@ -165,6 +172,7 @@ _TABLE: tuple[Analysis[Any], ...] = (
         symbols_of(PRECESSION_QUANTITIES),
     ),
     Analysis(SWAY, sway_tables, sway_part, sway_columns, SWAY_ROW, symbols_of(SWAY_QUANTITIES)),
+    Analysis(HOLD, hold_tables, hold_part, hold_columns, HOLD_ROW, symbols_of(HOLD_QUANTITIES)),
 )
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 

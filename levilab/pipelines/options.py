@@ -244,6 +244,16 @@ class SwayOptions(InputOptions):
     ))  # fmt: skip
 
 
+@dataclass(frozen=True)
+class HoldOptions(InputOptions):
+    """Options of held spins."""
+
+    spindown: Path | None = field(default=None, metadata=_about(
+        "A spin-down of the same top, a run or a file: its drag is compared, and the tilt of its moment counts.",
+        kind=Path, metavar="PATH", read=Path,
+    ))  # fmt: skip
+
+
 def options_of(kind: type[InputOptions]) -> dict[str, Option]:
     """Return the options of an analysis by the names of their fields."""
     return {one.name: one.metadata["option"] for one in fields(kind) if "option" in one.metadata}
@@ -252,7 +262,7 @@ def options_of(kind: type[InputOptions]) -> dict[str, Option]:
 #: Name of the analysis → its options.
 KINDS: Mapping[str, type[InputOptions]] = MappingProxyType({
     "spindown": SpinDownOptions, "spin": SpinOptions, "field": FieldOptions, "precession": PrecessionOptions,
-    "limit": LimitOptions, "sway": SwayOptions,
+    "limit": LimitOptions, "sway": SwayOptions, "hold": HoldOptions,
 })  # fmt: skip
 #: All options by the names of their fields.
 OPTIONS: Mapping[str, Option] = MappingProxyType(

@@ -40,6 +40,7 @@ class RunEvent(StrEnum):
     LOCK_LOST = "lock lost"
     HELD = "held"
     PHASE_FOUND = "phase found"  # at which a cycle speeds a top up that triggers it
+    GAIN = "gain measured"  # of the spin at the full amplitude
     CALMED = "calmed"
     # the top
     FELL = "fell"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, PositiveFloat
 
-from analysis.uncertainty import Estimate
+from analysis.held import hold_of
 from instruments.errors import InstrumentError
 from levilab.acquisition.counting import prepare_counter
 from levilab.acquisition.driving import DriveSettings, drive_off, drive_up, reach_generator_again
@@ -20,6 +21,8 @@ from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from levilab.acquisition.session import Row, Session
     from levilab.acquisition.triggering import Motor
     from levilab.bench.config import Limits
@@ -83,8 +86,10 @@ def run(session: Session[HoldSettings]) -> None:
         except (NotHeld, InstrumentError) as lost:
             _let_go(session, lost)
             drive()
+    with suppress(NotHeld, InstrumentError):  # the readings and the first gain are there
+        motors[-1].measure_gain(session.settings.drive_frequency_hz)
     drive_off(session)
-    _report_drag(session, motors[-1])
+    _report_drag(session, motors)
 
 
 def _let_go(session: Session[HoldSettings], lost: NotHeld | InstrumentError) -> None:
@@ -121,41 +126,22 @@ def _reading(session: Session[HoldSettings], motor: Motor) -> Row:
     }
 
 
-def _report_drag(session: Session[HoldSettings], motor: Motor) -> None:
-    """Record the scatter of the held spin, and the drag that the amplitude balanced."""
+def _report_drag(session: Session[HoldSettings], motors: Sequence[Motor]) -> None:
+    """Record the scatter of the held spin, and the drag that the amplitude balanced, as `levilab analyze hold` does."""
     rows = session.rows
     if len(rows) < _FEWEST:
         return
-    spins = np.array([row["spin_frequency_hz"] for row in rows])
-    shares = np.array([row["drive_amplitude_v"] for row in rows]) / (session.settings.drive_amplitude_vpp / 2)
-    share, u_share = float(shares.mean()), float(shares.std(ddof=1)) / math.sqrt(len(rows))
-    drag = drag_of(share, u_share, motor.gain)
-    scatter = float(spins.std(ddof=1))
+    time, spin, u, volts = (np.array([row[one.name] for row in rows]) for one in channels(session.settings))
+    gains = [(np.array(times), np.array(spins)) for motor in motors for times, spins in motor.gains]
+    found = hold_of(time, spin, u, volts / (session.settings.drive_amplitude_vpp / 2), gains)
+    drag = found.drag
     data = {"drag_hz_per_s": drag.value, "drag_u_hz_per_s": drag.u} if drag else {}
     text = (
-        f"held at {spins.mean():.3f} Hz, s.d. of a reading {scatter:.3f} Hz; "
-        f"{100 * share:.1f} % of the amplitude balanced the drag{f', {with_uncertainty(drag)}' if drag else ''}"
+        f"held at {found.spin.value:.3f} Hz, s.d. of a reading {found.scatter.value:.3f} Hz; "
+        f"{100 * found.share:.1f} % of the amplitude balanced the drag{f', {with_uncertainty(drag)}' if drag else ''}"
     )
-    session.event(RunEvent.HELD, text, spin_frequency_hz=float(spins.mean()), scatter_hz=scatter, **data)
-
-
-def drag_of(share: float, u_share: float, gain: Estimate | None) -> Estimate | None:
-    """Return the drag that a share of the amplitude balances [Hz/s].
-
-    The pull p goes with the amplitude: share · p = drag, and the full amplitude gains p − drag.
-
-    Args:
-        share: of the amplitude that holds the spin.
-        u_share: its standard uncertainty.
-        gain: of the spin at the full amplitude [Hz/s]; None where it was not measured.
-
-    >>> drag_of(0.4, 0.004, Estimate(0.24, 0.005, "Hz/s"))
-    Estimate(value=0.16, u=0.0042..., unit='Hz/s', interval=None)
-    """
-    if gain is None or gain.value is None or gain.u is None or not 0 < share < 1:
-        return None
-    value = share * gain.value / (1 - share)
-    return Estimate(value, math.hypot(share / (1 - share) * gain.u, gain.value / (1 - share) ** 2 * u_share), "Hz/s")
+    more = {"spin_frequency_hz": found.spin.value, "scatter_hz": found.scatter.value}
+    session.event(RunEvent.HELD, text, **more, **data)
 
 
 EXPERIMENT = Experiment(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.errors import AnalysisError
-from levilab.crosscheck.own import field, limit, precession, spin, spindown, sway
+from levilab.crosscheck.own import field, hold, limit, precession, spin, spindown, sway
 from levilab.crosscheck.study import Study, make_trials
 from levilab.errors import LevilabError
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 OWN: Mapping[str, Callable[[Any], Own]] = MappingProxyType({
     "spindown": spindown.trials_of, "precession": precession.trials_of, "spin": spin.trials_of,
     "field": field.trials_of, "limit": limit.trials_of, "sway": sway.trials_of,
+    "hold": hold.trials_of,
 })  # fmt: skip
 #: Number of trials where none is asked for.
 TRIALS = 200

@@ -49,7 +49,7 @@ def trial(seed: int, folder: Path, counter: str | None = None, scope: str | None
     """Try one spin-down.  counter, scope: that counts in place of the bench's."""
     scene = draw_scene(seed)
     law, names, exponent = scene.drag, LAWS[scene.drag].names, LAWS[scene.drag].exponent
-    run = acquire_mock("spin", seed, folder, lambda request: _in_world(request, scene), counter=counter, scope=scope)
+    run = acquire_mock("spin", seed, folder, lambda request: in_world(request, scene), counter=counter, scope=scope)
     found = spindown_of(run.folder, tilt="none")  # a count of this world is the spin
     pulls = [
         pull_of(f"{law} {name}", found.fit(law).parameters[name], truth)
@@ -63,7 +63,8 @@ def trial(seed: int, folder: Path, counter: str | None = None, scope: str | None
     return pulls
 
 
-def _in_world(request: AcquisitionRequest, scene: SpinScene) -> AcquisitionRequest:
+def in_world(request: AcquisitionRequest, scene: SpinScene) -> AcquisitionRequest:
+    """Return a request for a run with the top of a scene."""
     limits, named = request.config.limits, request.named
     return replace(request, wiring=lambda: virtual_wiring(SpinWorld(scene, VirtualClock()), limits, named))
 

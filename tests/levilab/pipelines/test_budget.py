@@ -28,6 +28,7 @@ CASES = {
     "rounded times": ("spin", ("scope-files/rigol-ds1000e.csv",)),
     "a sweep": ("precession", ("precession-sweep",)),
     "a track": ("sway", ("sway/track.csv",)),
+    "a held spin": ("hold", ("hold/45-hz",)),
     "a scan": ("field", ("field-scan",)),
     "lower limits": ("limit", ("lower-limits",)),
     "upper limits": ("limit", ("upper-limits",)),

@@ -25,6 +25,7 @@ INPUTS = (
     ("limit", ["lower-limits", "upper-limits"]),
     ("precession", ["precession-sweep"]),
     ("sway", ["sway"]),
+    ("hold", ["hold"]),
 )
 
 

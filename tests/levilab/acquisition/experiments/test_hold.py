@@ -6,11 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.uncertainty import Estimate
 from instruments.clock import VirtualClock
 from levilab.acquisition.driving import drive_off
 from levilab.acquisition.experiments import hold
-from levilab.acquisition.experiments.hold import drag_of
 from levilab.acquisition.failures import DidNotFollow, NotHeld
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
@@ -45,7 +43,7 @@ def test_a_spin_is_held_and_its_amplitude_gives_the_drag(tmp_path):
         assert text["drag_u_hz_per_s"] < 0.006
         pulls.append((text["drag_hz_per_s"] - drag_at(seed, 45.0)) / text["drag_u_hz_per_s"])
         assert run.record.instruments["generator"]["settings_end"]["output"] is False
-    assert abs(np.mean(pulls)) < 2.0  # 16 seeds of 300 s: mean -0.2, s.d. 1.3, which is that of 10 counts' scatter
+    assert abs(np.mean(pulls)) < 2.0
     assert np.abs(pulls).max() < 5.0
 
 
@@ -169,9 +167,3 @@ def test_a_faster_top_is_braked_to_its_spin_and_held(tmp_path):
 def test_a_hold_is_triggered_and_nothing_else(tmp_path):
     with pytest.raises(UsageError, match="triggered is expected"):
         held(tmp_path, 1, "hold.drive=ramp")
-
-
-def test_a_share_that_shows_no_drag_gives_none():
-    assert drag_of(1.0, 0.01, Estimate(0.2, 0.01, "Hz/s")) is None
-    assert drag_of(0.5, 0.01, None) is None
-    assert drag_of(0.5, 0.0, Estimate(0.2, 0.01, "Hz/s")).value == pytest.approx(0.2)

@@ -1,0 +1,45 @@
+"""A top that only spins, held by a drive that it triggers: the drag that the amplitude balances."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from levilab.acquisition.table import settings_of
+from levilab.crosscheck.subject import Pull, Subject, acquire_mock, pull_of
+from levilab.crosscheck.subjects.spindown import draw_scene, in_world
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.simulator.laws import LAWS
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from levilab.acquisition.loop import AcquisitionRequest
+
+#: Range of the held spins [Hz], and the time for which each is held [s].
+_SPINS_HZ, _HELD_S = (28.0, 48.0), 100.0
+
+
+def trial(seed: int, folder: Path) -> list[Pull]:
+    """Try one held spin; the truth is the drag of the world's law at the mean of the readings."""
+    scene = replace(draw_scene(seed), fall_hz=21.4)
+    spin = float(np.random.default_rng((seed, 25)).uniform(*_SPINS_HZ))
+
+    def change(request: AcquisitionRequest) -> AcquisitionRequest:
+        settings = settings_of(request.config, "hold")
+        settings = settings.model_copy(update={"drive_frequency_hz": spin, "longest_s": _HELD_S})
+        return in_world(replace(request, config=request.config.model_copy(update={"hold": settings})), scene)
+
+    run = acquire_mock("hold", seed, folder, change)
+    analysis = ANALYSES["hold"]
+    (found,) = analysis.analyze([run.folder], analysis.options_from({})).runs
+    omega, power = 2 * math.pi * (found.spin.value or 0.0), LAWS[scene.drag].exponent
+    powers = (1.0, 2.0) if power is None else (power,)
+    truth = sum(c * omega**n for c, n in zip(scene.constants, powers, strict=True)) / (2 * math.pi)
+    return [pull_of("drag", found.drag, truth)]
+
+
+SUBJECT = Subject("hold", "a spin held by a drive that the top triggers: the drag by the amplitude", trial, trials=100)

@@ -1,0 +1,1 @@
+"""Held spins: the drag that the amplitude of a triggered drive balances."""

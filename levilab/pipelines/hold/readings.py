@@ -1,0 +1,81 @@
+"""Readings of a held spin, and the gain at the full amplitude that was measured before and after it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from levilab.errors import DataError, DoesNotSuit
+from levilab.formats.columns import TableError
+from levilab.pipelines.sources import Readings
+from levilab.runs.events import RunEvent
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from levilab.pipelines.options import InputOptions
+    from levilab.runs.run import Run
+
+    Array = NDArray[np.float64]
+
+#: Fewest readings that show a scatter.
+_FEWEST = 3
+
+
+@dataclass(frozen=True, eq=False)
+class HoldReadings(Readings):
+    """A held spin, each array of shape (n,).
+
+    Attributes:
+        time: [s].
+        spin, u: [Hz].
+        share: of the full amplitude.
+        gains: times [s] and counts [Hz] at the full amplitude.
+        warnings: about the run.
+    """
+
+    time: Array
+    spin: Array
+    u: Array
+    share: Array
+    gains: tuple[tuple[Array, Array], ...]
+    warnings: tuple[str, ...]
+
+    compared: ClassVar[tuple[str, ...]] = ("time", "share", "spin")
+
+
+def read_hold_file(path: Path, _: InputOptions) -> HoldReadings:
+    """Raise DoesNotSuit: a file has no gain."""
+    raise DoesNotSuit(f"{path}: a run folder of `levilab acquire hold` is expected: the gain stands in its events")
+
+
+def read_hold_run(run: Run, _: InputOptions) -> HoldReadings:
+    """Return the readings of a run.  Raises DataError."""
+    table = run.readings()
+    time, spin, u, volts = (
+        table.column(name) for name in ("time_s", "spin_frequency_hz", "spin_frequency_u_hz", "drive_amplitude_v")
+    )
+    if len(time) < _FEWEST:
+        raise TableError(table.path, f"holds {len(time)} readings, at least {_FEWEST} are needed: hold the spin longer")
+    settings = run.record.configuration.get("hold")
+    full = settings.get("drive_amplitude_vpp") if isinstance(settings, dict) else None
+    if not isinstance(full, int | float) or not full > 0:
+        raise DataError(f"{run.folder}/run.json: configuration.hold.drive_amplitude_vpp, above 0, is expected")
+    return HoldReadings(time, spin, u, volts / (full / 2), _gains(run), table.warnings)
+
+
+def _gains(run: Run) -> tuple[tuple[Array, Array], ...]:
+    found = []
+    for event in run.events():
+        if event["kind"] == RunEvent.GAIN:
+            try:
+                times, spins = (np.array(event.get(name), dtype=float) for name in ("times_s", "spins_hz"))
+            except (TypeError, ValueError):
+                continue
+            if times.shape == spins.shape and times.ndim == 1 and times.size > 2 and np.ptp(times) > 0:
+                found.append((times, spins))
+    return tuple(found)

@@ -1,0 +1,77 @@
+"""The drag at a held spin: its uncertainty against the scatter of trials, and the laws through several spins."""
+
+import numpy as np
+import pytest
+
+from analysis.held import fit_held, hold_of
+from analysis.spindown.drag import LAWS, spin
+from analysis.spindown.tilt import THESIS_TOP, count_of, slowing_by_tilt
+
+C, PULL, NOISE = 2.34e-4, 0.36, 0.03
+
+
+def drag_at(frequency):
+    return C * (2 * np.pi * frequency) ** 1.5 / (2 * np.pi)
+
+
+def trial(random, held=40.0, wander=0.0):
+    """A hold of 12 readings whose share wanders, and two gains at the full amplitude, integrated with the drag."""
+    step = 0.01
+    time = np.arange(0, 120, step)
+    share = drag_at(held) / PULL + wander * np.sin(2 * np.pi * time / 50)
+    moved = held + np.cumsum((share * PULL - drag_at(held)) * step)  # the drag's change within 0.1 Hz is 1e-3 of it
+    spins, shares, times = (x.reshape(12, -1).mean(axis=1) for x in (moved, share, time))
+    u = np.full(12, NOISE / np.sqrt(10))
+    gains = []
+    for _ in range(2):
+        late = np.arange(10.0) - 4.5
+        counts = held + (PULL - drag_at(held)) * late
+        gains.append((late, counts + NOISE * random.standard_normal(10)))
+    return hold_of(times, spins + u * random.standard_normal(12), u, shares, gains)
+
+
+def test_u_of_the_drag_predicts_the_scatter():
+    random = np.random.default_rng(1)
+    pulls = [(one.drag.value - drag_at(40.0)) / one.drag.u for one in (trial(random) for _ in range(600))]
+    assert abs(np.mean(pulls)) < 0.13  # 3 standard errors
+    assert np.std(pulls) == pytest.approx(1.04, abs=0.1)  # Student's 16 degrees of freedom, widened: 1.07/1.03
+
+
+def test_a_spin_that_moves_meanwhile_does_not_bias_the_drag():
+    random = np.random.default_rng(2)
+    found = [trial(random, wander=0.02).drag for _ in range(40)]
+    mean = np.mean([one.value for one in found])
+    assert mean == pytest.approx(drag_at(40.0), abs=3 * found[0].u / np.sqrt(40))
+
+
+def test_without_a_gain_there_is_no_drag():
+    ones = np.ones(4)
+    found = hold_of(np.arange(4.0), 40 * ones + [0, 0.01, 0, 0.01], 0.01 * ones, 0.95 * ones, [])
+    assert found.drag is None
+    assert found.share == pytest.approx(0.95)
+
+
+CONSTANTS = {"stokes": (3.2e-3,), "newton": (1.7e-5,), "disc": (C,), "mixed": (1.6e-3, 8e-6), "power": (C, 1.5)}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_drag_along_a_closed_form_gives_its_constants_back(law):
+    constants = CONSTANTS[law]
+    time = np.linspace(0, 150, 7)
+    spins = spin(law, time, 45.0, *constants)
+    drag = (spin(law, time - 0.01, 45.0, *constants) - spin(law, time + 0.01, 45.0, *constants)) / 0.02
+    fits = {one.name: one for one in fit_held(spins, drag, 1e-3 * drag)}
+    assert [one.value for one in fits[law].constants.values()] == pytest.approx(constants, rel=1e-4)  # differences
+    assert fits[law].drag(spins) == pytest.approx(drag, rel=1e-5)
+
+
+def test_the_tilt_changes_the_drag_as_the_count_of_a_spin_down_does():
+    delta, resonance, start = 0.03, 22.0, 40.0
+    law = LAWS["disc"]
+    q = law.dimensionless([start, C], start, 100.0)
+    tau = np.linspace(0, 1.9, 2000)
+    count = start * count_of(law, tau, np.array([*q, delta**2, resonance / start, 0.0]), THESIS_TOP)
+    drag = -np.gradient(count, tau * 100.0)
+    factor = drag / drag_at(count)
+    high = slice(10, np.argmax(count < 25.5))  # below, the fall is near
+    assert slowing_by_tilt(count, resonance, delta)[high] == pytest.approx(factor[high], abs=2e-4)  # by differences

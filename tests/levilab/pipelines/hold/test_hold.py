@@ -1,0 +1,82 @@
+"""Held spins: from run folders to the drag, the laws through several, and a spin-down beside them."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from levilab.errors import DataError
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.hold.figure import hold_figure
+from levilab.present.document.blocks import Tabular
+from support.paths import SAMPLE_DATA
+
+HOLD = ANALYSES["hold"]
+RUNS = sorted((SAMPLE_DATA / "hold").glob("*-hz"))
+#: The constant of the virtual top of seed 3, as its run.json says.
+C32 = 2.4355e-4
+
+
+def analyzed(paths=RUNS, **options):
+    return HOLD.analyze(paths, HOLD.options_from(options))
+
+
+def test_each_held_spin_gives_its_drag_and_several_the_law():
+    found = analyzed()
+    for run in found.runs:
+        truth = C32 * (2 * np.pi * run.spin.value) ** 1.5 / (2 * np.pi)
+        assert abs(run.drag.value - truth) < 4 * run.drag.u
+        assert run.drag.u < 0.02 * truth
+    best = found.combined.laws[0]
+    assert best.name == "disc"
+    assert abs(best.constants["c32"].value - C32) < 4 * best.constants["c32"].u
+    assert "disc is the best" in found.text
+
+
+def test_a_spin_down_is_compared_and_its_tilt_counts():
+    found = analyzed(spindown=SAMPLE_DATA / "spin-down-1")  # of another top, whose constant is 2.371e-4
+    (disc,) = (one for one in found.combined.compared if one.law == "disc")
+    assert disc.pull == pytest.approx((disc.held.value - 2.371e-4) / np.hypot(disc.held.u, disc.spindown.u), abs=0.3)
+    assert "DISAGREES with" in found.text
+    tilted = analyzed(spindown=SAMPLE_DATA / "spin-down-1")
+    assert all(0.8 < one < 1.2 for one in tilted.combined.factors)
+
+
+def test_a_result_is_as_the_interface_has_it(tmp_path):
+    found = analyzed(spindown=SAMPLE_DATA / "spin-down-1")
+    document = HOLD.document(found, tmp_path)
+    assert document["analysis"] == "hold"
+    assert document["best_model"] == "disc"
+    assert document["values"]["c32"]["unit"] == "(rad/s)^-1/2/s"
+    assert document["values"]["c32_pull"]["value"] > 3
+    assert document["runs"][0]["values"]["drag"]["unit"] == "Hz/s"
+    assert json.loads(json.dumps(document)) == document
+    assert len(HOLD.budgets(found)) > 4
+
+
+def test_tables_figure_and_report_have_each_spin_and_law():
+    found = analyzed()
+    spins, laws = HOLD.tables(found)
+    assert len(spins.rows) == 4
+    assert {row.cells[0] for row in laws.rows} == {"stokes", "newton", "disc", "mixed", "power"}
+    assert hold_figure(found).axes[0].get_xlabel() == "spin  [Hz]"
+    assert any(isinstance(block, Tabular) for block in HOLD.part(found).result)
+
+
+def test_a_single_hold_and_one_without_a_gain(tmp_path):
+    alone = analyzed(RUNS[:1])
+    assert {law.name for law in alone.combined.laws} == {"stokes", "newton", "disc"}
+    shutil.copytree(RUNS[0], tmp_path / "run")
+    (tmp_path / "run" / "events.jsonl").write_text('{"kind": "gain measured", "text": "", "times_s": [1]}\n')
+    found = analyzed([tmp_path / "run"])
+    assert found.runs[0].drag is None
+    assert any("no drag follows" in text for text in found.all_warnings)
+    assert not found.combined.laws
+    hold_figure(found)
+
+
+def test_a_file_has_no_gain_and_is_refused(tmp_path):
+    shutil.copy(RUNS[0] / "readings.csv", tmp_path / "a.csv")
+    with pytest.raises(DataError, match="a run folder of `levilab acquire hold` is expected"):
+        analyzed([tmp_path / "a.csv"])
