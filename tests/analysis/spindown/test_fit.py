@@ -131,7 +131,7 @@ def test_without_stated_uncertainties_the_intervals_cover_as_students_t(law, fit
 
 
 def likelihood(fit, u):
-    """Return −2 ln of the greatest likelihood of a law: dense matrices, s at its mode, a mean over τ."""
+    """Return −2 ln of the greatest likelihood of a law: dense matrices, s at its mode, Cox and Reid's mean over τ."""
     p, (frequency, _) = len(fit.law.parameters), fit.reference
     scale = np.ones(T.size) if u is None else np.full(T.size, u)
     slopes = np.array([
@@ -139,14 +139,16 @@ def likelihood(fit, u):
         for step in np.diag(values(fit)) * 1e-4
     ]) / scale  # fmt: skip
     own, freedom = fit.residuals / scale, 0 if u is None else 8
-    chances = []
+    chances, known = [], []
     for tau in 10 ** np.linspace(-1, 1, 9):
         r = np.exp(-np.abs(np.subtract.outer(T, T)) / (10 * tau))
         w = np.linalg.inv(r)
         e = own - slopes.T @ np.linalg.solve(slopes @ w @ slopes.T, slopes @ w @ own)
         s2 = (freedom + e @ w @ e) / (T.size + freedom)
         total = T.size + freedom
-        chances.append(np.exp(-(total * np.log(s2) + total + np.linalg.slogdet(r)[1]) / 2))
+        at_mode = (freedom + e @ w @ e) / (T.size - p + freedom)
+        known.append(np.linalg.slogdet(slopes @ w @ slopes.T / at_mode)[1])
+        chances.append(np.exp(-(total * np.log(s2) + total + np.linalg.slogdet(r)[1] + known[-1] - known[0]) / 2))
     assert frequency > 0
     assert p == len(slopes)
     return -2 * np.log(np.mean(chances))
