@@ -53,6 +53,15 @@ def test_the_end_of_a_line_scatters_about_the_fall_as_its_u_says(fresh):
     assert np.mean(np.abs(pulls) < 2) > 0.95 - 4 * np.sqrt(0.95 * 0.05 / 60)
 
 
+def test_a_jolt_at_the_fall_does_not_move_the_end_of_the_line(fresh):
+    moved = []
+    for _ in range(6):
+        times, field, _ = synthetic_flight(fresh, duration=50.0, up=(0.0, 34.3))
+        jolted = field + np.where(times < 34.3, 0, 6e-5)[:, None]
+        moved.append(track_of_field(times, jolted).flights[0].end - track_of_field(times, field).flights[0].end)
+    assert np.sqrt(np.mean(np.square(moved))) < 0.25  # half of a piece, in which a line keeps its phase
+
+
 def test_a_line_that_runs_through_half_the_rate_is_followed_there(fresh):
     track, pulls = follow(fresh, start_hz=57.0)
     assert np.abs(pulls).max() < 4
@@ -72,6 +81,14 @@ def test_two_tops_are_two_flights(fresh):
     assert [flight.ended for flight in track.flights] == [True, True]
     starts = [track.frequency[flight.first] for flight in track.flights]
     assert starts == pytest.approx([27.5, 35.4], abs=0.3)
+
+
+def test_a_flight_begins_where_the_one_before_has_ended(fresh):
+    rest, again = {"duration": 51.0, "up": (0, 48.0), "start_hz": 32.6}, {"duration": 50.0, "up": (0, 40.0)}
+    first, second = synthetic_flight(fresh, **rest), synthetic_flight(fresh, **again, start_hz=28.3)
+    times = np.concatenate([first[0], first[0][-1] + 0.01 + second[0] - second[0][0]])
+    one, two = track_of_field(times, np.concatenate([first[1], second[1]])).flights
+    assert one.end <= two.start  # their lines differ by 0.3 Hz there
 
 
 def test_a_record_without_a_top_is_refused(fresh):

@@ -161,6 +161,11 @@ def test_washers_on_the_top_are_not_changed_for_others_of_the_same_mass() -> Non
     assert advise(owner, 21.0).text.startswith("Leave the washers as they are")
 
 
+def test_of_washers_that_promise_nearly_the_same_the_fewest_are_changed() -> None:
+    owner = Owner(24.9 * G, (0.1 * G, 0.05 * G, 0.05 * G, 0.02 * G))
+    assert advise(owner, 21.0).text.startswith("Put on the 0.1 g washer:")  # 0.02 g more promise less than 2 % more
+
+
 # --- the scan ---
 
 
