@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from typing import TYPE_CHECKING
@@ -26,7 +27,19 @@ from analysis.spindown import drag
 row = drag._of_power("turbulent", "9/5", "the spin to the power 9/5, as of turbulent air")
 drag.LAWS = MappingProxyType({**drag.LAWS, row.name: row})
 """
-ANALYZE = "from levilab.cli.start import main; sys.exit(main())"
+#: Several commands in one process, which shares imports and kernels; no test looks at the trials of this report.
+COMMANDS = """
+import json
+from pathlib import Path
+sys.path.append("tests")
+from support.commands import command
+from support.trials import with_few_trials
+with with_few_trials():
+    for words in json.loads(sys.argv[1]):
+        ended = command(*words, cwd=Path.cwd())
+        assert ended.status == 0, ended.err
+        print(ended.out)
+"""
 LIVE = """
 import numpy as np
 from levilab.live.running import spin_down
@@ -66,21 +79,23 @@ def test_a_new_law_is_one_row_from_the_fit_to_every_page(tmp_path: Path) -> None
     data = tmp_path / "turbulent.csv"
     rows = [f"{a},{b},0.01" for a, b in zip(t, frequency, strict=True)]
     data.write_text("\n".join(["time_s,spin_frequency_hz,spin_frequency_u_hz", *rows]))
-    shown = with_turbulent_law(ANALYZE, "analyze", "spindown", "--tilt", "none", str(data))
+    page, many = tmp_path / "report.html", tmp_path / "many.csv"
+    commands = (
+        ("analyze", "spindown", "--tilt", "none", data),
+        ("report", data, "--tables", "-o", page),
+        ("analyze", "spindown", SAMPLE_DATA, data, "--table", many, "--cores=1"),
+    )
+    shown = with_turbulent_law(COMMANDS, json.dumps(commands, default=str))
     assert "C₉/₅ = " in shown
     assert "(rad/s)^−4/5/s" in shown
     assert "ω^−4/5" in shown
     # the free exponent contains it, so that a tie of the two decides for it
     assert "turbulent law fits best" in " ".join(shown.split())
     assert (tmp_path / "turbulent.csv.spindown.png").exists()
-    page = tmp_path / "report.html"
-    with_turbulent_law(ANALYZE, "report", str(data), "--tables", "-o", str(page))
     assert "turbulent" in page.read_text(encoding="utf-8")
     tables = {file.name: file.read_text(encoding="utf-8") for file in (tmp_path / "report.tables").iterdir()}
     assert "turbulent_c95_per_rad_s_4_5_per_s" in tables["spindown-inputs.csv"]
     assert "turbulent" in tables["spindown-laws.tex"]
-    many = tmp_path / "many.csv"
-    with_turbulent_law(ANALYZE, "analyze", "spindown", str(SAMPLE_DATA), str(data), "--table", str(many), "--cores=1")
     assert "turbulent_c95_u_per_rad_s_4_5_per_s" in many.read_text()
 
 
