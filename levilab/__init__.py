@@ -33,7 +33,7 @@ __all__ = ["LevilabError", "acquire", "analyze", "load", "simulate"]
 
 
 def acquire(
-    experiment: Literal["spin", "trace", "field", "limit", "precession", "hold"],
+    experiment: Literal["spin", "trace", "field", "limit", "precession", "hold", "sway"],
     *,
     mock: bool = False,
     bench: str | PathLike[str] | None = None,

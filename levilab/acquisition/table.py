@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field, create_model
 
 from levilab.acquisition.experiment import CounterSettings, Experiment
-from levilab.acquisition.experiments import field, hold, limit, precession, spin, trace
+from levilab.acquisition.experiments import field, hold, limit, precession, spin, sway, trace
 from levilab.bench.config import BenchConfig
 from levilab.bench.template import Setting, SettingsTable
 
@@ -27,6 +27,7 @@ EXPERIMENTS: dict[str, Experiment[Any]] = {
         limit.EXPERIMENT,
         precession.EXPERIMENT,
         hold.EXPERIMENT,
+        sway.EXPERIMENT,
     )
 }
 

@@ -44,6 +44,7 @@ class Bench:
     Attributes:
         clock: of the bench.
         instruments: the open ones by kind.
+        camera: see `Wiring`; None on a real bench, whose films are files.
         trigger: the edge that starts the generator's bursts, None: no wire leads to its trigger input.
         counter, generator, oscilloscope, magnetometer: the same, for the kinds that were opened.
     """
@@ -54,7 +55,7 @@ class Bench:
     magnetometer: Magnetometer
 
     def __init__(self, wiring: Wiring) -> None:
-        self.clock = wiring.clock
+        self.clock, self.camera = wiring.clock, wiring.camera
         generator = wiring.instruments.get(GENERATOR.name)
         self.trigger = generator.trigger if generator else None
         self.instruments: dict[str, Instrument] = {}

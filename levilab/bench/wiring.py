@@ -13,6 +13,9 @@ from levilab.bench.person import Person, ask_no_person
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from levilab.bench.config import BenchConfig
     from levilab.telemetry.messages import Poses
 
@@ -29,7 +32,8 @@ class Wiring:
 
     instruments: kind → model and address, for those that the bench has; limits: what the coil stands; library:
     PyVISA's, or a virtual one; clock: of the bench; count_with: the kind of instrument that counts; person: who stands
-    at it; poses: of a virtual bench: first time [s], step [s], number → where its top is, for a view.
+    at it; poses: of a virtual bench: first time [s], step [s], number → where its top is, for a view; camera: the
+    same → the places of that top in films from above and from the side, shape (n, 3) [m].
     """
 
     instruments: Mapping[str, InstrumentSettings]
@@ -39,6 +43,7 @@ class Wiring:
     count_with: str = "counter"
     person: Person = ask_no_person
     poses: Callable[[float, float, int], Poses] | None = None
+    camera: Callable[[float, float, int], NDArray[np.float64]] | None = None
 
     def describe(self, kind: str) -> InstrumentSettings:
         """Return the settings of an instrument, of the one that counts for a counter.

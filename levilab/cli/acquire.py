@@ -29,6 +29,7 @@ EXPERIMENT_HELP = {
     "field": "Hall scan: the base's flux density on its axis, at one height after the other.",
     "limit": "Limits of the spin, top after top: where a free top falls, or with --upper where a driven one is lost.",
     "hold": "A held spin: a drive that the top triggers holds it for hours, and its amplitude shows the drag.",
+    "sway": "Sway, with --mock: films of a free top and its spin; a real top's film is for levilab analyze video.",
     "precession": "Precession: sweep the drive, and count at each frequency how often the stem cuts a laser beam.",
 }
 #: Option → the setting that it stands for, as --set takes it; only this experiment has the option.

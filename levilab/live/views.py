@@ -25,6 +25,7 @@ class View:
 VIEWS = {
     "spin": View("time_s", "spin_frequency_hz"),
     "hold": View("time_s", "spin_frequency_hz"),
+    "sway": View("time_s", "spin_frequency_hz"),
     "limit": View("time_s", "spin_frequency_hz", y_label="limit of the spin"),
     "precession": View("drive_frequency_hz", "precession_frequency_hz", "drive", "precession"),
     "field": View("height_m", "flux_density_t", "height", "flux density"),

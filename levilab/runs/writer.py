@@ -39,14 +39,14 @@ from levilab.runs.run import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from instruments.drivers.oscilloscope import Trace
     from levilab.runs.run import Run, Status
 
 #: Files that grow line by line, kept in memory to be written again.
-_KEPT = (READINGS, EVENTS, traces.INDEX)
+_KEPT = (READINGS, STATES, EVENTS, traces.INDEX)
 #: Errors that free space would mend.
 _FULL = frozenset(getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG") if hasattr(errno, name))
 
@@ -225,6 +225,12 @@ class RunWriter:
             for line in lines:
                 self._append(STATES, line, sync=False)
             self._files[STATES].sync()
+
+    def film(self, lines: Sequence[str]) -> None:
+        """Append rows of a film's track to states.csv, on the disk and kept as readings are.  Raises CannotWrite."""
+        with _explain_errors(f"write {STATES}", self.folder):
+            self._append(STATES, "\n".join(lines))
+            self._rescue_if_lost()
 
     def trace(self, time_s: float, trace: Trace, channel: str) -> int:
         """Keep an oscilloscope's record; returns its number.  Raises CannotWrite."""
@@ -564,7 +570,9 @@ def _datapackage(folder: Path, record: RunRecord) -> str:
             data = path.read_bytes()
             about = {"path": name, "name": name.replace(".", "-").replace("/", "-"), "bytes": len(data)}
             about["hash"] = "sha256:" + hashlib.sha256(data).hexdigest()
-            resources.append(about | ({"schema": {"fields": fields}} if name in {READINGS, STATES} else {}))
+            # the fields are those of the readings, or else of the states
+            described = name == READINGS or (name == STATES and not (folder / READINGS).exists())
+            resources.append(about | ({"schema": {"fields": fields}} if described else {}))
     package = {
         "name": folder.name.lower(),
         "title": f"levilab {record.experiment} run",

@@ -100,6 +100,24 @@ class PickupCoil:
         return np.asarray(self.amplifier * self.turns * self.area_m2 * np.diff(field) / step)
 
 
+@dataclass(frozen=True)
+class Camera:
+    """Films of the top from above and from the side, followed as `levilab analyze video` does.
+
+    Attributes:
+        noise_m: error of a coordinate in a frame [m].
+    """
+
+    world: World
+    noise_m: float = 1e-4
+
+    def __call__(self, start: float, step: float, n: int) -> Array:
+        """Return the places of the top at start + step·k, shape (n, 3) [m]; NaN where none is up."""
+        poses = self.world.poses(start, step, n)
+        noise = np.random.default_rng((self.world.seed, round(start / step))).standard_normal((n, 3))
+        return np.where(poses.up[:, None], poses.position + self.noise_m * noise, np.nan)
+
+
 def scope_signals(world: World) -> dict[int, Callable[[float, float, int], Array]]:
     """Return the signals of an oscilloscope's channels.
 
@@ -189,7 +207,8 @@ def virtual_wiring(world: World, limits: Limits | None = None, models: Mapping[s
     library = library_for(virtual_bus(world, models))
     instruments = virtual_instruments(models)
     person, poses = VirtualPerson(world), world.poses
-    return Wiring(instruments, limits or Limits(), library, world.clock, person=person, poses=poses)
+    films = Camera(world)
+    return Wiring(instruments, limits or Limits(), library, world.clock, person=person, poses=poses, camera=films)
 
 
 class VirtualPerson:

@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 SWAY = "sway"
 NEEDS = Needs(
     analysis=SWAY,
-    experiments=frozenset({"simulate"}),
+    experiments=frozenset({"simulate", "sway"}),
     read_file=read_track_file,
     read_run=read_motion_run,
     data=STATES,
     particular=True,
-    wanted="track of x and y over time, or a simulated motion",
+    wanted="track of x and y over time, a sway run, or a simulated motion",
 )
 #: A split of fewer standard uncertainties excludes nothing; a ratio that is more of them from 1 disagrees.
 _ENOUGH = 3.0

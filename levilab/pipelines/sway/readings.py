@@ -65,13 +65,18 @@ def _with_spin_beside(path: Path, readings: SwayReadings) -> SwayReadings:
     if not (path.name.endswith(_TRACKS) and beside.exists()):
         return readings
     table = read_table(beside, quantities=("time_s", "spin_frequency_hz"), needed=("time_s", "spin_frequency_hz"))
+    return _with_spin(readings, table)
+
+
+def _with_spin(readings: SwayReadings, table: Table) -> SwayReadings:
     spin = np.interp(readings.time, table.column("time_s"), table.column("spin_frequency_hz"))
     return replace(readings, spin=spin, warnings=(*readings.warnings, *table.warnings))
 
 
 def read_motion_run(run: Run, _: InputOptions) -> SwayReadings:
-    """Return the track of a simulated motion."""
-    return _readings(read_run_readings(run.folder / STATES, QUANTITIES))
+    """Return the track of a film with the counter's spins, or of a simulated motion."""
+    readings = _readings(read_run_readings(run.folder / STATES, QUANTITIES))
+    return readings if readings.spin is not None else _with_spin(readings, run.readings())
 
 
 def _readings(table: Table) -> SwayReadings:

@@ -50,18 +50,8 @@ def refusal(*words, scene=None):
 
 
 def test_the_scenes_that_ship_are_known_by_name():
-    names = [
-        "driven",
-        "friction",
-        "loose-washers",
-        "motor",
-        "practice",
-        "precession",
-        "ramp",
-        "spindown",
-        "tilted",
-        "undriven",
-    ]
+    names = ["driven", "friction", "loose-washers", "motor", "practice", "precession", "ramp", "spindown", "sway",
+             "tilted", "undriven"]  # fmt: skip
     assert presets() == names
 
 
