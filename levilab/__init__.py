@@ -151,6 +151,7 @@ def analyze(
     moment_a_m2: float | None = None,
     scan: str | PathLike[str] | None = None,
     spin_hz: float | None = None,
+    spindown: str | PathLike[str] | None = None,
 ) -> AnalysisResult:
     """Analyze runs, data files or DataFrames.  Nothing is written; `save(folder)` of the result does.
 
@@ -182,6 +183,7 @@ def analyze(
         moment_a_m2: moment of the top [A m²]; the angle of its tilt follows (spin).
         scan: a Hall scan of the base, a run or a file (sway).
         spin_hz: spin of the top where no column has it [Hz] (sway).
+        spindown: a spin-down of the same top, a run or a file, that is compared (hold).
 
     Returns:
         The result: `values`, `verdict`, `warnings`, `summary()`, `to_dataframe()`, `plot()`, `save(folder)`.
