@@ -44,18 +44,22 @@ SLOW = """
     test_browser.py
     test_documentation.py
 """
+#: Files with tests of ten seconds and more: they go first of all, so that at the end no worker waits for another's.
+LONGEST = """
+    levilab/live/test_practice.py  levilab/live/test_open.py  levilab/reproduce/test_run.py  test_documentation.py
+"""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what is slow, and let it go first: at the end no worker waits for another's long test."""
+    """Mark what is slow, and let it go first, the longest before the others."""
     tests = Path(__file__).parent
-    slow = [(tests / name).resolve() for name in SLOW.split()]
-    assert all(path.exists() for path in slow), "SLOW in tests/conftest.py names a file that is gone"
+    slow, longest = ([(tests / name).resolve() for name in names.split()] for names in (SLOW, LONGEST))
+    assert all(path.exists() for path in slow + longest), "tests/conftest.py names a file that is gone"
     is_slow = functools.cache(lambda file: any(file.is_relative_to(path) for path in slow))
     for item in items:
         if is_slow(item.path):
             item.add_marker(pytest.mark.slow)
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    items.sort(key=lambda item: (item.path not in longest, item.get_closest_marker("slow") is None))
 
 
 def pytest_collection_finish() -> None:
