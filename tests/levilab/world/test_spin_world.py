@@ -499,7 +499,8 @@ def second_channel(top, at):
         (SQUARE + "TRIG:SOUR BUS;:BURS:NCYC 2;STAT ON;:OUTP ON", [0.1, 0.6], [0, 0]),
         (SQUARE + "TRIG:SOUR BUS;:BURS:NCYC 2;STAT ON;:OUTP ON;*TRG", [0.1, 0.6, 1.1, 2.1], [2, -2, 2, 0]),
         ("FUNC SIN;FREQ 1;VOLT 4;TRIG:SOUR BUS;:BURS:NCYC 2;PHAS 90;STAT ON;:OUTP ON;*TRG", [0.0, 0.5], [2, -2]),
-        (SQUARE + "BURS:MODE GAT;STAT ON;:OUTP ON", [0.1, 0.6], [0, 0]),
+        # the tape's pulse opens the gate for whole cycles
+        (SQUARE + "BURS:MODE GAT;STAT ON;:OUTP ON", [0.1, 0.6], [2, -2]),
         (SQUARE + "BURS:MODE GAT;GATE:POL INV;:BURS:STAT ON;:OUTP ON", [0.1, 0.6], [2, -2]),
     ],
 )  # fmt: skip
