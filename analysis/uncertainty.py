@@ -3,6 +3,7 @@
 Source: JCGM 100:2008 (GUM) for the words; Bates & Watts, Nonlinear Regression Analysis (1988), §2.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,14 @@ Array = NDArray[np.float64]
 
 #: Of the numbers: what these differ by less is the computer's, and no scatter of theirs.
 ROUNDING = 64 * float(np.finfo(float).eps)
+
+#: u that was given is believed within a quarter of it: as of 8 degrees of freedom (GUM G.4.2).
+BELIEVED = 8.0
+
+
+def partly_believed(chi_square: float, freedom: int) -> float:
+    """Return the factor of standard uncertainties that were given, from χ² and its degrees of freedom."""
+    return math.sqrt((chi_square + BELIEVED) / (freedom + BELIEVED))
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError, TooFewReadings
+from analysis.uncertainty import BELIEVED
 
 Array = NDArray[np.float64]
 
@@ -23,8 +24,6 @@ Array = NDArray[np.float64]
 FEWEST = 3
 #: A χ² less probable than this is named.
 NO_FIT = 1e-3
-#: u of points is believed within a quarter of it: as of 8 degrees of freedom (GUM G.4.2).
-BELIEVED = 8.0
 #: Confidence of the bands.
 CONFIDENCE = 0.95
 #: York's iteration ends at this relative change of the slope.  It takes 5 to 10 rounds; after a hundred it has failed.

@@ -24,9 +24,10 @@ from analysis.errors import ShapesDiffer, TooFewReadings
 from analysis.field.errors import ImpossibleRing
 from analysis.field.magnet import axial_field, stiffnesses
 from analysis.stability import SymmetricTop, windows
+from analysis.sway.joint import Corrections, Joint, fit_together
 from analysis.sway.lines import vertical_swing
 from analysis.sway.orbit import NoSwing, slow_swings, small_swings
-from analysis.uncertainty import Estimate, propagate
+from analysis.uncertainty import Estimate, partly_believed, propagate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,8 +53,6 @@ LEAN_U = 0.3
 #: The precession's frequency is that of small swings: relative standard uncertainty of B′/2B from it, per square of the
 #: swings' amplitudes [1/m²].
 PRECESSION_SHIFT_U = 1e3
-#: u of the lines is believed within a quarter of it: as of 8 degrees of freedom (GUM G.4.2).
-BELIEVED = 8.0
 #: A line that is so much weaker than a swing is not taken for it; the split over the spin scatters by this
 #: part in a spin-down.
 _WEAK, _BENT = 0.1, 0.05
@@ -77,7 +76,7 @@ class Known:
 
     Attributes:
         top: its moment is not used, but the one that carries the weight at the height at which the top floats.
-        mass_u, axial_u: standard uncertainties of mass [kg] and I₃ [kg m²].
+        mass_u, axial_u, transverse_u: standard uncertainties of mass [kg], I₃ and I₁ [kg m²].
         ring: of the base; of its strength the sign counts alone.
         covariance: of thickness, inner and outer radius, shape (3, 3) [m²].
         magnet: of the top, a disc; None: a point.
@@ -89,6 +88,7 @@ class Known:
     ring: Ring
     covariance: Array
     magnet: Disc | None = None
+    transverse_u: float = 0.0
 
     @cached_property
     def field(self) -> AxialField:
@@ -156,6 +156,7 @@ class Geometry:
         heights: at which α₋α₊ is as seen, shape (n,) [m].
         splits, expected: of small swings, as seen and as `predicted` has them, shape (n,) [Hz].
         chi_square: Σ((share − measured)/u)².
+        joint: all lines fitted together to the quartic.
     """
 
     spin: float
@@ -176,6 +177,7 @@ class Geometry:
     splits: Array
     expected: Array
     chi_square: float
+    joint: Joint
 
 
 def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) -> Geometry:
@@ -224,6 +226,8 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
         "lean": LEAN_U * lean * abs(value),
     }
     u = math.hypot(*parts.values())
+    far = np.array([PRECESSION_SHIFT_U * float(np.sum(one.amplitude[:2] ** 2)) for one in swings])
+    less = Corrections(shifts, leans, SHIFT_U, LEAN_U, far, np.abs(seen) * resonance + mistaken, MOTION_U)
     measured = Estimate(value, u, "Hz")
     of_base, predicted, parts_predicted = _predict(each, heights, known)
     share = (predicted.value or 0.0) / REFERENCE_HZ
@@ -246,6 +250,7 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
         splits=(1 + leans) * seen,
         expected=np.array([_split(share, *row, known)[0] for row in zip(spin, small, strict=True)]),
         chi_square=chi_square,
+        joint=fit_together(swings, spin, heights, known, less),
     )
 
 
@@ -254,8 +259,7 @@ def _mean(values: Array, u: Array) -> tuple[float, float, float]:
     weight = 1 / u**2
     mean = float(np.average(values, weights=weight))
     chi_square = float(np.sum(weight * (values - mean) ** 2))
-    scale = math.sqrt((chi_square + BELIEVED) / (values.size - 1 + BELIEVED))
-    return mean, scale / math.sqrt(float(np.sum(weight))), chi_square
+    return mean, partly_believed(chi_square, values.size - 1) / math.sqrt(float(np.sum(weight))), chi_square
 
 
 def _assigned(swings: Sequence[Swings], spin: Array, known: Known) -> tuple[Sequence[Swings], float]:

@@ -269,8 +269,7 @@ def _fit(t: Array, s: Places, start: Array, slopes_start: Array) -> tuple[Swings
         slopes -= linear @ np.linalg.solve(normal, linear.conj().T @ slopes)
         information = (slopes.conj().T @ slopes).real / noise**2
         gradient = (slopes.conj().T @ rest).real / noise**2
-        expected = vertical_swing(frequency[0], frequency[1])
-        prior[-1, :2] = -prior[-1, -1] * frequency[1::-1] / expected
+        expected = vertical_swing(frequency[0], frequency[1])  # its own slopes would move the swings by 1e-6 Hz
         off = np.append(slope / _SLOPES_U[:count], (rise - expected) * prior[-1, -1])
         information += prior.T @ prior
         gradient -= prior.T @ off

@@ -58,7 +58,7 @@ def known_of(source: Source[SwayReadings], options: SwayOptions) -> tuple[Known,
     top = SymmetricTop(m, i1, i3, -1.0, device.gravity_m_s2)
     size = device.top.magnet_radius_m, device.top.magnet_height_m
     magnet = None if size[0] is None else Disc(size[0], size[1] or 0.0)
-    return Known(top, mass.u or 0.0, axial.u or 0.0, ring, covariance, magnet), notes
+    return Known(top, mass.u or 0.0, axial.u or 0.0, ring, covariance, magnet, transverse.u or 0.0), notes
 
 
 def _base(device: Device, scan: Path | None) -> tuple[Ring | None, np.ndarray]:

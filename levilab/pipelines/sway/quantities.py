@@ -16,6 +16,9 @@ QUANTITIES = (
     Quantity("gradient_of_base", "1/m", "B′/2B of the base where the top floats", "B′/2B of the base", of="of_base"),
     Quantity("split_significance", "1", "split over its standard uncertainty", "split over its u", of="against_null",
              has_u=False),
+    Quantity("joint_ratio", "1", "measured over predicted, of all lines fitted together",
+             "measured/predicted, all lines", of="joint.ratio"),
+    Quantity("joint_gradient", "1/m", "B′/2B of all lines fitted together", "B′/2B by all lines", of="joint.gradient"),
     Quantity("windows", "1", "windows in which the swings stand out", of=lambda found: float(len(found.shares)),
              has_u=False),
 )  # fmt: skip

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from levilab.formats.columns import TableError
+from levilab.formats.columns import NoSuchColumn, TableError
 from levilab.formats.table import read_run_readings, read_table
+from levilab.formats.understanding import Request, plan_of
 from levilab.pipelines.sources import Readings
 from levilab.runs.run import STATES
 
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 #: Columns of a table that are looked at, and those without which it is no track.
 QUANTITIES = ("time_s", "x_m", "y_m", "spin_frequency_hz")
 NEEDED = QUANTITIES[:3]
+#: Of a magnetometer's record.
+_FIELD = ("time_s", "flux_density_x_t", "flux_density_y_t")
 #: How the names of a film's track and of its spin end.
 _TRACKS, _SPIN = ".tracks.csv", ".spin.csv"
 #: A top that is farther from the axis has left the field [m]: beyond, the unit is most likely another one.
@@ -54,9 +57,26 @@ class SwayReadings(Readings):
 
 def read_track_file(path: Path, options: InputOptions) -> SwayReadings:
     """Return the track in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
-    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=False)
+    try:
+        table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=False)
+    except NoSuchColumn as missing:
+        raise (_field_alone(path) or missing) from None
     readings = _readings(table)
     return readings if readings.spin is not None else _with_spin_beside(path, readings)
+
+
+def _field_alone(path: Path) -> NoSuchColumn | None:
+    """Return the error for a table of a magnetic field; None for any other."""
+    try:
+        plan_of(path, Request({}, _FIELD, _FIELD, guess=False))
+    except TableError:
+        return None
+    return NoSuchColumn(
+        path,
+        "holds the magnetic field: it gives the frequencies of the swings, not their size, nor the tilt of the "
+        "precession, which the split is corrected by; move the top by a known distance to learn how many µT a "
+        "millimetre makes, and write columns x [mm] and y [mm], or film the top",
+    )
 
 
 def _with_spin_beside(path: Path, readings: SwayReadings) -> SwayReadings:

@@ -22,7 +22,8 @@ _VALUES = (
     f"{VALUE_U} Ω_g/2π is what the split would be of small swings of a slow top, brought to a spin of 30 Hz: the "
     "frequencies are corrected for the size of the swings and of the precession. Predicted: (I₃ω₃/m)(B′/2B)² with the "
     "form of the base's field at the height at which the swings are as fast as seen; neither the strength of the base "
-    "nor the moment of the top is needed."
+    "nor the moment of the top is needed. All lines: swings and precession of all windows as roots of one "
+    "quartic; the ratio is the part of the angular momentum that the slow swings carry along."
 )
 
 

@@ -1,5 +1,7 @@
 """Slow swings in a place over time, their shift at finite amplitude, and geometric magnetism."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -63,6 +65,14 @@ def test_a_line_of_the_vertical_swing_beside_the_backward_one_is_none_of_it(fres
     assert abs(found.frequency[0] + 0.5945) < 4 * found.u[0]
 
 
+def test_the_vertical_swing_is_that_of_the_lines_beside(fresh):
+    times = np.arange(2400) / 120
+    places = swing(times, (-0.5945, 0.7400)) + 1e-4 * np.exp(2j * np.pi * (0.74 + 1.23) * times)
+    places += 1e-4 * (fresh.normal(size=times.size) + 1j * fresh.normal(size=times.size))
+    # the usual field has 1.198 Hz, with u of 0.03 Hz; a line of this strength is known to 1 mHz
+    assert swings_of(times, places)[0].vertical == pytest.approx(1.23, abs=0.004)
+
+
 def test_a_mirrored_view_is_known_by_the_precession(fresh):
     times = np.arange(2400) / 120
     places = swing(times, (-0.59, 0.77)) + 1e-4 * (fresh.normal(size=2400) + 1j * fresh.normal(size=2400))
@@ -122,7 +132,7 @@ def known(mass):
 
 @pytest.mark.slow
 def test_tops_in_full_motion_have_the_split_that_is_predicted(fresh):
-    pulls, u = [], []
+    pulls, u, together = [], [], []
     for mass in (0.02502, 0.02508, 0.02526, 0.02530, 0.02534):
         start = {"top.mass_kg": mass, "start.place": "equilibrium", "start.spin_hz": 40.0}
         height = simulate(preset("undriven").changed(start), 0.01, rate=None).position[0, 2]
@@ -138,16 +148,21 @@ def test_tops_in_full_motion_have_the_split_that_is_predicted(fresh):
         truth = 1.731314e-6 * 30.0 / mass * (slope / (2 * b)) ** 2
         pulls.append((found.measured.value - truth) / found.measured.u)
         u.append(found.measured.u / truth)
+        together.append((found.joint.ratio.value - 1) / found.joint.ratio.u)
         assert found.against_null > 30
         # what floats lower by its swings and by its precession sways as there
         assert found.predicted.value == pytest.approx(truth, rel=4e-3)
-    assert np.abs(pulls).max() < 3
+    assert max(np.abs(pulls).max(), np.abs(together).max()) < 3
     assert np.median(u) < 0.003
     assert max(u) < 0.035  # of 25.26 g, near the meeting of beat and vertical swing
 
 
 def lines(slow, u=3e-4):
     return Swings(0.0, np.array(slow), np.full(2, u), np.full(2, 1e-5), 1.2, np.zeros((2, 3)), 1e-4, 0.0)
+
+
+def three_lines(frequencies):
+    return replace(lines(frequencies), u=np.full(3, 3e-4), amplitude=np.full(3, 1e-5))
 
 
 @pytest.mark.parametrize("split", [-0.02, 0.0, 0.02])
@@ -157,6 +172,7 @@ def test_a_split_of_either_sign_is_told_with_its_u(split):
     assert 0 < found.measured.u < 1e-3
     assert (abs(found.against_null) > 0.1) == bool(split)  # without one nothing stands against the null
     assert abs(found.ratio.value) < 0.15
+    assert found.joint.ratio.value == pytest.approx(found.ratio.value, rel=0.1, abs=1e-4)
 
 
 @pytest.mark.parametrize("which", [0, 1])
@@ -180,3 +196,28 @@ def test_the_roots_of_the_quartic_give_back_its_gradient():
     assert found.gradient.value == pytest.approx(abs(slope / (2 * b)), rel=1e-4)
     assert found.of_base.value == pytest.approx(abs(slope / (2 * b)), rel=1e-5)
     assert found.ratio.value == pytest.approx(1, abs=2e-4)
+    assert found.joint.ratio.value == pytest.approx(1, abs=2e-4)
+    assert found.joint.gradient.value == pytest.approx(abs(slope / (2 * b)), rel=1e-5)
+
+
+@pytest.mark.parametrize("axial", [1.70e-6, 1.731314e-6])
+def test_all_lines_together_correct_what_is_known_but_not_exactly(axial):
+    spins = np.array([25.0, 30.0, 40.0])
+    seen = []
+    for spin in spins:
+        found = sorted(modes(field, TOP, HEIGHT, spin).real, key=abs)[:3]
+        seen.append(three_lines([*sorted(found[:2]), found[2]]))
+    body = replace(known(0.02526), top=replace(TOP, axial=axial), covariance=np.zeros((3, 3)), axial_u=4e-8)
+    joint = geometric_magnetism(seen, spins, body).joint
+    assert joint.axial.value == pytest.approx(1.731314e-6, abs=3 * joint.axial.u)
+    assert joint.axial.u < 1e-8  # slow swings give the height, and precessions at three spins I₃
+    assert joint.ratio.value == pytest.approx(1, abs=3 * joint.ratio.u)
+    assert joint.chi_square < 4  # no noise, and a prior that is 0.8 u off
+
+
+def test_the_shift_by_the_size_of_the_swings_is_in_u_by_its_part():
+    swings = [replace(lines((-0.59, 0.77)), amplitude=np.full(2, 1e-3), vertical=3.0)]  # far from the beat
+    found = geometric_magnetism(swings, np.array([30.0]), known(0.02526))
+    (shift,) = np.abs(found.shifts.sum(axis=1))
+    assert shift > 5e-4
+    assert found.parts["amplitude"] == pytest.approx(0.035 * shift, rel=0.1)  # Ω_g is the split but for some percent

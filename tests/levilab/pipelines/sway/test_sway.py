@@ -69,6 +69,21 @@ def test_without_a_spin_nothing_is_said_and_an_option_gives_it(found, tmp_path):
     assert abs(geometry.measured.value - TRUE_HZ) < 3 * geometry.measured.u
 
 
+def test_a_record_of_the_field_is_refused_with_the_reason(tmp_path):
+    rows = [(f"{k / 100:.2f}", f"{np.sin(k / 9):.3f}", f"{np.cos(k / 9):.3f}", "40.0") for k in range(300)]
+    titles = ("Time (s)", "Magnetic field x (µT)", "Magnetic field y (µT)", "Magnetic field z (µT)")
+    with pytest.raises(DoesNotSuit, match="how many µT a millimetre makes"):
+        analyze(write(tmp_path / "phone.csv", titles, rows), device=DEVICE, spin_hz=35.0)
+
+
+def test_all_lines_together_agree_with_the_split(found):
+    joint = found.runs[0].geometry.joint
+    assert abs(joint.ratio.value - 1) < 3 * joint.ratio.u
+    # its height is that at which a top floats lower by its swings, as B′/2B of the base is
+    assert joint.gradient.value == pytest.approx(found.runs[0].geometry.of_base.value, rel=2e-3)
+    assert joint.chi_square < joint.freedom + 4 * np.sqrt(2 * joint.freedom)  # 4 standard deviations of χ²
+
+
 def test_a_mark_on_the_end_of_the_stem_is_noticed(tmp_path):
     rows = rows_of(TRACK)[:1200]
     t = np.array([float(r["t [s]"]) for r in rows])
