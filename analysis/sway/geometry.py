@@ -14,16 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping  # noqa: TC003 - the types of a result are read when it runs
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import ShapesDiffer, TooFewReadings
-from analysis.field.errors import ImpossibleRing
-from analysis.field.magnet import axial_field, stiffnesses
-from analysis.stability import SymmetricTop, windows
 from analysis.sway.joint import Corrections, Joint, fit_together
 from analysis.sway.lines import vertical_swing
 from analysis.sway.orbit import NoSwing, slow_swings, small_swings
@@ -32,9 +28,7 @@ from analysis.uncertainty import Estimate, partly_believed, propagate
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from analysis.field.magnet import Disc
-    from analysis.field.ring import Ring
-    from analysis.stability import AxialField
+    from analysis.sway.known import Known
     from analysis.sway.lines import Swings
 
 Array = NDArray[np.float64]
@@ -60,79 +54,12 @@ _WEAK, _BENT = 0.1, 0.05
 _VERTICAL_U_HZ = 0.015
 #: The spin at which Ω_g is given [Hz].
 REFERENCE_HZ = 30.0
-#: Tops float between these heights above the upper face, in outer radii.
-_FLOATING = (0.05, 4.0)
 #: Step of the slopes by the ring's sizes, in their standard uncertainties.
 _STEP = 0.1
 #: Without a split the factor is that of this Ω_g/ω₃, a hundredth of the usual one.
 _SMALL = 1e-4
 #: Rounds in which Ω_g and the factor between split and Ω_g are computed from each other; each gains three digits.
 _ROUNDS = 4
-
-
-@dataclass(frozen=True)
-class Known:
-    """What is known of the top and of the base.
-
-    Attributes:
-        top: its moment is not used, but the one that carries the weight at the height at which the top floats.
-        mass_u, axial_u, transverse_u: standard uncertainties of mass [kg], I₃ and I₁ [kg m²].
-        ring: of the base; of its strength the sign counts alone.
-        covariance: of thickness, inner and outer radius, shape (3, 3) [m²].
-        magnet: of the top, a disc; None: a point.
-    """
-
-    top: SymmetricTop
-    mass_u: float
-    axial_u: float
-    ring: Ring
-    covariance: Array
-    magnet: Disc | None = None
-    transverse_u: float = 0.0
-
-    @cached_property
-    def field(self) -> AxialField:
-        """Heights, shape (n,) [m] → the field that the upright magnet feels and four derivatives, shape (5, n)."""
-        return axial_field(self.ring, self.magnet, 5)
-
-    @cached_property
-    def heights(self) -> tuple[float, float]:
-        """The heights at which a top floats, and half of them more below, for large swings [m].
-
-        Raises ImpossibleRing where it floats nowhere.
-        """
-        face = self.ring.origin + self.ring.thickness / 2
-        low, high = (face + share * self.ring.outer_radius for share in _FLOATING)
-        found = windows(self.field, replace(self.top, moment=-math.copysign(1.0, self.ring.strength)), low, high)
-        if not found:
-            raise ImpossibleRing(inner=self.ring.inner_radius, outer=self.ring.outer_radius)
-        return found[-1].low - (found[-1].high - found[-1].low) / 2, found[-1].high
-
-    def top_at(self, height: float) -> SymmetricTop:
-        """Return the top with the moment that carries its weight at a height [m]."""
-        moment = self.top.mass * self.top.gravity / float(self.field(np.array([height]))[1, 0])
-        stiffness = None if self.magnet is None else stiffnesses(self.ring, self.magnet, moment)
-        return replace(self.top, moment=moment, stiffnesses=stiffness)
-
-    def gradient(self, height: float) -> float:
-        """Return B′/2B at a height; of a disc E_xθ/E_θθ [1/m]."""
-        tilt, _, both = self.top_at(height).stiffness(self.field, np.array([height]))[:, 0]
-        return abs(float(both / tilt))
-
-    def height(self, swings: Swings, spin: float) -> float:
-        """Return the height at which α₋α₊ of small swings is as seen [m].  Raises NoSwing."""
-        from scipy.optimize import brentq
-
-        product = float(swings.frequency[0] * swings.frequency[1])
-
-        def excess(z: float) -> float:
-            return math.prod(small_swings(self.field, self.top_at(z), z, spin)) - product
-
-        try:
-            return float(brentq(excess, *self.heights, xtol=1e-7))
-        except ValueError:
-            amplitudes = float(swings.amplitude[0]), float(swings.amplitude[1])
-            raise NoSwing(amplitudes=amplitudes, spin=spin) from None
 
 
 @dataclass(frozen=True, eq=False)

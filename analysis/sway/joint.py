@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from analysis.stability import SymmetricTop
-    from analysis.sway.geometry import Known
+    from analysis.sway.known import Known
     from analysis.sway.lines import Swings
 
 Array = NDArray[np.float64]
