@@ -154,7 +154,7 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
     }
     u = math.hypot(*parts.values())
     far = np.array([PRECESSION_SHIFT_U * float(np.sum(one.amplitude[:2] ** 2)) for one in swings])
-    less = Corrections(shifts, leans, SHIFT_U, LEAN_U, far, np.abs(seen) * resonance + mistaken, MOTION_U)
+    less = Corrections(shifts, leans, LEAN_U, far, np.abs(seen) * resonance + mistaken + SHIFT_U * shift, MOTION_U)
     measured = Estimate(value, u, "Hz")
     of_base, predicted, parts_predicted = _predict(each, heights, known)
     share = (predicted.value or 0.0) / REFERENCE_HZ

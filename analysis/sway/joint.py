@@ -2,7 +2,7 @@
 
 Each window has a height of its own; mass, I₁, I₃ and the sizes of the base are common, and the moment is the one that
 carries the weight.  The slow swings have the angular momentum ρ I₃ω₃: ρ = 1 is geometric magnetism, 0 the null, without
-a split.  The precession has I₃ω₃.  What the corrections may be off by, as of `geometry`, is a parameter each.
+a split.  The precession has I₃ω₃.  What the corrections may be off by is a parameter, or part of u of the split.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _ROUNDS = 12
 _STEP_M = 1e-4
 #: Parameters before the heights: ρ − 1 in parts of a thousand; the others in their standard uncertainties.
 _STEP = 1e-3  # of the slopes
-_COMMON = ("ratio", "mass", "transverse", "axial", "size 1", "size 2", "size 3", "shift", "lean", "precession")
+_COMMON = ("ratio", "mass", "transverse", "axial", "size 1", "size 2", "size 3", "lean", "precession")
 _RATIO_STEP = 1e-3
 
 
@@ -43,7 +43,7 @@ class Corrections:
     Attributes:
         shifts: of the slow swings at finite amplitude, shape (n, 2) [Hz].
         leans: parts by which the precession makes the split smaller, shape (n,).
-        shift_u, lean_u: the relative standard uncertainties of both.
+        lean_u: their relative standard uncertainty.
         precession_u: relative standard uncertainty of the precession's frequency in each window, shape (n,).
         split_u: standard uncertainty of each split beside that of its lines, alike in all windows, shape (n,) [Hz].
         motion_u: relative standard uncertainty of ρ from changes within a window.
@@ -51,7 +51,6 @@ class Corrections:
 
     shifts: Array
     leans: Array
-    shift_u: float
     lean_u: float
     precession_u: Array
     split_u: Array
@@ -126,18 +125,17 @@ def fit_together(swings: Sequence[Swings], spin: Array, heights: Array, known: K
     owners = [np.full(min(one.frequency.size, 3), k) for k, one in enumerate(swings)]
 
     def residuals(q: Array) -> Array:
-        ratio, shift, lean, late = 1 + _RATIO_STEP * q[0], *q[7:count]
+        ratio, lean, late = 1 + _RATIO_STEP * q[0], *q[7:count]
         here, found = suited(q), []
         for k, (one, nu) in enumerate(zip(swings, spin.tolist(), strict=True)):
             z = float(heights[k] + _STEP_M * q[count + k])
             top = here.top_at(z)
             carried = ratio * (1 - (1 + less.lean_u * lean) * less.leans[k])
             expected = _slow_roots(top, top.stiffness(here.field, np.array([z]))[:, 0], carried * nu)
-            seen = one.frequency[:2] - (1 + less.shift_u * shift) * less.shifts[k]
+            seen = one.frequency[:2] - less.shifts[k]
             off = seen - expected
             split_u = math.hypot(one.u_split, math.sqrt(len(swings)) * less.split_u[k])  # no smaller in the mean
-            # sum and difference: what adds to u of the split leaves the other alone
-            found += [(off[0] + off[1]) / split_u, (off[1] - off[0]) / one.u_split]
+            found += [(off[0] + off[1]) / split_u, (off[1] - off[0]) / split_u]
             if one.frequency.size > 2:
                 line = sorted(modes(here.field, top, z, nu).real.tolist(), key=abs)[2]
                 line *= 1 + less.precession_u[k] * late
