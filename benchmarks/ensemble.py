@@ -9,11 +9,12 @@ NUMBA_CPU_NAME=haswell, NUMBA_CPU_FEATURES=+avx2,+fma,+avx,+bmi2 and an XDG_CACH
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levilab.simulator import grid, preset, simulate_many
+from levilab.simulator import grid, preset, simulate, simulate_many
 from levilab.simulator.ensemble import integrate_in_lanes, runs_of
 from levilab.simulator.equilibrium import stability_of, windows_over
 from levilab.simulator.kernels.motion import R
@@ -30,7 +31,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 ROUNDS = 7
-UNDRIVEN, DRIVEN = preset("undriven"), preset("driven")
+UNDRIVEN, DRIVEN, MOTOR = preset("undriven"), preset("driven"), preset("motor")
+ALONE = {"sine": MOTOR.changed({"drive.waveform": "sine"}), "triggered": MOTOR}
 THOUSAND = {"start.spin_hz": np.linspace(25, 40, 1000)}
 LOCKS = grid({"drive.frequency_hz": np.linspace(28, 32, 16), "drive.amplitude_t": np.linspace(1e-4, 5e-4, 16)})
 MASSES = np.linspace(0.0245, 0.0256, 61)
@@ -104,6 +106,11 @@ def main() -> None:
             **{
                 f"128 driven tops, 10 s, {names}": observables(names)
                 for names in ("survived", "position_error_m", "height_spread_m", "locked", "lines")
+            },
+            **{
+                f"one top, 20 s, {name}, {key} {value:g}": partial(simulate, scene, 20.0, rate=None, **{key: value})
+                for key, value in (("tolerance", 1e-7), ("tolerance", 1e-9), ("tolerance", 1e-11), ("step", 1e-3))
+                for name, scene in ALONE.items()
             },
             "windows of 61 masses": lambda: windows_over(UNDRIVEN, MASSES),
             "the same, one by one": lambda: [stability_of(UNDRIVEN.changed({"top.mass_kg": m})) for m in MASSES],

@@ -51,6 +51,10 @@ _LEAST_GAIN_HZ, _GAINING = 0.15, 30
 #: Number of counts that show the gain at the full amplitude: 3 mHz/s of 0.2 Hz/s; a top that is held by more than this
 #: share of the amplitude gains too little for that.
 _GAIN_COUNTS, _MOST_SHARE = 10, 0.9
+#: Fewest counts on the way that show it: 13 mHz/s.
+_FEWEST_COUNTS = 4
+#: The pull changes by no more than this factor on the way to a spin: that of the lean is 2 from 30 to 80 Hz.
+_MOST_CHANGE = 3.0
 #: Least amplitude of the drive, as a share: no generator is near its own lowest one.
 _LEAST_SHARE = 0.01
 #: Where the pull was not found by trial: that of 0.4 mT on the thesis's top [Hz/s]; a factor of 3 does not matter.
@@ -124,7 +128,8 @@ class Motor:
         session: the acquisition.
         spin: the last count [Hz].
         phase: the start phase that speeds it up [°].
-        pull: rate that the full amplitude adds to its spin [Hz/s].
+        pull: rate that the full amplitude adds to its spin [Hz/s]; the less the faster, since a tilted top leans less.
+        drag: rate of its loss without a drive at the spin of the trials [Hz/s]; None where there were none.
         share: of the full amplitude that holds it, as the loop has found.
         counts: its spin while it was held [Hz].
         shares: of the full amplitude, at each of the counts.
@@ -135,6 +140,7 @@ class Motor:
     spin: float
     phase: float
     pull: float
+    drag: float | None = None
     share: float = 1.0
     counts: list[float] = field(default_factory=list)
     shares: list[float] = field(default_factory=list)
@@ -142,6 +148,7 @@ class Motor:
     _missed: int = 0
     _trend: float = 0.0  # of the spin [Hz/s]
     _errors: float = 0.0  # summed [Hz s]
+    _drag_at: float = 0.0  # spin of the trials [Hz]
     _base: float = 1.0  # share of the amplitude without errors
 
     # --- the generator ---
@@ -188,7 +195,7 @@ class Motor:
         """Try start phases, and choose the one that speeds the top up.  Raises DidNotFollow, NotHeld."""
         session = self.session
         prepare_counter_again(session, GATE_S)
-        lines = []
+        lines, means = [], []
         for k, phase in enumerate(_PHASES):
             session.progress(f"start phase {phase:g}°: how the spin answers", k / len(_PHASES))
             self._turn_to(phase)
@@ -198,11 +205,13 @@ class Motor:
                 spins.append(self.count(GATE_S))
                 times.append(session.now())
             lines.append(slope_of(times, spins))
+            means.append(np.mean(spins))
         prepare_counter_again(session)
         slopes, scatters, spreads = zip(*lines, strict=True)
         scatter = math.sqrt(float(np.mean(np.square(scatters))))
         found = response(slopes, scatter / min(spreads))
         self.phase, self.pull = found.phase, found.pull
+        self.drag, self._drag_at = max(found.drag, 0.0), float(np.mean(means))
         if found.pull < _CLEAR * found.u:
             raise _no_pull(session, found)
         self._turn_to(self.phase)
@@ -232,6 +241,7 @@ class Motor:
         self.gains.append((times, spins))
         text = f"gains {slope_of(times, spins)[0]:.3f} Hz/s at the full amplitude, about {np.mean(spins):.2f} Hz"
         self.session.event(RunEvent.GAIN, text, times_s=times, spins_hz=spins)
+        self.pull = max(slope_of(times, spins)[0] / (1 - share), self.pull / _MOST_CHANGE)
         self._trend = 0.0
         self._set_share(_LEAST_SHARE)
         while self.spin > target:
@@ -265,6 +275,11 @@ class Motor:
         self._trend = 0.0
         if brakes:
             self._turn_to(self.phase)
+        latest = slice(max(1, len(spins) - _GAIN_COUNTS), None)  # the first count was not under this drive
+        if self.drag is not None and len(spins[latest]) >= _FEWEST_COUNTS:
+            gain, _, _ = slope_of(times[latest], spins[latest])
+            pull = sign * (gain + self.drag * (self.spin / self._drag_at) ** 1.5)
+            self.pull = min(max(pull, self.pull / _MOST_CHANGE), self.pull * _MOST_CHANGE)
         self._set_share(sign - gain / self.pull)  # drag over pull, for gain = sign · pull − drag
 
     def climb(self, highest: float) -> Climb:

@@ -72,8 +72,8 @@ def reproduce(
         str | None,
         typer.Option(
             metavar="CHAPTER,…",
-            help="These chapters alone: stability, limits, paths, driven, spindown, statistics, dipole, errata, "
-            "beyond, simon, gans.",
+            help="These chapters alone: stability, limits, paths, driven, drive, spindown, statistics, dipole, "
+            "errata, beyond, simon, gans.",
         ),
     ] = None,
     as_json: Json = False,

@@ -1,4 +1,8 @@
-"""Why the thesis stopped at 61 Hz: the pull of its drive against drag and ramp, the swing, and loose washers."""
+"""Why the thesis stopped at 61 Hz: the pull of its drive against drag and ramp, the swing, and loose washers.
+
+The numbers that were computed apart are those of a top that only spins, so they are compared without the lean.  What is
+said about the thesis is of a top that leans in step with its moment, as the simulated one does.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +38,7 @@ _CONSTANTS = np.array([one.value for one in several("thesis", "spindown.c32")])
 DRAG, DRAG_U = float(_CONSTANTS.mean()), float(_CONSTANTS.std(ddof=1))
 
 
-def driven(field: float, ramp: float, *, leans: bool = False) -> Driven:
+def driven(field: float, ramp: float, *, leans: bool = True) -> Driven:
     """Return the thesis's top, its moment tilted as in its driven runs, under a drive of this amplitude [T]."""
     scene = preset("driven")
     across = scene.top.moment_tilt[0] * abs(scene.top.moment_a_m2)
@@ -56,19 +60,23 @@ def field_for(spin: float, ramp: float) -> float:
 
 
 def crossings() -> list[Finding]:
-    """Compare the crossings of the drive's pull and the load with those that were computed apart."""
-    pull = driven(FIELD_T, 0.0)
+    """Compare the crossings of the drive's pull and the load with those that were computed apart, without the lean."""
+    pull = driven(FIELD_T, 0.0, leans=False)
     share = 2 / 3 * DRAG_U / DRAG  # ν goes with C^(−2/3); a top's constant is known as well as they scatter
-    found = [check("pull of the drive on the spin, 0.4 mT", THESIS["drive.pull"], pull.strongest / (2 * math.pi))]
+    found = [
+        check(
+            "pull of the drive on the spin, 0.4 mT, without lean", THESIS["drive.pull"], pull.strongest / (2 * math.pi)
+        )
+    ]
     for key, field, ramp in (
         *((f"still_{1e4 * field:02.0f}", field, 0.0) for field in FIELDS_T),
         *((f"ramp_{1e3 * ramp:03.0f}", FIELD_T, ramp) for ramp in RAMPS if ramp),
     ):
-        spin = driven(field, ramp).highest()
+        spin = driven(field, ramp, leans=False).highest()
         found.append(
             check(
                 f"spin at which {f'drag and a ramp of {ramp:g} Hz/s' if ramp else 'drag'} takes all of the pull of "
-                f"{1e3 * field:.1f} mT",
+                f"{1e3 * field:.1f} mT, without lean",
                 THESIS[f"drive.{key}"],
                 spin,
                 u=share * spin,
@@ -81,10 +89,9 @@ def about_61() -> list[Finding]:
     """State the consequences of 61 Hz and 66 Hz for the drive."""
     still, ramp = driven(FIELD_T, 0.0), driven(FIELD_T, 0.1)
     shares = [100 * one.load(HIGHEST_HZ) / one.pull(HIGHEST_HZ) for one in (still, driven(FIELD_T, 0.05), ramp)]
-    swings = (0.1, 0.2)
+    swings = (0.2, 0.4)
     lost = [ramp.highest_with_swing(swing, START_HZ) for swing in swings]
-    leaning = driven(FIELD_T, 0.0, leans=True)
-    leans = [driven(FIELD_T, one, leans=True).highest() for one in RAMPS]
+    spins = [[driven(FIELD_T, one, leans=leans).highest() for one in RAMPS] for leans in (True, False)]
     fields, loose = ([1e3 * field_for(spin, one) for one in RAMPS] for spin in (HIGHEST_HZ, LOOSE_HZ))
     edge = known(stability_of(preset("undriven")).floating).spins[0][1]
     return [
@@ -94,10 +101,10 @@ def about_61() -> list[Finding]:
             "there is no reason for this to occur at the upper frequency limit",
             f"the window of small motions ends at {edge:.1f} Hz. At 61 Hz drag takes {shares[0]:.0f} % of what a drive "
             f"of 0.4 mT gives, with a ramp of 0.05 or 0.1 Hz/s {shares[1]:.0f} or {shares[2]:.0f} %",
-            holds=edge > HIGHEST_HZ + 15 and shares[0] < 80 and 90 < shares[2] < 100,
+            holds=edge > HIGHEST_HZ + 15 and shares[0] < 70 and 80 < shares[2] < 90,
         ),
         statement(
-            "a swing about the drive costs the rest",
+            "a swing about the drive costs some of it",
             THESIS["measured.highest"].place,
             "",
             f"at 0.4 mT and 0.1 Hz/s a top is lost at {ramp.highest():.1f} Hz; one that swings about the drive by "
@@ -108,18 +115,21 @@ def about_61() -> list[Finding]:
             "a top that leans in step with its moment is pulled more",
             THESIS["measured.highest"].place,
             "",
-            f"the lean adds {100 * (leaning.pull(HIGHEST_HZ) / leaning.strongest - 1):.0f} % to the moment across the "
+            f"the lean adds {100 * (still.pull(HIGHEST_HZ) / still.strongest - 1):.0f} % to the moment across the "
             "axis at 61 Hz: a top that does not swing reaches "
-            + ", ".join(f"{spin:.1f} Hz ({one:g} Hz/s)" for spin, one in zip(leans, RAMPS, strict=True))
-            + " at 0.4 mT, where creeps in full motion end (benchmarks/upper_limit.py)",
-            holds=leans[0] > leans[1] > leans[2] > HIGHEST_HZ,
+            + ", ".join(
+                f"{spin:.1f} instead of {other:.1f} Hz ({one:g} Hz/s)"
+                for spin, other, one in zip(*spins, RAMPS, strict=True)
+            )
+            + " at 0.4 mT. Locked tops in full motion have this pull within 0.02 % at 60, 66 and 72 Hz, and creeps end "
+            "there (benchmarks/upper_limit.py)",
+            holds=all(spin > other for spin, other in zip(*spins, strict=True)) and spins[0][-1] > HIGHEST_HZ,
         ),
         statement(
-            "the field for which 61 Hz is the end, without swing or lean",
+            "the field for which 61 Hz is the end, without a swing",
             THESIS["measured.highest"].place,
             "",
-            ", ".join(f"{field:.2f} mT ({one:g} Hz/s)" for field, one in zip(fields, RAMPS, strict=True))
-            + "; the lean takes a seventh off",
+            ", ".join(f"{field:.2f} mT ({one:g} Hz/s)" for field, one in zip(fields, RAMPS, strict=True)),
             holds=all(0.2 < field < 0.5 for field in fields),
         ),
         statement(
@@ -128,7 +138,7 @@ def about_61() -> list[Finding]:
             "",
             "washers that slip damp the swing about the drive. In full motion (0.4 mT, 0.1 Hz/s, 24.3 g) three starts "
             "end at 64.0, 66.9 and 69.1 Hz with fixed washers, all at 70.0 to 70.1 Hz with loose ones "
-            "(benchmarks/upper_limit.py). Without swing or lean 66 Hz is the end for "
+            "(benchmarks/upper_limit.py). Without a swing 66 Hz is the end for "
             + ", ".join(f"{field:.2f} mT ({one:g} Hz/s)" for field, one in zip(loose, RAMPS, strict=True)),
             holds=all(field > other for field, other in zip(loose, fields, strict=True)),
         ),
@@ -148,7 +158,7 @@ def make() -> Found:
     picture = Picture(
         "drive",
         "The drive, not stability, ended the thesis's climb.",
-        "Left: what drives of 0.3 to 0.6 mT can add to the spin in a second (level lines), and what drag and a ramp "
+        "Left: what drives of 0.3 to 0.6 mT can add to the spin in a second (falling lines), and what drag and a ramp "
         "take (rising lines; the bands are the scatter of the drag between runs); dots: where all is taken. Right: the "
         "spin at which a drive of 0.4 mT loses a top that swings about it where the ramp begins, without and with the "
         "lean of the top. Dotted: the thesis's 61 Hz, and 66 Hz with loose washers; shaded: beyond the window of small "
@@ -167,12 +177,12 @@ def make() -> Found:
     note = Note(
         "Not known: the field of the thesis's coil at the top (0.4 mT is that of its simulations), how its knob was "
         "turned, how the top swung, and which washers were loose. A field of 0.25 to 0.4 mT, a ramp up to 0.1 Hz/s "
-        "and a swing of some 0.1 Hz give 61 Hz in many combinations: it was the drive, but which of them it was cannot "
+        "and a swing up to 0.4 Hz give 61 Hz in many combinations: it was the drive, but which of them it was cannot "
         "be said. "
         "The drag is that of a laminar disc, measured below 40 Hz and continued."
     )
     said = (
-        "The drive can add no more than μδB₀/(2I₃) to the spin, and drag and the ramp take it. Where they take all, "
-        "the top is left behind."
+        "The drive can add no more than μδB₀/(2I₃)/(1 − (ν_r/ν)²) to the spin, with the resonance ν_r of its wobble, "
+        "and drag and the ramp take it. Where they take all, the top is left behind."
     )
     return Found((*crossings(), *about_61()), (picture, note), said)

@@ -422,9 +422,9 @@ def drive_figure(
     edge = known(stability_of(preset("undriven")).floating).spins[0][1]
     spins, turn = np.linspace(30.0, 105.0, 151), 2 * math.pi
     for field in fields:
-        pull = driven(field, 0.0).strongest / turn
-        left.axhline(pull, color=GREY, linewidth=1)
-        left.annotate(f"{1e3 * field:.1f} mT", (31, pull), va="bottom", fontsize=SMALL)
+        pull = np.array([driven(field, 0.0).pull(spin) for spin in spins]) / turn
+        left.plot(spins, pull, color=GREY, linewidth=1)
+        left.annotate(f"{1e3 * field:.1f} mT", (spins[30], pull[30]), va="bottom", fontsize=SMALL)
     for ramp, colour in zip(ramps, (BLUE, GREEN, VERMILION), strict=True):
         tops = [driven(field, ramp) for field in fields]
         load = np.array([tops[0].load(spin) for spin in spins]) / turn
@@ -432,7 +432,11 @@ def drive_figure(
         scatter = spread * (load - ramp)
         left.fill_between(spins, load - scatter, load + scatter, color=colour, alpha=0.2, linewidth=0)
         left.plot(
-            [one.highest() for one in tops], [one.strongest / turn for one in tops], "o", color=colour, markersize=4
+            [one.highest() for one in tops],
+            [one.pull(one.highest()) / turn for one in tops],
+            "o",
+            color=colour,
+            markersize=4,
         )
         for leans, style in ((False, "-"), (True, "--")) if ramp else ():
             lost = [driven(4e-4, ramp, leans=leans).highest_with_swing(swing, start) for swing in swings]
@@ -443,7 +447,7 @@ def drive_figure(
     for spin in (HIGHEST_HZ, LOOSE_HZ):
         left.axvline(spin, color=BLACK, linewidth=0.8, linestyle=":")
         right.axhline(spin, color=BLACK, linewidth=0.8, linestyle=":")
-    left.set(xlabel="spin  [Hz]", ylabel="change of the spin  [Hz/s]", xlim=(30, 105), ylim=(0, 0.7))
+    left.set(xlabel="spin  [Hz]", ylabel="change of the spin  [Hz/s]", xlim=(30, 105), ylim=(0, 1.0))
     right.set(xlabel=f"swing about the drive at {start:g} Hz  [Hz]", ylabel="spin at the loss  [Hz]", ylim=(40, 85))
     left.legend(loc="lower right")
     right.legend(loc="lower left")

@@ -7,12 +7,14 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import cumulative_trapezoid, quad, solve_ivp
 
 from analysis.pull import Driven, action, barrier
 from analysis.stability import wobble_resonance
+from levilab.motion.lock import turns_behind
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset
+from levilab.simulator.single import simulate
 from support.paths import ROOT
 
 #: δ|μ|/(2I₃) of the thesis's device [rad s⁻² T⁻¹], and the disc's constant of its spin-downs.
@@ -84,6 +86,23 @@ def in_motion(entry: dict[str, object]) -> Driven:
     assert found.floating is not None
     resonance = wobble_resonance(found.field, found.top, found.floating.height)
     return Driven(PER_TESLA * float(entry["field_t"]), DRAG, float(entry["creep_hz_per_s"]), resonance)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("spin", [60.0, 72.0])
+def test_a_top_locked_in_full_motion_lags_as_one_that_leans(spin: float) -> None:
+    """What its spin gains and the drag takes, over the sine of the lag: the pull, however the top swings."""
+    drive = {"waveform": "sine", "amplitude_t": 4e-4, "frequency_hz": spin, "phase_rad": 3.7}
+    scene = preset("spindown").changed({"start.spin_hz": spin} | {f"drive.{key}": one for key, one in drive.items()})
+    motion = simulate(scene, 20.0, tolerance=1e-5, rate=1000.0)
+    lag, omega = 2 * math.pi * turns_behind(scene, motion.states), 2 * math.pi * motion.spin_hz
+    assert np.ptp(lag) < 2 * math.pi
+    sums = [
+        cumulative_trapezoid(one, motion.time, initial=0.0) for one in (np.cos(lag), np.sin(lag), DRAG * omega**1.5)
+    ]
+    found = np.linalg.lstsq(np.column_stack([*sums[:2], np.ones_like(lag)]), omega + sums[2], rcond=None)[0]
+    expected = in_motion({"field_t": 4e-4, "creep_hz_per_s": 0.0})
+    # 0.02 % in 40 s from a calm start; without the lean it would be 13 or 9 % less
+    assert math.hypot(*found[:2]) == pytest.approx(expected.pull(spin), rel=2e-3)
 
 
 def test_full_motion_ends_at_the_balance_where_the_ramp_is_slow() -> None:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 #: Fewest readings from which a scatter and a drag are estimated.
 _FEWEST = 3
-#: A top further from its spin [Hz] is not held: the wobble of a full motion leaves 0.3 Hz after the loop has settled,
+#: A top further from its spin [Hz] is not held: the wobble of a full motion leaves 0.1 Hz after the loop has settled,
 #: and a top whose pulses no longer come loses 1 Hz in some 6 s.
 _HELD_WITHIN_HZ = 1.0
 
