@@ -128,7 +128,7 @@ def load(path: str | PathLike[str]) -> Run:
 
 def analyze(
     data: Run | str | PathLike[str] | pd.DataFrame | Sequence[Run | str | PathLike[str] | pd.DataFrame],
-    kind: Literal["spindown", "spin", "field", "limit", "precession", "sway", "hold"] | None = None,
+    kind: Literal["spindown", "spin", "field", "limit", "precession", "sway", "hold", "video"] | None = None,
     *,
     columns: Mapping[str, str | int] | str | None = None,
     channel: str | None = None,
@@ -152,6 +152,13 @@ def analyze(
     scan: str | PathLike[str] | None = None,
     spin_hz: float | None = None,
     spindown: str | PathLike[str] | None = None,
+    rim_m: float | None = None,
+    base_m: float | None = None,
+    scale_m: float | None = None,
+    camera_m: float | None = None,
+    start_s: float | None = None,
+    stop_s: float | None = None,
+    line_time_s: float | None = None,
 ) -> AnalysisResult:
     """Analyze runs, data files or DataFrames.  Nothing is written; `save(folder)` of the result does.
 
@@ -162,7 +169,7 @@ def analyze(
         columns: of a file or a DataFrame, where titles are not known: {"t": "Zeit", "f": "Drehzahl [rpm]"}, or as text
             "t=Zeit,f=Drehzahl [rpm]"; numbers count columns from 1.
         channel: of a record with several (spindown, spin).
-        rate: samples per second [Hz], of files that do not say it (spindown, spin).
+        rate: samples per second [Hz], of files that do not say it (spindown, spin); pictures, in slow motion (video).
         reading_u: standard uncertainty of every reading [Hz], in the place of what the data say (spindown, limit,
             precession).
         keep_outliers: fit readings that look like miscounts, too (spindown, precession).
@@ -175,7 +182,7 @@ def analyze(
         height_u_m: standard uncertainty of it [m]; by default that of the scan's heights (field).
         free_radii: let the scan move the radii, within what the calliper says (field).
         clock_u: relative standard uncertainty of the clock that counts or samples, for the budgets (not field, sway).
-        near: about where the spin of a magnetometer's record is at first, to 10 % [Hz] (spindown, spin, limit).
+        near: about where the spin of a magnetometer's record is at first, to 10 % [Hz] (spindown, spin, limit, video).
         drive: frequency of the drive meanwhile, for whether the top is locked to it [Hz] (spin).
         distance_m: of a magnetometer from the top's axis, horizontally [m]; the moment's tilt follows (spin).
         distance_u_m: standard uncertainty of distance_m and below_m [m] (spin).
@@ -184,6 +191,13 @@ def analyze(
         scan: a Hall scan of the base, a run or a file (sway).
         spin_hz: spin of the top where no column has it [Hz] (sway).
         spindown: a spin-down of the same top, a run or a file, that is compared (hold).
+        rim_m: scale of a film: diameter of the top's rim [m] (video).
+        base_m: scale of a film: outer diameter of the base [m] (video).
+        scale_m: scale of a film: length of a pixel [m] (video).
+        camera_m: its distance from the base, with base_m and height_m, here of the rim [m] (video).
+        start_s: time in the film from which the top floats [s] (video).
+        stop_s: time until which [s] (video).
+        line_time_s: from a row of the sensor to the next one [s] (video).
 
     Returns:
         The result: `values`, `verdict`, `warnings`, `summary()`, `to_dataframe()`, `plot()`, `save(folder)`.

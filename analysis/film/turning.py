@@ -6,18 +6,15 @@ Times at even distances fold it: the spins that describe the phases as well are 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
+from numpy.typing import NDArray
 
 from analysis.errors import TooFewReadings
 from analysis.film.errors import NoMark
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 #: Spins with which a top floats, or is lost at, with room for a driven one [Hz].
 LOW, HIGH = 14.0, 75.0
@@ -51,7 +48,6 @@ class Turning:
     """How a top turned.
 
     Attributes:
-        turns: since the first picture, by picture, shape (n,); rising: in the sense of the phase.
         smooth: spin in each picture, a polynomial through the film, shape (n,) [Hz].
         time: middles of the readings of the spin, shape (m,) [s].
         spin: shape (m,) [Hz].
@@ -63,7 +59,6 @@ class Turning:
         u_chirp: [Hz/s].
     """
 
-    turns: Array
     smooth: Array
     time: Array
     spin: Array
@@ -162,7 +157,6 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, *, start: floa
         for part in _windows(times)
     ]).reshape(-1, 3)  # fmt: skip
     return Turning(
-        turns=turns - turns[0],
         smooth=np.asarray(speed),
         time=readings[:, 0],
         spin=readings[:, 1] + np.interp(readings[:, 0], times, speed),

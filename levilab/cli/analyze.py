@@ -69,6 +69,7 @@ COMMANDS = {
     "limit": "Limits of the spin, lower and upper: mean, scatter, trend and outliers, beside the window of the top.",
     "sway": "Slow swings of a floating top from x and y over time: their split, beside Berry's geometric magnetism.",
     "hold": "Held spins: the drag that the amplitude balances, drag laws through several, beside a spin-down's.",
+    "video": "Place, spin and fall of a top in a film from above, with the tables that other analyses read.",
     _EACH: "Each analysis that suits the runs or data files; --json prints a list where several suit.",
 }
 
@@ -156,7 +157,13 @@ def _command(options: Iterable[str]) -> Callable[..., None]:
 def _add(name: str, text: str) -> None:
     words = "levilab analyze" if name == _EACH else f"levilab analyze {name}"
     # a search of sample_data leaves these folders out
-    words += f" sample_data/{name}/" if name in {"sway", "hold"} else " sample_data/"
+    words += (
+        f" sample_data/{name}/"
+        if name in {"sway", "hold"}
+        else " IMG_0042.MOV --rim 30"
+        if name == "video"
+        else " sample_data/"
+    )
 
     @analyze_app.command(name, cls=Later, help=text, epilog=f"Example: {words}", hidden=name == _EACH)
     def command() -> Callable[..., None]:
@@ -165,18 +172,6 @@ def _add(name: str, text: str) -> None:
 
 for _name, _text in COMMANDS.items():
     _add(_name, _text)
-
-
-@analyze_app.command(
-    "video",
-    cls=Later,
-    help="A film of the top from above: place and spin at the times of its pictures, as tables for other analyses.",
-    epilog="Example: levilab analyze video IMG_0042.MOV --rim 30",
-)
-def _video() -> Callable[..., None]:
-    from levilab.cli.video import video
-
-    return video
 
 
 def _analyze(

@@ -46,6 +46,11 @@ from levilab.pipelines.sway.quantities import QUANTITIES as SWAY_QUANTITIES
 from levilab.pipelines.sway.quantities import SWAY_ROW
 from levilab.pipelines.sway.report import sway_part
 from levilab.pipelines.sway.table import sway_columns, sway_tables
+from levilab.pipelines.video.document import DOCUMENT as VIDEO
+from levilab.pipelines.video.quantities import QUANTITIES as VIDEO_QUANTITIES
+from levilab.pipelines.video.quantities import VIDEO_ROW
+from levilab.pipelines.video.report import video_part
+from levilab.pipelines.video.table import video_columns, video_files, video_tables
 from levilab.present.clock import moment
 from levilab.present.numbers import short_name
 
@@ -82,6 +87,7 @@ class Analysis(Generic[A]):
         columns: the readings of each input as columns of a table, with residuals.
         row: the columns that an input has as one row of a table of many.
         symbols: of its quantities, for people.
+        files: tables for other analyses that are saved with the result, by their names.
     """
 
     result: Document[Any, Any, Any, A, Any]
@@ -90,6 +96,7 @@ class Analysis(Generic[A]):
     columns: Callable[[A], Iterable[Mapping[str, np.ndarray]]]
     row: tuple[Column, ...] = ()
     symbols: Mapping[str, str] = field(default_factory=dict)
+    files: Callable[[A], Mapping[str, str]] = lambda _: {}
 
     @property
     def needs(self) -> Needs[Any]:
@@ -139,6 +146,7 @@ class Analysis(Generic[A]):
         from levilab.pipelines.spin.figure import spin_figure
         from levilab.pipelines.spindown.figure import spindown_figure
         from levilab.pipelines.sway.figure import sway_figure
+        from levilab.pipelines.video.figure import video_figure
 
         figures: dict[str, Callable[[Any], Figure]] = {
             "spindown": spindown_figure,
@@ -148,6 +156,7 @@ class Analysis(Generic[A]):
             "precession": precession_figure,
             "sway": sway_figure,
             "hold": hold_figure,
+            "video": video_figure,
         }
         return figures[self.name](found)
 
@@ -173,6 +182,7 @@ _TABLE: tuple[Analysis[Any], ...] = (
     ),
     Analysis(SWAY, sway_tables, sway_part, sway_columns, SWAY_ROW, symbols_of(SWAY_QUANTITIES)),
     Analysis(HOLD, hold_tables, hold_part, hold_columns, HOLD_ROW, symbols_of(HOLD_QUANTITIES)),
+    Analysis(VIDEO, video_tables, video_part, video_columns, VIDEO_ROW, symbols_of(VIDEO_QUANTITIES), video_files),
 )
 ANALYSES = MappingProxyType({analysis.name: analysis for analysis in _TABLE})
 

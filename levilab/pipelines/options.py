@@ -103,8 +103,17 @@ _DEVICE = _about(
     kind=Path, metavar="FILE", read=_read_device,
 )  # fmt: skip
 _NEAR = _about(
-    "About where the spin of a magnetometer's record is at first, to 10 %, where its samples leave a choice.",
+    "About where the spin is at first, to 10 %, where a magnetometer's samples or a film's pictures leave a choice.",
     kind=float, metavar="HZ", unit="Hz", above=0.0,
+)  # fmt: skip
+_RATE = _about(
+    "Samples per second, of files that do not say it, as .npy; goes before the file's.  Of a film in slow motion the "
+    "true number of pictures.",
+    kind=float, metavar="HZ", unit="Hz", above=0.0,
+)  # fmt: skip
+_HEIGHT = _about(
+    "Height at which the top floats; with a scan its moment follows, if its mass is known.  Of the rim, with --base.",
+    kind=float, metavar="MM", typed="height", unit="mm", factor=1e-3, low=-1.0, high=2.0,
 )  # fmt: skip
 _CLOCK_U = _about(
     "Relative standard uncertainty of the clock that counts or samples, as 2e-6, from its manual; the budgets show "
@@ -138,10 +147,7 @@ class RecordOptions(InputOptions):
     channel: str | None = field(default=None, metadata=_about(
         "Channel of a record with several, by its name or number.", metavar="NAME",
     ))  # fmt: skip
-    rate: float | None = field(default=None, metadata=_about(
-        "Samples per second, of files that do not say it, as .npy; goes before the file's.",
-        kind=float, metavar="HZ", unit="Hz", above=0.0,
-    ))  # fmt: skip
+    rate: float | None = field(default=None, metadata=_RATE)
 
 
 @dataclass(frozen=True)
@@ -196,10 +202,7 @@ class FieldOptions(InputOptions):
     """Options of scans of the field."""
 
     device: Device | None = field(default=None, metadata=_DEVICE)
-    height_m: float | None = field(default=None, metadata=_about(
-        "Height at which the top floats; its moment follows, if its mass is known.",
-        kind=float, metavar="MM", typed="height", unit="mm", factor=1e-3, low=-1.0, high=2.0,
-    ))  # fmt: skip
+    height_m: float | None = field(default=None, metadata=_HEIGHT)
     height_u_m: float | None = field(default=None, metadata=_about(
         "Standard uncertainty of --height.", default_text="that of the scan's heights", needs="height_m",
         kind=float, metavar="MM", typed="height_u", unit="mm", factor=1e-3, low=0.0, high=2.0,
@@ -254,6 +257,39 @@ class HoldOptions(InputOptions):
     ))  # fmt: skip
 
 
+def _length(help: str, typed: str) -> dict[str, Option]:  # noqa: A002 - as the attribute
+    return _about(help, kind=float, metavar="MM", typed=typed, unit="mm", factor=1e-3, above=0.0)
+
+
+@dataclass(frozen=True)
+class VideoOptions(InputOptions):
+    """Options of films of a top."""
+
+    rim_m: float | None = field(
+        default=None, metadata=_length("Scale: diameter of the top's rim, which is best.", "rim")
+    )
+    base_m: float | None = field(default=None, metadata=_length("Scale: outer diameter of a round base.", "base"))
+    scale_m: float | None = field(default=None, metadata=_about(
+        "Scale: metres in a pixel, at the top.", kind=float, metavar="M", typed="scale", unit="m", above=0.0,
+    ))  # fmt: skip
+    camera_m: float | None = field(
+        default=None, metadata=_length("With --base: distance of the camera from it.", "camera")
+    )
+    height_m: float | None = field(default=None, metadata=_HEIGHT)
+    start_s: float | None = field(default=None, metadata=_about(
+        "Time in the film from which the top floats.", kind=float, metavar="S", typed="start", unit="s", low=0.0,
+    ))  # fmt: skip
+    stop_s: float | None = field(default=None, metadata=_about(
+        "Time in the film until which it floats.", kind=float, metavar="S", typed="stop", unit="s", above=0.0,
+    ))  # fmt: skip
+    line_time_s: float | None = field(default=None, metadata=_about(
+        "Rolling shutter: µs from a row of the picture to the next.",
+        kind=float, metavar="US", typed="line_time", unit="us", factor=1e-6, low=0.0, high=1e-3,
+    ))  # fmt: skip
+    rate: float | None = field(default=None, metadata=_RATE)
+    near: float | None = field(default=None, metadata=_NEAR)
+
+
 def options_of(kind: type[InputOptions]) -> dict[str, Option]:
     """Return the options of an analysis by the names of their fields."""
     return {one.name: one.metadata["option"] for one in fields(kind) if "option" in one.metadata}
@@ -262,7 +298,7 @@ def options_of(kind: type[InputOptions]) -> dict[str, Option]:
 #: Name of the analysis → its options.
 KINDS: Mapping[str, type[InputOptions]] = MappingProxyType({
     "spindown": SpinDownOptions, "spin": SpinOptions, "field": FieldOptions, "precession": PrecessionOptions,
-    "limit": LimitOptions, "sway": SwayOptions, "hold": HoldOptions,
+    "limit": LimitOptions, "sway": SwayOptions, "hold": HoldOptions, "video": VideoOptions,
 })  # fmt: skip
 #: All options by the names of their fields.
 OPTIONS: Mapping[str, Option] = MappingProxyType(

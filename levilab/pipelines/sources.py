@@ -469,6 +469,8 @@ def _analysis_of(result: Path) -> str:
 
 #: How names of files begin that are not a person's.
 _OF_DESKTOPS = (".", "~$", "desktop.ini", "Thumbs.db", SKIP)
+#: Tables that are saved with the result of a film, and this: results, and no further inputs of a folder.
+_OF_FILM, _RESULT_OF_FILM = re.compile(r"(.+)\.(tracks|spin|limit)\.csv"), re.compile(r"(.+)\.\w+\.result\.video\.json")
 #: How names of files end that levilab writes beside what it reads.
 _RESULT, _CORRECTION = re.compile(r"result(\.\w+)?\.json$"), ".levilab.toml"
 
@@ -482,7 +484,9 @@ def _files(root: Path) -> list[Path]:
             below.clear()
             continue
         seen.add(real)
-        found += [Path(folder) / name for name in files if not name.startswith(_OF_DESKTOPS)]
+        films = {film[1] for name in files if (film := _RESULT_OF_FILM.fullmatch(name))}
+        own = {name for name in files if (table := _OF_FILM.fullmatch(name)) and table[1] in films}
+        found += [Path(folder) / name for name in files if name not in own and not name.startswith(_OF_DESKTOPS)]
     return found
 
 

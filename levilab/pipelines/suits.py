@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.errors import AnalysisError
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
+from levilab.files import replace_atomically, writing
 from levilab.pipelines import catalogue
 from levilab.pipelines.result import ResultError, is_of_another, read_inputs, results_in
 from levilab.pipelines.result import save as save_files
@@ -299,4 +300,9 @@ def save(analysis: Analysis[A], found: A, folder: Path | None = None, *, with_fi
     place = replace(found.place, folder=folder or found.output_folder)
     is_first = first[0] == analysis.name and not (folder and is_of_another(place.result(), analysis.name))
     picture = analysis.png(found) if with_figure else None
-    return save_files(analysis.result.of(found, place), place, picture, first=is_first)
+    written = save_files(analysis.result.of(found, place), place, picture, first=is_first)
+    for name, text in analysis.files(found).items():
+        written.append(place.folder / name)
+        with writing(f"the tables could not be written into {place.folder}"):
+            replace_atomically(written[-1], text)
+    return written

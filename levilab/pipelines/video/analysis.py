@@ -3,31 +3,45 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path  # noqa: TC003
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
+from analysis.film.circles import Circle  # noqa: TC001 - pydantic reads it
 from analysis.film.errors import NoMark, SlowMotion
 from analysis.film.mark import phases_of
-from analysis.film.turning import choices_of, spins_of_start, turning_of
+from analysis.film.turning import Turning, choices_of, spins_of_start, turning_of
+from analysis.limits import spin_at_fall
+from analysis.sway import swings_of
 from analysis.uncertainty import Estimate
-from levilab.errors import DataError, UsageError
+from levilab.errors import DataError, DoesNotSuit, UsageError
 from levilab.formats.film import Film, open_film
-from levilab.pipelines.sources import no_such_path
+from levilab.formats.kinds import AUDIO, kind_of_bytes
+from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.options import VideoOptions
+from levilab.pipelines.sources import Needs, Readings
 from levilab.pipelines.video.tracking import Followed, follow
+from levilab.present.numbers import with_uncertainty
+from levilab.present.progress import ShareBar
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from numpy.typing import NDArray
+    from collections.abc import Iterable, Iterator
+    from pathlib import Path
 
     from analysis.film.mark import Phases
-    from analysis.film.turning import Turning
+    from levilab.pipelines.options import InputOptions
+    from levilab.pipelines.sources import Source
+    from levilab.runs.run import Run
 
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
+#: First bytes by which the same film is found again.
+_HEAD = 4096
+#: Steps of the time that differ by less are even [ms].
+_EVEN_MS = 0.2
+#: Readings of the spin from which it is continued to a fall.
+_FEWEST = 3
 
 #: A film whose pictures were taken faster than they follow, by this factor, is in slow motion.
 _SLOWER = 1.2
@@ -41,48 +55,51 @@ _NEARER = 0.5
 _FALLS = 3.0
 
 
-@dataclass(frozen=True)
-class VideoOptions:
-    """How a film is read.
+#: A top that is farther out than this many times its usual distance from its mean place, and stays so, falls.
+_LEAVES = 2.0
+#: Share of the pictures in which it is nearer than the usual distance.
+_USUAL = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class FilmReadings(Readings):
+    """A film.
 
     Attributes:
-        start, stop: of the part with the floating top [s of the film].
-        rate: true number of pictures in a second; None: by the file's times.
-        near: about where the spin is [Hz].
-        line_time: from the reading of a row of the sensor to that of the next one [s].
-        scale: [m a pixel] at the top.
-        rim: diameter of the top's rim [m].
-        base: outer diameter of the base [m].
-        distance: of the camera from the base's upper edge [m].
-        height: of the rim above the base's upper edge [m].
+        film: its file, and what this states.
+        head: its first bytes and its size, by which the same film is found again.
+        warnings: about the file.
     """
 
-    start: float = 0.0
-    stop: float = np.inf
-    rate: float | None = None
-    near: float | None = None
-    line_time: float = 0.0
-    scale: float | None = None
-    rim: float | None = None
-    base: float | None = None
-    distance: float | None = None
-    height: float | None = None
+    film: Film
+    head: Array
+    warnings: tuple[str, ...] = ()
 
-    def __post_init__(self) -> None:
-        given = [name for name in ("scale", "rim", "base") if getattr(self, name) is not None]
-        if len(given) != 1:
-            seen = "none is given" if not given else f"{' and '.join(given)} are given"
-            raise UsageError(
-                "scale",
-                f"one scale is expected, {seen}: `rim`, the diameter of the top's rim; `base`, the outer diameter of "
-                "the base; or `scale`, metres in a pixel",
-            )
-        if (self.distance is None) != (self.height is None):
-            raise UsageError("distance", "goes with `height`: the top is nearer to the camera than the base")
-        if self.distance is not None and (self.base is None or not self.height or self.height >= self.distance):
-            raise UsageError("distance", "goes with `base`, and is greater than `height`")
-        if self.start >= self.stop:
-            raise UsageError("stop", f"a time after `start` = {self.start:g} is expected", value=self.stop)
+    compared: ClassVar[tuple[str, ...]] = ("head",)
+
+
+def read_film(path: Path, options: VideoOptions) -> FilmReadings:
+    """Return the head of a film.  Raises DoesNotSuit for other files, and where no scale is given; UsageError."""
+    with path.open("rb") as stream:
+        head = stream.read(_HEAD)
+    if kind_of_bytes(head, path.suffix) is not AUDIO:
+        raise DoesNotSuit(f"{path}: holds no film that can be read: give the file that the camera wrote")
+    given = [name for name in ("scale", "rim", "base") if getattr(options, f"{name}_m") is not None]
+    wanted = (
+        "`rim`, the diameter of the top's rim; `base`, the outer diameter of the base; or `scale`, metres in a pixel"
+    )
+    if not given:
+        raise DoesNotSuit(f"{path}: one scale is expected, none is given: {wanted}")
+    if len(given) > 1:
+        raise UsageError("scale", f"one scale is expected, {' and '.join(given)} are given: {wanted}")
+    camera, height = options.camera_m, options.height_m
+    if (camera is None) != (height is None):
+        raise UsageError("camera", "goes with `height`: the top is nearer to the camera than the base")
+    if camera is not None and (options.base_m is None or not 0 < (height or 0) < camera):
+        raise UsageError("camera", "goes with `base`, and is greater than `height`")
+    if options.stop_s is not None and (options.start_s or 0.0) >= options.stop_s:
+        raise UsageError("stop", f"a time after `start` = {options.start_s:g} is expected", value=options.stop_s)
+    return FilmReadings(open_film(path), np.array([*head, path.stat().st_size], dtype=np.float64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,51 +107,40 @@ class Video:
     """Place and spin of a top in a film.
 
     Attributes:
-        film: the file.
-        options: how it was read.
-        followed: the top in its pictures.
-        phases: of the mark, one a picture.
-        times: of the place, shape (n,) [s].
+        start: of the first picture, by the file [s].
+        time: of the place, shape (n,) [s].
+        x: to the right, from `origin`, shape (n,) [m].
+        y: upwards in the picture, shape (n,) [m].
+        u: standard uncertainty of each place, without that of the scale, shape (n,) [m].
+        scale: at the top [m a pixel].
+        origin: middle of the base where it gives the scale, else the mean place [pixels].
+        radius: of the rim [pixels].
+        base: its circle; None: not seen.
+        mark: angle of the mark in the first picture; None: none turns.
         turning: None: no mark turns, or the spin is in doubt.
         choices: spins in doubt, seen from above, counter-clockwise is positive [Hz].
-        by_slope: whether one of them was chosen since a free top slows down.
-        problem: why there is no spin; empty: there is one.
-        scale: at the top [m a pixel].
+        precession: in the middle of the film; None: it does not stand out [Hz].
+        fall: when the top fell; None: it floats to the end [s].
+        spin_at_fall: None: not known [Hz].
+        warnings: doubts about the numbers, and parts of the film that are left out.
     """
 
-    film: Film
-    options: VideoOptions
-    followed: Followed
-    phases: Phases
-    times: Array
+    start: float
+    time: Array
+    x: Array
+    y: Array
+    u: Array
+    scale: Estimate
+    origin: tuple[float, float]
+    radius: float
+    base: Circle | None
+    mark: float | None
     turning: Turning | None
     choices: tuple[float, ...]
-    by_slope: bool
-    problem: str
-    scale: Estimate
-
-    @cached_property
-    def origin(self) -> tuple[float, float]:
-        """Middle of the base where it gives the scale, else the mean place [pixels]."""
-        base = self.followed.base
-        if self.options.base is not None and base is not None:
-            return base.x, base.y
-        return float(self.followed.x.mean()), float(self.followed.y.mean())
-
-    @property
-    def x(self) -> Array:
-        """To the right, shape (n,) [m]."""
-        return np.asarray((self.followed.x - self.origin[0]) * _known(self.scale))
-
-    @property
-    def y(self) -> Array:
-        """Upwards in the picture, shape (n,) [m]."""
-        return np.asarray((self.origin[1] - self.followed.y) * _known(self.scale))
-
-    @property
-    def u(self) -> Array:
-        """Standard uncertainty of each place, without that of the scale, shape (n,) [m]."""
-        return np.asarray(self.followed.u * _known(self.scale))
+    precession: Estimate | None
+    fall: Estimate | None
+    spin_at_fall: Estimate | None
+    warnings: tuple[str, ...]
 
     @property
     def spin(self) -> Estimate | None:
@@ -143,46 +149,127 @@ class Video:
         return Estimate(abs(found.frequency), found.u_frequency, "Hz") if found else None
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """Doubts about the numbers, and parts of the film that are left out."""
-        return tuple(_notes(self))
+    def chirp(self) -> Estimate | None:
+        """Its slope."""
+        found = self.turning
+        return Estimate(found.chirp * np.sign(found.frequency), found.u_chirp, "Hz/s") if found else None
+
+    @property
+    def pictures(self) -> str:
+        """Number of the pictures and their times, in words."""
+        steps = np.diff(self.time) * 1e3
+        even = f"{np.median(steps):.2f}" if np.ptp(steps) < _EVEN_MS else f"{steps.min():.2f} to {steps.max():.2f}"
+        return f"{self.time.size} pictures in {np.ptp(self.time):.2f} s, {even} ms apart"
+
+    @property
+    def text(self) -> str:
+        """What the film shows, in a few sentences."""
+        place = f"x stays within {1e3 * np.ptp(self.x):.2f} mm and y within {1e3 * np.ptp(self.y):.2f} mm"
+        text = f"{self.pictures}: {place}, u of a place is {1e3 * np.median(self.u):.3f} mm."
+        if self.spin and self.turning:
+            sense = "clockwise" if self.turning.frequency > 0 else "counter-clockwise"
+            text += f" The spin is {with_uncertainty(self.spin)} in the middle of the film, {sense} seen from above."
+        if self.precession:
+            text += f" The precession is {with_uncertainty(self.precession)}."
+        if self.fall:
+            spin = f", at a spin of {with_uncertainty(self.spin_at_fall)}" if self.spin_at_fall else ""
+            text += f" The top falls at {with_uncertainty(self.fall)} of the film{spin}."
+        return text
 
 
-def _known(estimate: Estimate) -> float:
-    assert estimate.value is not None
-    return estimate.value
+class VideoAnalysis(Analyzed[FilmReadings, Video, None, VideoOptions]):
+    """Films, each by itself."""
+
+    @property
+    def text(self) -> str:
+        """What the films show."""
+        if len(self.runs) == 1:
+            return self.runs[0].text
+        return "  ".join(f"{source.name}: {run.text}" for source, run in zip(self.sources, self.runs, strict=True))
+
+    def about_run(self, run: Video) -> Iterable[str]:
+        """Return what to know of one film."""
+        return run.warnings
 
 
-def analyze_film(path: Path, options: VideoOptions, progress: Callable[[float], None] = lambda _: None) -> Video:
-    """Follow the top in a film and find its spin.
-
-    Raises:
-        DataError: the file cannot be read, or shows no top that can be followed.
-    """
-    if not path.exists():
-        raise no_such_path(path)
-    film = open_film(path)
+def analyze_source(source: Source[FilmReadings], options: VideoOptions) -> Video:
+    """Follow the top in a film and find its spin.  Raises DataError: no top that can be followed."""
+    film = source.readings.film
+    bar = ShareBar("following the top", line_every=30.0)
     try:
-        followed = follow(film, options.start, options.stop, progress)
-        return _video(film, options, followed)
+        start, stop = options.start_s or 0.0, np.inf if options.stop_s is None else options.stop_s
+        return _video(film, options, follow(film, start, stop, bar))
     except AnalysisError as error:
-        raise DataError(f"{path}: {error}") from error
+        raise DataError(f"{film.path}: {error}") from error
+    finally:
+        bar.close()
+
+
+def _no_run(run: Run, _: InputOptions) -> FilmReadings:
+    raise DoesNotSuit(f"{run.folder}: is a run, a film is expected")
+
+
+METHOD = Method(
+    needs=Needs("video", frozenset(), read_film, _no_run, particular=True, wanted="film"),  # type: ignore[arg-type]
+    kind=VideoAnalysis,
+    options=VideoOptions,
+    fit=analyze_source,
+    skips=True,
+)
 
 
 def _video(film: Film, options: VideoOptions, followed: Followed) -> Video:
     if film.captured and options.rate is None and film.captured > _SLOWER * followed.rate:
         raise SlowMotion(rate=followed.rate, captured=film.captured, spin=None)
     factor = 1.0 if options.rate is None else followed.rate / options.rate
+    line_time = options.line_time_s or 0.0
     times = factor * followed.times
     phases = phases_of(followed.profiles)
-    rows = followed.y + _MARK * followed.radius * np.sin(2 * np.pi * (phases.phase + phases.angle))
-    read = times + options.line_time * rows
-    late = rows if options.line_time == 0 else np.zeros_like(rows)
-    turning, choices, by_slope, problem = _turn(read, phases, late, options, followed.rate / factor)
+    angles = 2 * np.pi * (phases.phase + phases.angle)
+    rows = followed.y + _MARK * followed.radius * np.sin(angles)
+    late = np.zeros_like(rows) if line_time else rows
+    rate = followed.rate / factor
+    turning, choices, by_slope, problem = _turn(times + line_time * rows, phases, late, options, rate)
+    scale, base = _scale(film, options, followed), followed.base
+    size = _known(scale)
+    centred = options.base_m is not None and base is not None
+    left, up = (base.x, base.y) if centred and base else (float(followed.x.mean()), float(followed.y.mean()))
+    times, x, y = times + line_time * followed.y, size * (followed.x - left), size * (up - followed.y)
+    fall, at_fall = _fall(times, x, y, turning, 1 / rate) if followed.ended == "lost" else (None, None)
     return Video(
-        film, options, followed, phases, times + options.line_time * followed.y, turning, choices, by_slope, problem,
-        _scale(film, options, followed),
+        float(followed.times[0]), times, x, y, size * followed.u, scale, (left, up), float(np.median(followed.radius)),
+        base, None if problem else float(angles[0]), turning, choices, _precession(times, x + 1j * y), fall, at_fall,
+        (*_notes(options, followed), *_notes_on_spin(turning, choices, problem, rate, options, by_slope=by_slope)),
     )  # fmt: skip
+
+
+def _fall(times: Array, x: Array, y: Array, turning: Turning | None, step: float) -> tuple[Estimate, Estimate | None]:
+    """Return when a top that is lost fell, and its spin then: it left its place, and was not seen any more."""
+    out = np.hypot(x - np.median(x), y - np.median(y))
+    left = float(times[out <= _LEAVES * np.quantile(out, _USUAL)][-1])
+    lost = float(times[-1]) + step
+    fall = Estimate((left + lost) / 2, (lost - left) / np.sqrt(12), "s")
+    if turning is None or turning.time.size < _FEWEST:
+        return fall, None
+    u = float(np.median(turning.u))
+    return fall, spin_at_fall(turning.time, np.abs(turning.spin), u, (left, lost))
+
+
+def _precession(times: Array, places: NDArray[np.complex128]) -> Estimate | None:
+    """Return the precession in the window in the middle of the film in which it stands out."""
+    try:
+        windows = [one for one in swings_of(times, places) if one.frequency.size > 2]
+    except AnalysisError:
+        return None
+    if not windows:
+        return None
+    one = windows[len(windows) // 2]
+    return Estimate(abs(float(one.frequency[2])), float(one.u[2]), "Hz")
+
+
+def _known(estimate: Estimate) -> float:
+    assert estimate.value is not None
+    return estimate.value
 
 
 def _turn(
@@ -214,43 +301,47 @@ def _turn(
 
 
 def _scale(film: Film, options: VideoOptions, followed: Followed) -> Estimate:
-    if options.scale is not None:
-        return Estimate(options.scale, None, "m")
-    if options.rim is not None:
-        diameter, radius, nearer = options.rim, float(np.median(followed.radius)), 1.0
+    if options.scale_m is not None:
+        return Estimate(options.scale_m, None, "m")
+    if options.rim_m is not None:
+        diameter, radius, nearer = options.rim_m, float(np.median(followed.radius)), 1.0
     elif followed.base is None:
         raise DataError(f"{film.path}: no round base is seen round the top: give `rim`, or `scale`")
     else:
-        assert options.base is not None
-        diameter, radius = options.base, followed.base.radius
-        nearer = 1 - options.height / options.distance if options.height and options.distance else 1.0
+        assert options.base_m is not None
+        diameter, radius = options.base_m, followed.base.radius
+        nearer = 1 - options.height_m / options.camera_m if options.height_m and options.camera_m else 1.0
     value = nearer * diameter / (2 * radius)
     return Estimate(value, value * _EDGE_U / radius, "m")
 
 
-def _notes(video: Video) -> Iterator[str]:
-    seen, options = video.followed, video.options
-    last = f"{seen.times[-1]:.2f} s"
+def _notes(options: VideoOptions, seen: Followed) -> Iterator[str]:
     if seen.ended:
         why = {"lost": "the rim is lost", "hand": "a large part of the view changes, as by a hand,"}[seen.ended]
-        yield f"{why} after {last}: the rest of the film is left out"
+        yield f"{why} after {seen.times[-1]:.2f} s: the rest of the film is left out"
     if seen.missed:
         yield f"no rim is seen in {seen.missed} pictures in between; they are left out"
-    if options.base is not None and options.distance is None:
+    if options.base_m is not None and options.camera_m is None:
         yield (
             "the scale is that of the base, and the top is nearer to the camera: places are too large by height over "
-            "distance; say both by `height` and `distance`, or give `rim`"
+            "distance; say both by `height` and `camera`, or give `rim`"
         )
-    yield from _notes_on_spin(video)
 
 
-def _notes_on_spin(video: Video) -> Iterator[str]:
-    listed = " or ".join(f"{abs(f):.3f} Hz ({'counter-' * (f > 0)}clockwise)" for f in video.choices)
-    if video.problem:
-        yield f"no spin: {video.problem}"
-    elif video.turning is None:
-        rate = f"{video.followed.rate:.4g}"
-        slow = "" if video.options.rate else "; or, if the film is in slow motion, the true `rate`"
-        yield f"no spin: at {rate} pictures in a second it may be {listed}; say which by `near`{slow}"
-    elif video.by_slope:
+def _notes_on_spin(
+    turning: Turning | None,
+    choices: tuple[float, ...],
+    problem: str,
+    rate: float,
+    options: VideoOptions,
+    *,
+    by_slope: bool,
+) -> Iterator[str]:
+    listed = " or ".join(f"{abs(f):.3f} Hz ({'counter-' * (f > 0)}clockwise)" for f in choices)
+    if problem:
+        yield f"no spin: {problem}"
+    elif turning is None:
+        slow = "" if options.rate else "; or, if the film is in slow motion, the true `rate`"
+        yield f"no spin: at {rate:.4g} pictures in a second it may be {listed}; say which by `near`{slow}"
+    elif by_slope:
         yield f"of {listed}, which look the same, the one that slows down is taken, as a free top does"

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from levilab.errors import DataError, UsageError
-from levilab.formats.film import pictures
-from levilab.pipelines.video.analysis import VideoOptions, analyze_film
+from levilab.formats.film import open_film, pictures
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.options import VideoOptions
+from levilab.pipelines.suits import save
 from levilab.simulator.scene import preset
 from support.camera import (
     BASE,
@@ -26,6 +28,7 @@ from support.camera import (
     write_film,
 )
 from support.commands import command
+from support.equal import differences
 
 pytestmark = pytest.mark.skipif(util.find_spec("av") is None, reason="pip install 'levilab[video]'")
 
@@ -44,6 +47,11 @@ def path(folder):
     return film(folder / "IMG_0042.mp4", CAMERA, LEVEL, phone_times(1.0))
 
 
+def analyze_film(path, options):
+    """What the analysis finds of one film."""
+    return ANALYSES["video"].analyze([path], options).runs[0]
+
+
 def filmed(folder, name, take, times, **more):
     """A film of what is taken at each time."""
     shown = Picture(CAMERA, LEVEL)
@@ -52,7 +60,7 @@ def filmed(folder, name, take, times, **more):
 
 def compare(found, flight):
     """Errors of place [m], shape (2, n), less their means; and pulls of the readings of the spin."""
-    x, y, _, _ = flight.at(found.times)
+    x, y, _, _ = flight.at(found.time)
     errors = np.array([found.x - x, found.y - y])
     pulls = []
     for time, spin, u in zip(found.turning.time, found.turning.spin, found.turning.u, strict=True):
@@ -67,12 +75,12 @@ def test_ten_seconds_of_a_phone_give_place_and_spin_of_a_simulated_top(folder):
     flight = flight_of(preset("friction"), 10.0)
     camera = Camera(width=144, height=112, line_time=10e-6)  # the base is larger than the picture
     path = film(folder / "ten.mp4", camera, flight, phone_times(10.0))
-    found = analyze_film(path, VideoOptions(rim=2 * RIM, line_time=10e-6))
+    found = analyze_film(path, VideoOptions(rim_m=2 * RIM, line_time_s=10e-6))
     errors, pulls = compare(found, flight)
     assert np.abs(errors).max() < 1e-4
     assert np.mean(errors / found.u) == pytest.approx(0, abs=0.1)
     assert np.std(errors / found.u) == pytest.approx(1, abs=0.5)  # what a codec adds to a place is a constant of u
-    whole = (flight.times >= found.times[0]) & (flight.times <= found.times[-1])
+    whole = (flight.times >= found.time[0]) & (flight.times <= found.time[-1])
     truth = np.polyfit(flight.times[whole] - found.turning.middle, flight.yaw[whole] / (2 * np.pi), 2)[1]
     assert found.spin.value == pytest.approx(abs(truth), abs=5e-3)
     assert np.abs(pulls.mean()) < 1.3  # 4 standard errors of a mean of 10
@@ -84,7 +92,7 @@ def test_a_tilted_top_under_a_rolling_shutter_has_its_place_and_spin(folder):
     flight = flight_of(preset("tilted"), 0.8)
     path = film(folder / "tilted.mp4", Camera(line_time=10e-6), flight, phone_times(0.8))
     for line_time in (0.0, 10e-6):  # not known and known
-        found = analyze_film(path, VideoOptions(rim=2 * RIM, line_time=line_time))
+        found = analyze_film(path, VideoOptions(rim_m=2 * RIM, line_time_s=line_time))
         errors, pulls = compare(found, flight)
         assert np.abs(errors).max() < 1e-4
         assert np.std(errors / found.u) == pytest.approx(1, abs=0.5)
@@ -95,45 +103,47 @@ def test_a_tilted_top_under_a_rolling_shutter_has_its_place_and_spin(folder):
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of trackpy 0.7 with pandas 3
 def test_opencv_and_trackpy_see_the_top_at_the_same_place(path):
     cv2, trackpy = (pytest.importorskip(name) for name in ("cv2", "trackpy"))
-    found = analyze_film(path, VideoOptions(rim=2 * RIM))
-    places = found.scale.value * np.array([found.followed.x, found.followed.y]).T
+    found = analyze_film(path, VideoOptions(rim_m=2 * RIM))
+    scale, middle = found.scale.value, np.array(found.origin)
+    places = scale * middle + np.array([found.x, -found.y]).T
     others = []
-    for _, picture in islice(pictures(found.film), 0, None, 6):
+    for _, picture in islice(pictures(open_film(path)), 0, None, 6):
         _, bright = cv2.threshold(picture, 100, 255, cv2.THRESH_BINARY)
         edges, _ = cv2.findContours(bright, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         rim = max((edge for edge in edges if cv2.boundingRect(edge)[2] < 80), key=len)  # the base is wider
-        middle = np.array(cv2.fitEllipse(rim)[0])
-        left, up = corner = middle.astype(int) - 20
+        of_rim = np.array(cv2.fitEllipse(rim)[0])
+        left, up = corner = of_rim.astype(int) - 20
         hub = np.clip(110 - picture[up : up + 40, left : left + 40].astype(int), 0, 255).astype(np.uint8)
-        others += [(middle, corner + trackpy.locate(hub, 17, topn=1)[["x", "y"]].to_numpy()[0])]
-    off = found.scale.value * np.array(others) - places[::6, None]
+        others += [(of_rim, corner + trackpy.locate(hub, 17, topn=1)[["x", "y"]].to_numpy()[0])]
+    off = scale * np.array(others) - places[::6, None]
     assert np.abs(off).max() < 1e-4  # 0.2 pixels; each of the three is within 0.07 mm of the truth
 
 
 def test_the_base_and_the_rim_give_the_scale(path):
     for options in (
-        VideoOptions(rim=2 * RIM, stop=0.45),
-        VideoOptions(base=2 * BASE, stop=0.45),
-        VideoOptions(base=2 * BASE / 0.95, distance=0.6, height=0.03, stop=0.45),
+        VideoOptions(rim_m=2 * RIM, stop_s=0.45),
+        VideoOptions(base_m=2 * BASE, stop_s=0.45),
+        VideoOptions(base_m=2 * BASE / 0.95, camera_m=0.6, height_m=0.03, stop_s=0.45),
     ):
         scale = analyze_film(path, options).scale
         assert scale.value == pytest.approx(CAMERA.scale, abs=2 * scale.u)
         assert 0 < scale.u < 0.011 * scale.value
-    assert any("nearer to the camera" in note for note in analyze_film(path, VideoOptions(base=0.1, stop=0.45)).notes)
+    assert any(
+        "nearer to the camera" in note for note in analyze_film(path, VideoOptions(base_m=0.1, stop_s=0.45)).warnings
+    )
 
 
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({}, "one scale is expected, none is given"),
-        ({"rim": 0.03, "scale": 1e-4}, "scale and rim are given"),
-        ({"base": 0.1, "distance": 0.5}, "goes with `height`"),
-        ({"rim": 0.03, "start": 2.0, "stop": 1.0}, "a time after `start` = 2"),
+        ({"rim_m": 0.03, "scale_m": 1e-4}, "scale and rim are given"),
+        ({"base_m": 0.1, "camera_m": 0.5}, "goes with `height`"),
+        ({"rim_m": 0.03, "start_s": 2.0, "stop_s": 1.0}, "a time after `start` = 2"),
     ],
 )
-def test_options_that_do_not_go_together_are_refused(options, text):
+def test_options_that_do_not_go_together_are_refused(path, options, text):
     with pytest.raises(UsageError, match=text):
-        VideoOptions(**options)
+        analyze_film(path, VideoOptions(**options))
 
 
 def hand(shown, time):
@@ -153,12 +163,11 @@ def gone(shown, time):
 
 def test_a_hand_and_a_lost_top_end_the_track_where_they_are_seen(folder):
     for name, take, text in (("hand.mp4", hand, "as by a hand, after 0.50 s"), ("gone.mp4", gone, "lost after 0.59 s")):
-        found = analyze_film(filmed(folder, name, take, phone_times(1.0)), VideoOptions(rim=0.03))
-        assert text in found.notes[0]
-        assert found.followed.rate == pytest.approx(240, abs=2)
-        assert found.times[-1] == pytest.approx(0.6, abs=0.11)  # a hand is looked for each 0.1 s
+        found = analyze_film(filmed(folder, name, take, phone_times(1.0)), VideoOptions(rim_m=0.03))
+        assert text in found.warnings[0]
+        assert found.time[-1] == pytest.approx(0.6, abs=0.11)  # a hand is looked for each 0.1 s
         assert found.spin.value == pytest.approx(31 - 0.05 * found.turning.middle, abs=5e-3)
-    assert "no rim is seen in 5 pictures in between" in found.notes[1]
+    assert "no rim is seen in 5 pictures in between" in found.warnings[1]
 
 
 @pytest.mark.parametrize(
@@ -171,7 +180,7 @@ def test_a_hand_and_a_lost_top_end_the_track_where_they_are_seen(folder):
 )
 def test_a_film_that_shows_no_lone_top_is_refused(folder, take, text):
     with pytest.raises(DataError, match=rf"bad\.mp4: .*({text})"):
-        analyze_film(filmed(folder, "bad.mp4", take, phone_times(0.7)), VideoOptions(rim=0.03))
+        analyze_film(filmed(folder, "bad.mp4", take, phone_times(0.7)), VideoOptions(rim_m=0.03))
 
 
 def test_a_film_in_slow_motion_asks_for_its_rate(folder):
@@ -181,28 +190,28 @@ def test_a_film_in_slow_motion_asks_for_its_rate(folder):
     times = 8 * phone_times(0.45)
     said = filmed(folder, "slow.mp4", slowly, times, metadata={"com.android.capture.fps": "240.000000"})
     with pytest.raises(DataError, match=r"slow motion: .* 30\.\d+ in a second .* taken at 240, .* say the true number"):
-        analyze_film(said, VideoOptions(rim=0.03))
-    found = analyze_film(said, VideoOptions(rim=0.03, rate=240.0))
+        analyze_film(said, VideoOptions(rim_m=0.03))
+    found = analyze_film(said, VideoOptions(rim_m=0.03, rate=240.0))
     assert found.spin.value == pytest.approx(31 - 0.05 * found.turning.middle, rel=2e-3)  # mean rate of a piece
-    unsaid = analyze_film(filmed(folder, "slow.mp4", slowly, times), VideoOptions(rim=0.03))
+    unsaid = analyze_film(filmed(folder, "slow.mp4", slowly, times), VideoOptions(rim_m=0.03))
     assert unsaid.spin is None
-    assert "if the film is in slow motion, the true `rate`" in unsaid.notes[0]
+    assert "if the film is in slow motion, the true `rate`" in unsaid.warnings[0]
 
 
 def test_even_times_that_fold_the_spin_are_named_and_near_chooses(folder):
     path = filmed(folder, "thirty.mp4", Picture.take, even_times(1.0, 30.0))
-    doubtful = analyze_film(path, VideoOptions(rim=0.03))
+    doubtful = analyze_film(path, VideoOptions(rim_m=0.03))
     assert doubtful.spin is None
-    assert "30.97" in doubtful.notes[0]
-    assert analyze_film(path, VideoOptions(rim=0.03, near=31.0)).spin.value == pytest.approx(30.975, abs=5e-3)
+    assert "30.97" in doubtful.warnings[0]
+    assert analyze_film(path, VideoOptions(rim_m=0.03, near=31.0)).spin.value == pytest.approx(30.975, abs=5e-3)
 
 
 def test_of_spins_that_look_the_same_the_one_that_slows_down_is_taken(folder):
     flight = level_flight(1.2, 31.0, chirp=-0.6)
     path = film(folder / "sixty.mp4", CAMERA, flight, even_times(1.2, 60.0))
-    found = analyze_film(path, VideoOptions(rim=0.03))
+    found = analyze_film(path, VideoOptions(rim_m=0.03))
     assert found.spin.value == pytest.approx(31 - 0.6 * found.turning.middle, abs=5e-3)
-    (note,) = (note for note in found.notes if "slows down" in note)
+    (note,) = (note for note in found.warnings if "slows down" in note)
     assert "30.6" in note
 
 
@@ -211,14 +220,55 @@ def test_the_command_writes_tables_that_other_analyses_read(path, tmp_path):
     assert ended.status == 0, ended.err
     document = json.loads(ended.out)
     assert document["values"]["frequency"]["value"] == pytest.approx(30.975, abs=1e-3)
-    assert document["pictures"] == 240
+    assert document["values"]["pictures"]["value"] == 240
     tracks = np.genfromtxt(tmp_path / "IMG_0042.tracks.csv", delimiter=",", names=True)
     assert tracks.dtype.names == ("time_s", "x_m", "x_u_m", "y_m", "y_u_m", "spin_frequency_hz")
     assert np.diff(tracks["time_s"]) == pytest.approx(np.tile([1 / 300, 1 / 200], 120)[:-1], abs=2e-5)  # of the file
-    assert (tmp_path / "IMG_0042.tracks.png").read_bytes()[:4] == b"\x89PNG"
+    assert (tmp_path / "IMG_0042.mp4.video.png").read_bytes()[:4] == b"\x89PNG"
     ended = command("analyze", "video", path, "--rim", 30, "--no-save", cwd=tmp_path)
     assert "30.975" in ended.out
-    assert "240 pictures in 0.99 s, 3.33 to 5.00 ms apart" in ended.out
+    assert "240 pictures in 0.99 s, 3.33 to 5.00 ms apart" in " ".join(ended.out.split())
+
+
+def test_a_film_is_recalled_from_its_result_and_reported_with_its_still(path, tmp_path):
+    video, copy = ANALYSES["video"], tmp_path / path.name
+    copy.write_bytes(path.read_bytes())
+    found = video.analyze([copy], VideoOptions(rim_m=2 * RIM))
+    assert {file.name.removeprefix("IMG_0042.") for file in save(video, found)} == {
+        "mp4.result.video.json", "mp4.video.png", "tracks.csv", "spin.csv",
+    }  # fmt: skip
+    again = video.recall([copy], VideoOptions())
+    assert again.origins[0].text.startswith("as levilab analyze found it")
+    assert differences(found.runs, again.runs) == []
+    assert video.document(again, tmp_path) == video.document(found, tmp_path)
+    ended = command("report", tmp_path, "-o", "page.html", "--no-crosscheck", cwd=tmp_path)
+    assert ended.status == 0, ended.err
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "filmed from above" in page
+    assert "Uncertainty budget" in page
+    assert 'xlink:href="data:image/png;base64' in page
+    assert "Report of" not in page  # its tables are no further inputs
+
+
+@pytest.mark.slow
+def test_a_top_that_falls_has_its_spin_then_as_a_limit_that_others_read(folder, tmp_path):
+    flight = level_flight(4.0, 22.0, chirp=-0.06)
+    shown, times = Picture(CAMERA, flight), phone_times(3.8)
+    path = write_film(
+        folder / "falls.mp4", (shown.noisy(shown.take(t) if t < 3.4 else shown.background) for t in times), times
+    )
+    ended = command("analyze", "video", path, "--rim", 2000 * RIM, "--out", tmp_path, "--json", cwd=tmp_path)
+    values = json.loads(ended.out)["values"]
+    fall, spin = values["fall_time"], values["spin_at_fall"]
+    assert fall["value"] == pytest.approx(3.4, abs=2 * fall["u"])
+    assert fall["u"] < 0.1
+    assert spin["value"] == pytest.approx(22 - 0.06 * 3.4, abs=3 * spin["u"])
+    assert spin["u"] < 0.01
+    for name, table in (("limit", "limit"), ("spindown", "spin")):
+        read = command("analyze", name, f"falls.{table}.csv", "--no-save", "--json", cwd=tmp_path)
+        assert read.status == 0, read.err
+        if name == "limit":
+            assert json.loads(read.out)["values"]["mean"]["value"] == pytest.approx(spin["value"])
 
 
 def test_what_is_no_film_is_refused_in_one_line(path, tmp_path):

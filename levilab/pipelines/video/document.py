@@ -1,0 +1,63 @@
+"""Films of tops ↔ result.json."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from analysis.budget import Budget
+from levilab.pipelines.budget import direct_row
+from levilab.pipelines.document import Document, result_model, values_of
+from levilab.pipelines.row import find_all
+from levilab.pipelines.video.analysis import METHOD, Video
+from levilab.pipelines.video.quantities import QUANTITIES
+
+if TYPE_CHECKING:
+    from levilab.pipelines.options import VideoOptions
+    from levilab.pipelines.sources import Source
+    from levilab.pipelines.video.analysis import FilmReadings, VideoAnalysis
+
+#: Quantity → the only part of its u: what it is, kind, where it comes from, what would make it smaller.
+_ROWS = {
+    "frequency": ("phase", "phases of the mark", "A", "scatter about a smooth spin", "a longer film"),
+    "scale": (
+        "edge",
+        "edge of the circle that gives the scale",
+        "B",
+        "0.3 pixels, by focus and light",
+        "a nearer camera",
+    ),
+}
+
+
+def budget_of_run(_: Source[FilmReadings], run: Video, __: VideoOptions) -> tuple[Budget, ...]:
+    """Return the budgets of one film; what the camera's clock and lens do is in none."""
+    return tuple(
+        Budget(
+            name,
+            one.value or 0.0,
+            one.u,
+            one.unit,
+            (direct_row(row, what, one.u, one.unit, note, remedy, "A" if kind == "A" else "B"),),
+        )
+        for name, one in find_all(QUANTITIES, run).items()
+        if name in _ROWS and one.u
+        for row, what, kind, note, remedy in [_ROWS[name]]
+    )
+
+
+def _entries(analysis: VideoAnalysis) -> dict[str, Any]:
+    alone = _run_entries(analysis.runs[0]) if len(analysis.runs) == 1 else {"values": {}}
+    return alone | {"text": analysis.text}
+
+
+def _run_entries(run: Video) -> dict[str, Any]:
+    return {"values": values_of(find_all(QUANTITIES, run)), "choices_hz": [abs(f) for f in run.choices]}
+
+
+DOCUMENT = Document(
+    method=replace(METHOD, budget_of_run=budget_of_run),
+    result=result_model(METHOD, Video),
+    entries=_entries,
+    run_entries=_run_entries,
+)
