@@ -35,7 +35,7 @@ class Kind:
 
 AUDIO = Kind(
     "a sound file or film",
-    "levilab analyze spin reads its sound; levilab analyze video, with a length as --rim MM, follows a filmed top",
+    "levilab analyze spin reads its sound; levilab analyze video, with the `rim` of the top, follows it in a film",
     suffixes=(
         ".m4a", ".mp3", ".mp4", ".ogg", ".oga", ".opus", ".flac", ".aac", ".mov", ".3gp", ".amr", ".aif", ".aiff",
         ".caf", ".webm", ".mkv", ".wma", ".avi",

@@ -19,6 +19,7 @@ from analysis.uncertainty import Estimate
 from levilab.errors import DataError, DoesNotSuit, UsageError
 from levilab.formats.film import Film, open_film
 from levilab.formats.kinds import AUDIO, kind_of_bytes
+from levilab.formats.table import file_errors
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.options import VideoOptions
 from levilab.pipelines.sources import Needs, Readings
@@ -80,7 +81,7 @@ class FilmReadings(Readings):
 
 def read_film(path: Path, options: VideoOptions) -> FilmReadings:
     """Return the head of a film.  Raises DoesNotSuit for other files, and where no scale is given; UsageError."""
-    with path.open("rb") as stream:
+    with file_errors(path), path.open("rb") as stream:
         head = stream.read(_HEAD)
     if kind_of_bytes(head, path.suffix) is not AUDIO:
         raise DoesNotSuit(f"{path}: holds no film that can be read: give the file that the camera wrote")

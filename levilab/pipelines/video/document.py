@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from analysis.budget import Budget
 from levilab.pipelines.budget import direct_row
@@ -17,32 +17,20 @@ if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
     from levilab.pipelines.video.analysis import FilmReadings, VideoAnalysis
 
-#: Quantity → the only part of its u: what it is, kind, where it comes from, what would make it smaller.
-_ROWS = {
-    "frequency": ("phase", "phases of the mark", "A", "scatter about a smooth spin", "a longer film"),
-    "scale": (
-        "edge",
-        "edge of the circle that gives the scale",
-        "B",
-        "0.3 pixels, by focus and light",
-        "a nearer camera",
-    ),
-}
+#: Quantity, and the only part of its u: what it is, kind, where it comes from, what would make it smaller.
+_ROWS: tuple[tuple[str, str, str, Literal["A", "B"], str, str], ...] = (
+    ("frequency", "phase", "phases of the mark", "A", "scatter about a smooth spin", "a longer film"),
+    ("scale", "edge", "edge of the circle that gives the scale", "B", "0.3 pixels: focus, light", "a nearer camera"),
+)
 
 
 def budget_of_run(_: Source[FilmReadings], run: Video, __: VideoOptions) -> tuple[Budget, ...]:
     """Return the budgets of one film; what the camera's clock and lens do is in none."""
+    found = find_all(QUANTITIES, run)
     return tuple(
-        Budget(
-            name,
-            one.value or 0.0,
-            one.u,
-            one.unit,
-            (direct_row(row, what, one.u, one.unit, note, remedy, "A" if kind == "A" else "B"),),
-        )
-        for name, one in find_all(QUANTITIES, run).items()
-        if name in _ROWS and one.u
-        for row, what, kind, note, remedy in [_ROWS[name]]
+        Budget(name, one.value or 0.0, one.u, one.unit, (direct_row(row, what, one.u, one.unit, note, remedy, kind),))
+        for name, row, what, kind, note, remedy in _ROWS
+        if (one := found.get(name)) and one.u
     )
 
 
