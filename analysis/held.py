@@ -5,6 +5,10 @@ is measured before and after the hold.  Over a hold of length T the spin changes
 
     d = (g ∫s dt − Δν)/(T − ∫s dt).
 
+The gain is seen over some spins about the held one.  From the mean of these it is brought to the held spin by the drag,
+and by the pull: that of a top whose moment is tilted, which leans, goes with 1/(1 − (ν_r/ν)²), of an upright one it is
+the same everywhere.
+
 Source: PHYSICS.md §7.
 """
 
@@ -27,6 +31,8 @@ Array = NDArray[np.float64]
 _GAP = 1.5
 #: The exponent of any drag is between 1 and 2: it brings the gain from the spins at which it was seen to the held one.
 _EXPONENT, _EXPONENT_U = 1.5, 0.3
+#: ν_r of the usual Levitron, and a spin below which none is held [Hz].
+_RESONANCE_HZ, _LOWEST_HZ = 21.6, 24.0
 
 
 @dataclass(frozen=True)
@@ -78,12 +84,15 @@ def hold_of(time: Array, spin: Array, u: Array, share: Array, gains: Sequence[tu
         return Hold(*held, mean_share, gain, None, {})
     moved = float(np.diff(spin)[joined].sum())
     ends = np.diff(np.concatenate([[0.0], joined.astype(float), [0.0]]))  # readings that begin or end a stretch
-    left = whole - driven * (1 + _EXPONENT * beside / mean)
-    drag = (driven * gain.value - moved) / left
+    nu = max(mean, _LOWEST_HZ)
+    lean = beside / (nu * ((nu / _RESONANCE_HZ) ** 2 - 1))  # half of the change of ln pull: it leans, or is upright
+    left = whole - driven * (1 + _EXPONENT * beside / mean + lean)
+    drag = (driven * gain.value * (1 + lean) - moved) / left
     parts = {
         "gain": driven / left * gain.u,
         "drift": float(np.linalg.norm(ends * u)) / left,
         "exponent": driven / left * _EXPONENT_U * abs(drag * beside) / mean,
+        "lean": driven / left * abs((gain.value + drag) * lean) / sqrt(3),  # even between the two
     }
     return Hold(*held, mean_share, gain, Estimate(drag, hypot(*parts.values()), "Hz/s"), parts)
 

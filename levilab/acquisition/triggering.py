@@ -49,9 +49,10 @@ _NEAR_S = 3.0
 #: A top that gains less than this [Hz] within this number of counts has reached the greatest spin of the drive.
 _LEAST_GAIN_HZ, _GAINING = 0.15, 30
 #: Number of counts that show the gain at the full amplitude: 3 mHz/s of 0.2 Hz/s; a top that is held by more than this
-#: share of the amplitude gains too little for that.
-_GAIN_COUNTS, _MOST_SHARE = 10, 0.9
-#: Fewest counts on the way that show it: 13 mHz/s.
+#: share of the amplitude gains too little for that.  Near its lowest spin a top that leans is turned so much harder
+#: that as many would lead out of where it floats: they go over no more than this [Hz].
+_GAIN_COUNTS, _MOST_SHARE, _GAIN_HZ = 10, 0.9, 3.0
+#: Fewest counts that show it, on the way, too: 13 mHz/s.
 _FEWEST_COUNTS = 4
 #: The pull changes by no more than this factor on the way to a spin: that of the lean is 2 from 30 to 80 Hz.
 _MOST_CHANGE = 3.0
@@ -228,14 +229,16 @@ class Motor:
         share, gain = self.share, self.pull * (1 - self.share)
         if share > _MOST_SHARE:
             return
+        half = min(gain * _GAIN_COUNTS, _GAIN_HZ) / 2
         self._set_share(_LEAST_SHARE)
-        while self.spin > target - gain * _GAIN_COUNTS / 2:
+        while self.spin > target - half - 1.5 * gain:  # a count and half of the next
             self.count()
         self._set_share(1.0)
         self._trend = gain
         self.count()  # of a gate in which the amplitude may have changed
-        times, spins = [], []
-        for _ in range(_GAIN_COUNTS):
+        times: list[float] = []
+        spins: list[float] = []
+        while len(spins) < _FEWEST_COUNTS or (self.spin < target + half - gain / 2 and len(spins) < 2 * _GAIN_COUNTS):
             spins.append(self.count())
             times.append(self.session.now())
         self.gains.append((times, spins))

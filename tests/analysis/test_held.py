@@ -44,6 +44,23 @@ def test_a_spin_that_moves_meanwhile_does_not_bias_the_drag():
     assert mean == pytest.approx(drag_at(40.0), abs=3 * found[0].u / np.sqrt(40))
 
 
+@pytest.mark.parametrize("leans", [False, True])
+def test_a_gain_seen_beside_the_held_spin_is_brought_there(leans):
+    held, step, spins = 28.0, 0.01, [27.5]
+
+    def pull(spin):
+        return PULL / (1 - (21.6 / spin) ** 2) if leans else PULL
+
+    for _ in range(300):
+        spins.append(spins[-1] + (pull(spins[-1]) - drag_at(spins[-1])) * step)
+    gain = np.arange(301) * step, np.array(spins)
+    ones = np.ones(12)
+    found = hold_of(10 * np.arange(12.0), held * ones, 1e-4 * ones, drag_at(held) / pull(held) * ones, [gain])
+    off = found.drag.value - drag_at(held)
+    assert abs(np.mean(spins) - held) > 0.05
+    assert abs(off) < 2.0 * found.parts["lean"]  # from the middle of an even distribution √3 at most, and its bend
+
+
 def test_without_a_gain_there_is_no_drag():
     ones = np.ones(4)
     found = hold_of(np.arange(4.0), 40 * ones + [0, 0.01, 0, 0.01], 0.01 * ones, 0.95 * ones, [])

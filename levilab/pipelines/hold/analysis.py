@@ -9,7 +9,7 @@ import numpy as np
 
 from analysis.held import HeldLaw, Hold, fit_held, hold_of
 from analysis.spindown.tilt import slowing_by_tilt
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate  # noqa: TC001 - pydantic reads it
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.hold.readings import HoldReadings, read_hold_file, read_hold_run
 from levilab.pipelines.options import HoldOptions, SpinDownOptions
@@ -30,20 +30,6 @@ NEEDS = Needs(analysis=HOLD, experiments=frozenset({HOLD}), read_file=read_hold_
 _ENOUGH = 3.0
 
 
-@dataclass(frozen=True)
-class Compared:
-    """A constant of a drag law, beside that of a spin-down.
-
-    law, constant: their names; held, spindown: the two; pull: their difference over its u.
-    """
-
-    law: str
-    constant: str
-    held: Estimate
-    spindown: Estimate
-    pull: float
-
-
 @dataclass(frozen=True, eq=False)
 class HeldTogether:
     """Several held spins together.
@@ -51,12 +37,17 @@ class HeldTogether:
     Attributes:
         laws: through the drag of an upright top, the best first.
         factors: of each input's drag over that of an upright top, by the spin-down's tilt; 1 where none is known.
-        compared: the constants of laws with a single one.
+        beside: law with a single constant → that of the spin-down, and the pull: their difference over its u.
     """
 
     laws: tuple[HeldLaw, ...]
     factors: tuple[float, ...]
-    compared: tuple[Compared, ...]
+    beside: dict[str, tuple[Estimate, float]]
+
+    @property
+    def best(self) -> HeldLaw | None:
+        """The best law; None of a single spin, through which each law goes."""
+        return self.laws[0] if len(self.factors) > 1 and self.laws else None
 
 
 class HoldAnalysis(Analyzed[HoldReadings, Hold, HeldTogether, HoldOptions]):
@@ -65,7 +56,9 @@ class HoldAnalysis(Analyzed[HoldReadings, Hold, HeldTogether, HoldOptions]):
     @property
     def text(self) -> str:
         """What the data say, in a few sentences."""
-        return " ".join([text_of(run) for run in self.runs] + [*_of_laws(self.combined)])
+        spins = [run.spin.value or 0.0 for run in self.runs]
+        several = f"One top was held at {len(spins)} spins, {min(spins):.1f} Hz to {max(spins):.1f} Hz."
+        return " ".join([several if len(spins) > 1 else text_of(self.runs[0]), *_of_laws(self.combined)])
 
     def about_run(self, run: Hold) -> Iterable[str]:
         """Return what to know of one held spin."""
@@ -83,20 +76,20 @@ def text_of(run: Hold) -> str:
 
 
 def _of_laws(found: HeldTogether) -> Iterable[str]:
-    if not found.laws:
-        return
-    best = found.laws[0]
-    constants = [f"{SYMBOLS.get(name, name)} = {with_uncertainty(one)}" for name, one in best.constants.items()]
-    chi = best.statistics.reduced_chi_square
-    fits = "" if chi is None else f", χ² per degree of freedom {plain(chi, 2)}"
-    yield f"Of the drag laws {best.name} is the best: {list_in_words(constants)}{fits}."
-    beside = next((one for one in found.compared if one.law == best.name), None) or next(iter(found.compared), None)
-    if beside:
-        agrees = "agrees with" if abs(beside.pull) < _ENOUGH else "DISAGREES with"
-        yield (
-            f"By the {beside.law} law {SYMBOLS[beside.constant]} {agrees} the spin-down's "
-            f"{with_uncertainty(beside.spindown)}: {plain(beside.pull, 2)} standard uncertainties off."
-        )
+    if best := found.best:
+        constants = [f"{SYMBOLS[name]} = {with_uncertainty(one)}" for name, one in best.constants.items()]
+        chi = best.statistics.reduced_chi_square
+        fits = "" if chi is None else f", χ² per degree of freedom {plain(chi, 2)}"
+        yield f"Of the drag laws {best.name} is the best: {list_in_words(constants)}{fits}."
+    for law in sorted(found.laws, key=lambda one: one is not best)[: 1 if best else None]:
+        if law.name in found.beside:
+            (name,) = law.constants
+            spindown, pull = found.beside[law.name]
+            agrees = "agrees with" if abs(pull) < _ENOUGH else "DISAGREES with"
+            yield (
+                f"By the {law.name} law {SYMBOLS[name]} {agrees} the spin-down's {with_uncertainty(spindown)}: "
+                f"{plain(pull, 2)} standard uncertainties off."
+            )
 
 
 def fit_source(source: Source[HoldReadings], _: HoldOptions) -> Hold:
@@ -109,19 +102,18 @@ def combine(_: Sequence[Source[HoldReadings]], runs: Sequence[Hold], options: Ho
     """Return the laws through the drag, and their constants beside a spin-down's.  Raises DataError."""
     beside = SPINDOWN.recall([options.spindown], SpinDownOptions()) if options.spindown else None
     spins = np.array([run.spin.value for run in runs])
-    factors, u_factors = (np.ones(len(runs)), np.zeros(len(runs))) if beside is None else _tilt(beside, spins)
-    known = np.array([run.drag is not None for run in runs])
-    drags = np.array([(run.drag.value, run.drag.u) for run in runs if run.drag]).T
+    factors, u_factors = _tilt(beside, spins)
+    known = [run.drag is not None for run in runs]
     laws: tuple[HeldLaw, ...] = ()
-    if known.any():
-        upright = drags[0] / factors[known]
-        laws = fit_held(spins[known], upright, np.hypot(drags[1] / factors[known], upright * u_factors[known]))
-    return HeldTogether(laws, tuple(factors.tolist()), tuple(_compare(laws, beside)) if beside else ())
+    if any(known):
+        drag, u = np.array([(run.drag.value, run.drag.u) for run in runs if run.drag]).T / factors[known]
+        laws = fit_held(spins[known], drag, np.hypot(u, drag * u_factors[known]))
+    return HeldTogether(laws, tuple(factors.tolist()), dict(_compare(laws, beside)) if beside else {})
 
 
-def _tilt(beside: SpinDownAnalysis, spins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _tilt(beside: SpinDownAnalysis | None, spins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return by which factor the tilt of the moment changes the drag of the count, and its relative u, shape (n,)."""
-    fits = [run.fit(beside.combined.best) for run in beside.runs]
+    fits = [run.fit(beside.combined.best) for run in beside.runs] if beside else []
     tilted = [fit.parameters for fit in fits if fit.has_tilt]
     if not tilted:
         return np.ones(len(spins)), np.zeros(len(spins))
@@ -131,16 +123,13 @@ def _tilt(beside: SpinDownAnalysis, spins: np.ndarray) -> tuple[np.ndarray, np.n
     return factor, np.abs(slowing_by_tilt(spins, resonance, delta + u, fits[0].top) / factor - 1)
 
 
-def _compare(laws: Sequence[HeldLaw], beside: SpinDownAnalysis) -> Iterable[Compared]:
+def _compare(laws: Sequence[HeldLaw], beside: SpinDownAnalysis) -> Iterable[tuple[str, tuple[Estimate, float]]]:
     theirs = {fit.name: fit.constants for fit in beside.combined.fits}
     for law in laws:
-        if len(law.constants) > 1 or law.name not in theirs:
-            continue
-        ((name, held),) = law.constants.items()
-        other = theirs[law.name][name]
-        if held.value is not None and held.u and other.value is not None and other.u:
-            pull = (held.value - other.value) / np.hypot(held.u, other.u)
-            yield Compared(law.name, name, held, Estimate(other.value, other.u, other.unit), float(pull))
+        for name, held in law.constants.items() if len(law.constants) == 1 and law.name in theirs else ():
+            other = theirs[law.name][name]
+            if held.value is not None and held.u and other.value is not None and other.u:
+                yield law.name, (other, float((held.value - other.value) / np.hypot(held.u, other.u)))
 
 
 METHOD = Method(

@@ -13,18 +13,19 @@ if TYPE_CHECKING:
     from levilab.pipelines.options import HoldOptions
     from levilab.pipelines.sources import Source
 
+#: Name of a part → what it is, where it comes from, what would make it smaller.
+_ROWS = {
+    "gain": ("gain at the full amplitude", "scatter of the counts about their lines", "more measurements of the gain"),
+    "drift": ("change of the spin meanwhile", "u of the first and of the last reading", "a longer hold"),
+    "exponent": ("gain seen beside the held spin", "an exponent of the drag of 1.5(3)", "counts evenly about the spin"),
+    "lean": ("pull there", "a top that leans, or is upright", "counts evenly about the spin"),
+}
+
 
 def budget_of_run(_: Source[HoldReadings], run: Hold, __: HoldOptions) -> tuple[Budget, ...]:
     """Return the budget of one held spin; none without a drag."""
     if run.drag is None or run.drag.value is None or run.drag.u is None:
         return ()
-    parts, unit = run.parts, "Hz/s"
-    rows = (
-        direct_row("gain", "gain at the full amplitude", parts["gain"], unit, "scatter of the counts about their lines",
-                   "more measurements of the gain", "A"),
-        direct_row("drift", "change of the spin from the first to the last reading", parts["drift"], unit,
-                   "u of these readings", "a longer hold", "A"),
-        direct_row("exponent", "gain seen beside the held spin", parts["exponent"], unit,
-                   "an exponent of the drag of 1.5(3)", "counts evenly about the held spin"),
-    )  # fmt: skip
-    return (Budget("drag", run.drag.value, run.drag.u, unit, rows),)
+    rows = [direct_row(name, what, run.parts[name], "Hz/s", note, remedy, "A" if name in {"gain", "drift"} else "B")
+            for name, (what, note, remedy) in _ROWS.items()]  # fmt: skip
+    return (Budget("drag", run.drag.value, run.drag.u, "Hz/s", tuple(rows)),)

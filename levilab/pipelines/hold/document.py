@@ -30,9 +30,12 @@ def _entries(analysis: HoldAnalysis) -> dict[str, Any]:
         for law in found.laws
     ]
     alone = values_of(find_all(QUANTITIES, analysis.runs[0])) if len(analysis.runs) == 1 else {}
-    values = values_of(found.laws[0].constants) if found.laws and not alone else alone
-    pulls = {f"{one.constant}_pull": number(one.pull, "1") for one in found.compared}
-    best = {"best_model": found.laws[0].name} if found.laws else {}
+    values = values_of(found.best.constants) if found.best else alone
+    pulls = {
+        f"{name}_pull": number(found.beside[law.name][1], "1")
+        for law in found.laws if law.name in found.beside for name in law.constants
+    }  # fmt: skip
+    best = {"best_model": found.best.name} if found.best else {}
     return {"values": values | pulls, "models": models, "verdict": analysis.text} | best
 
 

@@ -37,9 +37,12 @@ def hold_part(analysis: HoldAnalysis) -> ReportPart:
         ),
         figure=FigureText(
             title="Drag at held spins.",
-            caption="The drag that the amplitude balanced at each held spin, with its u, and the drag laws through it.",
+            caption=(
+                "The drag that the amplitude balanced at each held spin, with its u, and the drag laws through it; "
+                "below, both over the best law."
+            ),
             alt="Drag against spin, with the drag laws",
-            points=points_of(analysis, _points, "readings"),
+            points=points_of(analysis, _points, "readings", *(["ratios"] if analysis.combined.best else [])),
         ),
         runs_title="",
         runs=(),

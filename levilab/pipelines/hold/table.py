@@ -35,19 +35,16 @@ def spins_table(analysis: HoldAnalysis) -> Table:
 def laws_table(analysis: HoldAnalysis) -> Table:
     """Return a row for each drag law, with its constants beside those of the spin-down."""
     found = analysis.combined
-    beside = {one.law: one for one in found.compared}
-    rows = [
-        (
-            law.name,
-            ", ".join(f"{SYMBOLS.get(name, name)} = {without_unit(one)}" for name, one in law.constants.items()),
-            plain(law.statistics.chi_square, 3),
-            without_unit(beside[law.name].spindown) if law.name in beside else "—",
-            plain(beside[law.name].pull, 2) if law.name in beside else "—",
-        )
-        for law in found.laws
-    ]
-    heads = ("law", "constants", "χ²", "spin-down's", "pull")
-    return table("Drag laws through the held spins, constants in SI", heads, rows, numbers=("χ²", "pull"))
+    rows = []
+    for law in found.laws:
+        constants = ", ".join(f"{SYMBOLS[name]} = {without_unit(one)}" for name, one in law.constants.items())
+        spindown, pull = found.beside.get(law.name, (None, None))
+        beside = without_unit(spindown) if spindown else "—"
+        rows.append((law.name, constants, plain(law.statistics.chi_square, 3), beside, plain(pull, 2)))
+    shown = 5 if found.beside else 3
+    heads = ("law", "constants", "χ²", "spin-down's", "pull")[:shown]
+    cells = [row[:shown] for row in rows]
+    return table("Drag laws through the held spins, constants in SI", heads, cells, numbers=heads[2::2])
 
 
 def hold_columns(analysis: HoldAnalysis) -> Iterator[Mapping[str, np.ndarray]]:

@@ -142,6 +142,19 @@ def test_a_top_lost_while_the_loop_settles_is_brought_up_again(tmp_path, monkeyp
     assert "drive on" in [event["kind"] for event in run.events()][off:]
 
 
+def test_the_gain_of_a_hard_drive_is_seen_near_the_held_spin(tmp_path):
+    scene = random_scene(3)
+    world = SpinWorld(replace(scene, lock_torque=3 * scene.lock_torque), VirtualClock())
+    settings = ("hold.longest_s=40", "hold.drive_frequency_hz=28")
+    run = acquire(
+        in_world(request_for("hold", AcquisitionOptions(mock=True, out=tmp_path, settings=settings)), world), Silent()
+    )
+    gains = [np.array(event["spins_hz"]) for event in run.events() if event["kind"] == "gain measured"]
+    assert len(gains) == 2
+    assert all(np.ptp(spins) < 4.5 for spins in gains)  # 3 Hz, and a count of 1 Hz/s at the ends; ten would be 9 Hz
+    assert all(abs(spins.mean() - 28.0) < 0.6 for spins in gains)
+
+
 def test_two_readings_show_neither_a_scatter_nor_a_drag(tmp_path):
     run = held(tmp_path, 3, "hold.longest_s=15")
     assert (run.status, run.count()) == ("finished", 2)
