@@ -36,6 +36,8 @@ AGREES_P = 0.05
 #: Readings before the fall that a line is drawn through [s]: in ν^(−1/2), which is straight under the drag of a disc;
 #: u contains its bend under Stokes's or Newton's.
 _LINE_S = 20.0
+#: Fewest counts that a parabola, which bends with the gain of a driven top, is drawn through.
+FEWEST_ON_PARABOLA = 6
 
 
 def spin_at_fall(times: Array, spins: Array, u: float | None, between: tuple[float, float]) -> Estimate:
@@ -76,6 +78,21 @@ def spin_at_fall(times: Array, spins: Array, u: float | None, between: tuple[flo
     # ν̇ ∝ ν^n with n from 1 to 2, evenly: ÿ = 2 (n − 3/2) ẏ²/y
     of_law = per_hz * abs(float(bent)) * float(slope) ** 2 / float(at_fall) / math.sqrt(12)
     return Estimate(value, math.hypot(of_line, of_moment, of_law), "Hz")
+
+
+def spin_at_loss(times: Array, spins: Array, between: tuple[float, float]) -> Estimate:
+    """Return the spin at which a top that a drive sped up was lost [Hz]; arguments and errors as of `spin_at_fall`.
+
+    A parabola through the last counts: what the drag leaves of the pull becomes less on the way.
+    """
+    if times.size < FEWEST_ON_PARABOLA:
+        raise TooFewReadings(seen=times.size, needed=FEWEST_ON_PARABOLA)
+    low, high = between
+    last = times >= min(times[-1] - _LINE_S, times[-FEWEST_ON_PARABOLA])
+    t, y = times[last] - (low + high) / 2, spins[last]
+    parabola, covariance = np.polyfit(t, y, 2, cov=True)
+    of_moment = abs(float(parabola[1])) * (high - low) / math.sqrt(12)
+    return Estimate(float(parabola[2]), math.hypot(math.sqrt(float(covariance[2, 2])), of_moment), "Hz")
 
 
 # --- all of them ---

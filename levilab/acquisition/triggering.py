@@ -109,9 +109,9 @@ def slope_of(times: Sequence[float], spins: Sequence[float]) -> tuple[float, flo
 class Climb:
     """A way up under the full amplitude of the drive.
 
-    times, spins: ends of the counts [s], and counts [Hz], shape (n,); first_missed: end of the first count without the
-    top [s]; lost: what was seen in its place; levels_off_at: the spin at which pull and drag are equal, of a top that
-    was not lost [Hz].
+    times, spins: ends of the counts [s], and counts [Hz], shape (n,); first_missed: when the first count without the
+    top would have ended [s], later than which a dark counter answers; lost: what was seen in its place; levels_off_at:
+    the spin at which pull and drag are equal, of a top that was not lost [Hz].
     """
 
     times: Array
@@ -302,18 +302,19 @@ class Motor:
         self._set_share(1.0)
         times: list[float] = []
         spins: list[float] = []
-        first_missed, level = math.nan, 0
+        first_missed, lasts, level = math.nan, session.settings.gate_s, 0
         while True:
-            missed = self._missed
+            missed, asked = self._missed, session.now()
             try:
                 self.count()
             except NotHeld as lost:
                 return Climb(np.array(times), np.array(spins), first_missed, lost=lost)
             if self._missed > missed:
-                first_missed = session.now() if missed == 0 else first_missed
+                first_missed = asked + lasts if missed == 0 else first_missed
                 continue
             times.append(session.now())
             spins.append(self.spin)
+            lasts = times[-1] - asked
             if self.spin > highest:
                 raise _too_fast(session, highest)
             session.progress(f"speeds up, {self.spin:.2f} Hz", (self.spin - start) / (highest - start))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from levilab.crosscheck.subjects import field, hold, motion, phone, precession, spin, spindown, sway
+from levilab.crosscheck.subjects import field, hold, limit, motion, phone, precession, spin, spindown, sway
 
 #: Name → subject.
 SUBJECTS = MappingProxyType(
@@ -20,6 +20,7 @@ SUBJECTS = MappingProxyType(
             field.SUBJECT,
             sway.SUBJECT,
             hold.SUBJECT,
+            limit.SUBJECT,
         )
     }
 )

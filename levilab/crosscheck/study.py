@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import tempfile
-from collections.abc import Mapping  # noqa: TC003  # pydantic reads the fields of Study from it
+from collections.abc import Mapping  # pydantic reads the fields of Study from it
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
@@ -212,18 +212,21 @@ def study_world(subject: Subject, trials: int, seed: int, progress: Callable[[fl
             except (LevilabError, InstrumentError) as error:
                 raise TrialFailed(str(error).replace(folder, "")) from error
 
-    return make_trials(Study(subject.name, subject.about, trials, seed), trial, {}, progress)
+    return make_trials(Study(subject.name, subject.about, trials, seed), trial, subject.freedom, progress)
 
 
 def make_trials(
-    study: Study, trial: Callable[[int], Trial], freedom: Mapping[str, int], progress: Callable[[float], None]
+    study: Study,
+    trial: Callable[[int], Trial],
+    freedom: Mapping[str, int] | int | None,
+    progress: Callable[[float], None],
 ) -> Study:
     """Return a study with its trials.
 
     Args:
         study: without trials.
         trial: makes the trial of a number; raises LevilabError or AnalysisError where it comes to no estimate.
-        freedom: quantity → degrees of freedom of its u, where these are few.
+        freedom: quantity → degrees of freedom of its u, where these are few; or those of each.
         progress: called with the share that is done.
     """
     done, failures = [], []
@@ -251,7 +254,9 @@ def make_trials(
     )
 
 
-def spreads_of(pulls: Sequence[Pull], freedom: Mapping[str, int], widened: float | None) -> Iterator[Spread]:
+def spreads_of(
+    pulls: Sequence[Pull], freedom: Mapping[str, int] | int | None, widened: float | None
+) -> Iterator[Spread]:
     """Yield the pulls of each quantity."""
     quantities = dict.fromkeys(pull.quantity for pull in pulls)
     for quantity in quantities:
@@ -259,7 +264,8 @@ def spreads_of(pulls: Sequence[Pull], freedom: Mapping[str, int], widened: float
         relative = [pull.u / abs(pull.estimate) for pull in some if pull.estimate]
         values = tuple(pull.value for pull in some)
         median = float(np.median(relative)) if relative else None
-        yield Spread(quantity, values, median, freedom.get(quantity), widened, len(quantities))
+        few = freedom.get(quantity) if isinstance(freedom, Mapping) else freedom
+        yield Spread(quantity, values, median, few, widened, len(quantities))
 
 
 def by_reason(texts: Sequence[str]) -> dict[str, int]:

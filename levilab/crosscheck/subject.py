@@ -64,13 +64,15 @@ class Subject:
     """One way from a world whose numbers are known to what the analysis says of them.
 
     name: on the command line; about: one line; trial: from a seed and an empty folder to pulls, which raises
-    LevilabError or an instrument's error where it comes to none; trials: how many unless another number is asked for.
+    LevilabError or an instrument's error where it comes to none; trials: how many unless another number is asked for;
+    freedom: degrees of freedom of u where it comes from the scatter of few values.
     """
 
     name: str
     about: str
     trial: Callable[[int, Path], list[Pull]]
     trials: int = 40
+    freedom: int | None = None
 
 
 def acquire_mock(

@@ -122,6 +122,7 @@ class SpinScene:
         fall_hz: the spin at which the first top falls.
         later_falls_hz: those at which tops 1, 2, … fall, repeated from its first when all are used; empty: all fall at
             fall_hz.
+        edges_hz: those at which tops 0, 1, … leave the window upwards, repeated when all are used; empty: none does.
         lock_torque: the greatest angular acceleration per tesla of drive [rad s⁻² T⁻¹]: the moment's transverse part
             over I₃, halved because only half of a field along one line turns with the top.
         tape: what the phototransistor sees.
@@ -141,6 +142,7 @@ class SpinScene:
     constants: tuple[float, ...] = LAWS["disc"].usual
     fall_hz: float = published("thesis")["measured.mean"].value
     later_falls_hz: tuple[float, ...] = ()
+    edges_hz: tuple[float, ...] = ()
     lock_torque: float = MOMENT_TILT[0] * abs(MOMENT_A_M2) / 2 / Top().inertia_axial_kg_m2
     tape: Tape = field(default_factory=Tape)
     laser: Laser = field(default_factory=Laser)
@@ -160,6 +162,10 @@ class SpinScene:
         """
         later = self.later_falls_hz
         return later[(number - 1) % len(later)] if number and later else self.fall_hz
+
+    def edge_of(self, number: int) -> float:
+        """Return the spin at which a top leaves the window upwards, infinite where it does not [Hz]; see `fall_of`."""
+        return self.edges_hz[number % len(self.edges_hz)] if self.edges_hz else math.inf
 
 
 #: Number of later tops with different spins at which they fall; then these repeat.
@@ -331,40 +337,44 @@ class SpinWorld:
     def _plan_future(self, now: _Stretch) -> None:
         """Append the stretches that follow from this state, as long as nothing changes."""
         fall, hold, drive_spin = 2 * math.pi * self.scene.fall_of(now.number), self._hold, self._drive_spin
-        if now.spin <= fall:
+        edge = 2 * math.pi * self.scene.edge_of(now.number)
+        if not fall < now.spin < edge:
             self._append(replace(now, phase=Phase.FALLEN, spin=0.0))
             return
         if self._bursts is not None:
-            self._trigger(now, fall)
+            self._trigger(now, fall, edge)
             return
         # deceleration by drag: the change of spin over 1 ms, which is short against 1/C ~ 300 s
         drag = (now.spin - float(self._decay.after(now.spin, 1e-3, *self.scene.constants))) / 1e-3
         captured = hold > drag and abs(now.spin - drive_spin) < 2 * math.sqrt(hold) and drive_spin > fall
         if captured:
-            self._lock(now, drive_spin, hold, drag)
+            self._lock(now, drive_spin, hold, drag, edge)
         else:
             self._append(replace(now, phase=Phase.COASTING))
             lasts = float(self._decay.elapsed(now.spin, fall, *self.scene.constants))
             angle = now.angle + float(self._decay.turned(now.spin, fall, *self.scene.constants))
             self._append(_Stretch(now.start + lasts, 0.0, angle, Phase.FALLEN, number=now.number))
 
-    def _lock(self, now: _Stretch, drive_spin: float, hold: float, drag: float) -> None:
-        missing = drive_spin - now.spin
+    def _lock(self, now: _Stretch, drive_spin: float, hold: float, drag: float, edge: float) -> None:
+        end = min(drive_spin, edge)
+        missing = end - now.spin
         acceleration = hold - drag if missing > 0 else -(hold + drag)
         lasts = missing / acceleration
-        angle = now.angle + (now.spin + drive_spin) / 2 * lasts
+        angle = now.angle + (now.spin + end) / 2 * lasts
         if lasts > 0:
             self._append(replace(now, phase=Phase.PULLED, acceleration=acceleration))
-        self._append(_Stretch(now.start + lasts, drive_spin, angle, Phase.LOCKED, number=now.number))
+        spin, phase = (drive_spin, Phase.LOCKED) if drive_spin < edge else (0.0, Phase.FALLEN)
+        self._append(_Stretch(now.start + lasts, spin, angle, phase, number=now.number))
 
-    def _trigger(self, now: _Stretch, fall: float) -> None:
+    def _trigger(self, now: _Stretch, fall: float, edge: float) -> None:
         """Append a step of a top that triggers its drive, and its fall where it ends so."""
         half = now.spin + self._triggered_acceleration(now.spin) * BURST_STEP_S / 2
         acceleration = self._triggered_acceleration(half)
         self._append(replace(now, phase=Phase.TRIGGERING, acceleration=acceleration))
-        if now.spin + acceleration * BURST_STEP_S <= fall:
-            lasts = (fall - now.spin) / acceleration
-            angle = now.angle + (now.spin + fall) / 2 * lasts
+        if not fall < (end := now.spin + acceleration * BURST_STEP_S) < edge:
+            lost = fall if end <= fall else edge
+            lasts = (lost - now.spin) / acceleration
+            angle = now.angle + (now.spin + lost) / 2 * lasts
             self._append(_Stretch(now.start + lasts, 0.0, angle, Phase.FALLEN, number=now.number))
 
     def _triggered_acceleration(self, spin: float) -> float:

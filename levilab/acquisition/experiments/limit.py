@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 
-from analysis.limits import spin_at_fall
+from analysis.limits import FEWEST_ON_PARABOLA, spin_at_fall, spin_at_loss
 from analysis.locked import Cause, cause_of_loss, lag_before_loss, slip_of
 from levilab.acquisition.counting import NO_TOP, AnotherTop, Missed, free_top, prepare_counter, spin_now
 from levilab.acquisition.driving import (
@@ -254,17 +254,19 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
             try:
                 spin = held_spin(session, drive)
             except NotHeld as lost:
-                limit = _limit_of_loss(settings, (held, drive), seen)
+                if not counts:  # no spin at which it was held to begin with
+                    raise DidNotFollow(f"{lost}, as the creep began", "float it again, or drive harder") from lost
+                limit = _limit_of_loss(settings, (held, drive), counts[-1][1])
                 keep({"time_s": session.now()} | limit)
                 if lost.spin is not None:
                     counts.append((session.now(), lost.spin, drive))
                 _say_how_it_was_lost(session, lost, limit, seen, counts)
                 return
             seen.append((spin, drive))
-            held = drive
             if is_over(session):
                 return
         counts.append((session.now(), spin, drive))
+        held = drive
         before, at = at, session.now()
         drive += settings.creep_hz_per_s * min(at - before, longest_step_s)
         if drive > settings.highest_hz:
@@ -280,7 +282,7 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
 def _climb(session: Session[LimitSettings], motor: Motor, keep: Callable[[Row], None]) -> None:
     """Let a top that triggers its drive get faster until it is lost or gets no faster, and keep that spin.
 
-    A limit is the spin of a line through the last counts, continued to the middle of the time in which it was lost.
+    A limit is the spin of a parabola through the last counts, in the middle of the time in which it was lost.
     """
     settings = session.settings
     climb = motor.climb(
@@ -288,10 +290,10 @@ def _climb(session: Session[LimitSettings], motor: Motor, keep: Callable[[Row], 
     )
     spin, lost = climb.levels_off_at, climb.lost
     if spin is None:
-        if climb.spins.size < _FEWEST:
+        if climb.spins.size < FEWEST_ON_PARABOLA:
             raise DidNotFollow(f"the top was lost {climb.spins.size} counts after the way up began", "float it again")
         between = (float(climb.times[-1]), climb.first_missed)
-        spin = spin_at_fall(climb.times - settings.gate_s / 2, climb.spins, None, between)
+        spin = spin_at_loss(climb.times - settings.gate_s / 2, climb.spins, between)
     assert spin.value is not None
     assert spin.u is not None
     amplitude, seen = settings.drive_amplitude_vpp / 2, float(climb.spins[-1])
@@ -317,19 +319,19 @@ def _end_of(session: Session[LimitSettings], lost: NotHeld) -> tuple[RunEvent, s
     return (RunEvent.LOCK_LOST, "the drive lost the top") if is_up else (RunEvent.TOP_LOST, "the top fell")
 
 
-def _limit_of_loss(settings: LimitSettings, between: tuple[float, float], seen: list[tuple[float, float]]) -> Row:
+def _limit_of_loss(settings: LimitSettings, between: tuple[float, float], seen: float) -> Row:
     """Return the reading of a top that no longer follows, without its time.
 
-    between: the drive's frequencies at the last look at which it did, and at the first one at which it did not [Hz];
-    seen: each count until then, with the drive's frequency [Hz].
+    between: the drive's frequencies at the last count at which it did, and at the first one at which it did not [Hz];
+    seen: that last count [Hz].
     """
     held, drive = between
     # a top that slips is taken for held until it is far behind; but it only slows, so its limit is above the counts
-    low = min(held, seen[-1][0]) if seen else held
+    low = min(held, seen)
     return {
         "spin_frequency_hz": (low + drive) / 2,
         "spin_frequency_u_hz": (drive - low) / 12**0.5,
-        "spin_seen_hz": seen[-1][0] if seen else held,
+        "spin_seen_hz": seen,
         "drive_frequency_hz": held,
         "drive_amplitude_v": settings.drive_amplitude_vpp / 2,
     }

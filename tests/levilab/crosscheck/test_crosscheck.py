@@ -111,6 +111,14 @@ def test_ctrl_c_in_a_trial_ends_the_cross_check():
     assert trials == [0]
 
 
+def test_a_trial_of_limits_finds_their_means_and_each_cause(tmp_path, monkeypatch):
+    """With three tops in place of ten: Student's t of two degrees of freedom is below 10 in 99 % of all cases."""
+    monkeypatch.setattr("levilab.crosscheck.subjects.limit.TOPS", 3)
+    pulls = SUBJECTS["limit"].trial(9000, tmp_path)
+    assert [pull.quantity for pull in pulls] == ["lower mean", "upper mean", "triggered upper mean"]
+    assert all(abs(pull.value) < 10 for pull in pulls)
+
+
 @pytest.mark.parametrize(
     ("name", "seed", "quantities"),
     [

@@ -2,8 +2,6 @@
 
 import json
 import math
-from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -15,7 +13,7 @@ from instruments.virtual.generator.channel import Output, Triggered
 from levilab.acquisition.counting import FreeTop
 from levilab.acquisition.driving import held_spin
 from levilab.acquisition.experiments.limit import LimitSettings
-from levilab.acquisition.failures import DidNotFollow
+from levilab.acquisition.failures import DidNotFollow, NotHeld
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
@@ -105,6 +103,24 @@ def test_a_top_that_slips_before_it_is_missed_has_its_limit_within_u(tmp_path):
     assert "lock lost" in kinds(run)
     assert abs(limit - 36) < 2 * u  # an even distribution ends at 1.7 u
     assert u < 0.5
+
+
+def test_a_top_that_is_lost_as_the_creep_begins_has_no_limit(tmp_path, monkeypatch):
+    """No count shows how fast it still was under the drive: a u of 0 Hz would be wrong."""
+    lost = iter([NotHeld(None, 34.0)])
+
+    def held_at_second(session, drive):
+        for first in lost:
+            raise first
+        return held_spin(session, drive)
+
+    monkeypatch.setattr("levilab.acquisition.experiments.limit.held_spin", held_at_second)
+    world = Slipping(SpinScene(), VirtualClock())
+    run = acquire(in_world(mock(tmp_path, *SLIPS, "limit.interval_s=0.6"), world), Silent())
+    (once_more,) = [event["text"] for event in run.events() if event["kind"] == "once more"]
+    assert "as the creep began" in once_more
+    (limit,), (u,) = (run.readings().frame[name] for name in ("spin_frequency_hz", "spin_frequency_u_hz"))
+    assert abs(limit - 36) < 2 * u
 
 
 def test_the_mean_of_tops_that_are_all_alike_is_no_better_than_a_step(tmp_path):
@@ -399,21 +415,9 @@ def test_a_top_that_levels_off_shows_where_pull_and_drag_are_equal(tmp_path):
     assert "this is no limit of the top" in found.text
 
 
-class Windowed(SpinWorld):
-    """The first two tops fall at 37 Hz, the third one nowhere."""
-
-    falls_hz: ClassVar = {0: 37.0, 1: 37.0}
-
-    def _plan_until(self, time):
-        super()._plan_until(time)
-        now = self._stretch_at(time)
-        if now.spin > 2 * math.pi * self.falls_hz.get(now.number, 99.0):
-            self.take_top()
-
-
 def test_a_top_that_leaves_the_window_has_its_limit_where_it_fell(tmp_path):
-    """And one that only levels off is no limit, and enters no mean."""
-    world = Windowed(replace(SpinScene(), put_back_after_s=60.0), VirtualClock())
+    """Two at 37 Hz; two that only level off are no limits, and enter no mean."""
+    world = SpinWorld(SpinScene(edges_hz=(37.0, 37.0, 99.0, 99.0), put_back_after_s=60.0), VirtualClock())
     settings = [*TRIGGERED[:-1], "limit.drive_amplitude_vpp=4.2", "limit.repetitions=4"]
     run = acquire(in_world(mock(tmp_path, *settings), world), Silent())
     assert causes(run) == ["out of the window"] * 2 + ["the drive pulls no further"] * 2
