@@ -35,6 +35,11 @@ Array = NDArray[np.float64]
 
 #: The shift at finite amplitude is known to this part of it: it is computed without a vertical swing of its own.
 SHIFT_U = 0.035
+#: The next order of the shift: part of it that it is uncertain by, over the square of the sum of amplitudes² [1/m⁴].
+NEXT_SHIFT_U = 5e10
+#: A vertical swing of its own shifts the split, too: relative standard uncertainty, over the square of the energy of the
+#: lines beside the slow swings over that of these, times the fourth power of the difference from the beat [1/Hz⁴].
+RISE_U = 250.0
 #: Where the beat of the slow swings comes near the vertical swing, they exchange energy with it, and the shift's next
 #: orders count: relative standard uncertainty of the split, times A⁴ over the fourth power of the difference [Hz⁴/m⁴],
 #: as full motions of 120 tops over the whole window of masses have it; differences below NEAREST_HZ count as that.
@@ -47,13 +52,18 @@ LEAN_U = 0.3
 #: The precession's frequency is that of small swings: relative standard uncertainty of B′/2B from it, per square of the
 #: swings' amplitudes [1/m²].
 PRECESSION_SHIFT_U = 1e3
-#: A line that is so much weaker than a swing is not taken for it; the split over the spin scatters by this
+#: A line that is so much weaker than a swing is not taken for it; the split over that of the quartic scatters by this
 #: part in a spin-down.
-_WEAK, _BENT = 0.1, 0.05
+_WEAK, _BENT = 0.1, 0.015
 #: Standard uncertainty of the vertical swing that follows from the slow ones and the field [Hz].
 _VERTICAL_U_HZ = 0.015
+#: Large swings change it by so much more, times the square of the sum of amplitudes² and over the difference from the
+#: beat [Hz²/m⁴].
+_VERTICAL_SHIFT_U = 2.4e9
 #: The spin at which Ω_g is given [Hz].
 REFERENCE_HZ = 30.0
+#: The usual split over the beat: what the vertical swing does to it is no smaller where the lines have less.
+_USUAL = 0.13
 #: Step of the slopes by the ring's sizes, in their standard uncertainties.
 _STEP = 0.1
 #: Without a split the factor is that of this Ω_g/ω₃, a hundredth of the usual one.
@@ -125,7 +135,7 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
         raise TooFewReadings(seen=0, needed=1)
     if spin.shape != (len(swings),):
         raise ShapesDiffer(quantity="the spin", seen=spin.shape, expected=(len(swings),))
-    swings, wrong = _assigned(swings, spin, known)
+    swings, mistaken = _assigned(swings, spin, known)
     each = list(zip(swings, spin.tolist(), strict=True))
     heights = np.array([known.height(one, nu) for one, nu in each])
     placed = [(one, nu, z) for (one, nu), z in zip(each, heights.tolist(), strict=True)]
@@ -133,7 +143,8 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
     small = np.array([one.frequency[:2] for one in swings]) - shifts
     seen, shift = small.sum(axis=1), np.abs(shifts.sum(axis=1))
     resonance = np.array([_doubt(one) for one in swings])
-    mistaken = wrong * np.array([_away(one) for one in swings])
+    resonance *= np.maximum(np.abs(seen), [_USUAL * (one.frequency[1] - one.frequency[0]) for one in swings])
+    shift_u = shift * np.hypot(SHIFT_U, NEXT_SHIFT_U * np.array([one.size for one in swings]) ** 2)
     leans = np.array([_lean(*one, known) for one in placed])
     value, half = REFERENCE_HZ * float(np.mean(seen / spin)), np.empty(0)
     for _ in range(_ROUNDS):  # Ω_g is the split but for some percent, which hardly depend on it
@@ -142,19 +153,20 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
         factor = (1 + leans) * size * REFERENCE_HZ / expected
         shares = factor * seen
         u_shares = np.abs(factor) * np.array([one.u_split for one in swings])
-        doubt = np.abs(shares) * resonance + np.abs(factor) * (mistaken + SHIFT_U * shift)
-        total = np.hypot(u_shares, doubt)
+        doubt, mistake = np.abs(factor) * (resonance + shift_u), np.abs(factor) * mistaken
+        total = np.sqrt(u_shares**2 + doubt**2 + mistake**2)
         value, u_lines, chi_square = _mean(shares, total)
     lean = float(np.mean(leans))
     parts = {
         "lines": u_lines,
         "amplitude": float(np.average(doubt, weights=1 / total**2)),
+        "mistake": float(np.average(mistake, weights=1 / total**2)),
         "motion": MOTION_U * abs(value),
         "lean": LEAN_U * lean * abs(value),
     }
     u = math.hypot(*parts.values())
     far = np.array([PRECESSION_SHIFT_U * float(np.sum(one.amplitude[:2] ** 2)) for one in swings])
-    less = Corrections(shifts, leans, LEAN_U, far, np.abs(seen) * resonance + mistaken + SHIFT_U * shift, MOTION_U)
+    less = Corrections(shifts, leans, LEAN_U, far, np.hypot(resonance + shift_u, mistaken), MOTION_U)
     measured = Estimate(value, u, "Hz")
     of_base, predicted, parts_predicted = _predict(each, heights, known)
     share = (predicted.value or 0.0) / REFERENCE_HZ
@@ -189,25 +201,32 @@ def _mean(values: Array, u: Array) -> tuple[float, float, float]:
     return mean, partly_believed(chi_square, values.size - 1) / math.sqrt(float(np.sum(weight))), chi_square
 
 
-def _assigned(swings: Sequence[Swings], spin: Array, known: Known) -> tuple[Sequence[Swings], float]:
-    """Return the swings, with the other lines for the backward or the forward ones where that fits better.
+def _assigned(swings: Sequence[Swings], spin: Array, known: Known) -> tuple[Sequence[Swings], Array]:
+    """Return the swings, with the other lines for the backward or the forward ones or both where that fits better.
 
-    The split goes with the spin but for some percent, and the vertical swing with both swings and the field.  The
-    second value is the probability that they are taken for each other.
+    The split goes with the spin but for some percent, the vertical swing with both swings and the field, and a swing
+    is likelier the stronger line.  The second value is the standard uncertainty of each split from the other choices.
     """
     choices = [list(swings)]
     for k in (0, 1):
-        turned = [one.turned(k) for one in swings]
-        if np.mean([one.amplitude[k] for one in turned]) > _WEAK * np.mean([one.amplitude[k] for one in swings]):
-            choices.append(turned)
+        for one in choices[:]:
+            turned = [window.turned(k) for window in one]
+            if np.mean([window.amplitude[k] for window in turned]) > _WEAK * np.mean([w.amplitude[k] for w in one]):
+                choices.append(turned)
     misfits = np.array([_misfit(one, spin, known) for one in choices])
-    odds = np.exp(-(misfits - misfits.min()) / 2)
-    return choices[int(np.argmin(misfits))], float(1 - 1 / odds.sum())
+    best = int(np.argmin(misfits))
+    odds = np.exp(-(misfits - misfits[best]) / 2)
+    splits = np.array([[window.split for window in one] for one in choices])
+    return choices[best], np.sqrt(odds @ (splits - splits[best]) ** 2 / odds.sum())
 
 
 def _misfit(swings: Sequence[Swings], spin: Array, known: Known) -> float:
-    """Return χ² of split over spin, and of the vertical swing."""
-    share = np.array([one.split for one in swings]) / spin
+    """Return χ² of split over spin, and of the vertical swing, less twice the logarithm of the swings' energy."""
+    split = np.array([one.split for one in swings])
+    size = max(abs(float(np.mean(split / spin))), _SMALL)
+    each = zip(spin.tolist(), swings, strict=True)
+    share = split / np.array([_split(size, nu, one.frequency[:2], known)[0] for nu, one in each])
+    bent = math.hypot(_BENT, float(np.mean([_doubt(one) for one in swings])))
     middle = len(swings) // 2
     one = swings[middle]
     try:
@@ -216,7 +235,10 @@ def _misfit(swings: Sequence[Swings], spin: Array, known: Known) -> float:
         return math.inf
     backward, forward = one.frequency[:2].tolist()
     off = one.vertical - vertical_swing(backward, forward, slope, known.top.gravity)
-    return float((share.std() / (_BENT * (abs(share.mean()) + 1e-9))) ** 2 + (off / _VERTICAL_U_HZ) ** 2)
+    u = math.hypot(_VERTICAL_U_HZ, _VERTICAL_SHIFT_U * one.size**2 / max(_away(one), NEAREST_HZ))
+    energy = 4 * float(np.sum(np.log(one.amplitude[:2])))
+    uneven = share.std() / (bent * (abs(share.mean()) + 1e-9))
+    return float(uneven**2 + (off / u) ** 2 + 2 * math.log(u)) - energy
 
 
 def _away(swings: Swings) -> float:
@@ -225,9 +247,11 @@ def _away(swings: Swings) -> float:
 
 
 def _doubt(swings: Swings) -> float:
-    """Return the relative standard uncertainty of a split from the exchange of energy with the vertical swing."""
-    size = float(np.sum(swings.amplitude[:2] ** 2))
-    return float(min(RESONANCE_U * size**2 / max(_away(swings), NEAREST_HZ) ** 4, 1.0))
+    """Return the relative standard uncertainty of a split from the vertical swing, of its own and by the slow ones."""
+    away = _away(swings)
+    beside = float(np.sum(swings.others[:, 2] ** 2)) / swings.size
+    exchange = RESONANCE_U * swings.size**2 / max(away, NEAREST_HZ) ** 4
+    return min(exchange + RISE_U * beside**2 * away**4, 1.0)
 
 
 def _split(share: float, spin: float, small: Array, known: Known) -> tuple[float, float]:

@@ -99,6 +99,11 @@ class Swings:
         return replace(self, frequency=frequency, u=u, amplitude=amplitude, vertical=beat, others=others)
 
     @property
+    def size(self) -> float:
+        """Sum of the squares of both slow swings' amplitudes [m²]."""
+        return float(np.sum(self.amplitude[:2] ** 2))
+
+    @property
     def split(self) -> float:
         """By how much the forward swing is faster than the backward one [Hz]."""
         return float(self.frequency[0] + self.frequency[1])
@@ -181,13 +186,14 @@ def swings_in_window(t: Array, s: Places, near: Sequence[Swings] = ()) -> Swings
         near: swings at nearby times, from which the search starts, too.
     """
     lines = _spectrum(t, s)
-    forward, seen = _peaks(lines, SLOW_HZ)[:1], _peaks(lines, (-SLOW_HZ[1], -SLOW_HZ[0]))[:_TRIED]
+    forward, seen = _peaks(lines, SLOW_HZ)[:2], _peaks(lines, (-SLOW_HZ[1], -SLOW_HZ[0]))[:_TRIED]
     if not (forward and seen):
         return None
     # two lines that are nearer than the window resolves have one peak between them
     apart = 0.6 / float(t[-1] - t[0])
     starts = [one.frequency[:2] for one in near]
-    starts += [np.array([backward, *forward]) for backward in {*seen, seen[0] - apart, seen[0] + apart}]
+    starts += [np.array([backward, forward[0]]) for backward in {*seen, seen[0] - apart, seen[0] + apart}]
+    starts += [np.array([backward, one]) for backward in seen[:2] for one in forward[1:]]
     fits = [_fit(t, s, start, np.zeros(2)) for start in starts]
     slow, rest = min(fits, key=lambda one: one[0].misfit)
     ahead, back = _precession(t, rest), _precession(t, rest.conj())

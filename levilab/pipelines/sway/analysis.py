@@ -138,7 +138,14 @@ def _doubts(swings: Sequence[Swings], found: Geometry, *, view: bool | None) -> 
             f"the precession is so large that {100 * found.lean:.0f} % are added to the split for its tilt: is the "
             "place that of the top's middle?  The end of the stem moves more; follow its foot or the rim"
         )
-    if (found.measured.u or 0.0) > _LARGE_U * abs(found.measured.value or 0.0):
+    large = _LARGE_U * abs(found.measured.value or 0.0)
+    if found.parts["mistake"] > large:
+        one, ((backward, *_), (forward, *_)) = swings[len(swings) // 2], swings[len(swings) // 2].others
+        yield (
+            f"u is large: the swings may be those at {one.frequency[0]:.2f} and {one.frequency[1]:.2f} Hz, or at "
+            f"{backward:.2f} and {forward:.2f} Hz; let the top swing less, or film until its spin has fallen by a third"
+        )
+    elif (found.measured.u or 0.0) > large:
         beat = float(np.mean([one.frequency[1] - one.frequency[0] for one in swings]))
         vertical = float(np.mean([one.vertical for one in swings]))
         yield (

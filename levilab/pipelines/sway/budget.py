@@ -19,6 +19,8 @@ _ROWS = {
               "a longer spin-down, or a sharper picture"),
     "amplitude": ("shift at finite amplitude", "B", "computed for a top without a vertical swing",
                   "smaller swings, or another washer"),
+    "mistake": ("which line is which", "B", "lines of the vertical swing lie beside the swings",
+                "a longer spin-down, or smaller swings"),
     "motion": ("changes within a window", "B", "as tops in full motion scatter", "a slower spin-down"),
     "lean": ("tilt of the precession", "B", "by the size of its line, as of the centre of mass",
              "a top that precesses less, or a mark nearer to the centre of mass"),

@@ -220,4 +220,28 @@ def test_the_shift_by_the_size_of_the_swings_is_in_u_by_its_part():
     found = geometric_magnetism(swings, np.array([30.0]), known(0.02526))
     (shift,) = np.abs(found.shifts.sum(axis=1))
     assert shift > 5e-4
-    assert found.parts["amplitude"] == pytest.approx(0.035 * shift, rel=0.1)  # Ω_g is the split but for some percent
+    part = np.hypot(0.035, 0.05 * 2**2)  # of both swings' squares in mm²
+    assert found.parts["amplitude"] == pytest.approx(part * shift, rel=0.1)  # Ω_g is the split but for some percent
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("duration", [4.0, 6.0, 8.0])
+def test_of_short_tracks_the_mistake_of_a_line_is_in_u(fresh, duration):
+    pulls, small = [], []
+    for trial in range(20):
+        spin = float(fresh.uniform(26, 38))
+        start = {"start.spin_hz": spin, "start.position_m": [fresh.uniform(3e-4, 2e-3), 0.0, 0.0729]}
+        start |= {"start.velocity_m_s": fresh.uniform(-4e-3, 4e-3, 3).tolist()}
+        if trial < 2:  # as the scene has it: swings of 1.2 mm beside lines of 0.7 mm
+            start = {}
+        motion = simulate(preset("friction").changed(start), duration, rate=240.0, tolerance=1e-5)
+        places = motion.position[:-1, 0] + 1j * motion.position[:-1, 1]
+        places = places + 3e-5 * (fresh.normal(size=places.size) + 1j * fresh.normal(size=places.size))
+        swings = swings_of(motion.time[:-1], places)
+        at = np.interp([one.time for one in swings], motion.time, motion.spin_hz)
+        found = geometric_magnetism(swings, at, known(0.02526))
+        pulls.append((found.measured.value - 0.1765) / found.measured.u)  # where it floats at rest
+        small.append(found.measured.u < 0.1 * 0.1765)
+    assert np.abs(pulls).max() < 3
+    assert np.std(pulls) < 1.5  # 1, and 3 of its standard errors
+    assert sum(small) > 5  # u is no larger than it has to be
