@@ -37,8 +37,8 @@ Array = NDArray[np.float64]
 SHIFT_U = 0.035
 #: The next order of the shift: part of it that it is uncertain by, over the square of the sum of amplitudes² [1/m⁴].
 NEXT_SHIFT_U = 5e10
-#: A vertical swing of its own shifts the split, too: relative standard uncertainty, over the square of the energy of the
-#: lines beside the slow swings over that of these, times the fourth power of the difference from the beat [1/Hz⁴].
+#: A vertical swing of its own shifts the split, too: relative standard uncertainty, over the square of the energy of
+#: the lines beside the slow swings over theirs, times the fourth power of the difference from the beat [1/Hz⁴].
 RISE_U = 250.0
 #: Where the beat of the slow swings comes near the vertical swing, they exchange energy with it, and the shift's next
 #: orders count: relative standard uncertainty of the split, times A⁴ over the fourth power of the difference [Hz⁴/m⁴],

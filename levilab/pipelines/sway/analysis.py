@@ -117,6 +117,8 @@ def _in_words(found: Geometry) -> str:
     )
     off = abs((found.ratio.value or 0.0) - 1) / (found.ratio.u or np.inf)
     agrees = "agrees with" if off < _ENOUGH else "disagrees with"
+    if (found.ratio.u or np.inf) * _ENOUGH > 1:
+        agrees = "is too uncertain for a comparison with"
     predicted = replace(found.predicted, u=found.predicted.u or 0.0)
     return (
         f"The slow swings are split by geometric magnetism of {with_uncertainty(found.measured)} at a spin of "
@@ -142,8 +144,9 @@ def _doubts(swings: Sequence[Swings], found: Geometry, *, view: bool | None) -> 
     if found.parts["mistake"] > large:
         one, ((backward, *_), (forward, *_)) = swings[len(swings) // 2], swings[len(swings) // 2].others
         yield (
-            f"u is large: the swings may be those at {one.frequency[0]:.2f} and {one.frequency[1]:.2f} Hz, or at "
-            f"{backward:.2f} and {forward:.2f} Hz; let the top swing less, or film until its spin has fallen by a third"
+            f"u is large: the slow swings may be the lines at {one.frequency[0]:.2f} or {backward:.2f} Hz and at "
+            f"{one.frequency[1]:.2f} or {forward:.2f} Hz; let the top swing less, by half a millimetre, or film until "
+            "its spin has fallen by a third"
         )
     elif (found.measured.u or 0.0) > large:
         beat = float(np.mean([one.frequency[1] - one.frequency[0] for one in swings]))

@@ -95,6 +95,17 @@ def test_a_mark_on_the_end_of_the_stem_is_noticed(tmp_path):
     assert found.runs[0].geometry.parts["lean"] > 0.1 * found.runs[0].geometry.measured.u
 
 
+def test_lines_that_may_be_either_are_named_and_not_compared(tmp_path):
+    t = np.arange(720) / 120  # the lines of 6 s of preset friction, whose push was too large
+    waves = ((-0.561, 1.12, 0.1), (0.739, 1.22, 1.0), (-0.358, 0.74, 2.0), (0.536, 0.68, 3.0), (7.62, 0.03, 0.0))
+    z = sum(size * np.exp(2j * np.pi * f * t + 1j * phase) for f, size, phase in waves)
+    rows = [(f"{one:.4f}", f"{place.real:.6f}", f"{place.imag:.6f}") for one, place in zip(t, z, strict=True)]
+    found = analyze(write(tmp_path / "large.csv", ("t [s]", "x [mm]", "y [mm]"), rows), spin_hz=29.7)
+    assert "may be the lines at -0.56 or -0.36 Hz and at 0.74 or 0.54 Hz" in " ".join(found.all_warnings)
+    assert "too uncertain" in found.text
+    assert found.runs[0].geometry.measured.u > 0.1
+
+
 def test_without_a_precession_the_view_is_doubted(tmp_path):
     t = np.arange(1200) / 60
     z = 0.11 * np.exp(-2j * np.pi * 0.617 * t) + 0.45 * np.exp(2j * np.pi * 0.852 * t)
