@@ -24,6 +24,8 @@ MISSING_WORDS = (
     "-", "--", "---", "n/a", "na", "n.a.", "nan", "#n/a", "#nv", "#num!", "#wert!", "#value!", "null", "none"
 )  # fmt: skip
 MISSING = frozenset(("", *MISSING_WORDS))
+#: What stands for a formula without its value, in the place of a number.
+UNVALUED = "=?"
 #: Decimal mark → (mark of thousands, numbers that have both, as 2.394,0 and 2,394.0); 2.394 alone could be either.
 _THOUSANDS = {
     ",": (".", re.compile(r"[+-]?\d{1,3}(\.\d{3})+,\d+")),
@@ -91,7 +93,7 @@ class Dialect:
 
     def kind(self, text: str) -> Kind:
         """Return whether a field holds a number, a time of a clock, a missed reading, or text."""
-        if text.casefold() in MISSING:
+        if text.casefold() in MISSING or text == UNVALUED:
             return "missing"
         try:
             self.number(_without_unit(text))

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.formats.columns import Column, TableError, shorten
-from levilab.formats.dialect import CLOCK, MISSING, clock_time, is_dated, slashed_date, unit_behind
+from levilab.formats.dialect import CLOCK, MISSING, UNVALUED, clock_time, is_dated, slashed_date, unit_behind
 from levilab.formats.layout import Layout
 from levilab.formats.texts import Text
 from levilab.formats.titles import dimension, unit_factor
@@ -295,6 +295,9 @@ def _number(path: Path, layout: Layout, column: Column, line: int, text: str) ->
     if column.name == "time_s":
         with contextlib.suppress(ValueError):
             return clock_time(text, month_first=layout.dialect.month_first) / column.factor
+    if text == UNVALUED:
+        what = f"column '{shorten(column.label)}' holds a formula without its value"
+        raise TableError(path, f"{what}: open the file in Excel or LibreOffice, save it", line=line)
     mark = "comma" if layout.dialect.decimal == "," else "point"
     combined = "±" in text or "+/-" in text
     do = _ITS_OWN_COLUMN if combined else "correct it, or leave it empty if the reading was missed"

@@ -20,6 +20,7 @@ from typing import Any, BinaryIO
 import python_calamine
 
 from levilab.formats.columns import NoTable, TableError, shorten
+from levilab.formats.dialect import UNVALUED
 from levilab.formats.dress import undress
 
 #: Bytes that a workbook or an archive may unpack to: a spreadsheet of a million rows has some 100 MB, and a reader
@@ -118,7 +119,7 @@ def _texts(file: Path, _: int, size: int) -> tuple[Text, ...]:
     with file.open("rb") as stream:
         head = stream.read(1 << 16)
     if head.startswith(_OLE):
-        return _sheets(file)
+        return _sheets(file, file)
     if head.startswith(_ZIP):
         return _unpacked(file)
     if head[:200].removeprefix(codecs.BOM_UTF8).lstrip()[:1] in {b"{", b"["} and file.suffix.casefold() != ".csv":
@@ -173,12 +174,12 @@ def _unpacked(file: Path) -> tuple[Text, ...]:
             seen = sum(member.file_size for member in taken)
             if len(taken) > MOST_MEMBERS or seen > MOST_UNPACKED:
                 raise _too_large(file, f"{len(taken)} files of {seen / 2**30:.1f} GB")
-            found = _check(file, archive, taken) if workbook else list(_members(file, archive, taken))
+            if workbook:
+                return _sheets(file, _marked(file, archive, taken) if _check(file, archive, taken) else file)
+            found = list(_members(file, archive, taken))
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
         what = "is locked by a password" if "encrypted" in str(error) else f"is a damaged ZIP or Excel file ({error})"
         raise TableError(file, f"{what}: open it with its own program and save it again, unlocked") from error
-    if workbook:
-        return _sheets(file)
     if not found:
         raise NoTable(file, "is a ZIP file without a table: CSV, TXT or a spreadsheet is expected in it: unpack it")
     return tuple(found)
@@ -225,17 +226,17 @@ def _blocks(file: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, most:
 _ADDRESS = re.compile(rb"r=[\"']([A-Z]{1,3})(\d{1,7})")
 #: The address of a cell right of column Z or below row 999 999; without any such a sheet is of an allowed size.
 _FAR = re.compile(rb"r=[\"'](?:[A-Z]{2}|[A-Z]\d{7})")
-#: A formula of Excel whose number was never worked out; a text may be empty.
+#: A formula of Excel whose number was never worked out, its address; a text may be empty.
 _WITHOUT_VALUE = re.compile(
-    rb"""<c (?![^<>]*t="str")[^<>]*>\s*<f[^<>]*(?:/>|>[^<]*</f>)\s*(?:<v ?/>|<v></v>)?\s*</c>"""
+    rb"""<c (?![^<>]*t="str")(?:[^<>]*?(r="\w+"))?[^<>]*>\s*<f[^<>]*(?:/>|>[^<]*</f>)\s*(?:<v ?/>|<v></v>)?\s*</c>"""
 )
 _OPENED = re.compile(rb"<table:(table|table-row|table-cell|covered-table-cell)(?![\w-])([^<>]*)>")
 _REPEATED = re.compile(rb"number-(?:rows|columns)-repeated=[\"'](\d+)")
 
 
-def _check(file: Path, archive: zipfile.ZipFile, members: Sequence[zipfile.ZipInfo]) -> list[Text]:
-    """Refuse a workbook that is too large: its bytes, its cells, its repeated texts.  Returns nothing to read."""
-    left, longest, texts = MOST_UNPACKED, 0, 0
+def _check(file: Path, archive: zipfile.ZipFile, members: Sequence[zipfile.ZipInfo]) -> bool:
+    """Refuse a workbook that is too large: its bytes, cells, repeated texts.  Return whether a formula has no value."""
+    left, longest, texts, unvalued = MOST_UNPACKED, 0, 0, False
     for member in members:
         far, ods, rest = False, _OdsCells(), b""
         for block in _blocks(file, archive, member, left):
@@ -246,18 +247,28 @@ def _check(file: Path, archive: zipfile.ZipFile, members: Sequence[zipfile.ZipIn
             if b"</si>" in rest:
                 longest = max(longest, *map(len, rest.split(b"</si>")))
             far = far or _FAR.search(rest) is not None
-            if b"<f" in rest and _WITHOUT_VALUE.search(rest):
-                raise TableError(file, "holds formulas without their values: open it in Excel or LibreOffice, save it")
+            unvalued = unvalued or (b"<f" in rest and _WITHOUT_VALUE.search(rest) is not None)
             texts += rest.count(b't="s"') + rest.count(b"t='s'")
             rest = rest[max(rest.rfind(b"<"), 0) :]
-        rows, columns = (
-            _extent(_blocks(file, archive, member, MOST_UNPACKED)) if far else (ods.rows, ods.columns)
-        )  # fmt: skip
+        rows, columns = ods.rows, ods.columns
+        if far:
+            rows, columns = _extent(_blocks(file, archive, member, MOST_UNPACKED))
         if rows * columns > MOST_CELLS:
             raise _too_large(file, f"{rows:,} rows of {columns:,} columns")
     if longest * texts > 4 * MOST_UNPACKED:
         raise _too_large(file, f"{texts:,} cells with texts of up to {longest:,} letters")
-    return []
+    return unvalued
+
+
+def _marked(file: Path, archive: zipfile.ZipFile, members: Sequence[zipfile.ZipInfo]) -> BinaryIO:
+    """Return a workbook with a text in each cell whose formula has no value: empty it would pass for a missed one."""
+    marked, cell = io.BytesIO(), rf'<c \1 t="str"><v>{UNVALUED}</v></c>'.encode()
+    with zipfile.ZipFile(marked, "w") as out:
+        for member in members:
+            content = b"".join(_blocks(file, archive, member, MOST_UNPACKED))
+            out.writestr(member.filename, _WITHOUT_VALUE.sub(cell, content))
+    marked.seek(0)
+    return marked
 
 
 def _extent(blocks: Iterable[bytes]) -> tuple[int, int]:
@@ -301,10 +312,10 @@ class _OdsCells:
                     self.columns = max(self.columns, self._column)
 
 
-def _sheets(file: Path) -> tuple[Text, ...]:
-    """Return the sheets of a spreadsheet that hold cells, in their order."""
+def _sheets(file: Path, source: Path | BinaryIO) -> tuple[Text, ...]:
+    """Return the sheets of a spreadsheet that hold cells, in their order, from the file or from its bytes."""
     try:
-        with python_calamine.load_workbook(file) as book:
+        with python_calamine.load_workbook(source) as book:
             sheets = [book.get_sheet_by_index(k) for k in range(len(book.sheet_names))]
             _must_be_of_a_size(file, sheets)
             found = [(sheet.name, sheet.to_python(skip_empty_area=False)) for sheet in sheets if sheet.height]

@@ -18,7 +18,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
         ), 1),
         "ms": 1e-3, "msec": 1e-3, "milliseconds": 1e-3, "millisekunden": 1e-3, "μs": 1e-6, "us": 1e-6, "ns": 1e-9,
         **dict.fromkeys(("min", "minute", "minutes", "minuten", "minuto", "minutos", "minut", "minuter"), 60),
-        "h": 3600,
+        "h": 3600, **dict.fromkeys(("mm:ss", "m:ss", "min:s", "min:sec", "hh:mm:ss", "h:mm:ss", "h:min:s"), 1),
     },
     "frequency": {
         "Hz": 1, "hertz": 1, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3, "μHz": 1e-6, "1/s": 1, "s-1": 1, "rps": 1, "U/s": 1,

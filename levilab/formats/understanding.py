@@ -25,8 +25,9 @@ from levilab.formats.columns import (
     quote_names,
     shorten,
 )
-from levilab.formats.dialect import unit_behind
+from levilab.formats.dialect import UNVALUED, unit_behind
 from levilab.formats.layout import Layout, sniff
+from levilab.formats.rows import read_rows
 from levilab.formats.texts import Text, locate, texts_of
 from levilab.formats.titles import (
     CANONICAL,
@@ -36,6 +37,8 @@ from levilab.formats.titles import (
     NEED_UNITS,
     OTHER_SENSORS,
     QUANTITIES,
+    Title,
+    as_a_period,
     dimension,
     nearly_a_frequency,
     plain_name,
@@ -242,11 +245,13 @@ def _unanswered(path: Path, doubt: Doubt) -> NoSuchColumn:
 
 
 def _must_be_sure(plan: "Plan") -> "Plan":
-    """Return a plan whose spin is in a stated or a possible unit.  Raises NoSuchColumn, with the question."""
+    """Return a plan; raise NoSuchColumn for a unit in doubt, TableError for a formula without its value."""
     for column in plan.columns:
         doubt = None if column.written else _unit_doubt(plan.layout, column, plan.columns)
         if doubt:
             raise _unanswered(plan.path, doubt)
+    if UNVALUED.encode() in (plan.text.content or b""):
+        read_rows(replace(plan.text, path=plan.path), plan.layout, plan.columns)
     return plan
 
 
@@ -422,6 +427,8 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
     quantities, needed = request.quantities, request.needed
     header, wanted, warnings = _titles(path, layout, request.columns, guess=request.guess)
     meant = part.titles if layout.header else header
+    if not {"t", "time_s"} & {*wanted}:
+        _must_be_one_time(path, layout, meant)
     chosen, doubts = choose_columns(path, header, layout.units, wanted, quantities, meant=meant)
     if request.guess and _SPIN in quantities:
         spin, note = _by_values(path, layout, meant, chosen, quantities)
@@ -442,6 +449,18 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
             raise no_column(path, name, header, _which_columns(layout, [name]))
     chosen = tuple(sorted(chosen, key=lambda column: CANONICAL.index(column.name)))
     return Plan(path, text, layout, header, chosen, part.own, (*warnings, *doubts))
+
+
+def _must_be_one_time(path: Path, layout: Layout, meant: Sequence[str]) -> None:
+    """Raise TableError for times in two columns: whole minutes, and seconds below 60 beside them."""
+    titles = [Title("time_s", text) if unit_factor(text, "time") else read_title(text) for text in meant]
+    times = [unit_factor(one.unit or "", "time") if one.column == "time_s" else None for one in titles]
+    for minutes in (k for k in range(len(times)) if times[k : k + 2] == [60, 1] and not as_a_period(meant[k + 1])):
+        whole, seconds = _numbers(layout, minutes), _numbers(layout, minutes + 1)
+        if any(whole) and all(n == int(n) for n in whole) and seconds and max(seconds) < 60:
+            what = f"its times stand in two columns, {quote_names(meant[minutes : minutes + 2])}"
+            do = "write them as one, in seconds (60 × minutes + seconds) or as 1:20"
+            raise TableError(path, f"{what}: {do}", line=layout.header_line or layout.first_line)
 
 
 def _which_columns(layout: Layout, names: Collection[str]) -> Doubt:

@@ -319,8 +319,48 @@ def test_formulas_that_were_never_worked_out_say_what_to_do(tmp_path, value):
         f'<row r="{k}"><c r="A{k}"><v>{k}</v></c><c r="B{k}"><f>38-A{k}</f>{value}</c></row>' for k in (1, 2, 3)
     )
     sheet = f'<worksheet xmlns="{MAIN}"><sheetData>{rows}</sheetData></worksheet>'
-    with pytest.raises(TableError, match="holds formulas without their values: open it in Excel or LibreOffice"):
-        read_table(workbook(tmp_path / "formulas.xlsx", sheet), quantities=SPIN)
+    path = workbook(tmp_path / "formulas.xlsx", sheet)
+    with pytest.raises(TableError, match=r"Run 1, line 1: column '2' holds a formula without its value: open the file"):
+        read_table(path / "Run 1", quantities=SPIN)
+    table = read_table(path, quantities=SPIN)  # the other sheet, with a note
+    assert table.path == path / "Run 2"
+    assert table.warnings[0].startswith("not read: ")
+    assert "Run 1, line 1" in table.warnings[0]
+
+
+def test_formulas_without_values_beside_the_readings_refuse_nothing(tmp_path):
+    rows = "".join(
+        f'<row r="{k}"><c r="A{k}"><v>{k}</v></c><c r="B{k}"><v>{38 - k}</v></c><c r="D{k}"><f>B{k}</f></c></row>'
+        for k in range(1, 5)
+    )
+    last = '<row r="5"><c r="A5" t="inlineStr"><is><t>mean</t></is></c><c r="B5"><f>AVERAGE(B1:B4)</f></c></row>'
+    sheet = f'<worksheet xmlns="{MAIN}"><sheetData>{rows}{last}</sheetData></worksheet>'
+    table = read_table(workbook(tmp_path / "beside.xlsx", sheet) / "Run 1", columns={"t": "1", "f": "2"})
+    assert table.column("spin_frequency_hz").tolist() == [37, 36, 35, 34]
+    assert "is no reading and is left out" in table.warnings[0]
+
+
+TIMES = ["0;0;38", "0;40;37.5", "1;20;37.2", "1;55;37"]
+
+
+@pytest.mark.parametrize("titles", ["min;s;f", "t [min];t [s];f", "Minuten;Sekunden;f / Hz", "Zeit min;Zeit s;f"])
+def test_times_in_two_columns_say_to_write_them_as_one(titles, tmp_path):
+    path = tmp_path / "two.csv"
+    path.write_text("\n".join([titles, *TIMES, ""]), encoding="utf-8")
+    with pytest.raises(TableError, match=r"its times stand in two columns, .* or as 1:20"):
+        read_table(path, quantities=SPIN)
+
+
+def test_minutes_beside_other_seconds_are_the_times(tmp_path):
+    path = tmp_path / "u.csv"
+    path.write_text("t [min];u_t [s];f\n0;1;38\n1;1;37\n2;1;36\n", encoding="utf-8")
+    assert read_table(path, quantities=SPIN).column("time_s").tolist() == [0, 60, 120]
+
+
+def test_a_stopwatch_may_say_so_in_its_title(tmp_path):
+    path = tmp_path / "watch.csv"
+    path.write_text("t [mm:ss];f\n0:30;38\n1:20;37\n2:00;36\n", encoding="utf-8")
+    assert read_table(path, quantities=SPIN).column("time_s").tolist() == [30, 80, 120]
 
 
 def test_a_path_into_no_file_stays_a_path():
