@@ -13,7 +13,7 @@ Paths = Annotated[
     list[Path], typer.Argument(metavar="PATH…", readable=False, help="Run folders, data files, or folders to search.")
 ]
 #: Those that come with levilab, simple ones first; help is not to wait for their files.
-SCENES = "undriven, friction, tilted, driven, loose-washers, motor, precession, spindown, sway, practice"
+SCENES = "undriven, friction, tilted, driven, loose-washers, motor, ramp, precession, spindown, sway, practice"
 Presets = Annotated[
     str,
     typer.Argument(

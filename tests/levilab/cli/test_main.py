@@ -103,6 +103,7 @@ def test_an_analysis_need_not_be_named(levilab, sample_data):
         ("field", 1),
         ("limit", 3),
         ("precession", 1),
+        ("hold", 4),
     ]
     assert "Did you mean 'spindown'" in levilab("analyze", "spindwon", check=2).stderr
 
