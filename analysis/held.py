@@ -141,13 +141,14 @@ class HeldLaw:
         return self.reference_hz * LAWS[self.name].slowing(spin / self.reference_hz, self.solution)
 
 
-def fit_held(spin: Array, drag: Array, u: Array) -> tuple[HeldLaw, ...]:
+def fit_held(spin: Array, drag: Array, u: Array, common: Array | None = None) -> tuple[HeldLaw, ...]:
     """Return each law that has no more constants than there are spins, fitted to the drag, the best law first.
 
     Args:
         spin: shape (n,) [Hz].
         drag: shape (n,) [Hz/s].
         u: of the drag, shape (n,) [Hz/s].
+        common: u of a correction by which all are wrong alike, shape (n,) [Hz/s]; None: there is none.
 
     >>> spins = np.array([25.0, 35.0, 45.0])
     >>> found = fit_held(spins, 2e-4 * (2 * np.pi * spins) ** 1.5 / (2 * np.pi), 0.001 * np.ones(3))
@@ -155,7 +156,9 @@ def fit_held(spin: Array, drag: Array, u: Array) -> tuple[HeldLaw, ...]:
     ('disc', 0.0002)
     """
     reference = float(np.exp(np.mean(np.log(spin))))
-    fits = [_fit(law, spin, drag, u, reference) for law in LAWS.values() if len(law.constants) <= len(spin)]
+    shared = np.zeros(len(spin)) if common is None else common
+    white = np.linalg.inv(np.linalg.cholesky(np.diag(u**2) + np.outer(shared, shared)))
+    fits = [_fit(law, spin, drag, white, reference) for law in LAWS.values() if len(law.constants) <= len(spin)]
     weighed, _ = weigh({one.name: one.statistics for one in fits})
     by_name = {one.name: one for one in fits}
     return tuple(
@@ -164,7 +167,8 @@ def fit_held(spin: Array, drag: Array, u: Array) -> tuple[HeldLaw, ...]:
     )
 
 
-def _fit(law: DragLaw, spin: Array, drag: Array, u: Array, reference: float) -> HeldLaw:
+def _fit(law: DragLaw, spin: Array, drag: Array, white: Array, reference: float) -> HeldLaw:
+    """Fit a law; white, shape (n, n), makes errors of the drag independent, with a standard deviation of 1."""
     x, scale = spin / reference, float(np.mean(drag)) / reference
     p = len(law.constants)
 
@@ -173,16 +177,16 @@ def _fit(law: DragLaw, spin: Array, drag: Array, u: Array, reference: float) -> 
 
     def slopes(k: Array) -> Array:
         steps = np.diag(1e-6 * np.maximum(np.abs(k), scale))
-        return np.array([(model(k + step) - model(k - step)) / (2 * step.sum()) for step in steps]) / u
+        return np.array([(model(k + step) - model(k - step)) / (2 * step.sum()) for step in steps]) @ white.T
 
     start = np.array([scale, 0.5] if not law.orders else [scale / p] * p)
-    k, _ = solve(lambda k: (model(k) - drag) / u, slopes, start)
+    k, _ = solve(lambda k: white @ (model(k) - drag), slopes, start)
     solution = np.concatenate([[1.0], k])
     values, natural = law.natural(solution, reference, 1.0)
     inverse = curvature(slopes(k)).covariance
     covariance, of_u = (None, np.full(p, np.nan)) if inverse is None else propagate(inverse, natural[1:, 1:])
     residuals = drag - model(k)
-    chi_square = float(np.sum((residuals / u) ** 2))
+    chi_square = float(np.sum((white @ residuals) ** 2))
     found = statistics(
         n=len(x), n_parameters=p, rss=float(residuals @ residuals), chi_square=chi_square, misfit=chi_square,
         durbin_watson=None, runs_test_p=None, runs=0,

@@ -7,7 +7,7 @@ return the published C₁ and C₂, rounded to 0.01 Hz.  They are not the author
 
 The files in scope-files/ all hold the same synthetic half second of a tape that passes a phototransistor 30 times a
 second, written as several makers' oscilloscopes would.
-The upper limits are made up, too: a normal law about what the simulated bench gives (docs/experiments/limit.md), once
+The upper limits are synthetic, too: a normal law about what the simulated bench gives (docs/experiments/limit.md), once
 of a sound top and once of one whose washers slip under the tape.
 
 The records, the held spins and the scan are what `levilab acquire` writes on the virtual bench: their times and what

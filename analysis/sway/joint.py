@@ -2,7 +2,7 @@
 
 Each window has a height of its own; mass, I₁, I₃ and the sizes of the base are common, and the moment is the one that
 carries the weight.  The slow swings have the angular momentum ρ I₃ω₃: ρ = 1 is geometric magnetism, 0 the null, without
-a split.  The precession has I₃ω₃.  What the corrections may be off by is a parameter, or part of u of the split.
+a split.  The precession has I₃ω₃.  The error of a correction is a parameter, or part of u of the split.
 """
 
 from __future__ import annotations
@@ -30,8 +30,9 @@ Array = NDArray[np.float64]
 _ROUNDS = 12
 #: Height that one step of its parameter stands for [m].
 _STEP_M = 1e-4
+#: Step of the slopes, in parameters.
+_STEP = 1e-3
 #: Parameters before the heights: ρ − 1 in parts of a thousand; the others in their standard uncertainties.
-_STEP = 1e-3  # of the slopes
 _COMMON = ("ratio", "mass", "transverse", "axial", "size 1", "size 2", "size 3", "lean", "precession")
 _RATIO_STEP = 1e-3
 

@@ -294,11 +294,11 @@ def _analyze_as(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping
     try:
         return analysis.analyze(paths, analysis.options_from(given))
     except DoesNotSuit as error:
-        raise DoesNotSuit(f"{error}{_advice(paths, given)}") from error
+        raise DoesNotSuit(f"{error}{_advice(analysis.name, paths, given)}") from error
 
 
-def _advice(paths: Sequence[Path], given: Mapping[str, Any]) -> str:
-    """Return which analyses read the paths, as the end of a sentence; empty if none does."""
+def _advice(tried: str, paths: Sequence[Path], given: Mapping[str, Any]) -> str:
+    """Return which analyses read a path that the tried one does not, as the end of a sentence; empty if none does."""
     from levilab.pipelines.suits import suiting
 
     for path in paths:
@@ -306,7 +306,8 @@ def _advice(paths: Sequence[Path], given: Mapping[str, Any]) -> str:
             names = [one.analysis.name for one in suiting([path], given)]
         except LevilabError:
             continue
-        return f"; levilab analyze {' or '.join(names)} {path} reads it"
+        if tried not in names:
+            return f"; levilab analyze {' or '.join(names)} {path} reads it"
     return ""
 
 

@@ -47,8 +47,8 @@ def longest_step(scene: Scene, model: Model, start: Array, scheme: Scheme) -> An
     """Return the longest step [s] for which the kernels' polynomials hold and no motion is skipped.
 
     It is that of each top, if there are many.  Three limits: a drift turns the axis by 2 rad, a kick slows the spin by
-    a fifth, a step takes half a period of the drive.  A drive that goes up takes the top along: all
-    are shorter by its ratio.
+    a fifth, a step takes half a period of the drive.  A drive that goes up takes the top along: all are shorter by the
+    ratio of its frequencies.
     """
     turning = turning_rate(model, start)
     drift, kick = (float(np.max(np.abs(c))) for c in (scheme.drifts, scheme.kicks))

@@ -82,6 +82,13 @@ def test_the_drag_along_a_closed_form_gives_its_constants_back(law):
     assert fits[law].drag(spins) == pytest.approx(drag, rel=1e-5)
 
 
+def test_a_common_error_of_the_drag_does_not_average_out():
+    spins = np.linspace(25, 45, 30)
+    own, common = 0.001 * np.ones(30), 0.02 * drag_at(spins)
+    (alike,) = (one for one in fit_held(spins, drag_at(spins), own, common) if one.name == "disc")
+    assert alike.constants["c32"].u == pytest.approx(0.02 * C, rel=0.02)  # own errors add 1e-3
+
+
 def test_the_tilt_changes_the_drag_as_the_count_of_a_spin_down_does():
     delta, resonance, start = 0.03, 22.0, 40.0
     law = LAWS["disc"]

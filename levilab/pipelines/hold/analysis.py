@@ -46,8 +46,8 @@ class HeldTogether:
 
     @property
     def best(self) -> HeldLaw | None:
-        """The best law; None of a single spin, through which each law goes."""
-        return self.laws[0] if len(self.factors) > 1 and self.laws else None
+        """The best law; None of a single drag, through which each law goes."""
+        return self.laws[0] if self.laws and self.laws[0].statistics.n > 1 else None
 
 
 class HoldAnalysis(Analyzed[HoldReadings, Hold, HeldTogether, HoldOptions]):
@@ -107,7 +107,7 @@ def combine(_: Sequence[Source[HoldReadings]], runs: Sequence[Hold], options: Ho
     laws: tuple[HeldLaw, ...] = ()
     if any(known):
         drag, u = np.array([(run.drag.value, run.drag.u) for run in runs if run.drag]).T / factors[known]
-        laws = fit_held(spins[known], drag, np.hypot(u, drag * u_factors[known]))
+        laws = fit_held(spins[known], drag, u, drag * u_factors[known])
     return HeldTogether(laws, tuple(factors.tolist()), dict(_compare(laws, beside)) if beside else {})
 
 

@@ -127,7 +127,7 @@ class Conditions:
     levels_off: bool = False
 
     def name(self, count: int) -> str:
-        """Return the name of so many spins."""
+        """Return the name of one or several such spins."""
         plural = "s" * (count > 1)
         return f"spin{plural} at which the drive pulls no further" if self.levels_off else f"{self.which} limit{plural}"
 
