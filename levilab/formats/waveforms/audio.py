@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.formats.columns import NoTable, TableError, shorten
+from levilab.formats.film import NoFilm, open_film
 from levilab.formats.kinds import AUDIO
 from levilab.formats.waveforms.wav import signals_of
 from levilab.formats.waveforms.waveform import BLOCK, Waveform, check_count
@@ -32,8 +33,8 @@ _FORMATS = "mov,mp4,m4a,3gp,3g2,mj2,mp3,ogg,flac,aac,amr,aiff,caf,matroska,webm,
 #: Sun's .au begins with marks, place of the samples, their bytes, kind, rate and channels, each of four bytes: a head
 #: that needs no length, so that it goes through a pipe.
 _AU_HEAD = 24
-#: Where there is no sound.
-_FILMED = "levilab analyze video follows the top in the pictures of a film"
+#: Problem with a film without a sound track, and what to do.
+_SILENT = "holds no sound: levilab analyze video, with the `rim` of the top, follows it in the pictures of a film"
 #: Bytes of a sample.
 _FLOAT = 4
 
@@ -44,8 +45,8 @@ def read_audio(path: Path) -> Waveform:
     It is decoded once for its length, and again for the samples of a channel, in memory that does not grow with it.
 
     Raises:
-        NoTable: the extra is not installed.
-        TableError: it has no sound, or is damaged.
+        NoTable: the extra is not installed, or it is a film without sound.
+        TableError: it is damaged.
     """
     if not _is_installed():
         kind = replace(AUDIO, advice=advice_on_sound())
@@ -59,7 +60,7 @@ def read_audio(path: Path) -> Waveform:
             size = _FLOAT * channels
             count = (sum(map(len, iter(lambda: stream.read(BLOCK), b""))) - (offset - _AU_HEAD)) // size
     if not rate:
-        raise TableError(path, f"holds no sound: {_FILMED}")
+        raise NoTable(path, _SILENT)
     check_count(path, count)
 
     def read(signal: int) -> Iterator[Array]:
@@ -105,6 +106,7 @@ def _decoded(path: Path, errors: list[str]) -> Iterator[IO[bytes]]:
         errors: where the first error in a file that was read to its end goes.
 
     Raises:
+        NoTable: it is a film without sound.
         TableError: it is damaged, or FFmpeg cannot be started.
     """
     import imageio_ffmpeg
@@ -130,7 +132,9 @@ def _decoded(path: Path, errors: list[str]) -> Iterator[IO[bytes]]:
         said.seek(0)
         lines = said.read(2000).decode(errors="replace").strip().splitlines()
     if whole and decoder.returncode:
+        with contextlib.suppress(NoFilm):
+            open_film(path)
+            raise NoTable(path, _SILENT)
         why = shorten(lines[-1] if lines else f"it ended with {decoder.returncode}", 100)
-        advice = f"{_FILMED}; convert a recording to WAV with Audacity"
-        raise TableError(path, f"holds no sound that FFmpeg reads ({why}): {advice}")
+        raise TableError(path, f"holds no sound that FFmpeg reads ({why}): convert it to WAV with Audacity")
     errors += [shorten(line, 100) for line in lines[:1]] if whole else []

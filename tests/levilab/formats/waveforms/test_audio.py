@@ -98,7 +98,7 @@ def test_a_list_of_other_files_is_not_followed(tmp_path, recording):
 def test_a_film_without_sound_says_so(tmp_path):
     path = tmp_path / "film.mp4"
     subprocess.run([ffmpeg, "-v", "error", *FILM.split(), "-c:v", "mpeg4", str(path)], check=True)
-    with pytest.raises(DataError, match=r"film\.mp4: holds no sound"):
+    with pytest.raises(DoesNotSuit, match=r"film\.mp4: holds no sound: levilab analyze video"):
         read_record(path)
 
 

@@ -243,6 +243,7 @@ def test_a_film_is_recalled_from_its_result_and_reported_with_its_still(path, tm
     assert video.document(again, tmp_path) == video.document(found, tmp_path)
     ended = command("report", tmp_path, "-o", "page.html", "--no-crosscheck", cwd=tmp_path)
     assert ended.status == 0, ended.err
+    assert "no sound" not in ended.err
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "filmed from above" in page
     assert "Uncertainty budget" in page
