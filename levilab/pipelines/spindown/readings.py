@@ -11,6 +11,7 @@ from analysis.numbers import digits
 from analysis.pulses import phases, track_of_times
 from analysis.rotation import track_of_field
 from analysis.rotation.track import WINDOW_S as FIELD_WINDOW_S
+from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from analysis.spindown.readings import check_readings
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
@@ -203,8 +204,8 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> SpinReadings:
 #: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, times in ms
 #: 3e-6; a brake of eddy currents and a poor vacuum lie between.
 FASTEST_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 1e-5
-#: No hand spins a top so fast; and where one falls, at 21.4 to 23 Hz, if each turn is counted twice [Hz].
-FASTEST_BY_HAND_HZ, TWICE_A_FALL_HZ = 60.0, (42.7, 46.0)
+#: No hand spins a top so fast [Hz].
+FASTEST_BY_HAND_HZ = 60.0
 
 
 def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[str]:
@@ -230,11 +231,10 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
         unit = "min" if loss > FASTEST_LOSS_PER_S else "ms"
         return [f"{doubt}, in air it takes minutes; if the times are not in seconds, say so, as t=NAME [{unit}]"]
     first, last = float(frequency[0]), float(frequency[-1])
-    if first > FASTEST_BY_HAND_HZ and TWICE_A_FALL_HZ[0] < last < TWICE_A_FALL_HZ[1]:
-        doubt = (
-            f"{table.path.name}: the spin goes from {first:.4g} to {last:.4g} Hz: is each turn counted twice? No hand"
-        )
-        return [f"{doubt} starts a top so fast, and it falls at {last / 2:.3g} Hz; f=NAME [1/2s] halves the numbers"]
+    if first > FASTEST_BY_HAND_HZ and FALLS_BETWEEN_HZ[1] < last / 2 < FALLS_BETWEEN_HZ[0]:
+        doubt = f"{table.path.name}: the spin goes from {first:.4g} to {last:.4g} Hz: is each turn counted twice?"
+        why = f"No hand starts a top so fast, and it falls at {last / 2:.3g} Hz"
+        return [f"{doubt} {why}; f=NAME [1/2s] halves the numbers"]
     return []
 
 

@@ -74,7 +74,9 @@ def test_points_behind_thousands_are_named_where_they_pass_for_decimals(tmp_path
     assert warning.endswith("if its point stands behind the thousands, write the numbers without it")
 
 
-@pytest.mark.parametrize(("first", "last", "asks"), [(76, 44, True), (76, 60, False), (50, 44, False)])
+@pytest.mark.parametrize(
+    ("first", "last", "asks"), [(76, 44, True), (76, 49.8, True), (76, 60, False), (50, 44, False), (66, 42, False)]
+)
 def test_a_count_that_ends_at_twice_the_lower_limit_is_doubted(first, last, asks, tmp_path):
     readings = spin_readings(table_of(tmp_path, f"t,f\n0,{first}\n90,{(first + last) / 2}\n180,{last}\n"))
     assert (readings.doubtful, "f=NAME [1/2s]" in " ".join(readings.warnings)) == (asks, asks)
