@@ -72,6 +72,8 @@ COMMANDS = {
     "video": "Place, spin and fall of a top in a film from above, with the tables that other analyses read.",
     _EACH: "Each analysis that suits the runs or data files; --json prints a list where several suit.",
 }
+#: Where in sample_data the input of an analysis lies that a search of it leaves out.
+_EXAMPLES = {"sway": "sway/", "hold": "hold/", "video": "video/top.mp4 --rim 30"}
 
 
 def takes_options(names: Iterable[str]) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -156,14 +158,7 @@ def _command(options: Iterable[str]) -> Callable[..., None]:
 
 def _add(name: str, text: str) -> None:
     words = "levilab analyze" if name == _EACH else f"levilab analyze {name}"
-    # a search of sample_data leaves these folders out
-    words += (
-        f" sample_data/{name}/"
-        if name in {"sway", "hold"}
-        else " IMG_0042.MOV --rim 30"
-        if name == "video"
-        else " sample_data/"
-    )
+    words += f" sample_data/{_EXAMPLES.get(name, '')}"
 
     @analyze_app.command(name, cls=Later, help=text, epilog=f"Example: {words}", hidden=name == _EACH)
     def command() -> Callable[..., None]:
