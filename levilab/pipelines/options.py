@@ -257,24 +257,22 @@ class HoldOptions(InputOptions):
     ))  # fmt: skip
 
 
-def _length(help: str, typed: str) -> dict[str, Option]:  # noqa: A002 - as the attribute
-    return _about(help, kind=float, metavar="MM", typed=typed, unit="mm", factor=1e-3, above=0.0)
+def _length(text: str, typed: str) -> Any:
+    """Return the field of a length [m] that is typed in millimetres."""
+    about = _about(text, kind=float, metavar="MM", typed=typed, unit="mm", factor=1e-3, above=0.0)
+    return field(default=None, metadata=about)
 
 
 @dataclass(frozen=True)
 class VideoOptions(InputOptions):
     """Options of films of a top."""
 
-    rim_m: float | None = field(
-        default=None, metadata=_length("Scale: diameter of the top's rim, which is best.", "rim")
-    )
-    base_m: float | None = field(default=None, metadata=_length("Scale: outer diameter of a round base.", "base"))
+    rim_m: float | None = _length("Scale: diameter of the top's rim, which is best.", "rim")
+    base_m: float | None = _length("Scale: outer diameter of a round base.", "base")
     scale_m: float | None = field(default=None, metadata=_about(
         "Scale: metres in a pixel, at the top.", kind=float, metavar="M", typed="scale", unit="m", above=0.0,
     ))  # fmt: skip
-    camera_m: float | None = field(
-        default=None, metadata=_length("With --base: distance of the camera from it.", "camera")
-    )
+    camera_m: float | None = _length("With --base: distance of the camera from it.", "camera")
     height_m: float | None = field(default=None, metadata=_HEIGHT)
     start_s: float | None = field(default=None, metadata=_about(
         "Time in the film from which the top floats.", kind=float, metavar="S", typed="start", unit="s", low=0.0,
