@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from levilab.errors import DataError
 from levilab.pipelines.options import OF_FILES, InputOptions
@@ -122,6 +122,36 @@ class Analyzed(Generic[S, R, T, Opt]):
         for text in self.all_warnings:
             groups.setdefault(_NUMBER.sub("#", name.sub("…", text)), []).append(text)
         return [*groups.values()]
+
+
+class Described(Protocol):
+    """What was found of an input that has no part in anything of all inputs."""
+
+    @property
+    def text(self) -> str:
+        """What it says, in a few sentences."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Doubts about its numbers."""
+
+
+D = TypeVar("D", bound=Described)
+
+
+class EachAlone(Analyzed[S, D, None, Opt]):
+    """Inputs, each by itself."""
+
+    @property
+    def text(self) -> str:
+        """What the data say, in a few sentences for each input."""
+        if len(self.runs) == 1:
+            return self.runs[0].text
+        return "  ".join(f"{source.name}: {run.text}" for source, run in zip(self.sources, self.runs, strict=True))
+
+    def about_run(self, run: D) -> Iterable[str]:
+        """Return what to know of one input."""
+        return run.warnings
 
 
 #: A run's folder with what stands before it and behind it, and a number with its uncertainty.

@@ -21,7 +21,7 @@ from levilab.settings import in_one_line
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from levilab.pipelines.sources import Source
 
@@ -196,13 +196,16 @@ def _together(paths: Sequence[Path]) -> Place:
     return Place(Path("..") if Path(RECORD).exists() else Path())
 
 
-def save(result: Result, place: Place, picture: bytes | None, *, first: bool = True) -> list[Path]:
-    """Write a result and its figure; returns the files.  Raises CannotWrite.
+def save(
+    result: Result, place: Place, picture: bytes | None, tables: Mapping[str, str] | None = None, *, first: bool = True
+) -> list[Path]:
+    """Write a result, its figure and tables; returns the files.  Raises CannotWrite.
 
     Args:
         result: what is written.
         place: where.
         picture: the figure, as PNG; None: none is written.
+        tables: for other analyses, by the names of their files.
         first: whether the analysis is the first here, so that result.json is its own.
     """
     text = json.dumps(result.as_dict(), indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
@@ -213,6 +216,9 @@ def save(result: Result, place: Place, picture: bytes | None, *, first: bool = T
         if picture is not None:  # before the result: a reader that finds that shows the figure with it
             files.append(place.figure(result.analysis))
             replace_atomically(files[1], picture)
+        for name, table in (tables or {}).items():
+            files.append(place.folder / name)
+            replace_atomically(files[-1], table)
         replace_atomically(files[0], text + "\n")
     return files
 

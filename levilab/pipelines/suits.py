@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.errors import AnalysisError
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
-from levilab.files import replace_atomically, writing
 from levilab.pipelines import catalogue
 from levilab.pipelines.result import ResultError, is_of_another, read_inputs, results_in
 from levilab.pipelines.result import save as save_files
@@ -300,9 +299,4 @@ def save(analysis: Analysis[A], found: A, folder: Path | None = None, *, with_fi
     place = replace(found.place, folder=folder or found.output_folder)
     is_first = first[0] == analysis.name and not (folder and is_of_another(place.result(), analysis.name))
     picture = analysis.png(found) if with_figure else None
-    written = save_files(analysis.result.of(found, place), place, picture, first=is_first)
-    for name, text in analysis.files(found).items():
-        written.append(place.folder / name)
-        with writing(f"the tables could not be written into {place.folder}"):
-            replace_atomically(written[-1], text)
-    return written
+    return save_files(analysis.result.of(found, place), place, picture, analysis.files(found), first=is_first)

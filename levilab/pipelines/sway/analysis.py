@@ -12,7 +12,7 @@ from analysis.errors import AnalysisError
 from analysis.numbers import digits
 from analysis.sway import Geometry, Swings, geometric_magnetism, mirrored, swings_of
 from levilab.errors import DataError
-from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.analyzed import EachAlone, Method
 from levilab.pipelines.options import SwayOptions
 from levilab.pipelines.sources import Needs
 from levilab.pipelines.sway.device import known_of
@@ -64,19 +64,8 @@ class SwayRun:
     warnings: tuple[str, ...]
 
 
-class SwayAnalysis(Analyzed[SwayReadings, SwayRun, None, SwayOptions]):
+class SwayAnalysis(EachAlone[SwayReadings, SwayRun, SwayOptions]):
     """Tracks, each by itself: another mass or another height has another split."""
-
-    @property
-    def text(self) -> str:
-        """What the data say, in a few sentences."""
-        if len(self.runs) == 1:
-            return self.runs[0].text
-        return "  ".join(f"{source.name}: {run.text}" for source, run in zip(self.sources, self.runs, strict=True))
-
-    def about_run(self, run: SwayRun) -> Iterable[str]:
-        """Return what to know of one track."""
-        return run.warnings
 
 
 def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRun:

@@ -20,7 +20,7 @@ from levilab.errors import DataError, DoesNotSuit, UsageError
 from levilab.formats.film import Film, open_film
 from levilab.formats.kinds import AUDIO, kind_of_bytes
 from levilab.formats.table import file_errors
-from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.analyzed import EachAlone, Method
 from levilab.pipelines.options import VideoOptions
 from levilab.pipelines.sources import Needs, Readings
 from levilab.pipelines.video.tracking import Followed, follow
@@ -28,7 +28,7 @@ from levilab.present.numbers import with_uncertainty
 from levilab.present.progress import ShareBar
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
     from pathlib import Path
 
     from analysis.film.mark import Phases
@@ -43,7 +43,6 @@ _HEAD = 4096
 _EVEN_MS = 0.2
 #: Readings of the spin from which it is continued to a fall.
 _FEWEST = 3
-
 #: A film whose pictures were taken faster than they follow, by this factor, is in slow motion.
 _SLOWER = 1.2
 #: Where the edge of a round thing is depends on focus and light [pixels].
@@ -54,8 +53,6 @@ _MARK = 0.65
 _NEARER = 0.5
 #: A slope of the spin counts from this number of standard uncertainties on.
 _FALLS = 3.0
-
-
 #: A top that is farther out than this many times its usual distance from its mean place, and stays so, falls.
 _LEAVES = 2.0
 #: Share of the pictures in which it is nearer than the usual distance.
@@ -67,8 +64,8 @@ class FilmReadings(Readings):
     """A film.
 
     Attributes:
-        film: its file, and what this states.
-        head: its first bytes and its size, by which the same film is found again.
+        film: properties that the file states.
+        head: first bytes and size of the file, by which the same film is found again.
         warnings: about the file.
     """
 
@@ -157,14 +154,14 @@ class Video:
 
     @property
     def pictures(self) -> str:
-        """Number of the pictures and their times, in words."""
+        """Number and times of the pictures, as text."""
         steps = np.diff(self.time) * 1e3
         even = f"{np.median(steps):.2f}" if np.ptp(steps) < _EVEN_MS else f"{steps.min():.2f} to {steps.max():.2f}"
         return f"{self.time.size} pictures in {np.ptp(self.time):.2f} s, {even} ms apart"
 
     @property
     def text(self) -> str:
-        """What the film shows, in a few sentences."""
+        """Place, spin, precession and fall, in a few sentences."""
         place = f"x stays within {1e3 * np.ptp(self.x):.2f} mm and y within {1e3 * np.ptp(self.y):.2f} mm"
         text = f"{self.pictures}: {place}, u of a place is {1e3 * np.median(self.u):.3f} mm."
         if self.spin and self.turning:
@@ -178,19 +175,8 @@ class Video:
         return text
 
 
-class VideoAnalysis(Analyzed[FilmReadings, Video, None, VideoOptions]):
+class VideoAnalysis(EachAlone[FilmReadings, Video, VideoOptions]):
     """Films, each by itself."""
-
-    @property
-    def text(self) -> str:
-        """What the films show."""
-        if len(self.runs) == 1:
-            return self.runs[0].text
-        return "  ".join(f"{source.name}: {run.text}" for source, run in zip(self.sources, self.runs, strict=True))
-
-    def about_run(self, run: Video) -> Iterable[str]:
-        """Return what to know of one film."""
-        return run.warnings
 
 
 def analyze_source(source: Source[FilmReadings], options: VideoOptions) -> Video:

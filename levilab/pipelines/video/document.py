@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
     from levilab.pipelines.video.analysis import FilmReadings, VideoAnalysis
 
-#: Quantity, and the only part of its u: what it is, kind, where it comes from, what would make it smaller.
+#: Quantity, and the only part of its u: name, source, kind, note, remedy.
 _ROWS: tuple[tuple[str, str, str, Literal["A", "B"], str, str], ...] = (
     ("frequency", "phase", "phases of the mark", "A", "scatter about a smooth spin", "a longer film"),
     ("scale", "edge", "edge of the circle that gives the scale", "B", "0.3 pixels: focus, light", "a nearer camera"),

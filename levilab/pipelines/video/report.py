@@ -32,11 +32,11 @@ def video_part(analysis: VideoAnalysis) -> ReportPart:
         ),
         runs_title="Readings of the spin",
         runs=tuple(_spins(run, k) for k, run in enumerate(analysis.runs)),
-        inputs=input_parts(analysis, _in_words, lambda *_: ()),
+        inputs=input_parts(analysis, _pictures, lambda *_: ()),
     )
 
 
-def _in_words(source: Source[FilmReadings], run: Video, *_: object) -> tuple[str, ...]:
+def _pictures(source: Source[FilmReadings], run: Video, *_: object) -> tuple[str, ...]:
     film = source.readings.film
     return (f"{film.width} × {film.height}, {film.codec}", run.pictures)
 

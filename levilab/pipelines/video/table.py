@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from typing import TYPE_CHECKING
 
@@ -40,25 +39,20 @@ def video_files(analysis: VideoAnalysis) -> dict[str, str]:
     """Return the tables of each film for other analyses, by the names of their files."""
     files: dict[str, str] = {}
     for source, run, track in zip(analysis.sources, analysis.runs, video_columns(analysis), strict=True):
-        tables = {"tracks": track, **_readings(run)}
-        files |= {f"{source.path.stem}.{name}.csv": _csv(columns) for name, columns in tables.items()}
+        tables = (("tracks", track), *_readings(run))
+        files |= {f"{source.path.stem}.{name}.csv": _csv(columns) for name, columns in tables}
     return files
 
 
-def _readings(run: Video) -> dict[str, Mapping[str, np.ndarray]]:
-    """Return the readings of the spin, and the spin at the fall, where they are known."""
-    found: dict[str, Mapping[str, np.ndarray]] = {}
-    fall, names = run.spin_at_fall, ("spin_frequency_hz", "spin_frequency_u_hz")
+def _readings(run: Video) -> Iterator[tuple[str, Mapping[str, np.ndarray]]]:
+    """Yield the readings of the spin, and the spin at the fall, where they are known."""
     if (spin := run.turning) is not None:
-        found["spin"] = {"time_s": spin.time, names[0]: np.abs(spin.spin), names[1]: spin.u}
-    if fall is not None:
-        found["limit"] = {names[0]: np.array([fall.value])}
-    return found
+        yield "spin", {"time_s": spin.time, "spin_frequency_hz": np.abs(spin.spin), "spin_frequency_u_hz": spin.u}
+    if (fall := run.spin_at_fall) is not None:
+        yield "limit", {"spin_frequency_hz": np.array([fall.value])}  # u: a table of two columns needs three rows
 
 
 def _csv(columns: Mapping[str, np.ndarray]) -> str:
     text = io.StringIO()
-    lines = csv.writer(text, lineterminator="\n")
-    lines.writerow(columns)
-    lines.writerows([f"{value:.9g}" for value in row] for row in zip(*columns.values(), strict=True))
+    np.savetxt(text, np.column_stack([*columns.values()]), "%.9g", ",", header=",".join(columns), comments="")
     return text.getvalue()

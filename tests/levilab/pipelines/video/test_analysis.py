@@ -29,6 +29,7 @@ from support.camera import (
 )
 from support.commands import command
 from support.equal import differences
+from support.paths import SAMPLE_DATA
 
 pytestmark = pytest.mark.skipif(util.find_spec("av") is None, reason="pip install 'levilab[video]'")
 
@@ -265,11 +266,22 @@ def test_a_top_that_falls_has_its_spin_then_as_a_limit_that_others_read(folder, 
     assert fall["u"] < 0.1
     assert spin["value"] == pytest.approx(22 - 0.06 * 3.4, abs=3 * spin["u"])
     assert spin["u"] < 0.01
-    for name, table in (("limit", "limit"), ("spindown", "spin")):
-        read = command("analyze", name, f"falls.{table}.csv", "--no-save", "--json", cwd=tmp_path)
-        assert read.status == 0, read.err
-        if name == "limit":
-            assert json.loads(read.out)["values"]["mean"]["value"] == pytest.approx(spin["value"])
+    ended = command("analyze", "limit", "falls.limit.csv", "--no-save", "--json", cwd=tmp_path)
+    assert json.loads(ended.out)["values"]["mean"]["value"] == pytest.approx(spin["value"])
+    assert command("analyze", "spindown", "falls.spin.csv", "--no-save", cwd=tmp_path).status == 0
+
+
+def test_the_sample_film_has_the_spin_and_the_precession_of_its_simulation():
+    path = SAMPLE_DATA / "video" / "top.mp4"
+    found = analyze_film(path, VideoOptions(rim_m=2 * RIM, line_time_s=10e-6))
+    assert found.spin.value == pytest.approx(31.476264, abs=4 * found.spin.u)
+    assert found.chirp.value == pytest.approx(-0.103583, abs=4 * found.chirp.u)
+    assert found.precession.value == pytest.approx(7.0660, abs=4 * found.precession.u)
+    unknown = analyze_film(
+        path, VideoOptions(rim_m=2 * RIM)
+    )  # its times are those of the first row, a millisecond early
+    assert unknown.spin.value == pytest.approx(found.spin.value, abs=1e-3 * abs(found.chirp.value))
+    assert "x stays within 1.07 mm and y within 1.07 mm" in unknown.text  # docs/video.md
 
 
 def test_what_is_no_film_is_refused_in_one_line(path, tmp_path):
