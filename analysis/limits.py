@@ -36,6 +36,9 @@ AGREES_P = 0.05
 #: Readings before the fall that a line is drawn through [s]: in ν^(−1/2), which is straight under the drag of a disc;
 #: u contains its bend under Stokes's or Newton's.
 _LINE_S = 20.0
+#: The rest of the way of a top that levels off is added to its last count; u of it, as a part: the pull nears the drag
+#: sooner or later than one that does not depend on the spin, in the same sense for all tops.
+U_OF_WAY = 0.5
 #: Fewest counts that a parabola, which bends with the gain of a driven top, is drawn through.
 FEWEST_ON_PARABOLA = 6
 
@@ -107,11 +110,13 @@ class Sample:
         u: their standard uncertainties, shape (n,) [Hz]; None: not known.
         steps: each limit lies somewhere within a step of the drive of this width, shape (n,) [Hz], in the middle of
             which it is given; the steps are the same for all tops.  None: the drive made no steps.
+        common: part of each u that is the same error in all limits, shape (n,) [Hz]; None: there is none.
     """
 
     limits: Array
     u: Array | None = None
     steps: Array | None = None
+    common: Array | None = None
 
     @classmethod
     def within_steps(cls, limits: Array, u: Array) -> Sample:
@@ -128,7 +133,13 @@ class Sample:
         """Variance that the limits' own, independent uncertainties leave to their mean [Hz²]."""
         if self.u is None or self.steps is not None:
             return 0.0
-        return float(np.sum(self.u**2)) / self.limits.size**2
+        common = 0.0 if self.common is None else self.common
+        return float(np.sum(self.u**2 - common**2)) / self.limits.size**2
+
+    @property
+    def shared(self) -> float:
+        """Standard uncertainty of the mean from the common errors [Hz]."""
+        return 0.0 if self.common is None else float(np.mean(self.common))
 
 
 @dataclass(frozen=True)
@@ -147,6 +158,7 @@ class Statistics:
         runs: of how many runs.
         between: standard deviation of a run's mean from another's, beyond what their tops explain, with its u [Hz];
             None of one run, and of runs with a single repetition each, where it is part of the scatter.
+        common: the part of the standard error that is the same error in all limits [Hz].
     """
 
     mean: Estimate
@@ -159,6 +171,7 @@ class Statistics:
     freedom: float | None = None
     runs: int = 1
     between: Estimate | None = None
+    common: float = 0.0
 
     @property
     def drifts(self) -> bool:
@@ -171,8 +184,8 @@ def summarize(sample: Sample) -> Statistics:
 
     The mean is not weighted: tops differ by more than their limits are uncertain.  Its standard error is s/√n, no less
     than the limits' own uncertainties leave to it; where the drive made steps, with what these leave: tops that scatter
-    by much less than a step all fall into the same one, and their mean is no better than its width over √12.  Of a
-    single one the u of the mean is its own.
+    by much less than a step all fall into the same one, and their mean is no better than its width over √12.  A common
+    error stays as it is.  Of a single one the u of the mean is its own.
 
     Raises:
         TooFewReadings, NotFinite, NotPositive: for what cannot be limits.
@@ -189,11 +202,12 @@ def summarize(sample: Sample) -> Statistics:
     mean = float(limits.mean())
     if n < FEWEST:
         own = None if sample.u is None else float(sample.u[0])
-        return Statistics(Estimate(mean, own, "Hz"), None, n, None, None, (), sample.step / math.sqrt(12))
+        step = sample.step / math.sqrt(12)
+        return Statistics(Estimate(mean, own, "Hz"), None, n, None, None, (), step, common=sample.shared)
     scatter = _scatter(limits)
     by_scatter = scatter**2 / n
     step = _common_error(scatter, sample.step)
-    variance = max(by_scatter, sample.least) + step**2
+    variance = max(by_scatter, sample.least) + step**2 + sample.shared**2
     trend, p = _trend(limits) if n >= FEWEST_FOR_SHAPE and scatter > 0 else (None, None)
     return Statistics(
         mean=Estimate(mean, math.sqrt(variance), "Hz"),
@@ -204,6 +218,7 @@ def summarize(sample: Sample) -> Statistics:
         outliers=outliers_of(limits),
         step=step,
         freedom=_freedom(variance, by_scatter, n - 1),
+        common=sample.shared,
     )
 
 
@@ -228,10 +243,11 @@ def combine(runs: Sequence[Sample]) -> Statistics:
     if len(runs) == 1:
         return summarize(runs[0])
     if within == 0:
-        known = [run.u for run in runs if run.u is not None]
-        steps = [run.steps for run in runs if run.steps is not None]
-        u, widths = (np.concatenate(one) if len(one) == len(runs) else None for one in (known, steps))
-        found = summarize(Sample(np.concatenate(limits), u, widths))
+        columns = (
+            [column for run in runs if (column := getattr(run, name)) is not None] for name in ("u", "steps", "common")
+        )
+        joined = (np.concatenate(column) if len(column) == len(runs) else None for column in columns)
+        found = summarize(Sample(np.concatenate(limits), *joined))
         return replace(found, trend=None, trend_p=None, runs=len(runs))
     means = np.array([one.mean() for one in limits])
     square = sum((one.size - 1) * _scatter(one) ** 2 for one in limits if one.size > 1) / within
@@ -241,7 +257,8 @@ def combine(runs: Sequence[Sample]) -> Statistics:
     mean = float(weights @ means)
     by_scatter = float(weights**2 @ (own + between))
     step = _common_error(math.sqrt(square + between), math.sqrt(float(np.mean([run.step**2 for run in runs]))))
-    variance = by_scatter + step**2
+    common = float(weights @ [run.shared for run in runs])
+    variance = by_scatter + step**2 + common**2
     first = np.cumsum(numbers) - numbers
     return Statistics(
         mean=Estimate(mean, math.sqrt(variance), "Hz"),
@@ -254,6 +271,7 @@ def combine(runs: Sequence[Sample]) -> Statistics:
         freedom=_freedom(variance, by_scatter, len(runs) - 1 if between > 0 else within),
         runs=len(runs),
         between=_with_own_u(math.sqrt(between), len(runs) - 1),
+        common=common,
     )
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from analysis.limits import U_OF_WAY
 from analysis.uncertainty import Estimate
 from levilab.acquisition.counting import prepare_counter_again, spin_now
 from levilab.acquisition.failures import DidNotFollow, NotHeld
@@ -333,7 +334,7 @@ class Motor:
             if level == _GAINING:  # for as long: one that is about to get slower has shown it
                 rate = 1.5 * self.pull / self.spin
                 left = max(gain, 0.0) / rate
-                at = Estimate(self.spin + left, math.hypot(left / 2, scatter / spread / rate), "Hz")
+                at = Estimate(self.spin + left, math.hypot(U_OF_WAY * left, scatter / spread / rate), "Hz")
                 return Climb(np.array(times), np.array(spins), math.nan, levels_off_at=at)
 
     def hold(self, target: float, duration: float) -> None:

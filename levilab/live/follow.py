@@ -171,9 +171,10 @@ def _event(line: bytes, number: int) -> dict[str, Any]:
         event = json.loads(line)
         time_s, kind, text = event["time_s"], str(event["kind"]), str(event["text"])
         time_s = float(time_s) if time_s is not None else None
-        utc = str(event.get("utc", ""))
+        utc, top = str(event.get("utc", "")), event.get("top")
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
-        time_s, kind, text, utc = None, "damaged", "a line of events.jsonl is damaged", ""
+        time_s, kind, text, utc, top = None, "damaged", "a line of events.jsonl is damaged", "", None
     if time_s is not None and not np.isfinite(time_s):
         time_s = None
-    return {"n": number, "time_s": time_s, "utc": utc[:40], "kind": kind[:60], "text": text[:_MOST_CHARACTERS]}
+    shown = {"time_s": time_s, "utc": utc[:40], "kind": kind[:60], "text": text[:_MOST_CHARACTERS]}
+    return {"n": number, **shown, "top": top if isinstance(top, int) else None}

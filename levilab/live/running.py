@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from analysis.errors import AnalysisError, TooFewReadings
-from analysis.limits import Sample, summarize
+from analysis.limits import U_OF_WAY, Sample, summarize
 from analysis.precession.sweep import Sweep, fit_sweep
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fall import times_of_fall
@@ -83,6 +83,7 @@ def fit_so_far(
     groups: Groups,
     settings: Mapping[str, Any] = MappingProxyType({}),
     *,
+    levels_off: frozenset[int] = frozenset(),
     ended: bool = False,
 ) -> Running | None:
     """Fit the readings of a run so far; None for an experiment without a running fit.
@@ -92,6 +93,7 @@ def fit_so_far(
         columns: names of the readings' channels.
         groups: the readings.
         settings: of the experiment.
+        levels_off: numbers of the tops that only levelled off, from 1.
         ended: whether no reading will come any more: nothing is forecast then.
     """
     method = METHODS.get(experiment)
@@ -99,7 +101,7 @@ def fit_so_far(
         return None
     by_name = {name: groups.mean[k] for k, name in enumerate(columns)}
     try:
-        found = method(by_name, groups.size, settings)
+        found = method(by_name, groups.size, settings, levels_off)
     except TooFewReadings as error:
         return Running("no fit", (str(error),)) if ended else Running("no fit yet", ("it begins after some readings",))
     except (AnalysisError, KeyError) as error:
@@ -117,7 +119,7 @@ def _without_forecast(found: Running) -> Running:
     return replace(found, head=_SO_FAR.sub("", found.head), curve=curve, end_s=None, dashed="")
 
 
-def spin_down(columns: Mapping[str, Array], size: int, _: Mapping[str, Any] = MappingProxyType({})) -> Running:
+def spin_down(columns: Mapping[str, Array], size: int, *_: object) -> Running:
     """Fit the drag laws through a spin-down, the best of them drawn on to the fall."""
     time, spin, u = columns["time_s"], columns["spin_frequency_hz"], columns.get("spin_frequency_u_hz")
     used = np.isfinite(spin) & (np.isfinite(u) if u is not None else True)
@@ -151,7 +153,7 @@ def _times_of_fall(best: LawFit, last: float, duration: float) -> tuple[float, f
     return between if math.isfinite(between[1]) else None
 
 
-def locked_line(columns: Mapping[str, Array], size: int, _: Mapping[str, Any]) -> Running:
+def locked_line(columns: Mapping[str, Array], size: int, *_: object) -> Running:
     """Fit the line through precession against drive, and the joint test of slope 1 and intercept 0."""
     drive, precession = columns["drive_frequency_hz"], columns["precession_frequency_hz"]
     u = columns.get("precession_frequency_u_hz")
@@ -167,31 +169,37 @@ def locked_line(columns: Mapping[str, Array], size: int, _: Mapping[str, Any]) -
     )
 
 
-def mean_limit(columns: Mapping[str, Array], size: int, settings: Mapping[str, Any]) -> Running:
-    """Return the mean of the limits so far, with the u of `levilab analyze limit`."""
+def mean_limit(
+    columns: Mapping[str, Array], size: int, settings: Mapping[str, Any], levels_off: frozenset[int]
+) -> Running:
+    """Return the mean of the limits so far, or of tops that all level off, with the u of `levilab analyze limit`."""
     spin, time, u = columns["spin_frequency_hz"], columns["time_s"], columns.get("spin_frequency_u_hz")
-    used = np.isfinite(spin) & (np.isfinite(u) if u is not None else True)
+    levels = np.isin(np.arange(1, spin.size + 1), list(levels_off))
+    used = np.isfinite(spin) & (np.isfinite(u) if u is not None else True) & (~levels | levels.all())
     spin, time = spin[used], time[used]
     if not len(spin):
         return Running("no limit yet")
-    sample = Sample(spin)
-    triggered = settings.get("which") == "upper" and settings.get("drive") == "triggered"
+    sample, note = Sample(spin), ""
     if u is not None:
-        stepped = settings.get("which") == "upper" and not triggered
+        stepped = settings.get("which") == "upper" and settings.get("drive") != "triggered"
         sample = (Sample.within_steps if stepped else Sample)(spin, u[used] / np.sqrt(size))
+    if levels.all():
+        sample = replace(sample, common=U_OF_WAY * (spin - columns["spin_seen_hz"][used]))
+        note = "the drive pulls no further: no limits of the top"
+    elif levels.any():
+        note = f"without {levels.sum()} of {levels.size} tops that only got no faster"
     found = summarize(sample)
     students = float(stdtrit(np.inf if found.freedom is None else found.freedom, 0.975))
     band = np.empty(0) if found.mean.u is None else np.full(2, students * found.mean.u)
     curve = Curve(np.array([time[0], time[-1]]), np.full(2, found.mean.value), band)
-    note = ("with tops that level off, which are no limits",) * triggered
-    return Running("mean so far", (with_uncertainty(found.mean), *note), curve)
+    return Running("mean so far", tuple(filter(None, (with_uncertainty(found.mean), note))), curve)
 
 
 def _value(value: float, u: float | None, unit: str = "") -> str:
     return with_uncertainty(Estimate(value, u, unit))
 
 
-METHODS: dict[str, Callable[[Mapping[str, Array], int, Mapping[str, Any]], Running]] = {
+METHODS: dict[str, Callable[[Mapping[str, Array], int, Mapping[str, Any], frozenset[int]], Running]] = {
     "spin": spin_down,
     "precession": locked_line,
     "limit": mean_limit,

@@ -16,6 +16,7 @@ from levilab.live.envelope import by_columns
 from levilab.live.follow import Followed
 from levilab.live.running import Running, fit_so_far
 from levilab.live.views import u_of, unit_of, view_of
+from levilab.runs.events import RunEvent
 from levilab.telemetry.address import read_address
 from levilab.telemetry.codec import pack
 from levilab.telemetry.messages import Poses, Record, State
@@ -180,7 +181,9 @@ class Watch:
         experiment, columns, groups = followed.record.experiment, followed.columns, followed.readings.groups()
         settings = followed.record.configuration.get(experiment)
         settings = settings if isinstance(settings, dict) else {}
-        return followed.folder, partial(fit_so_far, experiment, columns, groups, settings, ended=ended)
+        level = frozenset(event["top"] for event in followed.events if event["kind"] == RunEvent.LEVELS_OFF)
+        fit = partial(fit_so_far, experiment, columns, groups, settings, levels_off=level, ended=ended)
+        return followed.folder, fit
 
     def take_fit(self, folder: Path, found: Running | None, took_s: float) -> None:
         """Take in the fit of a run, and its processor time [s].

@@ -13,6 +13,21 @@ from analysis.limits import Sample, combine, compare, outliers_of, spin_at_fall,
 THESIS = np.array([21.7, 21.4, 21.7, 21.9, 21.8, 22.3, 21.8, 22.0, 22.1, 21.9])
 
 
+def test_an_error_that_all_limits_share_stays_in_the_mean_of_a_run_and_of_runs() -> None:
+    """Of 400 means; √n would make u a third of the scatter."""
+    random, pulls = np.random.default_rng(4), []
+    for _ in range(400):
+        common = 0.5 * random.standard_normal()
+        samples = [
+            Sample(68.0 + common + 0.3 * random.standard_normal(5), np.full(5, 0.6), common=np.full(5, 0.5))
+            for _ in range(2)
+        ]
+        pulls.append([(mean.value - 68.0) / mean.u for mean in (summarize(samples[0]).mean, combine(samples).mean)])  # type: ignore[operator]
+    assert np.std(pulls, axis=0) == pytest.approx(1, abs=0.12)  # 3 standard errors of 400
+    single = combine([Sample(np.array([x]), np.array([0.6]), common=np.array([0.5])) for x in (67.8, 68.2)])
+    assert single.mean.u == pytest.approx(math.sqrt(0.5**2 + (0.6**2 - 0.5**2) / 2))
+
+
 def test_the_published_limits_have_the_published_statistics() -> None:
     found = summarize(Sample(THESIS))
     assert found.scatter

@@ -128,11 +128,16 @@ class GrowingRun:
         self.add("".join(",".join(map(repr, row)) + "\n" for row in rows))
 
     def event(
-        self, text: str, kind: str = "said", time_s: float | None = None, utc: str = "2026-11-22T09:00:05.123456Z"
+        self,
+        text: str,
+        kind: str = "said",
+        time_s: float | None = None,
+        utc: str = "2026-11-22T09:00:05.123456Z",
+        **more: Any,
     ) -> None:
         """Append an event."""
         with (self.folder / "events.jsonl").open("a", encoding="utf-8") as file:
-            file.write(json.dumps({"utc": utc, "time_s": time_s, "kind": kind, "text": text}) + "\n")
+            file.write(json.dumps({"utc": utc, "time_s": time_s, "kind": kind, "text": text} | more) + "\n")
 
     @contextlib.contextmanager
     def running(self) -> Iterator[None]:

@@ -51,6 +51,7 @@ def _samples(random: np.random.Generator, found: LimitAnalysis, group: Limits) -
     between = (statistics.between.value or 0.0) if statistics.between else 0.0
     step = group.conditions.step_hz if statistics.step else None
     origin = random.uniform(0, step) if step else 0.0
+    error = statistics.common * random.standard_normal()
     made = []
     for k in group.runs:
         n = len(found.sources[k].readings)
@@ -59,5 +60,5 @@ def _samples(random: np.random.Generator, found: LimitAnalysis, group: Limits) -
         )
         if step:
             limits = (np.floor((limits - origin) / step) + 0.5) * step + origin
-        made.append(Sample(limits, None, np.full(n, step) if step else None))
+        made.append(Sample(limits + error, None, np.full(n, step) if step else None, np.full(n, statistics.common)))
     return made

@@ -245,15 +245,16 @@ def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
         statistics = summarize(_sample(source, which, options))
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error
+    conditions = _conditions(source, which, device)
     events = source.run.events() if source.run else []
     kinds = Counter(str(event["kind"]) for event in events)
     causes = Counter(str(event["cause"]) for event in events if event.get("cause"))
     ends = {str(kind): kinds[kind] for kind in ENDS if kinds[kind]}
     return Limits(
         which,
-        _conditions(source, which, device),
+        conditions,
         statistics,
-        _comparisons(statistics, device, which),
+        _comparisons(statistics, device, conditions),
         device,
         ends,
         causes=dict(causes),
@@ -309,7 +310,7 @@ def _combine(
     ends, causes = (
         sum((Counter(getattr(runs[k], name)) for k in numbers), Counter[str]()) for name in ("ends", "causes")
     )
-    comparisons = _comparisons(statistics, device, which)
+    comparisons = _comparisons(statistics, device, first.conditions)
     conditions = replace(first.conditions, synthetic=synthetic_runs(runs[k] for k in numbers))
     return Limits(which, conditions, statistics, comparisons, device, dict(ends), numbers, dict(causes))
 
@@ -321,7 +322,7 @@ def _sample(source: Source[LimitReadings], which: Which, options: LimitOptions) 
         return Sample(readings.limit, np.full(len(readings), options.reading_u))
     if which == "upper" and source.run is not None and readings.u is not None and not _is_triggered(source):
         return Sample.within_steps(readings.limit, readings.u)
-    return Sample(readings.limit, readings.u)
+    return Sample(readings.limit, readings.u, common=readings.common)
 
 
 def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> Conditions:
@@ -341,7 +342,7 @@ def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> 
         step_hz=None if creep is None or interval is None else round(creep * interval, 9),
         synthetic=synthetic_source(source),
         triggered=triggered,
-        levels_off=source.readings.levels_off,
+        levels_off=source.readings.common is not None,
     )
 
 
@@ -353,8 +354,10 @@ def _number(value: object) -> float | None:
     return float(value) if isinstance(value, int | float) else None
 
 
-def _comparisons(statistics: Statistics, device: Device, which: Which) -> tuple[Comparison, ...]:
-    return tuple(compare(statistics, name, *spin) for name, spin in device.expected_spins(which).items())
+def _comparisons(statistics: Statistics, device: Device, conditions: Conditions) -> tuple[Comparison, ...]:
+    """Return the comparisons with theory; spins that are no limits have none."""
+    expected = {} if conditions.levels_off else device.expected_spins(conditions.which)
+    return tuple(compare(statistics, name, *spin) for name, spin in expected.items())
 
 
 def _which(source: Source[LimitReadings], device: Device) -> Which:

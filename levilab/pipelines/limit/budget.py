@@ -54,7 +54,8 @@ def _rows(sources: Sequence[Source[LimitReadings]], limits: Limits) -> Iterator[
                         note="of a single top: its scatter is not known", remedy="more tops")  # fmt: skip
         return
     step = min(found.step, whole)
-    by_tops = rest(whole, step)
+    common = found.common
+    by_tops = rest(whole, math.hypot(step, common))
     if by_tops > 0:
         root = math.sqrt(found.n)
         each = by_tops * root
@@ -70,6 +71,9 @@ def _rows(sources: Sequence[Source[LimitReadings]], limits: Limits) -> Iterator[
         note = "the drive goes on in steps, the same for all tops, and each limit lies somewhere within one"
         yield Component("step", "steps of the drive", "B", step, "Hz", 1.0, note=note,
                         remedy="smaller steps (limit.creep_hz_per_s, limit.interval_s)")  # fmt: skip
+    if common > 0:
+        note = "the tops were still getting faster; the rest of the way is estimated, for all in the same way"
+        yield Component("way", "rest of the way", "B", common, "Hz", 1.0, note=note)
 
 
 def _more(limits: Limits) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from analysis.errors import AnalysisError
-from analysis.limits import spin_at_fall
+from analysis.limits import U_OF_WAY, spin_at_fall
 from analysis.rotation import track_of_field
 from levilab.errors import DoesNotSuit
 from levilab.formats.columns import NoSuchColumn, NoTable, TableError
@@ -53,13 +53,14 @@ class LimitReadings(Readings):
         limit: spin at which the top was lost [Hz].
         u: standard uncertainties [Hz], None where they are not known.
         warnings: about the table.
-        levels_off: whether these are no limits, but spins at which the pull of a drive equalled the drag.
+        common: of spins at which the pull of a drive equalled the drag, which are no limits: the part of each u that is
+            the same error in all [Hz].
     """
 
     limit: Array
     u: Array | None
     warnings: tuple[str, ...]
-    levels_off: bool = False
+    common: Array | None = None
 
     compared: ClassVar[tuple[str, ...]] = ("limit",)
 
@@ -157,11 +158,14 @@ def _single_column(path: Path, *, guess: bool) -> Table | None:
 
 def read_limit_run(run: Run, _: InputOptions) -> LimitReadings:
     """Return the limits of a run; spins at which tops levelled off are none, and are left out if there are others."""
-    found = limit_readings(run.readings())
+    table = run.readings()
+    found = limit_readings(table)
     tops = [int(event["top"]) for event in run.events() if event["kind"] == RunEvent.LEVELS_OFF]
     levels = np.isin(np.arange(1, len(found) + 1), tops)
-    if not levels.any() or levels.all():
-        return replace(found, levels_off=bool(levels.any()))
+    if not levels.any():
+        return found
+    if levels.all():
+        return replace(found, common=U_OF_WAY * (found.limit - table.column("spin_seen_hz")))
     left_out = ", ".join(f"{spin:.2f} Hz" for spin in found.limit[levels])
     note = (
         f"{levels.sum()} of {levels.size} tops got no faster than {left_out}, where the pull of the drive equals the "

@@ -30,6 +30,7 @@ _MOST_SHOWN = 200
 def limit_part(analysis: LimitAnalysis) -> ReportPart:
     """Return verdict, statistics, theory, and the limits."""
     n = sum(run.statistics.n for run in analysis.runs)
+    theory = theory_table(analysis)
     return ReportPart(
         subject="limits of the spin",
         heading="Limits of the spin of a levitated top",
@@ -50,9 +51,11 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
         ),
         runs_title="Beside theory",
         runs=(
-            Paragraph("What theory says of the top, and how far the mean is from it."),
-            Tabular("limit-theory", theory_table(analysis), _THEORY, first_column_wraps=True),
-        ),
+            Paragraph("Spins that theory names for the top, and the distance of the mean from them."),
+            Tabular("limit-theory", theory, _THEORY, first_column_wraps=True),
+        )
+        if theory.rows
+        else (Paragraph("These spins are no limits of the top, so none is compared with theory."),),
         inputs=input_parts(analysis, _in_words, _readings),
     )
 

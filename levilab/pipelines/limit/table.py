@@ -19,8 +19,9 @@ HEADS = ("limits", "tops", "mean [Hz]", "scatter [Hz]", "trend [Hz/top]", "outli
 
 
 def limit_tables(analysis: LimitAnalysis) -> tuple[Table, ...]:
-    """Return the runs, and theory beside them.  Each fits a terminal of 80 columns."""
-    return runs_table(analysis), theory_table(analysis)
+    """Return the runs, and theory beside them where it says something.  Each fits a terminal of 80 columns."""
+    theory = theory_table(analysis)
+    return (runs_table(analysis), theory) if theory.rows else (runs_table(analysis),)
 
 
 def runs_table(analysis: LimitAnalysis) -> Table:

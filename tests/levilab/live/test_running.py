@@ -14,6 +14,7 @@ from analysis.uncertainty import Estimate
 from levilab import analyze
 from levilab.live.envelope import Groups
 from levilab.live.running import _without_forecast, fit_so_far, spin_down
+from levilab.live.watch import Watch
 from levilab.present.numbers import with_uncertainty
 from support.live_pages import GrowingRun
 
@@ -47,6 +48,33 @@ def test_the_forecast_is_of_the_law_and_does_not_run_into_the_resonance() -> Non
     assert ended.head.startswith(f"{found.look} law   ω̇ = ")
     assert not ended.dashed
     assert steps.max() < 2 * steps.min() * (START_HZ / FALLS_BETWEEN_HZ[1]) ** 1.5  # no kink at the last reading
+
+
+@pytest.mark.parametrize("levels_off", [(), (2,), (1, 2, 3)])
+def test_tops_that_level_off_count_as_in_the_analysis(tmp_path: Path, levels_off: tuple[int, ...]) -> None:
+    columns = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz", "spin_seen_hz")
+    run = GrowingRun(
+        tmp_path,
+        "20261122T100000Z-limit-0000",
+        experiment="limit",
+        configuration={"limit": {"which": "upper", "drive": "triggered"}},
+        channels=[{"name": name, "unit": "", "source": ""} for name in columns],
+    )
+    (run.folder / "readings.csv").write_text(",".join(columns) + "\n", encoding="utf-8")
+    run.readings([(10.0 * k, 68.0 + 0.2 * k, 0.6, 67.0 + 0.1 * k) for k in range(3)])
+    for top in levels_off:
+        run.event("the top gets no faster", "levels off", 10.0, top=top)
+    run.event("the top fell", "top lost", 10.0, top=9)
+    watch = Watch(run.folder)
+    watch.step()
+    task = watch.fit_task()
+    assert task is not None
+    shown = task[1]()
+    assert shown is not None
+    mean = analyze(run.folder, kind="limit").values["mean"]
+    assert shown.lines[0] == with_uncertainty(Estimate(mean.value, mean.u, "Hz"))
+    notes: dict[int, list[str]] = {0: [], 1: ["without 1 of 3 tops that only got no faster"]}
+    assert list(shown.lines[1:]) == notes.get(len(levels_off), ["the drive pulls no further: no limits of the top"])
 
 
 @pytest.mark.parametrize("which", ["lower", "upper"])

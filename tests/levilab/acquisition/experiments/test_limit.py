@@ -412,6 +412,10 @@ def test_a_top_that_levels_off_shows_where_pull_and_drag_are_equal(tmp_path):
     assert found.conditions.triggered
     assert found.conditions.levels_off
     assert found.statistics.step == 0
+    assert not found.comparisons
+    way = frame["spin_frequency_hz"] - frame["spin_seen_hz"]
+    assert found.statistics.common == pytest.approx(way.mean() / 2)
+    assert found.statistics.mean.u > found.statistics.common  # by √n less without it
     assert "this is no limit of the top" in found.text
 
 
