@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
 import sys
 import time
 from typing import TYPE_CHECKING
@@ -191,6 +192,7 @@ def time_in_words(seconds: float) -> str:
 class ShareBar:
     """A bar on a terminal for work whose progress is known, once it takes longer than a second.
 
+    A worker process shows nothing: several bars would be drawn over one another, and its parent shows the whole.
     A share that goes back is a new attempt: a simulation tries shorter steps until its error is small enough.
 
     Args:
@@ -207,7 +209,9 @@ class ShareBar:
         self._attempt = 1
 
     def __call__(self, share: float, description: str = "") -> None:
-        """Show the share that is done, and of what, if that changes."""
+        """Show the share that is done, and the work, if its description changes."""
+        if multiprocessing.parent_process():
+            return
         now = time.monotonic()
         self._description = description or self._description
         if share < self._last:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from levilab.present.progress import LineDisplay
+import multiprocessing
+
+from levilab.present.progress import LineDisplay, ShareBar
 
 
 def test_a_log_has_a_line_each_fifth_of_each_part_and_none_twice(capsys) -> None:
@@ -21,3 +23,11 @@ def test_a_log_calls_the_time_left_of_a_bench_that_jumps_bench_time(capsys) -> N
         "25 Hz   about 1:35 min left",
         "25 Hz   about 1:35 min of bench time left",
     ]
+
+
+def test_a_worker_process_shows_no_share_beside_that_of_its_parent(capsys, monkeypatch) -> None:
+    ShareBar("films", line_every=0.0)(0.5)
+    assert capsys.readouterr().err == "films: 50 %\n"
+    monkeypatch.setattr(multiprocessing, "parent_process", lambda: "a process")
+    ShareBar("films", line_every=0.0)(0.5)
+    assert not capsys.readouterr().err
