@@ -10,8 +10,8 @@ second, written as several makers' oscilloscopes would.
 The upper limits are synthetic, too: a normal law about what the simulated bench gives (docs/experiments/limit.md), once
 of a sound top and once of one whose washers slip under the tape.
 
-The records, the held spins and the scan are what `levilab acquire` writes on the virtual bench: their times and what
-differs between computers are left out.
+The records, the held spins and the scan are written by `levilab acquire` on the virtual bench, without times and values
+that differ between computers.
 
 Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes each time.
 

@@ -24,7 +24,7 @@ MISSING_WORDS = (
     "-", "--", "---", "n/a", "na", "n.a.", "nan", "#n/a", "#nv", "#num!", "#wert!", "#value!", "null", "none"
 )  # fmt: skip
 MISSING = frozenset(("", *MISSING_WORDS))
-#: What stands for a formula without its value, in the place of a number.
+#: Mark of a formula without its value, in the place of a number.
 UNVALUED = "=?"
 #: Decimal mark → (mark of thousands, numbers that have both, as 2.394,0 and 2,394.0); 2.394 alone could be either.
 _THOUSANDS = {

@@ -125,15 +125,15 @@ class Analyzed(Generic[S, R, T, Opt]):
 
 
 class Described(Protocol):
-    """What was found of an input that has no part in anything of all inputs."""
+    """Findings of one input, which no analysis combines with those of others."""
 
     @property
     def text(self) -> str:
-        """What it says, in a few sentences."""
+        """Findings in a few sentences."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Doubts about its numbers."""
+        """Doubts about the numbers."""
 
 
 D = TypeVar("D", bound=Described)
@@ -144,7 +144,7 @@ class EachAlone(Analyzed[S, D, None, Opt]):
 
     @property
     def text(self) -> str:
-        """What the data say, in a few sentences for each input."""
+        """Findings in a few sentences for each input."""
         if len(self.runs) == 1:
             return self.runs[0].text
         return "  ".join(f"{source.name}: {run.text}" for source, run in zip(self.sources, self.runs, strict=True))

@@ -116,7 +116,7 @@ class Video:
         base: its circle; None: not seen.
         mark: angle of the mark in the first picture; None: none turns.
         turning: None: no mark turns, or the spin is in doubt.
-        choices: spins in doubt, seen from above, counter-clockwise is positive [Hz].
+        choices: spins that describe the mark, seen from above, counter-clockwise is positive [Hz].
         precession: in the middle of the film; None: it does not stand out [Hz].
         fall: when the top fell; None: it floats to the end [s].
         spin_at_fall: None: not known [Hz].
@@ -216,17 +216,18 @@ def _video(film: Film, options: VideoOptions, followed: Followed) -> Video:
     rows = followed.y + _MARK * followed.radius * np.sin(angles)
     late = np.zeros_like(rows) if line_time else rows
     rate = followed.rate / factor
-    turning, choices, by_slope, problem = _turn(times + line_time * rows, phases, late, options, rate)
+    turning, choices, problem = _turn(times + line_time * rows, phases, late, options, rate)
     scale, base = _scale(film, options, followed), followed.base
-    size = _known(scale)
+    assert scale.value is not None
+    size = scale.value
     centred = options.base_m is not None and base is not None
     left, up = (base.x, base.y) if centred and base else (float(followed.x.mean()), float(followed.y.mean()))
     times, x, y = times + line_time * followed.y, size * (followed.x - left), size * (up - followed.y)
     fall, at_fall = _fall(times, x, y, turning, 1 / rate) if followed.ended == "lost" else (None, None)
     return Video(
         float(followed.times[0]), times, x, y, size * followed.u, scale, (left, up), float(np.median(followed.radius)),
-        base, None if problem else float(angles[0]), turning, choices, _precession(times, x + 1j * y), fall, at_fall,
-        (*_notes(options, followed), *_notes_on_spin(turning, choices, problem, rate, options, by_slope=by_slope)),
+        base, float(angles[0]) if choices else None, turning, choices, _precession(times, x + 1j * y), fall, at_fall,
+        (*_notes(options, followed), *_notes_on_spin(turning, choices, problem, rate, options)),
     )  # fmt: skip
 
 
@@ -254,24 +255,19 @@ def _precession(times: Array, places: NDArray[np.complex128]) -> Estimate | None
     return Estimate(abs(float(one.frequency[2])), float(one.u[2]), "Hz")
 
 
-def _known(estimate: Estimate) -> float:
-    assert estimate.value is not None
-    return estimate.value
-
-
 def _turn(
     times: Array, phases: Phases, rows: Array, options: VideoOptions, rate: float
-) -> tuple[Turning | None, tuple[float, ...], bool, str]:
-    """Return how the top turned, spins in doubt, whether the slope chose among them, and why there is none."""
+) -> tuple[Turning | None, tuple[float, ...], str]:
+    """Return how the top turned, the spins that describe its mark, and why there is none of these."""
     try:
         found = spins_of_start(times, phases.phase, phases.u)
     except NoMark as error:
-        return None, (), False, str(error)
+        return None, (), str(error)
     choices, slow = choices_of(found, options.near)
     if not choices:
         if slow:
             raise SlowMotion(rate=rate, captured=None, spin=slow[0])
-        return None, (), False, "no spin with which a top floats, or of `near`, describes its mark"
+        return None, (), "no spin with which a top floats, or of `near`, describes its mark"
     if options.near is not None and len(choices) > 1:
         choices.sort(key=lambda f: abs(abs(f) - (options.near or 0.0)))
         off = [abs(abs(f) - options.near) for f in choices[:2]]
@@ -279,12 +275,13 @@ def _turn(
     turning = turning_of(times, phases.phase, phases.u, rows, start=choices[0])
     by_slope = len(choices) > 1 and abs(turning.chirp) > _FALLS * turning.u_chirp
     falling = [f for f in choices if f * turning.chirp < 0] if by_slope else []
+    seen_from_above = tuple(-f for f in choices)
     played_slowly = bool(slow) and options.rate is None
     if played_slowly or (len(choices) > 1 and len(falling) != 1):
-        return None, tuple(-f for f in choices), False, ""
+        return None, seen_from_above, ""
     if falling and falling[0] != choices[0]:
         turning = turning_of(times, phases.phase, phases.u, rows, start=falling[0])
-    return turning, tuple(-f for f in choices), bool(falling), ""
+    return turning, seen_from_above, ""
 
 
 def _scale(film: Film, options: VideoOptions, followed: Followed) -> Estimate:
@@ -316,13 +313,7 @@ def _notes(options: VideoOptions, seen: Followed) -> Iterator[str]:
 
 
 def _notes_on_spin(
-    turning: Turning | None,
-    choices: tuple[float, ...],
-    problem: str,
-    rate: float,
-    options: VideoOptions,
-    *,
-    by_slope: bool,
+    turning: Turning | None, choices: tuple[float, ...], problem: str, rate: float, options: VideoOptions
 ) -> Iterator[str]:
     listed = " or ".join(f"{abs(f):.3f} Hz ({'counter-' * (f > 0)}clockwise)" for f in choices)
     if problem:
@@ -330,5 +321,5 @@ def _notes_on_spin(
     elif turning is None:
         slow = "" if options.rate else "; or, if the film is in slow motion, the true `rate`"
         yield f"no spin: at {rate:.4g} pictures in a second it may be {listed}; say which by `near`{slow}"
-    elif by_slope:
+    elif len(choices) > 1:  # the slope chose
         yield f"of {listed}, which look the same, the one that slows down is taken, as a free top does"

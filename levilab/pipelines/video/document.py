@@ -25,7 +25,7 @@ _ROWS: tuple[tuple[str, str, str, Literal["A", "B"], str, str], ...] = (
 
 
 def budget_of_run(_: Source[FilmReadings], run: Video, __: VideoOptions) -> tuple[Budget, ...]:
-    """Return the budgets of one film; what the camera's clock and lens do is in none."""
+    """Return the budgets of one film; those of the camera's clock and lens are unknown."""
     found = find_all(QUANTITIES, run)
     return tuple(
         Budget(name, one.value or 0.0, one.u, one.unit, (direct_row(row, what, one.u, one.unit, note, remedy, kind),))

@@ -27,7 +27,7 @@ def video_part(analysis: VideoAnalysis) -> ReportPart:
         result=(Tabular("video-values", values, f"{VALUE_U} The scale is common to all places, and not in their u."),),
         figure=FigureText(
             title="First picture.",
-            caption="What was tracked, drawn over it: rim, mark, base, and the path of the rim's middle.",
+            caption="Rim, mark, base, and the path of the rim's middle, drawn over the first picture.",
             alt="First picture of the film with rim, mark, base and path drawn over it",
         ),
         runs_title="Readings of the spin",
@@ -43,7 +43,7 @@ def _pictures(source: Source[FilmReadings], run: Video, *_: object) -> tuple[str
 
 def _spins(run: Video, number: int) -> Block:
     if (found := run.turning) is None:
-        return Paragraph("There is none: see the warnings.")
+        return Paragraph("No spin was found: see the warnings.")
     rows = [
         tuple(with_decimals(float(value), n) for value, n in zip(row, (2, 4, 4), strict=True))
         for row in zip(found.time, abs(found.spin), found.u, strict=True)

@@ -201,9 +201,11 @@ def test_a_film_in_slow_motion_asks_for_its_rate(folder):
 
 def test_even_times_that_fold_the_spin_are_named_and_near_chooses(folder):
     path = filmed(folder, "thirty.mp4", Picture.take, even_times(1.0, 30.0))
-    doubtful = analyze_film(path, VideoOptions(rim_m=0.03))
+    analysis = ANALYSES["video"].analyze([path], VideoOptions(rim_m=0.03))
+    doubtful = analysis.runs[0]
     assert doubtful.spin is None
     assert "30.97" in doubtful.warnings[0]
+    assert pytest.approx(30.975, abs=0.01) in ANALYSES["video"].document(analysis, folder)["choices_hz"]
     assert analyze_film(path, VideoOptions(rim_m=0.03, near=31.0)).spin.value == pytest.approx(30.975, abs=5e-3)
 
 
