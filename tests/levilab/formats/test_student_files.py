@@ -351,10 +351,25 @@ def test_times_in_two_columns_say_to_write_them_as_one(titles, tmp_path):
         read_table(path, quantities=SPIN)
 
 
-def test_minutes_beside_other_seconds_are_the_times(tmp_path):
+@pytest.mark.parametrize(
+    "rows", ["0;0;38\n1;60;37\n2;120;36", "0.5;30;38\n0.6;36;37\n0.75;45;36", "0;9;38\n0;20;37\n0;30;36"]
+)
+def test_times_in_either_of_two_units_are_asked_about(rows, tmp_path):
+    path = tmp_path / "twice.csv"
+    path.write_text(f"t [min];t [s];f\n{rows}\n", encoding="utf-8")
+    with pytest.raises(TableError, match="say which: `columns` = t=1 or t=2"):
+        read_table(path, quantities=SPIN)
+
+
+@pytest.mark.parametrize(
+    ("titles", "seconds", "columns"),
+    [("t [min];u_t [s];f", 1, {}), ("t [min];T [s];n", 0.026, {}), ("t [min];t [s];f", 20, {"t": "1"})],
+)
+def test_minutes_beside_other_seconds_are_the_times(titles, seconds, columns, tmp_path):
     path = tmp_path / "u.csv"
-    path.write_text("t [min];u_t [s];f\n0;1;38\n1;1;37\n2;1;36\n", encoding="utf-8")
-    assert read_table(path, quantities=SPIN).column("time_s").tolist() == [0, 60, 120]
+    rows = "".join(f"{k};{seconds};{38 - k}\n" for k in range(3))
+    path.write_text(f"{titles}\n{rows}", encoding="utf-8")
+    assert read_table(path, quantities=SPIN, columns=columns).column("time_s").tolist() == [0, 60, 120]
 
 
 def test_a_stopwatch_may_say_so_in_its_title(tmp_path):

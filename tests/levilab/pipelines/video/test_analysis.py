@@ -282,6 +282,7 @@ def test_the_sample_film_has_the_spin_and_the_precession_of_its_simulation():
     unknown = analyze_film(
         path, VideoOptions(rim_m=2 * RIM)
     )  # its times are those of the first row, a millisecond early
+    assert np.median(found.time - unknown.time) == pytest.approx(10e-6 * 104, rel=0.1)  # its middle row, nearly
     assert unknown.spin.value == pytest.approx(found.spin.value, abs=1e-3 * abs(found.chirp.value))
     assert "x stays within 1.07 mm and y within 1.07 mm" in unknown.text  # docs/video.md
 
