@@ -25,7 +25,7 @@ STEP_HZ, UPPER_STEP_HZ, COARSE_HZ = 0.01, 0.02, 0.05
 AROUND_HZ = 0.2
 MASSES_KG = 1e-3 * np.arange(25.26, 25.3051, 0.005)
 #: Spins of the upper scans [Hz].
-UPPER_HZ = (56.0, 84.0)
+UPPER_HZ = (45.0, 84.0)
 #: With drag: starts that nothing distinguishes [Hz], and how long a top has to come down [s].
 DRAG_STARTS_HZ = 30.0 + 0.001 * np.arange(48)
 DRAG_S = 150.0
