@@ -224,8 +224,7 @@ def simulate(
     """Simulate the motion of a top.  The first call for a kind of scene compiles for some seconds.
 
     Args:
-        scene: the name of one that ships (undriven, friction, tilted, driven, loose-washers, motor, precession,
-            spindown, practice), a TOML file, or a `levilab.simulator.Scene`.
+        scene: the name of one that ships (`levilab.simulator.presets()`), a TOML file, or a `levilab.simulator.Scene`.
         duration: how much is simulated [s].
         settings: changes of the scene by dotted keys, as {"top.mass_kg": 0.0255}.
         tolerance: wanted error at the end, of the place [m] and of the axis [rad].

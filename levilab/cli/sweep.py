@@ -46,8 +46,8 @@ def sweep(
         str | None,
         typer.Option(
             metavar="NAME,…",
-            help="What is observed: survived, lifetime_s, fall_spin_hz, end_spin_hz, highest_spin_hz, "
-            "energy_error, position_error_m, height_spread_m, locked, lines.",
+            help="What is observed: survived, lifetime_s, fall_spin_hz, end_spin_hz, energy_error, position_error_m, "
+            "highest_spin_hz, height_spread_m, locked, lines.",
             show_default="survived,lifetime_s",
         ),
     ] = None,

@@ -6,16 +6,21 @@ import re
 import shutil
 import subprocess
 import sys
+from typing import get_type_hints
 
 import pytest
 
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.cli.acquire import EXPERIMENT_HELP
 from levilab.cli.analyze import COMMANDS
+from levilab.cli.checks import reproduce
 from levilab.cli.options import SCENES
+from levilab.cli.sweep import sweep
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import KINDS
+from levilab.reproduce.run import CHAPTERS
 from levilab.simulator.scene import presets
+from levilab.sweeps.observables import NAMES
 from support.acquisitions import QUICKLY
 from support.commands import command
 from support.spin_downs import spin_down_csv
@@ -355,3 +360,13 @@ def test_nothing_heavy_is_imported_where_it_is_not_used(tmp_path, commands, allo
 
 def test_help_lists_the_scenes_that_come_with_levilab():
     assert sorted(SCENES.split(", ")) == presets()
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "names"),
+    [(sweep, "observe", NAMES), (reproduce, "only", CHAPTERS)],
+    ids=["sweep", "reproduce"],
+)
+def test_help_lists_all_observables_and_chapters(command, option, names):
+    (given,) = get_type_hints(command, include_extras=True)[option].__metadata__
+    assert given.help.partition(": ")[2].rstrip(".").split(", ") == list(names)
