@@ -32,7 +32,6 @@ class Film:
         path: the file.
         width: of a picture [pixels].
         height: [pixels].
-        nominal: pictures in a second by the head of the file; no time is computed from it.
         captured: pictures in a second when it was taken; None: not stated.
         duration: [s]; None: not stated.
         codec: its name.
@@ -41,7 +40,6 @@ class Film:
     path: Path
     width: int
     height: int
-    nominal: float | None
     captured: float | None
     duration: float | None
     codec: str
@@ -62,7 +60,6 @@ def open_film(path: Path) -> Film:
             path,
             stream.codec_context.width,
             stream.codec_context.height,
-            float(stream.average_rate) if stream.average_rate else None,
             _number(container.metadata.get(_CAPTURED)),
             container.duration / 1e6 if container.duration else None,
             stream.codec_context.name,

@@ -58,7 +58,6 @@ class Followed:
         u: standard uncertainty of each, shape (n,) [pixels].
         radius: of the rim, shape (n,) [pixels].
         profiles: shape (n, bands, rays).
-        still: the first picture.
         base: the circle of the base; None: not seen.
         rate: pictures in a second, by their times.
         missed: pictures in between in which no rim was seen.
@@ -71,7 +70,6 @@ class Followed:
     u: Array
     radius: Array
     profiles: Array
-    still: Picture
     base: Circle | None
     rate: float
     missed: int
@@ -112,7 +110,7 @@ def follow(film: Film, start: float, stop: float, progress: Callable[[float], No
             break
         if 0 < span < np.inf:
             progress(min((time - start) / span, 1.0))
-    return _followed(film, track, watch, still, base)
+    return _followed(film, track, watch, base)
 
 
 def _beginning(film: Film, start: float, stop: float) -> tuple[Array, Picture, int]:
@@ -208,7 +206,7 @@ class _Track:
         del self.times[count:], self.rims[count:]
 
 
-def _followed(film: Film, track: _Track, watch: _Watch, still: Picture, base: Circle | None) -> Followed:
+def _followed(film: Film, track: _Track, watch: _Watch, base: Circle | None) -> Followed:
     span = track.times[-1] - track.times[0] if track.times else 0.0
     if span < _LEAST_S:
         if track.ended == "hand":
@@ -227,7 +225,6 @@ def _followed(film: Film, track: _Track, watch: _Watch, still: Picture, base: Ci
         radius=radius,
         u=np.hypot([rim.u for rim in track.rims], CODEC_U),
         profiles=np.stack([rim.profiles for rim in track.rims]),
-        still=still,
         base=base,
         rate=(times.size - 1 + missed) / span,
         missed=missed,

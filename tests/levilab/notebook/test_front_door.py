@@ -130,17 +130,14 @@ def test_readings_stand_with_their_residuals(four: Any) -> None:
 
 @pytest.mark.parametrize("kind", ANALYSES)
 def test_every_analysis_has_readings_with_the_residuals_of_its_result(kind: str) -> None:
-    folder = {"spin": "trace-laser", "sway": "sway", "hold": "hold/45-hz", "video": "video"} | {
-        name: case[0] for name, case in CASES.items()
-    }
+    folder = {"spin": "trace-laser", "sway": "sway", "hold": "hold/45-hz", "video": "video"}
+    folder |= {name: case[0] for name, case in CASES.items()}
     of_film = {"rim_m": 0.03, "stop_s": 1.0} if kind == "video" and pytest.importorskip("av") else {}
     result = levilab.analyze(SAMPLE_DATA / folder[kind], kind if of_film else None, **of_film)
     table = result.to_dataframe("readings")
     assert len(table) > 2
     assert np.isfinite(table.filter(regex="^(spin_frequency_hz|residual|flux)").to_numpy()).all()
-    fits = [
-        model for model in result.document["models"] if model["name"] in {"disc", "ring", "weighted"} and kind != "hold"
-    ]
+    fits = [one for one in result.document["models"] if one["name"] in {"disc", "ring", "weighted"} and kind != "hold"]
     for model in fits:
         rms = float(np.sqrt((table.filter(like="residual").to_numpy() ** 2).mean()))
         assert rms == pytest.approx(model["statistics"]["rms_residual"])

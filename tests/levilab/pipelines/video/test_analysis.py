@@ -129,9 +129,8 @@ def test_the_base_and_the_rim_give_the_scale(path):
         scale = analyze_film(path, options).scale
         assert scale.value == pytest.approx(CAMERA.scale, abs=2 * scale.u)
         assert 0 < scale.u < 0.011 * scale.value
-    assert any(
-        "nearer to the camera" in note for note in analyze_film(path, VideoOptions(base_m=0.1, stop_s=0.45)).warnings
-    )
+    (note,) = analyze_film(path, VideoOptions(base_m=0.1, stop_s=0.45)).warnings
+    assert "nearer to the camera" in note
 
 
 @pytest.mark.parametrize(
@@ -202,7 +201,7 @@ def test_a_film_in_slow_motion_asks_for_its_rate(folder):
 def test_even_times_that_fold_the_spin_are_named_and_near_chooses(folder):
     path = filmed(folder, "thirty.mp4", Picture.take, even_times(1.0, 30.0))
     analysis = ANALYSES["video"].analyze([path], VideoOptions(rim_m=0.03))
-    doubtful = analysis.runs[0]
+    (doubtful,) = analysis.runs
     assert doubtful.spin is None
     assert "30.97" in doubtful.warnings[0]
     assert pytest.approx(30.975, abs=0.01) in ANALYSES["video"].document(analysis, folder)["choices_hz"]
@@ -279,9 +278,7 @@ def test_the_sample_film_has_the_spin_and_the_precession_of_its_simulation():
     assert found.spin.value == pytest.approx(31.476264, abs=4 * found.spin.u)
     assert found.chirp.value == pytest.approx(-0.103583, abs=4 * found.chirp.u)
     assert found.precession.value == pytest.approx(7.0660, abs=4 * found.precession.u)
-    unknown = analyze_film(
-        path, VideoOptions(rim_m=2 * RIM)
-    )  # its times are those of the first row, a millisecond early
+    unknown = analyze_film(path, VideoOptions(rim_m=2 * RIM))  # with times of the first row, a millisecond early
     assert np.median(found.time - unknown.time) == pytest.approx(10e-6 * 104, rel=0.1)  # its middle row, nearly
     assert unknown.spin.value == pytest.approx(found.spin.value, abs=1e-3 * abs(found.chirp.value))
     assert "x stays within 1.07 mm and y within 1.07 mm" in unknown.text  # docs/video.md
