@@ -13,7 +13,7 @@ Source: PHYSICS.md §7.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot, sqrt
 
 import numpy as np
@@ -23,6 +23,7 @@ from analysis.least_squares import solve
 from analysis.pulses.regression import student
 from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.selection import Statistics, statistics, weigh
+from analysis.spindown.tilt import THESIS_TOP
 from analysis.uncertainty import Estimate, curvature, propagate
 
 Array = NDArray[np.float64]
@@ -31,8 +32,8 @@ Array = NDArray[np.float64]
 _GAP = 1.5
 #: The exponent of any drag is between 1 and 2: it brings the gain from the spins at which it was seen to the held one.
 _EXPONENT, _EXPONENT_U = 1.5, 0.3
-#: ν_r of the usual Levitron, and a spin below which none is held [Hz].
-_RESONANCE_HZ, _LOWEST_HZ = 21.6, 24.0
+#: No top is held below this spin [Hz].
+_LOWEST_HZ = 24.0
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Hold:
 
 
 def hold_of(time: Array, spin: Array, u: Array, share: Array, gains: Sequence[tuple[Array, Array]]) -> Hold:
-    """Return what the readings of a held spin say.
+    """Return the mean spin of the readings, and the drag that the amplitude balanced there.
 
     Args:
         time: of the readings, at least two, shape (n,) [s].
@@ -85,7 +86,8 @@ def hold_of(time: Array, spin: Array, u: Array, share: Array, gains: Sequence[tu
     moved = float(np.diff(spin)[joined].sum())
     ends = np.diff(np.concatenate([[0.0], joined.astype(float), [0.0]]))  # readings that begin or end a stretch
     nu = max(mean, _LOWEST_HZ)
-    lean = beside / (nu * ((nu / _RESONANCE_HZ) ** 2 - 1))  # half of the change of ln pull: it leans, or is upright
+    # half of the change of ln pull: the top leans, or is upright
+    lean = beside / (nu * ((nu / THESIS_TOP.resonance_hz) ** 2 - 1))
     left = whole - driven * (1 + _EXPONENT * beside / mean + lean)
     drag = (driven * gain.value * (1 + lean) - moved) / left
     parts = {
@@ -98,9 +100,9 @@ def hold_of(time: Array, spin: Array, u: Array, share: Array, gains: Sequence[tu
 
 
 def _gain(gains: Sequence[tuple[Array, Array]], held: float) -> tuple[Estimate | None, float]:
-    """Return the common slope of the counts at the full amplitude, and by how much they lie above the held spin [Hz].
+    """Return the common slope of the counts at the full amplitude, and their mean distance above the held spin [Hz].
 
-    u holds the few counts: it is widened by Student's factor, so that it covers as much as a normal one.
+    u is widened by Student's factor, as the counts are few.
     """
     if not gains:
         return None, 0.0
@@ -148,7 +150,7 @@ def fit_held(spin: Array, drag: Array, u: Array, common: Array | None = None) ->
         spin: shape (n,) [Hz].
         drag: shape (n,) [Hz/s].
         u: of the drag, shape (n,) [Hz/s].
-        common: u of a correction by which all are wrong alike, shape (n,) [Hz/s]; None: there is none.
+        common: u of an error that is common to all spins, shape (n,) [Hz/s]; None: there is none.
 
     >>> spins = np.array([25.0, 35.0, 45.0])
     >>> found = fit_held(spins, 2e-4 * (2 * np.pi * spins) ** 1.5 / (2 * np.pi), 0.001 * np.ones(3))
@@ -161,10 +163,7 @@ def fit_held(spin: Array, drag: Array, u: Array, common: Array | None = None) ->
     fits = [_fit(law, spin, drag, white, reference) for law in LAWS.values() if len(law.constants) <= len(spin)]
     weighed, _ = weigh({one.name: one.statistics for one in fits})
     by_name = {one.name: one for one in fits}
-    return tuple(
-        HeldLaw(name, by_name[name].constants, by_name[name].covariance, stats, by_name[name].solution, reference)
-        for name, stats in weighed.items()
-    )
+    return tuple(replace(by_name[name], statistics=stats) for name, stats in weighed.items())
 
 
 def _fit(law: DragLaw, spin: Array, drag: Array, white: Array, reference: float) -> HeldLaw:

@@ -51,9 +51,9 @@ _NEAR_S = 3.0
 _LEAST_GAIN_HZ, _GAINING = 0.15, 30
 #: Number of counts that show the gain at the full amplitude: 3 mHz/s of 0.2 Hz/s; a top that is held by more than this
 #: share of the amplitude gains too little for that.  Near its lowest spin a top that leans is turned so much harder
-#: that as many would lead out of where it floats: they go over no more than this [Hz].
+#: that ten counts would lead out of its window: they cover no more than this [Hz].
 _GAIN_COUNTS, _MOST_SHARE, _GAIN_HZ = 10, 0.9, 3.0
-#: Fewest counts that show it, on the way, too: 13 mHz/s.
+#: Fewest counts that show a gain, also on the way to a spin: to 13 mHz/s.
 _FEWEST_COUNTS = 4
 #: The pull changes by no more than this factor on the way to a spin: that of the lean is 2 from 30 to 80 Hz.
 _MOST_CHANGE = 3.0
@@ -131,7 +131,7 @@ class Motor:
         spin: the last count [Hz].
         phase: the start phase that speeds it up [°].
         pull: rate that the full amplitude adds to its spin [Hz/s]; the less the faster, since a tilted top leans less.
-        drag: rate of its loss without a drive at the spin of the trials [Hz/s]; None where there were none.
+        drag: rate of its loss without a drive over ν^(3/2) [Hz^(-1/2)/s]; None where the phase was not found by trial.
         share: of the full amplitude that holds it, as the loop has found.
         counts: its spin while it was held [Hz].
         shares: of the full amplitude, at each of the counts.
@@ -150,7 +150,6 @@ class Motor:
     _missed: int = 0
     _trend: float = 0.0  # of the spin [Hz/s]
     _errors: float = 0.0  # summed [Hz s]
-    _drag_at: float = 0.0  # spin of the trials [Hz]
     _base: float = 1.0  # share of the amplitude without errors
 
     # --- the generator ---
@@ -213,7 +212,7 @@ class Motor:
         scatter = math.sqrt(float(np.mean(np.square(scatters))))
         found = response(slopes, scatter / min(spreads))
         self.phase, self.pull = found.phase, found.pull
-        self.drag, self._drag_at = max(found.drag, 0.0), float(np.mean(means))
+        self.drag = max(found.drag, 0.0) / float(np.mean(means)) ** 1.5
         if found.pull < _CLEAR * found.u:
             raise _no_pull(session, found)
         self._turn_to(self.phase)
@@ -243,9 +242,10 @@ class Motor:
             spins.append(self.count())
             times.append(self.session.now())
         self.gains.append((times, spins))
-        text = f"gains {slope_of(times, spins)[0]:.3f} Hz/s at the full amplitude, about {np.mean(spins):.2f} Hz"
+        slope, _, _ = slope_of(times, spins)
+        text = f"gains {slope:.3f} Hz/s at the full amplitude, about {np.mean(spins):.2f} Hz"
         self.session.event(RunEvent.GAIN, text, times_s=times, spins_hz=spins)
-        self.pull = max(slope_of(times, spins)[0] / (1 - share), self.pull / _MOST_CHANGE)
+        self.pull = max(slope / (1 - share), self.pull / _MOST_CHANGE)
         self._trend = 0.0
         self._set_share(_LEAST_SHARE)
         while self.spin > target:
@@ -282,7 +282,7 @@ class Motor:
         latest = slice(max(1, len(spins) - _GAIN_COUNTS), None)  # the first count was not under this drive
         if self.drag is not None and len(spins[latest]) >= _FEWEST_COUNTS:
             gain, _, _ = slope_of(times[latest], spins[latest])
-            pull = sign * (gain + self.drag * (self.spin / self._drag_at) ** 1.5)
+            pull = sign * (gain + self.drag * self.spin**1.5)
             self.pull = min(max(pull, self.pull / _MOST_CHANGE), self.pull * _MOST_CHANGE)
         self._set_share(sign - gain / self.pull)  # drag over pull, for gain = sign · pull − drag
 

@@ -16,6 +16,7 @@ from levilab.acquisition.driving import DriveSettings, drive_off, drive_up, reac
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.failures import NotHeld
 from levilab.bench.config import ConfigError
+from levilab.formats.table import FEWEST
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
     from levilab.acquisition.triggering import Motor
     from levilab.bench.config import Limits
 
-#: Fewest readings from which a scatter and a drag are estimated.
-_FEWEST = 3
 #: A top further from its spin [Hz] is not held: the wobble of a full motion leaves 0.1 Hz after the loop has settled,
 #: and a top whose pulses no longer come loses 1 Hz in some 6 s.
 _HELD_WITHIN_HZ = 1.0
@@ -129,16 +128,19 @@ def _reading(session: Session[HoldSettings], motor: Motor) -> Row:
 def _report_drag(session: Session[HoldSettings], motors: Sequence[Motor]) -> None:
     """Record the scatter of the held spin, and the drag that the amplitude balanced, as `levilab analyze hold` does."""
     rows = session.rows
-    if len(rows) < _FEWEST:
+    if len(rows) < FEWEST:
+        text = f"{len(rows)} readings show neither a scatter nor a drag, {FEWEST} are needed: hold the spin longer"
+        session.event(RunEvent.ENDED, f"{text} ({session.writer.record.experiment}.longest_s)")
         return
     time, spin, u, volts = (np.array([row[one.name] for row in rows]) for one in channels(session.settings))
     gains = [(np.array(times), np.array(spins)) for motor in motors for times, spins in motor.gains]
     found = hold_of(time, spin, u, volts / (session.settings.drive_amplitude_vpp / 2), gains)
     drag = found.drag
     data = {"drag_hz_per_s": drag.value, "drag_u_hz_per_s": drag.u} if drag else {}
+    size = with_uncertainty(drag) if drag else "of unknown size, as no gain was measured: drive harder"
     text = (
         f"held at {found.spin.value:.3f} Hz, s.d. of a reading {found.scatter.value:.3f} Hz; "
-        f"{100 * found.share:.1f} % of the amplitude balanced the drag{f', {with_uncertainty(drag)}' if drag else ''}"
+        f"{100 * found.share:.1f} % of the amplitude balanced the drag, {size}"
     )
     more = {"spin_frequency_hz": found.spin.value, "scatter_hz": found.scatter.value}
     session.event(RunEvent.HELD, text, **more, **data)

@@ -12,7 +12,7 @@ from levilab.acquisition.table import settings_of
 from levilab.crosscheck.subject import Pull, Subject, acquire_mock, pull_of
 from levilab.crosscheck.subjects.spindown import draw_scene, in_world
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.simulator.laws import LAWS
+from levilab.simulator.spin import DECAYS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,10 +36,8 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     run = acquire_mock("hold", seed, folder, change)
     analysis = ANALYSES["hold"]
     (found,) = analysis.analyze([run.folder], analysis.options_from({})).runs
-    omega, power = 2 * math.pi * (found.spin.value or 0.0), LAWS[scene.drag].exponent
-    powers = (1.0, 2.0) if power is None else (power,)
-    truth = sum(c * omega**n for c, n in zip(scene.constants, powers, strict=True)) / (2 * math.pi)
-    return [pull_of("drag", found.drag, truth)]
+    held = found.spin.value or 0.0
+    return [pull_of("drag", found.drag, held * DECAYS[scene.drag].damping(2 * math.pi * held, *scene.constants))]
 
 
 SUBJECT = Subject("hold", "a spin held by a drive that the top triggers: the drag by the amplitude", trial, trials=100)

@@ -81,7 +81,7 @@ def _of_laws(found: HeldTogether) -> Iterable[str]:
         chi = best.statistics.reduced_chi_square
         fits = "" if chi is None else f", χ² per degree of freedom {plain(chi, 2)}"
         yield f"Of the drag laws {best.name} is the best: {list_in_words(constants)}{fits}."
-    for law in sorted(found.laws, key=lambda one: one is not best)[: 1 if best else None]:
+    for law in found.laws[: 1 if best else None]:  # a single drag lies on each
         if law.name in found.beside:
             (name,) = law.constants
             spindown, pull = found.beside[law.name]
@@ -126,7 +126,8 @@ def _tilt(beside: SpinDownAnalysis | None, spins: np.ndarray) -> tuple[np.ndarra
 def _compare(laws: Sequence[HeldLaw], beside: SpinDownAnalysis) -> Iterable[tuple[str, tuple[Estimate, float]]]:
     theirs = {fit.name: fit.constants for fit in beside.combined.fits}
     for law in laws:
-        for name, held in law.constants.items() if len(law.constants) == 1 and law.name in theirs else ():
+        if len(law.constants) == 1 and law.name in theirs:
+            ((name, held),) = law.constants.items()
             other = theirs[law.name][name]
             if held.value is not None and held.u and other.value is not None and other.u:
                 yield law.name, (other, float((held.value - other.value) / np.hypot(held.u, other.u)))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
+from levilab.formats.table import FEWEST
 from levilab.pipelines.sources import Readings
 from levilab.runs.events import RunEvent
 
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
     from levilab.runs.run import Run
 
     Array = NDArray[np.float64]
-
-#: Fewest readings that show a scatter.
-_FEWEST = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +57,8 @@ def read_hold_run(run: Run, _: InputOptions) -> HoldReadings:
     time, spin, u, volts = (
         table.column(name) for name in ("time_s", "spin_frequency_hz", "spin_frequency_u_hz", "drive_amplitude_v")
     )
-    if len(time) < _FEWEST:
-        raise TableError(table.path, f"holds {len(time)} readings, at least {_FEWEST} are needed: hold the spin longer")
+    if len(time) < FEWEST:
+        raise TableError(table.path, f"holds {len(time)} readings, at least {FEWEST} are needed: hold the spin longer")
     settings = run.record.configuration.get("hold")
     full = settings.get("drive_amplitude_vpp") if isinstance(settings, dict) else None
     if not isinstance(full, int | float) or not full > 0:
@@ -69,13 +67,15 @@ def read_hold_run(run: Run, _: InputOptions) -> HoldReadings:
 
 
 def _gains(run: Run) -> tuple[tuple[Array, Array], ...]:
-    found = []
-    for event in run.events():
-        if event["kind"] == RunEvent.GAIN:
-            try:
-                times, spins = (np.array(event.get(name), dtype=float) for name in ("times_s", "spins_hz"))
-            except (TypeError, ValueError):
-                continue
-            if times.shape == spins.shape and times.ndim == 1 and times.size > 2 and np.ptp(times) > 0:
-                found.append((times, spins))
-    return tuple(found)
+    found = (_gain(event) for event in run.events() if event["kind"] == RunEvent.GAIN)
+    return tuple(gain for gain in found if gain)
+
+
+def _gain(event: dict[str, Any]) -> tuple[Array, Array] | None:
+    """Return the times and counts of a gain, three counts at least; None for a damaged event."""
+    try:
+        times, spins = gain = np.array([event.get("times_s"), event.get("spins_hz")], dtype=float)
+    except (TypeError, ValueError):
+        return None
+    whole = gain.ndim == 2 and gain.shape[1] >= FEWEST and np.isfinite(gain).all() and np.ptp(times) > 0
+    return (times, spins) if whole else None

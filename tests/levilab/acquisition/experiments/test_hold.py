@@ -159,6 +159,8 @@ def test_two_readings_show_neither_a_scatter_nor_a_drag(tmp_path):
     run = held(tmp_path, 3, "hold.longest_s=15")
     assert (run.status, run.count()) == ("finished", 2)
     assert not [event for event in run.events() if event["kind"] == "held"]
+    (ended,) = (event["text"] for event in run.events() if event["kind"] == "ended")
+    assert ended.endswith("3 are needed: hold the spin longer (hold.longest_s)")
 
 
 def test_a_hold_of_hours_does_not_drift(tmp_path):

@@ -6,6 +6,8 @@ import shutil
 import numpy as np
 import pytest
 
+from analysis.spindown.drag import LAWS
+from analysis.spindown.tilt import count_of, slowing_by_tilt
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.hold.figure import hold_figure
@@ -34,14 +36,34 @@ def test_each_held_spin_gives_its_drag_and_several_the_law():
     assert "disc is the best" in found.text
 
 
-def test_a_spin_down_is_compared_and_its_tilt_counts():
+def tilted_spin_down(path):
+    """A spin-down of the same top with its moment tilted by 0.03 rad."""
+    time = np.arange(0.0, 130.0, 2.0)
+    q = LAWS["disc"].dimensionless([40.0, C32], 40.0, time[-1])
+    spins = 40.0 * count_of(LAWS["disc"], time / time[-1], np.array([*q, 0.03**2, 22.0 / 40.0, 0.0]))
+    noise = np.random.default_rng(3).normal(0, 0.005, time.size)
+    np.savetxt(
+        path, np.column_stack([time, spins + noise]), delimiter=",", header="time_s,spin_frequency_hz", comments=""
+    )
+    return path
+
+
+def test_the_tilt_of_a_spin_down_is_taken_out_of_the_drag(tmp_path):
+    alone, found = analyzed(), analyzed(spindown=tilted_spin_down(tmp_path / "a.csv"))
+    factors = np.array(found.combined.factors)
+    expected = slowing_by_tilt(np.array([run.spin.value for run in found.runs]), 22.0, 0.03)
+    assert factors == pytest.approx(expected, abs=0.01)  # u of δ is 5 %
+    assert factors.min() < 0.97
+    before, after = (one.combined.laws[0].drag(np.array([26.0]))[0] for one in (alone, found))
+    assert after > 1.003 * before  # 3 % more at 26 Hz alone, in a mean over four spins
+
+
+def test_a_spin_down_is_compared():
     found = analyzed(spindown=SAMPLE_DATA / "spin-down-1")  # of another top, whose constant is 2.371e-4
     disc = found.combined.laws[0].constants["c32"]
     spindown, pull = found.combined.beside["disc"]
     assert pull == pytest.approx((disc.value - 2.371e-4) / np.hypot(disc.u, spindown.u), abs=0.3)
     assert "DISAGREES with" in found.text
-    tilted = analyzed(spindown=SAMPLE_DATA / "spin-down-1")
-    assert all(0.8 < one < 1.2 for one in tilted.combined.factors)
 
 
 def test_a_result_is_as_the_interface_has_it(tmp_path):
@@ -75,6 +97,16 @@ def test_a_single_hold_and_one_without_a_gain(tmp_path):
     assert any("no drag follows" in text for text in found.all_warnings)
     assert not found.combined.laws
     hold_figure(found)
+
+
+@pytest.mark.parametrize(
+    "spins", [None, 1.0, "40", [40], [40, 41], [40, 41, None], [40, 41, "x"], [[40], [41], [42]], {"a": 1}]
+)
+def test_a_damaged_gain_is_none(tmp_path, spins):
+    shutil.copytree(RUNS[0], tmp_path / "run")
+    event = {"kind": "gain measured", "text": "", "times_s": [1, 2, 3], "spins_hz": spins}
+    (tmp_path / "run" / "events.jsonl").write_text(json.dumps(event) + "\n")
+    assert analyzed([tmp_path / "run"]).runs[0].gain is None
 
 
 def test_a_file_has_no_gain_and_is_refused(tmp_path):
