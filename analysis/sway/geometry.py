@@ -155,7 +155,7 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
         u_shares = np.abs(factor) * np.array([one.u_split for one in swings])
         doubt, mistake = np.abs(factor) * (resonance + shift_u), np.abs(factor) * mistaken
         total = np.sqrt(u_shares**2 + doubt**2 + mistake**2)
-        value, u_lines, chi_square = _mean(shares, total)
+        value, u_lines, chi_square = _mean(shares, total, u_shares)
     lean = float(np.mean(leans))
     parts = {
         "lines": u_lines,
@@ -193,12 +193,13 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
     )
 
 
-def _mean(values: Array, u: Array) -> tuple[float, float, float]:
-    """Return the weighted mean, its standard uncertainty, for which u of the values is partly believed, and χ²."""
+def _mean(values: Array, u: Array, independent: Array) -> tuple[float, float, float]:
+    """Return the mean weighted by u, its standard uncertainty from the independent part, partly believed, and χ²."""
     weight = 1 / u**2
     mean = float(np.average(values, weights=weight))
     chi_square = float(np.sum(weight * (values - mean) ** 2))
-    return mean, partly_believed(chi_square, values.size - 1) / math.sqrt(float(np.sum(weight))), chi_square
+    own = float(np.linalg.norm(weight * independent) / np.sum(weight))
+    return mean, partly_believed(chi_square, values.size - 1) * own, chi_square
 
 
 def _assigned(swings: Sequence[Swings], spin: Array, known: Known) -> tuple[Sequence[Swings], Array]:
@@ -317,7 +318,8 @@ def _precession(swings: Sequence[Swings], spin: Array, half: Array, known: Known
     alpha, u = 2 * np.pi * np.array([(swings[k].frequency[2], swings[k].u[2]) for k in seen]).T
     turning = top.axial * 2 * np.pi * spin[seen]
     p = top.mass * top.gravity**2 / (4 * (alpha**2 + half[seen])) + turning * alpha - top.transverse * alpha**2
-    mean, u_mean, _ = _mean(p, (turning - 2 * top.transverse * alpha) * u)
+    u_p = (turning - 2 * top.transverse * alpha) * u
+    mean, u_mean, _ = _mean(p, u_p, u_p)
     value = top.mass * top.gravity / (2 * mean)
     parts = (
         u_mean / mean,

@@ -156,7 +156,9 @@ def fit_together(swings: Sequence[Swings], spin: Array, heights: Array, known: K
     end = least_squares(residuals, np.zeros(count + len(swings)), jac=slopes_at, x_scale="jac")
     jacobian = np.asarray(end.jac, dtype=np.float64)
     freedom = end.fun.size - end.x.size
-    covariance = np.linalg.pinv(jacobian.T @ jacobian) * partly_believed(float(2 * end.cost), freedom) ** 2
+    # The doubt of each split, times √n, makes χ² small, which says nothing about the lines or the priors
+    scale = max(partly_believed(float(2 * end.cost), freedom), 1.0)
+    covariance = np.linalg.pinv(jacobian.T @ jacobian) * scale**2
     here, mean = suited(end.x), float(np.mean(heights + _STEP_M * end.x[count:]))
     u = np.sqrt(np.diagonal(covariance))
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 #: Frames per second, error of a coordinate [m], and length of the film [s].
 RATE, NOISE_M, DURATION_S = 120.0, 1e-4, 110.0
-#: The mass is weighed to this [kg].
-_WEIGHED_U_KG = 1e-5
+#: Standard uncertainties of the mass by scales [kg], and of the radii of the base by a calliper [m].
+_WEIGHED_U_KG, _CALLIPER_U_M = 1e-5, 1e-4
 
 
 def draw_scene(seed: int) -> Scene:
@@ -43,19 +43,25 @@ def draw_scene(seed: int) -> Scene:
 
 
 def trial(seed: int, folder: Path) -> list[Pull]:
-    """Try one film of a drawn top.  The truth is (I₃ω₃/m)(B′/2B)² where a top of its mass floats at rest."""
+    """Try one film of a drawn top.
+
+    True are (I₃ω₃/m)(B′/2B)² where a top of its mass floats at rest, and all of the spin's angular momentum.
+    """
     scene = draw_scene(seed)
     place = stability_of(scene).floating
     assert place is not None
     motion = simulate(scene, DURATION_S, rate=RATE, tolerance=1e-5)
-    noise = NOISE_M * np.random.default_rng((seed, 24)).standard_normal((len(motion.time), 2))
+    by = np.random.default_rng((seed, 24))
+    noise = NOISE_M * by.standard_normal((len(motion.time), 2))
     table = np.column_stack([motion.time, motion.position[:, :2] + noise, motion.spin_hz])[:-1]
     track, device = folder / "track.csv", folder / "device.toml"
     np.savetxt(track, table, "%.6f", ",", header="time_s,x_m,y_m,spin_frequency_hz", comments="")
     top, base = scene.top, scene.base
+    weighed = by.normal(top.mass_kg, _WEIGHED_U_KG)
+    inner, outer = by.normal((base.inner_radius_m, base.outer_radius_m), _CALLIPER_U_M).tolist()
     device.write_text(
-        f"[base]\ninner_radius_m = {base.inner_radius_m}\nouter_radius_m = {base.outer_radius_m}\n[top]\n"
-        f"mass_kg = {top.mass_kg}\nmass_u_kg = {_WEIGHED_U_KG}\n"
+        f"[base]\ninner_radius_m = {inner}\ninner_radius_u_m = {_CALLIPER_U_M}\nouter_radius_m = {outer}\n"
+        f"outer_radius_u_m = {_CALLIPER_U_M}\n[top]\nmass_kg = {weighed}\nmass_u_kg = {_WEIGHED_U_KG}\n"
         f"inertia_transverse_kg_m2 = {top.inertia_transverse_kg_m2}\ninertia_axial_kg_m2 = {top.inertia_axial_kg_m2}\n",
         encoding="utf-8",
     )
@@ -63,7 +69,10 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     (found,) = analysis.analyze([track], analysis.options_from({"device": read_device(device)})).runs
     b, slope, _ = stability_of(scene).field(np.array([place.height]))[:, 0]
     truth = top.inertia_axial_kg_m2 / top.mass_kg * float(slope / (2 * b)) ** 2 * found.geometry.spin
-    return [pull_of("geometric magnetism", found.geometry.measured, truth)]
+    return [
+        pull_of("geometric magnetism", found.geometry.measured, truth),
+        pull_of("joint ratio", found.geometry.joint.ratio, 1.0),
+    ]
 
 
 SUBJECT = Subject(

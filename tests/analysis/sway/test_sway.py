@@ -198,6 +198,8 @@ def test_the_roots_of_the_quartic_give_back_its_gradient():
     assert found.ratio.value == pytest.approx(1, abs=2e-4)
     assert found.joint.ratio.value == pytest.approx(1, abs=2e-4)
     assert found.joint.gradient.value == pytest.approx(abs(slope / (2 * b)), rel=1e-5)
+    weighed = geometric_magnetism(seen, spins, replace(known(0.02526), mass_u=1e-5))
+    assert weighed.joint.mass.u == pytest.approx(1e-5, rel=0.01)  # two lines a window say nothing about the mass
 
 
 @pytest.mark.parametrize("axial", [1.70e-6, 1.731314e-6])
@@ -222,6 +224,7 @@ def test_the_shift_by_the_size_of_the_swings_is_in_u_by_its_part():
     assert shift > 5e-4
     part = np.hypot(0.035, 0.05 * 2**2)  # of both swings' squares in mm²
     assert found.parts["amplitude"] == pytest.approx(part * shift, rel=0.1)  # Ω_g is the split but for some percent
+    assert found.parts["lines"] == pytest.approx(found.u_shares[0])  # it is not in the part of the lines, too
 
 
 @pytest.mark.slow
