@@ -2,6 +2,7 @@
 
 import {command, connect, read, takeToken} from "./connection.js";
 import {takeDrops} from "./drop.js";
+import {drawHistory, openHistory} from "./history.js";
 import {drawReadings, drawRecords, saidOf, sheet} from "./plot.js";
 import {openPractice, watchPractice} from "./practice.js";
 import {between, by, fixed, lapse, make, option, short, typeset, write} from "./words.js";
@@ -31,9 +32,10 @@ const token = takeToken();
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, source: null, records: {}};
 const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
+const history = openHistory();
 let paused = false, drawn = null, pointed = -1, space = null, topOf = "", wanted = "", practice = null, reachable = true;
 let spoken = 0, close = null, dirty = {plot: true, trace: true};
-window.levilab = {frames: 0, drawn: 0, seen, data};  // what tests and benchmarks read
+window.levilab = {frames: 0, drawn: 0, seen, data, history};  // what tests and benchmarks read
 
 // --- frames ---
 
@@ -51,6 +53,7 @@ function take(head) {
     dirty.trace = true;
   }
   data.bench = head.bench;
+  if (data.bench && !data.bench.silent && history.add(data.bench) && isOfMinutes()) dirty.plot = true;
   let follows = false;
   for (const one of head.said) {
     seen.said = one.n;
@@ -80,6 +83,7 @@ function turnTo(run) {
   Object.assign(data, {readings: null, fit: null, about: null, ended: "", end: null, last: {}, count: 0, trend: NaN});
   by("event-list").replaceChildren();
   by("events-key").hidden = true;
+  if (by("drawn").value === "minutes") by("drawn").value = "all";
   pointed = -1;
   dirty = {plot: true, trace: true};
   if (by("run").value !== run && run) listRuns(run);
@@ -209,9 +213,12 @@ function show() {
   showMagnetometer(bench, last);
   showFacts(about);
   document.body.classList.toggle("no-scope", !data.records.size && !practice && Boolean(about) && about.status !== "running");
-  write("count", data.count ? `${data.count.toLocaleString("en").replaceAll(",", "\u202f")}${data.readings?.single === false ? ", each stroke from the lowest to the highest of many" : ""}` : "");
-  by("fit-head").hidden = by("fit-lines").hidden = !data.count;
-  by("empty").hidden = data.count > 0;
+  write("count", isOfMinutes() ? "the spin as it is counted, and the drive" : data.count ? `${data.count.toLocaleString("en").replaceAll(",", "\u202f")}${data.readings?.single === false ? ", each stroke from the lowest to the highest of many" : ""}` : "");
+  by("fit-head").parentElement.hidden = !data.count || isOfMinutes();
+  const minutes = isOfMinutes();
+  by("empty").hidden = data.count > 0 || minutes;
+  by("drawn").parentElement.hidden = !data.count;
+  write("readings-title", minutes ? "The last minutes" : "Readings");
   write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: practice?.guest ? "No run yet: it appears here once one is recorded." : "No run yet: the guide says how to record one.", setup: "The bench is being set up."}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
   document.title = `${state === "running" && data.count ? `${data.count} readings · ` : ""}levilab live`;
   practice?.show(bench, about, data.count, down);
@@ -351,12 +358,18 @@ function speak(state, left) {
   }
 }
 
+/** Whether the last minutes of the bench are drawn: where a person wants them, and before the first reading. */
+const isOfMinutes = () => history.rows.length > 0 && Boolean(data.bench) && (by("drawn").value === "minutes" || !data.count);
+
 function draw() {
   requestAnimationFrame(draw);
   if (document.hidden) return;
   if (dirty.plot) {
     dirty.plot = false;
-    if (data.readings) {
+    if (isOfMinutes()) {
+      by("plot").setAttribute("aria-label", drawHistory(papers.plot, history));
+      drawn = null;
+    } else if (data.readings) {
       drawn = drawReadings(papers.plot, {...data.readings, fit: data.fit}, pointed);
       const said = `${data.count} readings of the ${data.readings.yAxis[0]} against ${data.readings.xAxis[0]}`;
       by("plot").setAttribute("aria-label", pointed >= 0 ? `${said}: ${saidOf({...data.readings, fit: data.fit}, drawn, pointed)}` : `${said}; the arrow keys go from one to the next`);
@@ -424,7 +437,10 @@ function pause() {
 }
 by("pause").addEventListener("click", pause);
 by("help").addEventListener("click", () => by("keys").showModal());
-by("latest").addEventListener("change", () => { seen.readings = seen.tick = -1; });
+by("drawn").addEventListener("change", () => {
+  seen.readings = seen.tick = pointed = -1;
+  dirty.plot = true;
+});
 by("motion").addEventListener("change", () => space?.setRate?.(Number(by("motion").value)));
 by("own").addEventListener("click", () => {
   open(wanted = OWN_BENCH);
@@ -433,7 +449,7 @@ by("own").addEventListener("click", () => {
 });
 by("run").addEventListener("change", () => {
   wanted = by("run").value;
-  history.replaceState(null, "", wanted && !practice ? `?run=${encodeURIComponent(wanted)}` : location.pathname);
+  window.history.replaceState(null, "", wanted && !practice ? `?run=${encodeURIComponent(wanted)}` : location.pathname);
   open(wanted);
 });
 
@@ -462,7 +478,7 @@ document.addEventListener("keydown", (event) => {
 
 function ask() {
   const columns = Math.max(1, Math.round(by("plot").clientWidth - 70));
-  const about = {...seen, columns, latest: by("latest").checked};
+  const about = {...seen, columns, latest: by("drawn").value === "latest"};
   return paused ? {run: seen.run, tick: seen.tick, readings: seen.readings, events: seen.events, fit: seen.fit, poses: seen.poses, said: seen.said} : about;
 }
 

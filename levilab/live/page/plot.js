@@ -42,7 +42,8 @@ export function ticks(low, high, count) {
   return found;
 }
 
-const decimals = (marks) => marks.length < 2 ? 2 : Math.max(0, Math.min(6, -Math.floor(Math.log10(marks[1] - marks[0]) + 1e-9)));
+/** How many decimals the numbers at an axis need. */
+export const decimals = (marks) => marks.length < 2 ? 2 : Math.max(0, Math.min(6, -Math.floor(Math.log10(marks[1] - marks[0]) + 1e-9)));
 
 /** The least and the greatest of all values, [0, 0] without any. */
 function range(arrays) {
@@ -57,7 +58,7 @@ function range(arrays) {
 }
 
 /** That range, and beyond it so large a share of it. */
-function extent(arrays, share) {
+export function extent(arrays, share) {
   const [low, high] = range(arrays);
   const more = share * (high - low) || Math.abs(high) * 1e-3 || 1;
   return [low - more, high + more];
@@ -222,7 +223,7 @@ function nearest(x, toX, px) {
 
 const named = ([label, unit]) => unit ? `${label} [${unit}]` : label;
 
-function upright(c, text, x, y) {
+export function upright(c, text, x, y) {
   c.save();
   c.translate(x, y);
   c.rotate(-Math.PI / 2);
@@ -231,7 +232,7 @@ function upright(c, text, x, y) {
   c.restore();
 }
 
-function line(c, pieces) {
+export function line(c, pieces) {
   c.beginPath();
   for (const [x0, y0, x1, y1] of pieces) {
     c.moveTo(x0, y0);

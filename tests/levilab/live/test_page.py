@@ -258,6 +258,32 @@ def test_what_the_bench_publishes_is_drawn(served: Hall, page: Page, tmp_path: P
     assert until(page, f"{SAID}.includes('tape from 0 to 0 volts, laser from') && {SAID}").count("before the fall") == 1
 
 
+def test_the_last_minutes_of_the_bench_are_drawn_before_the_first_reading(
+    served: Hall, page: Page, tmp_path: Path
+) -> None:
+    """Without a drive, with one, without light pulses; then only where a person wants them."""
+    run = GrowingRun(tmp_path)
+    watch = served.watches
+    with run.running():
+        page.goto(address(served, run.folder.name))
+        until(page, "levilab.frames > 0")
+        for time, spin, drive in ((1.0, 31.0, False), (2.0, 30.9, False), (3.0, 30.8, True), (200.0, None, True)):
+            last = {} if spin is None else {"spin_frequency_hz": spin}
+            publish(watch[run.folder.name], State(time, last=last, drive=Drive("SIN", 30.75, 10.0, output=drive)))
+            until(page, f"levilab.history.rows.at(-1)?.[0] === {time}")
+            if spin:
+                said = f"top at {spin:.2f} hertz" + ", drive at 30.75 hertz" * drive
+                until(page, f"document.getElementById('plot').getAttribute('aria-label').endsWith(': {said}')")
+        assert page.evaluate("levilab.history.rows.length") == 1  # of the last three minutes
+        assert page.inner_text("#readings-title") == "The last minutes"
+        assert not page.locator("#empty").is_visible()
+        run.readings(spin_down(3))
+        until(page, "levilab.data.count === 3 && document.getElementById('readings-title').textContent === 'Readings'")
+        page.select_option("#drawn", "minutes")
+        until(page, "document.getElementById('readings-title').textContent === 'The last minutes'")
+        until(page, "document.getElementById('plot').getAttribute('aria-label').startsWith('the last ')")
+
+
 def test_a_million_readings_are_drawn_from_a_few_thousand_numbers(served: Hall, page: Page, tmp_path: Path) -> None:
     run = GrowingRun(tmp_path)
     n = 1_000_000

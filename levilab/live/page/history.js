@@ -1,0 +1,142 @@
+// The last minutes of a bench, run or no run: the spin as it is counted, the drive, and their difference.
+
+import {decimals, extent, line, ticks, upright} from "./plot.js";
+import {colours, fixed, lapse} from "./words.js";
+
+/** The time that is shown, at most and at least [s of bench time]: a free top is down 90 s after it was put up. */
+const SHOWN_S = 180, LEAST_S = 60;
+/** A value that stays is noted again after this time [s]. */
+const NOTED_S = 1;
+/** The least height of the plot, and of that of the difference about zero [Hz]. */
+const LEAST_HZ = 2, LEAST_OFF_HZ = 0.2;
+const LEFT = 58, RIGHT = 84, TOP = 10, BOTTOM = 34, GAP = 24;
+
+/** The values of the last minutes, each [time, spin, drive]; NaN where no top is counted, or the drive is off. */
+export function openHistory() {
+  let rows = [], marks = [];
+  return {
+    get rows() { return rows; },
+    get marks() { return marks; },
+
+    /** Take in a state of the bench.  Returns whether the chart has changed. */
+    add(bench) {
+      const now = bench.time_s, last = rows.at(-1);
+      if (last && now < last[0]) [rows, marks] = [[], []];  // another bench
+      const spin = bench.last.spin_frequency_hz ?? bench.last.spin_seen_hz ?? NaN;
+      const drive = bench.drive?.output ? bench.drive.frequency_hz : NaN;
+      if (last && Object.is(last[1], spin) && Object.is(last[2], drive) && now - last[0] < NOTED_S) return false;
+      rows.push([now, spin, drive]);
+      while (rows[0][0] < now - SHOWN_S) rows.shift();
+      marks = marks.filter(([time]) => time >= now - SHOWN_S);
+      return true;
+    },
+
+    /** Mark what happened at a time. */
+    mark(time, text) { marks.push([time, text]); },
+  };
+}
+
+/**
+ * Draw the last minutes: spin and drive, and below them their difference while the drive was on.
+ *
+ * @returns the same as text.
+ */
+export function drawHistory(paper, {rows, marks}) {
+  const paint = colours(), {context: c} = paper;
+  const [width, height] = paper.fit();
+  const now = rows.at(-1)[0], shown = Math.min(Math.max(now - rows[0][0], LEAST_S), SHOWN_S);
+  const differences = rows.map(([, spin, drive]) => spin - drive);
+  const known = (values) => values.filter(Number.isFinite);
+  const driven = known(rows.map((row) => row[2])).length > 0;
+  const bottom = height - BOTTOM, below = driven ? Math.max(44, 0.26 * (bottom - TOP)) : 0;
+  const split = bottom - (driven ? below + GAP : 0);
+
+  const ys = atLeast(extent([known(rows.flatMap(([, spin, drive]) => [spin, drive]))], 0.08), LEAST_HZ);
+  const reach = Math.max(LEAST_OFF_HZ, Math.min(2, 1.15 * Math.max(0, ...known(differences).map(Math.abs))));
+  const toX = (time) => width - RIGHT + (time - now) / shown * (width - LEFT - RIGHT);
+  const toY = (value) => split - (value - ys[0]) / (ys[1] - ys[0]) * (split - TOP);
+  const middle = bottom - below / 2, toOff = (value) => middle - value / reach * below / 2;
+
+  c.lineWidth = 1;
+  c.fillStyle = paint.soft;
+  c.strokeStyle = paint.grid;
+  c.textBaseline = "middle";
+  const each = (shown > 90 ? 30 : 15) * (width < 420 ? 2 : 1), times = Array.from({length: Math.floor(shown / each) + 1}, (_, k) => -each * k);
+  const yMarks = ticks(...ys, split / 46);
+  for (const [from, to] of driven ? [[TOP, split], [bottom - below, bottom]] : [[TOP, bottom]]) {
+    line(c, times.map((time) => [toX(now + time), from, toX(now + time), to]));
+  }
+  line(c, yMarks.map((mark) => [LEFT, toY(mark), width - RIGHT, toY(mark)]));
+  c.textAlign = "right";
+  for (const mark of yMarks) c.fillText(fixed(mark, decimals(yMarks)), LEFT - 7, toY(mark));
+  c.textAlign = "center";
+  for (const time of times) c.fillText(time ? lapse(time).replace(" min", "") : "now", toX(now + time), bottom + 11);
+  c.fillText("bench time before now", (LEFT + width - RIGHT) / 2, height - 8);
+  upright(c, "frequency [Hz]", 11, (TOP + split) / 2);
+  c.strokeStyle = paint.line;
+  c.strokeRect(LEFT + 0.5, TOP + 0.5, width - LEFT - RIGHT - 1, split - TOP - 1);
+  if (driven) {
+    c.strokeRect(LEFT + 0.5, bottom - below + 0.5, width - LEFT - RIGHT - 1, below - 1);
+    c.strokeStyle = paint.soft;
+    line(c, [[LEFT, middle, width - RIGHT, middle]]);
+    c.textAlign = "right";
+    for (const mark of [-reach, 0, reach]) c.fillText(fixed(0.8 * mark, 2), LEFT - 7, toOff(0.8 * mark));
+    c.textAlign = "left";
+    c.fillText("top − drive [Hz]", LEFT, bottom - below - 11);
+  }
+
+  c.save();
+  c.beginPath();
+  c.rect(LEFT, 0, width - LEFT - RIGHT, bottom);
+  c.clip();
+  course(c, rows, (row) => row[2], toX, toY, paint.newton, 3.5);
+  course(c, rows, (row) => row[1], toX, toY, paint.reading, 1.8);
+  if (driven) course(c, rows, (row) => Math.max(-reach, Math.min(reach, row[1] - row[2])), toX, toOff, paint.stokes, 1.6);
+  c.strokeStyle = c.fillStyle = paint.bad;
+  c.lineWidth = 1;
+  c.setLineDash([3, 3]);
+  line(c, marks.map(([time]) => [toX(time), TOP, toX(time), bottom]));
+  c.setLineDash([]);
+  for (const [time, text] of marks) {
+    const right = toX(time) > width / 2;
+    c.textAlign = right ? "right" : "left";
+    c.fillText(text, toX(time) + (right ? -5 : 5), TOP + 10);
+  }
+  c.restore();
+
+  // what each line is stands at its end
+  c.textAlign = "left";
+  const [, spin, drive] = rows.at(-1), ends = [["top", spin, paint.reading], ["drive", drive, paint.newton]].filter((one) => Number.isFinite(one[1]));
+  const [one, two] = ends.map(([, value]) => toY(value));
+  const apart = two === undefined || Math.abs(one - two) >= 15 ? 0 : (15 - Math.abs(one - two)) / 2 * (one <= two ? -1 : 1);
+  ends.forEach(([name, value, colour], k) => {
+    c.fillStyle = colour;
+    c.fillText(`${name} ${value.toFixed(2)}`, width - RIGHT + 6, Math.min(Math.max(toY(value) + (k ? -apart : apart), TOP + 6), split - 6));
+  });
+  const said = ends.map(([name, value]) => `${name} at ${value.toFixed(2)} hertz`).join(", ") || "no top is counted";
+  return `the last ${lapse(now - rows[0][0])} of the bench: ${said}`;
+}
+
+/** Widen a range about its middle to a least width. */
+function atLeast([low, high], width) {
+  const more = Math.max(0, width - (high - low)) / 2;
+  return [low - more, high + more];
+}
+
+/** Draw a value over the time, with gaps where there is none. */
+function course(c, rows, value, toX, toY, colour, width) {
+  c.strokeStyle = c.fillStyle = colour;
+  c.lineWidth = width;
+  c.lineJoin = "round";
+  c.beginPath();
+  let before = NaN;
+  for (const row of rows) {
+    const now = value(row);
+    if (Number.isFinite(now)) {
+      if (!Number.isFinite(before)) c.moveTo(toX(row[0]) - 1, toY(now));  // a single value is a dash
+      c.lineTo(toX(row[0]), toY(now));
+    }
+    before = now;
+  }
+  c.stroke();
+}
