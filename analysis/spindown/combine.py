@@ -15,6 +15,7 @@ from analysis.errors import AnalysisError
 from analysis.residuals import durbin_watson, runs_test_p
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown, comparison_remarks, correlation_remarks
+from analysis.spindown.joint import JointExponent, joint_exponent
 from analysis.spindown.lawfit import LawFit
 from analysis.spindown.remarks import Remark
 from analysis.spindown.selection import NO_FIT, Statistics, statistics, weigh
@@ -109,7 +110,8 @@ def combine(runs: Sequence[SpinDown]) -> Combined:
     names = [name for name in LAWS if runs and all(name in _names(run) for run in runs)]
     if not names:
         raise NothingToCombine(runs=len(runs))
-    weighed, criterion = weigh({name: _statistics(runs, name) for name in names})
+    joint = joint_exponent(runs)
+    weighed, criterion = weigh({name: _statistics(runs, name, joint) for name in names})
     correlation, tilt = _correlation(runs), _tilt(runs, next(iter(weighed)))
     fits = tuple(_combine_law(name, [run.fit(name) for run in runs], weighed[name]) for name in names)
     changes = tuple(1.0 if run.verdict.change is None else run.verdict.change.p for run in runs)
@@ -164,7 +166,7 @@ def _names(run: SpinDown) -> set[str]:
     return {fit.name for fit in run.fits}
 
 
-def _statistics(runs: Sequence[SpinDown], name: str) -> Statistics:
+def _statistics(runs: Sequence[SpinDown], name: str, joint: JointExponent | None) -> Statistics:
     fits = [run.fit(name) for run in runs]
     known = [fit.statistics.chi_square for fit in fits if fit.statistics.chi_square is not None]
     all_known = len(known) == len(fits)
@@ -172,30 +174,20 @@ def _statistics(runs: Sequence[SpinDown], name: str) -> Statistics:
         fit.residuals / run.u if all_known and run.u is not None else fit.residuals
         for run, fit in zip(runs, fits, strict=True)
     ]
-    spared, more = _common_exponent(fits)
+    separate, spared = sum(fit.statistics.misfit for fit in fits), 0
+    if joint is not None:
+        separate = joint.misfit if name == "power" else joint.misfit_of(separate)
+        spared = len(fits) - 1 if name == "power" else 0
     return statistics(
         n=sum(fit.statistics.n for fit in fits),
         n_parameters=sum(fit.statistics.n_parameters for fit in fits) - spared,
         rss=sum(fit.statistics.rss for fit in fits),
         chi_square=sum(known) if all_known else None,
-        misfit=sum(fit.statistics.misfit for fit in fits) + more,
+        misfit=separate,
         durbin_watson=durbin_watson(*series),
         runs_test_p=runs_test_p(*series),
         runs=len(fits),
     )
-
-
-def _common_exponent(fits: Sequence[LawFit]) -> tuple[int, float]:
-    """Return the parameters that one exponent for all runs spares, and the growth of the misfit that it costs.
-
-    Near its minimum each misfit is a parabola in the exponent.  With one exponent for all, their mean weighted by 1/u²,
-    they grow by Cochran's Q.
-    """
-    exponents = [each for fit in fits if (each := fit.parameters.get("exponent"))]
-    seen = [(each.value, each.u) for each in exponents if each.value is not None and each.u]
-    if len(fits) < 2 or len(seen) < len(fits):
-        return 0, 0.0
-    return len(fits) - 1, _cochran(*np.array(seen).T)
 
 
 def _cochran(values: Array, u: Array) -> float:

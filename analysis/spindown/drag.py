@@ -221,22 +221,21 @@ def _fraction(x: float) -> Fraction:
 _LOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
-def _of_power(name: str, exponent: str, torque: str) -> DragLaw:
+def power_law(name: str, n: Fraction, torque: str = "") -> DragLaw:
     """Return the law ω̇ = −C ωⁿ, with its constant's name, unit and symbol.
 
     Args:
         name: of the law.
-        exponent: n, as "3/2".
+        n: its exponent.
         torque: see `DragLaw`.
     """
-    n = Fraction(exponent)
     m = float(n - 1)
     units = {Fraction(1): "1/s", Fraction(2): "1/rad"}
     return DragLaw(
         name=name,
-        constants=(f"c{exponent.replace('/', '')}",),
+        constants=(f"c{n}".replace("/", ""),),
         units=(units.get(n, f"(rad/s)^{1 - n}/s"),),
-        symbols=(f"C{exponent.translate(_LOW)}",),
+        symbols=(f"C{n}".translate(_LOW),),
         orders=(m,),
         torque=torque,
         spin=partial(_power, m=m),
@@ -247,9 +246,11 @@ def _of_power(name: str, exponent: str, torque: str) -> DragLaw:
 
 #: One row a law.  Everything that names, shows, nests or explains laws is made from these rows.
 _TABLE = (
-    _of_power("stokes", "1", "the spin, as of eddy currents, or of air that creeps"),
-    _of_power("newton", "2", "the square of the spin, as of air that is stirred up"),
-    _of_power("disc", "3/2", "the spin to the power 3/2, as of the laminar layer of air on a disc (von Kármán, 1921)"),
+    power_law("stokes", Fraction(1), "the spin, as of eddy currents, or of air that creeps"),
+    power_law("newton", Fraction(2), "the square of the spin, as of air that is stirred up"),
+    power_law(
+        "disc", Fraction(3, 2), "the spin to the power 3/2, as of the laminar layer of air on a disc (von Kármán, 1921)"
+    ),
     DragLaw(
         name="mixed",
         constants=("c1", "c2"),

@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import AnalysisError
 from analysis.residuals import Change, gross_errors, gross_limit, largest_change
-from analysis.spindown.drag import LAWS
+from analysis.spindown.drag import LAWS, DragLaw, power_law
 from analysis.spindown.lawfit import LawFit, Solution, fit_law, solution
 from analysis.spindown.posterior import INDEPENDENT, RHO
 from analysis.spindown.readings import Readings, check_readings
@@ -33,6 +34,25 @@ class UnknownName(AnalysisError):
         super().__init__(f"no {kind} is called {seen!r}: choose from {', '.join(self.known)}")
 
 
+@dataclass(frozen=True)
+class CountModel:
+    """Assumptions about the count, for every law alike.
+
+    Attributes:
+        tilt: whether the count has the tilt of the top.
+        top: the top that is counted.
+        nutation: as expected.
+    """
+
+    tilt: bool
+    top: Top
+    nutation: Nutation
+
+    def fit(self, law: DragLaw, readings: Readings, rho: Array = RHO) -> Solution:
+        """Return the best point of one law."""
+        return solution(law, readings, tilt=self.tilt, top=self.top, nutation=self.nutation, rho=rho)
+
+
 @dataclass(frozen=True, eq=False)
 class SpinDown:
     """All laws fitted to one run.
@@ -47,6 +67,7 @@ class SpinDown:
         outliers: indices, among the readings given, of those that do not belong.
         start_time: time of the first reading [s].
         remarks: what to know before using the numbers.
+        model: of the count.
         correlation: of neighbouring readings' noise, about the best law; None where it is undefined.
     """
 
@@ -59,6 +80,7 @@ class SpinDown:
     outliers: tuple[int, ...]
     start_time: float
     remarks: tuple[Remark, ...]
+    model: CountModel
     correlation: Estimate | None = None
 
     @property
@@ -75,24 +97,17 @@ class SpinDown:
         """Return the fit of one law."""
         return next(fit for fit in self.fits if fit.name == name)
 
+    def misfit(self, exponent: float) -> float:
+        """Return −2 ln of the greatest likelihood of a power law with this exponent, see `Statistics.misfit`."""
+        law = power_law("", Fraction(exponent))
+        return self.model.fit(law, check_readings(self.time, self.frequency, self.u)).statistics.misfit
+
 
 def is_correlated(correlation: Estimate | None) -> bool:
     """Return whether readings show a correlation of their noise: it is worth a remark, and in every u anyway."""
     if correlation is None or correlation.value is None or correlation.u is None:
         return False
     return correlation.value > 2 * correlation.u
-
-
-@dataclass(frozen=True)
-class _Model:
-    """What is assumed of the count."""
-
-    tilt: bool
-    top: Top
-    nutation: Nutation
-
-    def fit(self, law: str, readings: Readings, rho: Array = RHO) -> Solution:
-        return solution(LAWS[law], readings, tilt=self.tilt, top=self.top, nutation=self.nutation, rho=rho)
 
 
 def fit_spin_down(
@@ -136,11 +151,11 @@ def fit_spin_down(
     """
     chosen = _check_names("drag law", laws, LAWS)
     given = check_readings(time, spin_frequency, u)
-    model = _Model(tilt, top, DRIVEN if driven else CALM)
+    model = CountModel(tilt, top, DRIVEN if driven else CALM)
     outliers = _search_outliers(given, model)
     while True:
         readings = given if keep_outliers or not len(outliers) else given.without(outliers)
-        found = {name: model.fit(name, readings) for name in chosen}
+        found = {name: model.fit(LAWS[name], readings) for name in chosen}
         stats, criterion = weigh({name: each.statistics for name, each in found.items()})
         fits = {name: fit_law(each, gate) for name, each in found.items()}
         best = next(iter(stats))
@@ -164,6 +179,7 @@ def fit_spin_down(
             *comparison_remarks(stats, best),
             *correlation_remarks(fits[best].rho, len(readings)),
         ),
+        model=model,
         correlation=fits[best].rho,
     )
 
@@ -203,7 +219,7 @@ def _check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> tuple
     return seen
 
 
-def _search_outliers(readings: Readings, model: _Model) -> NDArray[np.intp]:
+def _search_outliers(readings: Readings, model: CountModel) -> NDArray[np.intp]:
     """Return readings that lie too far from a power law fitted to the others, at most a tenth beside the miscounts.
 
     The worst goes first, then all is fitted again: one at a time, or a hundredth of very many.  The noise counts as
@@ -216,7 +232,7 @@ def _search_outliers(readings: Readings, model: _Model) -> NDArray[np.intp]:
     allowed = len(left_out) + max(1, n // 10)
     while True:
         kept = np.delete(np.arange(n), left_out)
-        found = model.fit("power", readings.without(left_out) if len(left_out) else readings, INDEPENDENT)
+        found = model.fit(LAWS["power"], readings.without(left_out) if len(left_out) else readings, INDEPENDENT)
         most = min(allowed - len(left_out), max(1, n // 100))
         floor = 1.0 if readings.sigma_known else ROUNDING  # a stated uncertainty is a scatter to be expected
         worst = gross_errors(found.studentise(floor), len(found.law.parameters))[:most]

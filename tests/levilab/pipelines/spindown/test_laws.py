@@ -24,7 +24,7 @@ TURBULENT = """
 import sys
 from types import MappingProxyType
 from analysis.spindown import drag
-row = drag._of_power("turbulent", "9/5", "the spin to the power 9/5, as of turbulent air")
+row = drag.power_law("turbulent", drag.Fraction(9, 5), "the spin to the power 9/5, as of turbulent air")
 drag.LAWS = MappingProxyType({**drag.LAWS, row.name: row})
 """
 #: Several commands in one process, which shares imports and kernels; no test looks at the trials of this report.
