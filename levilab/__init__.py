@@ -42,6 +42,7 @@ def acquire(
     out: str | PathLike[str] = "runs",
     seed: int | None = None,
     scene: str | PathLike[str] | None = None,
+    group: str = "",
     note: str = "",
     temperature: float | str | None = None,
     washers: str | None = None,
@@ -66,6 +67,7 @@ def acquire(
         out: folder in which the run folder is made.
         seed: makes a virtual run repeatable.
         scene: with `mock`, a top in full motion: the name of a scene, such as "spindown", or its TOML file.
+        group: who measures, as "Group 7": the name of the run in tables and figures.
         note: kept with the run.
         temperature: of the magnets [°C], or with its unit: "70 F"; kept with the run.
         washers: on the top, as "0.06+0.1 g"; kept with the run.
@@ -97,6 +99,7 @@ def acquire(
         out=Path(out),
         seed=seed,
         scene=None if scene is None else str(scene),
+        group=group,
         note=note,
         temperature=None if temperature is None else str(temperature),
         washers=washers,

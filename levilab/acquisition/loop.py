@@ -51,7 +51,7 @@ class AcquisitionRequest:
         world: of a virtual bench, if its top only spins.
         scene: of the full motion, as a table.
         seed: of what is drawn by chance on a virtual bench.
-        note: kept with the run.
+        group, note: kept with the run.
         temperature_c: of the magnets [°C]; None: not known.
         washers_kg: on the top [kg]; None: not known.
         wire_log: whether all bytes on the wire are kept.
@@ -67,6 +67,7 @@ class AcquisitionRequest:
     world: Literal["spin"] | None = None
     scene: dict[str, Any] | None = None
     seed: int | None = None
+    group: str = ""
     note: str = ""
     temperature_c: float | None = None
     washers_kg: tuple[float, ...] | None = None
@@ -219,6 +220,7 @@ def _record(request: AcquisitionRequest) -> RunRecord:
         | ({"named": dict(request.named)} if request.named else {}),
         software=software_versions(),
         seed=request.seed,
+        group=request.group,
         note=request.note,
         temperature_c=request.temperature_c,
         washers_kg=request.washers_kg,

@@ -70,6 +70,7 @@ class AcquisitionOptions:
         out: the folder in which the run folder is made.
         seed: makes a virtual run repeatable.
         scene: with mock, the name or file of a scene in full motion; by default the top only spins.
+        group: who measures, as "Group 7"; kept with the run, which tables and figures then call so.
         note: kept with the run.
         temperature, washers: of the magnets and on the top, as a person types them; kept with the run.
         realtime: keeps the virtual bench to the wall clock.
@@ -87,6 +88,7 @@ class AcquisitionOptions:
     out: Path = Path("runs")
     seed: int | None = None
     scene: str | None = None
+    group: str = ""
     note: str = ""
     temperature: str | None = None
     washers: str | None = None
@@ -117,6 +119,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
         config,
         lambda: described_wiring(config, options.person),
         out=options.out,
+        group=_group(options.group),
         note=options.note,
         temperature_c=_typed("temperature", options.temperature, read_temperature),
         washers_kg=_typed("washers", options.washers, read_masses),
@@ -153,7 +156,7 @@ def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: boo
     for name in ("seed", "scene"):
         if getattr(options, name) is not None and (run or not options.mock):
             raise UsageError(name, f"goes with `mock`, and not with `resume`: a run keeps its {name}")
-    for name in ("settings", "temperature", "washers"):
+    for name in ("settings", "group", "temperature", "washers"):
         if getattr(options, name) and run:
             raise UsageError(name, f"goes with a new run: a resumed run keeps its {name}")
     if options.realtime and not virtual:
@@ -165,6 +168,18 @@ def _typed(name: str, text: str | None, read: Callable[[str], T]) -> T | None:
         return None if text is None else read(text)
     except ValueError as error:
         raise UsageError(name, str(error), value=text) from error
+
+
+#: Letters of the name of a group, so that it has room in tables and figures.
+_LONGEST_GROUP = 24
+
+
+def _group(typed: str) -> str:
+    """Return the name of a group.  Raises UsageError."""
+    group = " ".join(typed.split())
+    if len(group) > _LONGEST_GROUP or not group.isprintable():
+        raise UsageError("group", f"a name of at most {_LONGEST_GROUP} letters is expected, as Group 7", value=typed)
+    return group
 
 
 def _configuration(
@@ -403,7 +418,7 @@ def request_at(wiring: Wiring, scene: Scene, experiment: str, options: Acquisiti
         wiring: of the bench.
         scene: of its top.
         experiment: the name of the experiment.
-        options: `out`, `seed`, `note` and `settings` count.
+        options: `out`, `seed`, `group`, `note` and `settings` count.
 
     Raises:
         ConfigError: its limits forbid a setting.
@@ -420,6 +435,7 @@ def request_at(wiring: Wiring, scene: Scene, experiment: str, options: Acquisiti
         config,
         lambda: wiring,
         out=options.out,
+        group=_group(options.group),
         note=options.note,
         synthetic_how=HOW.format(what=_IN_MOTION.format(name=scene.name)),
         scene=scene.as_table(),

@@ -116,6 +116,7 @@ class Document(Generic[S, R, Opt, A, D]):
                     "models": [],
                     "result": run,
                 }
+                | ({"group": source.group} if source.group else {})
                 | _budget(origin.budget or ())
                 | self.run_entries(run)
                 for source, run, origin in zip(found.sources, found.runs, found.origins, strict=True)

@@ -96,6 +96,7 @@ class RunPart(Part):
     model_config = _FOR_OTHERS
 
     path: str
+    group: str = ""
     synthetic: bool
     values: dict[str, Value]
     models: tuple[Model, ...] = ()

@@ -26,7 +26,7 @@ from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.record import SEARCHED
 from levilab.pipelines.correction import describe, place_of_correction, read_correction
 from levilab.present.clock import local
-from levilab.present.numbers import list_in_words
+from levilab.present.numbers import list_in_words, short_name
 from levilab.runs.run import READINGS, RECORD, Run, find_runs
 
 if TYPE_CHECKING:
@@ -133,6 +133,16 @@ class Source(Generic[R]):
     name: str
     warnings: tuple[str, ...] = ()
     kept: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def group(self) -> str:
+        """Who measured it; empty where that is not known."""
+        return in_one_line(self.run.record.group) if self.run else ""
+
+    @property
+    def note(self) -> str:
+        """What the person at the bench wrote down; empty for a data file."""
+        return in_one_line(self.run.record.note) if self.run else ""
 
     @property
     def synthetic(self) -> bool:
@@ -281,7 +291,7 @@ def join(found: Sequence[Found[R]]) -> Found[R]:
     warnings = [text for one in found for text in one.warnings]
     sources = _without_copies([source for one in found for source in one.sources], warnings)
     remarks = tuple(remark for one in found for remark in one.remarks)
-    return Found(_with_short_names(sources), tuple(warnings), remarks)
+    return Found(_with_short_names(_by_group(sources)), tuple(warnings), remarks)
 
 
 #: Logarithms of fingerprints that are alike differ by less: those of the same readings are in neighbouring cells.
@@ -311,7 +321,52 @@ def _with_short_names(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
         names = ["/".join(source.path.resolve().parts[-parts:]) for source in sources]
         if max(Counter(names).values(), default=1) == 1:
             break
+    named = [_name_for_people(source, name, sources) for source, name in zip(sources, names, strict=True)]
+    names = named if len({*named}) == len(named) else names
     return tuple(replace(source, name=name) for source, name in zip(sources, names, strict=True))
+
+
+#: Letters of a note in the name of a group's run; the report has all of it.
+_LETTERS_OF_NOTE = 20
+
+
+def _name_for_people(source: Source[R], name: str, sources: Sequence[Source[R]]) -> str:
+    """Return the group of a run with the beginning of its note, and the run's name if it is not the group's only one.
+
+    A run of no group keeps its name.
+    """
+    if not source.group:
+        return name
+    alone = sum(other.group == source.group for other in sources) == 1
+    note = source.note if len(source.note) <= _LETTERS_OF_NOTE else f"{source.note[: _LETTERS_OF_NOTE - 1]}…"
+    return f"{source.group}{'' if alone else f', {short_name(name)}'}{f' ({note})' if note else ''}"
+
+
+def _by_group(sources: Sequence[Source[R]]) -> Sequence[Source[R]]:
+    """Return the runs of groups in the order of their names, "Group 2" before "Group 10", those of no group last."""
+    return sorted(sources, key=lambda one: (not one.group, [*_natural(one.group)]))
+
+
+def _natural(name: str) -> Iterator[tuple[float, str]]:
+    """Yield the parts of a name, numbers as numbers, so that names are in a person's order."""
+    for digits, letters in re.findall(r"([0-9]+)|([^0-9]+)", name):
+        yield (float(digits), "") if digits else (math.inf, letters.casefold())
+
+
+#: How the name of a run folder begins, to the second.
+_SECOND = re.compile(r"\d{8}T\d{6}Z")
+
+
+def _begun(source: Source[Any]) -> tuple[list[str], str, str]:
+    """Return the place of a run among those of a folder: by name, but of one second by the time in its record."""
+    *folders, name = source.path.parts
+    second = _SECOND.match(name)
+    return [*folders, second[0] if second else name], (source.run and source.run.record.started_utc) or "", name
+
+
+def in_one_line(text: str) -> str:
+    """Return what a person typed, without what does not print."""
+    return "".join(c if c.isprintable() else " " for c in text).strip()
 
 
 def no_such_path(path: Path) -> DataError:
@@ -401,6 +456,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
                 others[run.record.experiment] += 1
         except DataError as error:
             broken.append(Skipped(str(error)))
+    found.sort(key=_begun)
     files = data_files(root)
     remarks += [LeftOut(file, _kind(file)) for file in other_files(root)]
     for file in files:

@@ -109,6 +109,8 @@ def _facts(source: Source[Any], parts: Sequence[About]) -> list[Fact]:
     instruments = [Fact(kind.capitalize(), _instrument(about)) for kind, about in record.instruments.items()]
     return [
         Fact("Synthetic", made_up),
+        Fact("Group", (record.group,) if record.group else ()),
+        Fact("Run", (source.path.name,) if source.path.name != source.name else ()),
         Fact("Note", (record.note,) if record.note else ()),
         Fact("Temperature", () if record.temperature_c is None else (f"{record.temperature_c:g} °C",)),
         Fact("Washers", () if record.washers_kg is None else (washers_text(record.washers_kg),)),

@@ -37,7 +37,7 @@ class Listed:
         length_s: from time zero, or the first reading where that is not known, to the last reading or state; None
             where they have no times.
         synthetic: whether any of it is synthetic.
-        note: as in run.json.
+        group, note: as in run.json.
         problem: why it cannot be read.
         states: of a simulation, 0 for what was measured.
         scene: of a simulation, empty for what was measured.
@@ -56,6 +56,7 @@ class Listed:
     states: int = 0
     scene: str = ""
     records: int = 0
+    group: str = ""
 
     @property
     def size(self) -> str:
@@ -92,6 +93,7 @@ def _list_run(folder: Path) -> Listed:
         length_s=(_number(simulation, "end_s") or None) if rows.length_s is None else rows.length_s,
         synthetic=run.record.synthetic,
         note=run.record.note,
+        group=run.record.group,
         states=int(_number(simulation, "states")),
         scene=str(_table(run.record.configuration, "scene").get("name", "")),
         records=rows.readings if rows.of_records else 0,
@@ -210,8 +212,10 @@ def print_runs(runs: Sequence[Listed], root: Path) -> None:
     heads = ["when (UTC)", "run", "what", "status", "readings", "length"]
     room = console.width - 80 if console.width >= ROOM_FOR_NOTES else 0
     above = f"{root}{os.sep}" if root != Path() else ""
-    rows = [_cells(run, above, room) for run in runs]
-    heads, rows = _that_fit([*heads, "note"] if room else heads, rows, console.width)
+    groups = any(run.group for run in runs)
+    rows = [_cells(run, above, room, groups=groups) for run in runs]
+    more = [*["group"] * groups, *["note"] * bool(room)]
+    heads, rows = _that_fit([*heads, *more], rows, console.width)
     print_rows(console, heads, rows, numbers=["readings", "length"])
     problems = [run.problem for run in runs if run.problem]
     for problem in problems[:MOST_PROBLEMS]:
@@ -240,12 +244,21 @@ def _seconds(length: float | None) -> str:
     return "—" if length is None else f"{length:.0f} s"
 
 
-def _cells(run: Listed, above: str, room: int) -> list[str]:
-    """Return a row of the list; above: the folder that was searched; room: for a note, none where it is 0."""
+def _cells(run: Listed, above: str, room: int, *, groups: bool) -> list[str]:
+    """Return a row of the list.
+
+    Args:
+        run: the run.
+        above: the folder that was searched.
+        room: letters for a note; 0: there is none.
+        groups: whether the list has a column of groups.
+    """
     when = (run.started_utc or "—")[:16].replace("T", " ")
     scene = f" {run.scene}" if run.scene not in {"", run.experiment} else ""
     what = run.experiment + scene + (", synthetic" if run.synthetic else "")
     cells = [when, _below(run.path, above), what, run.status, run.size, _seconds(run.length_s)]
+    if groups:
+        cells.append(run.group)
     if room:
         cells.append(run.note if len(run.note) <= room else f"{run.note[: room - 1]}…")
     return [cell if cell.isprintable() else " ".join(cell.splitlines()) for cell in cells]

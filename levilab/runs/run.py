@@ -66,6 +66,8 @@ class RunRecord(BaseModel):
     instruments: dict[str, dict[str, Any]] = {}
     software: dict[str, str] = {}
     seed: int | None = Field(default=None, ge=0)
+    #: Who measured: a name of a group of a class, or of a person.
+    group: str = ""
     note: str = ""
     #: Of the magnets [°C], and the washers on the top [kg], as a person said; None: nothing was said.
     temperature_c: float | None = None
@@ -130,6 +132,7 @@ class Run:
             ("status", self.status),
             ("started", (self.record.started_utc or "").partition(".")[0]),
             ("synthetic", self.record.synthetic_how or "yes" if self.record.synthetic else ""),
+            ("group", self.record.group),
             ("note", self.record.note),
             ("folder", str(self.folder)),
             ("readings", problem or count),

@@ -74,6 +74,8 @@ HEAD = (
     entry("path", "text", "run folder or data file, from the table's folder"),
     entry("started_utc", "text", "when the run began, as in run.json"),
     entry("experiment", "text", "of the run"),
+    entry("group", "text", "who measured, as in run.json"),
+    entry("note", "text", "as in run.json"),
     entry("status", "text", "finished, interrupted, failed, or running when it was analyzed"),
     entry("synthetic", "truth", "whether any of it is simulated or synthetic; empty for a data file"),
     entry("readings_sha256", "text", "of the file with the readings"),
@@ -142,6 +144,8 @@ def _read_record(task: Task, analysis: Analysis[Any], about: dict[str, Any]) -> 
     about |= {
         "started_utc": run.record.started_utc,
         "experiment": run.record.experiment,
+        "group": run.record.group,
+        "note": run.record.note,
         "status": run.status,
         "synthetic": run.record.synthetic,
     }

@@ -245,7 +245,8 @@ def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
     axes.plot(number, value, color="black", linestyle="none", marker="o", markersize=2.5 if few else 1.2)
     unit = in_mathtext(unit_row(mean.unit).text)
     times = f"$10^{{{power}}}$ ".replace("-", "−") if power else ""
-    axes.set(xlabel="run", ylabel=f"{SYMBOLS[name]}  [{times}{unit}]")
+    groups = [_legend_text(source.group) for source in analysis.sources if source.group]
+    axes.set(xlabel=f"{groups[0]} … {groups[-1]}" if groups else "run", ylabel=f"{SYMBOLS[name]}  [{times}{unit}]")
     axes.set_title(f"{SYMBOLS[name]}, {best.name}: mean, ±s", pad=3, fontsize=8)
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 #: A spreadsheet takes a text that begins with one of these for a formula.
 _FORMULA = re.compile(r"\s*[=+\-@\t\r]")
 #: The first columns of both kinds of tables.
-INPUT, SYNTHETIC = "input", "synthetic"
+INPUT, GROUP, NOTE, SYNTHETIC = "input", "group", "note", "synthetic"
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,7 @@ def of_analysis(analysis: Analysis[Any], found: Any, folder: Path) -> Iterator[V
         folder: of the tables.
     """
     document = analysis.document(found, folder)
-    names = [source.name for source in found.sources]
-    yield _by_input(analysis, document, names)
+    yield _by_input(analysis, document, found.sources)
     yield Values(
         f"{analysis.name}-quantities",
         f"{analysis.name}: a row for each quantity of each input, and of all inputs together",
@@ -95,13 +94,19 @@ def _unit_of_residuals(analysis: Analysis[Any]) -> str:
     return unit.si if unit else ""
 
 
-def _by_input(analysis: Analysis[Any], document: Mapping[str, Any], names: Sequence[str]) -> Values:
+def _by_input(analysis: Analysis[Any], document: Mapping[str, Any], sources: Sequence[Source[Any]]) -> Values:
     columns: tuple[Column, ...] = analysis.row
     rows = [
-        (name, bool(part["synthetic"]), *(plain(column.read(part), column.kind) for column in columns))
-        for name, part in zip(names, document["runs"], strict=True)
+        (
+            source.name,
+            source.group,
+            source.note,
+            bool(part["synthetic"]),
+            *(plain(column.read(part), column.kind) for column in columns),
+        )
+        for source, part in zip(sources, document["runs"], strict=True)
     ]
-    heads = (INPUT, SYNTHETIC, *(column.name for column in columns))
+    heads = (INPUT, GROUP, NOTE, SYNTHETIC, *(column.name for column in columns))
     return Values(f"{analysis.name}-inputs", f"{analysis.name}: a row for each input", heads, tuple(rows))
 
 

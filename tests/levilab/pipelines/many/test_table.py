@@ -212,7 +212,11 @@ def test_every_analysis_fills_its_columns(name: str, sample: str) -> None:
     row = analyze_one(task)
     assert isinstance(row, Row)
     empty = {column.name for column, cell in zip(columns_of(analysis), row.cells, strict=True) if cell is None}
-    assert empty - {"notes"} == {"problem", "started_utc"}  # which the samples leave out; a sound record has no notes
+    assert empty - {"notes"} == {
+        "problem",
+        "started_utc",
+        "group",
+    }  # which the samples leave out; a sound record has no notes
 
 
 def test_inputs_of_other_analyses_are_passed_over_and_counted(tmp_path: Path) -> None:
