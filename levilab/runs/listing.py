@@ -214,8 +214,8 @@ def print_runs(runs: Sequence[Listed], root: Path) -> None:
     above = f"{root}{os.sep}" if root != Path() else ""
     groups = any(run.group for run in runs)
     rows = [_cells(run, above, room, groups=groups) for run in runs]
-    more = [*["group"] * groups, *["note"] * bool(room)]
-    heads, rows = _that_fit([*heads, *more], rows, console.width)
+    heads += [*["group"] * groups, *["note"] * bool(room)]
+    heads, rows = _that_fit(heads, rows, console.width)
     print_rows(console, heads, rows, numbers=["readings", "length"])
     problems = [run.problem for run in runs if run.problem]
     for problem in problems[:MOST_PROBLEMS]:
