@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from levilab.bench.person import Task
     from levilab.notebook.motion import SimulatedMotion
     from levilab.notebook.result import AnalysisResult
+    from levilab.notebook.run import RecordedRun
     from levilab.pipelines.options import Method, Tilt
     from levilab.runs.run import Run
     from levilab.simulator.scene import Scene
@@ -51,7 +52,7 @@ def acquire(
     settings: Mapping[str, Any] | None = None,
     wire_log: bool = False,
     person: Callable[[Task], str] | None = None,
-) -> Run:
+) -> RecordedRun:
     """Run an experiment on the bench, and write a run folder.
 
     Ctrl-C ends it after the reading under way: outputs go off, and the run is kept and returned; its `status` is then
@@ -112,7 +113,7 @@ def acquire(
     return acquire_run(experiment, options)
 
 
-def load(path: str | PathLike[str]) -> Run:
+def load(path: str | PathLike[str]) -> RecordedRun:
     """Return the run in a run folder.
 
     Args:

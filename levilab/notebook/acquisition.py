@@ -11,6 +11,7 @@ from levilab.acquisition.request import request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.errors import DataError, UsageError
+from levilab.notebook.run import RecordedRun
 from levilab.present.progress import Display
 from levilab.runs.run import RECORD, Run, find_run
 from levilab.simulator.keys import plain
@@ -23,11 +24,11 @@ if TYPE_CHECKING:
     from levilab.bench.person import Task
 
 
-def acquire_run(experiment: str, options: AcquisitionOptions) -> Run:
+def acquire_run(experiment: str, options: AcquisitionOptions) -> RecordedRun:
     """Run an experiment without a word on the terminal; see `levilab.acquire`."""
     if experiment not in EXPERIMENTS:
         raise UsageError("experiment", f"{', '.join(EXPERIMENTS)} are known", value=experiment)
-    return acquire(request_for(experiment, options), Display())
+    return RecordedRun.of(acquire(request_for(experiment, options), Display()))
 
 
 def as_path(place: str | PathLike[str] | Run | None) -> Path | None:
@@ -58,11 +59,12 @@ def ask_with_input(task: Task) -> str:
         ) from None
 
 
-def load_run(path: str | PathLike[str]) -> Run:
+def load_run(path: str | PathLike[str]) -> RecordedRun:
     """Load the run in a run folder, or of a name in runs/.  Raises DataError."""
     folder = find_run(Path(path))
     if folder.is_file():
         raise DataError(f"{folder}: is a file; a run folder is expected, a data file goes to levilab.analyze as it is")
     if folder.is_dir() and not (folder / RECORD).exists():
-        raise DataError(f"{folder}: holds no {RECORD}, so it is no run folder: name one of the runs in it")
-    return Run.load(folder)
+        advice = "name one of the runs in it, which levilab.runs lists"
+        raise DataError(f"{folder}: holds no {RECORD}, so it is no run folder: {advice}")
+    return RecordedRun.load(folder)

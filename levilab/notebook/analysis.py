@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from levilab.errors import DoesNotSuit, LevilabError, UsageError
-from levilab.notebook.frame import has_numbers_for_titles, in_rows, is_frame, write_frame
+from levilab.notebook.frame import are_arrays, frame_of_arrays, has_numbers_for_titles, in_rows, is_frame, write_frame
 from levilab.notebook.result import AnalysisResult
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import read_options
@@ -38,7 +38,7 @@ def analyze_data(data: One | Sequence[One], kind: str | None, given: Mapping[str
     """Analyze data by one analysis.
 
     Args:
-        data: a run, a path, a DataFrame, or several of them.
+        data: a run, a path, a DataFrame, or several of them; or arrays, see `frame_of_arrays`.
         kind: of the analysis; None for the one that is made for the data.
         given: options by their names; None, or what an analysis has by itself, is not given.
 
@@ -47,6 +47,8 @@ def analyze_data(data: One | Sequence[One], kind: str | None, given: Mapping[str
         DataError: the data suit none, or cannot be used.
     """
     options = read_options(given)
+    if are_arrays(data):
+        data = frame_of_arrays(data, kind)
     items: list[Any] = [data] if _is_one(data) else list(data)  # type: ignore[arg-type]
     if not items:
         raise UsageError("data", "a run, a path or a DataFrame is expected", value="nothing")

@@ -5,12 +5,60 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from levilab.errors import UsageError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
+
+
+#: Analysis → names of one, two or three arrays that are given without names; "": no analysis was chosen.
+ARRAYS: dict[str, tuple[str, ...]] = {
+    "": ("time_s", "spin_frequency_hz", "spin_frequency_u_hz"),
+    "spin": ("time_s", "light_v"),
+    "field": ("height_m", "flux_density_t", "flux_density_u_t"),
+    "limit": ("spin_frequency_hz", "spin_frequency_u_hz"),
+    "precession": ("drive_frequency_hz", "precession_frequency_hz", "precession_frequency_u_hz"),
+}
+
+
+def are_arrays(data: Any) -> bool:
+    """Return whether data are numbers: an array, or several arrays or lists of numbers."""
+    if hasattr(data, "dtype") and not is_frame(data):
+        return True
+    items = list(data) if isinstance(data, list | tuple) else []
+    return bool(items) and all(
+        hasattr(item, "dtype") or (isinstance(item, list | tuple) and item and isinstance(item[0], int | float))
+        for item in items
+    )
+
+
+def frame_of_arrays(data: Any, kind: str | None) -> pd.DataFrame:
+    """Return arrays as a DataFrame with the columns of data files.
+
+    Args:
+        data: one array, shape (n,) or (n, columns); or several of one length, as (t, f) or (t, f, u): see `ARRAYS`.
+        kind: of the analysis, which decides what they are.
+
+    Raises:
+        UsageError: their number or their lengths are wrong.
+    """
+    import pandas as pd
+
+    names = ARRAYS.get(kind or "", ARRAYS[""])
+    if hasattr(data, "dtype"):
+        data = [data] if data.ndim == 1 else data.T  # an array of two dimensions has a row a reading
+    columns = [np.asarray(item) for item in data]
+    if len(columns) > len(names) or (len(columns) < 2 and names[0] == "time_s"):
+        expected = f"arrays of {', '.join(names[:2])}, in this order, are expected; or a DataFrame"
+        raise UsageError("data", expected, value=f"{len(columns)} array{'s' * (len(columns) > 1)}")
+    if {one.ndim for one in columns} != {1} or len({len(one) for one in columns}) > 1:
+        shapes = " and ".join(str(one.shape) for one in columns)
+        raise UsageError("data", "arrays of one length are expected", value=f"arrays of the shapes {shapes}")
+    return pd.DataFrame(dict(zip(names, columns, strict=False)))
 
 
 def write_frame(frame: pd.DataFrame, path: Path) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation
 from levilab.motion.summary import as_document
 from levilab.motion.table import headline, print_motion
+from levilab.notebook.labels import as_dataset
 from levilab.present.html import facts_as_html
 from levilab.simulator.scene import Scene, read_scene
 from levilab.simulator.trajectory import Trajectory
@@ -18,7 +19,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from os import PathLike
 
+    import numpy as np
     import pandas as pd
+    import xarray
 
     from levilab.motion.summary import Summary
     from levilab.present.style import Figure
@@ -40,6 +43,21 @@ class SimulatedMotion(Trajectory):
     def _found(self) -> Summary:
         assert self.found
         return self.found
+
+    @property
+    def x(self) -> np.ndarray:
+        """Position of the top across [m]."""
+        return self.position[:, 0]
+
+    @property
+    def y(self) -> np.ndarray:
+        """Position of the top across [m]."""
+        return self.position[:, 1]
+
+    @property
+    def z(self) -> np.ndarray:
+        """Height of the top above the base [m]."""
+        return self.position[:, 2]
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -75,6 +93,10 @@ class SimulatedMotion(Trajectory):
         import pandas as pd
 
         return pd.DataFrame({name: values(self) for name, _, _, values in COLUMNS})
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the states as a Dataset over time_s, with units; needs xarray.  Raises MissingXarray."""
+        return as_dataset(self.to_dataframe(), "time_s")
 
     def plot(self) -> Figure:
         """Draw path, height, spin, tilt and energy in time, and the spectrum of the axis; it needs no display."""

@@ -2,25 +2,33 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
+import weakref
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from analysis.uncertainty import Estimate
+import numpy as np
+
 from levilab.errors import UsageError, unquote
 from levilab.files import CannotWrite, replace_atomically
-from levilab.pipelines.catalogue import print_analysis
+from levilab.notebook.labels import as_dataset
+from levilab.notebook.quantity import Named, Quantity, correlate
+from levilab.pipelines.catalogue import ANALYSES, print_analysis
 from levilab.pipelines.result import Place
 from levilab.pipelines.suits import save as save_result
-from levilab.present.numbers import in_one_line
 from levilab.report.page import render_part
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
     from os import PathLike
 
     import pandas as pd
+    import xarray
+    from numpy.typing import ArrayLike
 
     from levilab.pipelines.catalogue import Analysis
     from levilab.pipelines.result import Result, Value
@@ -30,27 +38,16 @@ TableName = Literal["values", "models", "readings"]
 #: Values that the short form of a result shows.
 MOST_VALUES = 4
 _ELSEWHERE = "choose another `folder`"
-
-
-@dataclass(frozen=True, repr=False)
-class Quantity(Estimate):
-    """A quantity with its standard uncertainty: `value`, `u` (None where not determined), `unit`, and `interval`.
-
-    It prints as value(u), and `float` takes its value.
-
-    >>> Quantity(0.003262, 2.3e-5, "1/s")
-    0.003262(23) 1/s
-    """
-
-    def __repr__(self) -> str:
-        return in_one_line(self)
-
-    def __float__(self) -> float:
-        return float("nan") if self.value is None else self.value
-
-
-def _quantity(value: Value) -> Quantity:
-    return Quantity(value.value, value.u, value.unit, value.interval_68)
+#: Weaker correlations are not reported, as lmfit does not.
+_LEAST_CORRELATION = 0.1
+#: Statistics of a model in a fit report: key in result.json → as people write it.
+_STATISTICS = {
+    "n": "n",
+    "reduced_chi_square": "reduced χ²",
+    "rms_residual": "rms residual",
+    "aicc": "AICc",
+    "weight": "weight",
+}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -66,6 +63,24 @@ class AnalysisResult:
     analysis: Analysis[Any]
     found: Any
     copies: tuple[Path, ...] = ()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a pickle holds: the analysis by its name, and the DataFrames' files with their content."""
+        return {
+            "analysis": self.analysis.name,
+            "found": self.found,
+            "copies": [(path, path.read_bytes()) for path in self.copies],
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        found, copies = state["found"], []
+        if state["copies"]:
+            folder = temporary_folder(self)
+            for path, content in state["copies"]:
+                copies.append(folder / path.name)
+                copies[-1].write_bytes(content)
+                found = _with_copy(found, path, copies[-1])
+        vars(self).update(analysis=ANALYSES[state["analysis"]], found=found, copies=tuple(copies))
 
     @property
     def kind(self) -> str:
@@ -103,17 +118,71 @@ class AnalysisResult:
         return self.analysis.result.of(self.found, Place(Path()))  # type: ignore[no-any-return]
 
     @cached_property
-    def values(self) -> Mapping[str, Quantity]:
-        """Name → quantity, with u and unit: of the only input, or of all together where the analysis combines them."""
-        return {name: _quantity(value) for name, value in self._written.values.items()}
+    def models(self) -> Named[Named[Quantity]]:
+        """Model → parameter → quantity: every drag law that was fitted, whichever is the best; of all inputs together.
+
+        Parameters of one model are correlated as its fit says.
+        """
+        return _models_of(self._written, "this result")
+
+    @cached_property
+    def models_by_input(self) -> Mapping[str, Named[Named[Quantity]]]:
+        """Name of the input → the same of that input alone."""
+        runs = zip(self.inputs, self._written.runs, strict=True)
+        return Named({name: _models_of(run, name) for name, run in runs}, "the inputs")
+
+    @property
+    def best_model(self) -> str:
+        """The drag law, or the only model, that describes the readings best; empty where an analysis has no model."""
+        return str(self.document.get("best_model") or next(iter(self.models), ""))
+
+    @property
+    def params(self) -> Mapping[str, Quantity]:
+        """The parameters of the best model, as lmfit names them."""
+        return self.models[self.best_model]
+
+    @cached_property
+    def values(self) -> Named[Quantity]:
+        """Name → quantity, with u and unit: of the only input, or of all together where the analysis combines them.
+
+        Constants are those of the best law; `models` has all laws.
+        """
+        return self._values_of(self._written, self.models, "models", "the values of this result")
 
     @cached_property
     def by_input(self) -> Mapping[str, Mapping[str, Quantity]]:
         """Name of the input → name → quantity."""
-        return {
-            name: {of: _quantity(value) for of, value in run.values.items()}
-            for name, run in zip(self.inputs, self._written.runs, strict=True)
-        }
+        return Named(
+            {
+                name: self._values_of(run, self.models_by_input[name], f"models_by_input[{name!r}]", f"those of {name}")
+                for name, run in zip(self.inputs, self._written.runs, strict=True)
+            },
+            "the inputs",
+        )
+
+    def _values_of(self, part: Any, models: Named[Named[Quantity]], where: str, what: str) -> Named[Quantity]:
+        """Return the values of a part of the result, the same numbers as the parameters of its best model."""
+        best = getattr(part, "best_model", None) or next(iter(models), "")
+        fitted: Mapping[str, Quantity] = models.get(best, {})
+        values = {name: _quantity(value) for name, value in part.values.items()}
+        values |= {name: fitted[name] for name, value in values.items() if fitted.get(name) == value}
+        law = f" (its best law is {best})" if hasattr(part, "best_model") else ""
+        elsewhere = {
+            name: f"{where}[{model!r}][{name!r}]" for model, of in reversed(models.items()) for name in of
+        }  # the first law that has it
+        return Named(values, f"{what}{law}", elsewhere)
+
+    def __getitem__(self, name: str) -> Quantity:
+        return self.values[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.values
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.values)
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return [*self.values]
 
     @property
     def _first_of_each(self) -> dict[str, Quantity]:
@@ -178,13 +247,67 @@ class AnalysisResult:
         frame = pd.DataFrame(rows, columns=["input", "name", "value", "u", "unit"])
         return frame.astype({"value": float, "u": float})
 
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the readings with their residuals as a Dataset with units; needs xarray.  Raises MissingXarray."""
+        return as_dataset(self.to_dataframe("readings"), "reading")
+
+    @property
+    def residuals(self) -> np.ndarray:
+        """Reading less the best model, shape (n,), in SI; NaN for readings that are not used.  Raises UsageError."""
+        frame = self.to_dataframe("readings")
+        name = self._residual(frame)
+        return frame[name].to_numpy()
+
+    def _residual(self, frame: pd.DataFrame) -> str:
+        """Return the name of the column of residuals.  Raises UsageError."""
+        for name in frame.columns:
+            if name.startswith("residual"):
+                return str(name)
+        raise UsageError("residuals", f"a result of {self.kind} has none: its values come from pulses or pictures")
+
+    def predict(self, x: ArrayLike, model: str | None = None, *, input: str | None = None) -> np.ndarray:  # noqa: A002
+        """Return a fitted curve at other places, in SI, in the shape of x.
+
+        Args:
+            x: times [s] of a spin-down, heights [m] of a field scan, drive frequencies [Hz] of a precession sweep.
+            model: a drag law; None: the best one.
+            input: which one, of several; its name in `inputs`.
+
+        Raises:
+            UsageError: there is no such curve.
+        """
+        if self.analysis.curve is None:
+            has = [name for name, one in ANALYSES.items() if one.curve]
+            raise UsageError("predict", f"a result of {self.kind} has no curve; those of {', '.join(has)} have")
+        if input is None and len(self.inputs) > 1:
+            raise UsageError("input", f"each of several has its own curve: say one of {', '.join(self.inputs)}")
+        if input is not None and input not in self.inputs:
+            raise UsageError("input", f"known are {', '.join(self.inputs)}", value=input)
+        number = self.inputs.index(input) if input else 0
+        chosen = self.best_model if model is None else model
+        if chosen not in self.models:
+            raise UsageError("model", f"known are {', '.join(self.models)}", value=model)
+        places = np.asarray(x, dtype=float)
+        return self.analysis.curve(self.found, number, chosen)(places.ravel()).reshape(places.shape)
+
+    def fit_report(self) -> str:
+        """Return the fits as text: each model's statistics, parameters of the best one, and their correlations."""
+        lines = [f"{self.kind} of {', '.join(self.inputs)}{', SYNTHETIC' * self.synthetic}", ""]
+        for model in self.document["models"]:
+            found = model.get("statistics", {})
+            words = [f"{name} = {found[key]:.4g}" for key, name in _STATISTICS.items() if found.get(key) is not None]
+            best = " (best)" if model["name"] == self.best_model and len(self.models) > 1 else ""
+            lines.append(f"{model['name']}{best}: {', '.join(words)}")
+        fitted = self.models.get(self.best_model, self.values)
+        lines += ["", *(f"  {name} = {quantity!r}" for name, quantity in fitted.items()), ""]
+        lines += [f"  correlation of {one} and {other} = {r:+.3f}" for one, other, r in _correlations(fitted)]
+        return "\n".join(lines).strip()
+
     def _models(self) -> pd.DataFrame:
         import pandas as pd
 
         rows = [
-            (model["name"], name, one["value"], one["u"], one["unit"])
-            for model in self.document["models"]
-            for name, one in model["parameters"].items()
+            (model, name, one.value, one.u, one.unit) for model, of in self.models.items() for name, one in of.items()
         ]
         frame = pd.DataFrame(rows, columns=["model", "name", "value", "u", "unit"])
         return frame.astype({"value": float, "u": float})
@@ -205,13 +328,49 @@ class AnalysisResult:
         for path in self.copies:
             copy = _copy(path, place)
             written.append(copy)
-            sources = [replace(one, path=copy, data=copy) if one.path == path else one for one in found.sources]
-            name = copy.name if len(sources) == 1 else found.place.name
-            found = replace(found, sources=tuple(sources), place=replace(found.place, name=name))
+            found = _with_copy(found, path, copy)
         try:
             return [*written, *save_result(self.analysis, found, place)]
         except CannotWrite as error:
             raise CannotWrite(error.problem, _ELSEWHERE) from error
+
+
+def _quantity(value: Value) -> Quantity:
+    return Quantity(value.value, value.u, value.unit, value.interval_68)
+
+
+def _models_of(part: Any, of: str) -> Named[Named[Quantity]]:
+    """Return the models of a part of result.json, by their names."""
+    models = {}
+    for model in part.models:
+        quantities = correlate([_quantity(value) for value in model.parameters.values()], model.covariance)
+        models[model.name] = Named(dict(zip(model.parameters, quantities, strict=True)), f"the {model.name} model's")
+    return Named(models, f"the models of {of}")
+
+
+def _correlations(fitted: Mapping[str, Quantity]) -> Iterator[tuple[str, str, float]]:
+    """Yield pairs of quantities with the correlation of their estimates."""
+    from uncertainties import correlation_matrix
+
+    for (one, first), (other, second) in combinations(fitted.items(), 2):
+        if first.u and second.u:
+            r = float(correlation_matrix([first.to_ufloat(), second.to_ufloat()])[0, 1])
+            if abs(r) >= _LEAST_CORRELATION:
+                yield one, other, r
+
+
+def temporary_folder(of: object) -> Path:
+    """Return a new folder that goes with an object: a long record is read again when it is drawn."""
+    folder = Path(tempfile.mkdtemp(prefix="levilab-"))
+    weakref.finalize(of, shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def _with_copy(found: Any, path: Path, copy: Path) -> Any:
+    """Return what was found, with a copy in the place of a file."""
+    sources = [replace(one, path=copy, data=copy) if one.path == path else one for one in found.sources]
+    name = copy.name if len(sources) == 1 else found.place.name
+    return replace(found, sources=tuple(sources), place=replace(found.place, name=name))
 
 
 def _copy(path: Path, folder: Path) -> Path:

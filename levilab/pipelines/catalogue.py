@@ -13,7 +13,7 @@ from levilab.pipelines.field.document import DOCUMENT as FIELD
 from levilab.pipelines.field.quantities import FIELD_ROW
 from levilab.pipelines.field.quantities import QUANTITIES as FIELD_QUANTITIES
 from levilab.pipelines.field.report import field_part
-from levilab.pipelines.field.table import field_columns, field_tables
+from levilab.pipelines.field.table import field_columns, field_curve, field_tables
 from levilab.pipelines.hold.document import DOCUMENT as HOLD
 from levilab.pipelines.hold.quantities import HOLD_ROW
 from levilab.pipelines.hold.quantities import QUANTITIES as HOLD_QUANTITIES
@@ -28,7 +28,7 @@ from levilab.pipelines.precession.document import DOCUMENT as PRECESSION
 from levilab.pipelines.precession.quantities import PRECESSION_ROW
 from levilab.pipelines.precession.quantities import QUANTITIES as PRECESSION_QUANTITIES
 from levilab.pipelines.precession.report import precession_part
-from levilab.pipelines.precession.table import precession_columns, precession_tables
+from levilab.pipelines.precession.table import precession_columns, precession_curve, precession_tables
 from levilab.pipelines.result import Place
 from levilab.pipelines.row import symbols_of
 from levilab.pipelines.spin.document import DOCUMENT as SPIN
@@ -40,7 +40,7 @@ from levilab.pipelines.spindown.document import DOCUMENT as SPINDOWN
 from levilab.pipelines.spindown.laws import SYMBOLS
 from levilab.pipelines.spindown.quantities import SPINDOWN_ROW
 from levilab.pipelines.spindown.report import spindown_part
-from levilab.pipelines.spindown.table import spindown_columns, spindown_tables
+from levilab.pipelines.spindown.table import spindown_columns, spindown_curve, spindown_tables
 from levilab.pipelines.sway.document import DOCUMENT as SWAY
 from levilab.pipelines.sway.quantities import QUANTITIES as SWAY_QUANTITIES
 from levilab.pipelines.sway.quantities import SWAY_ROW
@@ -88,6 +88,8 @@ class Analysis(Generic[A]):
         row: the columns that an input has as one row of a table of many.
         symbols: of its quantities, for people.
         files: tables for other analyses that are saved with the result, by their names.
+        curve: the fitted curve of an input, by its number and the model's name, as a function of arrays in SI; None:
+            there is none.
     """
 
     result: Document[Any, Any, Any, A, Any]
@@ -97,6 +99,7 @@ class Analysis(Generic[A]):
     row: tuple[Column, ...] = ()
     symbols: Mapping[str, str] = field(default_factory=dict)
     files: Callable[[A], Mapping[str, str]] = lambda _: {}
+    curve: Callable[[A, int, str], Callable[[np.ndarray], np.ndarray]] | None = None
 
     @property
     def needs(self) -> Needs[Any]:
@@ -168,9 +171,17 @@ class Analysis(Generic[A]):
 
 
 _TABLE: tuple[Analysis[Any], ...] = (
-    Analysis(SPINDOWN, spindown_tables, spindown_part, spindown_columns, SPINDOWN_ROW, SYMBOLS),
+    Analysis(SPINDOWN, spindown_tables, spindown_part, spindown_columns, SPINDOWN_ROW, SYMBOLS, curve=spindown_curve),
     Analysis(SPIN, spin_tables, spin_part, spin_columns, SPIN_ROW, symbols_of(SPIN_QUANTITIES)),
-    Analysis(FIELD, field_tables, field_part, field_columns, FIELD_ROW, symbols_of(FIELD_QUANTITIES.values())),
+    Analysis(
+        FIELD,
+        field_tables,
+        field_part,
+        field_columns,
+        FIELD_ROW,
+        symbols_of(FIELD_QUANTITIES.values()),
+        curve=field_curve,
+    ),
     Analysis(LIMIT, limit_tables, limit_part, limit_columns, LIMIT_ROW, symbols_of(LIMIT_QUANTITIES)),
     Analysis(
         PRECESSION,
@@ -179,6 +190,7 @@ _TABLE: tuple[Analysis[Any], ...] = (
         precession_columns,
         PRECESSION_ROW,
         symbols_of(PRECESSION_QUANTITIES),
+        curve=precession_curve,
     ),
     Analysis(SWAY, sway_tables, sway_part, sway_columns, SWAY_ROW, symbols_of(SWAY_QUANTITIES)),
     Analysis(HOLD, hold_tables, hold_part, hold_columns, HOLD_ROW, symbols_of(HOLD_QUANTITIES)),

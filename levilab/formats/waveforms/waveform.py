@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -45,6 +45,21 @@ class Signal:
 
 
 @dataclass(frozen=True, eq=False)
+class Held:
+    """Samples in memory, read as those of a file.
+
+    Attributes:
+        samples: of each channel.
+    """
+
+    samples: tuple[Array, ...]
+
+    def __call__(self, signal: int) -> Iterator[Array]:
+        """Yield the samples of a channel, by its index."""
+        yield self.samples[signal]
+
+
+@dataclass(frozen=True, eq=False)
 class Waveform:
     """Samples of one or more channels.
 
@@ -73,6 +88,11 @@ class Waveform:
     step_u: float = 0.0
     start_u: float = 0.0
     times: Array | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a pickle holds: the samples themselves, since another process may not have the file."""
+        samples = tuple(np.concatenate([*self.read(k)]) for k in range(len(self.signals)))
+        return vars(self) | {"read": Held(samples)}
 
     @property
     def rate(self) -> float:

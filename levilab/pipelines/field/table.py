@@ -14,7 +14,7 @@ from levilab.present.numbers import plain, short_name, with_decimals, with_uncer
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     import numpy as np
     from numpy.typing import NDArray
@@ -117,3 +117,8 @@ def field_columns(analysis: FieldAnalysis) -> Iterator[Mapping[str, np.ndarray]]
             "flux_density_u_t": scan.u,
             "residual_t": scan.residuals,
         }
+
+
+def field_curve(analysis: FieldAnalysis, number: int, _: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the flux density [T] of the ring fitted to one scan, of heights [m]."""
+    return analysis.runs[number].scan.model

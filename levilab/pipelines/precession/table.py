@@ -14,7 +14,7 @@ from levilab.present.numbers import column, plain, short_name, with_decimals, wi
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from analysis.precession.sweep import Point, SweepFit
     from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
@@ -177,3 +177,12 @@ def precession_columns(analysis: PrecessionAnalysis) -> Iterator[Mapping[str, np
     for run in analysis.runs:
         used = np.array([point.used for point in run.fit.points])
         yield {name: run.fit.column(attribute) for name, attribute in _COLUMNS.items()} | {"used": used}
+
+
+def precession_curve(analysis: PrecessionAnalysis, number: int, model: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the precession frequency [Hz] of a line fitted to one sweep, of drive frequencies [Hz]."""
+    fit = analysis.runs[number].fit
+    if model != "robust":
+        return lambda drive: fit.line.intercept + fit.line.slope * drive
+    slope, intercept = fit.robust.slope.value or 0.0, fit.robust.intercept.value or 0.0
+    return lambda drive: intercept + slope * drive

@@ -26,7 +26,7 @@ from levilab.present.tables import Row, Table, table
 from levilab.present.units import unit
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -220,3 +220,8 @@ def spindown_columns(analysis: SpinDownAnalysis) -> Iterator[Mapping[str, np.nda
             "residual_hz": residual,
             "used": used,
         }
+
+
+def spindown_curve(analysis: SpinDownAnalysis, number: int, law: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the spin frequency [Hz] of a law fitted to one run, of times [s]."""
+    return analysis.runs[number].fit(law).spin_frequency

@@ -1,0 +1,183 @@
+"""A quantity that can be calculated with, and tables of quantities that say where a missing name is found."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from analysis.uncertainty import Estimate
+from levilab.errors import UsageError
+from levilab.present.numbers import in_one_line
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import ArrayLike
+
+V = TypeVar("V")
+
+
+@dataclass(frozen=True, repr=False)
+class Quantity(Estimate):
+    """A quantity with its standard uncertainty: `value`, `u` (None where not determined), `unit`, and `interval`.
+
+    It prints as value(u); `float` takes its value, a format such as `.3g` or `.1uS` is one of `uncertainties`.  Sums
+    of quantities in one unit, and multiples, are quantities; products and powers are numbers of `uncertainties`
+    without a unit.  Quantities of one fit stay correlated: a quantity less itself is 0 without an uncertainty.
+
+    >>> c = Quantity(0.003262, 2.3e-5, "1/s")
+    >>> c, 2 * c, c - c
+    (0.003262(23) 1/s, 0.00652(5) 1/s, 0 1/s)
+    >>> print(f"{c:.1uS}", c * c)
+    0.00326(2) 1/s (1.064+/-0.015)e-05
+    >>> float(c), c.n, c.s
+    (0.003262, 0.003262, 2.3e-05)
+    """
+
+    number: Any = field(default=None, compare=False)
+
+    def __repr__(self) -> str:
+        return in_one_line(self)
+
+    def __float__(self) -> float:
+        return float("nan") if self.value is None else self.value
+
+    def __format__(self, spec: str) -> str:
+        if not spec:
+            return repr(self)
+        number = format(self.to_ufloat() if self.u else float(self), spec)
+        return number if self.unit == "1" else f"{number} {self.unit}"
+
+    @property
+    def n(self) -> float:
+        """The value, as `uncertainties` names it; NaN where it is not determined."""
+        return float(self)
+
+    @property
+    def s(self) -> float:
+        """The standard uncertainty, as `uncertainties` names it; NaN where it is not determined."""
+        return math.nan if self.u is None else self.u
+
+    def to_ufloat(self) -> Any:
+        """Return it as a number of the library `uncertainties`, without its unit; u is NaN where not determined."""
+        from uncertainties import ufloat
+
+        if self.number is None:
+            object.__setattr__(self, "number", ufloat(float(self), self.s))  # one number for all that is made of it
+        return self.number
+
+    # --- arithmetic ---
+
+    def _sum(self, other: object, sign: int) -> Any:
+        """Return this plus or minus a number in the same unit."""
+        if isinstance(other, Estimate) and other.unit != self.unit:
+            raise UsageError("sum", f"{self!r} and {other!r} have unlike units: convert one, or take its `to_ufloat()`")
+        return _of(self.to_ufloat() + sign * _plain(other), self.unit)
+
+    def __add__(self, other: object) -> Any:
+        return self._sum(other, 1)
+
+    def __sub__(self, other: object) -> Any:
+        return self._sum(other, -1)
+
+    def __rsub__(self, other: object) -> Any:
+        return -self + other
+
+    def __neg__(self) -> Any:
+        return _of(-self.to_ufloat(), self.unit)
+
+    def __abs__(self) -> Any:
+        return _of(abs(self.to_ufloat()), self.unit)
+
+    def __mul__(self, other: object) -> Any:
+        product = self.to_ufloat() * _plain(other)
+        return product if isinstance(other, Estimate) else _of(product, self.unit)
+
+    def __truediv__(self, other: object) -> Any:
+        ratio = self.to_ufloat() / _plain(other)
+        return ratio if isinstance(other, Estimate) else _of(ratio, self.unit)
+
+    def __rtruediv__(self, other: object) -> Any:
+        return _plain(other) / self.to_ufloat()
+
+    def __pow__(self, other: object) -> Any:
+        return self.to_ufloat() ** _plain(other)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __lt__(self, other: object) -> bool:
+        return float(self) < float(_value(other))
+
+    def __gt__(self, other: object) -> bool:
+        return float(self) > float(_value(other))
+
+
+def _value(of: Any) -> Any:
+    return of.nominal_value if hasattr(of, "nominal_value") else of
+
+
+def _plain(of: Any) -> Any:
+    """Return a quantity as a number of `uncertainties`, any other number as it is."""
+    return of.to_ufloat() if isinstance(of, Quantity) else of
+
+
+def _of(number: Any, unit: str) -> Any:
+    """Return a quantity of a number of `uncertainties`; an array of such numbers as it is."""
+    if not hasattr(number, "nominal_value"):
+        return number
+    value, u = float(number.nominal_value), float(number.std_dev)
+    determined = not math.isnan(value)
+    return Quantity(value if determined else None, None if math.isnan(u) else u, unit, None, number)
+
+
+def correlate(quantities: Sequence[Quantity], covariance: ArrayLike | None) -> list[Quantity]:
+    """Return the quantities of one fit with its correlations; as they are where it has no covariance.
+
+    Args:
+        quantities: with u.
+        covariance: shape (p, p), in their order and units.
+    """
+    from uncertainties import correlated_values_norm
+
+    if covariance is None or any(one.value is None or not one.u for one in quantities):
+        return list(quantities)
+    table = np.array(covariance, dtype=float)
+    scale = np.sqrt(np.diagonal(table))
+    if not (np.isfinite(table).all() and (scale > 0).all()):
+        return list(quantities)
+    numbers = correlated_values_norm([(one.n, one.s) for one in quantities], table / np.outer(scale, scale))
+    return [
+        Quantity(one.value, one.u, one.unit, one.interval, number)
+        for one, number in zip(quantities, numbers, strict=True)
+    ]
+
+
+class NoSuchName(UsageError, KeyError):
+    """A name that a result lacks."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])  # not as KeyError, in quotes
+
+
+class Named(dict[str, V]):
+    """Values by their names; a missing name raises an error that says where it stands instead.
+
+    Attributes:
+        what: which names these are, for messages.
+        elsewhere: name → where it is found.
+    """
+
+    def __init__(self, values: Mapping[str, V], what: str, elsewhere: Mapping[str, str] | None = None) -> None:
+        super().__init__(values)
+        self.what, self.elsewhere = what, dict(elsewhere or {})
+
+    def __missing__(self, name: str) -> V:
+        where = self.elsewhere.get(name)
+        known = f"known are {', '.join(self) or 'none'}"
+        raise NoSuchName(str(name), f"not among {self.what}: {f'take result.{where}' if where else known}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (dict(self), self.what, self.elsewhere)

@@ -1,0 +1,147 @@
+"""What people type who know lmfit, pandas and xarray: each guess of a round of new users, as they typed it."""
+
+from __future__ import annotations
+
+import pickle
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import levilab
+from support.paths import SAMPLE_DATA
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+#: Spin of the disc law with the constant of the first sample, at the times of its readings [Hz].
+T = np.arange(0.0, 200.0, 10.0)
+
+
+def _disc(t: np.ndarray) -> np.ndarray:
+    return 40.0 / (1 + 0.5 * 2.37e-4 * np.sqrt(2 * np.pi * 40.0) * t) ** 2
+
+
+#: What is typed → whether the answer is right.
+GUESSES: dict[str, Callable[[Any], object]] = {
+    # a run
+    "run._repr_html_()": lambda html: "spin run" in html,
+    "run.to_dataframe()": lambda frame: len(frame) == 20,
+    "run.df": lambda frame: list(frame.columns) == ["time_s", "spin_frequency_hz", "spin_frequency_u_hz"],
+    "run['spin_frequency_hz']": lambda series: series.iloc[0] == 39.93,
+    "run.path": lambda path: path == SAMPLE_DATA / "spin-down-1",
+    "len(run)": lambda count: count == 20,
+    "run.plot()": lambda figure: len(figure.axes) == 1,
+    "run.analyze()": lambda result: result.kind == "spindown",
+    # a result
+    "result._repr_html_()": lambda html: "spin-down-1" in html,
+    "str(result)": lambda text: "c32 = 0.0002369(4)" in text,
+    "result.values['c32']": lambda c: c.value == pytest.approx(2.3686e-4, abs=1e-8),
+    "result['c32']": lambda c: c.u == pytest.approx(3.84e-7, rel=0.01),
+    "result.params": lambda params: list(params) == ["start_frequency", "c32"],
+    "result.best_model": lambda law: law == "disc",
+    "result.models['newton']['c2'].unit": lambda unit: unit == "1/rad",
+    "result.fit_report()": lambda text: "disc (best): n = 20" in text and "c32 = +0.768" in text,
+    "result.residuals": lambda residuals: np.std(residuals) == pytest.approx(0.036, abs=0.002),
+    "result.predict(0.0)": lambda f: f == pytest.approx(39.941, abs=0.001),
+    "result.plot()": lambda figure: len(figure.axes) > 5,
+    "pickle.loads(pickle.dumps(result)).values == result.values": bool,
+    "help(levilab.analyze)": lambda _: True,
+    # a quantity
+    "float(result['c32'])": lambda value: value == pytest.approx(2.3686e-4, abs=1e-8),
+    "result['c32'].n, result['c32'].s": lambda pair: pair[0] > 600 * pair[1] > 0,
+    "result['c32'] * 2": lambda twice: f"{twice}" == "0.0004737(8) (rad/s)^-1/2/s",
+    # a motion
+    "motion._repr_html_()": lambda html: "undriven" in html,
+    "motion.to_dataframe().plot(x='time_s', y='z_m')": lambda axes: len(axes.lines) == 1,
+    "motion.position": lambda position: position.shape == (101, 3),
+    "motion.z": lambda height: 0.07 < height.min() < height.max() < 0.075,
+    "motion.to_xarray()": lambda data: data["z_m"].sel(time_s=0.0).item() == pytest.approx(0.071),
+    "levilab.simulate('undriven', 0.1, settings={'start.spin_hz': 20}).spin_hz[0]": lambda f: f == pytest.approx(20),
+    # data in many forms
+    "levilab.analyze(frame)": lambda result: result.kind == "spindown",
+    "levilab.analyze([folder / 'spin-down-1', folder / 'spin-down-2'])": lambda result: len(result.inputs) == 2,
+    "levilab.analyze((t, f))": lambda result: "c32" in result.models["disc"],
+}
+#: Wrong guesses → what the error says instead.
+REFUSED = {
+    "levilab.simulate('undrivn')": "did you mean undriven?",
+    "levilab.acquire('spinn', mock=True)": "spin, trace, field",
+    "levilab.load(folder)": "levilab.runs lists",
+    "result['c1']": "not among the values of this result (its best law is disc): take result.models['stokes']['c1']",
+    "result.models['disk']": "known are stokes, newton, disc",
+    "result.predict(0.0, 'disk')": "known are stokes, newton, disc",
+    "result.models['disc']['c32'] + result.models['stokes']['c1']": "unlike units",
+    "levilab.analyze((t,))": "arrays of time_s, spin_frequency_hz",
+    "levilab.analyze((t, f[1:]))": "arrays of one length",
+}
+
+
+@pytest.fixture(scope="module")
+def names() -> dict[str, Any]:
+    run = levilab.load(SAMPLE_DATA / "spin-down-1")
+    return {
+        "levilab": levilab,
+        "pickle": pickle,
+        "run": run,
+        "result": levilab.analyze(run),
+        "motion": levilab.simulate("undriven", 1),
+        "frame": run.to_dataframe(),
+        "folder": SAMPLE_DATA,
+        "t": T,
+        "f": _disc(T) + np.random.default_rng(1).normal(0.0, 0.03, T.size),
+    }
+
+
+@pytest.mark.parametrize("typed", GUESSES)
+def test_a_natural_guess_works(typed: str, names: dict[str, Any], tmp_path: Path) -> None:
+    assert GUESSES[typed](eval(typed, names | {"folder_of_test": tmp_path}))
+
+
+@pytest.mark.parametrize("typed", REFUSED)
+def test_a_wrong_guess_is_told_the_right_one(typed: str, names: dict[str, Any]) -> None:
+    with pytest.raises(levilab.LevilabError) as raised:
+        eval(typed, names)
+    assert REFUSED[typed] in str(raised.value)
+
+
+def test_parameters_of_a_fit_are_correlated_as_it_says(names: dict[str, Any]) -> None:
+    start, c = names["result"].params.values()
+    covariance = np.array(names["result"].document["models"][2]["covariance"])
+    total = start.to_ufloat() + 1e5 * c.to_ufloat()  # of like sizes
+    weights = np.array([1.0, 1e5])
+    assert total.std_dev == pytest.approx(float(np.sqrt(weights @ covariance @ weights)), rel=1e-6)
+    assert total.std_dev > 1.2 * float(np.hypot(start.u, 1e5 * c.u))
+    assert (c - names["result"].models["disc"]["c32"]).u == 0
+    assert (1 - 2 * c / c).n == -1
+    of_another = levilab.analyze(SAMPLE_DATA / "spin-down-2")["c32"]
+    assert (of_another - c).u == pytest.approx(float(np.hypot(of_another.u, c.u)))
+
+
+def test_the_laws_of_each_of_several_runs_have_their_keys() -> None:
+    both = levilab.analyze([SAMPLE_DATA / "spin-down-1", SAMPLE_DATA / "spin-down-2"])
+    each = [models["disc"]["c32"] for models in both.models_by_input.values()]
+    assert both["c32"].value == pytest.approx(np.mean([c.n for c in each]))
+    assert both.predict([0.0], input="spin-down-2")[0] == pytest.approx(40.07, abs=0.02)
+    with pytest.raises(levilab.LevilabError, match="say one of spin-down-1, spin-down-2"):
+        both.predict(0.0)
+
+
+def test_arrays_are_named_by_the_analysis_that_is_chosen() -> None:
+    assert levilab.analyze(np.array([21.0, 22.0, 23.0]), "limit")["mean"].n == 22.0
+    scan = levilab.load(SAMPLE_DATA / "field-scan").df[["height_m", "flux_density_t"]]
+    of_arrays = levilab.analyze(scan.to_numpy(), "field", device=SAMPLE_DATA / "device.toml")
+    of_frame = levilab.analyze(scan, "field", device=SAMPLE_DATA / "device.toml")
+    assert of_arrays.values == of_frame.values
+    assert of_frame.predict(scan["height_m"]) == pytest.approx(scan["flux_density_t"], abs=3e-4)  # three of its scatter
+
+
+def test_a_pickle_of_a_dataframes_result_can_be_saved_and_drawn(tmp_path: Path) -> None:
+    time = np.arange(6000) / 3000.0
+    light = 1.0 * (np.abs((25.0 * time) % 1 - 0.5) < 0.03) + np.random.default_rng(1).normal(0, 0.01, time.size)
+    pickled = pickle.dumps(levilab.analyze(pd.DataFrame({"time_s": time, "light_v": light})))
+    result = pickle.loads(pickled)
+    assert result.plot().axes
+    assert {path.name for path in result.save(tmp_path)} >= {"DataFrame.csv", "DataFrame.csv.result.spin.json"}
