@@ -1,22 +1,18 @@
 """Make sample_data/video/top.mp4: a synthetic film of a top from above, as a phone's slow motion has it.
 
-The virtual camera of the tests films a top of 25.30 g that is simulated in full motion: 208 × 208 pixels of 0.5 mm, at
-times 3.3 and 5 ms apart, with an exposure of 1 ms, a rolling shutter of 10 µs a row, and noise.  Its bytes depend on
-the processor and the version of FFmpeg.  Run it from anywhere: ``python sample_data/film.py``.
+The virtual camera films a top of 25.30 g that is simulated in full motion: 208 × 208 pixels of 0.5 mm, at times 3.3 and
+5 ms apart, with an exposure of 1 ms, a rolling shutter of 10 µs a row, and noise.  Its bytes depend on the processor
+and the version of FFmpeg.  Run it from anywhere: ``python sample_data/film.py``.
 """
 
-import sys
 from pathlib import Path
 
-from levilab.simulator import preset
+from make import TRACK_SCENE
+
+from levilab.animation.camera import Camera, film, flight_of, phone_times
+from levilab.simulator.scene import preset
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parent / "tests"))
-
-from make import TRACK_SCENE  # noqa: E402
-
-from support.camera import Camera, film, flight_of, phone_times  # noqa: E402
-
 SECONDS = 10.0
 CAMERA = Camera(width=208, height=208, line_time=10e-6, away=(2.3, -1.7))
 

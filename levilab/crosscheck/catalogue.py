@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from levilab.crosscheck.subjects import field, hold, limit, motion, phone, precession, spin, spindown, sway
+from levilab.crosscheck.subjects import field, hold, limit, motion, phone, precession, spin, spindown, sway, video
 
 #: Name → subject.
 SUBJECTS = MappingProxyType(
@@ -19,6 +19,7 @@ SUBJECTS = MappingProxyType(
             precession.SUBJECT,
             field.SUBJECT,
             sway.SUBJECT,
+            video.SUBJECT,
             hold.SUBJECT,
             limit.SUBJECT,
         )

@@ -118,11 +118,16 @@ def _number(text: str | None) -> float | None:
         return None
 
 
+def check_reader(path: Path) -> None:
+    """Raise NoFilm where the extra is not installed, by which a film is read and written."""
+    if find_spec("av") is None:
+        raise NoFilm(f"{path}: films need the extra video (av, which is not installed): {how_to_install('video')}")
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
     """Open a file; yields its container and its first film."""
-    if find_spec("av") is None:
-        raise NoFilm(f"{path}: films need the extra video (av, which is not installed): {how_to_install('video')}")
+    check_reader(path)
     import av
 
     try:

@@ -9,15 +9,16 @@ from analysis.film.circles import Circle, coarse, find_base, find_top
 from analysis.film.errors import NoTop
 from analysis.film.rim import fit_rim
 from analysis.film.view import compare_views
-from support.camera import BASE, RIM, Camera, Picture, level_flight
+from levilab.animation.camera import BASE, RIM, Camera, Pictures
+from support.flights import level_flight
 
 CAMERA = Camera()
 RADIUS = RIM / CAMERA.scale
 
 
 @pytest.fixture(scope="module")
-def shown() -> Picture:
-    return Picture(CAMERA, level_flight(1.0, 31.0))
+def shown() -> Pictures:
+    return Pictures(CAMERA, level_flight(1.0, 31.0))
 
 
 def centre(time: float) -> tuple[float, float]:

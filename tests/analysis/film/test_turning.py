@@ -9,7 +9,7 @@ from analysis.errors import TooFewReadings
 from analysis.film.errors import NoMark
 from analysis.film.mark import phases_of
 from analysis.film.turning import Turning, choices_of, spins_of_start, turning_of
-from support.camera import even_times, phone_times
+from levilab.animation.camera import even_times, phone_times
 
 NOISE = 1e-3  # of a phase [turns]
 

@@ -9,26 +9,16 @@ from itertools import islice
 import numpy as np
 import pytest
 
+from levilab.animation.camera import BASE, RIM, Camera, Pictures, even_times, film, flight_of, phone_times, write_film
 from levilab.errors import DataError, UsageError
 from levilab.formats.film import open_film, pictures
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import VideoOptions
 from levilab.pipelines.suits import save
 from levilab.simulator.scene import preset
-from support.camera import (
-    BASE,
-    RIM,
-    Camera,
-    Picture,
-    even_times,
-    film,
-    flight_of,
-    level_flight,
-    phone_times,
-    write_film,
-)
 from support.commands import command
 from support.equal import differences
+from support.flights import level_flight
 from support.paths import SAMPLE_DATA
 
 pytestmark = pytest.mark.skipif(util.find_spec("av") is None, reason="pip install 'levilab[video]'")
@@ -55,7 +45,7 @@ def analyze_film(path, options):
 
 def filmed(folder, name, take, times, **more):
     """A film of what is taken at each time."""
-    shown = Picture(CAMERA, LEVEL)
+    shown = Pictures(CAMERA, LEVEL)
     return write_film(folder / name, (shown.noisy(take(shown, time)) for time in times), times, **more)
 
 
@@ -199,7 +189,7 @@ def test_a_film_in_slow_motion_asks_for_its_rate(folder):
 
 
 def test_even_times_that_fold_the_spin_are_named_and_near_chooses(folder):
-    path = filmed(folder, "thirty.mp4", Picture.take, even_times(1.0, 30.0))
+    path = filmed(folder, "thirty.mp4", Pictures.take, even_times(1.0, 30.0))
     analysis = ANALYSES["video"].analyze([path], VideoOptions(rim_m=0.03))
     (doubtful,) = analysis.runs
     assert doubtful.spin is None
@@ -256,7 +246,7 @@ def test_a_film_is_recalled_from_its_result_and_reported_with_its_still(path, tm
 @pytest.mark.slow
 def test_a_top_that_falls_has_its_spin_then_as_a_limit_that_others_read(folder, tmp_path):
     flight = level_flight(4.0, 22.0, chirp=-0.06)
-    shown, times = Picture(CAMERA, flight), phone_times(3.8)
+    shown, times = Pictures(CAMERA, flight), phone_times(3.8)
     path = write_film(
         folder / "falls.mp4", (shown.noisy(shown.take(t) if t < 3.4 else shown.background) for t in times), times
     )

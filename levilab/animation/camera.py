@@ -1,6 +1,6 @@
 """A camera that films a simulated top from above: exposure, rolling shutter, blur, noise, codec, uneven times.
 
-It draws base and top as they are projected by one camera at a height; lenses are not modelled.
+It draws a dark base, and a lighter top with a light mark.  Lenses and perspective are not modelled.
 """
 
 from __future__ import annotations
@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.animation.poses import matrices, poses_of
+from levilab.formats.film import check_reader
 from levilab.simulator.single import simulate
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -98,15 +100,7 @@ def flight_of(scene: Scene, duration: float) -> Flight:
     return Flight(poses.times, poses.positions[:, 0], poses.positions[:, 1], yaw, back @ turn)
 
 
-def level_flight(duration: float, spin: float, chirp: float = -0.05, swing: float = 1e-3) -> Flight:
-    """Return a top that stays level and swings along a rosette: a motion without a simulation."""
-    t = np.linspace(-0.02, duration + 0.02, round(2000 * (duration + 0.04)))
-    x, y = swing * np.cos(2 * np.pi * 1.1 * t), 0.7 * swing * np.sin(2 * np.pi * 0.9 * t)
-    yaw = 2 * np.pi * (0.123 + spin * t + 0.5 * chirp * t**2)
-    return Flight(t, x, y, yaw, np.broadcast_to(np.eye(2), (t.size, 2, 2)))
-
-
-class Picture:
+class Pictures:
     """The pictures that a camera takes of a flight.
 
     Args:
@@ -135,14 +129,14 @@ class Picture:
         left, up = (round(v - reach) for v in (x0 + at[0][0] / camera.scale, y0 - at[1][0] / camera.scale))
         size = round(2 * reach)
         columns, rows = np.arange(left, left + size), np.arange(up, up + size)
-        picture = self.background.copy()
+        picture = np.array(self.background)
         seen = picture[up : up + size, left : left + size]
         seen[:] = sum(self._top(columns, rows, time + by, seen) for by in self._exposed()) / camera.parts
         return picture
 
     def _exposed(self) -> Array:
         camera = self._camera
-        return camera.exposure * ((np.arange(camera.parts) + 0.5) / camera.parts - 0.5)
+        return np.asarray(camera.exposure * ((np.arange(camera.parts) + 0.5) / camera.parts - 0.5))
 
     def _top(self, columns: Any, rows: Any, time: float, behind: Array) -> Array:
         camera = self._camera
@@ -162,7 +156,7 @@ class Picture:
         hub = _edge((0.2 * RIM - away) / soft)
         top = TOP + (MARK - TOP) * mark
         top += (HUB - top) * hub
-        return behind + (top - behind) * _edge((RIM - away) / soft)
+        return np.asarray(behind + (top - behind) * _edge((RIM - away) / soft))
 
     def noisy(self, picture: Array) -> NDArray[np.uint8]:
         """Return a picture as a sensor has it."""
@@ -188,29 +182,37 @@ def phone_times(duration: float) -> Array:
     return np.concatenate([[0.0], np.cumsum(steps)])[:-1]
 
 
-def write_film(path: Path, pictures: Any, times: Array, *, codec: str = "libx264", metadata: Any = None) -> Path:
-    """Write pictures as a film with their times."""
+def write_film(
+    path: Path,
+    pictures: Iterable[NDArray[np.uint8]],
+    times: Array,
+    *,
+    codec: str = "libx264",
+    metadata: Mapping[str, str] | None = None,
+) -> Path:
+    """Write pictures as a film with their times [s].  Raises NoFilm where the extra is not installed."""
+    check_reader(path)
     import av
 
+    h264 = codec == "libx264"
     with av.open(str(path), "w", options={"movflags": "use_metadata_tags"}) as file:
         file.metadata.update(metadata or {})
-        stream = None
+        stream: Any = None
         for time, picture in zip(times, pictures, strict=True):
             if stream is None:
-                options = {"crf": "18", "preset": "ultrafast"} if codec == "libx264" else {}
+                options = {"crf": "18", "preset": "ultrafast"} if h264 else {}
                 stream = file.add_stream(codec, rate=240, options=options)
                 stream.height, stream.width = picture.shape
-                stream.pix_fmt = "yuv420p" if codec == "libx264" else "yuvj420p"
+                stream.pix_fmt = "yuv420p" if h264 else "yuvj420p"
                 stream.time_base = stream.codec_context.time_base = CLOCK
             frame = av.VideoFrame.from_ndarray(picture, format="gray").reformat(format=stream.pix_fmt)
             frame.pts, frame.time_base = round(time / CLOCK), CLOCK
             file.mux(stream.encode(frame))
-        assert stream is not None
         file.mux(stream.encode())
     return path
 
 
-def film(path: Path, camera: Camera, flight: Flight, times: Array, **more: Any) -> Path:
-    """Film a flight."""
-    shown = Picture(camera, flight, more.pop("seed", 1))
-    return write_film(path, (shown.noisy(shown.take(t)) for t in times), times, **more)
+def film(path: Path, camera: Camera, flight: Flight, times: Array, *, codec: str = "libx264", seed: int = 1) -> Path:
+    """Film a flight at some times [s].  Raises NoFilm where the extra is not installed."""
+    shown = Pictures(camera, flight, seed)
+    return write_film(path, (shown.noisy(shown.take(t)) for t in times.tolist()), times, codec=codec)
