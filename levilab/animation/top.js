@@ -28,7 +28,7 @@ const AROUND = 96;          // facets around a part
  *     turned on it [rad], `drive` the drive's field as a part of its amplitude, −1 to 1;
  *   setPath(points, count): the line that the axis' end has drawn, a Float32Array of x, y, z [m];
  *   setSpin(sense): which way the arrow turns, 1, −1 or 0;
- *   setTheme(theme); show({path, axis, spin, drive}): what is seen, each true or false;
+ *   setTheme(theme); show({path, axis, spin, drive, top}): what is seen, each true or false;
  *   setPixel(size): lines are drawn no thinner than pixels of this size, as pixelOf returns it;
  *   axisEnd(position, quaternion): where the end of the drawn axis is then [m]; dispose(): free the graphics' memory.
  */
@@ -143,12 +143,13 @@ export function buildScene(THREE, parts, theme = "light") {
     setPose(position, quaternion, {washers: slipped = 0, drive: share = 0} = {}) {
       const n = along(quaternion), aside = Math.hypot(n.x, n.y);  // a simulated fall knows no ground
       const lower = points.reduce((least, [r, z]) => Math.min(least, n.z * z - aside * r), Infinity);
-      top.position.set(position[0] * scale, position[1] * scale, Math.max(position[2], bottom - lower) * scale);
+      const away = Math.hypot(position[0], position[1]), floor = away > inner && away < outer ? upper : bottom;
+      top.position.set(position[0] * scale, position[1] * scale, Math.max(position[2], floor - lower) * scale);
       top.quaternion.set(...quaternion);
       washers.rotation.z = slipped;
       leaning.position.copy(top.position);
       leaning.quaternion.setFromUnitVectors(upright, along(quaternion));
-      const from = bottom * scale, height = Math.max(top.position.z + lowest * scale - from, 0.01);
+      const from = floor * scale, height = Math.max(top.position.z + lowest * scale - from, 0.01);
       plumb.position.set(top.position.x, top.position.y, from + height / 2);
       plumb.scale.y = height;
       const radius = widest * scale * (1.2 + 0.04 * height);  // the higher, the softer
@@ -184,6 +185,7 @@ export function buildScene(THREE, parts, theme = "light") {
       if ("axis" in wanted) axis.visible = wanted.axis;
       if ("spin" in wanted) spin.visible = (spin.userData.wanted = wanted.spin) && spin.userData.there;
       if ("drive" in wanted && drive) drive.visible = wanted.drive;
+      if ("top" in wanted) top.visible = leaning.visible = plumb.visible = shadow.visible = wanted.top;
     },
 
     setTheme(name) {

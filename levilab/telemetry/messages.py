@@ -167,7 +167,8 @@ class Poses:
         step_s: from one to the next [s].
         position: of the centre of mass, shape (n, 3), float32 [m].
         quaternion: turns the body's axes to the room's; x, y, z, w; shape (n, 4), float32.
-        up: whether a top floats; where none does, position and quaternion are those of rest; shape (n,), bool.
+        up: whether a top floats, shape (n,), bool; where none does, position and quaternion are those of the top as it
+            fell and lies, or, without one, 0 and upright.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = _READ

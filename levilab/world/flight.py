@@ -16,6 +16,7 @@ from levilab.simulator.model import with_attitude
 from levilab.simulator.single import simulate
 from levilab.simulator.start import start_of
 from levilab.world.timeline import Timeline
+from levilab.world.tumble import tumble
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -93,11 +94,18 @@ class _Samples:
         return self.turns * math.copysign(1.0, rate), abs(rate)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Absent:
-    """No top is up from this time on [s]."""
+    """No top is up from a time on.
+
+    Attributes:
+        start: the time [s].
+        scene, state: of the top that fell then, shape (18,); None: there was none, or it was taken away.
+    """
 
     start: float
+    scene: Scene | None = None
+    state: Array | None = None
 
 
 class Flight:
@@ -243,14 +251,20 @@ class Flight:
 
         The states of a piece are not kept, so a piece is simulated once more, from its start and with its step, when
         the first of these is asked for: 1.5 ms for a second of motion, and nothing as long as no one looks.  Between
-        two states they change evenly: an arm that turns by 27° is nowhere off by more than 0.2°.
+        two states they change evenly: an arm that turns by 27° is nowhere off by more than 0.2°.  Of a top that fell
+        they say how it lies; without one they are 0.
 
         Args:
             times: shape (n,) [s].
         """
         place, axis, arm = (np.zeros((times.size, 3)) for _ in range(3))
         up = np.zeros(times.shape, dtype=np.bool_)
-        for piece, part in self._flying_pieces(times):
+        self.simulate_until(float(times.max(initial=0.0)))
+        for piece, part in self._pieces.pieces(times):
+            if isinstance(piece, _Absent):
+                if piece.scene is not None and piece.state is not None:
+                    place[part], axis[part], arm[part] = tumble(piece.scene, piece.state, times[part] - piece.start)
+                continue
             up[part] = True
             time, states = self._states_of(piece)
             for found, columns in ((place, R), (axis, N), (arm, ARM)):
@@ -302,7 +316,7 @@ class Flight:
         try:
             motion = self._motion(state)
         except LeftRange:  # it has hit the base, where the field is infinite
-            self._fall(begin)
+            self._fall(begin, state)
             return
         # a bench may run for hours: of all pieces only the first state is kept
         piece = _Flying(self._scene, state, motion.accuracy.step, self._slip, self._memory)
@@ -311,7 +325,7 @@ class Flight:
         self._pieces.append(begin, piece)
         _keep(self._samples, piece, samples, SAMPLED)
         if motion.fell is not None:
-            self._fall(motion.fell.time)
+            self._fall(motion.fell.time, motion.fell.state)
         else:
             self._state, self._known_until = motion.states[-1].copy(), float(motion.time[-1])
 
@@ -326,8 +340,9 @@ class Flight:
         self._step = motion.accuracy.step
         return motion
 
-    def _fall(self, time: float) -> None:
-        self._pieces.append(time, _Absent(time))
+    def _fall(self, time: float, state: Array | None = None) -> None:
+        """Let no top be up from a time on.  state: of one that fell, shape (18,); None: it was taken away."""
+        self._pieces.append(time, _Absent(time, None if state is None else self._scene, state))
         self._wait(time)
 
     def _wait(self, fallen: float) -> None:

@@ -39,7 +39,7 @@ def poses_of(position: Array, axis: Array, arm: Array, up: NDArray[np.bool_], *,
 
     Args:
         position: of the centre of mass, shape (n, 3) [m].
-        axis: up the stem, shape (n, 3).
+        axis: up the stem, shape (n, 3); 0 where there is no top.
         arm: to the mark on the rim, where the tape is, shape (n, 3).
         up: whether a top floats, shape (n,).
         start: time of the first [s].
@@ -47,6 +47,7 @@ def poses_of(position: Array, axis: Array, arm: Array, up: NDArray[np.bool_], *,
     """
     turned = np.zeros((up.size, 4), dtype=np.float32)
     turned[:, 3] = 1.0
-    if up.any():
-        turned[up] = quaternions(axis[up], arm[up])
-    return Poses(start, step, np.where(up[:, None], position, 0.0).astype(np.float32), turned, up)
+    is_there = np.any(axis, axis=1)
+    if is_there.any():
+        turned[is_there] = quaternions(axis[is_there], arm[is_there])
+    return Poses(start, step, np.where(is_there[:, None], position, 0.0).astype(np.float32), turned, up)

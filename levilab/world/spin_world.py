@@ -471,6 +471,7 @@ class SpinWorld:
     def poses(self, start: float, step: float, n: int) -> Poses:
         """Return a top upright and at rest, which turns; see :class:`World`."""
         upright, arm, up = self._upright(start + step * np.arange(n, dtype=np.float64))
+        upright = np.where(up[:, None], upright, 0.0)  # how it fell is not known
         return poses_of(FLOATS_M * upright, upright, arm, up, start=start, step=step)
 
     def magnetic_field(self, times: Array, place: Array) -> Array:

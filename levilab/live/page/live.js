@@ -150,10 +150,19 @@ function takePoses(pieces) {
   for (const piece of pieces) {
     seen.poses = piece.number;
     const up = piece.up, last = up.findLastIndex(Boolean);
+    const before = data.up;
     data.up = last === up.length - 1;
+    if (before && !data.up) markFall();
     if (last >= 0) data.lastUp = piece.start_s + last * piece.step_s;
     space.add(piece.start_s, piece.step_s, piece.position, piece.quaternion, up);
   }
+}
+
+/** Mark the fall in the last minutes, with the spin that was counted last. */
+function markFall() {
+  const spin = history.rows.findLast((row) => Number.isFinite(row[1]))?.[1];
+  history.mark(data.lastUp, spin ? `fell at ${spin.toFixed(1)} Hz` : "fell");
+  dirty.plot = true;
 }
 
 /** What is drawn of the top that is shown. */
@@ -199,7 +208,7 @@ function show() {
   const lost = bench?.lost?.length ? `the ${bench.lost.join(" and the ")} does not answer` : "";
   const running = about?.status === "running" || practice;
   const down = Boolean(practice) && data.up === false && Boolean(bench) && !bench.silent && !bench.folder;
-  const advice = !down ? "" : practice.guest ? "the top is down" : data.count ? "the top is down: “Analyze” the run, or “Top back”" : "the top is down: “Top back” floats it again";
+  const advice = !down ? "" : [bench.text || "the top is down", ...practice.guest ? [] : [data.count ? "“Analyze” the run, or “Top back”" : "“Top back” floats it again"]].join("; ");
   write("state-text", lost || LONGER[state] || advice || about?.problem || ended(about) || (running && !bench?.silent && bench?.text) || "");
   by("synthetic").hidden = !(about?.synthetic || (!about && bench?.virtual));
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
@@ -320,9 +329,9 @@ function showFacts(about) {
 function showTop(bench) {
   const pose = space?.state;
   if (!pose) return;
-  const height = `at ${fixed(pose.place[2] * 1000, 1)} mm`;
-  write("top-text", pose.up ? `floats ${height}` : "does not float");
-  by("space").setAttribute("aria-label", `the top over its base in three dimensions: it ${pose.up ? `floats ${height}` : "does not float"}`);
+  const said = pose.up ? `floats at ${fixed(pose.place[2] * 1000, 1)} mm` : pose.there ? "lies where it fell" : "is taken away";
+  write("top-text", said);
+  by("space").setAttribute("aria-label", `the top over its base in three dimensions: it ${said}`);
 }
 
 /** Say beside the oscilloscope that no top is up, that the run does not read it, and of each record how old it is, where it is old. */

@@ -83,7 +83,9 @@ export async function openSpace(canvas, description) {
     view.setSpin(ups[low] ? Math.sign((about.x * axis[0] + about.y * axis[1] + about.z * axis[2]) * about.w) : 0);
     const place = places[low].map((value, k) => value + share * (places[high][k] - value));
     view.setPose(place, one.slerp(two, share).toArray());
-    return {place, up: ups[low], time: playhead};
+    const there = ups[low] || place[2] !== 0;  // else it was taken away
+    view.show({top: there});
+    return {place, up: ups[low], there, time: playhead};
   }
 
   function resize() {

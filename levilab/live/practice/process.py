@@ -13,7 +13,8 @@ from functools import partial, singledispatchmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analysis.spindown.fall import FALLS_BETWEEN_HZ
+import numpy as np
+
 from instruments.clock import PacedClock
 from instruments.errors import InstrumentError
 from levilab.acquisition.failures import DidNotFollow, NoLight
@@ -39,6 +40,7 @@ from levilab.live.practice.commands import (
     SwitchDrive,
     TuneDrive,
 )
+from levilab.live.practice.fall import cause_of_fall
 from levilab.present.progress import Display
 from levilab.simulator.scene import read_scene
 from levilab.telemetry.messages import State
@@ -166,8 +168,12 @@ ADVICE: dict[type[ExperimentFailed], str] = {
     DidNotFollow: "put the top back if it is down, and record once more",
     NoLight: "put the top back, and record once more",
 }
-#: What a person can do about a top that the drive lost.
-AGAIN = "switch it off, match the spin, and go up more slowly"
+#: What a person can do about a top that the drive lost on the way up, on the way down, and where it stood still.
+AGAIN = {
+    1: "switch it off, match the spin, and go up more slowly",
+    -1: "switch it off, match the spin, and go down more slowly",
+    0: "switch it off, match the spin, and drive with more volts",
+}
 
 
 def _in_words(spin: float | None) -> str:
@@ -253,6 +259,8 @@ class PracticeProcess:
         self._text = ""  # what the drive does, for the page
         self._moved = 0.0  # bench time of the last step of the drive's frequency [s]
         self._tops = 0
+        self._up_since: float | None = 0.0  # when the top that floats was put there, bench time [s]
+        self._last_spin: float | None = None  # of that top [Hz]
         self._probe_m: float | None = None
         self._next_record = -math.inf  # by the publisher's clock
 
@@ -305,11 +313,10 @@ class PracticeProcess:
 
     def _measure(self, bench: Bench) -> None:
         """Read each instrument once."""
-        before = self._seen.values.get("spin_frequency_hz")
         spin = bench.counter.frequency()
         self._saw("spin_frequency_hz", spin)
-        if spin is None and before is not None and before <= max(FALLS_BETWEEN_HZ) and not self._floats():
-            self._note_fall(before)
+        self._last_spin = self._last_spin if spin is None else spin  # of one that leans the counter sees no light
+        self._look_at_top()
         self._go_on_with_hold(bench, spin)
         if self._hold is not None and self._hold.grip is not None and self._hold.is_under_way:
             return  # the drive yields to the top: no other instrument keeps it waiting
@@ -323,13 +330,17 @@ class PracticeProcess:
             for input_, channel in CHANNELS.items():
                 self._seen.records[channel] = self._seen.number, taken, bench.oscilloscope.trace(input_)
 
-    def _note_fall(self, spin: float) -> None:
-        """Say that the top fell because it was slow, and at which spin it was counted last [Hz]."""
-        if self._hold is not None:
-            self._hold.is_lost, self._text = True, ""
-        low, high = sorted(FALLS_BETWEEN_HZ)
-        slow = f"too slow for the spin to hold it up, as every top between {high:.0f} and {low:.0f} Hz"
-        self._report("message", f"the top fell at {spin:.1f} Hz, {slow}: put it back")
+    def _look_at_top(self) -> None:
+        """See whether the top has fallen since the last look, and say why."""
+        floats, now = self._floats(), self.clock.now()
+        if self._up_since is None:
+            self._up_since = now if floats else None
+        elif not floats:
+            after, self._up_since = now - self._up_since, None
+            driven = self._hold is not None and not self._hold.is_lost
+            if self._hold is not None:
+                self._hold.is_lost = True
+            self._say(cause_of_fall(self.scene, self._last_spin, after, driven=driven))
 
     def _saw(self, channel: str, value: float | None) -> None:
         if value is None:
@@ -455,6 +466,7 @@ class PracticeProcess:
         self._tops += 1
         self.world.take_top()
         self.world.float_top(self._tops)
+        self._up_since, self._last_spin, self._text = self.clock.now(), None, ""
         return "the top floats again"
 
     def _floats(self) -> bool:
@@ -605,9 +617,10 @@ class PracticeProcess:
             self._say(f"the top follows the drive at {drive:.2f} Hz", "the top follows the drive")
         elif off > LOST_HZ:
             hold.is_lost = True
+            again = AGAIN[int(np.sign(self._knobs.frequency_hz - drive))]
             self._say(
-                f"the drive has lost the top, {_in_words(spin)} under a drive of {drive:.2f} Hz: {AGAIN}",
-                f"the drive has lost the top: {AGAIN}",
+                f"the drive has lost the top, {_in_words(spin)} under a drive of {drive:.2f} Hz: {again}",
+                f"the drive has lost the top: {again}",
             )
         elif off <= SWINGS_HZ and drive >= hold.at_hz + TUNED_UP_HZ and not self._tuned_up:
             self._tuned_up = True
@@ -665,6 +678,7 @@ class PracticeProcess:
         else:
             text, status, folder = f"{run.status}: {run.count()} readings", run.status, str(run.folder)
         self._report("recorded", text, self._number, status=status, folder=folder)
+        self._up_since = self.clock.now() if self._floats() else None
         self._place_probe(self._probe_m)  # a run may have moved it
         if AFTER_A_RUN < self.clock.speed < math.inf:
             self.clock.speed = AFTER_A_RUN

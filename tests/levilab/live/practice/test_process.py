@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ from levilab.live.practice.commands import (
     SwitchDrive,
     TuneDrive,
 )
+from levilab.live.practice.fall import cause_of_fall
 from levilab.live.practice.process import PracticeOptions, PracticeProcess
 from levilab.runs.run import Run
 from levilab.simulator.scene import read_scene
@@ -206,7 +208,17 @@ def test_a_top_falls_near_the_edge_and_is_put_back(tmp_path: Path) -> None:
     assert math.isnan(script.spins(30.0, 33.0)[-1][2])
     assert [text.partition(", ")[0] for text in script.said("refused")] == 3 * ["the top is down"]
     assert script.said("done") == ["the top floats again"]
-    assert [text.partition(" Hz,")[0] for text in script.said("message")] == [f"the top fell at {counted[-1]:.1f}"]
+    low = 20.94  # levilab stability practice
+    (said,) = script.said("message")
+    assert said.startswith(
+        f"below {low:.1f} Hz the spin cannot hold the top, and one that wobbles falls sooner: it fell"
+    )
+    seen, after = (float(number) for number in re.findall(r"at ([\d.]+) Hz after (\d+) s$", said)[0])
+    assert seen == pytest.approx(counted[-1], abs=0.06)
+    fell = max(time for time, _, spin in script.spins(0.0, 33.0) if spin > 0)
+    assert after == pytest.approx(fell, abs=3.0)  # without pulses a count takes 2.5 s
+    assert [state.text for state in script.states if 31.0 < state.time_s < 33.0][-1] == said
+    assert script.states[-1].text == ""
     assert not list(tmp_path.iterdir())  # no run was begun
     assert script.spins(36.0, 39.0)[-1][2] == pytest.approx(25.0, abs=0.5)
 
@@ -216,10 +228,25 @@ def test_a_held_top_that_falls_for_want_of_spin_is_not_said_to_be_lost_by_the_dr
     script = carry_out(
         tmp_path, (2.0, MatchDrive()), (2.1, SwitchDrive(on=True)), (20.0, down), (45.0, None), start_hz=26.0
     )
-    assert [text.partition(" at ")[0] for text in script.said("message")][-2:] == [
-        "the top follows the drive",
-        "the top fell",
-    ]
+    follows, fell = script.said("message")[-2:]
+    assert follows.startswith("the top follows the drive at ")
+    assert fell.startswith("below 20.9 Hz the spin cannot hold the top")
+    assert fell.endswith(", held down there by its drive")
+
+
+@pytest.mark.parametrize(
+    ("changes", "spin", "said"),
+    [
+        ({}, 82.0, "near 83.7 Hz the top is too stiff for its axis to follow the field"),
+        ({}, 40.0, "the spin could hold it, from 20.9 to 83.7 Hz, so it swung too far: it fell at 40.0 Hz after 7 s"),
+        ({"base.tilt_rad": 0.02}, 22.0, "below 20.9 Hz the spin cannot hold the top"),
+        ({"top.mass_kg": 0.0252}, 30.0, "it could not float here, however it spins (a top of 25.2 g does not float"),
+        ({}, None, "it fell after 7 s, before its spin was counted"),
+    ],
+)
+def test_a_fall_is_told_with_its_cause(changes: dict[str, float], spin: float | None, said: str) -> None:
+    scene = read_scene("practice").changed(changes)
+    assert cause_of_fall(scene, spin, 7.0, driven=False).startswith(said)
 
 
 def test_what_the_bench_cannot_do_is_refused_with_what_to_do(session: Script) -> None:
