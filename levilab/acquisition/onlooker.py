@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -21,6 +21,8 @@ from levilab.telemetry.publisher import Publisher
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from numpy.typing import NDArray
+
     from instruments.drivers.oscilloscope import Trace
     from levilab.acquisition.session import Session
     from levilab.bench.bench import Bench
@@ -29,6 +31,9 @@ if TYPE_CHECKING:
 
 #: Interval at which a record is sent again [s].
 _AGAIN_EVERY_S = 1.0
+#: What a virtual bench's oscilloscope would show is drawn so often [s of the wall]: length [s], step [s].  A trigger
+#: comes in the first 70 ms of it, of a top at 15 Hz.
+_DRAWN_EVERY_S, _DRAWN_S, _DRAWN_STEP_S = 0.15, 0.24, 4e-4
 #: Of a bench that jumps ahead only the last part of its motion is shown [s].
 _SHOWN_S = 1.0
 
@@ -40,10 +45,29 @@ class Sent:
     Attributes:
         records: channel → its last record that was sent, and when [s of the wall].
         pose: number of the next pose to be sent, counted from bench time 0.
+        drawn: number of the last records that were drawn from signals, and when [s of the wall].
     """
 
     records: dict[str, tuple[Record, float]] = field(default_factory=dict)
     pose: int = 0
+    drawn: tuple[int, float] = (0, -math.inf)
+
+    def send_scope(
+        self, publisher: Publisher, records: dict[str, tuple[int, float, Trace]], signals: Signals, now: float
+    ) -> None:
+        """Send the records that a run takes; where it takes none, what an oscilloscope would show up to now [s].
+
+        To read an oscilloscope would keep the counter waiting; a virtual bench knows its signals anyway.
+        """
+        number, when = self.drawn
+        if records:
+            self.send_new_records(publisher, records)
+        elif publisher.clock() - when >= _DRAWN_EVERY_S:
+            self.drawn = number + 1, publisher.clock()
+            n = round(_DRAWN_S / _DRAWN_STEP_S)
+            for channel, signal in signals.items():
+                volts = signal(now - _DRAWN_S, _DRAWN_STEP_S, n).astype(np.float32)
+                publisher.send(Record(number + 1, channel, now, 0.0, _DRAWN_STEP_S, volts, volts, drawn=True))
 
     def send_new_records(self, publisher: Publisher, records: dict[str, tuple[int, float, Trace]]) -> None:
         """Send the records that are new, and each again every second, for views that came later."""
@@ -67,6 +91,8 @@ class Sent:
             publisher.send(poses(begin / POSES_PER_S, 1 / POSES_PER_S, end - begin))
 
 
+#: What an oscilloscope would show → first time [s], step [s], number → its voltages [V].
+Signals = Mapping[str, Callable[[float, float, int], "NDArray[np.float64]"]]
 #: What makes an onlooker of an acquisition at a bench, for the time of a context.
 Watch = Callable[["Session[Any]", "Wiring"], AbstractContextManager[Callable[[], None]]]
 
@@ -75,7 +101,7 @@ Watch = Callable[["Session[Any]", "Wiring"], AbstractContextManager[Callable[[],
 def publishing(session: Session[Any], wiring: Wiring) -> Iterator[Onlooker]:
     """Yield an onlooker that publishes for views; its address stands in the run folder until the context ends."""
     with Publisher() as publisher:
-        yield Onlooker(session, publisher, wiring.poses)
+        yield Onlooker(session, publisher, wiring.poses, wiring.signals)
 
 
 @dataclass
@@ -86,11 +112,13 @@ class Onlooker:
         session: the acquisition.
         publisher: to the views; it is announced in the run folder.
         poses: first time [s], step [s], number → where the top of a virtual bench is; None on a real one.
+        signals: what an oscilloscope would show → the same → its voltages [V]; none on a real bench.
     """
 
     session: Session[Any]
     publisher: Publisher
     poses: Callable[[float, float, int], Poses] | None = None
+    signals: Signals = field(default_factory=dict)
     _sent: Sent = field(default_factory=Sent)
 
     def __call__(self) -> None:
@@ -104,7 +132,7 @@ class Onlooker:
             self.session.show.state(state)
         if to_views:
             self.publisher.send(state)
-            self._sent.send_new_records(self.publisher, self.session.doing.records)
+            self._sent.send_scope(self.publisher, self.session.doing.records, self.signals, state.time_s)
             self._sent.send_poses(self.publisher, self.poses, state.time_s)
 
 
@@ -170,4 +198,4 @@ def record_of(number: int, channel: str, time_s: float, trace: Trace) -> Record:
     volts = [part * np.float32(trace.volts_per_code) + np.float32(trace.offset_v) for part in (low, high)]
     if trace.volts_per_code < 0:
         volts.reverse()
-    return Record(number, channel, time_s, trace.t0_s, each * trace.dt_s, *volts)
+    return Record(number, channel, time_s, trace.t0_s, each * trace.dt_s, volts[0], volts[1])

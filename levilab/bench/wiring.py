@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from instruments.clock import Clock, WallClock
@@ -33,7 +33,8 @@ class Wiring:
     instruments: kind → model and address, for those that the bench has; limits: what the coil stands; library:
     PyVISA's, or a virtual one; clock: of the bench; count_with: the kind of instrument that counts; person: who stands
     at it; poses: of a virtual bench: first time [s], step [s], number → where its top is, for a view; camera: the
-    same → the places of that top in films from above and from the side, shape (n, 3) [m].
+    same → the places of that top in films from above and from the side, shape (n, 3) [m]; signals: what an oscilloscope
+    would show → the same → its voltages, shape (n,) [V], for a view.
     """
 
     instruments: Mapping[str, InstrumentSettings]
@@ -44,6 +45,7 @@ class Wiring:
     person: Person = ask_no_person
     poses: Callable[[float, float, int], Poses] | None = None
     camera: Callable[[float, float, int], NDArray[np.float64]] | None = None
+    signals: Mapping[str, Callable[[float, float, int], NDArray[np.float64]]] = field(default_factory=dict)
 
     def describe(self, kind: str) -> InstrumentSettings:
         """Return the settings of an instrument, of the one that counts for a counter.

@@ -142,6 +142,7 @@ class Record:
         step_s: length of a step [s].
         low: shape (n,), float32 [V].
         high: shape (n,), float32 [V].
+        drawn: whether a virtual bench drew it from its signals, and no oscilloscope was read.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = _READ
@@ -153,6 +154,7 @@ class Record:
     step_s: float
     low: Annotated[NDArray[np.float32], _must_be(np.float32)]
     high: Annotated[NDArray[np.float32], _must_be(np.float32)]
+    drawn: bool = False
 
     def __post_init__(self) -> None:
         _same_length(self.low, self.high)

@@ -206,9 +206,12 @@ def virtual_wiring(world: World, limits: Limits | None = None, models: Mapping[s
     """
     library = library_for(virtual_bus(world, models))
     instruments = virtual_instruments(models)
-    person, poses = VirtualPerson(world), world.poses
-    films = Camera(world)
-    return Wiring(instruments, limits or Limits(), library, world.clock, person=person, poses=poses, camera=films)
+    signals = dict(zip(("tape", "drive", "laser"), scope_signals(world).values(), strict=True))
+    person = VirtualPerson(world)
+    return Wiring(
+        instruments, limits or Limits(), library, world.clock,
+        person=person, poses=world.poses, camera=Camera(world), signals=signals,
+    )  # fmt: skip
 
 
 class VirtualPerson:

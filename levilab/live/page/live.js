@@ -334,12 +334,14 @@ function showTop(bench) {
   by("space").setAttribute("aria-label", `the top over its base in three dimensions: it ${said}`);
 }
 
-/** Say beside the oscilloscope that no top is up, that the run does not read it, and of each record how old it is, where it is old. */
+/** Say beside the oscilloscope that no top is up, that no instrument is read, and of each record how old it is, where it is old. */
 function showAge(bench) {
-  const used = Object.keys(data.about?.instruments || {});
-  const still = data.about?.status === "running" && used.length && !used.includes("oscilloscope");
-  const why = still ? `a ${data.about.experiment} run does not read it` : "";
+  const used = Object.keys(data.about?.instruments || {}), runs = data.about?.status === "running";
+  const drawn = [...data.records.values()].some((one) => one.drawn);
+  const still = runs && used.length && !used.includes("oscilloscope") ? `a ${data.about.experiment} run does not read it` : "";
+  const why = still && drawn ? `${still}: the simulated signals` : still;
   write("scope-key", [data.up === false ? "the top is down" : "", why].filter(Boolean).join("; "));
+  by("trigger-of").hidden = !drawn;
   for (const one of data.records.values()) {
     const said = ageOf(one, bench);
     if (one.said === said) continue;
@@ -390,7 +392,7 @@ function draw() {
     dirty.trace = false;
     const place = ({channel}) => CHANNELS.indexOf(channel);  // they may come in any order
     const records = [...data.records.values()].sort((one, two) => place(one) - place(two));
-    const said = [drawRecords(papers.trace, records), by("scope-key").textContent];
+    const said = [drawRecords(papers.trace, records, by("source").value), by("scope-key").textContent];
     by("trace").setAttribute("aria-label", said.filter(Boolean).join("; "));
   }
 }
@@ -445,6 +447,7 @@ function pause() {
   if (!paused && by("said").textContent === PAUSED) write("said", "");
 }
 by("pause").addEventListener("click", pause);
+by("source").addEventListener("change", () => { dirty.trace = true; });
 by("help").addEventListener("click", () => by("keys").showModal());
 by("drawn").addEventListener("change", () => {
   seen.readings = seen.tick = pointed = -1;

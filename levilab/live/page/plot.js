@@ -264,13 +264,38 @@ const LEAST_SPAN_V = 0.8;
 /** A record with something said of it is old: it is drawn so faintly. */
 const FAINT = 0.45;
 
+/** What is seen of records that the page triggers, and how much of that before the trigger [s]. */
+const SWEEP_S = 0.15, BEFORE_S = 0.015;
+/** A signal that moves by less is none, and triggers nothing [V]. */
+const LEAST_SIGNAL_V = 0.3;
+
+/** When a record first rises through its middle, at least BEFORE_S after its beginning [s]; NaN where it does not. */
+export function triggerOf({low, high, start_s, step_s}) {
+  const [from, to] = range([low, high]), level = (from + to) / 2;
+  if (to - from < LEAST_SIGNAL_V) return NaN;
+  for (let k = Math.ceil(BEFORE_S / step_s); k + 1 < high.length; k += 1) {
+    if (high[k] < level && high[k + 1] >= level) return start_s + (k + (level - high[k]) / (high[k + 1] - high[k])) * step_s;
+  }
+  return NaN;
+}
+
+/** The record that triggers: of the drive where it is on and wanted, else of the tape; and when it does [s]. */
+function trigger(records, source) {
+  for (const channel of [source, "drive", "tape"]) {
+    const one = records.find((record) => record.drawn && record.channel === channel), at = one ? triggerOf(one) : NaN;
+    if (Number.isFinite(at)) return [channel, at];
+  }
+  return ["", NaN];
+}
+
 /**
  * Draw the oscilloscope's screen: each channel's latest record, one below the other, on one scale of time.
  *
- * @param records channel, low, high, start_s, step_s, and said: how old it is, "" for a new one.
+ * @param records channel, low, high, start_s, step_s, drawn, and said: how old it is, "" for a new one.
+ * @param {string} source the channel that triggers records which were drawn; another one where it has no pulse.
  * @returns the same as text.
  */
-export function drawRecords(paper, records) {
+export function drawRecords(paper, records, source) {
   const paint = colours(), {context: c} = paper;
   const [width, height] = paper.fit();
   c.strokeStyle = paint.graticule;
@@ -286,8 +311,17 @@ export function drawRecords(paper, records) {
     c.fillText("no record yet", width / 2, height / 2);
     return "no record yet";
   }
-  const begin = Math.min(...records.map((one) => one.start_s));
-  const end = Math.max(...records.map((one) => one.start_s + one.step_s * one.low.length));
+  const [by, triggered] = trigger(records, source), first = Math.min(...records.map((one) => one.start_s));
+  const begin = by ? triggered - BEFORE_S : first;
+  const drawn = records.every((one) => one.drawn);
+  const end = by || drawn ? begin + SWEEP_S : Math.max(...records.map((one) => one.start_s + one.step_s * one.low.length));
+  if (by) {  // the moment of the trigger, as scopes mark it
+    const x = (triggered - begin) / (end - begin) * width;
+    c.fillStyle = paint[`trace-${records.findIndex(({channel}) => channel === by) % 4 + 1}`];
+    c.beginPath();
+    for (const [dx, y] of [[-5, 0], [5, 0], [0, 8]]) c.lineTo(x + dx, y);
+    c.fill();
+  }
   const said = [];
   records.forEach((one, channel) => {
     const [from, to] = range([one.low, one.high]);
@@ -310,12 +344,12 @@ export function drawRecords(paper, records) {
     c.fillStyle = c.strokeStyle;
     c.textAlign = "left";
     c.textBaseline = "top";
-    c.fillText(`${one.channel}  ${short(from, 3)} … ${short(to, 3)} V${old}`, 8, channel * band + 6);
-    said.push(`${one.channel} from ${short(from, 3)} to ${short(to, 3)} volts${old}`);
+    c.fillText(`${one.channel}  ${short(from, 2)} … ${short(to, 2)} V${old}`, 8, channel * band + 6);
+    said.push(`${one.channel} from ${short(from, 2)} to ${short(to, 2)} volts${old}`);
   });
   c.fillStyle = paint.dim;
   c.textAlign = "right";
   c.textBaseline = "top";
-  c.fillText(`${short((end - begin) * 100, 3)} ms a division`, width - 8, 6);
-  return `${said.join(", ")}, over ${short((end - begin) * 1000, 3)} milliseconds`;
+  c.fillText(`${short((end - begin) * 100, 3)} ms a division${by ? `, triggered by the ${by}` : ""}`, width - 8, 6);
+  return `${said.join(", ")}, over ${short((end - begin) * 1000, 3)} milliseconds${by ? `, triggered by the ${by}` : ""}`;
 }

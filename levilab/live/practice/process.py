@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial, singledispatchmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,7 +51,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from multiprocessing.connection import Connection
 
-    from instruments.drivers.oscilloscope import Trace
     from levilab.acquisition.session import Session
     from levilab.bench.bench import Bench
     from levilab.bench.wiring import Wiring
@@ -62,10 +61,6 @@ if TYPE_CHECKING:
 
 #: Between runs the counter counts for so long [s], as the light of the tape passes this level [V].
 GATE_S, TRIGGER_V = 0.5, 0.6
-#: Between runs the oscilloscope's records: what its channels show, duration [s], samples, volts of a division, and
-#: least time of the wall between two [s].
-CHANNELS = {1: "tape", 2: "drive", 3: "laser"}
-RECORD_S, SAMPLES, VOLTS_PER_DIVISION = 0.2, 1000, 2.0
 #: The drive's frequency moves in even steps of about this time [s]; with uneven ones the top swings about the drive.
 RAMP_STEP_S = 0.5
 #: The drive can take hold of a top that spins as fast as it is set, within this [Hz].
@@ -148,21 +143,6 @@ class Hold:
         return self.since is None
 
 
-@dataclass
-class Seen:
-    """What the instruments answered last, between runs.
-
-    Attributes:
-        values: channel → value.
-        records: of the oscilloscope, as `Doing` has them.
-        number: of the last record.
-    """
-
-    values: dict[str, float] = field(default_factory=dict)
-    records: dict[str, tuple[int, float, Trace]] = field(default_factory=dict)
-    number: int = 0
-
-
 #: What a person can do at this bench about a run that failed.
 ADVICE: dict[type[ExperimentFailed], str] = {
     DidNotFollow: "put the top back if it is down, and record once more",
@@ -243,7 +223,8 @@ class PracticeProcess:
         self._options, self._pipe, self._publisher, self._end = options, pipe, publisher, end
         self._report = partial(_report, pipe)
         self._wiring: Wiring = virtual_wiring(world, Limits())
-        self._knobs, self._seen, self._sent = Knobs(), Seen(), Sent()
+        self._knobs, self._sent = Knobs(), Sent()
+        self._seen: dict[str, float] = {}  # channel → what the instruments answered last, between runs
         self._bench: Bench | None = None  # open between runs
         self._session: Session[Any] | None = None  # of the run that is recorded
         self._folder = ""
@@ -262,7 +243,6 @@ class PracticeProcess:
         self._up_since: float | None = 0.0  # when the top that floats was put there, bench time [s]
         self._last_spin: float | None = None  # of that top [Hz]
         self._probe_m: float | None = None
-        self._next_record = -math.inf  # by the publisher's clock
 
     # --- the bench ---
 
@@ -301,15 +281,6 @@ class PracticeProcess:
     def _set_up(self, bench: Bench) -> None:
         bench.counter.prepare(gate_s=GATE_S, trigger_level_v=TRIGGER_V)
         bench.magnetometer.prepare(range_t=None)
-        bench.oscilloscope.prepare(
-            channels=tuple(CHANNELS),
-            duration_s=RECORD_S,
-            points=SAMPLES,
-            volts_per_division=VOLTS_PER_DIVISION,
-            trigger_level_v=TRIGGER_V,
-            trigger_source=1,
-            sweep="auto",
-        )
 
     def _measure(self, bench: Bench) -> None:
         """Read each instrument once."""
@@ -321,14 +292,6 @@ class PracticeProcess:
         if self._hold is not None and self._hold.grip is not None and self._hold.is_under_way:
             return  # the drive yields to the top: no other instrument keeps it waiting
         self._saw("flux_density_t", bench.magnetometer.flux_density())
-        now = self._publisher.clock()
-        if self._publisher.is_watched and now >= self._next_record:
-            self._next_record = now + 0.5
-            bench.oscilloscope.acquire(timeout_s=1.0)
-            taken = self.clock.now()  # the record's way to this computer takes longer
-            self._seen.number += 1
-            for input_, channel in CHANNELS.items():
-                self._seen.records[channel] = self._seen.number, taken, bench.oscilloscope.trace(input_)
 
     def _look_at_top(self) -> None:
         """See whether the top has fallen since the last look, and say why."""
@@ -344,9 +307,9 @@ class PracticeProcess:
 
     def _saw(self, channel: str, value: float | None) -> None:
         if value is None:
-            self._seen.values.pop(channel, None)
+            self._seen.pop(channel, None)
         else:
-            self._seen.values[channel] = value
+            self._seen[channel] = value
 
     # --- what goes on meanwhile ---
 
@@ -399,8 +362,8 @@ class PracticeProcess:
         if not self._publisher.is_due():
             return
         self._publisher.send(self.state())
-        records = self._seen.records if self._session is None else self._session.doing.records
-        self._sent.send_new_records(self._publisher, records)
+        records = {} if self._session is None else self._session.doing.records
+        self._sent.send_scope(self._publisher, records, self._wiring.signals, self.clock.now())
         self._sent.send_poses(self._publisher, self._wiring.poses, self.clock.now())
 
     def state(self) -> State:
@@ -419,9 +382,7 @@ class PracticeProcess:
             drive = replace(
                 drive, waveform=knobs.waveform, frequency_hz=knobs.frequency_hz, amplitude_vpp=knobs.amplitude_vpp
             )
-        return State(
-            self.clock.now(), text=self._text, last=dict(self._seen.values), drive=drive, counting=counting, **here
-        )
+        return State(self.clock.now(), text=self._text, last=dict(self._seen), drive=drive, counting=counting, **here)
 
     # --- commands ---
 
@@ -488,7 +449,7 @@ class PracticeProcess:
 
     @_carry_out.register
     def _(self, command: MatchDrive) -> str:
-        spin = self._seen.values.get("spin_frequency_hz")
+        spin = self._seen.get("spin_frequency_hz")
         if spin is None:
             raise CommandRefused("the counter sees no top whose spin the drive could be set to: put the top back first")
         if self._knobs.on:
@@ -524,7 +485,7 @@ class PracticeProcess:
             return f"the drive is on at {knobs.frequency_hz:g} Hz already"
         self._check(knobs)
         knobs.on = True
-        spin = self._seen.values.get("spin_frequency_hz")
+        spin = self._seen.get("spin_frequency_hz")
         if spin is not None and abs(spin - knobs.frequency_hz) <= CATCHES_WITHIN_HZ:
             self._hold = Hold(knobs.frequency_hz)
             return f"the drive comes on after the next count, at the top's spin, {spin:.2f} Hz"
@@ -668,8 +629,7 @@ class PracticeProcess:
 
     def _record(self, command: RecordRun) -> None:
         """Carry out an experiment; whatever ends it, the bench goes on."""
-        self._seen.values.clear()
-        self._seen.records.clear()  # else views get them once more when the run is over
+        self._seen.clear()
         self._folder = ""  # a run may fail before it has one
         try:
             run = acquire(self._request(command), LinesToReport(partial(self._report, "message")), self._watching)

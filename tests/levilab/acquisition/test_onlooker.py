@@ -34,7 +34,7 @@ def watched(out, experiment="spin", *settings):
     def watch(session, wiring):
         wall = [0.0]
         with Publisher(lambda: wall[0]) as publisher:
-            look = Onlooker(session, publisher, wiring.poses)
+            look = Onlooker(session, publisher, wiring.poses, wiring.signals)
             look()
             found = read_address(session.writer.folder)
             assert found == publisher.address is not None
@@ -131,9 +131,21 @@ def test_a_terminal_that_wants_it_sees_the_state(tmp_path):
 def test_records_reach_the_view_by_their_lows_and_highs(tmp_path):
     messages, run = watched(tmp_path, "trace", "trace.records=2", "trace.interval_s=2")
     records = [message for message in messages if isinstance(message, Record)]
-    assert {(record.number, record.channel) for record in records} >= {(1, "tape")}
+    assert {(record.number, record.channel) for record in records if not record.drawn} >= {(1, "tape")}
+    first = next(k for k, record in enumerate(records) if not record.drawn)
+    assert not any(record.drawn for record in records[first:])  # what the run reads is shown, and nothing else
     assert all(len(record.low) <= 1000 for record in records)
     assert run.count() == 2
+
+
+def test_a_virtual_bench_draws_the_signals_that_a_run_does_not_read(spin_run):
+    records = [message for message in spin_run[0] if isinstance(message, Record)]
+    assert {record.channel for record in records if record.drawn} == {"tape", "drive", "laser"}
+    assert all(record.drawn for record in records)
+    drive = [record for record in records if record.channel == "drive"]
+    swing = [float(np.ptp(record.low)) for record in drive]
+    assert max(swing) == pytest.approx(10.0, rel=0.01)  # [V], peak to peak: some record has both peaks of the sine
+    assert swing[-1] == 0.0  # the drive went off for the spin-down
 
 
 # --- a record in steps ---

@@ -284,6 +284,33 @@ def test_the_last_minutes_of_the_bench_are_drawn_before_the_first_reading(
         until(page, "document.getElementById('plot').getAttribute('aria-label').startsWith('the last ')")
 
 
+#: When a pulse that passes half of its height at t triggers the page, from records that began at other times.
+TRIGGERED = """async (source) => {
+  const {triggerOf, drawRecords, sheet} = await import("/page/plot.js");
+  const paper = sheet(document.getElementById("trace")), found = [];
+  for (const begin of [0, 3e-4, 0.011]) {
+    const make = (channel, signal) => {
+      const low = Float32Array.from({length: 600}, (_, k) => signal((begin + 4e-4 * k) * 30));
+      return {channel, low, high: low, start_s: begin, step_s: 4e-4, drawn: true};
+    };
+    const tape = make("tape", (turns) => Math.exp(-(((turns % 1) - 0.5) ** 2) / 2e-3));
+    const drive = make("drive", (turns) => source === "drive" ? 5 * Math.sin(2 * Math.PI * turns) : 0);
+    found.push([triggerOf(tape), triggerOf(drive), drawRecords(paper, [tape, drive], "drive").split(", ").at(-1)]);
+  }
+  return found;
+}"""
+
+
+def test_the_page_triggers_what_a_virtual_bench_draws(shown: Page) -> None:
+    """A wave stands still wherever its record begins; a drive that is off leaves the trigger to the tape."""
+    for tape, drive, said in shown.evaluate(TRIGGERED, "drive"):
+        rise = (0.5 - (2e-3 * np.log(2)) ** 0.5) / 30
+        assert min(abs(tape - rise - k / 30) for k in range(3)) < 5e-5  # an eighth of a step
+        assert min(abs(drive - k / 30) for k in range(3)) < 5e-6
+        assert said == "triggered by the drive"
+    assert [said for *_, said in shown.evaluate(TRIGGERED, "off")] == 3 * ["triggered by the tape"]
+
+
 def test_a_million_readings_are_drawn_from_a_few_thousand_numbers(served: Hall, page: Page, tmp_path: Path) -> None:
     run = GrowingRun(tmp_path)
     n = 1_000_000

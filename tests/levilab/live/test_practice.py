@@ -89,7 +89,7 @@ def turn_by_itself(page: Page, served: Hall, older: GrowingRun) -> None:
 
 
 def record_some_readings(page: Page) -> None:
-    """Meanwhile the oscilloscope stands still, and the page says why."""
+    """Meanwhile the oscilloscope, which the run does not read, shows the simulated signals."""
     own = page.get_by_role("button", name="To the practice bench")
     assert own.is_visible()  # an older run is shown
     listings: list[Route] = []
@@ -103,12 +103,11 @@ def record_some_readings(page: Page) -> None:
     until(page, f"levilab.data.bench?.busy && levilab.seen.run !== '{OLDER}' && levilab.data.count >= 3")
     until(page, "levilab.data.fit")
     assert listings
-    still = "a spin run does not read it"
-    assert page.inner_text("#scope-key").endswith(still)
-    gap = "document.getElementById('scope-key').getBoundingClientRect().left - range.getBoundingClientRect().right"
-    of_heading = "const range = document.createRange(); range.selectNodeContents(document.getElementById('scope-h'));"
-    assert page.evaluate(f"() => {{ {of_heading} return {gap}; }}") > 0  # beside the heading, not over it
+    until(page, "[...levilab.data.records.values()].some((one) => one.drawn)")
+    still = "a spin run does not read it: the simulated signals"
+    until(page, f"document.getElementById('scope-key').textContent.endsWith('{still}')")
     assert still in (page.get_attribute("#trace", "aria-label") or "")
+    assert "ago" not in (page.get_attribute("#trace", "aria-label") or "")
     page.click("#record")
 
 
