@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import shutil
 import tempfile
 import weakref
@@ -20,6 +21,9 @@ from levilab.notebook.quantity import Named, Quantity, correlate
 from levilab.pipelines.catalogue import ANALYSES, print_analysis
 from levilab.pipelines.result import Place
 from levilab.pipelines.suits import save as save_result
+from levilab.present.html import facts_as_html, fold, paragraphs, table_as_html
+from levilab.present.numbers import plain, without_unit
+from levilab.present.units import unit
 from levilab.report.page import render_part
 
 if TYPE_CHECKING:
@@ -37,6 +41,8 @@ if TYPE_CHECKING:
 TableName = Literal["values", "models", "readings"]
 #: Values that the short form of a result shows.
 MOST_VALUES = 4
+#: Rows that a cell of a notebook shows: of values, of inputs, of readings.
+_MOST_ROWS, _MOST_INPUTS, _MOST_READINGS = 20, 20, 5
 _ELSEWHERE = "choose another `folder`"
 #: Weaker correlations are not reported, as lmfit does not.
 _LEAST_CORRELATION = 0.1
@@ -133,8 +139,12 @@ class AnalysisResult:
 
     @property
     def best_model(self) -> str:
-        """The drag law, or the only model, that describes the readings best; empty where an analysis has no model."""
-        return str(self.document.get("best_model") or next(iter(self.models), ""))
+        """The drag law that describes the readings best, or the model that the values come from; empty: none is."""
+        values = self.document["values"]
+        return str(
+            self.document.get("best_model")
+            or next((name for name, of in self.models.items() if of.keys() <= values.keys()), "")
+        )
 
     @property
     def params(self) -> Mapping[str, Quantity]:
@@ -205,7 +215,16 @@ class AnalysisResult:
         )
 
     def _repr_html_(self) -> str:
-        """Return the HTML that a notebook shows: a report with its figure; nothing is fetched from elsewhere."""
+        """Return the HTML that a notebook shows, at most 30 kB: the answer, and parts that fold.
+
+        It fetches nothing from elsewhere, and what people typed is no markup.
+        """
+        of = self.inputs[0] if len(self.inputs) == 1 else f"{len(self.inputs)} inputs"
+        title = f"{self.kind} of {of}{' (SYNTHETIC)' * self.synthetic}"
+        return facts_as_html(title, [], paragraphs([self.verdict]) + "".join(_parts(self)))
+
+    def to_html(self) -> str:
+        """Return the whole report as HTML for another page, with its figure: some hundred kB."""
         return render_part(self.analysis, self.found)
 
     def summary(self) -> str:
@@ -255,11 +274,10 @@ class AnalysisResult:
     def residuals(self) -> np.ndarray:
         """Reading less the best model, shape (n,), in SI; NaN for readings that are not used.  Raises UsageError."""
         frame = self.to_dataframe("readings")
-        name = self._residual(frame)
-        return frame[name].to_numpy()
+        return frame[self._residual(frame)].to_numpy()
 
     def _residual(self, frame: pd.DataFrame) -> str:
-        """Return the name of the column of residuals.  Raises UsageError."""
+        """Return the name of the residuals' column in the table of readings.  Raises UsageError."""
         for name in frame.columns:
             if name.startswith("residual"):
                 return str(name)
@@ -312,11 +330,29 @@ class AnalysisResult:
         frame = pd.DataFrame(rows, columns=["model", "name", "value", "u", "unit"])
         return frame.astype({"value": float, "u": float})
 
-    def plot(self) -> Figure:
-        """Draw the figure; it needs no display, a notebook shows it, and `savefig` writes it."""
+    def plot(self, what: Literal["all", "residuals"] = "all") -> Figure:
+        """Draw the figure; it needs no display, a notebook shows it, and `savefig` writes it.
+
+        Args:
+            what: "all", as `levilab analyze` draws it; "residuals", a small one: the readings and their residuals.
+
+        Raises:
+            UsageError: there is no such figure.
+        """
         from levilab.present.style import for_notebooks  # with matplotlib
 
-        return for_notebooks(self.analysis.figure(self.found))
+        if what not in {"all", "residuals"}:
+            raise UsageError("what", "all or residuals is expected", value=what)
+        return for_notebooks(self._residuals_figure() if what == "residuals" else self.analysis.figure(self.found))
+
+    def _residuals_figure(self) -> Figure:
+        from levilab.notebook.figure import residuals_figure  # with matplotlib
+
+        frame, curve, best = self.to_dataframe("readings"), self.analysis.curve, self.best_model
+        curves = {name: curve(self.found, k, best) if curve else None for k, name in enumerate(self.inputs)}
+        title = f"{self.kind}{f', {best}' * bool(best)}: readings, and residuals"
+        made_up = [source.synthetic for source in self.found.sources]
+        return residuals_figure(frame, self._residual(frame), title, made_up, curves)
 
     def save(self, folder: str | PathLike[str]) -> list[Path]:
         """Write result.json and the figure into a folder, and beside them the DataFrames that were analyzed.
@@ -357,6 +393,71 @@ def _correlations(fitted: Mapping[str, Quantity]) -> Iterator[tuple[str, str, fl
             r = float(correlation_matrix([first.to_ufloat(), second.to_ufloat()])[0, 1])
             if abs(r) >= _LEAST_CORRELATION:
                 yield one, other, r
+
+
+# --- the HTML of a cell -----------------------------------------------------------------------------------
+
+
+def _parts(result: AnalysisResult) -> Iterator[str]:
+    """Yield what stands below the answer, each part with a line to fold it."""
+    yield _values(result.values)
+    if len(result.inputs) > 1:
+        shown = [*result.by_input.items()][:_MOST_INPUTS]
+        rows = [(name, "; ".join(f"{of} = {one}" for of, one in [*values.items()][:3])) for name, values in shown]
+        more = [("…", f"{len(result.inputs) - len(shown)} more in by_input")] * (len(shown) < len(result.inputs))
+        yield fold("each input", table_as_html((), [*rows, *more], texts=2))
+    yield fold("readings and residuals", _picture(result), opened=True)
+    yield fold("models", _models(result))
+    warnings = result.warnings
+    yield fold(f"{len(warnings)} note{'s' * (len(warnings) > 1)}", paragraphs(warnings[:_MOST_INPUTS]))
+    frame = result.to_dataframe("readings")
+    head = frame.head(_MOST_READINGS).map(lambda cell: f"{cell:.6g}" if isinstance(cell, float) else str(cell))
+    yield fold(f"{len(frame)} readings", table_as_html([*map(str, head.columns)], head.to_numpy().tolist()))
+    yield fold(
+        "how it was made",
+        paragraphs(
+            f"{source.name}: {source.run.record.synthetic_how or 'not said how'}"
+            for source in result.found.sources[:_MOST_INPUTS]
+            if source.run and source.run.record.synthetic
+        ),
+    )
+    yield paragraphs(["values, models, residuals, fit_report(), plot(), to_dataframe(), save(folder) have the rest"])
+
+
+def _values(values: Mapping[str, Quantity]) -> str:
+    rows = [(name, _in_words(quantity)) for name, quantity in [*values.items()][:_MOST_ROWS]]
+    more = [("…", f"{len(values) - _MOST_ROWS} more")] * (len(values) > _MOST_ROWS)
+    return table_as_html((), [*rows, *more], texts=2)
+
+
+def _in_words(quantity: Quantity) -> str:
+    return f"{without_unit(quantity)} {unit(quantity.unit).text}".strip()
+
+
+def _models(result: AnalysisResult) -> str:
+    """Return a table of the models; nothing where there is none."""
+    rows = []
+    for model in result.document["models"]:
+        name, statistics = model["name"], model.get("statistics", {})
+        found = ", ".join(f"{of} = {_in_words(one)}" for of, one in result.models[name].items())
+        numbers = (statistics.get(key) for key in ("reduced_chi_square", "weight"))
+        best = " (best)" if name == result.best_model else ""
+        rows.append((f"{name}{best}", found, *("" if one is None else plain(one, 3) for one in numbers)))
+    return table_as_html(("model", "parameters", "χ²/dof", "weight"), rows, texts=2) if rows else ""
+
+
+def _picture(result: AnalysisResult) -> str:
+    """Return the readings and residuals as a picture; nothing where there are none."""
+    from levilab.notebook.figure import small_png  # with matplotlib
+
+    try:
+        picture = base64.b64encode(small_png(result.plot("residuals"))).decode("ascii")
+    except UsageError:  # a result without residuals
+        return ""
+    return f'<img alt="readings and residuals" style="max-width: 100%" src="data:image/png;base64,{picture}">'
+
+
+# --- files -------------------------------------------------------------------------------------------------
 
 
 def temporary_folder(of: object) -> Path:

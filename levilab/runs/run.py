@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from levilab.errors import DataError
 from levilab.files import parse_json
 from levilab.formats.table import read_run_readings
-from levilab.present.html import facts_as_html
+from levilab.present.html import facts_as_html, table_as_html
 from levilab.runs.events import RunEvent
 from levilab.runs.traces import load_traces
 from levilab.settings import in_one_line
@@ -138,7 +138,8 @@ class Run:
             ("readings", problem or count),
         ]
         facts += [("warning", text) for text in ([] if problem else self.warnings())]
-        below = "" if frame is None else str(frame.head(SHOWN_ROWS).to_html(border=0))
+        rows = [] if frame is None else frame.head(SHOWN_ROWS).astype(str).to_numpy().tolist()
+        below = "" if frame is None else table_as_html([*map(str, frame.columns)], rows, texts=0)
         return facts_as_html(f"{self.record.experiment} run", facts, below)
 
     def _frame_or_problem(self) -> tuple[pd.DataFrame | None, str]:

@@ -165,23 +165,30 @@ def test_the_summary_is_what_the_command_line_prints_also_in_a_notebook(
     assert limits.summary().split() == printed.out.split()
 
 
-def test_a_notebook_shows_a_result_escaped_and_with_its_figure(tmp_path: Path) -> None:
+def test_a_notebook_shows_results_escaped_and_short(tmp_path: Path) -> None:
     folder = tmp_path / "lower-limits"
     shutil.copytree(SAMPLE_DATA / "lower-limits", folder)
     record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     record |= {"synthetic": True, "synthetic_how": "<script>alert(1)</script>", "note": "<script>"}
     (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
     result = levilab.analyze(folder)
-    html = result._repr_html_()
-    assert "&lt;script&gt;alert(1)" in html
-    assert "<figure id=" in html
-    assert "<svg " in html
-    html = re.sub(r' xmlns(:xlink)?="http://www.w3.org/[^"]*"', "", html)  # names of SVG, which nothing fetches
-    assert not any(text in html for text in ("<script", "http://", "https://", "@import", "<link"))
-    assert "&lt;script&gt;" in levilab.load(folder)._repr_html_()
-    assert "<script" not in levilab.load(folder)._repr_html_()
-    picture = result.plot()._repr_png_()
-    assert picture.startswith(b"\x89PNG")
+    for html in (result._repr_html_(), result.to_html(), levilab.load(folder)._repr_html_()):
+        assert "&lt;script&gt;" in html
+        own = re.sub(r' xmlns(:xlink)?="http://www.w3.org/[^"]*"', "", html)  # names of SVG, which nothing fetches
+        assert not any(text in own for text in ("<script", "http://", "https://", "@import", "<link"))
+    assert "<figure id=" in result.to_html()
+    assert '<img alt="readings and residuals"' in result._repr_html_()
+    assert result.plot()._repr_png_().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("kind", ANALYSES)
+def test_a_cell_is_short_and_folds(kind: str) -> None:
+    if kind == "video":
+        return  # its film takes seconds, and its cell is as all others
+    folder = {"spin": "trace-laser", "sway": "sway", "hold": "hold/45-hz"}
+    html = levilab.analyze(SAMPLE_DATA / (folder | {name: case[0] for name, case in CASES.items()})[kind])._repr_html_()
+    assert len(html.encode()) < 30_000  # a tenth of a report
+    assert html.count("<details") == html.count("</details>") > 1
 
 
 def test_analyze_writes_nothing_and_save_does(tmp_path: Path) -> None:

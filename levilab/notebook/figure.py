@@ -1,0 +1,96 @@
+"""Readings with the fitted curve, and residuals, side by side; importing this loads matplotlib."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from PIL import Image
+
+from levilab.present.drawing import headline, panel, run_look, synthetic_mark
+from levilab.present.looks import BLACK
+from levilab.present.style import STYLE, WIDE, as_png
+from levilab.present.units import split
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    import pandas as pd
+
+    Curve = Callable[[np.ndarray], np.ndarray]
+
+#: Places [inch]: left edges, width, top, and height of the panels; height of the figure.
+_LEFT, _RIGHT, _WIDTH, _TOP, _PANEL, _HEIGHT = 0.66, 4.16, 2.75, 0.42, 1.55, 2.45
+#: Points of a curve; pictures per inch, and colours of a small picture: 5 to 12 kB.
+_POINTS, _DPI, _COLOURS = 200, 110, 24
+
+
+def residuals_figure(
+    frame: pd.DataFrame, residual: str, title: str, made_up: Sequence[bool], curves: Mapping[str, Curve | None]
+) -> Figure:
+    """Draw the readings of each input with its curve, and beside them the residuals.
+
+    Args:
+        frame: the readings, with the column input.
+        residual: the column of the residuals.
+        title: of the figure.
+        made_up: whether each input is synthetic.
+        curves: input → its fitted curve, None where there is none.
+    """
+    x, y = _axes_of(frame, residual)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(WIDE, _HEIGHT))
+        headline(figure, title, synthetic_mark(made_up))
+        left = panel(figure, _LEFT, _TOP, _WIDTH, _PANEL)
+        right = panel(figure, _RIGHT, _TOP, _WIDTH, _PANEL, sharex=left)
+        for k, (name, curve) in enumerate(curves.items()):
+            own, look = frame[frame["input"] == name], run_look(k, len(curves))
+            style: Any = {"linestyle": "none", "marker": ".", "color": look.colour}
+            at, readings, residuals = (
+                own[column].to_numpy(dtype=float) * _factor(column) for column in (x, y, residual)
+            )
+            left.plot(at, readings, **style)
+            right.errorbar(at, residuals, yerr=_bars(own, y), elinewidth=0.8, **style)
+            if curve and len(at):
+                fine = np.linspace(own[x].min(), own[x].max(), _POINTS)
+                left.plot(fine * _factor(x), curve(fine) * _factor(y), color=look.colour, linewidth=1.0)
+        right.axhline(0.0, color=BLACK, linewidth=0.7)
+        for axes, column in ((left, y), (right, residual)):
+            axes.set(xlabel=_label(x), ylabel=_label(column))
+    return figure
+
+
+def _bars(frame: pd.DataFrame, column: str) -> np.ndarray | None:
+    """Return the standard uncertainties of a column, in the unit of its axis; None where they are not known."""
+    quantity, unit = split(column)
+    u = f"{quantity}_u_{unit.ending}" if unit else ""
+    known = u in frame and bool(frame[u].notna().any())
+    return frame[u].to_numpy(dtype=float) * _factor(column) if known else None
+
+
+def _axes_of(frame: pd.DataFrame, residual: str) -> tuple[str, str]:
+    """Return the columns that are drawn: the first one, and the first other one in the unit of the residuals."""
+    names = [name for name in map(str, frame.columns) if name not in {"input", residual}]
+    unit = split(residual)[1]
+    return names[0], next(name for name in names[1:] if split(name)[1] == unit and "_u_" not in name)
+
+
+def _label(column: str) -> str:
+    quantity, unit = split(column)
+    return f"{quantity.replace('_', ' ')}  [{unit.shown.unit}]" if unit else column
+
+
+def _factor(column: str) -> float:
+    unit = split(column)[1]
+    return unit.shown.factor if unit else 1.0
+
+
+def small_png(figure: Figure) -> bytes:
+    """Return a figure as a picture of few colours, for a notebook that keeps it in its file."""
+    buffer = io.BytesIO()
+    picture = Image.open(io.BytesIO(as_png(figure, dpi=_DPI))).convert("RGB")
+    picture.quantize(_COLOURS).save(buffer, format="png", optimize=True)
+    return buffer.getvalue()
