@@ -109,6 +109,14 @@ COMMANDS = {
         than the given, is analyzed for the page.""",
         "levilab report sample_data/ -o report.html, or -o report.pdf --tables",
     ),
+    "class": Row(
+        "groups.of_class",
+        """Put the groups of a class beside each other: values with u, residuals, warnings, distance from the class.
+
+        A run has its group by levilab acquire --group.  On a virtual bench each group's seed made a top of its own: its
+        distance from that truth is shown, too.""",
+        "levilab class runs/ -o class.html, or -o class.pdf, or -o class.xlsx",
+    ),
     "open": Row(
         "open.open_files",
         """Open data files: which columns hold what, in which units; correct that, keep it, analyze and report.

@@ -87,6 +87,8 @@ class Analysis(Generic[A]):
         columns: the readings of each input as columns of a table, with residuals.
         row: the columns that an input has as one row of a table of many.
         symbols: of its quantities, for people.
+        compared: quantities that groups of a class compare; empty: the constants of the law, or where there is none
+            the first quantities.
         files: tables for other analyses that are saved with the result, by their names.
         curve: the fitted curve of an input, by its number and the model's name, as a function of arrays in SI; None:
             there is none.
@@ -99,6 +101,7 @@ class Analysis(Generic[A]):
     row: tuple[Column, ...] = ()
     symbols: Mapping[str, str] = field(default_factory=dict)
     files: Callable[[A], Mapping[str, str]] = lambda _: {}
+    compared: tuple[str, ...] = ()
     curve: Callable[[A, int, str], Callable[[np.ndarray], np.ndarray]] | None = None
 
     @property
@@ -172,7 +175,9 @@ class Analysis(Generic[A]):
 
 _TABLE: tuple[Analysis[Any], ...] = (
     Analysis(SPINDOWN, spindown_tables, spindown_part, spindown_columns, SPINDOWN_ROW, SYMBOLS, curve=spindown_curve),
-    Analysis(SPIN, spin_tables, spin_part, spin_columns, SPIN_ROW, symbols_of(SPIN_QUANTITIES)),
+    Analysis(
+        SPIN, spin_tables, spin_part, spin_columns, SPIN_ROW, symbols_of(SPIN_QUANTITIES), compared=("frequency",)
+    ),
     Analysis(
         FIELD,
         field_tables,
@@ -181,8 +186,11 @@ _TABLE: tuple[Analysis[Any], ...] = (
         FIELD_ROW,
         symbols_of(FIELD_QUANTITIES.values()),
         curve=field_curve,
+        compared=("strength", "origin", "thickness"),
     ),
-    Analysis(LIMIT, limit_tables, limit_part, limit_columns, LIMIT_ROW, symbols_of(LIMIT_QUANTITIES)),
+    Analysis(
+        LIMIT, limit_tables, limit_part, limit_columns, LIMIT_ROW, symbols_of(LIMIT_QUANTITIES), compared=("mean",)
+    ),
     Analysis(
         PRECESSION,
         precession_tables,
@@ -191,6 +199,7 @@ _TABLE: tuple[Analysis[Any], ...] = (
         PRECESSION_ROW,
         symbols_of(PRECESSION_QUANTITIES),
         curve=precession_curve,
+        compared=("slope", "intercept"),
     ),
     Analysis(SWAY, sway_tables, sway_part, sway_columns, SWAY_ROW, symbols_of(SWAY_QUANTITIES)),
     Analysis(HOLD, hold_tables, hold_part, hold_columns, HOLD_ROW, symbols_of(HOLD_QUANTITIES)),

@@ -5,6 +5,7 @@ Panels are placed by hand because automatic layouts differ in the last bit from 
 
 from __future__ import annotations
 
+import re
 import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -156,3 +157,16 @@ def limits_about(values: ArrayLike, margin: float) -> tuple[float, float]:
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
     add = margin * (high - low) or abs(high) or 1.0
     return low - add, high + add
+
+
+#: A power in brackets, or a fraction without them.
+_RAISED = re.compile(r"\^(?:\(([^()]+)\)|(−?(?:½|\d+/\d+)))")
+
+
+def in_mathtext(text: str) -> str:
+    """Return plain notation as matplotlib's labels have it: what follows ^ is raised.
+
+    >>> in_mathtext("ω̇ = −C₃/₂ω^(3/2)"), in_mathtext("(rad/s)^−½/s")
+    ('ω̇ = −C₃/₂ω$^{3/2}$', '(rad/s)$^{−1/2}$/s')
+    """
+    return _RAISED.sub(lambda found: f"$^{{{(found[1] or found[2]).replace('½', '1/2')}}}$", text)

@@ -142,7 +142,7 @@ def _of_one_analysis(
 ) -> Section:
     """Return one of several analyses, below a heading of its own."""
     mixed = _mixes(found)
-    mark = _banner(found.sources, mixed=True) if mixed else None
+    mark = banner_of(found.sources, mixed=True) if mixed else None
     return Section(
         part.heading,
         (*([mark] if mark else []), *blocks),
@@ -195,7 +195,7 @@ def _document_banner(results: Results, sources: Sequence[Source[Any]], others: S
     if not results:
         return Banner("SYNTHETIC.", "All of it was simulated on a computer; nothing was measured.") if others else None
     mixed = _mixes(results[0][1]) if len(results) == 1 else False
-    mark = _banner(sources, mixed=mixed)
+    mark = banner_of(sources, mixed=mixed)
     if mark is None and others:
         return Banner("SYNTHETIC IN PART.", "Chapters that say so are of simulations on a computer.")
     return mark
@@ -206,7 +206,7 @@ def _mixes(found: Analyzed[Any, Any, Any, Any]) -> bool:
     return any(0 < sum(one.synthetic for one in together) < len(together) for together in found.averaged)
 
 
-def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner | None:
+def banner_of(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner | None:
     """Return which inputs are synthetic, and a warning of numbers that mix them with real ones."""
     total, made_up = len(sources), [source.name for source in sources if source.synthetic]
     files = sum(source.run is None for source in sources)
@@ -234,7 +234,7 @@ def _banner(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner | 
 def notebook_blocks(analysis: Analysis[A], found: A) -> tuple[Block, ...]:
     """Return the blocks of one analysis for another page: below a heading, with the origin of synthetic inputs."""
     part = analysis.part(found)
-    mark = _banner(found.sources, mixed=_mixes(found))
+    mark = banner_of(found.sources, mixed=_mixes(found))
     made_up = [
         Note(f"{source.name}: {source.run.record.synthetic_how or 'not said how'}")
         for source in found.sources

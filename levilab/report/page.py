@@ -100,16 +100,16 @@ def write_report(
     if form is None:
         raise UnknownFormat("output", "a name that ends in .html or .pdf is expected", value=output)
     form.check()
-    with _writing(output):
+    with writing_report(output):
         check_writable(output)  # before what takes long
     others, left = _sorted_by_kind(paths)
     sections = [section for kind, found in others for section in kind.sections(found)]
     results = _results(left, given or {}, tell, needed=not others)
     supplements = WITH_TRIALS if crosscheck else SUPPLEMENTS
     asked = Asked(paths, form.ending, given or {}, crosscheck)
-    document = replace(document_of(results, sections, supplements, asked), date=_newest(results, others))
+    document = replace(document_of(results, sections, supplements, asked), date=newest_of(results, others))
     content = form.content(document)
-    with _writing(output):
+    with writing_report(output):
         output.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(output, content)
     if tables:
@@ -119,7 +119,8 @@ def write_report(
     return output
 
 
-def _writing(output: Path) -> AbstractContextManager[None]:
+def writing_report(output: Path) -> AbstractContextManager[None]:
+    """Explain errors of writing a report."""
     return writing(f"{output}: could not be written", "choose another place with `output`")
 
 
@@ -151,7 +152,7 @@ def _holds_more(folder: Path, taken: Collection[Path]) -> bool:
     return folder not in taken and (any(run not in taken for run in find_runs(folder)) or bool(data_files(folder)))
 
 
-def _newest(results: Results, others: Found) -> datetime | None:
+def newest_of(results: Results, others: Found = ()) -> datetime | None:
     """Return when the newest of the inputs ended; None where none of them says."""
     records = [source.run.record for _, found in results for source in found.sources if source.run]
     texts = [record.ended_utc or record.started_utc for record in records]

@@ -15,12 +15,13 @@ from matplotlib.lines import Line2D
 
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
-from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS, in_mathtext
+from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
 from levilab.pipelines.spindown.table import laws_of, tilt_part
 from levilab.present.drawing import (
     SMALL,
     band,
     headline,
+    in_mathtext,
     limits_about,
     panel,
     run_look,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from fractions import Fraction
 from types import MappingProxyType
@@ -54,19 +53,6 @@ def straight_line(law: DragLaw) -> StraightLine | None:
     power = str(Fraction(m).limit_denominator(100))
     text = "½" if math.isclose(m, 0.5) else power
     return StraightLine(f"ω^−{text}", f"ω$^{{−{power}}}$  [(s/rad)$^{{{power}}}$]", lambda omega: np.asarray(omega**-m))
-
-
-#: A power in brackets, or a fraction without them.
-_RAISED = re.compile(r"\^(?:\(([^()]+)\)|(−?(?:½|\d+/\d+)))")
-
-
-def in_mathtext(text: str) -> str:
-    """Return plain notation as matplotlib's labels have it: what follows ^ is raised.
-
-    >>> in_mathtext(LAWS["disc"].equation), in_mathtext("(rad/s)^−½/s")
-    ('ω̇ = −C₃/₂ω$^{3/2}$', '(rad/s)$^{−1/2}$/s')
-    """
-    return _RAISED.sub(lambda found: f"$^{{{(found[1] or found[2]).replace('½', '1/2')}}}$", text)
 
 
 #: The laws that have a straight line.

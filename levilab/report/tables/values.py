@@ -83,11 +83,11 @@ def of_analysis(analysis: Analysis[Any], found: Any, folder: Path) -> Iterator[V
         f"{analysis.name}: a row for each quantity of each input, and of all inputs together",
         (INPUT, SYNTHETIC, "model", "quantity", "value", "u", "unit", "interval_68_low", "interval_68_high",
          "scatter", "runs"),
-        tuple(_quantities(found, document, _unit_of_residuals(analysis))),
+        tuple(_quantities(found, document, unit_of_residuals(analysis))),
     )  # fmt: skip
 
 
-def _unit_of_residuals(analysis: Analysis[Any]) -> str:
+def unit_of_residuals(analysis: Analysis[Any]) -> str:
     """Return the unit in the name of the column of their root mean square; empty where there is no such column."""
     names = [column.name for column in analysis.row if "rms_residual" in column.name]
     unit = split(names[0])[1] if names else None

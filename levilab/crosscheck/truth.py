@@ -1,0 +1,74 @@
+"""The truth of a run of the virtual bench: what its seed drew, in the names of the analyses' results."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from levilab.simulator.laws import LAWS
+from levilab.world.spin_world import SpinScene, random_scene
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from levilab.runs.run import Run
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What an analysis should find.
+
+    Attributes:
+        values: of quantities, by their names in result.json; empty where nothing is known.
+        model: the law that they belong to; empty where an analysis has one model.
+    """
+
+    values: Mapping[str, float] = field(default_factory=dict)
+    model: str = ""
+
+
+def truth_of(run: Run | None, analysis: str) -> Truth:
+    """Return the truth of a run, empty for a real one and for what is not known.
+
+    The mean of limits is that of the law which the seed draws each of them from.
+    """
+    record = run.record if run else None
+    if record is None or not record.synthetic or record.seed is None:
+        return Truth()
+    if analysis == "precession":  # a locked top wobbles at the drive's frequency
+        return Truth({"slope": 1.0, "intercept": 0.0})
+    if record.world == "spin":
+        known = _OF_SPIN_WORLD.get(analysis)
+        return known(random_scene(record.seed), record.configuration) if known else Truth()
+    scene = record.configuration.get("scene")
+    return _of_scene(scene.get("drag")) if analysis == "spindown" and isinstance(scene, dict) else Truth()
+
+
+def _of_scene(drag: Any) -> Truth:
+    """Return the drag of a top in full motion; nothing for a law of several constants."""
+    law = drag.get("law") if isinstance(drag, dict) else None
+    if law not in LAWS or len(LAWS[law].names) > 1 or not isinstance(drag.get("coefficient"), float):
+        return Truth()
+    return Truth({LAWS[law].names[0]: drag["coefficient"]}, law)
+
+
+def _drag(scene: SpinScene, _: Mapping[str, Any]) -> Truth:
+    return Truth(dict(zip(LAWS[scene.drag].names, scene.constants, strict=True)), scene.drag)
+
+
+def _base(scene: SpinScene, _: Mapping[str, Any]) -> Truth:
+    names = {"strength": "strength_t_m", "origin": "origin_m", "thickness": "thickness_m"}
+    return Truth({name: getattr(scene.base, of_base) for name, of_base in names.items()})
+
+
+def _lower_limit(_: SpinScene, configuration: Mapping[str, Any]) -> Truth:
+    settings = configuration.get("limit")
+    lower = isinstance(settings, dict) and settings.get("which") == "lower"
+    return Truth({"mean": SpinScene().fall_hz} if lower else {})
+
+
+_OF_SPIN_WORLD: Mapping[str, Callable[[SpinScene, Mapping[str, Any]], Truth]] = {
+    "spindown": _drag,
+    "field": _base,
+    "limit": _lower_limit,
+}

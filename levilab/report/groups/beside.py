@@ -1,0 +1,159 @@
+"""Results → each group's numbers beside those of the class, read from result.json as other programs read it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from analysis.comparison import Comparison, compare
+from analysis.uncertainty import Estimate
+from levilab.crosscheck.truth import Truth, truth_of
+from levilab.errors import unquote
+from levilab.present.units import unit
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.sources import Source
+
+#: Quantities that are compared where an analysis names none and has no model.
+_MOST_QUANTITIES = 3
+
+
+@dataclass(frozen=True)
+class Group:
+    """One input of a class.
+
+    Attributes:
+        source: with its name and note.
+        statistics: of the model; empty where the analysis has none.
+        best_model: the law that describes its readings best; empty where no laws compete.
+        warnings: about it.
+    """
+
+    source: Source[Any]
+    statistics: Mapping[str, Any]
+    best_model: str
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One quantity of all groups, in SI.
+
+    Attributes:
+        name: as in result.json.
+        symbol: for people.
+        unit: of results.
+        estimates: of each group; None where it has no value with u.
+        truths: of each group; None where it is not known.
+        together: of those with a value; None where there are none.
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    estimates: tuple[Estimate | None, ...]
+    truths: tuple[float | None, ...]
+    together: Comparison | None
+
+    @property
+    def shown_unit(self) -> str:
+        """The unit that people read."""
+        return unit(self.unit).shown.unit
+
+    @property
+    def head(self) -> str:
+        """Symbol and unit, above a column."""
+        return f"{self.symbol} [{self.shown_unit}]" if self.shown_unit else self.symbol
+
+    def show(self, value: float | None, u: float | None = None) -> Estimate | None:
+        """Return a number in the unit that people read."""
+        text, factor = unit(self.unit).shown
+        return None if value is None else Estimate(value * factor, None if u is None else u * factor, text)
+
+    @property
+    def from_class(self) -> tuple[float | None, ...]:
+        """The distance of each group from the mean of the others, in u."""
+        others = iter(self.together.distances if self.together else ())
+        return tuple(None if one is None else next(others) for one in self.estimates)
+
+    @property
+    def from_truth(self) -> tuple[float | None, ...]:
+        """The distance of each group from its truth, in its u."""
+        return tuple(
+            None if one is None or truth is None else (one.value - truth) / one.u  # type: ignore[operator]
+            for one, truth in zip(self.estimates, self.truths, strict=True)
+        )
+
+
+@dataclass(frozen=True)
+class Class:
+    """The groups of a class by one analysis.
+
+    Attributes:
+        analysis: the row of the catalogue.
+        found: what it found.
+        model: the law whose constants are compared; empty where the analysis has one model.
+    """
+
+    analysis: Analysis[Any]
+    found: Any
+    model: str
+    groups: tuple[Group, ...]
+    quantities: tuple[Quantity, ...]
+
+    @property
+    def knows_truth(self) -> bool:
+        """Whether the truth of any quantity of any group is known."""
+        return any(truth is not None for one in self.quantities for truth in one.truths)
+
+
+def class_of(analysis: Analysis[Any], found: Any) -> Class:
+    """Put the groups of a class beside each other."""
+    document = analysis.document(found, Path())
+    truths = [truth_of(source.run, analysis.name) for source in found.sources]
+    model = next((one.model for one in truths if one.model), "") or document.get("best_model", "")
+    parts = document["runs"]
+    groups = tuple(
+        Group(source, _model(part, model).get("statistics", {}), part.get("best_model", ""), _warnings(part))
+        for source, part in zip(found.sources, parts, strict=True)
+    )
+    names = analysis.compared or ([*_model(document, model).get("parameters", {})] if model else _common(parts))
+    quantities = (_quantity(name, analysis, model, parts, truths) for name in names)
+    return Class(analysis, found, model, groups, tuple(one for one in quantities if one.together))
+
+
+def _model(part: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Return the model of this name, or the first; empty where there are none."""
+    models: Sequence[Mapping[str, Any]] = part.get("models") or [{}]
+    return next((one for one in models if one.get("name") == name), {} if name else models[0])
+
+
+def _common(parts: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the first quantities that all inputs have with their u."""
+    first, *others = ([name for name, value in part["values"].items() if value["u"]] for part in parts)
+    return [name for name in first if all(name in other for other in others)][:_MOST_QUANTITIES]
+
+
+def _warnings(part: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(map(unquote, part["warnings"]))
+
+
+def _quantity(
+    name: str, analysis: Analysis[Any], model: str, parts: Sequence[Mapping[str, Any]], truths: Sequence[Truth]
+) -> Quantity:
+    found = [(_model(part, model).get("parameters", {}) if model else part["values"]).get(name) for part in parts]
+    good = [one if one and one["u"] and one["value"] is not None else None for one in found]
+    estimates = tuple(Estimate(one["value"], one["u"], one["unit"]) if one else None for one in good)
+    known = [one for one in good if one]
+    return Quantity(
+        name,
+        analysis.symbols.get(name, name.replace("_", " ")),
+        known[0]["unit"] if known else "1",
+        estimates,
+        tuple(truth.values.get(name) if truth.model in {"", model} else None for truth in truths),
+        compare([one["value"] for one in known], [one["u"] for one in known]) if known else None,
+    )

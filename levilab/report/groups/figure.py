@@ -1,0 +1,98 @@
+"""A class → its figure: each group's value with u, the class's mean, and the truth."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from levilab.present.drawing import SMALL, headline, in_mathtext, panel, synthetic_mark, write
+from levilab.present.looks import BLUE, GREEN, VERMILION
+from levilab.present.style import STYLE, WIDE, label_of_run
+from levilab.present.units import unit
+from levilab.report.groups.words import finding
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+
+    from levilab.report.groups.beside import Class, Group, Quantity
+
+#: Left edge of the panels, their right edge, from panel to panel, above them, below them, and a group's row [inch].
+_LEFT, _RIGHT, _GAP, _HEAD, _FOOT, _ROW = 1.75, 6.85, 0.25, 0.85, 0.55, 0.135
+#: Panels beside each other at most, the distances from the truth included.
+_MOST_PANELS = 3
+#: Of the name of a group, that have room at the left.
+_LETTERS = 26
+
+
+def class_figure(of: Class) -> Figure:
+    """Draw a panel for each quantity, a row for each group, and their distances from the truth."""
+    shown = of.quantities[: _MOST_PANELS - of.knows_truth]
+    count = len(of.groups)
+    height = max(_ROW * count, 0.6)
+    panels = len(shown) + of.knows_truth
+    width = (_RIGHT - _LEFT - (panels - 1) * _GAP) / panels
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(WIDE, _HEAD + height + _FOOT))
+        headline(figure, in_mathtext(finding(of)), synthetic_mark([group.source.synthetic for group in of.groups]))
+        about = "point and bar: value ± u of a group; line: mean of the class"
+        write(
+            figure, 0.08, 0.52, f"{about}; diamond: truth of the virtual bench" if of.knows_truth else about,
+            fontsize=SMALL,
+        )  # fmt: skip
+        for k in range(panels):
+            axes = panel(figure, _LEFT + k * (width + _GAP), _HEAD, width, height)
+            if k < len(shown):
+                _draw_values(axes, shown[k])
+            else:
+                _draw_distances(axes, of.quantities)
+            axes.set(ylim=(count - 0.5, -0.5))
+            axes.set_yticks(range(count), [_label(group) if k == 0 else "" for group in of.groups])
+            axes.tick_params(axis="y", which="both", length=0, labelsize=SMALL)
+            axes.tick_params(axis="x", labelsize=SMALL)
+            axes.locator_params(axis="x", nbins=4)
+    return figure
+
+
+def _label(group: Group) -> str:
+    name = label_of_run(group.source.name, 0, 2, "") or ""
+    return name if len(name) <= _LETTERS else f"{name[: _LETTERS - 1]}…"
+
+
+def _draw_values(axes: Axes, of: Quantity) -> None:
+    factor, together = unit(of.unit).shown.factor, of.together
+    power = _power(of)
+    scale = factor / 10.0**power
+    if together:
+        axes.axvspan((together.mean - together.u) * scale, (together.mean + together.u) * scale, color=BLUE, alpha=0.2)
+        axes.axvline(together.mean * scale, color=BLUE, linewidth=1)
+    for k, (one, truth) in enumerate(zip(of.estimates, of.truths, strict=True)):
+        if truth is not None:
+            axes.plot(truth * scale, k, marker="D", markersize=5, color=VERMILION, markerfacecolor="none")
+        if one is not None and one.value is not None and one.u is not None:
+            axes.errorbar(one.value * scale, k, xerr=one.u * scale, fmt="o", markersize=3, color="black", elinewidth=1)
+    times = f"10$^{{{power}}}$ ".replace("-", "−") if power else ""
+    shown = in_mathtext(of.shown_unit)
+    axes.set_xlabel(f"{of.symbol}  [{times}{shown}]" if times or shown else of.symbol, fontsize=8)
+
+
+def _power(of: Quantity) -> int:
+    """Return the power of ten in the label of the axis."""
+    factor = unit(of.unit).shown.factor
+    largest = max((abs(one.value * factor) for one in of.estimates if one and one.value), default=1.0)
+    return 0 if 0.01 <= largest < 1e4 else int(np.floor(np.log10(largest)))
+
+
+def _draw_distances(axes: Axes, quantities: Sequence[Quantity]) -> None:
+    axes.axvspan(-2, 2, color="black", alpha=0.07, linewidth=0)
+    axes.axvline(0, color=VERMILION, linewidth=1)
+    for of, colour, marker in zip(quantities, (GREEN, BLUE, "black"), "o^s", strict=False):
+        for k, distance in enumerate(of.from_truth):
+            if distance is not None:
+                axes.plot(np.clip(distance, -4.7, 4.7), k, marker=marker, markersize=3.5, color=colour)
+    axes.set(xlim=(-5, 5))
+    axes.set_xlabel("from the truth  [u]; band ±2", fontsize=8)

@@ -1,0 +1,112 @@
+"""The groups of a class beside each other: page, PDF and spreadsheet, and on a virtual bench the truth."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from python_calamine import CalamineWorkbook
+
+from levilab.acquisition.loop import acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.errors import UsageError
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.report.groups.beside import class_of
+from levilab.report.groups.write import write_class
+from levilab.runs.run import RECORD
+from levilab.world.spin_world import SpinScene, random_scene
+from support.acquisitions import RAISED_QUICKLY, Silent
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+#: What a spreadsheet, a page or a terminal could take for something else.
+HOSTILE = "=1+1 <b>&$x_1$"
+
+
+def measured(root: Path, groups: Sequence[str], experiment: str = "spin", *settings: str) -> Path:
+    """Let groups measure on virtual benches; the k-th has the seed k."""
+    settings = settings or RAISED_QUICKLY
+    for seed, group in enumerate(groups, start=1):
+        options = AcquisitionOptions(mock=True, seed=seed, group=group, out=root, settings=settings)
+        acquire(request_for(experiment, options), Silent())
+    return root
+
+
+def compared(root: Path, analysis: str = "spindown") -> Any:
+    row = ANALYSES[analysis]
+    return class_of(row, row.analyze([root], row.options_from({})))
+
+
+@pytest.fixture(scope="module")
+def of_three(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return measured(tmp_path_factory.mktemp("class"), ["Group 10", "Group 2", HOSTILE])
+
+
+def test_each_group_is_beside_the_truth_of_its_seed(of_three: Path) -> None:
+    of = compared(of_three)
+    assert [group.source.name for group in of.groups] == [HOSTILE, "Group 2", "Group 10"]
+    (c32,) = of.quantities
+    assert c32.truths == tuple(random_scene(seed).constants[0] for seed in (3, 2, 1))
+    assert all(abs(one) < 3 for one in c32.from_truth)  # each is so in 99.7 % of all seeds
+    assert all(0 < group.statistics["rms_residual"] < 0.06 for group in of.groups)  # u of a reading is 0.03 Hz
+
+
+def test_twenty_groups_lie_within_two_u_of_their_truths(tmp_path: Path) -> None:
+    (c32,) = compared(measured(tmp_path, [f"Group {k}" for k in range(1, 21)])).quantities
+    assert sum(abs(one) <= 2 for one in c32.from_truth) >= 17  # 19 are expected; fewer than 17 in one of 77 classes
+    assert max(map(abs, c32.from_truth)) < 3.5
+
+
+def test_a_real_run_has_no_truth(of_three: Path, tmp_path: Path) -> None:
+    for k, folder in enumerate(sorted(of_three.glob("2*"))):
+        (tmp_path / folder.name).mkdir()
+        for file in folder.iterdir():
+            (tmp_path / folder.name / file.name).write_bytes(file.read_bytes())
+        record = json.loads((folder / RECORD).read_text(encoding="utf-8")) | {"synthetic": k > 0}
+        (tmp_path / folder.name / RECORD).write_text(json.dumps(record), encoding="utf-8")
+    truths = compared(tmp_path).quantities[0].truths
+    assert [truth is None for truth in truths].count(True) == 1
+
+
+@pytest.mark.parametrize(("experiment", "names"), [("field", ["strength", "origin", "thickness"]), ("limit", ["mean"])])
+def test_other_experiments_have_their_truths_too(experiment: str, names: list[str], tmp_path: Path) -> None:
+    settings = {"field": ("field.settle_s=0",), "limit": ("limit.repetitions=5", "limit.hold_s=0")}
+    of = compared(measured(tmp_path, ["A", "B"], experiment, *settings[experiment]), experiment)
+    assert [one.name for one in of.quantities] == names
+    scene = random_scene(1)
+    truth = {"strength": scene.base.strength_t_m, "mean": SpinScene().fall_hz}[names[0]]
+    assert of.quantities[0].truths[0] == truth
+    assert all(abs(one) < 3.5 for quantity in of.quantities for one in quantity.from_truth)
+
+
+def test_page_and_pdf_have_result_figure_groups_and_how_to_make_them_again(of_three: Path, tmp_path: Path) -> None:
+    page = write_class([of_three], tmp_path / "new" / "class.html").read_text(encoding="utf-8")
+    places = [page.index(f">{title}<") for title in ("Result", "Figure", "Group by group", "How to make this again")]
+    assert places == sorted(places)
+    assert "SYNTHETIC." in page
+    assert "3 of 3 values lie within 2 u of it" in page
+    assert HOSTILE not in page
+    assert write_class([of_three], tmp_path / "class.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_the_spreadsheet_has_numbers_texts_and_each_reading(of_three: Path, tmp_path: Path) -> None:
+    file = write_class([of_three], tmp_path / "class.xlsx")
+    book = CalamineWorkbook.from_path(file)
+    assert book.sheet_names == ["spindown groups", "spindown class", "spindown readings"]
+    heads, *rows = book.get_sheet_by_name("spindown groups").to_python()
+    by_head = [dict(zip(heads, row, strict=True)) for row in rows]
+    assert [row["group"] for row in by_head] == [HOSTILE, "Group 2", "Group 10"]
+    c32 = compared(of_three).quantities[0]
+    assert [row["c32_per_sqrt_rad_s"] for row in by_head] == pytest.approx([one.value for one in c32.estimates])
+    assert [row["c32_from_the_truth_in_u"] for row in by_head] == pytest.approx(c32.from_truth)
+    readings = book.get_sheet_by_name("spindown readings").to_python()
+    assert len(readings) - 1 == sum(len(group.source.readings) for group in compared(of_three).groups)
+    assert file.read_bytes() == write_class([of_three], tmp_path / "again.xlsx").read_bytes()
+
+
+def test_another_ending_is_refused_with_those_that_are_known(of_three: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"\.html, \.pdf or \.xlsx"):
+        write_class([of_three], tmp_path / "class.ods")
