@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 HEAVY = {
     "PIL", "RigolWFM", "av", "dask", "distributed", "filelock", "grp", "heyoka", "imageio_ffmpeg", "jinja2", "llvmlite",
     "lmfit", "matplotlib", "nicegui", "numba", "pandas", "playwright", "pyarrow", "pyvisa", "rich", "scipy", "serial",
-    "sounddevice", "starlette", "typst", "uncertainties", "uvicorn", "xarray", "zarr",
+    "sounddevice", "starlette", "typst", "uncertainties", "uvicorn", "xarray", "xlsxwriter",
+    "zarr",
 }  # fmt: skip
 
 
