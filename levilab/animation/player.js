@@ -31,31 +31,21 @@
   const place = Object.fromEntries(columns.map((name, k) => [name, k]));
   const column = (name, k) => (name in place ? values[k * wide + place[name]] : 0);
 
-  let THREE, OrbitControls, buildScene, buildCamera, pixelOf, placeCamera, renderer;
+  let THREE, scene;
+  let wanted = 0;
   const canvas = document.createElement("canvas");
   try {
-    ({THREE, OrbitControls} = await load(await inflate(bytes(by("three").textContent))));
-    ({buildScene, buildCamera, pixelOf, placeCamera} = await load(by("top").textContent));
-    const soft = drawnBySoftware();
-    renderer = new THREE.WebGLRenderer({canvas, antialias: !soft});
-    renderer.setPixelRatio(soft ? 1 : Math.min(window.devicePixelRatio, 2));
+    const library = await load(await inflate(bytes(by("three").textContent)));
+    const {openStage} = await load(by("top").textContent);
+    THREE = library.THREE;
+    scene = openStage(THREE, library.OrbitControls, canvas, data.parts, {changed: () => redraw()});
   } catch (error) {
     say(`This browser does not draw in three dimensions (${error.message || error}), so the picture is still.`);
     return;
   }
 
-  const dark = window.matchMedia("(prefers-color-scheme: dark)");
   const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
-  const theme = () => (dark.matches ? "dark" : "light");
-  const view = buildScene(THREE, data.parts, theme());
-  const camera = buildCamera(THREE, data.parts, 1);
-  const controls = new OrbitControls(camera, canvas);
-  controls.target.copy(camera.userData.target);
-  controls.enablePan = false;
-  controls.minDistance = 6;
-  controls.maxDistance = 120;
-  controls.maxPolarAngle = 1.62;
-  controls.addEventListener("change", redraw);
+  const {view, theme} = scene;
 
   by("still").remove();
   canvas.tabIndex = 0;
@@ -83,15 +73,18 @@
 
   const trailLength = Math.max(2, Math.round(data.trail_s / step));
   const ends = new Float32Array(3 * count);
-  for (let k = 0; k < count; k += 1) {
-    const pose = poseAt(k);
-    ends.set(view.axisEnd(pose.position, pose.quaternion), 3 * k);
+  function drawEnds() {
+    for (let k = 0; k < count; k += 1) {
+      const pose = poseAt(k);
+      ends.set(view.axisEnd(pose.position, pose.quaternion), 3 * k);
+    }
   }
+  drawEnds();
   const trail = new Float32Array(3 * (trailLength + 2));
 
   // --- the picture ---
 
-  let steps = 0, playing = false, wanted = 0, last = 0, drawn = 0;
+  let steps = 0, playing = false, last = 0, drawn = 0;
 
   function draw() {
     const pose = poseAt(steps);
@@ -101,7 +94,7 @@
     trail.set(known);
     trail.set(view.axisEnd(pose.position, pose.quaternion), known.length);
     view.setPath(trail, known.length / 3 + 1);
-    renderer.render(view.scene, camera);
+    scene.render();
     const tilt = Math.atan2(
       2 * Math.hypot(pose.quaternion[0] * pose.quaternion[2] + pose.quaternion[1] * pose.quaternion[3],
         pose.quaternion[1] * pose.quaternion[2] - pose.quaternion[0] * pose.quaternion[3]),
@@ -191,13 +184,6 @@
     redraw();
   }
 
-  function reset() {
-    placeCamera(THREE, camera, data.parts, camera.aspect);
-    controls.target.copy(camera.userData.target);
-    controls.update();
-    redraw();
-  }
-
   function show(name) {
     view.show({[name]: by(`show-${name}`).checked});
     redraw();
@@ -208,76 +194,36 @@
     show(name);
   };
 
-  /** Turn the view by angles [rad] and come nearer by a factor. */
-  function orbit(around, up, nearer = 1) {
-    const offset = camera.position.clone().sub(controls.target);
-    const ball = new THREE.Spherical().setFromVector3(new THREE.Vector3(offset.x, offset.z, -offset.y));
-    ball.theta += around;
-    ball.phi = Math.min(Math.max(ball.phi - up, 0.02), controls.maxPolarAngle);
-    ball.radius = Math.min(Math.max(ball.radius / nearer, controls.minDistance), controls.maxDistance);
-    const moved = new THREE.Vector3().setFromSpherical(ball);
-    camera.position.set(moved.x, -moved.z, moved.y).add(controls.target);
-    controls.update();
-    redraw();
-  }
-
   by("scrub").max = count - 1;
   by("scrub").addEventListener("input", () => { play(false); go(Number(by("scrub").value)); });
   by("play").addEventListener("click", () => play(!playing));
-  by("reset").addEventListener("click", reset);
+  by("reset").addEventListener("click", scene.reset);
   by("speed").addEventListener("change", redraw);
-  for (const name of ["path", "axis", "spin"]) by(`show-${name}`).addEventListener("change", () => show(name));
+  for (const name of ["path", "axis", "spin", "height"]) by(`show-${name}`).addEventListener("change", () => show(name));
+  by("lean").addEventListener("change", () => {
+    view.setLean(by("lean").checked ? 5 : 1);
+    drawEnds();
+    redraw();
+  });
 
   const keys = {
     " ": () => play(!playing), k: () => play(!playing),
     ",": () => { play(false); go(Math.ceil(steps) - 1); }, ".": () => { play(false); go(Math.floor(steps) + 1); },
     "[": () => changeSpeed(1), "]": () => changeSpeed(-1),
-    Home: () => go(0), End: () => go(count - 1), r: reset,
+    Home: () => go(0), End: () => go(count - 1), r: scene.reset,
     p: () => toggle("path"), a: () => toggle("axis"), s: () => toggle("spin"),
-  };
-  const turns = {
-    ArrowLeft: () => orbit(-0.1, 0), ArrowRight: () => orbit(0.1, 0),
-    ArrowUp: () => orbit(0, 0.08), ArrowDown: () => orbit(0, -0.08),
-    "+": () => orbit(0, 0, 1.12), "=": () => orbit(0, 0, 1.12), "-": () => orbit(0, 0, 1 / 1.12),
   };
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const at = event.target.tagName, key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     // what has the focus keeps the keys that it uses itself
     if (at === "SELECT" || (at === "BUTTON" && key === " ") || (at === "INPUT" && (key === " " || key.length > 1))) return;
-    const action = keys[key] || (event.target === canvas && turns[key]);
+    const action = keys[key];
     if (action) {
       event.preventDefault();
       action();
     }
   });
 
-  dark.addEventListener("change", () => { view.setTheme(theme()); redraw(); });
-  new ResizeObserver(() => {
-    const {width, height} = stage.getBoundingClientRect();
-    renderer.setSize(width, height, false);
-    const untouched = camera.position.distanceTo(camera.userData.at || camera.position) < 1e-6;
-    camera.aspect = width / height;
-    if (untouched) {
-      placeCamera(THREE, camera, data.parts, camera.aspect);
-      controls.target.copy(camera.userData.target);
-      controls.update();
-      camera.userData.at = camera.position.clone();
-    } else {
-      camera.updateProjectionMatrix();
-    }
-    view.setPixel(pixelOf(camera, height * renderer.getPixelRatio()));
-    draw();
-  }).observe(stage);
-
   play(!calm.matches);
-
-  /** Whether WebGL is computed by the processor: then edges are not smoothed, which would take most of the time. */
-  function drawnBySoftware() {
-    const probe = document.createElement("canvas").getContext("webgl2");
-    const named = probe && probe.getExtension("WEBGL_debug_renderer_info");
-    const name = named ? probe.getParameter(named.UNMASKED_RENDERER_WEBGL) : "";
-    if (probe) probe.getExtension("WEBGL_lose_context").loseContext();
-    return /swiftshader|llvmpipe|software|basic render/i.test(name);
-  }
 })();

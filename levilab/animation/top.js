@@ -4,10 +4,9 @@
 // come from anywhere.  Lengths come in metres; z is up, as in the simulator.  A base of the usual size is drawn in
 // centimetres, and another one as large, so that lines, cameras and shadows suit bases and tops of any size.
 //
-//     const view = buildScene(THREE, parts, "light");          // parts: what parts_of(scene) made; or "dark"
-//     const camera = buildCamera(THREE, parts, width / height);
-//     view.setPose([x, y, z], [qx, qy, qz, qw], {washers: 0.1, drive: 0.5});
-//     renderer.render(view.scene, camera);
+//     const stage = openStage(THREE, OrbitControls, canvas, parts, {changed});  // parts: what parts_of(scene) made
+//     stage.view.setPose([x, y, z], [qx, qy, qz, qw], {washers: 0.1, drive: 0.5});
+//     stage.render();
 
 const REACH = 5.5;          // drawn units from the axis to the base's rim
 const TURN = 2 * Math.PI;
@@ -16,6 +15,8 @@ const THINNEST = 1.6;       // pixels: a line that is thinner breaks into dashes
 const AXIS = 0.022, PLUMB = 0.012, END = 0.075;  // radii of the lines and of the axis' end, at least
 const SPIN = 0.05;          // half of the arrow's thickness, as a part of its radius
 const AROUND = 96;          // facets around a part
+const LEAN_MOST = 1.2;      // a lean that is exaggerated goes no further [rad]
+const NEAREST = 6, FARTHEST = 120;  // distance of the camera, in drawn units
 
 /**
  * Build everything that is drawn.
@@ -28,7 +29,8 @@ const AROUND = 96;          // facets around a part
  *     turned on it [rad], `drive` the drive's field as a part of its amplitude, −1 to 1;
  *   setPath(points, count): the line that the axis' end has drawn, a Float32Array of x, y, z [m];
  *   setSpin(sense): which way the arrow turns, 1, −1 or 0;
- *   setTheme(theme); show({path, axis, spin, drive, top}): what is seen, each true or false;
+ *   setTheme(theme); show({path, axis, spin, drive, top, height}): what is seen, each true or false;
+ *   setLean(factor): the axis is drawn so many times as far from upright, up to LEAN_MOST, and so is its path;
  *   setPixel(size): lines are drawn no thinner than pixels of this size, as pixelOf returns it;
  *   axisEnd(position, quaternion): where the end of the drawn axis is then [m]; dispose(): free the graphics' memory.
  */
@@ -119,8 +121,23 @@ export function buildScene(THREE, parts, theme = "light") {
     scene.add(drive);
   }
 
-  const turned = new THREE.Quaternion(), axisNow = new THREE.Vector3(), upright = new THREE.Vector3(0, 0, 1);
-  const along = (quaternion) => axisNow.set(0, 0, 1).applyQuaternion(turned.set(...quaternion));
+  const height = heightScale(THREE, parts, scale, plain("faint"), plain("axis"));
+  scene.add(height.group);
+
+  const turned = new THREE.Quaternion(), more = new THREE.Quaternion(), axisNow = new THREE.Vector3();
+  const upright = new THREE.Vector3(0, 0, 1), across = new THREE.Vector3();
+  let lean = 1;
+  /** The axis of a pose as it is drawn; `turned` is its attitude then. */
+  const along = (quaternion) => {
+    axisNow.set(0, 0, 1).applyQuaternion(turned.set(...quaternion));
+    const tilt = Math.acos(Math.min(Math.max(axisNow.z, -1), 1)), wanted = Math.min(lean * tilt, LEAN_MOST);
+    if (lean !== 1 && tilt > 1e-6 && wanted > tilt) {
+      more.setFromAxisAngle(across.set(-axisNow.y, axisNow.x, 0).normalize(), wanted - tilt);
+      turned.premultiply(more);
+      axisNow.applyQuaternion(more);
+    }
+    return axisNow;
+  };
 
   let ribbon = RIBBON;
   const view = {
@@ -145,14 +162,15 @@ export function buildScene(THREE, parts, theme = "light") {
       const lower = points.reduce((least, [r, z]) => Math.min(least, n.z * z - aside * r), Infinity);
       const away = Math.hypot(position[0], position[1]), floor = away > inner && away < outer ? upper : bottom;
       top.position.set(position[0] * scale, position[1] * scale, Math.max(position[2], floor - lower) * scale);
-      top.quaternion.set(...quaternion);
+      top.quaternion.copy(turned);
       washers.rotation.z = slipped;
       leaning.position.copy(top.position);
-      leaning.quaternion.setFromUnitVectors(upright, along(quaternion));
-      const from = floor * scale, height = Math.max(top.position.z + lowest * scale - from, 0.01);
-      plumb.position.set(top.position.x, top.position.y, from + height / 2);
-      plumb.scale.y = height;
-      const radius = widest * scale * (1.2 + 0.04 * height);  // the higher, the softer
+      leaning.quaternion.setFromUnitVectors(upright, n);
+      const from = floor * scale, over = Math.max(top.position.z + lowest * scale - from, 0.01);
+      plumb.position.set(top.position.x, top.position.y, from + over / 2);
+      plumb.scale.y = over;
+      height.point(top.position.z);
+      const radius = widest * scale * (1.2 + 0.04 * over);  // the higher, the softer
       shadow.position.x = top.position.x;
       shadow.position.y = top.position.y;
       shadow.scale.set(radius, radius, 1);
@@ -185,23 +203,27 @@ export function buildScene(THREE, parts, theme = "light") {
       if ("axis" in wanted) axis.visible = wanted.axis;
       if ("spin" in wanted) spin.visible = (spin.userData.wanted = wanted.spin) && spin.userData.there;
       if ("drive" in wanted && drive) drive.visible = wanted.drive;
+      if ("height" in wanted) height.group.visible = wanted.height;
       if ("top" in wanted) top.visible = leaning.visible = plumb.visible = shadow.visible = wanted.top;
     },
+
+    setLean(factor) { lean = factor; },
 
     setTheme(name) {
       const colours = parts.colours[name];
       scene.background = new THREE.Color(colours.background);
       for (const [material, colour] of paints) material.color.set(colours[colour]);
+      height.label(colours.text);
       sky.intensity = name === "dark" ? 1.1 : 1.5;
       shadow.material.opacity = name === "dark" ? 0.75 : 0.45;
     },
 
     dispose() {
       scene.traverse((object) => {
-        if (object.geometry) object.geometry.dispose();
-        if (object.material) object.material.dispose();
+        object.geometry?.dispose();
+        object.material?.map?.dispose();
+        object.material?.dispose();
       });
-      shade.dispose();
     },
   };
   spin.userData.wanted = true;
@@ -209,6 +231,98 @@ export function buildScene(THREE, parts, theme = "light") {
   view.setTheme(theme);
   view.setPose(parts.view.floats, [0, 0, 0, 1]);
   return view;
+}
+
+/** Whether three dimensions are computed by the processor: then edges are not smoothed, which would take most of the time. */
+export function drawnBySoftware() {
+  const probe = document.createElement("canvas").getContext("webgl2");
+  if (!probe) return true;
+  const about = probe.getExtension("WEBGL_debug_renderer_info");
+  const name = about ? String(probe.getParameter(about.UNMASKED_RENDERER_WEBGL)) : "";
+  probe.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
+
+/**
+ * What is drawn on a canvas, with a camera that turns and comes nearer by mouse, touch and keys.
+ *
+ * Keys: arrows turn, + and − come nearer and go back, 0 puts the camera back.
+ *
+ * @param {() => void} changed is called when the picture should be drawn again.
+ * @param {number} ratio pixels of the picture in one of the page where the processor draws.
+ * @returns {object} view (of buildScene), camera, theme(), and render(), reset(), orbit(around, up, nearer), resize(),
+ *   setParts(parts).
+ */
+export function openStage(THREE, OrbitControls, canvas, parts, {changed, ratio = 1}) {
+  const soft = drawnBySoftware(), dark = matchMedia("(prefers-color-scheme: dark)");
+  const theme = () => (dark.matches ? "dark" : "light");
+  const renderer = new THREE.WebGLRenderer({canvas, antialias: !soft, powerPreference: "low-power"});
+  renderer.setPixelRatio(soft ? ratio : Math.min(devicePixelRatio || 1, 2));
+  const camera = buildCamera(THREE, parts, 1), controls = new OrbitControls(camera, canvas);
+  Object.assign(controls, {enablePan: false, minDistance: NEAREST, maxDistance: FARTHEST, maxPolarAngle: 1.62});
+  let view = buildScene(THREE, parts, theme()), placed = null;
+
+  function reset() {
+    placeCamera(THREE, camera, parts, camera.aspect);
+    controls.target.copy(camera.userData.target);
+    controls.update();
+    placed = camera.position.clone();
+    changed();
+  }
+
+  function resize() {
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    if (!width || !height) return;
+    renderer.setSize(width, height, false);
+    camera.aspect = width / height;
+    if (!placed || camera.position.distanceTo(placed) < 1e-6) reset();  // a person has not moved it
+    camera.updateProjectionMatrix();
+    view.setPixel(pixelOf(camera, height * renderer.getPixelRatio()));
+    changed();
+  }
+
+  /** Turn the camera by angles [rad] and come nearer by a factor. */
+  function orbit(around, up, nearer = 1) {
+    const offset = camera.position.clone().sub(controls.target);
+    const ball = new THREE.Spherical().setFromVector3(new THREE.Vector3(offset.x, offset.z, -offset.y));
+    ball.theta += around;
+    ball.phi = Math.min(Math.max(ball.phi - up, 0.02), controls.maxPolarAngle);
+    ball.radius = Math.min(Math.max(ball.radius / nearer, NEAREST), FARTHEST);
+    const moved = new THREE.Vector3().setFromSpherical(ball);
+    camera.position.set(moved.x, -moved.z, moved.y).add(controls.target);
+    controls.update();
+    changed();
+  }
+
+  const keys = {
+    ArrowLeft: () => orbit(-0.1, 0), ArrowRight: () => orbit(0.1, 0), ArrowUp: () => orbit(0, 0.08), ArrowDown: () => orbit(0, -0.08),
+    "+": () => orbit(0, 0, 1.12), "=": () => orbit(0, 0, 1.12), "-": () => orbit(0, 0, 1 / 1.12), 0: reset,
+  };
+  canvas.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || !keys[event.key]) return;
+    event.preventDefault();
+    keys[event.key]();
+  });
+  controls.addEventListener("change", changed);
+  dark.addEventListener("change", () => {
+    view.setTheme(theme());
+    changed();
+  });
+  new ResizeObserver(resize).observe(canvas);
+  resize();
+
+  return {
+    get view() { return view; },
+    camera, theme, reset, orbit, resize,
+    render: () => renderer.render(view.scene, camera),
+    setParts(described) {
+      view.dispose();
+      parts = described;
+      view = buildScene(THREE, parts, theme());
+      placed = null;
+      resize();
+    },
+  };
 }
 
 /** Drawn units in a metre. */
@@ -302,6 +416,53 @@ function spinArrow(THREE, radius, material) {
   head.rotation.z = length;  // a cone points along y, which is the sense at angle 0
   arrow.add(head);
   return arrow;
+}
+
+/**
+ * A post beside the base with a mark for each centimetre above its middle, and a pointer at the height of the top.
+ *
+ * A base of another size has marks at the power of ten that suits it.
+ */
+function heightScale(THREE, parts, scale, faint, dark) {
+  const group = new THREE.Group(), {outer} = parts.base, {top} = parts.view;
+  const step = 10 ** Math.round(Math.log10(top / 9)), x = -1.12 * outer * scale, marks = Math.round(0.85 * top / step);
+  const post = new THREE.Mesh(new THREE.BoxGeometry(0.06, 0.06, marks * step * scale), faint);
+  post.position.set(x, 0, marks * step * scale / 2);
+  group.add(post);
+  const labels = [];
+  for (let k = 0; k <= marks; k += 1) {
+    const long = k % 2 === 0, mark = new THREE.Mesh(new THREE.BoxGeometry(long ? 0.42 : 0.24, 0.06, 0.07), faint);
+    mark.position.set(x + (long ? 0.21 : 0.12), 0, k * step * scale);
+    group.add(mark);
+    if (!long || !k) continue;
+    const label = new THREE.Sprite(new THREE.SpriteMaterial({transparent: true, depthWrite: false}));
+    label.position.set(x - 1.05, 0, k * step * scale);
+    label.scale.set(2, 1, 1);
+    group.add(label);
+    labels.push([label, `${+(k * step * 100).toPrecision(3)}${k + 2 > marks ? " cm" : ""}`]);
+  }
+  const pointer = new THREE.Mesh(new THREE.ConeGeometry(0.16, 0.5, 12), dark);
+  pointer.rotation.z = Math.PI / 2;
+  pointer.position.x = x + 0.75;
+  group.add(pointer);
+  return {
+    group,
+    point: (z) => { pointer.position.z = z; },
+    label(colour) {
+      for (const [label, text] of labels) {
+        const paper = document.createElement("canvas"), pen = paper.getContext("2d");
+        [paper.width, paper.height] = [128, 64];
+        pen.font = "40px system-ui, sans-serif";
+        pen.textAlign = "right";
+        pen.textBaseline = "middle";
+        pen.fillStyle = colour;
+        pen.fillText(text, 124, 34);
+        label.material.map?.dispose();
+        label.material.map = new THREE.CanvasTexture(paper);
+        label.material.needsUpdate = true;
+      }
+    },
+  };
 }
 
 /** A double line of an arrow through the base's axis, along the drive's direction. */

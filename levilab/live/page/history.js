@@ -9,11 +9,13 @@ const SHOWN_S = 180, LEAST_S = 60;
 const NOTED_S = 1;
 /** The least height of the plot, and of that of the difference about zero [Hz]. */
 const LEAST_HZ = 2, LEAST_OFF_HZ = 0.2;
+/** Changes of the drive's frequency that are kept, to count its turns: a ramp makes two a second. */
+const MOST_CHANGES = 100;
 const LEFT = 58, RIGHT = 84, TOP = 10, BOTTOM = 34, GAP = 24;
 
 /** The values of the last minutes, each [time, spin, drive]; NaN where no top is counted, or the drive is off. */
 export function openHistory() {
-  let rows = [], marks = [];
+  let rows = [], marks = [], turns = [];  // of the drive: [time, turns by then, frequency]
   return {
     get rows() { return rows; },
     get marks() { return marks; },
@@ -21,9 +23,10 @@ export function openHistory() {
     /** Take in a state of the bench.  Returns whether the chart has changed. */
     add(bench) {
       const now = bench.time_s, last = rows.at(-1);
-      if (last && now < last[0]) [rows, marks] = [[], []];  // another bench
+      if (last && now < last[0]) [rows, marks, turns] = [[], [], []];  // another bench
       const spin = bench.last.spin_frequency_hz ?? bench.last.spin_seen_hz ?? NaN;
       const drive = bench.drive?.output ? bench.drive.frequency_hz : NaN;
+      count(now, drive);
       if (last && Object.is(last[1], spin) && Object.is(last[2], drive) && now - last[0] < NOTED_S) return false;
       rows.push([now, spin, drive]);
       while (rows[0][0] < now - SHOWN_S) rows.shift();
@@ -31,9 +34,25 @@ export function openHistory() {
       return true;
     },
 
+    /** When the drive began its last period before a time; the time itself while it is off [s]. */
+    flash(time) {
+      const one = turns.findLast(([start]) => start <= time);
+      if (!one || !Number.isFinite(one[2])) return time;
+      const [start, before, drive] = one;
+      return start + (Math.floor(before + (time - start) * drive) - before) / drive;
+    },
+
     /** Mark what happened at a time. */
     mark(time, text) { marks.push([time, text]); },
   };
+
+  /** Count the turns of the drive on, as long as its frequency stays. */
+  function count(now, drive) {
+    const last = turns.at(-1);
+    if (last && Object.is(last[2], drive)) return;
+    turns.push([now, last ? last[1] + (now - last[0]) * (last[2] || 0) : 0, drive]);
+    if (turns.length > MOST_CHANGES) turns.shift();
+  }
 }
 
 /**

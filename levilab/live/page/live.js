@@ -180,6 +180,7 @@ async function openTop() {
     for (const pieces of early) space.add(...pieces);
     window.levilab.space = space;
     space.setRate(Number(by("motion").value));
+    for (const set of [lookAtTop, leanTop, strobe]) set();
   } catch (error) {
     space = {add: () => {}};
     by("no-space").hidden = false;
@@ -328,6 +329,7 @@ function showFacts(about) {
 
 function showTop(bench) {
   const pose = space?.state;
+  by("strobe-of").hidden = !bench?.drive;
   if (!pose) return;
   const said = pose.up ? `floats at ${fixed(pose.place[2] * 1000, 1)} mm` : pose.there ? "lies where it fell" : "is taken away";
   write("top-text", said);
@@ -429,14 +431,6 @@ by("plot").addEventListener("keydown", (event) => {
   event.preventDefault();
   point(Math.min(Math.max((pointed < 0 ? (steps < 0 ? n : -1) : pointed) + steps, 0), n - 1), true);
 });
-by("space").addEventListener("keydown", (event) => {
-  const angle = {ArrowLeft: -0.15, ArrowRight: 0.15}[event.key];
-  if (angle) {
-    event.preventDefault();
-    space?.turn?.(angle);
-  }
-});
-
 // --- controls ---
 
 function pause() {
@@ -453,6 +447,22 @@ by("drawn").addEventListener("change", () => {
   seen.readings = seen.tick = pointed = -1;
   dirty.plot = true;
 });
+function lookAtTop() {
+  space?.show?.(Object.fromEntries(["path", "spin", "height"].map((name) => [name, by(`show-${name}`).checked])));
+}
+const leanTop = () => space?.setLean?.(by("lean").checked ? 5 : 1);
+/** A lamp that flashes with the drive; a drive that is off leaves the light steady. */
+const strobe = () => space?.setStrobe?.(by("strobe").checked ? (time) => history.flash(time) : null);
+function fillScreen() {
+  if (document.fullscreenElement) document.exitFullscreen();
+  else by("top").requestFullscreen?.().catch(() => {});
+}
+for (const name of ["path", "spin", "height"]) by(`show-${name}`).addEventListener("change", lookAtTop);
+by("lean").addEventListener("change", leanTop);
+by("strobe").addEventListener("change", strobe);
+by("nearest").addEventListener("click", () => space?.reset?.());
+by("full").addEventListener("click", fillScreen);
+by("space").addEventListener("dblclick", fillScreen);
 by("motion").addEventListener("change", () => space?.setRate?.(Number(by("motion").value)));
 by("own").addEventListener("click", () => {
   open(wanted = OWN_BENCH);
@@ -473,6 +483,7 @@ const KEYS = {
     select.selectedIndex = (select.selectedIndex + 1) % select.options.length;
     select.dispatchEvent(new Event("change"));
   },
+  v: fillScreen,
   d: () => practice?.act("drive"), f: () => practice?.act("match"), b: () => practice?.act("back"), p: () => practice?.act("hold"), r: () => practice?.act("record"),
   ".": () => practice?.step(0.05), ",": () => practice?.step(-0.05), ":": () => practice?.step(0.5), ">": () => practice?.step(0.5),
   ";": () => practice?.step(-0.5), "<": () => practice?.step(-0.5),

@@ -4,7 +4,7 @@
 // them, so that it moves evenly however often messages come. Slower than the bench, it plays what it has kept, and
 // goes on from the newest when that is at its end.
 
-import {buildCamera, buildScene, pixelOf, placeCamera} from "./top.js";
+import {openStage} from "./top.js";
 import {SOFTWARE} from "./plot.js";
 
 /** Poses that are kept: at most 20 s of the bench's time. */
@@ -12,38 +12,33 @@ const KEPT = 8000;
 /** Least mean time between pictures without a graphics card [ms]: the screen's own times are 17 ms apart. */
 const LEAST_MS = SOFTWARE ? 46 : 0;
 
+/** The path of the axis' end is drawn over this time [s of bench time]: some turns of the nutation. */
+const TRAIL_S = 1;
 /** Pixels without a graphics card, as a part of those that are shown: half would do, but is coarse to look at. */
 const SOFTWARE_RATIO = 0.75;
 
 /** @param description of the top and its base, as the server sends it. */
 export async function openSpace(canvas, description) {
   const {THREE, OrbitControls} = await import("./three.js");
-  const dark = matchMedia("(prefers-color-scheme: dark)");
-  const renderer = new THREE.WebGLRenderer({canvas, antialias: !SOFTWARE, powerPreference: "low-power"});
-  renderer.setPixelRatio(SOFTWARE ? SOFTWARE_RATIO : Math.min(devicePixelRatio || 1, 2));
-  let parts = null, view = null;
-  function build(described) {
-    view?.dispose();
-    parts = described;
-    view = buildScene(THREE, parts, dark.matches ? "dark" : "light");
-    view.show({drive: false});
-  }
-  build(description);
-  const camera = buildCamera(THREE, parts, 1);
-  const orbit = new OrbitControls(camera, canvas);
-  orbit.target.copy(camera.userData.target);
-  orbit.enablePan = orbit.enableZoom = false;
-  orbit.minPolarAngle = 0.2;
-  orbit.maxPolarAngle = 1.65;
-  orbit.addEventListener("change", () => { moved = true; });
-  dark.addEventListener("change", () => {
-    view.setTheme(dark.matches ? "dark" : "light");
+  let moved = true;
+  const stage = openStage(THREE, OrbitControls, canvas, description, {ratio: SOFTWARE_RATIO, changed: () => { moved = true; }});
+  canvas.style.touchAction = "pan-y";  // a finger that goes up or down scrolls the page; two come nearer
+  canvas.addEventListener("wheel", (event) => {  // so does the wheel, until the picture has the focus
+    if (document.documentElement.scrollHeight > innerHeight + 1 && document.activeElement !== canvas) event.stopImmediatePropagation();
+  }, {capture: true});
+  const shown = {drive: false, path: true, axis: true, spin: true, height: true};
+  let parts = description, lean = 1, flashes = null;
+  function show(wanted) {
+    Object.assign(shown, wanted);
+    stage.view.show(shown);
+    stage.view.setLean(lean);
     moved = true;
-  });
+  }
 
   const [one, two] = [new THREE.Quaternion(), new THREE.Quaternion()];
+  const trail = new Float32Array(3 * 2 * KEPT);
   let times = [], places = [], turns = [], ups = [];
-  let playhead = NaN, last = 0, drawnAt = 0, moved = true, rate = 1, speed = 1, paused = false, frames = 0;
+  let playhead = NaN, last = 0, drawnAt = 0, rate = 1, speed = 1, paused = false, frames = 0;
 
   function add(start, step, position, quaternion, up) {
     if (times.length && start < times.at(-1) - 1e-9) [times, places, turns, ups] = [[], [], [], []];  // a new bench
@@ -68,36 +63,42 @@ export async function openSpace(canvas, description) {
     playhead = Math.min(Math.max(playhead, times[0]), newest);
   }
 
-  function show() {
+  /** The number of the last pose at a time, or before. */
+  function poseAt(time) {
     let low = 0, high = times.length - 1;
     while (high - low > 1) {
       const middle = (low + high) >> 1;
-      if (times[middle] <= playhead) low = middle;
+      if (times[middle] <= time) low = middle;
       else high = middle;
     }
-    const share = times[high] > times[low] ? (playhead - times[low]) / (times[high] - times[low]) : 0;
+    return low;
+  }
+
+  function place() {
+    const {view} = stage, time = flashes ? Math.max(flashes(playhead), times[0]) : playhead;
+    const low = poseAt(time), high = Math.min(low + 1, times.length - 1);
+    const share = times[high] > times[low] ? Math.min((time - times[low]) / (times[high] - times[low]), 1) : 0;
     one.fromArray(turns[low]);
     two.fromArray(turns[high]);
     const about = two.clone().multiply(one.clone().invert());
     const axis = view.axisEnd([0, 0, 0], turns[low]);
     view.setSpin(ups[low] ? Math.sign((about.x * axis[0] + about.y * axis[1] + about.z * axis[2]) * about.w) : 0);
-    const place = places[low].map((value, k) => value + share * (places[high][k] - value));
-    view.setPose(place, one.slerp(two, share).toArray());
-    const there = ups[low] || place[2] !== 0;  // else it was taken away
+    const here = places[low].map((value, k) => value + share * (places[high][k] - value));
+    view.setLean(ups[low] ? lean : 1);
+    const now = one.slerp(two, share).toArray();
+    view.setPose(here, now);
+    const there = ups[low] || here[2] !== 0;  // else it was taken away
     view.show({top: there});
-    return {place, up: ups[low], there, time: playhead};
+    if (shown.path) {
+      let n = 0;
+      for (let k = Math.max(0, poseAt(time - TRAIL_S)); k <= low; k += 1) {
+        if (ups[k] === ups[low] && there) trail.set(view.axisEnd(places[k], turns[k]), 3 * n++);
+      }
+      trail.set(view.axisEnd(here, now), 3 * n);
+      view.setPath(trail, n + 1);
+    }
+    return {place: here, up: ups[low], there, time: playhead};
   }
-
-  function resize() {
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    if (!width || !height) return;
-    renderer.setSize(width, height, false);
-    placeCamera(THREE, camera, parts, width / height);
-    view.setPixel(pixelOf(camera, height * renderer.getPixelRatio()));
-    moved = true;
-  }
-  new ResizeObserver(resize).observe(canvas);
-  resize();
 
   let state = null;
   function draw(now) {
@@ -109,16 +110,17 @@ export async function openSpace(canvas, description) {
       const before = playhead;
       advance(seconds);
       if (playhead !== before || !state) {
-        state = show();
+        state = place();
         moved = true;
       }
     }
     if (!moved) return;
     moved = false;
     drawnAt = Math.max(drawnAt + LEAST_MS, now - LEAST_MS / 2);
-    renderer.render(view.scene, camera);
+    stage.render();
     frames += 1;
   }
+  show({});
   requestAnimationFrame(draw);
 
   return {
@@ -126,21 +128,26 @@ export async function openSpace(canvas, description) {
     get parts() { return parts; },
     setParts: (described) => {
       if (JSON.stringify(described) === JSON.stringify(parts)) return;
-      build(described);
-      resize();
+      parts = described;
+      stage.setParts(parts);
+      show({});
       if (!state) return;
       advance(0);  // the poses may have begun again, and a picture that stands still has not followed
-      state = show();
+      state = place();
     },
+    /** What is seen, as of the view's own function; and how many times as far as it is the axis leans. */
+    show,
+    setLean: (factor) => {
+      lean = factor;
+      if (state) state = place();
+      moved = true;
+    },
+    /** With a strobe lamp: a time → when the lamp flashed last [s]; null: in steady light. */
+    setStrobe: (lamp) => { flashes = lamp; },
+    reset: stage.reset,
     setRate: (value) => { rate = value; },
     setSpeed: (value, still) => { speed = still ? 0 : value || 1; },
     pause: (value) => { paused = value; },
-    turn: (angle) => {
-      const offset = camera.position.clone().sub(orbit.target).applyAxisAngle(new THREE.Vector3(0, 0, 1), angle);
-      camera.position.copy(orbit.target).add(offset);
-      camera.lookAt(orbit.target);
-      moved = true;
-    },
     get state() { return state; },
     get frames() { return frames; },
   };

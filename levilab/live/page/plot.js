@@ -1,16 +1,10 @@
 // Pictures of readings and of records on a canvas. They are drawn when there is something new, and not otherwise.
 
+import {drawnBySoftware} from "./top.js";
 import {colours, fixed, short} from "./words.js";
 
 /** Without a graphics card an accelerated canvas costs four times as much as one in memory. */
-export const SOFTWARE = (() => {
-  const gl = document.createElement("canvas").getContext("webgl");
-  if (!gl) return true;
-  const about = gl.getExtension("WEBGL_debug_renderer_info");
-  const renderer = about ? String(gl.getParameter(about.UNMASKED_RENDERER_WEBGL)) : "";
-  gl.getExtension("WEBGL_lose_context")?.loseContext();
-  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer);
-})();
+export const SOFTWARE = drawnBySoftware();
 
 const FONT = '12px system-ui, "Segoe UI", Roboto, "Helvetica Neue", "DejaVu Sans", sans-serif';
 
@@ -350,6 +344,7 @@ export function drawRecords(paper, records, source) {
   c.fillStyle = paint.dim;
   c.textAlign = "right";
   c.textBaseline = "top";
-  c.fillText(`${short((end - begin) * 100, 3)} ms a division${by ? `, triggered by the ${by}` : ""}`, width - 8, 6);
+  const division = `${short((end - begin) * 100, 3)} ms`;
+  c.fillText(width < 400 ? `${division}/div` : `${division} a division${by ? `, triggered by the ${by}` : ""}`, width - 8, 6);
   return `${said.join(", ")}, over ${short((end - begin) * 1000, 3)} milliseconds${by ? `, triggered by the ${by}` : ""}`;
 }

@@ -4,6 +4,7 @@ import base64
 import hashlib
 import html
 import io
+import math
 import re
 
 import numpy as np
@@ -12,6 +13,7 @@ from PIL import Image
 
 from levilab.animation.page import LARGEST, as_page, columns_of, most_poses
 from levilab.animation.poses import poses_of
+from levilab.animation.three import three_js
 from levilab.motion.summary import summarise
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
@@ -170,6 +172,33 @@ def test_keys_play_step_change_the_speed_and_turn_the_view(opened):
     inner = (slice(8, -8), slice(8, -8))  # without the line around what has the focus
     assert (np.abs(turned - seen)[inner].sum(axis=2) > 60).sum() > 1000
     assert (np.abs(canvas(opened) - seen)[inner].sum(axis=2) > 60).sum() < 100
+
+
+#: How far the drawn axis stands from upright [degrees], for leans by these angles, as it is and five times as far.
+LEANS = """async (three) => {
+  const link = (text) => URL.createObjectURL(new Blob([text], {type: "text/javascript"}));
+  const {buildScene} = await import(link(document.getElementById("top").textContent));
+  const {THREE} = await import(link(three));
+  const data = JSON.parse(document.getElementById("data").textContent), view = buildScene(THREE, data.parts);
+  const found = [1, 5].map((factor) => [0, 1, 10, 60, 90].map((degrees) => {
+    view.setLean(factor);
+    const half = degrees / 360 * Math.PI;
+    view.setPose([0, 0, 0.07], [Math.sin(half), 0, 0, Math.cos(half)]);
+    const end = view.axisEnd([0, 0, 0], [Math.sin(half), 0, 0, Math.cos(half)]);
+    const drawn = new THREE.Vector3(0, 0, 1).applyQuaternion(view.top.quaternion);
+    return [Math.atan2(-end[1], end[2]), Math.atan2(-drawn.y, drawn.z)].map((angle) => angle / Math.PI * 180);
+  }));
+  view.dispose();
+  return found;
+}"""
+
+
+def test_a_lean_is_exaggerated_and_goes_no_further_than_a_limit(opened):
+    drawn = opened.evaluate(LEANS, three_js("").read_text(encoding="utf-8"))
+    most = math.degrees(1.2)  # LEAN_MOST
+    for (end, top), wanted in zip(drawn[0] + drawn[1], [0, 1, 10, 60, 90, 0, 5, 50, most, 90], strict=True):
+        assert end == pytest.approx(wanted, abs=0.01)
+        assert top == pytest.approx(wanted, abs=0.01)
 
 
 def test_on_a_telephone_in_the_dark_nothing_is_wider_than_the_screen(watched, path):
