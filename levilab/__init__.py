@@ -3,15 +3,20 @@
 For scripts and notebooks, each with `help`:
 
     run = levilab.acquire("spin", mock=True)     # an experiment → a run
-    run = levilab.load("runs/…")                 # a run of earlier
-    result = levilab.analyze(run)                # a run, a file or a DataFrame → a result
-    motion = levilab.simulate("undriven", 5)     # a scene → a trajectory
+    run = levilab.load("runs/…")                 # a run of earlier; levilab.runs() lists them
+    result = levilab.analyze(run)                # a run, a file, a DataFrame or arrays → a result
+    levilab.report(result, "report.html")        # its report
+    motion = levilab.simulate("undriven", 5)     # a scene → a trajectory; levilab.scenes() lists them
+    levilab.sweep("undriven", {"spin_hz": …})    # a scene over its parameters → a map
+    levilab.stability("undriven")                # where its top floats
 
 What they need is imported when they are called.  Known failures are `levilab.LevilabError`s.
 """
 
 from __future__ import annotations
 
+import sys
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal
 
 from levilab.errors import LevilabError
@@ -19,18 +24,65 @@ from levilab.errors import LevilabError
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from os import PathLike
+    from pathlib import Path
 
     import pandas as pd
+    from numpy.typing import ArrayLike
 
     from levilab.bench.person import Task
+    from levilab.notebook.listing import RunList
     from levilab.notebook.motion import SimulatedMotion
     from levilab.notebook.result import AnalysisResult
     from levilab.notebook.run import RecordedRun
+    from levilab.notebook.stability import FloatingTop
+    from levilab.notebook.sweep import SimulatedMap
     from levilab.pipelines.options import Method, Tilt
     from levilab.runs.run import Run
     from levilab.simulator.scene import Scene
 
-__all__ = ["LevilabError", "acquire", "analyze", "load", "simulate"]
+__all__ = [
+    "LevilabError", "acquire", "analyze", "load", "report", "runs", "scenes", "simulate", "stability", "sweep",
+]  # fmt: skip
+
+
+class _Border:
+    """Ends the traceback of a known failure at the caller: what lies below explains nothing to a person."""
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+        __tracebackhide__ = True  # IPython and pytest leave this frame out
+        if error is None:
+            return
+        from instruments.errors import InstrumentError
+
+        if isinstance(error, LevilabError | InstrumentError):
+            error.__cause__, error.__context__ = None, None
+            raise error.with_traceback(None)
+
+
+_border = _Border()
+
+
+class _FrontDoor(ModuleType):
+    """This package, whose functions stay where the import system would put rooms of their names."""
+
+    def __dir__(self) -> list[str]:
+        return [*__all__, *(name for name in vars(self) if name.startswith("__")), "__version__"]
+
+    def __getattr__(self, name: str) -> Any:
+        if name != "__version__":
+            raise AttributeError(f"module 'levilab' has no attribute {name!r}")
+        from importlib.metadata import version
+
+        return version("levilab")
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in __all__ and isinstance(value, ModuleType):
+            getattr(self, name).__dict__ = vars(value)  # levilab.report.page is found at the function, too
+        else:
+            super().__setattr__(name, value)
 
 
 def acquire(
@@ -110,7 +162,8 @@ def acquire(
         person=person or ask_with_input,
         settings=assignments(settings or {}),
     )
-    return acquire_run(experiment, options)
+    with _border:
+        return acquire_run(experiment, options)
 
 
 def load(path: str | PathLike[str]) -> RecordedRun:
@@ -127,13 +180,21 @@ def load(path: str | PathLike[str]) -> RecordedRun:
     """
     from levilab.notebook.acquisition import load_run
 
-    return load_run(path)
+    with _border:
+        return load_run(path)
 
 
 def analyze(
-    data: Run | str | PathLike[str] | pd.DataFrame | Sequence[Run | str | PathLike[str] | pd.DataFrame],
+    data: Run
+    | str
+    | PathLike[str]
+    | pd.DataFrame
+    | ArrayLike
+    | Sequence[Run | str | PathLike[str] | pd.DataFrame] = (),
     kind: Literal["spindown", "spin", "field", "limit", "precession", "sway", "hold", "video"] | None = None,
     *,
+    time: ArrayLike | None = None,
+    frequency: ArrayLike | None = None,
     columns: Mapping[str, str | int] | str | None = None,
     channel: str | None = None,
     rate: float | None = None,
@@ -168,8 +229,12 @@ def analyze(
 
     Args:
         data: a run, the path of a run folder, of a data file or of a folder to search, a DataFrame with columns as in
-            data files (`time_s`, `spin_frequency_hz`, …, or titles that files may have, with their units), or several.
+            data files (`time_s`, `spin_frequency_hz`, …, or titles that files may have, with their units), or several;
+            or arrays: (times [s], spin frequencies [Hz]) and, third, their standard uncertainties; of other kinds
+            (times, light), (heights [m], flux densities [T]), (drive, precession [Hz]), or limits alone [Hz].
         kind: the analysis; None for the one that is made for the data.
+        time: times of readings [s], which with frequency take the place of data.
+        frequency: spin frequencies at these times [Hz].
         columns: of a file or a DataFrame, where titles are not known: {"t": "Zeit", "f": "Drehzahl [rpm]"}, or as text
             "t=Zeit,f=Drehzahl [rpm]"; numbers count columns from 1.
         channel: of a record with several (spindown, spin).
@@ -210,10 +275,11 @@ def analyze(
         UsageError: an argument is wrong, or the data suit several analyses equally.
         DataError: the data suit none, or cannot be used; the text names file and line.
     """
-    options = {name: value for name, value in locals().items() if name not in {"data", "kind"}}
+    options = {name: value for name, value in locals().items() if name not in {"data", "kind", "time", "frequency"}}
     from levilab.notebook.analysis import analyze_data
 
-    return analyze_data(data, kind, options)
+    with _border:
+        return analyze_data(data if time is None and frequency is None else (time, frequency), kind, options)
 
 
 def simulate(
@@ -224,16 +290,20 @@ def simulate(
     tolerance: float = 1e-7,
     rate: float = 100.0,
     out: str | PathLike[str] | None = None,
+    animate: str | PathLike[str] | None = None,
+    **changes: Any,
 ) -> SimulatedMotion:
     """Simulate the motion of a top.  The first call for a kind of scene compiles for some seconds.
 
     Args:
-        scene: the name of one that ships (`levilab.simulator.presets()`), a TOML file, or a `levilab.simulator.Scene`.
+        scene: the name of one that ships (`levilab.scenes()`), a TOML file, or a `levilab.simulator.Scene`.
         duration: how much is simulated [s].
         settings: changes of the scene by dotted keys, as {"top.mass_kg": 0.0255}.
         tolerance: wanted error at the end, of the place [m] and of the axis [rad].
         rate: states per second [1/s].
         out: folder in which a run folder is made; None writes nothing.
+        animate: file of an animation in slow motion, .html, .gif or .mp4; `animate()` of the trajectory has more.
+        **changes: of the scene by the last parts of keys, as mass_kg=0.0255.
 
     Returns:
         The trajectory: `time`, `position`, `axis`, `spin_hz`, `tilt`, …, `summary()`, `to_dataframe()`, `plot()`,
@@ -245,5 +315,133 @@ def simulate(
         SimulationError: the motion cannot be followed.
     """
     from levilab.notebook.motion import simulate_motion
+    from levilab.notebook.scene import chosen_scene
 
-    return simulate_motion(scene, duration, settings=settings or {}, tolerance=tolerance, rate=rate, out=out)
+    with _border:
+        chosen = chosen_scene(scene, settings or {}, changes)
+        return simulate_motion(chosen, duration, tolerance=tolerance, rate=rate, out=out, animate=animate)
+
+
+def scenes() -> dict[str, str]:
+    """Return the scenes that come with levilab: name → description."""
+    from levilab.notebook.scene import list_scenes
+
+    return list_scenes()
+
+
+def sweep(
+    scene: Scene | str | PathLike[str],
+    sweep: Mapping[str, ArrayLike | str] | Sequence[str],
+    *,
+    observe: str | Sequence[str] = ("survived", "lifetime_s"),
+    duration: float = 30.0,
+    settings: Mapping[str, Any] | None = None,
+    tolerance: float = 1e-6,
+    out: str | PathLike[str] | None = None,
+    resume: bool = False,
+    adaptive: bool = False,
+    seed: int = 0,
+    cores: int | None = None,
+) -> SimulatedMap:
+    """Simulate a scene over two or three of its parameters.
+
+    Args:
+        scene: its name (`levilab.scenes()`), a TOML file, or a `levilab.simulator.Scene`.
+        sweep: key of the scene, whole or its last part, → values, as {"spin_hz": np.linspace(20, 40, 21)}; or the text
+            "20:40:21".
+        observe: names of what is observed at each point; `levilab sweep --help` lists them.
+        duration: of each motion [s].
+        settings: changes of the scene by dotted keys.
+        tolerance: wanted error at the end, of the place [m] and of the axis [rad].
+        out: folder STORE.zarr, which xarray.open_zarr reads, too; None keeps the map in memory.
+        resume: go on with an interrupted store.
+        adaptive: compute points along the boundary alone, and fill in the rest.
+        seed: of the points that `adaptive` checks at random.
+        cores: processes; None: one for each core, where that pays.
+
+    Returns:
+        The map: `values`, `axes`, `to_dataframe()`, `to_xarray()`, `plot(column)`, `summary()`.
+
+    Raises:
+        UsageError: an argument is wrong.
+        SceneError: a key of the scene, or the scene.
+        SimulationError: a motion cannot be followed.
+    """
+    given: dict[str, Any] = {"observe": observe, "duration": duration, "tolerance": tolerance}
+    from levilab.notebook.sweep import sweep_scene
+
+    with _border:
+        return sweep_scene(
+            scene, sweep, settings or {}, out, resume=resume, cores=cores, adaptive=adaptive, seed=seed, **given
+        )
+
+
+def stability(
+    scene: Scene | str | PathLike[str], *, settings: Mapping[str, Any] | None = None, **changes: Any
+) -> FloatingTop:
+    """Find where the top of a scene floats: heights, masses and spins.
+
+    Args:
+        scene: its name (`levilab.scenes()`), a TOML file, or a `levilab.simulator.Scene`.
+        settings: changes of the scene by dotted keys, as {"top.mass_kg": 0.0255}.
+        **changes: the same by the last parts of keys, as mass_kg=0.0255.
+
+    Returns:
+        What was found: `floats`, `height`, `spins`, `values`, `summary()`.
+
+    Raises:
+        SceneError: the scene, or a key of it.
+    """
+    from levilab.notebook.scene import chosen_scene
+    from levilab.notebook.stability import floating_top
+
+    with _border:
+        return floating_top(chosen_scene(scene, settings or {}, changes))
+
+
+def runs(folder: str | PathLike[str] = "runs", *, last: int | None = None) -> RunList:
+    """Return the runs at or below a folder, oldest first; as the last line of a notebook's cell they are a table.
+
+    Args:
+        folder: that is searched.
+        last: the latest ones alone, so many.
+
+    Raises:
+        DataError: there is no such folder.
+    """
+    from levilab.notebook.listing import runs_in
+
+    with _border:
+        return runs_in(folder, last)
+
+
+def report(
+    data: Run | AnalysisResult | str | PathLike[str] | Sequence[Run | AnalysisResult | str | PathLike[str]],
+    output: str | PathLike[str] = "report.html",
+    *,
+    tables: bool = False,
+    crosscheck: bool = True,
+) -> Path:
+    """Write the report of runs, data files, folders or results.
+
+    Args:
+        data: one of them, or several.
+        output: the file; its ending, .html or .pdf, chooses the format.
+        tables: write the tables of results, too, into a folder beside it.
+        crosscheck: make a cross-check with the result's own parameters where none is stored and it takes seconds.
+
+    Returns:
+        The file.
+
+    Raises:
+        DataError: there is nothing to report.
+        UsageError: an argument is wrong.
+        CannotWrite: the file cannot be written.
+    """
+    from levilab.notebook.report import report_on
+
+    with _border:
+        return report_on(data, output, tables=tables, crosscheck=crosscheck)
+
+
+sys.modules[__name__].__class__ = _FrontDoor

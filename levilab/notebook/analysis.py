@@ -10,7 +10,7 @@ from dataclasses import fields, replace
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DoesNotSuit, LevilabError, UsageError
 from levilab.notebook.frame import are_arrays, frame_of_arrays, has_numbers_for_titles, in_rows, is_frame, write_frame
@@ -23,18 +23,15 @@ from levilab.runs.run import Run, find_run
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    import pandas as pd
-
     from levilab.pipelines.catalogue import Analysis
     from levilab.pipelines.suits import Suiting
 
-    One: TypeAlias = "Run | str | PathLike[str] | pd.DataFrame"
 
 #: What DataFrames are called, in messages and beside saved results.
 _FRAME = "DataFrame"
 
 
-def analyze_data(data: One | Sequence[One], kind: str | None, given: Mapping[str, Any]) -> AnalysisResult:
+def analyze_data(data: Any, kind: str | None, given: Mapping[str, Any]) -> AnalysisResult:
     """Analyze data by one analysis.
 
     Args:
@@ -47,9 +44,11 @@ def analyze_data(data: One | Sequence[One], kind: str | None, given: Mapping[str
         DataError: the data suit none, or cannot be used.
     """
     options = read_options(given)
+    if data is None or (isinstance(data, tuple) and any(item is None for item in data)):
+        raise UsageError("data", "data, or `time` and `frequency` together, are expected", value="nothing")
     if are_arrays(data):
         data = frame_of_arrays(data, kind)
-    items: list[Any] = [data] if _is_one(data) else list(data)  # type: ignore[arg-type]
+    items: list[Any] = [data] if _is_one(data) else list(data)
     if not items:
         raise UsageError("data", "a run, a path or a DataFrame is expected", value="nothing")
     if kind is not None and kind not in ANALYSES:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError
 from levilab.present.units import split
 from levilab.software import how_to_install
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     import pandas as pd
     import xarray
 
@@ -27,14 +29,20 @@ def as_dataset(frame: pd.DataFrame, dimension: str) -> xarray.Dataset:
     Raises:
         MissingXarray: xarray is not installed.
     """
+    columns = {str(name): frame[name].to_numpy() for name in frame}
+    return dataset_of(columns, (dimension,)).set_coords({"time_s", "input", dimension} & set(columns))
+
+
+def dataset_of(variables: Mapping[str, Any], dimensions: Sequence[str]) -> xarray.Dataset:
+    """Return arrays over the same dimensions as a Dataset with units.  Raises MissingXarray."""
     try:
         import xarray
     except ImportError:
         advice = f"{how_to_install('xarray')}; to_dataframe() does without"
         raise MissingXarray(f"xarray is not installed: {advice}") from None
-    columns = {
-        str(name): (dimension, frame[name].to_numpy(), {"units": unit.si} if (unit := split(str(name))[1]) else {})
-        for name in frame
+    units = {name: unit.si for name in variables if (unit := split(name.rstrip(".0123456789"))[1])}
+    described = {
+        name: (tuple(dimensions), values, {"units": units[name]} if name in units else {})
+        for name, values in variables.items()
     }
-    coordinates = [name for name in ("time_s", "input", dimension) if name in columns]
-    return xarray.Dataset(columns).set_coords(coordinates)
+    return xarray.Dataset(described)

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import base64
+import tempfile
 from dataclasses import dataclass, fields
 from functools import partial
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from levilab.animation.request import AnimationRequest, animate, check_request
 from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation
 from levilab.motion.summary import as_document
 from levilab.motion.table import headline, print_motion
 from levilab.notebook.labels import as_dataset
 from levilab.present.html import facts_as_html
-from levilab.simulator.scene import Scene, read_scene
 from levilab.simulator.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
     from os import PathLike
 
     import numpy as np
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 
     from levilab.motion.summary import Summary
     from levilab.present.style import Figure
+    from levilab.simulator.scene import Scene
 
 
 @dataclass(frozen=True, repr=False)
@@ -105,22 +108,87 @@ class SimulatedMotion(Trajectory):
 
         return for_notebooks(motion_figure(self._found))
 
+    def animate(
+        self,
+        path: str | PathLike[str] | None = None,
+        *,
+        start: float | None = None,
+        stop: float | None = None,
+        speed: float | None = None,
+    ) -> Animation:
+        """Show the top in slow motion: a page to turn and to scrub, or a film.
+
+        Args:
+            path: of the file, which ends in .html, .gif or .mp4; None writes none, and a notebook shows the page.
+            start: of the span that is shown [s].
+            stop: of it [s].
+            speed: part of the real one.
+
+        Raises:
+            UsageError: an argument is wrong.
+            MissingThree, MissingEncoder: a library is missing.
+            CannotWrite: the file cannot be written.
+        """
+        with tempfile.TemporaryDirectory(prefix="levilab-") as folder:
+            file = Path(folder, "animation.html") if path is None else Path(path)
+            request = AnimationRequest(file, start, stop, speed)
+            check_request(request, self.scene, self._found.duration)
+            shown = animate(request, self._found, lambda _: None)
+            return Animation(file.read_bytes(), file.suffix.lower(), shown, None if path is None else file)
+
+
+#: Ending of an animation's file → how a notebook shows it, with the content as base64.
+_SHOWN_AS = {
+    ".html": '<iframe src="data:text/html;base64,{}" title="{}" width="100%" height="640" style="border: 0"></iframe>',
+    ".gif": '<img src="data:image/gif;base64,{}" alt="{}">',
+    ".mp4": '<video src="data:video/mp4;base64,{}" title="{}" controls loop></video>',
+}
+
+
+@dataclass(frozen=True, repr=False)
+class Animation:
+    """An animation, which a notebook shows.
+
+    Attributes:
+        content: of the file.
+        ending: of its name, which says its kind.
+        text: a description.
+        path: of the file; None: none was written.
+    """
+
+    content: bytes
+    ending: str
+    text: str
+    path: Path | None
+
+    def __repr__(self) -> str:
+        return f"<Animation of {self.text}{f', in {self.path}' if self.path else ''}>"
+
+    def _repr_html_(self) -> str:
+        """Return the HTML that a notebook shows."""
+        content = base64.b64encode(self.content).decode("ascii")
+        return _SHOWN_AS[self.ending].format(content, escape(self.text, quote=True))
+
 
 def simulate_motion(
-    scene: Scene | str | PathLike[str],
+    scene: Scene,
     duration: float,
     *,
-    settings: Mapping[str, Any],
     tolerance: float,
     rate: float,
     out: str | PathLike[str] | None,
+    animate: str | PathLike[str] | None,
 ) -> SimulatedMotion:
-    """Simulate a scene with changes at dotted keys.  Raises SceneError, UsageError, SimulationError, CannotWrite."""
-    chosen = (scene if isinstance(scene, Scene) else read_scene(Path(scene))).changed(settings)
-    request = SimulationRequest(chosen, duration, tolerance, rate, None if out is None else Path(out))
+    """Simulate a scene.  Raises UsageError, SimulationError, CannotWrite."""
+    if animate is not None:
+        check_request(AnimationRequest(Path(animate)), scene, duration)
+    request = SimulationRequest(scene, duration, tolerance, rate, None if out is None else Path(out))
     done = run_simulation(request, lambda _: None, uses_states=True)
     motion = done.summary.motion
     rows = kept_rows(motion, done.samples_per_state)
     own = {one.name: getattr(motion, one.name) for one in fields(motion)}
     own |= {"states": motion.states[rows]}
-    return SimulatedMotion(**own, found=done.summary, folder=done.folder)
+    simulated = SimulatedMotion(**own, found=done.summary, folder=done.folder)
+    if animate is not None:
+        simulated.animate(animate)
+    return simulated

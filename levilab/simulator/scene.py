@@ -316,15 +316,15 @@ def changes(scene: Scene) -> dict[str, Any] | None:
     """
     if scene.name not in presets():
         return None
-    usual = dict(_leaves(preset(scene.name).as_table()))
-    return {key: value for key, value in _leaves(scene.as_table()) if value != usual[key]}
+    usual = dict(leaves(preset(scene.name).as_table()))
+    return {key: value for key, value in leaves(scene.as_table()) if value != usual[key]}
 
 
-def _leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+def leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
     """Yield dotted keys with their values."""
     for key, value in table.items():
         if isinstance(value, dict):
-            yield from _leaves(value, f"{before}{key}.")
+            yield from leaves(value, f"{before}{key}.")
         else:
             yield before + key, value
 

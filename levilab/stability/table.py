@@ -16,6 +16,8 @@ from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIM
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from rich.console import Console
+
     from levilab.simulator.equilibrium import Stability
     from levilab.simulator.scene import Scene
 
@@ -55,10 +57,10 @@ LEFT_OUT: tuple[tuple[Callable[[Scene], bool], str], ...] = (
 )
 
 
-def print_stability(found: Stability) -> None:
+def print_stability(found: Stability, console: Console | None = None) -> None:
     """Print the windows, the equilibria, the spins; beside the thesis's figures for the thesis's device."""
-    out = terminal()
-    out.print(f"[bold]{escape(found.scene.name or 'the scene')}: {escape(_headline(found))}[/bold]")
+    out = console or terminal()
+    out.print(f"[bold]{escape(found.scene.name or 'the scene')}: {escape(headline(found))}[/bold]")
     out.print(_windows_table(found))
     if found.equilibria:
         out.print(_equilibria_table(found))
@@ -68,7 +70,8 @@ def print_stability(found: Stability) -> None:
         out.print(f"[yellow]note:[/yellow] {escape(remark)}")
 
 
-def _headline(found: Stability) -> str:
+def headline(found: Stability) -> str:
+    """Return one line: at which height the top floats, or what is missing."""
     if not found.floating:
         return advice(found)
     return f"a top of {1000 * found.scene.top.mass_kg:.2f} g floats at {100 * found.floating.height:.3f} cm"

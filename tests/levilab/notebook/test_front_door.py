@@ -320,13 +320,15 @@ def test_every_option_is_a_keyword_with_its_default() -> None:
     given = inspect.signature(levilab.analyze).parameters
     options = {one.name: one.default for row in ANALYSES.values() for one in fields(row.result.method.options)}
     options.pop("guess")  # whether titles are guessed is for those who name a single file
-    assert {name: one.default for name, one in given.items() if name not in {"data", "kind"}} == options
+    data = {"data", "kind", "time", "frequency"}
+    assert {name: one.default for name, one in given.items() if name not in data} == options
     assert all(f"'{name}'" in str(given["kind"].annotation).replace('"', "'") for name in ANALYSES)
     of_acquire = set(inspect.signature(levilab.acquire).parameters) - {"experiment"}
     assert of_acquire == {one.name for one in fields(AcquisitionOptions)} - {"tell"}
     of_simulate = inspect.signature(levilab.simulate).parameters
     order = {one.name: one.default for one in fields(SimulationRequest) if one.name != "scene"}
-    assert {name: one.default for name, one in of_simulate.items() if name not in {"scene", "settings"}} == order
+    own = {"scene", "settings", "animate", "changes"}
+    assert {name: one.default for name, one in of_simulate.items() if name not in own} == order
 
 
 # --- acquire and load ---

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import traceback
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +16,6 @@ from support.paths import SAMPLE_DATA
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
 #: Spin of the disc law with the constant of the first sample, at the times of its readings [Hz].
 T = np.arange(0.0, 200.0, 10.0)
@@ -62,16 +63,32 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "motion.z": lambda height: 0.07 < height.min() < height.max() < 0.075,
     "motion.to_xarray()": lambda data: data["z_m"].sel(time_s=0.0).item() == pytest.approx(0.071),
     "levilab.simulate('undriven', 0.1, settings={'start.spin_hz': 20}).spin_hz[0]": lambda f: f == pytest.approx(20),
+    "levilab.simulate('undriven', 0.1, spin_hz=20).spin_hz[0]": lambda f: f == pytest.approx(20),
+    "motion.animate()._repr_html_()": lambda html: html.startswith("<iframe src="),
+    "levilab.simulate('undriven', 0.5, animate=new / 'a.html')": lambda motion: motion.survived,
     # data in many forms
     "levilab.analyze(frame)": lambda result: result.kind == "spindown",
     "levilab.analyze([folder / 'spin-down-1', folder / 'spin-down-2'])": lambda result: len(result.inputs) == 2,
     "levilab.analyze((t, f))": lambda result: "c32" in result.models["disc"],
+    "levilab.analyze(time=t, frequency=f)": lambda result: result.best_model in {"disc", "power"},
+    # the other commands
+    "levilab.__version__": lambda text: text[0].isdigit(),
+    "levilab.runs(folder)": lambda runs: len(runs) > 10 and "spin-down-1" in runs._repr_html_(),
+    "levilab.scenes()": lambda scenes: "drive" in scenes["driven"],
+    "levilab.stability('undriven')": lambda found: 21 < found.spins[0][0] < 22 and found.floats,
+    "levilab.sweep('undriven', {'spin_hz': [18, 30]}, duration=0.5)": lambda m: m["survived"].tolist() == [False, True],
+    "levilab.report(result, new / 'r.html', crosscheck=False)": lambda path: path.stat().st_size > 50_000,
 }
 #: Wrong guesses → what the error says instead.
 REFUSED = {
     "levilab.simulate('undrivn')": "did you mean undriven?",
     "levilab.acquire('spinn', mock=True)": "spin, trace, field",
     "levilab.load(folder)": "levilab.runs lists",
+    "levilab.simulate('undriven', spin=20)": "did you mean start.spin_hz?",
+    "levilab.sweep('undriven', {'spin_hz': [18, 19, 30]})": "numpy.linspace",
+    "levilab.report(5)": "runs, results or paths are expected",
+    "levilab.runs(folder / 'none')": "there is no such folder",
+    "levilab.analyze(time=t)": "`time` and `frequency` together",
     "result['c1']": "not among the values of this result (its best law is disc): take result.models['stokes']['c1']",
     "result.models['disk']": "known are stokes, newton, disc",
     "result.predict(0.0, 'disk')": "known are stokes, newton, disc",
@@ -99,7 +116,7 @@ def names() -> dict[str, Any]:
 
 @pytest.mark.parametrize("typed", GUESSES)
 def test_a_natural_guess_works(typed: str, names: dict[str, Any], tmp_path: Path) -> None:
-    assert GUESSES[typed](eval(typed, names | {"folder_of_test": tmp_path}))
+    assert GUESSES[typed](eval(typed, names | {"new": tmp_path}))
 
 
 @pytest.mark.parametrize("typed", REFUSED)
@@ -147,3 +164,45 @@ def test_a_pickle_of_a_dataframes_result_can_be_saved_and_drawn(tmp_path: Path) 
     result = pickle.loads(pickled)
     assert result.plot().axes
     assert {path.name for path in result.save(tmp_path)} >= {"DataFrame.csv", "DataFrame.csv.result.spin.json"}
+
+
+@pytest.mark.parametrize("typed", REFUSED)
+def test_a_traceback_ends_at_the_border(typed: str, names: dict[str, Any]) -> None:
+    with pytest.raises(levilab.LevilabError) as raised:
+        eval(typed, names)
+    error = raised.value
+    assert error.__cause__ is None
+    assert error.__context__ is None or error.__suppress_context__
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "levilab" in Path(frame.filename).parts]
+    assert len(frames) <= 5  # this test's own, two of the front door; a result's methods call one another
+
+
+def test_tab_offers_what_is_for_people() -> None:
+    offered = {name for name in dir(levilab) if not name.startswith("_")}
+    assert offered == set(levilab.__all__)
+    assert {"run", "page", "table"}.isdisjoint(offered)
+
+
+def test_rooms_are_found_where_a_function_has_their_name() -> None:
+    import levilab.report.page
+    import levilab.runs.run
+
+    assert callable(levilab.runs)
+    assert callable(levilab.report)
+    assert levilab.runs.run.Run is levilab.load(SAMPLE_DATA / "spin-down-1").__class__.__mro__[1]
+    assert levilab.report.page.write_report.__name__ == "write_report"
+
+
+def test_a_sweep_is_a_table_a_dataset_and_a_figure(tmp_path: Path) -> None:
+    axes = {"spin_hz": np.linspace(18, 26, 3), "top.mass_kg": "0.0245:0.0250:2"}
+    swept = levilab.sweep("undriven", axes, observe="survived", duration=0.3, out=tmp_path / "map.zarr")
+    assert swept.to_dataframe().shape == (6, 3)
+    data = swept.to_xarray()
+    assert data["survived"].dims == ("start.spin_hz", "top.mass_kg")
+    assert data["survived"].sel({"start.spin_hz": 26.0}).all()
+    assert not data["survived"].sel({"start.spin_hz": 18.0}).any()
+    assert swept.plot().axes
+    with pytest.raises(levilab.LevilabError, match="known are survived"):
+        swept.plot("lifetime_s")
+    again = levilab.sweep("undriven", axes, observe="survived", duration=0.3, out=tmp_path / "map.zarr", resume=True)
+    assert np.array_equal(again["survived"], swept["survived"])

@@ -1,0 +1,56 @@
+"""Reports from scripts and notebooks."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import UsageError
+from levilab.notebook.result import AnalysisResult
+from levilab.report.page import write_report
+from levilab.runs.run import Run, find_run
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    Reported = Run | AnalysisResult | str | PathLike[str]
+
+
+def report_on(data: Any, output: str | PathLike[str], *, tables: bool, crosscheck: bool) -> Path:
+    """Write a report of runs, files, folders or results; see `levilab.report`.
+
+    Raises:
+        UsageError: an argument is wrong, or results were made with unlike options.
+        DataError: there is nothing to report.
+    """
+    several = isinstance(data, list | tuple | set)
+    items = [*data] if several else [data]
+    paths, given = [], dict[str, Any]()
+    for item in items:
+        paths += _paths(item)
+        for name, value in _options(item).items():
+            if given.setdefault(name, value) != value:
+                raise UsageError("data", f"results with unlike options ({name}) need a report each")
+    return write_report(paths, Path(output), given, tables=tables, crosscheck=crosscheck)
+
+
+def _paths(item: Reported) -> list[Path]:
+    if isinstance(item, AnalysisResult):
+        return [source.path for source in item.found.sources]
+    if isinstance(item, Run):
+        return [item.folder]
+    if isinstance(item, str | PathLike):
+        return [find_run(Path(item))]
+    raise UsageError("data", "runs, results or paths are expected", value=type(item).__name__)
+
+
+def _options(item: Reported) -> Mapping[str, Any]:
+    """Return the options with which a result was made; those at their defaults count as not given."""
+    if not isinstance(item, AnalysisResult):
+        return {}
+    options = item.found.options
+    return {
+        one.name: value for one in fields(options) if (value := getattr(options, one.name)) not in (None, one.default)
+    }

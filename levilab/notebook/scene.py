@@ -1,0 +1,42 @@
+"""Scenes as scripts and notebooks name and change them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from levilab.simulator.scene import Scene, leaves, preset, presets, read_scene
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from os import PathLike
+
+
+def list_scenes() -> dict[str, str]:
+    """Return the scenes that come with levilab: name → description."""
+    return {name: preset(name).description for name in presets()}
+
+
+def chosen_scene(scene: Scene | str | PathLike[str], settings: Mapping[str, Any], by_name: Mapping[str, Any]) -> Scene:
+    """Return a scene with changes.
+
+    Args:
+        scene: itself, a name, or a TOML file.
+        settings: changes by dotted keys.
+        by_name: changes by the last parts of keys, as mass_kg.
+
+    Raises:
+        SceneError: there is no such scene, key or value.
+    """
+    read = scene if isinstance(scene, Scene) else read_scene(Path(scene))
+    return read.changed({**settings, **{whole_key(read, name): value for name, value in by_name.items()}})
+
+
+def whole_key(scene: Scene, name: str) -> str:
+    """Return the dotted key that ends in a name; the name itself where none or several do, for the error to come.
+
+    >>> whole_key(preset("undriven"), "mass_kg"), whole_key(preset("undriven"), "start.spin_hz")
+    ('top.mass_kg', 'start.spin_hz')
+    """
+    found = [key for key, _ in leaves(scene.as_table()) if key.rpartition(".")[2] == name]
+    return found[0] if len(found) == 1 else name

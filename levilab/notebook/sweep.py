@@ -1,0 +1,167 @@
+"""A sweep of a scene over its parameters, as scripts and notebooks use it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.errors import UsageError
+from levilab.notebook.labels import as_dataset, dataset_of
+from levilab.notebook.scene import chosen_scene, whole_key
+from levilab.present.html import facts_as_html, fold, table_as_html
+from levilab.sweeps.adaptive import is_adaptive, run_adaptive
+from levilab.sweeps.request import SweepRequest, store_for
+from levilab.sweeps.run import compile_for, run, workers_for
+from levilab.sweeps.summary import axes_lines, columns_table, headline, summarise
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from os import PathLike
+
+    import pandas as pd
+    import xarray
+
+    from levilab.present.style import Figure
+    from levilab.simulator.scene import Scene
+    from levilab.sweeps.store import Store
+
+#: Rows of a table that a notebook's cell shows.
+_MOST_ROWS = 10
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulatedMap:
+    """What a sweep found at each point.
+
+    Attributes:
+        store: that holds it, in a folder or in memory.
+    """
+
+    store: Store
+
+    @property
+    def path(self) -> Path | None:
+        """The folder of the store; None: it is in memory."""
+        return self.store.path
+
+    @property
+    def values(self) -> Mapping[str, np.ndarray]:
+        """Observable → values, in the shape of the axes; NaN, False or 0 where a point is not computed."""
+        return self.store.load().values
+
+    @property
+    def axes(self) -> Mapping[str, np.ndarray]:
+        """Key → its values."""
+        return {axis.key: axis.values for axis in self.store.plan.axes}
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.axes[name] if name in self.axes else self.values[name]
+
+    def __repr__(self) -> str:
+        return f"<SimulatedMap: {headline(summarise(self.store))}>"
+
+    def _repr_html_(self) -> str:
+        """Return the HTML that a notebook shows."""
+        frame = self.to_dataframe()
+        head = frame.head(_MOST_ROWS).map(lambda cell: f"{cell:.6g}" if isinstance(cell, float) else str(cell))
+        rows = table_as_html([*map(str, head.columns)], head.to_numpy().tolist(), texts=0)
+        facts = [("axis", line) for line in axes_lines(summarise(self.store))]
+        return facts_as_html(headline(summarise(self.store)), facts, fold(f"{len(frame)} points", rows, opened=True))
+
+    def summary(self) -> str:
+        """Return the text that `levilab sweep` prints."""
+        from levilab.present.terminal import as_text, draw  # with rich
+
+        table = columns_table(summarise(self.store))
+        return f"{headline(summarise(self.store))}\n{as_text(lambda console: console.print(draw(table)))}"
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a row for each point: its place on the axes, and what was observed."""
+        import pandas as pd
+
+        if self.store.plan.is_table:
+            return pd.DataFrame({**self.axes, **self.values})
+        grids = np.meshgrid(*self.axes.values(), indexing="ij")
+        places = dict(zip(self.axes, grids, strict=True))
+        return pd.DataFrame({name: values.ravel() for name, values in {**places, **self.values}.items()})
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return a Dataset with the axes as coordinates, and units; needs xarray.  Raises MissingXarray."""
+        if self.store.plan.is_table:
+            return as_dataset(self.to_dataframe(), "point")
+        return dataset_of(self.values, [*self.axes]).assign_coords(self.axes)
+
+    def plot(self, column: str | None = None) -> Figure:
+        """Draw a map of an observable, by default of the first one, over two axes or more.  Raises UsageError."""
+        from levilab.present.style import for_notebooks  # with matplotlib
+        from levilab.sweeps.figure import has_figure, map_figure
+
+        names = [*self.values]
+        if column is not None and column not in names:
+            raise UsageError("column", f"known are {', '.join(names)}", value=column)
+        if not has_figure(self.store.plan):
+            raise UsageError("plot", "a table of points is no map: draw columns of to_dataframe()")
+        return for_notebooks(map_figure(self.store.load(), column or names[0]))
+
+
+def sweep_scene(
+    scene: Scene | str | PathLike[str],
+    axes: Mapping[str, Any] | Sequence[str],
+    settings: Mapping[str, Any],
+    out: str | PathLike[str] | None,
+    *,
+    resume: bool,
+    cores: int | None,
+    **given: Any,
+) -> SimulatedMap:
+    """Compute a sweep; see `levilab.sweep`.
+
+    Args:
+        scene: that is simulated.
+        axes: key → values, or texts KEY=FROM:TO:N.
+        settings: changes of the scene by dotted keys.
+        out: folder of the store; None: it stays in memory.
+        resume: go on with the store that is there.
+        cores: processes; None: one for each core, where that pays.
+        given: the other attributes of a `SweepRequest`.
+
+    Raises:
+        UsageError: an argument is wrong.
+        SceneError, SimulationError: a scene of the sweep cannot be simulated.
+    """
+    chosen = chosen_scene(scene, settings, {})
+    spans = axes if not hasattr(axes, "items") else [_axis(whole_key(chosen, key), one) for key, one in axes.items()]
+    observe = given.pop("observe")
+    names = observe if isinstance(observe, str) else ",".join(observe)
+    keys = [f"{key}=0" for key in settings]
+    request = SweepRequest(chosen, sweep=spans, settings=keys, observe=names, **given)
+    store = store_for(request, None if out is None else Path(out), resume=resume)
+    carry_out = partial(run_adaptive if is_adaptive(store) else run, store)
+    with store.lock():
+        compile_for(store.plan)
+        carry_out(workers_for(store.plan, cores))
+    return SimulatedMap(store)
+
+
+def _axis(key: str, values: Any) -> str:
+    """Return an axis as `levilab sweep` takes it, KEY=FROM:TO:N: of such a text, or of values.  Raises UsageError."""
+    if isinstance(values, str):
+        return f"{key}={values}"
+    expected = "numbers are expected that numpy.linspace or geomspace gives, or a text FROM:TO:N"
+    try:
+        numbers = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise UsageError("sweep", expected, value=f"{key}: {values}") from None
+    if numbers.ndim != 1 or len(numbers) < 2 or not np.isfinite(numbers).all():
+        raise UsageError("sweep", expected, value=f"{key}: {values}")
+    first, last = float(numbers[0]), float(numbers[-1])
+    spaced = {"": np.linspace(first, last, len(numbers))}
+    spaced |= {":log": np.geomspace(first, last, len(numbers))} if first > 0 and last > 0 else {}
+    for ending, even in spaced.items():
+        if np.allclose(numbers, even, rtol=1e-9, atol=0):  # rounding of one who spaced them in another way
+            return f"{key}={first!r}:{last!r}:{len(numbers)}{ending}"
+    raise UsageError("sweep", expected, value=f"{key}: {values}")
