@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import Paths
+from levilab.cli.options import Author, Course, Date, Paths, Title
 from levilab.cli.output import interruptible, message, result
 from levilab.cli.quantities import with_options
 from levilab.pipelines.options import OF_REPORT, read_options
@@ -20,14 +20,23 @@ def of_class(
         Path,
         typer.Option("--output", "-o", metavar="FILE", help="The file to write; its ending is .html, .pdf or .xlsx."),
     ] = Path("class.html"),
+    title: Title = "",
+    course: Course = "",
+    author: Author = "",
+    date: Date = "",
     **given: Any,
 ) -> None:
     """Put the groups of a class beside each other."""
     from levilab.report.groups.write import write_class
+    from levilab.report.heading import Heading
 
     app = context.find_root().command
     with interruptible("nothing is written"):
         written = write_class(
-            paths, output, read_options(given, typed=True), lambda text: message(with_options(text, app))
+            paths,
+            output,
+            read_options(given, typed=True),
+            lambda text: message(with_options(text, app)),
+            Heading(title, course, author, date),
         )
     result(f"the class is in {written}")

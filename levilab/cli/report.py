@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import Json, Paths
+from levilab.cli.options import Author, Course, Date, Json, Paths, Title
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.pipelines.options import OF_REPORT, read_options
@@ -40,9 +40,15 @@ def report(
             help="Make a cross-check with the result's own parameters where none is stored and it takes seconds.",
         ),
     ] = True,
+    short: Annotated[bool, typer.Option("--short", help="Result, figure and notes alone.")] = False,
+    title: Title = "",
+    course: Course = "",
+    author: Author = "",
+    date: Date = "",
     **given: Any,
 ) -> None:
     """Write the report."""
+    from levilab.report.heading import Heading
     from levilab.report.page import write_report
 
     app = context.find_root().command
@@ -55,6 +61,8 @@ def report(
             lambda text: message(with_options(text, app)),
             tables=tables,
             crosscheck=crosscheck,
+            short=short,
+            heading=Heading(title, course, author, date),
         )
     result(place)
     if tables:

@@ -1,4 +1,4 @@
-"""Results → a document: warnings first, then what the data say, then with what they were measured."""
+"""Results → a document: what the data say, the figure, notes, then with what they were measured."""
 
 from __future__ import annotations
 
@@ -48,6 +48,8 @@ def document_of(
     others: Sequence[Section] = (),
     supplements: Sequence[Supplement] = SUPPLEMENTS,
     asked: Asked | None = None,
+    *,
+    short: bool = False,
 ) -> Document:
     """Return the report.
 
@@ -56,6 +58,7 @@ def document_of(
         others: sections of inputs that are no measurement; at least one of the two has something in it.
         supplements: what it says of each analysis beyond its own part.
         asked: what was asked for, where that is known.
+        short: whether it has result, figure and notes alone.
     """
     parts = [analysis.part(found) for analysis, found in results]
     alone = len(results) == 1 and not others
@@ -63,11 +66,13 @@ def document_of(
     banner = _document_banner(results, sources, others)
     blocks: list[Block] = []
     for (analysis, found), part in zip(results, parts, strict=True):
-        own = blocks_of_part(analysis, found, part, deeper=not alone, supplements=supplements)
+        own = blocks_of_part(analysis, found, part, deeper=not alone, supplements=supplements, short=short)
         blocks += own if alone else [_of_one_analysis(found, part, own, first=not blocks)]
     blocks += others
+    if results and not short:
+        blocks.append(_measurements(results, parts))
     if results:
-        blocks += [_measurements(results, parts), reproduction(results, asked)]
+        blocks.append(reproduction(results, asked, short=short))
     counts = count_inputs(sources)
     subjects = ", ".join([*(part.subject for part in parts), *(one.title.lower() for one in others)])
     return Document(
@@ -87,8 +92,9 @@ def blocks_of_part(
     *,
     deeper: bool = False,
     supplements: Sequence[Supplement] = SUPPLEMENTS,
+    short: bool = False,
 ) -> list[Block]:
-    """Return what one analysis found: warnings, result, figure, what else is known, run by run.
+    """Return what one analysis found: result, figure, notes, what else is known, run by run.
 
     Args:
         analysis: the row of the catalogue.
@@ -96,21 +102,21 @@ def blocks_of_part(
         part: its words.
         deeper: whether sections stand below a heading of the analysis, and need no links of their own.
         supplements: what it says beyond the part.
+        short: whether result, figure and notes are all of it.
     """
 
     def section(title: str, anchor: str, *blocks: Block) -> Section:
         return Section(title, blocks, anchor=f"{analysis.name}-{anchor}" if deeper else anchor)
 
     groups = tuple(tuple(map(unquote, alike)) for alike in found.grouped_warnings)
-    count = sum(map(len, groups))
-    warnings = [section(f"{count} warning{'s' * (count > 1)}", "warnings", Warnings(groups))] if groups else []
-    more = (block for supplement in supplements for block in supplement(analysis, found))
+    notes = [section("Notes", "notes", Warnings(groups))] if groups else []
+    more = [block for supplement in supplements for block in supplement(analysis, found)]
+    more.append(section(part.runs_title, "runs", *part.runs))
     blocks = [
-        *warnings,
         section("Result", "result", Verdict(_verdict(found, part)), *part.result),
         section("Figure", "figure", picture_of(analysis, found, part)),
-        *more,
-        section(part.runs_title, "runs", *part.runs),
+        *notes,
+        *([] if short else more),
     ]
     return with_marks(blocks, mark_of(found.sources))
 
@@ -161,8 +167,8 @@ def _title(counts: str, others: Sequence[Section]) -> str:
 
 def _lead(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
     """Return the amount of data used."""
-    warnings = "" if found.grouped_warnings else ", no warnings"
-    return f"{count_inputs(found.sources)}, {part.lead}{warnings}"
+    count = sum(map(len, found.grouped_warnings))
+    return f"{count_inputs(found.sources)}, {part.lead}, {count or 'no'} note{'s' * (count != 1)}"
 
 
 def _measurements(results: Results, parts: Sequence[ReportPart]) -> Section:

@@ -18,6 +18,7 @@ from levilab.pipelines.suits import recall_suiting, remarks, texts_of
 from levilab.present.clock import local
 from levilab.present.numbers import list_in_words
 from levilab.report.document import document_of, notebook_blocks
+from levilab.report.heading import Heading
 from levilab.report.html.page import fragment_of, page_of
 from levilab.report.kinds import KINDS
 from levilab.report.pdf.renderer import as_pdf, check_typst
@@ -75,6 +76,8 @@ def write_report(
     *,
     tables: bool = False,
     crosscheck: bool = False,
+    short: bool = False,
+    heading: Heading | None = None,
 ) -> Path:
     """Report what was found of the inputs at the paths; what has no result yet is analyzed, and nothing is stored.
 
@@ -85,6 +88,8 @@ def write_report(
             `levilab.pipelines.document.Document.look`.
         tell: called with what lies there and is not in the report, and with what has no result.
         tables: whether tables of the results are written, too, into the folder that `folder_of` names.
+        short: whether result, figure and notes are all of it.
+        heading: title, course, authors and date above it.
         crosscheck: whether one is made where none lies beside the result and it takes two seconds at most.
 
     Returns:
@@ -105,9 +110,11 @@ def write_report(
     others, left = _sorted_by_kind(paths)
     sections = [section for kind, found in others for section in kind.sections(found)]
     results = _results(left, given or {}, tell, needed=not others)
-    supplements = WITH_TRIALS if crosscheck else SUPPLEMENTS
-    asked = Asked(paths, form.ending, given or {}, crosscheck)
-    document = replace(document_of(results, sections, supplements, asked), date=newest_of(results, others))
+    supplements = () if short else WITH_TRIALS if crosscheck else SUPPLEMENTS
+    heading = heading or Heading()
+    asked = Asked(paths, form.ending, given or {}, crosscheck, short, heading)
+    document = heading.above(document_of(results, sections, supplements, asked, short=short))
+    document = replace(document, date=newest_of(results, others))
     content = form.content(document)
     with writing_report(output):
         output.parent.mkdir(parents=True, exist_ok=True)

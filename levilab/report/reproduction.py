@@ -12,6 +12,7 @@ from levilab.formats.table import parse_columns
 from levilab.pipelines.options import OF_REPORT, OPTIONS, options_of, typed_name
 from levilab.present.document.blocks import Code, Details, Fact, Facts, Note, Paragraph, Section, Tabular
 from levilab.present.tables import table
+from levilab.report.heading import Heading
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
@@ -34,28 +35,37 @@ class Asked:
         ending: of the file's name; it stands for the format.
         given: options by their names.
         crosscheck: whether one was asked for where none is stored.
+        short: whether result, figure and notes alone were asked for.
+        heading: what stands above it.
     """
 
     paths: Sequence[Path] = ()
     ending: str = ".html"
     given: Mapping[str, Any] = field(default_factory=dict)
     crosscheck: bool = True
+    short: bool = False
+    heading: Heading = field(default_factory=Heading)
 
     def command(self, sources: Sequence[Source[Any]]) -> str:
         """Return the command that makes the report again."""
         paths = [shlex.quote(str(path)) for path in self.paths] or paths_in_commands(sources)
         options = [word for name in OF_REPORT for word in _option(name, self.given.get(name))]
         no_crosscheck = [] if self.crosscheck else ["--no-crosscheck"]
-        return " ".join(["levilab", "report", *paths, *options, *no_crosscheck, "-o", f"report{self.ending}"])
+        short = ["--short"] if self.short else []
+        words = [*paths, *options, *no_crosscheck, *short, *self.heading.typed]
+        return " ".join(["levilab", "report", *words, "-o", f"report{self.ending}"])
 
 
-def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked | None = None) -> Section:
-    """Return the section at the end of a report of measurements."""
+def reproduction(
+    results: Sequence[tuple[Analysis[Any], Any]], asked: Asked | None = None, *, short: bool = False
+) -> Section:
+    """Return the section at the end of a report of measurements.  short: whether it names the commands alone."""
     asked = asked or Asked()
     sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
     many = len(sources) > _MOST_NAMED
     data = (_data(sources), *_recording(sources))
-    inputs: tuple[Block, ...] = (Details("The data", data, more=f"{len(sources)} inputs"),) if many else data
+    data = () if short else data
+    inputs: tuple[Block, ...] = (Details("The data", data, more=f"{len(sources)} inputs"),) if many and data else data
     return Section(
         "How to reproduce this",
         (

@@ -276,6 +276,7 @@ class Document:
         banner: stands directly below title and lead; None where nothing is synthetic.
         contents: whether links to the sections of the first depth stand before the blocks (HTML), or an outline (PDF).
         subject: the name of the file's window or in its metadata; empty for the title.
+        byline: a line between title and lead: course, authors, date; empty for none.
         date: when the newest of the data were taken, in the file's properties; None where that is not known.
     """
 
@@ -285,4 +286,5 @@ class Document:
     banner: Banner | None = None
     contents: bool = False
     subject: str = ""
+    byline: str = ""
     date: datetime | None = None

@@ -1,4 +1,4 @@
-"""A class → blocks of a document: the result, the figure, the groups, notes, how to make it again."""
+"""A class → blocks of a document: the result, the figure, notes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from levilab.present.document.blocks import Code, Document, Fact, Facts, Paragraph, Picture, Section, Tabular, Verdict
+from levilab.present.document.blocks import Document, Fact, Facts, Note, Picture, Section, Tabular, Verdict
 from levilab.present.numbers import column, plain, with_sign, without_unit
 from levilab.present.tables import Row, table
 from levilab.report.document import banner_of, count_inputs
@@ -47,7 +47,7 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], ending: str)
     return Document(
         title=f"Class of {len(names)} group{'s' * (len(names) > 1)}",
         lead=f"{count_inputs(sources)}: {', '.join(map(_subject, classes))}",
-        blocks=(*chapters, _again(paths, ending)),
+        blocks=(*chapters, _made_by(paths, ending)),
         banner=banner_of(sources),
         contents=True,
     )
@@ -62,9 +62,8 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
         return Section(title, blocks, anchor=f"{of.analysis.name}-{anchor}" if deeper else anchor)
 
     tables = (_values(of, one) for one in of.quantities)
-    yield section("Result", "result", Verdict(verdict(of)), *tables)
+    yield section("Result", "result", Verdict(verdict(of)), *tables, _groups(of))
     yield section("Figure", "figure", _picture(of))
-    yield section("Group by group", "groups", _groups(of))
     if any(group.warnings or group.source.note for group in of.groups):
         yield section("Notes", "notes", Facts(tuple(_notes(of))))
 
@@ -154,13 +153,7 @@ def _draw(of: Class) -> Figure:
     return class_figure(of)
 
 
-def _again(paths: Sequence[Path], ending: str) -> Section:
+def _made_by(paths: Sequence[Path], ending: str) -> Note:
     typed = " ".join(shlex.quote(str(path)) for path in paths)
-    return Section(
-        "How to make this again",
-        (
-            Paragraph("Each group's own report has its readings, its figure and the budget of its uncertainties."),
-            Code(f"levilab class {typed} -o class{ending}\nlevilab report {typed} -o report{ending}"),
-        ),
-        anchor="reproduce",
-    )
+    each = "each group's readings, figure and budget of uncertainties are in that of levilab report"
+    return Note(f"Made by: levilab class {typed} -o class{ending}; {each}.")

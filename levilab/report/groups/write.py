@@ -10,6 +10,7 @@ from levilab.pipelines.suits import recall_suiting
 from levilab.report.groups.beside import class_of
 from levilab.report.groups.document import class_document
 from levilab.report.groups.sheet import class_workbook
+from levilab.report.heading import Heading
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, writing_report
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ def write_class(
     output: Path,
     given: Mapping[str, Any] | None = None,
     tell: Callable[[str], None] | None = None,
+    heading: Heading | None = None,
 ) -> Path:
     """Put the groups of a class beside each other; what has no result yet is analyzed, and nothing is stored.
 
@@ -32,6 +34,7 @@ def write_class(
         output: the file to write; its ending, .html, .pdf or .xlsx, chooses the format.
         given: options of analyses by their names.
         tell: called with what lies there and is of no use.
+        heading: title, course, authors and date above it.
 
     Returns:
         The file.
@@ -54,7 +57,8 @@ def write_class(
     classes = [class_of(analysis, found) for analysis, found in results]
     date = newest_of(results)
     if form:
-        content = form.content(replace(class_document(classes, paths, form.ending), date=date))
+        document = (heading or Heading()).above(class_document(classes, paths, form.ending))
+        content = form.content(replace(document, date=date))
     else:
         content = class_workbook(classes, date)
     with writing_report(output):

@@ -51,7 +51,8 @@ def fragment_of(blocks: Iterable[Block], prefix: str = "") -> str:
 def _head(document: Document, writer: Writer) -> list[Html]:
     banner = writer.blocks([document.banner], level=2) if document.banner else join([])
     lead = element("p", words(document.lead), class_="lead") if document.lead else join([])
-    return [element("h1", words(document.title)), lead, banner, _contents(document)]
+    byline = element("p", words(document.byline), class_="byline") if document.byline else join([])
+    return [element("h1", words(document.title)), byline, lead, banner, _contents(document)]
 
 
 def _contents(document: Document) -> Html:

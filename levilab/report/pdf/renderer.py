@@ -184,6 +184,7 @@ def _content(document: Document, drawing: _Drawing) -> Drawn:
         "short": _text(title if len(title) <= SHORT_TITLE else f"{title[: SHORT_TITLE - 1]}…"),
         "heading": _text(document.title),
         "date": None if document.date is None else _date(document.date),
+        "byline": _text(document.byline),
         "lead": _text(document.lead),
         "banner": None if document.banner is None else _banner(document.banner, drawing),
         "mark": _text(document.banner.lead.rstrip(".")) if document.banner else "",
@@ -204,14 +205,14 @@ def _outline_depth(document: Document) -> int:
 
 
 def _in_short(blocks: Iterable[Block]) -> Iterator[Drawn]:
-    """Return each chapter of a report of several for the first page: its verdict and the number of warnings."""
+    """Return each chapter of a report of several for the first page: its verdict and the number of notes."""
     chapters = [(block, [*_all_in(block)]) for block in blocks if isinstance(block, Section)]
     verdicts = [next((one.text for one in inner if isinstance(one, Verdict)), "") for _, inner in chapters]
     several = sum(map(bool, verdicts)) > 1
     for (chapter, inner), verdict in zip(chapters, verdicts, strict=True) if several else ():
         count = sum(len(group) for one in inner if isinstance(one, Warnings) for group in one.groups)
-        warnings = f"{count} warning{'s' * (count > 1)}" if count else ""
-        yield {"title": _text(chapter.title), "verdict": _text(verdict), "warnings": warnings}
+        notes = f"{count} note{'s' * (count > 1)}" if count else ""
+        yield {"title": _text(chapter.title), "verdict": _text(verdict), "notes": notes}
 
 
 def _all_in(block: Block) -> Iterator[Block]:

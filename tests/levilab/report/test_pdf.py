@@ -153,9 +153,9 @@ def test_a_first_page_of_several_chapters_says_what_each_found() -> None:
     )
     last = Section("How to reproduce this", (Paragraph("x"),))
     said = data_of(Document("t", "", (*chapters, last)))["chapters"]
-    assert [(one["title"], one["verdict"], one["warnings"]) for one in said] == [
-        ("one", "one holds", "1 warning"),
-        ("two", "two holds", "1 warning"),
+    assert [(one["title"], one["verdict"], one["notes"]) for one in said] == [
+        ("one", "one holds", "1 note"),
+        ("two", "two holds", "1 note"),
         ("How to reproduce this", "", ""),
     ]
     assert data_of(Document("t", "", (chapters[0], last)))["chapters"] == []
