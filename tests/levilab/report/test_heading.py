@@ -33,7 +33,7 @@ def test_a_short_one_has_no_more_and_names_the_command_that_makes_it(tmp_path: P
     assert "Physics lab 2 · A. Kim · 28 November" in text
     assert "Spin-down of a levitated top: 2 runs" in text
     assert "--short --title" in text
-    assert "sha256" not in text
+    assert "readings.csv" not in text
 
 
 @pytest.mark.parametrize("ending", ["html", "pdf"])
