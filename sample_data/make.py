@@ -7,8 +7,6 @@ return the published C₁ and C₂, rounded to 0.01 Hz.  They are not the author
 
 The files in scope-files/ all hold the same synthetic half second of a tape that passes a phototransistor 30 times a
 second, written as several makers' oscilloscopes would.
-The upper limits are synthetic, too: a normal law about what the simulated bench gives (docs/experiments/limit.md), once
-of a sound top and once of one whose washers slip under the tape.
 
 The records, the held spins and the scan are written by `levilab acquire` on the virtual bench, without times and values
 that differ between computers.
@@ -16,8 +14,8 @@ that differ between computers.
 Run it from anywhere: ``python sample_data/make.py``.  It writes the same bytes each time.
 
 ``python sample_data/make.py --full-motion`` makes the sweep of the drive, too: ``levilab acquire precession --mock``
-with records of the phase, its top simulated in full motion, and the track of a swaying top.  Their last digits depend
-on the processor.
+with records of the phase, the upper limits of a sound top and of one whose washers slip under the tape, tops simulated
+in full motion, and the track of a swaying top.  Their last digits depend on the processor.
 
 ``python sample_data/make.py --sound`` makes phone.m4a, too; its bytes depend on the version of FFmpeg.
 """
@@ -37,10 +35,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.locked import slip_of
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
-from levilab.present.numbers import with_sign
+from levilab.crosscheck.subjects.tune import draw_world, keep_diary
+from levilab.pipelines.tune.owner import write_owner
 from levilab.present.progress import Display
 from levilab.reproduce.spindown import NOISE_HZ, READINGS, solve
 from levilab.runs.events import RunEvent
@@ -67,94 +65,6 @@ HOW = (
     "N(0, 0.03 Hz) of seed {seed}, both solved for so that unweighted straight lines return the published "
     "C1 = {c1} 1/s and C2 = {c2} 1/rad; rounded to 0.01 Hz; made by sample_data/make.py"
 )
-
-
-#: Upper limits: mean and scatter of the simulated bench (sine of 0.4 mT, creep of 0.1 Hz/s), tops, creep and how often
-#: the top is looked at; axial inertia, drag, and the coupling of the loose washers, which all the drag acts on.
-UPPER_HZ, UPPER_SCATTER_HZ, TOPS, CREEP_HZ_S, LOOK_S = 69.0, 1.4, 8, 0.1, 2.0
-AXIAL_KG_M2, DRAG, COUPLING_N_M_S = 1.731314e-6, 2.34e-4, 1e-6
-HELD_HZ, COUNTS, COUNT_SCATTER_HZ = 30.0, 40, 0.08
-#: A top that is lost slows by so much, the drive goes on; it is missed when it is so far behind.  The tape was compared
-#: with the drive so far below.
-SLOWS_HZ_S, MISSED_HZ, BELOW_HZ = 0.15, 1.0, 7.0
-UPPER_CHANNELS = [
-    {"name": "time_s", "unit": "s", "source": "made up, when the top was lost"},
-    {"name": "spin_frequency_hz", "unit": "Hz", "source": "made up, spin up to which the top followed the drive"},
-    {"name": "spin_frequency_u_hz", "unit": "Hz", "source": "width of what it lies within, over the root of 12"},
-    {"name": "spin_seen_hz", "unit": "Hz", "source": "made up, the last one counted before the top was missed"},
-    {"name": "drive_frequency_hz", "unit": "Hz", "source": "made up, the one at that time"},
-    {"name": "drive_amplitude_v", "unit": "V", "source": "made up, half of peak to peak"},
-]
-UPPER_HOW = (
-    "SYNTHETIC: upper limits drawn from a normal law about 69 Hz with a scatter of 1.4 Hz, as the simulated bench "
-    "gives with a sine of 0.4 mT and a creep of 0.1 Hz/s; each top then slips for some seconds until it is 1 Hz "
-    "behind; {washers}; made by sample_data/make.py"
-)
-UPPER_SETTINGS = {
-    "which": "upper",
-    "drive_frequency_hz": HELD_HZ,
-    "drive_waveform": "SIN",
-    "drive_amplitude_vpp": 10.0,
-    "creep_hz_per_s": CREEP_HZ_S,
-    "interval_s": LOOK_S,
-}
-
-
-def upper_limits(name: str, scene: str, seed: int, *, loose: bool) -> None:
-    """Make a run of upper limits.  scene: of the top; loose: the washers slip, and the tape on them turns slower."""
-    random = np.random.default_rng(seed)
-    rows, events, time = [], [], 0.0
-    for _ in range(TOPS):
-        limit = float(random.normal(UPPER_HZ, UPPER_SCATTER_HZ))
-        missed, held, seen = when_missed(limit, slip_hz(limit) * loose)
-        time += 60.0 + (missed - HELD_HZ) / CREEP_HZ_S
-        for drive, seconds in ((HELD_HZ, time - (missed - HELD_HZ) / CREEP_HZ_S), (held - BELOW_HZ, time)):
-            counts = drive - slip_hz(drive) * loose + random.normal(0, COUNT_SCATTER_HZ, COUNTS)
-            slip = slip_of(counts.round(3).tolist(), drive)
-            beside = f"{with_sign(slip.difference, 3)} Hz beside the drive"
-            text = f"held at {drive:.2f} Hz: counted {slip.spin:.3f} Hz, {beside}"
-            events.append({"time_s": round(seconds, 1), "kind": "held", "text": text})
-            if slip.warning:
-                events.append({"time_s": round(seconds, 1), "kind": "warning", "text": slip.warning})
-        seen += float(random.normal(0, COUNT_SCATTER_HZ))
-        low = min(held, seen)
-        middle, u = (low + missed) / 2, (missed - low) / 12**0.5
-        text = f"the drive lost the top at {middle:.2f} Hz"
-        events.append({"time_s": round(time, 1), "kind": "lock lost", "text": text})
-        rows.append(f"{time:.1f},{middle:.3f},{u:.4f},{seen:.3f},{held:.2f},5")
-    how = f"washers that slip by I3 C omega^1.5/k, k = {COUPLING_N_M_S:g} N m s" if loose else "sound washers"
-    record = {
-        "experiment": "limit",
-        "started_utc": None,
-        "channels": UPPER_CHANNELS,
-        "configuration": {"limit": UPPER_SETTINGS, "scene": preset(scene).as_table()},
-        "note": "a locked top whose washers are loose" if loose else "how far the drive takes the top",
-        "synthetic": True,
-        "synthetic_how": UPPER_HOW.format(washers=how),
-    }
-    write(HERE / name, ",".join(channel["name"] for channel in UPPER_CHANNELS), rows, record)
-    lines = [json.dumps(event, ensure_ascii=False) + "\n" for event in events]
-    (HERE / name / "events.jsonl").write_text("".join(lines), encoding="utf-8", newline="\n")
-
-
-def when_missed(limit: float, slip: float) -> tuple[float, float, float]:
-    """Return the drive at the first look without a top, and drive and counted spin at the look before [Hz].
-
-    limit: the drive at which the top was lost; slip: by how much its tape turns slower [Hz].
-    """
-    step = CREEP_HZ_S * LOOK_S
-    drive, spin, before = HELD_HZ, HELD_HZ - slip, (HELD_HZ, HELD_HZ - slip)
-    while drive - spin <= MISSED_HZ:
-        before = drive, spin
-        drive += step
-        since = max(0.0, (drive - limit) / CREEP_HZ_S)
-        spin = min(drive, limit) - SLOWS_HZ_S * since - slip
-    return drive, *before
-
-
-def slip_hz(spin_hz: float) -> float:
-    """By how much washers turn slower than the top that drags them along, against the drag of a disc [Hz]."""
-    return float(AXIAL_KG_M2 * DRAG * (2 * np.pi * spin_hz) ** 1.5 / COUPLING_N_M_S / (2 * np.pi))
 
 
 def write(folder: Path, header: str, rows: list[str], record: dict[str, Any]) -> None:
@@ -491,14 +401,23 @@ def write_traces(name: str, scene: str | None, settings: str, note: str) -> None
     print(f"{name}: {count} records")
 
 
-def from_the_virtual_bench(experiment: str, folder: str, seed: int, note: str, settings: tuple[str, ...] = ()) -> None:
-    """Make a run of the virtual bench that is the same each time."""
+def from_the_virtual_bench(
+    experiment: str,
+    folder: str,
+    seed: int,
+    note: str,
+    *,
+    settings: tuple[str, ...] = (),
+    scene: str | None = None,
+    kept: frozenset[str] = frozenset({RunEvent.GAIN}),
+) -> None:
+    """Make a run of the virtual bench that is the same each time.  kept: kinds of its events that stay."""
     with tempfile.TemporaryDirectory() as out:
-        options = AcquisitionOptions(mock=True, out=Path(out), seed=seed, settings=settings)
+        options = AcquisitionOptions(mock=True, out=Path(out), seed=seed, settings=settings, scene=scene)
         run = acquire(request_for(experiment, options), Display())
-        gains = [{k: v for k, v in one.items() if k != "utc"} for one in run.events() if one["kind"] == RunEvent.GAIN]
+        events = [{k: v for k, v in one.items() if k != "utc"} for one in run.events() if one["kind"] in kept]
         header, *rows = (run.folder / "readings.csv").read_text(encoding="utf-8").splitlines()
-    record = run.record
+    record, command = run.record, "sample_data/make.py" + " --full-motion" * bool(scene)
     write(
         HERE / folder,
         header,
@@ -507,15 +426,15 @@ def from_the_virtual_bench(experiment: str, folder: str, seed: int, note: str, s
             "experiment": experiment,
             "started_utc": None,
             "channels": record.channels,
-            "configuration": {experiment: record.configuration[experiment]},
+            "configuration": {name: record.configuration[name] for name in (experiment, *["scene"] * bool(scene))},
             "seed": seed,
             "note": note,
             "synthetic": True,
-            "synthetic_how": f"SYNTHETIC: {record.synthetic_how}; made by sample_data/make.py",
+            "synthetic_how": f"SYNTHETIC: {record.synthetic_how}; made by {command}",
         },
     )
-    if gains:
-        lines = [json.dumps(one, ensure_ascii=False) + "\n" for one in gains]
+    if events:
+        lines = [json.dumps(one, ensure_ascii=False) + "\n" for one in events]
         (HERE / folder / "events.jsonl").write_text("".join(lines), encoding="utf-8", newline="\n")
     print(f"{folder}: {record.synthetic_how}")
 
@@ -530,7 +449,23 @@ def held_spins() -> None:
     (HERE / "hold" / ".levilab-skip").touch()
     for spin in HELD:
         settings = (f"drive_frequency_hz={spin}", "longest_s=120")
-        from_the_virtual_bench("hold", f"hold/{spin}-hz", 3, f"a top held at {spin} Hz", settings)
+        from_the_virtual_bench("hold", f"hold/{spin}-hz", 3, f"a top held at {spin} Hz", settings=settings)
+
+
+#: Folder → scene, seed and note of a run of upper limits.
+UPPER_LIMITS = {
+    "upper-limits": ("spindown", 1, "how far the drive takes the top"),
+    "loose-washers": ("loose-washers", 2, "a locked top whose washers are loose"),
+}
+#: Events that say how a top was held and lost.
+OF_LIMITS = frozenset({RunEvent.HELD, RunEvent.LOCK_LOST, RunEvent.WARNING})
+
+
+def upper_limits() -> None:
+    """Make runs of upper limits on the virtual bench."""
+    settings = ("which=upper", "repetitions=8")
+    for folder, (scene, seed, note) in UPPER_LIMITS.items():
+        from_the_virtual_bench("limit", folder, seed, note, settings=settings, scene=scene, kept=OF_LIMITS)
 
 
 #: A film of 60 frames per second, with an error of each coordinate, of a top that was pushed.
@@ -559,6 +494,17 @@ def write_track() -> None:
     text = "\n".join(["# SYNTHETIC, made by sample_data/make.py", "t [s],x [mm],y [mm],spin [Hz]", *rows, ""])
     (HERE / "sway" / "track.csv").write_text(text, encoding="utf-8", newline="\n")
     print(f"sway: {len(rows)} frames")
+
+
+def write_diary() -> None:
+    """Make the file of an owner who follows `levilab tune` on three days, as the cross-check has one."""
+    by = np.random.default_rng(24)
+    (HERE / "tune").mkdir(exist_ok=True)
+    path = HERE / "tune" / "tune.toml"
+    write_owner(path, keep_diary(draw_world(by), by))
+    text = path.read_text(encoding="utf-8")
+    path.write_text(f"# SYNTHETIC, made by sample_data/make.py\n{text}", encoding="utf-8", newline="\n")
+    print("tune")
 
 
 def main() -> None:
@@ -599,18 +545,18 @@ def main() -> None:
             "configuration": {"limit": {"which": "lower"}},
         },
     )
-    upper_limits("upper-limits", "spindown", seed=1, loose=False)
-    upper_limits("loose-washers", "loose-washers", seed=2, loose=True)
     for name, how_made in TRACES.items():
         write_traces(name, *how_made)
     from_the_virtual_bench("field", "field-scan", 11, "a base as in device.toml, heights set by hand to 0.2 mm")
     held_spins()
+    write_diary()
 
 
 if __name__ == "__main__":
     main()
     if "--full-motion" in sys.argv[1:]:
         precession_sweep()
+        upper_limits()
         write_track()
     if "--sound" in sys.argv[1:]:
         write_sound()

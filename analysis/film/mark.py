@@ -25,6 +25,8 @@ _ROUNDS = 3
 _MOST = 2000
 #: Samples that the noise of a picture is alike over: rays are closer than pixels.
 _CORRELATED = 3.0
+#: A mark that turns by less from one picture to the next looks like a sway [turns].
+_SLOWEST = 0.08
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +65,24 @@ def phases_of(profiles: Array) -> Phases:
     shape = np.fft.irfft(pattern, rays, axis=1)[best]
     middle = np.sum(np.abs(shape) ** 3 * np.exp(2j * np.pi * np.arange(rays) / rays))
     return Phases(phases % 1, u, float(np.angle(middle)) / (2 * np.pi))
+
+
+def without_pull(places: Waves, phase: Array) -> Waves:
+    """Return places without the part that turns with the mark.
+
+    A light mark beside the rim pulls the circle through the edge towards it, by 0.01 pixels in a sharp picture and 0.2
+    in a coarsely coded one; and the middle of the rim may lie beside the axis.  Second differences leave the sway out.
+
+    Args:
+        places: x + iy, y downwards, shape (n,).
+        phase: of the mark, shape (n,) [turns].
+    """
+    turn = np.exp(2j * np.pi * phase)
+    step = np.diff(phase)
+    if np.median(np.abs(step - np.rint(step))) < _SLOWEST:
+        return places
+    fast, seen = np.diff(turn, 2), np.diff(places, 2)
+    return np.asarray(places - np.vdot(fast, seen) / np.vdot(fast, fast) * turn)
 
 
 def _changes(profiles: Array, still: Array) -> tuple[Waves, Array]:

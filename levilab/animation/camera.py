@@ -5,6 +5,7 @@ It draws a dark base, and a lighter top with a light mark.  Lenses and perspecti
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Radius of the rim and of the base [m].
-RIM, BASE = 0.015, 0.046
+#: Radius of the rim, of the base, and of a dot on the stem [m].
+RIM, BASE, DOT = 0.015, 0.046, 0.001
 #: Brightness of table, base, top, its hub and its mark.
 TABLE, DARK, TOP, HUB, MARK = 190.0, 60.0, 140.0, 40.0, 235.0
 #: Angle of the mark, to either side [rad].
@@ -48,6 +49,8 @@ class Camera:
         noise: standard deviation of a pixel, of 255.
         parts: of an exposure that are added up.
         away: where the middle of the base is in the picture, from its middle [pixels].
+        stem: height of a light dot on the stem above the rim; 0: there is none [m].
+        distance: of the camera from the rim at its mean height; infinite: no perspective [m].
     """
 
     width: int = 224
@@ -59,6 +62,8 @@ class Camera:
     noise: float = 2.5
     parts: int = 2
     away: tuple[float, float] = (5.3, -3.7)
+    stem: float = 0.0
+    distance: float = math.inf
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -75,6 +80,8 @@ class Flight:
         x, y: of the rim's centre [m].
         yaw: of the mark, seen from above [rad].
         tilt: of the body's plane, as seen from above, less the yaw, shape (n, 2, 2).
+        rise: of the rim's centre above its mean height, shape (n,) [m].
+        lean: x and y of the unit vector along the axis, shape (n, 2).
     """
 
     times: Array
@@ -82,6 +89,13 @@ class Flight:
     y: Array
     yaw: Array
     tilt: Array
+    rise: Array
+    lean: Array
+
+    def stem_at(self, time: float) -> tuple[float, float, float]:
+        """Return the rise [m] and the lean at a time."""
+        rise, x, y = (float(np.interp(time, self.times, one)) for one in (self.rise, *self.lean.T))
+        return rise, x, y
 
     def at(self, times: Array) -> tuple[Array, Array, Array, Array]:
         """Return x, y, yaw and tilt at times."""
@@ -94,10 +108,19 @@ def flight_of(scene: Scene, duration: float) -> Flight:
     """Simulate a top."""
     motion = simulate(scene, duration + 0.02, tolerance=1e-6)
     poses = poses_of(motion, 0.0, duration + 0.01, round(2000 * duration))
-    turn = matrices(poses.quaternions)[:, :2, :2]
+    attitude = matrices(poses.quaternions)
+    turn = attitude[:, :2, :2]
     yaw = np.unwrap(np.arctan2(turn[:, 1, 0] - turn[:, 0, 1], turn[:, 0, 0] + turn[:, 1, 1]))
     back = np.stack([np.cos(yaw), np.sin(yaw), -np.sin(yaw), np.cos(yaw)], axis=-1).reshape(-1, 2, 2)
-    return Flight(poses.times, poses.positions[:, 0], poses.positions[:, 1], yaw, back @ turn)
+    return Flight(
+        poses.times,
+        poses.positions[:, 0],
+        poses.positions[:, 1],
+        yaw,
+        back @ turn,
+        poses.positions[:, 2] - poses.positions[:, 2].mean(),
+        attitude[:, :2, 2],
+    )
 
 
 class Pictures:
@@ -142,11 +165,13 @@ class Pictures:
         camera = self._camera
         x0, y0 = camera.middle
         x, y, yaw, tilt = self._flight.at(time + rows * camera.line_time)
+        rise, lean_x, lean_y = self._flight.stem_at(time + float(np.mean(rows)) * camera.line_time)
+        scale, above = camera.scale * (1 - rise / camera.distance), camera.stem
         c, s = np.cos(yaw), np.sin(yaw)
         body = np.stack([c, -s, s, c], axis=-1).reshape(-1, 2, 2) @ tilt
         inverse = np.linalg.inv(body).astype(np.float32)
-        right = ((columns - x0) * camera.scale - x[:, None]).astype(np.float32)
-        forth = ((y0 - rows) * camera.scale - y)[:, None].astype(np.float32)
+        right = ((columns - x0) * scale - x[:, None]).astype(np.float32)
+        forth = ((y0 - rows) * scale - y)[:, None].astype(np.float32)
         a = inverse[:, 0, 0, None] * right + inverse[:, 0, 1, None] * forth
         b = inverse[:, 1, 0, None] * right + inverse[:, 1, 1, None] * forth
         away = np.hypot(a, b)
@@ -156,6 +181,11 @@ class Pictures:
         hub = _edge((0.2 * RIM - away) / soft)
         top = TOP + (MARK - TOP) * mark
         top += (HUB - top) * hub
+        if above:
+            nearer = 1 - above / camera.distance
+            across = nearer * (columns - x0) * scale - x[:, None] - above * lean_x
+            along = (nearer * (y0 - rows) * scale - y)[:, None] - above * lean_y
+            top += (MARK - top) * _edge((DOT - np.hypot(across, along)) / soft)
         return np.asarray(behind + (top - behind) * _edge((RIM - away) / soft))
 
     def noisy(self, picture: Array) -> NDArray[np.uint8]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from levilab.crosscheck.subjects import field, hold, limit, motion, phone, precession, spin, spindown, sway, video
+from levilab.crosscheck.subjects import field, hold, limit, motion, phone, precession, spin, spindown, sway, tune, video
 
 #: Name → subject.
 SUBJECTS = MappingProxyType(
@@ -22,6 +22,7 @@ SUBJECTS = MappingProxyType(
             video.SUBJECT,
             hold.SUBJECT,
             limit.SUBJECT,
+            tune.SUBJECT,
         )
     }
 )

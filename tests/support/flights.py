@@ -12,4 +12,5 @@ def level_flight(duration: float, spin: float, chirp: float = -0.05, swing: floa
     t = np.linspace(-0.02, duration + 0.02, round(2000 * (duration + 0.04)))
     x, y = swing * np.cos(2 * np.pi * 1.1 * t), 0.7 * swing * np.sin(2 * np.pi * 0.9 * t)
     yaw = 2 * np.pi * (0.123 + spin * t + 0.5 * chirp * t**2)
-    return Flight(t, x, y, yaw, np.broadcast_to(np.eye(2), (t.size, 2, 2)))
+    level = np.broadcast_to(np.eye(2), (t.size, 2, 2))
+    return Flight(t, x, y, yaw, level, np.zeros(t.size), np.zeros((t.size, 2)))

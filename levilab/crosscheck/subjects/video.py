@@ -33,7 +33,7 @@ def draw_camera(by: np.random.Generator) -> Camera:
         scale=float(by.uniform(4.6e-4, 5.4e-4)),
         exposure=float(by.uniform(3e-4, 1.5e-3)),
         line_time=float(by.uniform(5e-6, 25e-6)),
-        blur=float(by.uniform(1.0, 2.0)),
+        blur=float(by.uniform(1.0, 3.0)),
         noise=float(by.uniform(1.0, 4.0)),
         away=tuple(by.uniform(-4, 4, 2).tolist()),
     )

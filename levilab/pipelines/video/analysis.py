@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analysis.errors import AnalysisError
 from analysis.film.circles import Circle  # noqa: TC001 - pydantic reads it
 from analysis.film.errors import NoMark, SlowMotion
-from analysis.film.mark import phases_of
+from analysis.film.mark import phases_of, without_pull
 from analysis.film.turning import Turning, choices_of, spins_of_start, turning_of
 from analysis.limits import spin_at_fall
 from analysis.sway import swings_of
@@ -213,6 +213,8 @@ def _video(film: Film, options: VideoOptions, followed: Followed) -> Video:
     times = factor * followed.times
     phases = phases_of(followed.profiles)
     angles = 2 * np.pi * (phases.phase + phases.angle)
+    places = without_pull(followed.x + 1j * followed.y, phases.phase)
+    followed = replace(followed, x=places.real, y=places.imag)
     rows = followed.y + _MARK * followed.radius * np.sin(angles)
     late = np.zeros_like(rows) if line_time else rows
     rate = followed.rate / factor

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.errors import TooFewReadings
 from analysis.film.errors import NoMark
-from analysis.film.mark import phases_of
+from analysis.film.mark import phases_of, without_pull
 from analysis.film.turning import Turning, choices_of, spins_of_start, turning_of
 from levilab.animation.camera import even_times, phone_times
 
@@ -101,3 +101,15 @@ def test_what_neighbouring_pictures_share_is_in_the_u_of_the_spin():
         found = turning(times, seen(random, times, 31.0, more=shared))
         pulls += [(found.frequency - 31.0) / found.u_frequency]
     assert np.std(pulls) < 1.6  # 1, and 6 of its standard errors; 2.3 to 2.7 if each picture counts alone
+
+
+def test_a_mark_that_pulls_the_rim_is_taken_out_of_the_places():
+    random = np.random.default_rng(18)
+    times = phone_times(1.0)
+    sway = 2 * np.exp(2j * np.pi * 1.1 * times) + 0.3 * np.exp(2j * np.pi * 8 * times)
+    noise = random.normal(0, 0.03, times.size) + 1j * random.normal(0, 0.03, times.size)
+    for spin, left in ((31.0, 0.01), (301.0, 0.2)):  # 301 Hz looks like 0.6 Hz, so that nothing is taken out
+        turn = np.exp(2j * np.pi * (0.3 + spin * times))
+        found = without_pull(sway + noise + 0.2 * turn, (0.3 + spin * times + random.normal(0, NOISE, times.size)) % 1)
+        pull = np.vdot(turn, found - sway) / times.size
+        assert abs(pull) == pytest.approx(left, abs=0.012)  # 4 standard errors of noise in 240 pictures

@@ -128,6 +128,14 @@ def test_a_trial_films_a_top_and_finds_spin_and_place(tmp_path, monkeypatch):
     assert max(abs(pull.value) for pull in pulls) < 5
 
 
+def test_a_trial_tunes_washers_and_finds_the_mass_to_set(tmp_path, monkeypatch):
+    monkeypatch.setattr("levilab.crosscheck.subjects.tune.DAYS_C", (19.0,))
+    monkeypatch.setattr("levilab.crosscheck.subjects.tune.MOST", 2)
+    pulls = SUBJECTS["tune"].trial(9800, tmp_path)
+    assert [pull.quantity for pull in pulls] == ["mass to set", "mass per kelvin"]
+    assert max(abs(pull.value) for pull in pulls) < 5  # a slip in a unit or a sign of the slope would be 4 u and more
+
+
 @pytest.mark.parametrize(
     ("name", "seed", "quantities"),
     [

@@ -54,7 +54,7 @@ def test_warnings_that_are_alike_stand_together(tmp_path: Path) -> None:
 def test_of_many_runs_a_legend_does_not_name_each(tmp_path: Path) -> None:
     limits = (SAMPLE_DATA / "upper-limits" / "readings.csv").read_text(encoding="utf-8")
     for k in range(9):
-        (tmp_path / f"{k}.csv").write_text(limits.replace(",69.513,", f",{69.5 + k / 100},"), encoding="utf-8")
+        (tmp_path / f"{k}.csv").write_text(limits.replace(",69.26", f",69.{k}6"), encoding="utf-8")
     found = ANALYSES["limit"].analyze([tmp_path], ANALYSES["limit"].options_from({}))
     legend = limit_figure(found).axes[0].get_legend()
     assert legend is not None

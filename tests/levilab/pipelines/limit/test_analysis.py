@@ -68,8 +68,9 @@ def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Pa
     assert "The top was lost by the drive 8 times." in analysis.groups[1].text
     assert [run["result"]["which"] for run in document["runs"]] == ["upper", "lower", "upper"]
     assert [group["statistics"]["n"] for group in document["groups"]] == [10, 8, 8]
-    warning, conditions = sorted(analysis.all_warnings)  # spin-downs in the same folder are a remark
+    off, warning, conditions = sorted(analysis.all_warnings)  # spin-downs are a remark
     assert "the upper limits are of 2 conditions" in conditions
+    assert off.startswith("loose-washers: repetitions 1, 2 do not belong to the others")
     assert "LOOSE WASHERS" in warning
     assert warning.endswith("(the first of 16 such warnings)")
     assert SkippedRuns("spin", 4) in analysis.remarks
@@ -288,8 +289,8 @@ def test_causes_of_losses_are_counted_over_runs_and_explained(sample_data: Path,
     readings.write_text(readings.read_text(encoding="utf-8").replace("69.", "68."), encoding="utf-8")
     analysis = METHOD.analyze(folders, LimitOptions())
     (group,) = analysis.groups
-    assert group.causes == {"left behind by the drive": 2}
-    assert "The phase before each loss tells why: left behind by the drive twice." in group.text
+    assert group.causes == {"left behind by the drive": 18}
+    assert "The phase before each loss tells why: left behind by the drive 18 times." in group.text
     assert "Simon" not in group.text  # what others reached stands in the table alone
     meaning = str(limit_part(analysis).result[0])
     assert "a stronger drive gets higher" in meaning
