@@ -94,11 +94,11 @@ class Quantity(Estimate):
 
     def __mul__(self, other: object) -> Any:
         product = self.to_ufloat() * _plain(other)
-        return product if isinstance(other, Estimate) else _of(product, self.unit)
+        return product if _may_have_unit(other) else _of(product, self.unit)
 
     def __truediv__(self, other: object) -> Any:
         ratio = self.to_ufloat() / _plain(other)
-        return ratio if isinstance(other, Estimate) else _of(ratio, self.unit)
+        return ratio if _may_have_unit(other) else _of(ratio, self.unit)
 
     def __rtruediv__(self, other: object) -> Any:
         return _plain(other) / self.to_ufloat()
@@ -117,6 +117,11 @@ class Quantity(Estimate):
 
 def _value(of: Any) -> Any:
     return of.nominal_value if hasattr(of, "nominal_value") else of
+
+
+def _may_have_unit(number: object) -> bool:
+    """Return whether it is no plain number: a product with it has another unit."""
+    return isinstance(number, Estimate) or hasattr(number, "nominal_value")
 
 
 def _plain(of: Any) -> Any:
