@@ -20,7 +20,8 @@ from levilab.bench.person import ask_no_person
 from levilab.bench.wiring import described_wiring
 from levilab.errors import DataError, LevilabError, UsageError
 from levilab.formats.typed import read_masses, read_temperature
-from levilab.runs.run import Run, find_run, runs_named
+from levilab.runs.find import run_to_resume
+from levilab.runs.run import Run
 from levilab.settings import in_one_line
 from levilab.simulator.keys import parse_setting
 from levilab.simulator.scene import SceneError, read_scene, scene_of
@@ -102,7 +103,7 @@ class AcquisitionOptions:
 
 def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequest:
     """Return the request for an acquisition.  Raises ConfigError, CannotResume, UsageError, DataError, SceneError."""
-    run = _resumable(_run_folder(options.resume, options.out), experiment) if options.resume else None
+    run = _resumable(run_to_resume(options.resume, options.out), experiment) if options.resume else None
     virtual = options.mock or bool(run and run.record.seed is not None)
     _check_options(options, run, virtual=virtual)
     named = named_instruments(options, run)
@@ -313,20 +314,6 @@ def _original_configuration(run: Run) -> BenchConfig:
         return Configuration.model_validate(bench)
     except ValidationError as error:
         raise ConfigError(f"{run.folder}/run.json: configuration: {in_one_line(error)}") from error
-
-
-def _run_folder(name: Path, root: Path) -> Path:
-    """Return the folder of the run that is to be gone on with, by its path or its name.  Raises DataError."""
-    folder = find_run(name, root)
-    if folder.exists():
-        return folder
-    if name.name != str(name):
-        raise DataError(f"{name}: there is no such run; levilab runs lists those of a folder")
-    if not root.is_dir():
-        raise DataError(f"no run {name}, there is no folder {root} here: go to the folder that holds {root}")
-    if runs_named(name.name, root):
-        raise DataError(f"more than one run in {root} is called {name}: say its whole name; levilab runs lists them")
-    raise DataError(f"no run {name} in {root}: levilab runs lists those that are there")
 
 
 def _resumable(folder: Path, experiment: str) -> Run:

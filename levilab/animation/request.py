@@ -18,11 +18,12 @@ from levilab.animation.page import (
 from levilab.animation.poses import poses_of, turn_rate
 from levilab.animation.words import span_text, speed_text
 from levilab.errors import UsageError
-from levilab.files import replace_atomically, writing
+from levilab.files import check_writable, replace_atomically, writing
 from levilab.simulator.compilation import announce_compilation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from levilab.motion.summary import Summary
@@ -140,6 +141,12 @@ def check_request(request: AnimationRequest, scene: Scene, duration: float) -> N
             value=request.playing_speed,
         )
     chosen.check()
+    with _writing(request.path):
+        check_writable(request.path)
+
+
+def _writing(path: Path) -> AbstractContextManager[None]:
+    return writing(f"{path}: could not be written", "choose another place with `animate`")
 
 
 def _check_pictures(chosen: _Format, span: float, speed: float) -> None:

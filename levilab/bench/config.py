@@ -98,7 +98,15 @@ def read_bench(path: Path, tables: type[C], *, instead: str = ", or try `mock`")
     is no file.  Raises ConfigError.
     """
     try:
-        table = parse_toml(path.read_text(encoding="utf-8-sig"))
+        return tables.model_validate(read_table(path, instead=instead))
+    except ValidationError as error:
+        raise ConfigError(f"{path}: {in_one_line(error, tables)}") from error
+
+
+def read_table(path: Path, *, instead: str = ", or try `mock`") -> dict[str, Any]:
+    """Return the content of a bench file, whatever it is; see `read_bench`.  Raises ConfigError."""
+    try:
+        return parse_toml(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise ConfigError(
             f"{path}: there is no such file: describe your bench in it (docs/bench.md){instead}"
@@ -109,7 +117,3 @@ def read_bench(path: Path, tables: type[C], *, instead: str = ", or try `mock`")
         raise ConfigError(f"{path}: cannot be read ({error.strerror}): a TOML file is expected") from error
     except ValueError as error:
         raise ConfigError(f"{path}: not readable as TOML: {error}") from error
-    try:
-        return tables.model_validate(table)
-    except ValidationError as error:
-        raise ConfigError(f"{path}: {in_one_line(error, tables)}") from error

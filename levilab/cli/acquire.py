@@ -11,15 +11,30 @@ import typer
 
 from levilab.cli import exit_codes
 from levilab.cli.importing import importing
-from levilab.cli.later import Later
-from levilab.cli.options import Json
+from levilab.cli.later import Later, NamedLast
+from levilab.cli.options import Json, number, place
 from levilab.cli.output import message, print_json, result
 
 if TYPE_CHECKING:
     from levilab.bench.config import BenchConfig
     from levilab.bench.person import Task
 
-acquire_app = typer.Typer(no_args_is_help=True, add_completion=False)
+
+class AcquireGroup(NamedLast):
+    """`levilab acquire --mock spin` is `levilab acquire spin --mock`."""
+
+    typical = "limit"  # its options are those of all experiments
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the name of the experiment first.  Fails where options stand alone."""
+        if args and args[0].startswith("-") and args[0] not in ctx.help_option_names:
+            args = self.with_name_first(args) or ctx.fail(
+                f"name the experiment, as levilab acquire spin {' '.join(args)}: {', '.join(self.commands)}"
+            )
+        return super().parse_args(ctx, args)
+
+
+acquire_app = typer.Typer(cls=AcquireGroup, no_args_is_help=True, add_completion=False)
 
 
 #: Experiment → help of its command.  The table of experiments takes too long to import for a help page.
@@ -57,13 +72,16 @@ def acquire_experiment(
         str | None,
         typer.Option(metavar="MODEL|ADDRESS", help="Record with this oscilloscope instead of the bench's."),
     ] = None,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the run folder is made.")] = Path("runs"),
+    out: Annotated[Path, place("DIR", "Where the run folder is made.")] = Path("runs"),
     drive: Annotated[
         str | None,
         typer.Option(metavar="ramp|triggered", help="How the coil drives the top: triggered by its own light pulse."),
     ] = None,
     spin: Annotated[
-        float | None, typer.Option(metavar="HZ", help="Bring the top to this spin.", show_default="the settings'")
+        float | None,
+        typer.Option(
+            metavar="HZ", parser=number("Hz"), help="Bring the top to this spin.", show_default="the settings'"
+        ),
     ] = None,
     scene: Annotated[
         str | None,
@@ -99,7 +117,9 @@ def acquire_experiment(
     settings: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="KEY=VALUE", help="Change a setting of the experiment, as limit.repetitions=3; repeatable."
+            "--set",
+            metavar="KEY=VALUE",
+            help="Change a setting of the experiment, as limit.repetitions=3 or spin.gate_s=2s; repeatable.",
         ),
     ] = None,
     list_settings: Annotated[
@@ -108,6 +128,8 @@ def acquire_experiment(
     as_json: Json = False,
 ) -> None:
     """Carry out the experiment that the command is named after."""
+    if not list_settings:
+        look_at_files(bench, resume, out, virtual=mock, named=bool(counter or scope))
     with importing():
         from levilab.acquisition.loop import acquire
         from levilab.acquisition.request import AcquisitionOptions, chosen_settings, request_for
@@ -154,6 +176,21 @@ def acquire_experiment(
             if readings:
                 message(f"go on with it: levilab acquire {experiment} --resume {run.folder}")
             raise typer.Exit(exit_codes.INTERRUPTED)
+
+
+def look_at_files(bench: Path | None, resume: Path | None, out: Path, *, virtual: bool, named: bool) -> None:
+    """Refuse a bench file or a run that is not there, before what takes long is imported.
+
+    virtual: on the virtual bench; named: whether instruments are, so that bench.toml may be missing.
+    """
+    if bench or not (virtual or named or resume):
+        from levilab.bench.config import read_table
+
+        read_table(bench or Path("bench.toml"), **({"instead": ""} if virtual else {}))
+    if resume:
+        from levilab.runs.find import run_to_resume
+
+        run_to_resume(resume, out)
 
 
 def _print_settings(config: "BenchConfig", experiment: str, *, as_json: bool) -> None:

@@ -8,10 +8,9 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
-import typer.core
 
-from levilab.cli.later import Later
-from levilab.cli.options import Json, Paths
+from levilab.cli.later import Later, NamedLast
+from levilab.cli.options import Json, Paths, existing_path, number, place
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.errors import DoesNotSuit, LevilabError, NoneUsable, UsageError
@@ -22,42 +21,25 @@ if TYPE_CHECKING:
     from levilab.pipelines.many.table import Tally
 
 
-class AnalyzeGroup(typer.core.TyperGroup):
+#: The command without a name; the help does not list it.  Each analysis takes those options that it knows.
+_EACH = "each"
+
+
+class AnalyzeGroup(NamedLast):
     """`levilab analyze PATH…` without the name of an analysis is `levilab analyze each PATH…`."""
+
+    typical = _EACH
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Insert the name `each` unless the first word is, or was meant as, the name of an analysis."""
-        if args and args[0] not in ctx.help_option_names:
-            k = self._first_word(args)
-            named = k is not None and (args[k] in self.commands or self._is_misspelt(args[k]))
-            args = [args[k], *args[:k], *args[k + 1 :]] if k is not None and named else [_EACH, *args]
+        if args[:1] not in [[name] for name in ctx.help_option_names]:
+            args = self.with_name_first(args) or [_EACH, *args]
         return super().parse_args(ctx, args)
 
-    def _first_word(self, args: list[str]) -> int | None:
-        """Return the index of the first word that is neither an option nor the value of one; None if there is none."""
-        each: Any = self.commands[_EACH]
-        options = [one for one in each.command.params if not getattr(one, "is_flag", True)]
-        with_value = {name for option in options for name in option.opts}
-        numbered = iter(enumerate(args))
-        for k, word in numbered:
-            if word in with_value:
-                next(numbered, None)
-            elif word == "--" or not word.startswith("-"):
-                return None if word == "--" else k
-        return None
 
-    def _is_misspelt(self, word: str) -> bool:
-        """Return whether a word is similar to the name of an analysis, and no path."""
-        from difflib import get_close_matches  # not for every help
-
-        return bool(get_close_matches(word, self.commands)) and not Path(word).exists()
+analyze_app = typer.Typer(cls=AnalyzeGroup, add_completion=False)
 
 
-analyze_app = typer.Typer(cls=AnalyzeGroup, no_args_is_help=True, add_completion=False)
-
-
-#: The command without a name; the help does not list it.  Each analysis takes those options that it knows.
-_EACH = "each"
 #: What the command of each analysis does; the catalogue itself takes too long to import for a help page.
 COMMANDS = {
     "spindown": "Drag laws from spin-downs: the constants of each, and which laws the data exclude.",
@@ -105,6 +87,8 @@ def _parameter(name: str, option: Option) -> inspect.Parameter:
         metavar=option.metavar,
         help=option.help.replace("[", r"\["),
         show_default=option.default_text or True,
+        parser=number(option.unit) if option.kind is float else None,
+        callback=existing_path if option.kind is Path else None,
     )
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, about])
 
@@ -115,7 +99,7 @@ def _command(options: Iterable[str]) -> Callable[..., None]:
     @takes_options(options)
     def analyze(
         context: typer.Context,
-        paths: Paths,
+        paths: Paths = None,
         save: Annotated[
             bool | None,
             typer.Option(
@@ -124,7 +108,7 @@ def _command(options: Iterable[str]) -> Callable[..., None]:
                 show_default="save; with --table no-save",
             ),
         ] = None,
-        out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Write them there instead.")] = None,
+        out: Annotated[Path | None, place("DIR", "Write them there instead.")] = None,
         table: Annotated[
             Path | None,
             typer.Option(
@@ -146,12 +130,14 @@ def _command(options: Iterable[str]) -> Callable[..., None]:
     ) -> None:
         if table is not None:
             writing = Writing(table, cores=cores, resume=resume, save=bool(save))
-            _tabulate(context, paths, read_options(given, typed=True), writing, out=out, as_json=as_json)
+            _tabulate(context, paths or (), read_options(given, typed=True), writing, out=out, as_json=as_json)
             return
         for name, value in (("cores", cores), ("resume", resume or None)):
             if value is not None:
                 raise UsageError(name, "goes with `table` alone")
-        _analyze(context, paths, read_options(given, typed=True), save=save is not False, out=out, as_json=as_json)
+        _analyze(
+            context, paths or (), read_options(given, typed=True), save=save is not False, out=out, as_json=as_json
+        )
 
     return analyze
 
@@ -196,7 +182,7 @@ def _analyze(
 
 def _advise_on_many(paths: Sequence[Path]) -> None:
     """Print a note on --table before an analysis of very many runs."""
-    from levilab.runs.run import find_runs
+    from levilab.runs.find import find_runs
 
     if (count := sum(len(find_runs(path)) for path in paths if path.is_dir())) >= MANY_RUNS:
         advice = "--table FILE.csv writes a row for each by itself, in parallel, and goes on where it was interrupted"
@@ -289,19 +275,29 @@ def _analyze_as(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping
     try:
         return analysis.analyze(paths, analysis.options_from(given))
     except DoesNotSuit as error:
-        raise DoesNotSuit(f"{error}{_advice(analysis.name, paths, given)}") from error
+        raise DoesNotSuit(f"{error}{_advice(analysis, paths, given, error)}") from error
 
 
-def _advice(tried: str, paths: Sequence[Path], given: Mapping[str, Any]) -> str:
-    """Return which analyses read a path that the tried one does not, as the end of a sentence; empty if none does."""
+#: The analysis that reads any table with a column of frequencies.
+_NEEDS_LEAST = "limit"
+
+
+def _advice(tried: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, Any], error: DoesNotSuit) -> str:
+    """Return which analyses read a path that the tried one does not, as the end of a sentence; empty if none does.
+
+    A table in which the tried one misses its times is not meant for the one that needs none.
+    """
+    from levilab.formats.columns import NoSuchColumn
     from levilab.pipelines.suits import suiting
 
+    needs_more = {_NEEDS_LEAST} if isinstance(error, NoSuchColumn) else set()
     for path in paths:
         try:
-            names = [one.analysis.name for one in suiting([path], given)]
+            found = [one.analysis for one in suiting([path], given)]
         except LevilabError:
             continue
-        if tried not in names:
+        names = [one.name for one in found if one.name not in needs_more]
+        if names and tried not in found:
             return f"; levilab analyze {' or '.join(names)} {path} reads it"
     return ""
 

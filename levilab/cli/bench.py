@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from levilab.cli import exit_codes
-from levilab.cli.options import Json
+from levilab.cli.acquire import look_at_files
+from levilab.cli.options import Json, number, place
 from levilab.cli.output import message, print_json, result
 from levilab.errors import NoInstrument, UsageError
 
@@ -29,7 +30,7 @@ def bench_init(
     library: Annotated[
         str, typer.Option(metavar="NAME", help="PyVISA's library: @py is its own, '' a vendor's, @levilab virtual.")
     ] = "@py",
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The file to write.")] = Path("bench.toml"),
+    out: Annotated[Path, place("FILE", "The file to write.")] = Path("bench.toml"),
     force: Annotated[
         bool,
         typer.Option("--force", help="Replace the file if it is there; write one to fill in if no instrument answers."),
@@ -89,14 +90,16 @@ def bench_check(
 
     The drive stays off.  The exit status is 3 if an instrument does not answer as it should.
     """
+    if mock and bench:
+        raise UsageError("bench", "does not go with `mock`, the virtual bench, which no file describes")
+    look_at_files(bench, None, Path(), virtual=mock, named=bool(counter or scope))
+
     from levilab.acquisition.request import AcquisitionOptions, chosen_bench, named_instruments
     from levilab.acquisition.table import counter_settings
     from levilab.bench.check import Light, check
     from levilab.bench.wiring import described_wiring
     from levilab.world.bench import practice_world, virtual_wiring
 
-    if mock and bench:
-        raise UsageError("bench", "does not go with `mock`, the virtual bench, which no file describes")
     options = AcquisitionOptions(mock=mock, bench=bench, counter=counter, scope=scope)
     config = chosen_bench(options)
     wiring = virtual_wiring(practice_world(), models=named_instruments(options)) if mock else described_wiring(config)
@@ -126,20 +129,30 @@ def bench_clock(
     scope: Annotated[str, typer.Option(metavar="MODEL|ADDRESS", help="The sound card.")] = "sound",
     tone: Annotated[
         float | None,
-        typer.Option(metavar="HZ", min=20.0, max=20_000.0, help="Compare with a tone of this frequency at channel 1."),
+        typer.Option(
+            metavar="HZ",
+            parser=number("Hz", low=20.0, high=20_000.0),
+            help="Compare with a tone of this frequency at channel 1.",
+        ),
     ] = None,
     u: Annotated[
-        float | None, typer.Option("--u", metavar="HZ", min=0.0, help="Standard uncertainty of the tone.")
+        float | None,
+        typer.Option("--u", metavar="HZ", parser=number("Hz", low=0.0), help="Standard uncertainty of the tone."),
     ] = None,
     duration: Annotated[
         float | None,
-        typer.Option(metavar="S", min=1.0, max=86_400.0, help="How long.", show_default="600, a tone 20, --mock 60"),
+        typer.Option(
+            metavar="S",
+            parser=number("s", low=1.0, high=86_400.0),
+            help="How long.",
+            show_default="600, a tone 20, --mock 60",
+        ),
     ] = None,
     clock_u: Annotated[
         float | None,
         typer.Option(
             metavar="U",
-            min=0.0,
+            parser=number(low=0.0),
             help="Relative standard uncertainty of the computer's clock: 1e-6 for one that the network sets.",
             show_default="1e-5",
         ),
@@ -190,7 +203,10 @@ def bench_clock(
 @bench_app.command("serve", epilog="Example: levilab bench serve --speed 10 --port-base 15000")
 def bench_serve(
     speed: Annotated[
-        float, typer.Option(metavar="X", help="Seconds of the bench per second on the wall; with --scene up to 200.")
+        float,
+        typer.Option(
+            metavar="X", parser=number(), help="Seconds of the bench per second on the wall; with --scene up to 200."
+        ),
     ] = 1.0,
     models: Annotated[
         list[str] | None,

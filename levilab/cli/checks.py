@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from levilab.cli import exit_codes
-from levilab.cli.options import Json
+from levilab.cli.options import Json, existing_paths, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.errors import UsageError
 
@@ -22,6 +22,7 @@ def crosscheck(
             metavar="RUN",
             help="Make up readings with the values, times, scatter and number of runs of this result, not worlds at "
             "random; repeat it for several runs.  Writes crosscheck.json beside the result, for the report.",
+            callback=existing_paths,
         ),
     ] = None,
     trials: Annotated[
@@ -32,7 +33,7 @@ def crosscheck(
         int | None,
         typer.Option(min=0, help="Of the first trial; the next have the next.", show_default="0"),
     ] = None,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write crosscheck.json and .png there.")] = None,
+    out: Annotated[Path | None, place("DIR", "Write crosscheck.json and .png there.", callback=writable)] = None,
     as_json: Json = False,
 ) -> None:
     """Check the analyses, and end with 1 where an estimate or an uncertainty is wrong."""
@@ -58,14 +59,13 @@ def crosscheck(
 
 
 def reproduce(
-    output: Annotated[
+    out: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help=r"The report; its ending, .html or .pdf, chooses the format.  PDF needs levilab\[pdf].",
+        place(
+            "FILE",
+            r"The report; its ending, .html or .pdf, chooses the format.  PDF needs levilab\[pdf].",
             show_default="reproduce.html, and none with --json",
+            callback=writable,
         ),
     ] = None,
     only: Annotated[
@@ -90,7 +90,7 @@ def reproduce(
     from levilab.reproduce.report import format_of, write
     from levilab.reproduce.run import document, reproduce
 
-    report = output or (None if as_json else Path("reproduce.html"))
+    report = out or (None if as_json else Path("reproduce.html"))
     if report is not None:
         format_of(report)
     place = place_of_report(report) if report is not None else None

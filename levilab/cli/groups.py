@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import Author, Course, Date, Paths, Title
+from levilab.cli.options import Author, Course, Date, Paths, Title, place, writable
 from levilab.cli.output import interruptible, message, result
 from levilab.cli.quantities import with_options
 from levilab.pipelines.options import OF_REPORT, read_options
@@ -15,10 +15,9 @@ from levilab.pipelines.options import OF_REPORT, read_options
 @takes_options(OF_REPORT)
 def of_class(
     context: typer.Context,
-    paths: Paths,
-    output: Annotated[
-        Path,
-        typer.Option("--output", "-o", metavar="FILE", help="The file to write; its ending is .html, .pdf or .xlsx."),
+    paths: Paths = None,
+    out: Annotated[
+        Path, place("FILE", "The file to write; its ending is .html, .pdf or .xlsx.", callback=writable)
     ] = Path("class.html"),
     title: Title = "",
     course: Course = "",
@@ -33,8 +32,8 @@ def of_class(
     app = context.find_root().command
     with interruptible("nothing is written"):
         written = write_class(
-            paths,
-            output,
+            paths or (),
+            out,
             read_options(given, typed=True),
             lambda text: message(with_options(text, app)),
             Heading(title, course, author, date),

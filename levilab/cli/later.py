@@ -10,6 +10,11 @@ import typer.core
 
 from levilab.cli.importing import importing
 
+#: Names that options had once → those that they have.
+_FORMER = {"--output": "--out"}
+#: How similar a name must be to be suggested, from 0 to 1.
+_ALIKE = 0.6
+
 
 class Later(typer.core.TyperCommand):
     """A stand-in for a command, with its name and its texts.
@@ -39,7 +44,74 @@ class Later(typer.core.TyperCommand):
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
         """Return the command itself, which is called, asked for help or completed."""
-        return self.command.make_context(info_name, args, parent, **extra)
+        try:
+            return self.command.make_context(info_name, [_with_present_name(word) for word in args], parent, **extra)
+        except Exception as error:
+            if hasattr(error, "option_name") and hasattr(error, "possibilities"):  # typer keeps the class to itself
+                _explain_unknown(error, info_name or "", self.command)
+            raise
+
+
+class NamedLast(typer.core.TyperGroup):
+    """Commands whose name may stand behind their options: `levilab acquire --mock spin`.
+
+    Attributes:
+        typical: the command whose options say which words are the value of one.
+    """
+
+    typical = ""
+
+    def with_name_first(self, args: list[str]) -> list[str] | None:
+        """Return the words with the name of a command, or what was meant as one, in front; None if there is none."""
+        k = self._first_word(args)
+        if k is None or not (args[k] in self.commands or self._is_misspelt(args[k])):
+            return None
+        return [args[k], *args[:k], *args[k + 1 :]]
+
+    def _first_word(self, args: list[str]) -> int | None:
+        """Return the index of the first word that is neither an option nor the value of one; None if there is none."""
+        typical: Any = self.commands[self.typical]
+        options = [one for one in typical.command.params if not getattr(one, "is_flag", True)]
+        with_value = {name for option in options for name in option.opts}
+        numbered = iter(enumerate(args))
+        for k, word in numbered:
+            if word in with_value:
+                next(numbered, None)
+            elif word == "--" or not word.startswith("-"):
+                return None if word == "--" else k
+        return None
+
+    def _is_misspelt(self, word: str) -> bool:
+        """Return whether a word is similar to the name of a command, and no path."""
+        from difflib import get_close_matches  # not for every help
+        from pathlib import Path
+
+        return bool(get_close_matches(word, self.commands)) and not Path(word).exists()
+
+
+def _with_present_name(word: str) -> str:
+    name, equals, value = word.partition("=")
+    return f"{_FORMER.get(name, name)}{equals}{value}"
+
+
+def _explain_unknown(error: Any, name: str, command: Any) -> None:
+    """Add to the refusal of an unknown option what may have been meant: a similar option, or a key of --set."""
+    from difflib import get_close_matches
+
+    word = error.option_name.lstrip("-")
+    known = [one.lstrip("-") for one in error.possibilities or ()]
+    error.possibilities = [f"--{one}" for one in get_close_matches(word, known, cutoff=_ALIKE)]
+    if error.possibilities or not any(one.name == "settings" for one in command.params):
+        return
+    if any(one.name == "list_settings" for one in command.params):  # an experiment
+        error.message += f"; --set changes its settings, which levilab acquire {name} --settings lists"
+        return
+    from levilab.simulator.keys import similar_keys
+    from levilab.simulator.scene import preset
+
+    keys = similar_keys(preset("driven").as_table(), word.replace("-", "_"))
+    example = " or ".join(f"--set {key}=…" for key in keys) or "as --set top.mass_kg=25g"
+    error.message += f"; --set changes the scene: {example}"
 
 
 def _rewrap(text: str | None) -> str | None:

@@ -8,6 +8,7 @@ import typer
 
 from levilab.cli import exit_codes
 from levilab.cli.importing import importing
+from levilab.cli.options import place
 from levilab.cli.output import message, result
 
 
@@ -19,7 +20,7 @@ def live(
         ),
     ] = None,
     mock: Annotated[bool, typer.Option("--mock", help="A virtual bench to play with, and to record runs on.")] = False,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="The folder with the runs.")] = Path("runs"),
+    out: Annotated[Path, place("DIR", "The folder with the runs.")] = Path("runs"),
     port: Annotated[
         int, typer.Option(metavar="N", min=0, max=65535, help="Of the loopback address; 0: any that is free.")
     ] = 8765,
@@ -30,6 +31,10 @@ def live(
     no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser: print the address only.")] = False,
 ) -> None:
     """Serve the view until Ctrl-C."""
+    if run is not None:  # before what takes long to import
+        from levilab.runs.find import run_or_folder
+
+        run_or_folder(run, out)
     bench = " and the bench for practice, whose time stands still while no page is open"
     said = f"Ctrl-C ends the view{bench if mock else '; a run goes on without it'}"
     serve(said, opens=not no_open, run=run, out=out, mock=mock, port=port, share=share)

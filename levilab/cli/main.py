@@ -21,6 +21,10 @@ class Commands(typer.core.TyperGroup):
 
     def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
         """Read the options before the command, which imports pydantic."""
+        if args[:1] == ["help"]:
+            args = [*args[1:], "--help"]
+        elif args in (["version"], ["-v"], ["-V"]):
+            args = ["--version"]
         with importing():
             return super().make_context(info_name, args, parent, **extra)
 
@@ -49,11 +53,13 @@ def explain_bad_value(text: str, seen: object = None) -> str:
     "'0,03': a number is expected; write a decimal point, not a comma"
     >>> explain_bad_value("Input should be greater than or equal to 10")
     'a number greater than or equal to 10 is expected'
+    >>> explain_bad_value("Value error, '5kg': a number in s, ms or h is expected", "5kg")
+    "'5kg': a number in s, ms or h is expected"
     """
     from levilab.settings import explain_message, hint_about  # with pydantic
 
     said = explain_message(text)
-    if not said.endswith(" is expected"):
+    if not said.endswith(" is expected") or said.startswith(repr(seen)):
         return said
     return (f"{seen!r}: " if seen is not None else "") + said + hint_about(seen, "which --help names")
 

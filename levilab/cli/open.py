@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from levilab.cli.analyze import takes_options, write_and_print
-from levilab.cli.options import Json
+from levilab.cli.options import Json, existing_paths, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.errors import NoneUsable, UsageError
@@ -29,14 +29,17 @@ def open_files(
     context: typer.Context,
     paths: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="FILE…", readable=False, help="Data files, or sheets and runs in them: FILE/SHEET."),
+        typer.Argument(
+            metavar="FILE…",
+            readable=False,
+            help="Data files, or sheets and runs in them: FILE/SHEET.",
+            callback=existing_paths,
+        ),
     ] = None,
     keep: Annotated[
         bool, typer.Option("--keep", help="Keep the options in FILE.levilab.toml, which every analysis reads.")
     ] = False,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write the report, .html or .pdf.")
-    ] = None,
+    out: Annotated[Path | None, place("FILE", "Write the report, .html or .pdf.", callback=writable)] = None,
     browser: Annotated[
         bool | None,
         typer.Option(
@@ -53,7 +56,7 @@ def open_files(
     from levilab.pipelines.look import look_at
 
     files, options = paths or [], read_options(given, typed=True)
-    shows = _has_browser() and not (keep or output or as_json) if browser is None else browser
+    shows = _has_browser() and not (keep or out or as_json) if browser is None else browser
     if not files and not shows:
         raise UsageError("FILE", "name a data file, as levilab open my.csv: there is no browser here to choose one")
     looks = [look_at(path, {**read_correction(path), **options}, plots=False) for path in files]
@@ -67,8 +70,8 @@ def open_files(
         raise _refusal(looks[0])
     if not as_json:
         _analyze(context, readable, options)
-    if output:
-        _report(context, readable, options, output)
+    if out:
+        _report(context, readable, options, out)
 
 
 def _refusal(look: "Look") -> NoneUsable:

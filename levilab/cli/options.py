@@ -2,10 +2,84 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from levilab.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+def number(unit: str = "", *, low: float = -math.inf, high: float = math.inf) -> Callable[[Any], float]:
+    """Return the reader of an option: a number in a unit, which may be typed with another one, as 2min for 120 [s].
+
+    Its reader raises ValueError, whose text says what is expected; so it does beyond low and high.
+    """
+
+    def read(typed: Any) -> float:
+        from levilab.formats.typed import read_number  # not for every help
+
+        value = read_number(typed, unit) if isinstance(typed, str) else float(typed)
+        if not low <= value <= high and not math.isnan(value):
+            span = f"of {low:g} or more" if high == math.inf else f"from {low:g} to {high:g}"
+            raise ValueError(f"{typed!r}: a number {span}{f' [{unit}]' * bool(unit)} is expected")
+        return value
+
+    return read
+
+
+def place(metavar: str, text: str, **more: Any) -> Any:
+    """Return the option for where a command writes, which has one name in all of them.
+
+    Args:
+        metavar: what is written: DIR, FILE.
+        text: the help.
+        more: of typer.Option.
+    """
+    return typer.Option("--out", "-o", metavar=metavar, help=text, **more)
+
+
+def writable(path: Path | None) -> Path | None:
+    """Return the name of a file, or of a folder, that can be written.  Raises CannotWrite before anything is done."""
+    if path is not None:
+        from levilab.files import check_writable, writing
+
+        with writing(f"{path}: could not be written", "choose another place with `out`"):
+            check_writable(path if path.suffix else path / "file")
+    return path
+
+
+def existing_paths(paths: list[Path] | None) -> list[Path] | None:
+    """Return paths, each of which is there.  Raises DataError before anything is imported that takes long."""
+    if not paths:
+        return paths
+    from levilab.runs.find import existing
+
+    return existing(paths)
+
+
+def existing_path(path: Path | None) -> Path | None:
+    """Return a path that is there.  Raises DataError."""
+    existing_paths([path] if path else None)
+    return path
+
+
+def _runs_or(paths: list[Path] | None) -> list[Path]:
+    from levilab.runs.find import existing
+
+    return existing(paths)
+
+
+def named_scene(scene: str | None) -> str:
+    """Return the name of a scene.  Raises UsageError where none is given."""
+    if scene is None:
+        raise UsageError("SCENE", f"is missing: name one of {SCENES}, or a scene's file, as in levilab simulate driven")
+    return scene
+
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else on standard output.")]
 Title = Annotated[str, typer.Option(metavar="TEXT", help="In place of the report's own title.")]
@@ -14,18 +88,22 @@ Author = Annotated[str, typer.Option(metavar="NAMES", help="Below the title.")]
 Date = Annotated[str, typer.Option(metavar="TEXT", help="Below the title, as it is to stand there.")]
 #: readable=False here and elsewhere: what may not be read is said by the reader, in one line, with what to do.
 Paths = Annotated[
-    list[Path], typer.Argument(metavar="PATH…", readable=False, help="Run folders, data files, or folders to search.")
+    list[Path] | None,
+    typer.Argument(
+        metavar="[PATH]…",
+        readable=False,
+        help="Run folders, data files, or folders to search.",
+        show_default="runs",
+        callback=_runs_or,
+    ),
 ]
 #: Those that come with levilab, simple ones first; help is not to wait for their files.
 SCENES = "undriven, friction, tilted, driven, loose-washers, motor, ramp, precession, spindown, sway, practice"
 Presets = Annotated[
-    str,
-    typer.Argument(
-        metavar="SCENE",
-        help=f"{SCENES}, or a file.",
-    ),
+    str | None,
+    typer.Argument(metavar="SCENE", help=f"{SCENES}, or a file.", show_default=False, callback=named_scene),
 ]
 Settings = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the scene, as top.mass_kg=0.025; repeatable."),
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the scene, as top.mass_kg=25g; repeatable."),
 ]

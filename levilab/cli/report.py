@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import Author, Course, Date, Json, Paths, Title
+from levilab.cli.options import Author, Course, Date, Json, Paths, Title, existing_path, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.pipelines.options import OF_REPORT, read_options
@@ -15,14 +15,13 @@ from levilab.pipelines.options import OF_REPORT, read_options
 @takes_options(OF_REPORT)
 def report(
     context: typer.Context,
-    paths: Paths,
-    output: Annotated[
+    paths: Paths = None,
+    out: Annotated[
         Path,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help=r"The file to write; its ending, .html or .pdf, chooses the format.  PDF needs levilab\[pdf].",
+        place(
+            "FILE",
+            r"The file to write; its ending, .html or .pdf, chooses the format.  PDF needs levilab\[pdf].",
+            callback=writable,
         ),
     ] = Path("report.html"),
     tables: Annotated[
@@ -52,11 +51,11 @@ def report(
     from levilab.report.page import write_report
 
     app = context.find_root().command
-    place = place_of_report(output)
+    place = place_of_report(out)
     with interruptible("no report is written"):
         written = write_report(
-            paths,
-            output,
+            paths or (),
+            out,
             read_options(given, typed=True),
             lambda text: message(with_options(text, app)),
             tables=tables,
@@ -72,13 +71,19 @@ def report(
 
 
 def runs(
-    folder: Annotated[Path, typer.Argument(metavar="[DIR]", readable=False, help="The folder to search.")] = Path(
-        "runs"
-    ),
+    folder: Annotated[
+        Path | None,
+        typer.Argument(metavar="[DIR]", readable=False, help="The folder to search.", show_default="runs"),
+    ] = None,
+    out: Annotated[Path | None, place("DIR", "The same, as acquire has it.", readable=False)] = None,
     last: Annotated[int | None, typer.Option(metavar="N", min=1, help="The latest N runs alone.")] = None,
     as_json: Json = False,
 ) -> None:
     """List the runs in a folder."""
+    from levilab.runs.find import RUNS, must_be_searchable
+
+    folder = folder or out or RUNS
+    must_be_searchable(folder)  # before what takes long to import
     from levilab.runs.listing import list_runs, print_runs
 
     found = list_runs(folder)
@@ -93,7 +98,10 @@ def top(
     device: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", readable=False, help="Describes the top's parts, as sample_data/device.toml does."
+            metavar="FILE",
+            readable=False,
+            help="Describes the top's parts, as sample_data/device.toml does.",
+            callback=existing_path,
         ),
     ],
     as_json: Json = False,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from levilab.cli.options import Json, Presets, Settings
+from levilab.cli.options import Json, Presets, Settings, number, place, writable
 from levilab.cli.output import interruptible, message, print_json
 from levilab.cli.quantities import with_options
 from levilab.errors import UsageError
@@ -38,24 +38,27 @@ def chosen_scene(name: str, settings: list[str] | None) -> "Scene":
 
 def simulate(
     context: typer.Context,
-    scene: Presets,
-    duration: Annotated[float, typer.Option(metavar="S", help="How many seconds are simulated.")] = 30.0,
+    scene: Presets = None,
+    duration: Annotated[
+        float, typer.Option(metavar="S", parser=number("s"), help="How many seconds are simulated.")
+    ] = 30.0,
     tolerance: Annotated[
         float,
         typer.Option(
             metavar="X",
+            parser=number(),
             help="Error that is accepted at the end, of the place in m and of the axis in rad.  The step is chosen for "
             "it; the error may be far smaller.",
         ),
     ] = 1e-7,
-    rate: Annotated[float, typer.Option(metavar="HZ", help="States per second that are written.")] = 100.0,
+    rate: Annotated[
+        float, typer.Option(metavar="HZ", parser=number("Hz"), help="States per second that are written.")
+    ] = 100.0,
     settings: Settings = None,
     explain: Annotated[
         bool, typer.Option("--explain", help="Tell what is left out, and how much each of it would change.")
     ] = False,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Make a run folder there: states.csv, run.json, motion.png.")
-    ] = None,
+    out: Annotated[Path | None, place("DIR", "Make a run folder there: states.csv, run.json, motion.png.")] = None,
     animate: Annotated[
         Path | None,
         typer.Option(
@@ -64,18 +67,21 @@ def simulate(
         ),
     ] = None,
     animate_from: Annotated[
-        float | None, typer.Option(metavar="S", help="When the animation begins; a fall is shown unless you say.")
+        float | None,
+        typer.Option(metavar="S", parser=number("s"), help="When it begins; a fall is shown unless you say."),
     ] = None,
     animate_to: Annotated[
-        float | None, typer.Option(metavar="S", help="When it ends; usually 10 s later, 1 s for a film.")
+        float | None,
+        typer.Option(metavar="S", parser=number("s"), help="When it ends; usually 10 s later, 1 s for a film."),
     ] = None,
     animate_speed: Annotated[
-        float | None, typer.Option(metavar="X", help="Part of the real speed; 0.1, for a film 0.05 unless you say.")
+        float | None,
+        typer.Option(metavar="X", parser=number(), help="Part of the real speed; 0.1, for a film 0.05 unless you say."),
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Simulate a scene, and print a summary of the motion."""
-    chosen = chosen_scene(scene, settings)
+    chosen = chosen_scene(str(scene), settings)
     film = _animation_request(animate, animate_from, animate_to, animate_speed)
     if film:
         from levilab.animation.request import check_request
@@ -145,7 +151,7 @@ def _switch_effects(scene: "Scene", duration: float) -> "tuple[Effect, ...]":
 
 
 def stability(
-    scene: Presets,
+    scene: Presets = None,
     settings: Settings = None,
     survival: Annotated[
         bool, typer.Option("--map", help="Simulate a map of survival over spin and mass, too; 10 s or more.")
@@ -159,16 +165,17 @@ def stability(
     ] = None,
     duration: Annotated[
         float | None,
-        typer.Option(metavar="S", help="How long a top of the map has to stay up.", show_default="30"),
+        typer.Option(
+            metavar="S", parser=number("s"), help="How long a top of the map has to stay up.", show_default="30"
+        ),
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Where the map is written: survival.png and survival.csv.", show_default="."),
+        Path | None, place("DIR", "Where the map is written: survival.png and survival.csv.", show_default=".")
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Find where the top floats."""
-    chosen = chosen_scene(scene, settings)
+    chosen = chosen_scene(str(scene), settings)
     of_map = {"spins": spins, "masses": masses, "duration": duration, "out": out}
     if not survival and (without := [name for name, given in of_map.items() if given is not None]):
         raise UsageError(without[0], "it is of a map: give `survival`, too")
@@ -223,7 +230,7 @@ def _simulate_map(
 def benchmark_simulator(
     quick: Annotated[bool, typer.Option("--quick", help="Fewer points and repetitions: a first look.")] = False,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write simulator.json and simulator.png there.")
+        Path | None, place("DIR", "Write simulator.json and simulator.png there.", callback=writable)
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -247,7 +254,7 @@ def benchmark_estimators(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Other traces of the same kinds.")] = 2026,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Write estimators.json and estimators.png there.")
+        Path | None, place("DIR", "Write estimators.json and estimators.png there.", callback=writable)
     ] = None,
     as_json: Json = False,
 ) -> None:

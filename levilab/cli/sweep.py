@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from levilab.cli.options import SCENES, Json, Settings
+from levilab.cli.options import SCENES, Json, Settings, named_scene, number, place
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.errors import DataError, UsageError, WorkersLost
 
@@ -21,13 +21,15 @@ LINE_EVERY_S = 60.0
 
 def sweep(
     scene: Annotated[
-        str,
+        str | None,
         typer.Argument(
             metavar="SCENE|STORE",
+            show_default=False,
+            callback=named_scene,
             help=f"The scene: {SCENES}, or a file.  "
             "Or the store of a sweep, NAME.zarr, which is shown, and with --resume continued.",
         ),
-    ],
+    ] = None,
     sweep: Annotated[
         list[str] | None,
         typer.Option(
@@ -39,7 +41,8 @@ def sweep(
     points: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.csv", help="A table of points instead: its columns are named by keys, its rows are points."
+            metavar="FILE.csv",
+            help="A table of points instead: its columns are named by keys, its rows are points.",
         ),
     ] = None,
     observe: Annotated[
@@ -52,21 +55,25 @@ def sweep(
         ),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(metavar="S", help="Seconds that are simulated at each point.", show_default="30")
+        float | None,
+        typer.Option(
+            metavar="S", parser=number("s"), help="Seconds that are simulated at each point.", show_default="30"
+        ),
     ] = None,
     tolerance: Annotated[
         float | None,
         typer.Option(
-            metavar="X", help="Wanted error at the end, of the place in m and of the axis in rad.", show_default="1e-6"
+            metavar="X",
+            parser=number(),
+            help="Wanted error at the end, of the place in m and of the axis in rad.",
+            show_default="1e-6",
         ),
     ] = None,
     settings: Settings = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Seed of the points that --adaptive checks at random.", show_default="0")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="STORE.zarr", help="Where the results go.", show_default="NAME.zarr")
-    ] = None,
+    out: Annotated[Path | None, place("STORE.zarr", "Where the results go.", show_default="NAME.zarr")] = None,
     cores: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Processes on this machine.", show_default="one a core")
     ] = None,
@@ -94,8 +101,9 @@ def sweep(
     }  # fmt: skip
     if scheduler is not None and cores is not None:
         raise UsageError("cores", "a cluster has its own workers: leave it out, or leave out `scheduler`")
-    shown = _is_store(scene)
-    store = _open_store(Path(scene), given, resume=resume) if shown else _begin_store(scene, given, resume=resume)
+    name = str(scene)
+    shown = _is_store(name)
+    store = _open_store(Path(name), given, resume=resume) if shown else _begin_store(name, given, resume=resume)
     computed = (resume or not shown) and _compute(store, cores, scheduler)
     pictures = _show(store, as_json=as_json)
     for path in [store.path, *pictures] if computed else pictures:

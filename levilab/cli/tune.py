@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from levilab.cli.options import Json
+from levilab.cli.options import Json, existing_path
 from levilab.cli.output import message, print_json, result
 from levilab.errors import UsageError
 
@@ -36,10 +36,17 @@ def tune(
             "or slides sideways; repeatable.",
         ),
     ] = None,
-    scan: Annotated[Path | None, typer.Option(metavar="PATH", readable=False, help="A Hall scan of the base.")] = None,
+    scan: Annotated[
+        Path | None,
+        typer.Option(metavar="PATH", readable=False, help="A Hall scan of the base.", callback=existing_path),
+    ] = None,
     device: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", readable=False, help="Describes base and top for the scan, as in analyze field."),
+        typer.Option(
+            metavar="FILE",
+            readable=False,
+            help="Describes base and top for the scan, as in analyze field.",
+        ),
     ] = None,
     scan_temperature: Annotated[
         str | None, typer.Option(metavar="T", help="Of the base at the scan.", show_default="the run's")

@@ -206,20 +206,26 @@ def plain_unit(text: str) -> str:
     return re.sub(r"[\s^·*()\[\]]", "", unicodedata.normalize("NFKC", text).replace("−", "-"))
 
 
-def unit_factor(text: str, kind: str) -> float | None:
-    """Return the factor to SI of a unit of the dimension `kind`, or None for any other text.
+def factor_of(text: str, units: Mapping[str, float]) -> float | None:
+    """Return the factor of a unit in a table of them, or None for any other text.
 
     Case counts only where it must: "khz" is kHz, but "mhz" could be two units and is none.
     """
-    units, unit = UNITS[kind], plain_unit(text)
+    unit = plain_unit(text)
     if unit in units:
         return units[unit]
-    if kind == "frequency" and (turns := _TURNS_IN.fullmatch(unit)):
+    factors = {factor for name, factor in units.items() if name.casefold() == unit.casefold()}
+    return factors.pop() if len(factors) == 1 else None
+
+
+def unit_factor(text: str, kind: str) -> float | None:
+    """Return the factor to SI of a unit of the dimension `kind`, or None for any other text; see `factor_of`."""
+    factor = factor_of(text, UNITS[kind])
+    if factor is None and kind == "frequency" and (turns := _TURNS_IN.fullmatch(plain_unit(text))):
         second = unit_factor(turns["unit"], "time")
         length = float(turns["number"].replace(",", ".") if turns["number"] else 1)
         return 1 / (length * second) if second and length else None
-    factors = {factor for name, factor in units.items() if name.casefold() == unit.casefold()}
-    return factors.pop() if len(factors) == 1 else None
+    return factor
 
 
 def is_unit(text: str) -> bool:

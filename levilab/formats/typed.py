@@ -1,19 +1,95 @@
-"""Masses and temperatures as a person types them: 24.98 g, 60 mg, 0.06, 21 °C, 294 K."""
+"""Numbers as a person types them, with or without a unit: 24.98 g, 10s, 30 Hz, 2min, 21 °C."""
 
 from __future__ import annotations
 
+import math
 import re
+from types import MappingProxyType
+from typing import TYPE_CHECKING
 
+from levilab.formats.titles import UNITS, factor_of, plain_unit
 from levilab.settings import hint_about
 
-#: Unit → factor and offset to kg and °C; the first is that of a bare number.
-_MASSES = {"g": (1e-3, 0.0), "mg": (1e-6, 0.0), "kg": (1.0, 0.0)}
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+#: Units in which people type a quantity, with their factors to the first one, that of results and of keys.
+TYPED: tuple[Mapping[str, float], ...] = (
+    *UNITS.values(),
+    {"kg": 1.0, "g": 1e-3, "mg": 1e-6},
+    {"rad": 1.0, "mrad": 1e-3, "°": math.pi / 180, "deg": math.pi / 180, "grad": math.pi / 180},
+    {"Vpp": 1.0, "mVpp": 1e-3},
+    {"K": 1.0, "mK": 1e-3},
+    {"Hz/s": 1.0, "mHz/s": 1e-3},
+    {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
+    {"m/s2": 1.0},
+    {"Tm": 1.0, "mTm": 1e-3, "mTcm": 1e-5},
+    {"Am2": 1.0, "mAm2": 1e-3},
+    {"kgm2": 1.0, "gcm2": 1e-7},
+)
+#: Ending of a key → the unit of its value.
+OF_KEYS: Mapping[str, str] = MappingProxyType({
+    "s": "s", "hz": "Hz", "v": "V", "m": "m", "t": "T", "kg": "kg", "rad": "rad", "vpp": "Vpp", "k": "K",
+    "hz_per_s": "Hz/s", "m_s": "m/s", "m_s2": "m/s^2", "t_m": "T m", "a_m2": "A m^2", "kg_m2": "kg m^2",
+})  # fmt: skip
 _TEMPERATURES = {
     "°C": (1.0, 0.0), "C": (1.0, 0.0), "K": (1.0, -273.15), "°F": (5 / 9, -160 / 9), "F": (5 / 9, -160 / 9),
 }  # fmt: skip
-_TYPED = re.compile(r"([+-]?\d+\.?\d*|[+-]?\.\d+)\s*([^\d\s]*)")
+#: Units that a refusal names.
+_SHOWN = 8
+_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*([^\d\s,.;:].*)?", re.IGNORECASE)
 #: Magnets that people hold in their hands, and the lightest washer and the heaviest top [kg].
 _COLDEST, _WARMEST, _LIGHTEST, _HEAVIEST = -30.0, 60.0, 1e-6, 1.0
+
+
+def read_number(text: str, unit: str) -> float:
+    """Return a number in a unit; it may be typed with another unit of the same quantity.
+
+    Raises:
+        ValueError: it is no number, or has a unit of something else.  The text says what is expected.
+
+    >>> read_number("25g", "kg"), read_number("2 min", "s"), read_number("75", "mm"), read_number("1800rpm", "Hz")
+    (0.025, 120.0, 75.0, 30.0)
+    """
+    found = _NUMBER.fullmatch(text.strip().replace("−", "-"))
+    if not found:
+        return _float(text, unit)
+    own = plain_unit(unit)
+    units = next((one for one in TYPED if own in one), {own: 1.0})
+    typed = factor_of(found[2] or unit, units)
+    if typed is None:
+        raise ValueError(f"{text.strip()!r}: a number in {_words_for(unit, units)} is expected")
+    number, factor = float(found[1]), typed / units[own]
+    # with the 15 digits that a float has: 25.4 g are 0.0254 kg, and not 0.025399999999999999
+    return number if factor == 1 else float(f"{number * factor:.15g}")
+
+
+def _words_for(unit: str, units: Mapping[str, float]) -> str:
+    """Return a unit and some other ones for the same quantity, each size once."""
+    sizes = {units[plain_unit(unit)]: unit} if unit else {}
+    for name, factor in units.items():
+        sizes.setdefault(factor, name)
+    *some, last = list(sizes.values())[:_SHOWN]
+    return f"{', '.join(some)} or {last}" if some else last or "no unit"
+
+
+def _float(text: str, unit: str) -> float:
+    try:
+        return float(text)  # inf and nan, which are refused where they make no sense
+    except ValueError:
+        more = hint_about(text) or (f", which may have its unit, as 5 {unit}" if unit else "")
+        raise ValueError(f"{text!r}: a number is expected{more}") from None
+
+
+def unit_of_key(key: str) -> str:
+    """Return the unit with which a key ends, empty where it ends with none.
+
+    >>> unit_of_key("top.mass_kg"), unit_of_key("start.position_m.2"), unit_of_key("drag.law")
+    ('kg', 'm', '')
+    """
+    parts = re.sub(r"(\.\d+)+$", "", key).split("_")
+    endings = ("_".join(parts[at:]) for at in range(1, len(parts)))  # the longest counts
+    return next((OF_KEYS[one] for one in endings if one in OF_KEYS), "")
 
 
 def read_mass(text: str) -> float:
@@ -22,7 +98,12 @@ def read_mass(text: str) -> float:
     >>> read_mass("24.98 g"), read_mass("60mg"), round(read_mass("0.06"), 9)
     (0.02498, 6e-05, 6e-05)
     """
-    return round(_read(text, _MASSES, _LIGHTEST, _HEAVIEST, "a mass such as 24.98 g"), 9)
+    expected = "a mass such as 24.98 g"
+    try:
+        grams = read_number(text, "g")
+    except ValueError:
+        raise ValueError(f"{expected} is expected{hint_about(text) if ',' in text else ''}") from None
+    return round(_in_range(grams * 1e-3, _LIGHTEST, _HEAVIEST, expected), 9)
 
 
 def read_temperature(text: str) -> float:
@@ -31,7 +112,12 @@ def read_temperature(text: str) -> float:
     >>> read_temperature("21.5 C"), read_temperature("70 °F"), read_temperature("294.15 K")
     (21.5, 21.11, 21.0)
     """
-    return round(_read(text, _TEMPERATURES, _COLDEST, _WARMEST, "a temperature of a room such as 21.5 °C"), 2)
+    expected = "a temperature of a room such as 21.5 °C"
+    found = _NUMBER.fullmatch(text.strip().replace("−", "-"))
+    scale = _TEMPERATURES.get(found[2] or "°C") if found else None
+    if found is None or scale is None:
+        raise ValueError(f"{expected} is expected{hint_about(text) if ',' in text else ''}")
+    return round(_in_range(float(found[1]) * scale[0] + scale[1], _COLDEST, _WARMEST, expected), 2)
 
 
 def read_masses(text: str) -> tuple[float, ...]:
@@ -50,17 +136,12 @@ def read_masses(text: str) -> tuple[float, ...]:
         raise ValueError("a decimal point is expected, and a comma between two masses")
     if any(re.search(r"[\d.]\s+[\d.]", piece) for piece in pieces):
         raise ValueError("a comma is expected between two masses, as 0.06, 0.1 g")
-    last = _TYPED.fullmatch(pieces[-1])
-    unit = last[2] if last else ""
+    last = _NUMBER.fullmatch(pieces[-1])
+    unit = (last[2] or "") if last else ""
     return tuple(read_mass(f"{piece} {unit}" if piece[-1:].isdigit() else piece) for piece in pieces)
 
 
-def _read(text: str, units: dict[str, tuple[float, float]], low: float, high: float, expected: str) -> float:
-    found = _TYPED.fullmatch(text.strip().replace("−", "-"))
-    scale = units.get(found[2] or next(iter(units))) if found else None
-    if found is None or scale is None:
-        raise ValueError(f"{expected} is expected{hint_about(text) if ',' in text else ''}")
-    value = float(found[1]) * scale[0] + scale[1]
+def _in_range(value: float, low: float, high: float, expected: str) -> float:
     if not low <= value <= high:
         raise ValueError(f"{expected} is expected")
     return value

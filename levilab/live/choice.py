@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from levilab.errors import DataError
-from levilab.runs.run import RECORD, Run
+from levilab.runs.find import RECORD
+from levilab.runs.run import Run
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator

@@ -15,7 +15,8 @@ from levilab.files import stamp
 from levilab.formats.table import NO_READING
 from levilab.live.envelope import Envelope
 from levilab.live.tail import Tail
-from levilab.runs.run import EVENTS, READINGS, RECORD, Run, RunRecord
+from levilab.runs.find import RECORD
+from levilab.runs.run import EVENTS, READINGS, Run, RunRecord
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from levilab.errors import DataError, LevilabError, UsageError
+from levilab.errors import LevilabError, UsageError
 from levilab.live.desk import Desk
 from levilab.live.doors import Doors, doors_for_guests
 from levilab.live.practice.bench import PracticeBench
 from levilab.live.server import Hall, application
 from levilab.live.share import address_in_network
-from levilab.runs.run import RECORD, find_run
+from levilab.runs.find import RECORD, run_or_folder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping
@@ -197,9 +197,7 @@ def _where(options: LiveOptions) -> tuple[Path, str]:
         return options.out.absolute(), ""
     if options.mock:
         raise UsageError("mock", "a run and a bench for practice exclude each other: it records runs of its own")
-    run = find_run(options.run, options.out).absolute()
-    if not run.is_dir():
-        raise DataError(f"{options.run}: there is no such run or folder; levilab runs lists the runs")
+    run = run_or_folder(options.run, options.out).absolute()
     if not (run / RECORD).exists():
         return run, ""  # a folder with runs
     return run.parent, run.name

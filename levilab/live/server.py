@@ -32,7 +32,7 @@ from levilab.live.opened import Opened
 from levilab.live.watch import Watch
 from levilab.pipelines.look import QUANTITIES
 from levilab.pipelines.result import beside
-from levilab.runs.run import RECORD
+from levilab.runs.find import RECORD
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Iterator

@@ -13,7 +13,8 @@ from levilab.acquisition.table import EXPERIMENTS
 from levilab.errors import DataError, UsageError
 from levilab.notebook.run import RecordedRun
 from levilab.present.progress import Display
-from levilab.runs.run import RECORD, Run, find_run
+from levilab.runs.find import RECORD, find_run
+from levilab.runs.run import Run
 from levilab.simulator.keys import plain
 
 if TYPE_CHECKING:

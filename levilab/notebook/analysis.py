@@ -18,7 +18,8 @@ from levilab.notebook.result import AnalysisResult
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import read_options
 from levilab.pipelines.suits import suiting
-from levilab.runs.run import Run, find_run
+from levilab.runs.find import find_run
+from levilab.runs.run import Run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

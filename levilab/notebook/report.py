@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import UsageError
 from levilab.notebook.result import AnalysisResult
 from levilab.report.page import write_report
-from levilab.runs.run import Run, find_run
+from levilab.runs.find import find_run
+from levilab.runs.run import Run
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -10,7 +10,7 @@ from levilab.errors import DataError
 from levilab.pipelines.options import OF_FILES, InputOptions
 from levilab.pipelines.result import Place, place_of
 from levilab.pipelines.sources import Needs, Readings, Remark, Skipped, Source, collect
-from levilab.runs.run import find_run
+from levilab.runs.find import find_run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

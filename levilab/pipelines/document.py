@@ -18,7 +18,7 @@ from levilab.pipelines.options import options_of
 from levilab.pipelines.result import AGAIN, SCHEMA, Archive, Earlier, Part, Result, RunPart, relative
 from levilab.pipelines.sources import collect
 from levilab.present.units import name_with_unit, split
-from levilab.runs.run import find_run
+from levilab.runs.find import find_run
 from levilab.software import software_versions
 
 if TYPE_CHECKING:

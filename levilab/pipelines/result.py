@@ -16,7 +16,7 @@ from levilab.errors import DataError
 from levilab.files import parse_json, replace_atomically, writing
 from levilab.formats.texts import locate
 from levilab.pipelines.dump import Dump
-from levilab.runs.run import RECORD
+from levilab.runs.find import RECORD
 from levilab.settings import in_one_line
 from levilab.software import software_versions
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import json
 import math
@@ -27,7 +26,8 @@ from levilab.formats.waveforms.record import SEARCHED
 from levilab.pipelines.correction import describe, place_of_correction, read_correction
 from levilab.present.clock import local
 from levilab.present.numbers import list_in_words, short_name
-from levilab.runs.run import READINGS, RECORD, Run, find_runs
+from levilab.runs.find import RECORD, find_runs, no_such_path
+from levilab.runs.run import READINGS, Run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -367,15 +367,6 @@ def _begun(source: Source[Any]) -> tuple[list[str], str, str]:
 def in_one_line(text: str) -> str:
     """Return what a person typed, without what does not print."""
     return "".join(c if c.isprintable() else " " for c in text).strip()
-
-
-def no_such_path(path: Path) -> DataError:
-    """Return the error for a path that does not exist, with a name beside it that is nearly the same."""
-    folder = next(place for place in (path.parent, *path.parent.parents) if place.is_dir())
-    wanted = path.relative_to(folder).parts[0] if folder != path.parent else path.name
-    near = difflib.get_close_matches(wanted, sorted(one.name for one in folder.iterdir()), n=1, cutoff=0.8)
-    advice = f"did you mean {folder / near[0]}?" if near else "check the name; levilab runs lists the runs of a folder"
-    return DataError(f"{path}: there is no such file or folder in {folder.resolve()}: {advice}")
 
 
 def _at(path: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) -> Iterator[Source[R]]:

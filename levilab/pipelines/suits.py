@@ -17,7 +17,8 @@ from levilab.pipelines import catalogue
 from levilab.pipelines.result import ResultError, is_of_another, read_inputs, results_in
 from levilab.pipelines.result import save as save_files
 from levilab.pipelines.sources import Found, LeftOut, NothingSuits, Skipped, data_files, find, in_words, join
-from levilab.runs.run import RECORD, Run, find_run, find_runs
+from levilab.runs.find import RECORD, find_run, find_runs
+from levilab.runs.run import Run
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence

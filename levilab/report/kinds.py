@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import DataError
 from levilab.files import parse_json
 from levilab.report.tables.values import Values
-from levilab.runs.run import Run, find_runs, read_record
+from levilab.runs.find import find_runs
+from levilab.runs.run import Run, read_record
 from levilab.stability.report import stability_section
 
 if TYPE_CHECKING:

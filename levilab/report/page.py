@@ -26,7 +26,7 @@ from levilab.report.reproduction import Asked
 from levilab.report.supplements import SUPPLEMENTS, WITH_TRIALS
 from levilab.report.tables.folder import folder_of, write_tables
 from levilab.report.tables.values import of_analysis
-from levilab.runs.run import find_runs
+from levilab.runs.find import find_runs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -103,7 +103,7 @@ def write_report(
     """
     form = FORMATS.get(output.suffix.lower())
     if form is None:
-        raise UnknownFormat("output", "a name that ends in .html or .pdf is expected", value=output)
+        raise UnknownFormat("out", "a name that ends in .html or .pdf is expected", value=output)
     form.check()
     with writing_report(output):
         check_writable(output)  # before what takes long
@@ -128,7 +128,7 @@ def write_report(
 
 def writing_report(output: Path) -> AbstractContextManager[None]:
     """Explain errors of writing a report."""
-    return writing(f"{output}: could not be written", "choose another place with `output`")
+    return writing(f"{output}: could not be written", "choose another place with `out`")
 
 
 def _sorted_by_kind(paths: Sequence[Path]) -> tuple[Found, list[Path]]:

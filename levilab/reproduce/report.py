@@ -44,7 +44,7 @@ def format_of(output: Path) -> Format:
     """Return the format that a file's name asks for.  Raises UnknownFormat, or what the format itself lacks."""
     found = FORMATS.get(output.suffix.lower())
     if found is None:
-        raise UnknownFormat("output", "a name that ends in .html or .pdf is expected", value=output)
+        raise UnknownFormat("out", "a name that ends in .html or .pdf is expected", value=output)
     found.check()
     return found
 
@@ -57,7 +57,7 @@ def write(found: Reproduction, output: Path) -> Path:
         CannotWrite: of the file.
     """
     content = format_of(output).content(document_of(found))
-    with writing(f"{output}: could not be written", "choose another place with `output`"):
+    with writing(f"{output}: could not be written", "choose another place with `out`"):
         output.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(output, content)
     return output

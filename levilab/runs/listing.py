@@ -18,7 +18,8 @@ from levilab.errors import DataError
 from levilab.formats.table import NO_READING
 from levilab.present.numbers import short_name
 from levilab.present.terminal import print_rows, terminal
-from levilab.runs.run import READINGS, RECORD, Run, RunRecord, find_runs
+from levilab.runs.find import RECORD, find_runs, must_be_searchable
+from levilab.runs.run import READINGS, Run, RunRecord
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -68,12 +69,7 @@ class Listed:
 
 def list_runs(root: Path) -> list[Listed]:
     """List every run at or below a folder, oldest first, the broken ones with their fault.  Raises DataError."""
-    if root.is_file():
-        raise DataError(f"{root}: is a file; name the folder that holds the runs")
-    if not root.is_dir():
-        raise DataError(f"{root}: there is no such folder; levilab acquire writes runs into runs/")
-    if not os.access(root, os.R_OK | os.X_OK):
-        raise DataError(f"{root}: may not be searched by you; change its permissions or name another folder")
+    must_be_searchable(root)
     return sorted((_list_run(folder) for folder in find_runs(root)), key=lambda run: (run.started_utc or "", run.path))
 
 

@@ -6,7 +6,6 @@ It is written by `levilab.runs.writer`.
 from __future__ import annotations
 
 import json
-import os
 import re
 from collections import Counter
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from levilab.files import parse_json
 from levilab.formats.table import read_run_readings
 from levilab.present.html import facts_as_html, table_as_html
 from levilab.runs.events import RunEvent
+from levilab.runs.find import RECORD
 from levilab.runs.traces import load_traces
 from levilab.settings import in_one_line
 
@@ -32,11 +32,10 @@ if TYPE_CHECKING:
     from levilab.runs.traces import StoredTrace
 
 SCHEMA: Literal["levilab-run/1"] = "levilab-run/1"
-READINGS, STATES, EVENTS, RECORD, LOCK, WIRE, PACKAGE = (
+READINGS, STATES, EVENTS, LOCK, WIRE, PACKAGE = (
     "readings.csv",
     "states.csv",
     "events.jsonl",
-    "run.json",
     "run.lock",
     "wire.log",
     "datapackage.json",
@@ -274,45 +273,3 @@ def read_record(folder: Path) -> RunRecord:
         return RunRecord.model_validate(data)
     except ValidationError as error:
         raise DataError(f"{path}: {in_one_line(error)}; {rescue}") from error
-
-
-def find_run(name: Path, root: Path = Path("runs")) -> Path:
-    """Return the run folder of a path, or of the name of a run in a folder, with or without its time."""
-    if name.name != str(name) or name.exists() or not root.is_dir():
-        return name
-    named = runs_named(name.name, root)
-    return named[0] if len(named) == 1 else name
-
-
-def runs_named(name: str, root: Path) -> list[Path]:
-    """Return the runs in a folder that have this name, with or without their time."""
-    return [folder for folder in root.iterdir() if name in {folder.name, folder.name.split("Z-", 1)[-1]}]
-
-
-def find_runs(root: Path) -> list[Path]:
-    """Return the run folders at or below a folder, by name; links are followed, each folder is visited once."""
-    return [Path(folder) for folder in run_folders(root)]
-
-
-def run_folders(root: Path) -> list[str]:
-    """Return the same as text, of which ten thousand take little memory."""
-    found: list[str] = []
-    seen: set[object] = set()
-    for folder, below, files in os.walk(root, followlinks=True):
-        this = _identity(folder)
-        if this in seen:
-            below.clear()
-            continue
-        seen.add(this)
-        if RECORD in files:
-            found.append(folder)
-    return sorted(found, key=lambda folder: folder.split(os.sep))  # noqa: PTH206 - of ten thousand folders
-
-
-def _identity(folder: str) -> object:
-    """Return an identity that no two folders share: a path, where the file system numbers no files."""
-    try:
-        there = os.stat(folder)  # noqa: PTH116 - of ten thousand folders
-    except OSError:
-        return os.path.realpath(folder)
-    return (there.st_dev, there.st_ino) if there.st_ino else os.path.realpath(folder)

@@ -24,19 +24,8 @@ from levilab.errors import DataError
 from levilab.files import CannotWrite, replace_atomically, sync_folder
 from levilab.runs import traces
 from levilab.runs.events import RunEvent
-from levilab.runs.run import (
-    EVENTS,
-    LOCK,
-    PACKAGE,
-    READINGS,
-    RECORD,
-    STATES,
-    WIRE,
-    RunRecord,
-    lock_of,
-    read_record,
-    utc_now,
-)
+from levilab.runs.find import RECORD
+from levilab.runs.run import EVENTS, LOCK, PACKAGE, READINGS, STATES, WIRE, RunRecord, lock_of, read_record, utc_now
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError, RequestError
 from levilab.files import parse_toml, toml_value
+from levilab.formats.typed import read_number, unit_of_key
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -64,20 +65,24 @@ class UnknownScene(SceneError, RequestError):
 def parse_setting(setting: str) -> tuple[str, Any]:
     """Split KEY=VALUE into a dotted key and a value of TOML; a word without quotes is a string.
 
+    A number may have a unit of the quantity with which the key ends.
+
     Raises:
         SceneError: it has another form, or no TOML value.
 
-    >>> parse_setting("drag.law=stokes"), parse_setting("start.position_m = [0, 0, 0.072]")
-    (('drag.law', 'stokes'), ('start.position_m', [0, 0, 0.072]))
+    >>> parse_setting("drag.law=stokes"), parse_setting("start.position_m = [0, 0, 7.2cm]")
+    (('drag.law', 'stokes'), ('start.position_m', [0.0, 0.0, 0.072]))
+    >>> parse_setting("top.mass_kg=25 g")
+    ('top.mass_kg', 0.025)
     """
     key, equals, text = setting.partition("=")
     key, text = key.strip(), text.strip()
     if not (key and equals):
         raise SceneError(f"{setting!r}: KEY=VALUE is expected, such as top.mass_kg=0.025 or drag.law=stokes")
-    return key, _value(text)
+    return key, _value(text, unit_of_key(key))
 
 
-def _value(text: str) -> Any:
+def _value(text: str, unit: str) -> Any:
     try:
         table = parse_toml(f"value = {text}")
         if table.keys() == {"value"}:  # a line break in the text would begin another key
@@ -86,8 +91,9 @@ def _value(text: str) -> Any:
         pass
     except ValueError as error:
         raise SceneError(f"{short_text(text)!r}: {error}") from None
-    try:
-        return float(text)  # .5 and 5. are numbers, but not in TOML
+    listed = text.startswith("[") and text.endswith("]")
+    try:  # .5 and 5. are numbers, too, but not in TOML
+        return [read_number(one, unit) for one in text[1:-1].split(",")] if listed else read_number(text, unit)
     except ValueError:
         return text
 
@@ -169,6 +175,11 @@ def _suggestions(table: Table, at: Table, way: list[str]) -> list[str]:
     if best < _ALIKE_ANYWHERE or (near and _likeness(part, near) >= best):
         return beside
     return [path for path, value in likeness.items() if value == best]
+
+
+def similar_keys(table: Table, word: str) -> list[str]:
+    """Return the dotted keys that a single word may mean."""
+    return _suggestions(table, table, [word])
 
 
 def _by_meaning(table: Table, before: list[str], part: str) -> list[str]:

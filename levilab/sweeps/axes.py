@@ -10,6 +10,7 @@ import numpy as np
 
 from levilab.errors import SimulationError, UsageError
 from levilab.formats.dialect import Dialect
+from levilab.formats.typed import read_number, unit_of_key
 from levilab.settings import hint_about
 from levilab.simulator.equilibrium import HEAVIEST_KG
 from levilab.simulator.keys import SceneError, UnknownKey, short_text
@@ -49,7 +50,7 @@ def parse_axis(text: str) -> Axis:
     parts = [part.strip() for part in spaced.split(":")]
     if not (key and equals and len(parts) in {3, 4}):
         raise UsageError("sweep", _EXPECTED, value=text)
-    first, last = (_number(part, text) for part in parts[:2])
+    first, last = (_number(part, unit_of_key(key), text) for part in parts[:2])
     count = _count(parts[2], text)
     scale = _scale(parts[3:], text)
     _check_span(key, (first, last, count), scale, text)
@@ -57,9 +58,9 @@ def parse_axis(text: str) -> Axis:
     return Axis(key, values, scale)
 
 
-def _number(part: str, text: str) -> float:
+def _number(part: str, unit: str, text: str) -> float:
     try:
-        number = float(part)
+        number = read_number(part, unit)
     except ValueError:
         hint = hint_about(part) or f"; {part!r} is no number, and words are swept by a table of `points`"
         raise UsageError("sweep", f"{_EXPECTED}{hint}", value=text) from None

@@ -9,6 +9,7 @@ import numpy as np
 
 from levilab.errors import UsageError
 from levilab.files import CannotWrite, replace_atomically, writing
+from levilab.formats.typed import read_number
 from levilab.settings import hint_about
 from levilab.simulator.equilibrium import HEAVIEST_KG, stability_of
 from levilab.sweeps.observables import cut
@@ -42,19 +43,20 @@ def span_of(name: str, text: str) -> Span:
     Raises:
         UsageError: it is no range.
 
-    >>> span_of("spins", "20:30:0.5")
-    (20.0, 30.0, 21)
+    >>> span_of("spins", "20:30:0.5"), span_of("masses", "24g:32g:4g")
+    ((20.0, 30.0, 21), (0.024, 0.032, 3))
     """
     example, unit = ("0.0250:0.0254:2e-5", "kg") if name == "masses" else ("20:30:0.5", "Hz")
     expected = f"LOW:HIGH:STEP is expected, such as {example}"
     try:
-        low, high, step = map(float, text.split(":"))
+        low, high, step = (read_number(part, unit) for part in text.split(":"))
     except ValueError:
         hints = (hint_about(part, f"which is {unit}") for part in text.split(":"))
         raise UsageError(name, expected + next(filter(None, hints), ""), value=text) from None
-    if not (all(map(math.isfinite, (low, high, step))) and step > 0 and high >= low + step):
+    finite = all(map(math.isfinite, (low, high, step)))
+    steps = (high - low) / step * (1 + 1e-9) if finite and step > 0 else 0.0  # rounding must not lose the last one
+    if steps < 1:
         raise UsageError(name, f"{expected}, with HIGH at least one STEP above LOW", value=text)
-    steps = (high - low) / step * (1 + 1e-9)  # rounding must not lose the last one
     if steps > MOST_TOPS:
         raise UsageError(name, f"at most {MOST_TOPS} values are possible, take a longer STEP", value=text)
     return low, low + math.floor(steps) * step, math.floor(steps) + 1

@@ -14,8 +14,8 @@ from levilab.formats.texts import locate
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.many.file import TableFile, check_name
 from levilab.pipelines.many.one import PassedOver, Row, Task, analyze_one, columns_of, name_of, row
-from levilab.pipelines.sources import data_files, no_such_path, sha256_of
-from levilab.runs.run import RECORD, find_run, run_folders
+from levilab.pipelines.sources import data_files, sha256_of
+from levilab.runs.find import RECORD, find_run, no_such_path, run_folders
 from levilab.software import software_versions
 from levilab.workers import processes, results_of, this_process
 

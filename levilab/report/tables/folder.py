@@ -53,7 +53,7 @@ def write_tables(document: Document, values: Iterable[Values], folder: Path) -> 
     files = {**dict(_csv_files(values)), **dict(_latex_files(document))}
     listed = tuple((name, about) for name, (about, _) in sorted(files.items()))
     contents = as_csv(Values(CONTENTS, "", _HEADS, listed))
-    with writing(f"{folder}: the tables could not be written", "choose another place with `output`"):
+    with writing(f"{folder}: the tables could not be written", "choose another place with `out`"):
         folder.mkdir(parents=True, exist_ok=True)
         for name in _listed_before(folder / CONTENTS) - files.keys():
             (folder / name).unlink(missing_ok=True)

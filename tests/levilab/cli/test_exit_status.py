@@ -38,7 +38,7 @@ WRONG_USAGE = {
     f"analyze spin {SCOPE} --channel CH7": "--channel 'CH7': ",
     f"report {SAMPLE} --reading-u inf": "--reading-u inf: ",
     f"report {SAMPLE} --columns t=": "--columns 't=': ",
-    f"report {SAMPLE} -o x.docx": "--output x.docx: ",
+    f"report {SAMPLE} -o x.docx": "--out x.docx: ",
     "simulate undriven --set nonsense=1": "--set: nonsense = 1: there is no key nonsense",
     "simulate undriven --set top.mass_kg": "--set: 'top.mass_kg': KEY=VALUE is expected",
     "simulate undriven --set top.mass_kg=-1": "--set: top.mass_kg",
@@ -66,6 +66,7 @@ WRONG_USAGE = {
     "bench serve --port-base 65535": "--port-base",
     "bench serve --host ::1": "--host ::1: ",
     "acquire spin --mock --scene spindwon": "did you mean spindown?",
+    **dict.fromkeys(("simulate", "stability", "sweep"), "SCENE: is missing: name one of undriven, friction, "),
     "simulate nowhere": "there is no scene 'nowhere'",
     "stability nowhere": "there is no scene 'nowhere'",
     "bench serve --scene nowhere": "there is no scene 'nowhere'",
@@ -78,14 +79,11 @@ NOT_UNDERSTOOD = (
     "acquire spin --mok",
     "acquire spin --mock --seed -1",
     "acquire spin --mock --seed many",
-    "analyze",
-    "analyze spindown",
+    "acquire --mock",
     "analyze spindown x --uncertainty perhaps",
     "analyze spindown x --reading-u much",
-    "report",
-    "simulate",
     "simulate undriven --duration long",
-    "stability",
+    "bench clock --mock --duration 0.5s",
     "bench",
     "bench serve --port-base 0",
     "bench serve --port-base 65536",
@@ -93,6 +91,14 @@ NOT_UNDERSTOOD = (
     "benchmark fly",
 )
 FAILURES = {
+    **dict.fromkeys(("analyze", "analyze spindown", "report", "report -o r.html"), "there is no folder runs here"),
+    "simulate undriven --duration 1e6 --animate file/a.html": "choose another place with --animate",
+    "crosscheck spindown --out file": "choose another place with --out",
+    "reproduce -o file/r.html": "choose another place with --out",
+    "live nowhere": "nowhere: there is no such run or folder",
+    "open nowhere": "nowhere: there is no such file or folder",
+    "crosscheck --like nowhere": "nowhere: there is no such file or folder",
+    "analyze field file --device other.toml": "other.toml: there is no such file or folder",
     "acquire spin --bench other.toml": "other.toml: there is no such file",
     "acquire spin --mock --resume spin-567a": "no run spin-567a, there is no folder runs here",
     "acquire spin --mock --resume elsewhere/spin-567a": "elsewhere/spin-567a: there is no such run; levilab runs lists",
@@ -172,7 +178,7 @@ def test_the_virtual_bench_is_no_advice_to_those_who_use_it(place):
     ("words", "says"),
     [
         (f"analyze spindown {SAMPLE} --reading-u 0,03", "'0,03': a number is expected; write a decimal point"),
-        ("simulate undriven --duration 5s", "'5s': a number is expected; write the number without its unit"),
+        ("simulate undriven --duration 5kg", "'5kg': a number in s, ms, μs, ns, min or h is expected"),
         ("acquire spin --mock --seed abc", "'abc': a whole number is expected"),
     ],
 )
@@ -265,7 +271,7 @@ def test_one_quantity_has_one_option_in_all_commands():
     names = option_names(app)
     assert names["settings"] == ("--set", "")
     assert names["save"] == ("--save", "--no-save")
-    assert names["output"] == ("--output", "")
+    assert names["out"] == ("--out", "")
     assert len({on for on, _ in names.values()}) == len(names)
 
 

@@ -21,7 +21,7 @@ def test_the_first_help_lists_every_command_and_makes_none(monkeypatch):
 def test_a_command_has_the_texts_of_its_stand_in_and_the_options_of_its_function():
     stand_in = typer.main.get_command(app).commands["report"]  # type: ignore[attr-defined]
     assert stand_in.params == []
-    assert {"paths", "output", "columns"} <= {one.name for one in stand_in.command.params}
+    assert {"paths", "out", "columns"} <= {one.name for one in stand_in.command.params}
     assert stand_in.command.help.split() == stand_in.help.split()
     assert stand_in.command.epilog == "Example: levilab report sample_data/ -o report.html, or -o report.pdf --tables"
 

@@ -330,12 +330,34 @@ IMPORTS = [
         [["--help"], ["acquire", "spin", "--help"], ["simulate", "--help"], ["simulate", "nowhere"], ["--version"]],
         set[str](),
     ),
-    ([["runs", "."], ["analyze", "nowhere"]], {"numpy"}),
+    (  # a refusal of what is not there waits for nothing
+        [
+            words.split()
+            for words in (
+                "analyze nowhere",
+                "analyze",
+                "analyze field x --device nowhere",
+                "report nowhere",
+                "open nowhere",
+                "runs nowhere",
+                "live nowhere",
+                "crosscheck --like nowhere",
+                "acquire spin",
+                "acquire spin --resume nowhere",
+                "bench check",
+                "simulate no.toml",
+                "tune --scan nowhere",
+                "top nowhere",
+            )
+        ],
+        set[str](),
+    ),
+    ([["runs", "."]], {"numpy"}),
     ([["acquire", "spin", "--mock", *QUICKLY]], {"numpy", "pyvisa"}),
 ]
 
 
-@pytest.mark.parametrize(("commands", "allowed"), IMPORTS, ids=["help", "runs", "acquire"])
+@pytest.mark.parametrize(("commands", "allowed"), IMPORTS, ids=["help", "refusals", "runs", "acquire"])
 def test_nothing_heavy_is_imported_where_it_is_not_used(tmp_path, commands, allowed):
     program = (
         "import sys\nfrom levilab.cli.main import main\n"
@@ -370,3 +392,47 @@ def test_help_lists_the_scenes_that_come_with_levilab():
 def test_help_lists_all_observables_and_chapters(command, option, names):
     (given,) = get_type_hints(command, include_extras=True)[option].__metadata__
     assert given.help.partition(": ")[2].rstrip(".").split(", ") == list(names)
+
+
+def test_experiments_and_values_are_understood_as_people_write_them(levilab):
+    """The name behind the options, numbers with their units, the former name of --out, help and version as words."""
+    listed = levilab("acquire", "--mock", "spin", "--set", "gate_s=2000ms", "--settings", "--json").stdout
+    (gate,) = [one for one in json.loads(listed)["settings"] if one["name"] == "gate_s"]
+    assert gate["value"] == 2.0
+    done = levilab("simulate", "undriven", "--duration", "200ms", "--set", "top.mass_kg=25.26g", "--json").stdout
+    assert json.loads(done)["duration_s"] == 0.2
+    assert levilab("version").stdout == levilab("-v").stdout == levilab("--version").stdout
+    assert levilab("help", "runs").stdout == levilab("runs", "--help").stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("acquire --mock", "as levilab acquire spin --mock: spin, trace"),
+        ("acquire spin --duration 60", "levilab acquire spin --settings lists"),
+        ("acquire spin --mok", "(Possible options: --mock)"),
+        ("simulate undriven --spin 30", "--set changes the scene: --set start.spin_hz=…"),
+    ],
+)
+def test_what_is_not_understood_is_answered_with_what_was_meant(levilab, words, said):
+    refused = " ".join(levilab(*words.split(), check=2).stderr.replace("│", " ").split())
+    assert said in refused
+    assert ("Possible" in refused) == ("Possible" in said)
+
+
+@pytest.mark.usefixtures("undrawn_figures")
+def test_runs_are_where_acquire_writes_them_unless_another_place_is_named(levilab, sample_data, tmp_path):
+    shutil.copytree(sample_data / "spin-down-1", tmp_path / "runs" / "one")
+    assert "What the data say" in levilab("analyze", "--no-save").stdout
+    assert levilab("analyze", "spindown", "--no-save").stdout == levilab("analyze", "runs", "--no-save").stdout
+    for name in ("--out", "--output", "-o"):
+        levilab("report", "--no-crosscheck", name, f"page{name}.html")
+        assert (tmp_path / f"page{name}.html").exists()
+    assert levilab("runs", "--out", "runs").stdout == levilab("runs").stdout
+
+
+def test_a_table_without_times_is_not_sent_to_another_analysis(levilab, tmp_path):
+    (tmp_path / "d.csv").write_text("tick,f [Hz]\nfast,40\n20,39\n30,38\n40,37\n", encoding="utf-8")
+    refused = levilab("analyze", "spindown", "d.csv", check=1).stderr
+    assert "say --columns t=NAME" in refused
+    assert "reads it" not in refused

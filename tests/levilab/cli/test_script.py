@@ -38,7 +38,7 @@ class Finder:
             raise SystemExit
 
 sys.meta_path.insert(0, Finder())
-sys.argv = ["levilab", "analyze", "x.csv"]
+sys.argv = ["levilab", "runs", "."]
 main()
 """
 

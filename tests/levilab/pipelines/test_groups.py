@@ -13,8 +13,9 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.report.document import document_of
 from levilab.report.html.page import page_of
 from levilab.report.tables.values import of_analysis
+from levilab.runs.find import RECORD
 from levilab.runs.listing import list_runs
-from levilab.runs.run import READINGS, RECORD
+from levilab.runs.run import READINGS
 from support.paths import SAMPLE_DATA
 
 if TYPE_CHECKING:

@@ -348,5 +348,5 @@ def test_a_report_that_cannot_be_written_is_refused_before_anything_is_computed(
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     (tmp_path / "folder.html").mkdir()
     for output in (tmp_path / "file" / "report.html", tmp_path / "folder.html"):
-        with pytest.raises(LevilabError, match="`output`"):
+        with pytest.raises(LevilabError, match="`out`"):
             write_report([tmp_path / "no run, which would be said first"], output)

@@ -19,8 +19,9 @@ from levilab.acquisition.loop import acquire
 from levilab.errors import DataError
 from levilab.files import CannotWrite, parse_json, parse_toml, replace_atomically
 from levilab.formats.columns import CANONICAL
+from levilab.runs.find import find_run
 from levilab.runs.listing import list_runs
-from levilab.runs.run import Run, find_run
+from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from support.acquisitions import QUICKLY, Impatient, mock
 from support.commands import command

@@ -12,8 +12,9 @@ import pytest
 
 from levilab.present.terminal import Terminal
 from levilab.runs import listing
+from levilab.runs.find import RECORD
 from levilab.runs.listing import MOST_PROBLEMS, Listed, list_runs, print_runs
-from levilab.runs.run import READINGS, RECORD, Run
+from levilab.runs.run import READINGS, Run
 from many_runs import make_runs
 from support.commands import command
 

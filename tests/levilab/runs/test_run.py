@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 
 from levilab.errors import DataError
 from levilab.files import CannotWrite, replace_atomically
+from levilab.runs.find import find_run, find_runs
 from levilab.runs.listing import Listed, list_runs, print_runs
-from levilab.runs.run import Run, RunRecord, find_run, find_runs
+from levilab.runs.run import Run, RunRecord
 from levilab.runs.writer import RunWriter
 
 CHANNELS = [

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         ("start.spin_hz", "KEY=FROM:TO:N is expected"),
         ("start.spin_hz=18:40", "KEY=FROM:TO:N is expected"),
         ("start.spin_hz=18:40:2.5", "N, the number of values, is '2.5' here"),
-        ("start.spin_hz=18Hz:40:3", "write the number without its unit"),
+        ("start.spin_hz=18kg:40:3", "write the number without its unit"),
         ("start.spin_hz=18:inf:3", "with finite numbers"),
         ("start.spin_hz=40:18:23", "take start.spin_hz=18:40:23, the map is the same"),
         ("start.tilt_rad=1:0.1:5:log", "take start.tilt_rad=0.1:1:5:log"),

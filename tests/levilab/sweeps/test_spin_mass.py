@@ -52,6 +52,7 @@ def test_a_short_map_has_a_note_and_a_long_one_has_none() -> None:
 
 def test_spans_are_read_and_what_is_none_is_reported() -> None:
     assert span_of("spins", "20:23:0.5") == (20.0, 23.0, 7)
+    assert span_of("masses", "25g:26g:1g") == (0.025, pytest.approx(0.026, rel=1e-15), 2)
     assert span_of("spins", "-30:-20:4") == (-30.0, -22.0, 3)
     low, high, count = span_of("masses", "0.0245:0.0256:0.0001")
     assert (low, high, count) == (0.0245, pytest.approx(0.0256, rel=1e-12), 12)
@@ -66,7 +67,7 @@ def test_a_span_that_is_none_is_refused_with_what_one_looks_like(text: str) -> N
     with pytest.raises(
         UsageError, match=r"such as 0\.0250:0\.0254:2e-5; write the number without its unit, which is kg"
     ):
-        span_of("masses", "25g:26g:1g")
+        span_of("masses", "25m:26m:1m")
 
 
 def test_a_map_of_too_many_tops_or_of_no_masses_is_refused() -> None:

@@ -14,7 +14,7 @@ from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.report.groups.beside import class_of
 from levilab.report.groups.write import write_class
-from levilab.runs.run import RECORD
+from levilab.runs.find import RECORD
 from levilab.world.spin_world import SpinScene, random_scene
 from support.acquisitions import RAISED_QUICKLY, Silent
 
