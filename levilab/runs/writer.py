@@ -61,6 +61,7 @@ class RunWriter:
         self._files: dict[str, _GrowingFile] = {}
         self._kept: dict[str, list[bytes]] = {}  # all lines appended, to be written again
         self._created = False
+        self._record_size = 0  # of run.json as it was written last
         self.events = 0
         self._records = 0  # of the oscilloscope
         self._arriving: tuple[Path, int] | None = None  # the record on its way: its folder, and points that are there
@@ -88,7 +89,7 @@ class RunWriter:
             try:
                 writer._lock.acquire(blocking=False)
                 writer._append(table, writer._header())
-                replace_atomically(writer.folder / RECORD, record.as_json())
+                writer._write_record()
                 sync_folder(out)
             except BaseException:
                 writer.discard()
@@ -193,10 +194,10 @@ class RunWriter:
             self._rescue_if_lost()
             self.record = self.record.model_copy(update=changes)
             try:
-                replace_atomically(self.folder / RECORD, self.record.as_json())
+                self._write_record()
             except FileNotFoundError:  # the folder went at this moment
                 self._rescue_if_lost()
-                replace_atomically(self.folder / RECORD, self.record.as_json())
+                self._write_record()
 
     def reading(self, row: Mapping[str, float | None]) -> None:
         """Append a row to readings.csv.  None becomes an empty cell.  Raises CannotWrite with the row in it.
@@ -344,12 +345,17 @@ class RunWriter:
         if any(file.is_lost() for file in kept):
             self._rescue()
         elif kept and not self._record_is_whole():
-            replace_atomically(self.folder / RECORD, self.record.as_json())
+            self._write_record()
+
+    def _write_record(self) -> None:
+        text = self.record.as_json()
+        replace_atomically(self.folder / RECORD, text)
+        self._record_size = len(text.encode(errors="replace"))
 
     def _record_is_whole(self) -> bool:
         """Return whether run.json is there and can be read; a person may have changed it."""
         try:
-            if (self.folder / RECORD).stat().st_size == len(self.record.as_json().encode(errors="replace")):
+            if (self.folder / RECORD).stat().st_size == self._record_size:
                 return True
             read_record(self.folder)
         except (OSError, DataError):
@@ -370,7 +376,7 @@ class RunWriter:
             self._files[name].append(b"".join(blocks))
             self._files[name].sync()
         self.record = self.record.model_copy(update={"rescued_from": str(old)})
-        replace_atomically(self.folder / RECORD, self.record.as_json())
+        self._write_record()
         sync_folder(self.folder.parent)
         self._leave_readable(old, kept)
         readings = self._lines_kept(READINGS) - 1
