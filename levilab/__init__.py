@@ -52,14 +52,12 @@ class _Border:
         pass
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
-        __tracebackhide__ = True  # IPython and pytest leave this frame out
         if error is None:
             return
         from instruments.errors import InstrumentError
 
         if isinstance(error, LevilabError | InstrumentError):
-            error.__cause__, error.__context__ = None, None
-            raise error.with_traceback(None)
+            error.__cause__, error.__context__, error.__traceback__ = None, None, None
 
 
 _border = _Border()
