@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.animation.parts import parts_of
 from levilab.errors import LevilabError
-from levilab.live.practice.commands import RecordRun, command_of
+from levilab.live.practice.commands import command_of
+from levilab.live.practice.experiments import PRACTICE
 from levilab.runs.run import read_record, utc_now
 from levilab.simulator.scene import read_scene, scene_of
 
@@ -23,27 +24,6 @@ _MOST_SAID = 100
 #: Answers of the bench that are kept for the requests that wait for them.
 _MOST_ANSWERS = 64
 _LONGEST_TEXT = 600
-#: What a student can record, the experiment of the guide first, and settings that take some minutes of the bench at
-#: most: the usual ones are those of a laboratory, which has the time.  A square wave holds the top better by 4/π.
-EXPERIMENTS = {
-    "spin": (
-        "spin.drive_waveform=SQU",
-        "spin.drive_frequency_hz=34",
-        "spin.ramp_hz_per_s=0.08",
-        "spin.hold_s=10",
-        "spin.interval_s=2",
-    ),
-    "precession": (
-        "precession.drive_waveform=SQU",
-        "precession.first_hz=32",
-        "precession.last_hz=29",
-        "precession.step_hz=1",
-        "precession.hold_s=5",
-    ),
-    "limit": ("limit.repetitions=2",),
-    "trace": ("trace.records=5", "trace.interval_s=2"),  # a free top is down before ten records of every 10 s
-    "field": (),
-}
 
 
 @dataclass
@@ -70,7 +50,11 @@ class Desk:
     @property
     def about(self) -> dict[str, Any]:
         """The first data of the page."""
-        return {"experiments": [*EXPERIMENTS], "runs": [folder.name for folder in self.folders]}
+        rows = [
+            {"name": name, "title": row.title, "asks": row.asks, "length_s": row.length_s}
+            for name, row in PRACTICE.items()
+        ]
+        return {"experiments": rows, "runs": [folder.name for folder in self.folders]}
 
     @property
     def folder(self) -> Path | None:
@@ -90,7 +74,7 @@ class Desk:
         """Read the new events of the bench."""
         for event in self.bench.events():
             self.count += 1
-            if event.kind == "ready":
+            if event.scene:
                 self.scene = event.scene
             if event.kind == "recording" and event.folder:
                 self.folders.append(Path(event.folder))
@@ -109,10 +93,7 @@ class Desk:
 
     def carry_out(self, wanted: dict[str, Any]) -> int:
         """Send a command.  Returns its number.  Raises CommandRefused, BenchGone."""
-        command = command_of(wanted)
-        if isinstance(command, RecordRun) and not command.settings:
-            command = command.model_copy(update={"settings": EXPERIMENTS.get(command.experiment, ())})
-        return self.bench.command(command)
+        return self.bench.command(command_of(wanted))
 
 
 def scene_of_run(folder: Path) -> dict[str, Any] | None:

@@ -29,7 +29,7 @@ VIEWS = {
     "limit": View("time_s", "spin_frequency_hz", y_label="limit of the spin"),
     "precession": View("drive_frequency_hz", "precession_frequency_hz", "drive", "precession"),
     "field": View("height_m", "flux_density_t", "height", "flux density"),
-    "trace": View("time_s", "highest_v", y_label="highest value of a record"),
+    "trace": View("time_s", "tape_frequency_hz", y_label="frequency of the tape"),
 }
 
 

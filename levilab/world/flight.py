@@ -109,10 +109,11 @@ class _Absent:
 
 
 class Flight:
-    """A top from time 0 on; before, and after it has fallen, there is none.
+    """A top from a time on; before, and after it has fallen, there is none.
 
     Args:
         scene: with the top; its drive is ignored, see `change`.
+        start: the time [s].
         put_back_after_s: time from a fall until the top starts again as the scene says [s]; None: it stays down.
         stem_height_m: height of the laser's beam on the stem, above the centre of mass [m].
 
@@ -120,7 +121,9 @@ class Flight:
         SceneError: the scene has no motion.
     """
 
-    def __init__(self, scene: Scene, put_back_after_s: float | None = None, *, stem_height_m: float = 0.03) -> None:
+    def __init__(
+        self, scene: Scene, put_back_after_s: float | None = None, *, start: float = 0.0, stem_height_m: float = 0.03
+    ) -> None:
         if scene.observed != "motion":
             raise SceneError(f"observed = {scene.observed}: a scene for the bench is expected to have motion")
         # the tape's place needs the full attitude
@@ -129,8 +132,8 @@ class Flight:
         self._pieces: Timeline[_Flying | _Absent] = Timeline(-math.inf, _Absent(-math.inf))
         self._step: float | None = None
         # what comes next: a top in this state, or none until a new one is put there; and when [s]
-        self._state: Array | None = self._start_state(0.0)
-        self._known_until = 0.0
+        self._state: Array | None = self._start_state(start)
+        self._known_until = self._starts = start
         self._slip = 0.0  # of the washers then [turns]
         self._memory: Array | None = None  # of bursts that the top triggers, then
         self._samples: dict[_Flying, _Samples] = {}  # of the latest pieces
@@ -205,8 +208,8 @@ class Flight:
 
     def first_lift(self) -> float:
         """Return the mean height of the rim over the first second [m], in which a top bobs at least once."""
-        self.simulate_until(0.0)
-        piece = self._pieces.at(0.0)
+        self.simulate_until(self._starts)
+        piece = self._pieces.at(self._starts)
         if isinstance(piece, _Flying):
             return float(self._samples_of(piece).lift.mean())
         return self._scene.start.position_m[2]

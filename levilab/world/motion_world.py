@@ -61,7 +61,7 @@ class MotionWorld:
 
     Args:
         scene: with the top that moves.
-        clock: of the bench.
+        clock: of the bench; the top is up from its present time on.
         tape: the tape and its lamp.
         laser: the beam and its amplifier.
         put_back_after_s: see Flight.
@@ -93,7 +93,7 @@ class MotionWorld:
         self._tape, self._laser, self.seed = tape or Tape(), laser or Laser(), seed
         self._scene = scene
         self._wire, self._coil = TriggerWire(), Coil(self._trigger_edges)
-        self._flight = Flight(scene, put_back_after_s, stem_height_m=self._laser.height_m)
+        self._flight = Flight(scene, put_back_after_s, start=clock.now(), stem_height_m=self._laser.height_m)
         self._tape_place = float(np.random.default_rng(seed).uniform()) if seed else 0.0
         self._last_change = 0.0  # the time of the last change of the drive [s]
         self._lens_height_m = self._flight.first_lift()  # where the lens looks

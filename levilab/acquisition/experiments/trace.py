@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt
 
+from analysis.errors import AnalysisError
+from analysis.pulses.trace import spin_of_trace
 from instruments.drivers.oscilloscope import NeverTriggered
 from instruments.drivers.oscilloscope.sound import SilentInput
 from instruments.errors import CommandRefused, InstrumentError, OutOfRange
@@ -128,11 +130,19 @@ def channels(settings: TraceSettings) -> tuple[Channel, ...]:
     trigger = f"oscilloscope, channel {settings.trigger_source}, which triggers"
     if settings.trigger_source not in settings.channels:
         trigger = f"oscilloscope, channel {settings.channels[0]}"
-    return (
+    shown = (
         Channel("time_s", "s", "bench clock when the record was complete, from the moment the first was asked for"),
         Channel("record", "", "number of the record, in traces.jsonl those of all its channels one after the other"),
         Channel("lowest_v", "V", trigger),
         Channel("highest_v", "V", trigger),
+    )
+    if TAPE not in [settings.label(channel) for channel in settings.channels]:
+        return shown
+    tape = "the pulses of the tape in the record, by the oscilloscope's clock"
+    return (
+        *shown,
+        Channel("tape_frequency_hz", "Hz", f"{tape}, in its middle"),
+        Channel("tape_frequency_u_hz", "Hz", "its standard uncertainty, without the clock's"),
     )
 
 
@@ -337,7 +347,18 @@ def _keep(session: Session[TraceSettings], traces: list[Trace], time_s: float) -
     row: Row = {"time_s": time_s, "record": number}
     if not math.isnan(low):
         row |= {"lowest_v": low, "highest_v": high}
-    session.keep(row, (settings.records - number) * settings.interval_s)
+    tape = next((trace for trace in traces if settings.label(trace.channel) == TAPE), None)
+    session.keep(row | ({} if tape is None else _frequency(tape)), (settings.records - number) * settings.interval_s)
+
+
+def _frequency(tape: Trace) -> Row:
+    """Return the frequency of the tape in the middle of a record, as `levilab analyze spin` has it; empty without."""
+    try:
+        found = spin_of_trace(tape.volts, 1 / tape.dt_s).at(tape.dt_s * tape.codes.size / 2)
+    except AnalysisError:
+        return {}
+    named = {"tape_frequency_hz": found.value, "tape_frequency_u_hz": found.u}
+    return {name: value for name, value in named.items() if value is not None}
 
 
 def _problem(trace: Trace, settings: TraceSettings) -> str:

@@ -69,6 +69,7 @@ function take(head) {
   if (head.events) takeEvents(head.events);
   if (head.fit) takeFit(head.fit);
   for (const one of head.records) {
+    for (const [channel, other] of data.records) if (other.drawn !== one.drawn) data.records.delete(channel);  // what a run reads itself
     seen.records[one.channel] = one.number;
     data.records.set(one.channel, one);
     dirty.trace = true;
@@ -224,7 +225,7 @@ function show() {
   showFacts(about);
   document.body.classList.toggle("no-scope", !data.records.size && !practice && Boolean(about) && about.status !== "running");
   write("count", isOfMinutes() ? "the spin as it is counted, and the drive" : data.count ? `${data.count.toLocaleString("en").replaceAll(",", "\u202f")}${data.readings?.single === false ? ", each stroke from the lowest to the highest of many" : ""}` : "");
-  by("fit-head").parentElement.hidden = !data.count || isOfMinutes();
+  by("fit-head").parentElement.hidden = !data.count || !by("fit-head").textContent || isOfMinutes();
   const minutes = isOfMinutes();
   by("empty").hidden = data.count > 0 || minutes;
   by("drawn").parentElement.hidden = !data.count;
@@ -298,7 +299,7 @@ function showMagnetometer(bench, last) {
   const field = from.flux_density_t, height = from.height_m ?? bench?.probe_m;
   write("field-value", Number.isFinite(field) ? fixed(field * 1000, 3) : "–");
   stale("field-value", !bench || bench.silent);
-  write("probe", Number.isFinite(height) ? `${short(height * 100)} cm above the base` : "–");
+  write("probe", Number.isFinite(height) ? `${short(height * 100)} cm above the base` : bench?.virtual ? "in its chamber" : "–");
   write("magnetometer-model", modelOf("magnetometer"));
   write("scope-model", modelOf("oscilloscope"));
 }

@@ -1,7 +1,7 @@
 // The bench for practice: controls that send commands, and the guide that shows how far one is.
 
 import {showResult} from "./result.js";
-import {by, numberIn, option, write} from "./words.js";
+import {by, lapse, numberIn, option, write} from "./words.js";
 
 /** Least time between two messages of a slider [ms]. */
 const SENDS_EVERY_MS = 120;
@@ -21,7 +21,7 @@ export function watchPractice() {
 export function openPractice(about, command, run, isOwn, allowed) {
   document.body.classList.add("practice");
   by("practice").hidden = false;
-  for (const experiment of about.experiments) by("experiment").append(option(experiment));
+  for (const {name, title} of about.experiments) by("experiment").append(option(title, name));
   const now = {drive: false, busy: false, paused: false, analyzed: "", ended: false, elsewhere: false, bench: null};
 
   by("controls").disabled = !allowed;
@@ -95,6 +95,15 @@ export function openPractice(about, command, run, isOwn, allowed) {
   }
   by("speed").addEventListener("change", () => send("set the speed", {speed: Number(by("speed").value)}));
 
+  /** Say what the chosen experiment finds out, and how long it takes at the present speed of the bench. */
+  function sayWhatItAsks() {
+    const {asks, length_s} = about.experiments.find(({name}) => name === by("experiment").value);
+    const speed = Number(by("speed").value), soon = speed === 1 ? "" : `, ${lapse(length_s / speed)} at ${speed} ×`;
+    write("asks", `${asks} About ${lapse(length_s)} of the bench${soon}.`);
+  }
+  for (const id of ["experiment", "speed"]) by(id).addEventListener("change", sayWhatItAsks);
+  sayWhatItAsks();
+
   /** Change a field by a step, within its limits; what is no number stays, and is refused. */
   function stepBy(id, step) {
     const field = by(id), value = numberIn(field.value) + step;
@@ -139,7 +148,10 @@ export function openPractice(about, command, run, isOwn, allowed) {
       follow("frequency", drive.frequency_hz, 2);
     }
     if (drive && !timer && !/^amplitude/.test(document.activeElement?.id)) follow("amplitude", drive.amplitude_vpp, 2);
-    if (bench.speed && bench.speed !== now.speed) choose(by("speed"), now.speed = bench.speed);  // else it may just be chosen
+    if (bench.speed && bench.speed !== now.speed) {
+      choose(by("speed"), now.speed = bench.speed);
+      sayWhatItAsks();
+    }  // else it may just be chosen
   }
 
   function follow(id, value, decimals) {

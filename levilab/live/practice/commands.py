@@ -87,8 +87,8 @@ class RecordRun(Settings):
     """Carry out an experiment on this bench, and write a run folder.
 
     Attributes:
-        experiment: its name: spin, trace, field, limit or precession.
-        settings: as for the command line, such as "spin.interval_s=5".
+        experiment: its name in PRACTICE, or of `levilab acquire`.
+        settings: as for the command line, such as "spin.interval_s=5"; none: those of PRACTICE.
         note: kept with the run.
     """
 
@@ -134,7 +134,7 @@ class PracticeEvent:
         number: of the command that it answers, or that began the run; None where there is none.
         folder: of the run.
         status: of the run that ended: finished, interrupted or failed.
-        scene: of the simulated top, with "ready".
+        scene: of the simulated top, with "ready", "recording" and "recorded".
         port, token: where the bench publishes, on the way to `PracticeBench.address` alone.
     """
 

@@ -40,6 +40,7 @@ from levilab.live.practice.commands import (
     SwitchDrive,
     TuneDrive,
 )
+from levilab.live.practice.experiments import PRACTICE, PracticeExperiment
 from levilab.live.practice.fall import cause_of_fall
 from levilab.present.progress import Display
 from levilab.simulator.scene import read_scene
@@ -156,6 +157,13 @@ AGAIN = {
 }
 
 
+def plan_of(command: RecordRun) -> PracticeExperiment:
+    """Return the experiment that a command wants: a row of PRACTICE, or one with settings of its own."""
+    if not command.settings and command.experiment in PRACTICE:
+        return PRACTICE[command.experiment]
+    return PracticeExperiment(command.experiment, "", command.experiment, command.settings, 0.0)
+
+
 def _in_words(spin: float | None) -> str:
     return "no light pulses" if spin is None else f"{spin:.2f} Hz"
 
@@ -250,7 +258,7 @@ class PracticeProcess:
         """Run the bench until the end."""
         address = self._publisher.address
         said: dict[str, Any] = {"port": address.port, "token": address.token.hex()} if address else {}
-        self._place_probe(0.072)
+        self._place_probe(None)  # in the top's place it would be hit
         while not self._over:
             with open_bench(self._wiring, tuple(self._wiring.instruments)) as bench, self._looking_at(bench):
                 self._set_up(bench)
@@ -413,22 +421,26 @@ class PracticeProcess:
     @_carry_out.register
     def _(self, command: RecordRun) -> str:
         self._free_bench()
-        self._request(command)  # raises where it is not possible
-        if command.experiment in NEED_A_TOP and not self._floats():
+        plan = plan_of(command)
+        self._request(plan, command.note)  # raises where it is not possible
+        if plan.experiment in NEED_A_TOP and not plan.scene and not self._floats():
             raise CommandRefused(
-                f"the top is down, and a {command.experiment} run begins with one that floats: put the top back first"
+                f"the top is down, and a {plan.experiment} run begins with one that floats: put the top back first"
             )
         self._wanted, self._stopped = command, ""
-        return f"the run begins: {command.experiment}"
+        return f"the run begins: {plan.title}"
 
     @_carry_out.register
     def _(self, command: PutBack) -> str:
         self._free_bench()
+        self._put_back()
+        return "the top floats again"
+
+    def _put_back(self) -> None:
         self._tops += 1
         self.world.take_top()
         self.world.float_top(self._tops)
         self._up_since, self._last_spin, self._text = self.clock.now(), None, ""
-        return "the top floats again"
 
     def _floats(self) -> bool:
         """Return whether the top is up now, as a person at the bench sees; the counter knows it a second later."""
@@ -617,27 +629,27 @@ class PracticeProcess:
 
     # --- runs ---
 
-    def _request(self, command: RecordRun) -> Any:
+    def _request(self, plan: PracticeExperiment, note: str) -> Any:
         options = AcquisitionOptions(
-            mock=True,
-            out=Path(self._options.out),
-            seed=self._options.seed,
-            note=command.note,
-            settings=command.settings,
+            mock=True, out=Path(self._options.out), seed=self._options.seed, note=note, settings=plan.settings
         )
-        return request_at(self._wiring, self.scene, command.experiment, options)
+        scene = read_scene(plan.scene) if plan.scene else self.scene
+        return request_at(self._wiring, scene, plan.experiment, options)
 
     def _record(self, command: RecordRun) -> None:
         """Carry out an experiment; whatever ends it, the bench goes on."""
+        plan = plan_of(command)
         self._seen.clear()
         self._folder = ""  # a run may fail before it has one
         try:
-            run = acquire(self._request(command), LinesToReport(partial(self._report, "message")), self._watching)
+            with self._top_for(plan):
+                request = self._request(plan, command.note)
+                run = acquire(request, LinesToReport(partial(self._report, "message")), self._watching)
         except (LevilabError, InstrumentError) as error:
             text, status, folder = unquote(str(error)), "failed", self._folder
         else:
             text, status, folder = f"{run.status}: {run.count()} readings", run.status, str(run.folder)
-        self._report("recorded", text, self._number, status=status, folder=folder)
+        self._report("recorded", text, self._number, status=status, folder=folder, scene=self.scene.as_table())
         self._up_since = self.clock.now() if self._floats() else None
         self._place_probe(self._probe_m)  # a run may have moved it
         if AFTER_A_RUN < self.clock.speed < math.inf:
@@ -646,13 +658,31 @@ class PracticeProcess:
             self._report("message", text)  # not in the page's head: the speed may be changed
 
     @contextlib.contextmanager
+    def _top_for(self, plan: PracticeExperiment) -> Iterator[None]:
+        """Have the top of an experiment on the bench meanwhile, or none where its probe goes; then the usual one."""
+        if plan.experiment in MOVE_THE_PROBE:
+            self.world.take_top()
+            self._report("message", "the top is taken off: the probe goes where it floats")
+        usual = self.world, self.scene, self._wiring
+        if plan.scene:
+            self.scene = read_scene(plan.scene)
+            self.world = scene_world(self.scene, lambda: self.clock, partial(self._report, "message"))
+            self._wiring = virtual_wiring(self.world, Limits())
+        try:
+            yield
+        finally:
+            self.world, self.scene, self._wiring = usual
+            if (plan.scene or plan.experiment in MOVE_THE_PROBE) and not self._over:
+                self._put_back()
+
+    @contextlib.contextmanager
     def _watching(self, session: Session[Any], wiring: Wiring) -> Iterator[Callable[[], None]]:
         """Yield the function that session and clock call while a run is recorded."""
         self._session, self._folder = session, str(session.writer.folder)
         if self._stopped:
             session.stop.by = self._stopped
         experiment = session.writer.record.experiment
-        self._report("recording", experiment, self._number, folder=self._folder)
+        self._report("recording", experiment, self._number, folder=self._folder, scene=self.scene.as_table())
         try:
             yield self.look
         except ExperimentFailed as failed:

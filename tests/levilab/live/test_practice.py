@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from levilab.live.desk import EXPERIMENTS, Desk
+from levilab.live.desk import Desk
 from levilab.live.practice.bench import PracticeBench
 from levilab.simulator import preset
 from levilab.telemetry.address import Address, write_address
@@ -139,14 +140,23 @@ ANOTHER_TOP = """() => {
 }"""
 
 
+def record_quickly(route: Route) -> None:
+    """Give a run that a page asks for the settings of a test."""
+    wanted = json.loads(route.request.post_data or "{}")
+    more = {"settings": QUICK} if wanted["do"] == "record a run" else {}
+    route.continue_(post_data=json.dumps(wanted | more))
+
+
 def test_a_student_drives_records_and_analyzes(
     served: Hall, older: GrowingRun, page: Page, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(EXPERIMENTS, "spin", QUICK)
+    page.route("**/do", record_quickly)
     page.goto(address(served, token=True))
     until(page, "levilab.data.bench?.last.spin_frequency_hz && levilab.space?.frames && levilab.space.state")
     assert page.evaluate(ANOTHER_TOP) == pytest.approx([0, 0, 0.07], abs=2e-4)
     page.select_option("#speed", "10")
+    page.select_option("#experiment", "hold")
+    assert page.inner_text("#asks").endswith("The amplitude says it. About 3:00 min of the bench, 18 s at 10 ×.")
     page.select_option("#experiment", "spin")
     page.click("#match")
     page.keyboard.press("d")

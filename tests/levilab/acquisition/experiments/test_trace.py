@@ -115,7 +115,7 @@ def test_a_resumed_run_keeps_its_records_and_counts_on(tmp_path):
     assert len(show.readings) == 2
     assert show.messages[0] == "resumed after 2 records, the next record is number 3"
     heads = show.messages[1]
-    assert heads.split() == ["time", "record", "lowest", "highest"]
+    assert heads.split() == ["time", "record", "lowest", "highest", "tape"]
     assert len(heads) == len(show.readings[0])
     whole = acquire(mock_trace(tmp_path, "records = 4\ninterval_s = 2.0", seed=3), Silent())
     # the virtual top is where it would have been: a question or two earlier or later
