@@ -39,3 +39,30 @@ def of_class(
             Heading(title, course, author, date),
         )
     result(f"the class is in {written}")
+
+
+def worksheet(
+    experiments: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[EXPERIMENT]…", help="spin, limit, field or precession; by default all."),
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the files are written.")] = Path("worksheets"),
+    groups: Annotated[int, typer.Option(min=1, max=500, metavar="N", help="How many, each with its seed.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Of the first group; the next ones count up.")] = 1,
+    language: Annotated[str, typer.Option(metavar="CODE", help="en or de.")] = "en",
+    pdf: Annotated[bool, typer.Option("--pdf", help=r"PDF instead of HTML; needs levilab\[pdf].")] = False,
+    keys: Annotated[bool, typer.Option("--key/--no-key", help="Keys for the teacher, beside the worksheets.")] = True,
+) -> None:
+    """Write worksheets and keys."""
+    from levilab.report.worksheets.catalog import read_language
+    from levilab.report.worksheets.write import write_worksheets
+
+    name = read_language(language).words["group"].capitalize()
+    seeds = {f"{name} {k + 1}": seed + k for k in range(groups)}
+    with interruptible("keys that are not finished are not written"):
+        ending = ".pdf" if pdf else ".html"
+        files = write_worksheets(
+            experiments or (), out, seeds, language=language, ending=ending, keys=keys, tell=message
+        )
+    for file in files:
+        result(str(file))

@@ -123,6 +123,13 @@ COMMANDS = {
         distance from that truth is shown, too.""",
         "levilab class runs/ -o class.html, or -o class.pdf, or -o class.xlsx",
     ),
+    "worksheet": Row(
+        "groups.worksheet",
+        """Write worksheets for students and keys for their teacher, in English or German.
+
+        Each group has a seed, and by it a top of its own; the numbers of the key come from the virtual bench.""",
+        "levilab worksheet spin --language de --groups 20",
+    ),
     "open": Row(
         "open.open_files",
         """Open data files: which columns hold what, in which units; correct that, keep it, analyze and report.

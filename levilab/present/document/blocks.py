@@ -277,6 +277,7 @@ class Document:
         contents: whether links to the sections of the first depth stand before the blocks (HTML), or an outline (PDF).
         subject: the name of the file's window or in its metadata; empty for the title.
         byline: a line between title and lead: course, authors, date; empty for none.
+        language: of its texts, for hyphens and screen readers.
         date: when the newest of the data were taken, in the file's properties; None where that is not known.
     """
 
@@ -287,4 +288,5 @@ class Document:
     contents: bool = False
     subject: str = ""
     byline: str = ""
+    language: str = "en"
     date: datetime | None = None

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analysis.comparison import Comparison, compare
+from analysis.spindown.drag import LAWS
 from analysis.uncertainty import Estimate
 from levilab.crosscheck.truth import Truth, truth_of
 from levilab.errors import unquote
@@ -121,7 +122,7 @@ def class_of(analysis: Analysis[Any], found: Any) -> Class:
         Group(source, _model(part, model).get("statistics", {}), part.get("best_model", ""), _warnings(part))
         for source, part in zip(found.sources, parts, strict=True)
     )
-    names = analysis.compared or ([*_model(document, model).get("parameters", {})] if model else _common(parts))
+    names = analysis.compared or (_constants(document, model) if model else _common(parts))
     quantities = (_quantity(name, analysis, model, parts, truths) for name in names)
     return Class(analysis, found, model, groups, tuple(one for one in quantities if one.together))
 
@@ -130,6 +131,12 @@ def _model(part: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     """Return the model of this name, or the first; empty where there are none."""
     models: Sequence[Mapping[str, Any]] = part.get("models") or [{}]
     return next((one for one in models if one.get("name") == name), {} if name else models[0])
+
+
+def _constants(document: Mapping[str, Any], law: str) -> list[str]:
+    """Return the constants of a law, without the start of a run, which no two share."""
+    found = _model(document, law).get("parameters", {})
+    return [name for name in found if law not in LAWS or name in LAWS[law].parameters]
 
 
 def _common(parts: Sequence[Mapping[str, Any]]) -> list[str]:

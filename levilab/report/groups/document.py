@@ -77,7 +77,7 @@ def _values(of: Class, quantity: Quantity) -> Tabular:
     heads = ["group", quantity.head, _FROM_CLASS]
     if of.knows_truth:
         columns += [
-            [*map(_truth, map(quantity.show, quantity.truths), estimates), ""],
+            [*map(truth_text, map(quantity.show, quantity.truths), estimates), ""],
             [*map(_distance, quantity.from_truth), ""],
         ]
         heads += [_TRUTH, _FROM_TRUTH]
@@ -94,7 +94,7 @@ def _values(of: Class, quantity: Quantity) -> Tabular:
     return Tabular(name, table("", heads, rows, numbers=heads[1:]), note, first_column_wraps=True)
 
 
-def _truth(truth: Estimate | None, estimate: Estimate | None) -> str:
+def truth_text(truth: Estimate | None, estimate: Estimate | None) -> str:
     """Return a truth with as many digits as the estimate beside it."""
     if truth is None:
         return "—"

@@ -31,8 +31,8 @@ def page_of(document: Document) -> str:
         element("style", Html(style())),
     ])  # fmt: skip
     scripts = (_island(writer), element("script", Html(script()))) if writer.is_alive else ()
-    page = element("html", element("head", head), "\n",
-                   element("body", element("main", body), *scripts, class_="levilab"), lang="en")  # fmt: skip
+    body = element("body", element("main", body), *scripts, class_="levilab")
+    page = element("html", element("head", head), "\n", body, lang=document.language)
     return f"<!DOCTYPE html>\n{page.markup}\n"
 
 

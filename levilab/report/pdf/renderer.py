@@ -185,6 +185,7 @@ def _content(document: Document, drawing: _Drawing) -> Drawn:
         "heading": _text(document.title),
         "date": None if document.date is None else _date(document.date),
         "byline": _text(document.byline),
+        "language": document.language,
         "lead": _text(document.lead),
         "banner": None if document.banner is None else _banner(document.banner, drawing),
         "mark": _text(document.banner.lead.rstrip(".")) if document.banner else "",

@@ -1,0 +1,1 @@
+"""Worksheets for students and keys for their teacher: the texts are a file for each language."""

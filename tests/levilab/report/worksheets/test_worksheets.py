@@ -1,0 +1,98 @@
+"""Worksheets and keys: each language is complete, the commands work, and students find the numbers of the key."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from levilab.errors import UsageError
+from levilab.files import parse_toml
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.report.groups.beside import class_of
+from levilab.report.worksheets import catalog
+from levilab.report.worksheets.catalog import SHEETS, languages, read_language
+from levilab.report.worksheets.write import measure, write_worksheets
+from support.pages import Page
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+LANGUAGES = languages()
+#: The sweep of a top in full motion takes 8 s.
+BY_TIME = [pytest.param(name, marks=pytest.mark.slow) if name == "precession" else name for name in SHEETS]
+
+
+def table_of(code: str) -> dict[str, Any]:
+    return parse_toml((catalog._TEXTS / f"{code}.toml").read_text(encoding="utf-8"))
+
+
+def shape(value: Any) -> Any:
+    """The keys, the lengths of lists, and the names in braces of a table of texts."""
+    if isinstance(value, dict):
+        return {key: shape(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [shape(one) for one in value]
+    assert value.strip()
+    return sorted(re.findall(r"\{\w+\}", value))
+
+
+def test_english_and_german_are_there() -> None:
+    assert {"de", "en"} <= {*LANGUAGES}
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_a_language_has_every_text(code: str) -> None:
+    assert shape(table_of(code)) == shape(table_of("en"))
+    assert all(len(texts.tasks) == len(texts.answers) for texts in read_language(code).sheets.values())
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_every_text_is_used(code: str, tmp_path: Path) -> None:
+    files = write_worksheets(["field"], tmp_path, {"A": 1}, language=code)
+    page = " ".join(Page(file.read_text(encoding="utf-8")).text for file in files)
+    language = read_language(code)
+    filled = [text.replace("{group}", "A").replace("{seed}", "1") for text in language.words.values()]
+    texts = language.sheets["field"]
+    missing = [text for text in (*filled, texts.title, texts.aim, *texts.tasks, *texts.answers) if text not in page]
+    assert missing == []
+    assert f'lang="{code}"' in files[0].read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("experiment", BY_TIME)
+@pytest.mark.usefixtures("undrawn_figures")
+def test_the_commands_of_a_worksheet_find_the_numbers_of_its_key(experiment: str, tmp_path: Path, levilab: Any) -> None:
+    sheet, seeds = SHEETS[experiment], {"Group 1": 41}
+    (file,) = write_worksheets([experiment], tmp_path, seeds, keys=False)
+    commands = re.findall(r"levilab [^\n<]+", re.search(r"<pre>.*?</pre>", file.read_text("utf-8"), re.DOTALL)[0])  # type: ignore[index]
+    assert len(commands) == len(sheet.commands("", 0))
+    for command in commands:
+        levilab(*shlex.split(command.replace("&quot;", '"'))[1:])
+    analysis = ANALYSES[sheet.analysis]
+    students = class_of(analysis, analysis.recall([tmp_path / "class"], analysis.options_from({})))
+    key = measure(sheet, seeds)
+    assert [one.estimates for one in students.quantities] == [one.estimates for one in key.quantities]
+    assert [one.truths for one in students.quantities] == [one.truths for one in key.quantities]
+    assert all(None not in one.truths for one in key.quantities)
+    assert json.loads(next((tmp_path / "class").glob("2*/run.json")).read_text(encoding="utf-8"))["seed"] == 41
+
+
+def test_a_key_has_the_values_and_truths_of_each_seed_and_the_worksheet_none(tmp_path: Path) -> None:
+    seeds = {"Gruppe 1": 7, "Gruppe 2": 8}
+    sheet, key = write_worksheets(["spin"], tmp_path, seeds, language="de")
+    assert (sheet.name, key.name) == ("spin-de.html", "spin-key-de.html")
+    found = measure(SHEETS["spin"], seeds).quantities[0]
+    page = Page(key.read_text(encoding="utf-8")).text
+    assert all(f"{one.value * 1e4:.3f}"[:4] in page for one in found.estimates if one)
+    assert all(f"{truth * 1e4:.3f}"[:4] in page for truth in found.truths if truth)
+    assert "SYNTHETIC." in page
+    assert "×10⁻⁴" not in Page(sheet.read_text(encoding="utf-8")).text
+
+
+@pytest.mark.parametrize(("experiment", "language"), [("spni", "en"), ("spin", "xx")])
+def test_what_is_unknown_is_refused_with_what_there_is(experiment: str, language: str, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"precession|de, en"):
+        write_worksheets([experiment], tmp_path, {"A": 1}, language=language)
