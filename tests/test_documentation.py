@@ -49,21 +49,28 @@ def test_python_in_the_pages_prints_what_it_says(page: str, code: str, tmp_path:
 def steps() -> dict[str, dict[str, list[str]]]:
     """Page → command → what the page shows of its output; in order, each command once.
 
-    Blocks of ``sh`` are commands alone.  In a block of ``console`` a command stands after ``$``, above its output.
+    In a block of ``console`` a command stands after ``$``, above its output.  What is of the reader's own table, and
+    shows nothing, is not carried out; nor is a block of ``shell-session``.
     """
     found: dict[str, dict[str, list[str]]] = {}
     for page in PAGES:
-        text, steps = page.read_text(encoding="utf-8"), list[tuple[str, str]]()
-        for language, block in re.findall(r"```(sh|console)\n(.*?)```", text, re.DOTALL):
-            if language == "sh":
-                lines = [line.split("  #")[0].strip() for line in block.splitlines()]
-                steps += [(line, "") for line in lines if line.startswith("levilab ") and ".csv" not in line]
-            else:
-                steps += re.findall(r"^\$ (levilab .*)\n((?:(?!\$ ).*\n)*)", block, re.MULTILINE)
-        for line, shown in steps:
-            outputs = found.setdefault(page.relative_to(ROOT).as_posix(), {}).setdefault(line, [])
-            outputs += [shown] if shown else []
+        text = page.read_text(encoding="utf-8")
+        for block in re.findall(r"```console\n(.*?)```", text, re.DOTALL):
+            for line, shown in re.findall(r"^\$ (levilab .*)\n((?:(?!\$ ).*\n)*)", block, re.MULTILINE):
+                words = line.split("  #")[0].strip()
+                if shown or ".csv" not in words:
+                    outputs = found.setdefault(page.relative_to(ROOT).as_posix(), {}).setdefault(words, [])
+                    outputs += [shown] if shown else []
     return found
+
+
+def test_each_command_stands_after_a_dollar() -> None:
+    """So that a reader tells what is typed from what is printed; tables of settings and programs have other blocks."""
+    for page in (*PAGES, ROOT / "CONTRIBUTING.md"):
+        text = page.read_text(encoding="utf-8")
+        assert not re.findall(r"```(sh|bash|shell|text)\n(levilab|pip|make|python|uv) ", text), page
+        for block in re.findall(r"```(?:console|shell-session)\n(.*?)```", text, re.DOTALL):
+            assert block.startswith("$ "), (page, block)
 
 
 def as_pattern(shown: str) -> str:
@@ -152,8 +159,8 @@ def test_what_a_shell_would_change_is_seen(line: str, special: bool) -> None:
 
 def test_make_demo_and_make_test_stand_at_the_top_of_the_readme_and_in_the_makefile() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    first = blocks("sh")[0][1]
-    assert [line.split("#")[0].strip() for line in first.splitlines()] == ["make demo", "make test"]
+    first = blocks("console")[0][1]
+    assert [line.split("#")[0].strip("$ ") for line in first.splitlines()] == ["make demo", "make test"]
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     assert re.search(r"^demo:", makefile, re.MULTILINE)
     assert re.search(r"^test:", makefile, re.MULTILINE)
