@@ -11,6 +11,8 @@ from levilab.animation.parts import parts_of
 from levilab.errors import LevilabError
 from levilab.live.practice.commands import command_of
 from levilab.live.practice.experiments import PRACTICE
+from levilab.live.practice.tasks import TASKS
+from levilab.live.practice.what_if import WHAT_IF
 from levilab.runs.run import read_record, utc_now
 from levilab.simulator.scene import read_scene, scene_of
 
@@ -54,7 +56,16 @@ class Desk:
             {"name": name, "title": row.title, "asks": row.asks, "length_s": row.length_s}
             for name, row in PRACTICE.items()
         ]
-        return {"experiments": rows, "runs": [folder.name for folder in self.folders]}
+        what_if = {
+            name: {key: value for key, value in vars(row).items() if key != "keys"} for name, row in WHAT_IF.items()
+        }
+        tasks = [
+            {"name": name, "title": row.title, "does": row.does, "answers": dict(row.answers)}
+            for name, row in TASKS.items()
+        ]
+        return {"experiments": rows, "what_if": what_if, "tasks": tasks} | {
+            "runs": [folder.name for folder in self.folders]
+        }
 
     @property
     def folder(self) -> Path | None:

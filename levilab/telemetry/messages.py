@@ -103,6 +103,9 @@ class State:
         probe_m: height of the magnetometer's probe above the base; None: in its chamber, or not known [m].
         busy: on a bench for practice, whether a run is being recorded.
         took_hold, tuned_up: there, whether a top was seen to follow the drive yet, and to follow it up.
+        what_if: there, name → value of what a person can change of the top and its surroundings.
+        task, task_share: there, the task under way, and the part of the way to its goal.
+        tasks_done: there, the tasks whose goals were reached.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = _READ
@@ -128,6 +131,10 @@ class State:
     busy: bool = False
     took_hold: bool = False
     tuned_up: bool = False
+    what_if: dict[str, float] = field(default_factory=dict)
+    task: str = ""
+    task_share: float = 0.0
+    tasks_done: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

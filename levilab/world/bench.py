@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from instruments.virtual.counter.edges import Thresholds
     from levilab.bench.person import Task
     from levilab.simulator.scene import Scene
+    from levilab.world.motion_world import MotionWorld
     from levilab.world.spin_world import Array, World
 
 
@@ -266,7 +267,7 @@ def scene_world(
     *,
     put_back_after_s: float | None = None,
     seed: int = 0,
-) -> World:
+) -> MotionWorld:
     """Return a world with the top of a scene in full motion.
 
     Args:

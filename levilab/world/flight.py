@@ -132,7 +132,8 @@ class Flight:
         self._pieces: Timeline[_Flying | _Absent] = Timeline(-math.inf, _Absent(-math.inf))
         self._step: float | None = None
         # what comes next: a top in this state, or none until a new one is put there; and when [s]
-        self._state: Array | None = self._start_state(start)
+        self._state: Array | None = (first := self._start_state(start))
+        self._first_height = float(first[R][2])
         self._known_until = self._starts = start
         self._slip = 0.0  # of the washers then [turns]
         self._memory: Array | None = None  # of bursts that the top triggers, then
@@ -156,6 +157,15 @@ class Flight:
             time: [s].
             drive: keys of the scene's table `drive`, and their values.
         """
+        self.change_scene(time, {f"drive.{key}": value for key, value in drive.items()})
+
+    def change_scene(self, time: float, values: Mapping[str, Any]) -> None:
+        """Change the drive, the top or its surroundings from a time on, as `change` does.
+
+        Args:
+            time: [s].
+            values: dotted keys of the scene, and their values.
+        """
         self.simulate_until(time)
         self._step = None  # another drive may need another step
         now = self._pieces.at(time)
@@ -167,15 +177,17 @@ class Flight:
         else:
             self._pieces.cut(math.nextafter(time, math.inf))
             self._wait(now.start)
-        changed = self._scene.changed({f"drive.{key}": value for key, value in drive.items()})
-        self._scene = self._scene.model_copy(update={"drive": changed.drive})  # the pieces share all else
+        changed = self._scene.changed(values)
+        tables = {key.partition(".")[0] for key in values}
+        alone = self._scene.model_copy(update={table: getattr(changed, table) for table in tables})
+        self._scene = with_attitude(alone)  # the pieces share all that does not change
 
     def put_back(self, time: float) -> None:
         """Start the top again at this time, as the scene says, if it has fallen."""
         self.simulate_until(time)
         if isinstance(self._pieces.at(time), _Absent):
             self._pieces.cut(math.nextafter(time, math.inf))
-            self._state, self._step, self._known_until = self._start_state(time), None, time
+            self._state, self._step, self._known_until = self._put_by_hand(time), None, time
 
     def take_away(self, time: float) -> None:
         """Let no top be up from this time on, as after a fall."""
@@ -313,6 +325,18 @@ class Flight:
         state[TIME] = time
         self._slip, self._memory = 0.0, None
         return state
+
+    def _put_by_hand(self, time: float) -> Array:
+        """Return the state of a top that starts now; one that cannot float is let go where the first one was."""
+        try:
+            return self._start_state(time)
+        except SceneError:
+            scene = self._scene
+            self._scene = scene.changed({"start.place": "given", "start.position_m": (0.0, 0.0, self._first_height)})
+            try:
+                return self._start_state(time)
+            finally:
+                self._scene = scene
 
     def _advance(self, state: Array) -> None:
         begin = float(state[TIME])

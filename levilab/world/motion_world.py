@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ from levilab.world.pose import poses_of
 from levilab.world.spin_world import KEPT_S
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from instruments.clock import Clock
     from instruments.virtual.counter.edges import Thresholds
     from instruments.virtual.generator.channel import Output
@@ -97,7 +99,6 @@ class MotionWorld:
         self._tape_place = float(np.random.default_rng(seed).uniform()) if seed else 0.0
         self._last_change = 0.0  # the time of the last change of the drive [s]
         self._lens_height_m = self._flight.first_lift()  # where the lens looks
-        self._base = base_field(scene)
         self.place_probe(PROBE_M)
 
     def drive(self, time: float, output: Output) -> None:
@@ -109,6 +110,19 @@ class MotionWorld:
         if drive["waveform"] != "off" or self._flight.driven or time < self._last_change:
             self._flight.change(time, drive)
             self._last_change = time
+
+    def change_scene(self, values: Mapping[str, Any]) -> None:
+        """Change the top or its surroundings now.
+
+        Args:
+            values: dotted keys of the scene, and their values; not of its drive.
+
+        Raises:
+            SceneError: a value is not allowed.
+        """
+        self._scene = self._scene.changed(values)
+        self._flight.change_scene(self.clock.now(), values)
+        self.place_probe(self._probe_m)
 
     def float_top(self, number: int) -> None:
         """Put the top back to where the scene starts; see World."""
@@ -227,5 +241,6 @@ class MotionWorld:
 
     def place_probe(self, height_m: float | None) -> None:
         """Put the probe at a height, exactly; see World."""
+        self._probe_m = height_m
         place = np.array([[0.0, 0.0, height_m or 0.0]])
-        self._probe_t = 0.0 if height_m is None else float(flux_density(self._base, place)[0, 2])
+        self._probe_t = 0.0 if height_m is None else float(flux_density(base_field(self._scene), place)[0, 2])

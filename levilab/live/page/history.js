@@ -116,10 +116,10 @@ export function drawHistory(paper, {rows, marks}) {
   c.setLineDash([3, 3]);
   line(c, marks.map(([time]) => [toX(time), TOP, toX(time), bottom]));
   c.setLineDash([]);
-  for (const [time, text] of marks) {
+  for (const [k, [time, text]] of marks.entries()) {
     const right = toX(time) > width / 2;
     c.textAlign = right ? "right" : "left";
-    c.fillText(text, toX(time) + (right ? -5 : 5), TOP + 10);
+    c.fillText(text, toX(time) + (right ? -5 : 5), TOP + 10 + 14 * (k % 2));
   }
   c.restore();
 

@@ -1,7 +1,7 @@
 // The bench for practice: controls that send commands, and the guide that shows how far one is.
 
 import {showResult} from "./result.js";
-import {by, lapse, numberIn, option, write} from "./words.js";
+import {by, fixed, lapse, make, numberIn, option, write} from "./words.js";
 
 /** Least time between two messages of a slider [ms]. */
 const SENDS_EVERY_MS = 120;
@@ -95,6 +95,71 @@ export function openPractice(about, command, run, isOwn, allowed) {
   }
   by("speed").addEventListener("change", () => send("set the speed", {speed: Number(by("speed").value)}));
 
+  // what if
+  const knobs = Object.entries(about.what_if).map(([name, row]) => {
+    const label = make("label", "", "quantity"), value = make("output"), input = make("input"), small = make("small", row.shows);
+    Object.assign(input, {type: "range", min: row.low, max: row.high, step: row.step, value: row.usual});
+    input.setAttribute("aria-label", `${row.title}, ${row.unit || "as a part of the moment"}`);
+    label.append(make("span", row.title), value, input, small);
+    by("quantities").append(label);
+    const decimals = row.step < 0.01 ? 3 : row.step < 0.1 ? 2 : 1;
+    let wait = 0;
+    input.addEventListener("input", () => {
+      say(Number(input.value));
+      wait ||= setTimeout(() => {
+        wait = 0;
+        send("change the bench", {values: {[name]: Number(input.value)}});
+      }, SENDS_EVERY_MS);
+    });
+    function say(there) {
+      value.textContent = `${fixed(there, decimals)} ${row.unit}`;
+      input.setAttribute("aria-valuetext", value.textContent);
+      label.classList.toggle("changed", there !== row.usual);
+    }
+    return {
+      show(there) {
+        if (wait || document.activeElement === input && Math.abs(input.value - there) < row.step) return;
+        input.value = there;
+        say(there);
+      },
+    };
+  });
+  const names = Object.keys(about.what_if);
+  by("usual").addEventListener("click", () => send("change the bench"));
+
+  // tasks
+  const tasks = Object.fromEntries(about.tasks.map((row) => {
+    const item = make("li"), button = make("button", row.title);
+    button.addEventListener("click", () => send("begin a task", {task: row.name}));
+    item.append(button);
+    by("task-list").append(item);
+    return [row.name, {...row, item}];
+  }));
+  by("leave-task").addEventListener("click", () => send("begin a task"));
+  let shownTask = "";
+  function showTask(bench) {
+    const row = tasks[bench.task];
+    by("task").hidden = !row;
+    by("guide").hidden = Boolean(row);
+    by("task").inert = !allowed;
+    by("task-share").value = bench.task_share;
+    write("tasks-done", bench.tasks_done.length ? `${bench.tasks_done.length} of ${about.tasks.length} done` : "");
+    for (const [name, {item}] of Object.entries(tasks)) item.className = bench.tasks_done.includes(name) ? "done" : "";
+    if (bench.task === shownTask) return;
+    shownTask = bench.task;
+    if (!row) return;
+    write("task-title", row.title);
+    write("task-does", row.does);
+    const answers = Object.entries(row.answers);
+    by("task-share").hidden = answers.length > 0;
+    by("answers").replaceChildren(...answers.map(([text, value]) => {
+      const button = make("button", text);
+      button.addEventListener("click", () => send("answer", {value}));
+      return button;
+    }));
+    by("task").scrollIntoView({block: "nearest"});
+  }
+
   /** Say what the chosen experiment finds out, and how long it takes at the present speed of the bench. */
   function sayWhatItAsks() {
     const {asks, length_s} = about.experiments.find(({name}) => name === by("experiment").value);
@@ -143,6 +208,9 @@ export function openPractice(about, command, run, isOwn, allowed) {
     for (const id of ["drive", "match", "back", "frequency", "frequency-slider", "amplitude", "amplitude-slider", "experiment"]) {
       by(id).disabled = now.busy;
     }
+    names.forEach((name, k) => knobs[k].show(bench.what_if[name]));
+    showTask(bench);
+    for (const part of ["what-if", "tasks"]) by(part).inert = now.busy;
     by("analyze").disabled = now.busy || !readings || about_run?.status === "running";
     if (drive && !timer && document.activeElement !== by("frequency") && document.activeElement !== by("frequency-slider")) {
       follow("frequency", drive.frequency_hz, 2);

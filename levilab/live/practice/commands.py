@@ -62,6 +62,27 @@ class PutBack(Settings):
     do: Literal["put the top back"] = "put the top back"
 
 
+class ChangeBench(Settings):
+    """Change the top or its surroundings, with immediate effect.  values: names in WHAT_IF; none: all as usual."""
+
+    do: Literal["change the bench"] = "change the bench"
+    values: dict[str, Annotated[float, Field(strict=True, allow_inf_nan=False)]] = Field(default={}, max_length=20)
+
+
+class BeginTask(Settings):
+    """Begin a task.  task: its name in TASKS; empty: leave the one under way."""
+
+    do: Literal["begin a task"] = "begin a task"
+    task: str = ""
+
+
+class AnswerTask(Settings):
+    """Answer the task under way."""
+
+    do: Literal["answer"] = "answer"
+    value: Annotated[float, Field(strict=True, allow_inf_nan=False)]
+
+
 class SetSpeed(Settings):
     """Change how fast the bench's time passes.  speed: seconds of the bench in one of the wall."""
 
@@ -104,7 +125,10 @@ class StopRun(Settings):
     do: Literal["stop the run"] = "stop the run"
 
 
-Command = SwitchDrive | TuneDrive | MatchDrive | PutBack | SetSpeed | Pause | PlaceProbe | RecordRun | StopRun
+Command = (
+    SwitchDrive | TuneDrive | MatchDrive | PutBack | ChangeBench | BeginTask | AnswerTask
+    | SetSpeed | Pause | PlaceProbe | RecordRun | StopRun
+)  # fmt: skip
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="do")])
 
 

@@ -23,7 +23,19 @@ def _stability(table: str) -> Stability:
     return stability_of(Scene.model_validate_json(table))
 
 
-def cause_of_fall(scene: Scene, spin_hz: float | None, after_s: float, *, driven: bool) -> str:
+def _why_not(found: Stability, *, hides: bool) -> str:
+    """Return why no top like this floats; where the mass is to be found, without the masses that do."""
+    mass, window = found.scene.top.mass_kg, found.lifted[-1] if found.lifted else None
+    if window is None or window.light <= mass <= window.heavy:
+        return f"it cannot float here ({advice(found)})"
+    too = "too heavy" if mass > window.heavy else "too light"
+    masses = "" if hides else f": {1e3 * mass:.2f} g, and {1e3 * window.light:.2f} to {1e3 * window.heavy:.2f} g float"
+    return f"the top is {too} for this base{masses}"
+
+
+def cause_of_fall(
+    scene: Scene, spin_hz: float | None, after_s: float, *, driven: bool = False, hides: bool = False
+) -> str:
     """Return why a top fell.
 
     Args:
@@ -31,13 +43,14 @@ def cause_of_fall(scene: Scene, spin_hz: float | None, after_s: float, *, driven
         spin_hz: that was counted last [Hz]; None: none was.
         after_s: time since it was put there [s].
         driven: whether a drive held it.
+        hides: whether the masses that float are to be found.
     """
     after = f"after {after_s:.0f} s"
     if scene.base.tilt_rad:
         scene = scene.changed({"base.tilt_rad": 0.0})  # the theory is of an upright base
     found = _stability(scene.model_dump_json())
     if found.floating is None or not found.floating.spins:
-        return f"it could not float here, however it spins ({advice(found)}): it fell {after}"
+        return f"{_why_not(found, hides=hides)}, however it spins: it fell {after}"
     low, high = found.floating.spins[0]
     if spin_hz is None:
         return f"it fell {after}, before its spin was counted"

@@ -28,6 +28,9 @@ from levilab.bench.config import Limits
 from levilab.errors import LevilabError, unquote
 from levilab.interruption import watching_for_end
 from levilab.live.practice.commands import (
+    AnswerTask,
+    BeginTask,
+    ChangeBench,
     CommandRefused,
     MatchDrive,
     Pause,
@@ -42,7 +45,10 @@ from levilab.live.practice.commands import (
 )
 from levilab.live.practice.experiments import PRACTICE, PracticeExperiment
 from levilab.live.practice.fall import cause_of_fall
+from levilab.live.practice.tasks import TASKS, Look, Progress, exponent_of
+from levilab.live.practice.what_if import USUAL, WHAT_IF, keys_of
 from levilab.present.progress import Display
+from levilab.simulator.compilation import announce_compilation
 from levilab.simulator.scene import read_scene
 from levilab.telemetry.messages import State
 from levilab.telemetry.publisher import Publisher
@@ -58,7 +64,7 @@ if TYPE_CHECKING:
     from levilab.interruption import End
     from levilab.live.practice.commands import Command, EventKind
     from levilab.simulator.scene import Scene
-    from levilab.world.spin_world import World
+    from levilab.world.motion_world import MotionWorld
 
 #: Between runs the counter counts for so long [s], as the light of the tape passes this level [V].
 GATE_S, TRIGGER_V = 0.5, 0.6
@@ -164,6 +170,14 @@ def plan_of(command: RecordRun) -> PracticeExperiment:
     return PracticeExperiment(command.experiment, "", command.experiment, command.settings, 0.0)
 
 
+def _changeable(scene: Scene) -> dict[str, Any]:
+    """Return the keys of a scene that a person or a task can change, with their values."""
+    table = scene.as_table()
+    keys = {"temperature_rise_k": table["temperature_rise_k"], "base.tilt_rad": table["base"]["tilt_rad"]}
+    keys |= {f"top.{key}": table["top"][key] for key in ("mass_kg", "moment_tilt")}
+    return keys | {f"drag.{key}": table["drag"][key] for key in ("law", "coefficient")}
+
+
 def _in_words(spin: float | None) -> str:
     return "no light pulses" if spin is None else f"{spin:.2f} Hz"
 
@@ -219,7 +233,7 @@ class PracticeProcess:
         self,
         options: PracticeOptions,
         scene: Scene,
-        world: World,
+        world: MotionWorld,
         pipe: Connection,
         *,
         publisher: Publisher,
@@ -227,7 +241,12 @@ class PracticeProcess:
     ) -> None:
         assert isinstance(world.clock, PacedClock)
         self.world, self.clock = world, world.clock
-        self.scene = scene
+        self.scene = self._usual_scene = scene  # as it is now, and as it was at first or by a task
+        self._what_if = dict(USUAL)
+        self._task: Progress | None = None
+        self._task_share = 0.0
+        self._tasks_done: list[str] = []
+        self._chance = np.random.default_rng(options.seed)
         self._options, self._pipe, self._publisher, self._end = options, pipe, publisher, end
         self._report = partial(_report, pipe)
         self._wiring: Wiring = virtual_wiring(world, Limits())
@@ -296,6 +315,7 @@ class PracticeProcess:
         self._saw("spin_frequency_hz", spin)
         self._last_spin = self._last_spin if spin is None else spin  # of one that leans the counter sees no light
         self._look_at_top()
+        self._look_at_task()
         self._go_on_with_hold(bench, spin)
         if self._hold is not None and self._hold.grip is not None and self._hold.is_under_way:
             return  # the drive yields to the top: no other instrument keeps it waiting
@@ -311,7 +331,39 @@ class PracticeProcess:
             driven = self._hold is not None and not self._hold.is_lost
             if self._hold is not None:
                 self._hold.is_lost = True
-            self._say(cause_of_fall(self.scene, self._last_spin, after, driven=driven))
+            hides = self._task is not None
+            self._say(cause_of_fall(self.scene, self._last_spin, after, driven=driven, hides=hides))
+
+    def _look_at_task(self, answer: float | None = None) -> None:
+        """See whether the goal of the task under way is reached."""
+        if self._task is None or self._bench is None:
+            return
+        spin, drive = self._seen.get("spin_frequency_hz"), self._frequency(self._bench) if self._knobs.on else None
+        follows = self._hold is not None and self._hold.at_hz is not None and not self._hold.is_lost
+        look = Look(self.clock.now(), self._floats(), spin, drive, follows, answer)
+        self._task_share = self._task.share(look)
+        if self._task_share >= 1:
+            task = TASKS[self._task.name]
+            self._tasks_done += [self._task.name] * (self._task.name not in self._tasks_done)
+            self._say(f"reached: {task.title}. It shows: {task.teaches}", "")
+            self._leave_task()
+
+    def _leave_task(self) -> None:
+        """End the task under way; what it hid is taken away again."""
+        if self._task is None:
+            return
+        hid = TASKS[self._task.name].hidden(self._task.chance)
+        self._task, self._task_share = None, 0.0
+        if hid:
+            self._usual_scene = read_scene(self._options.scene)
+            self._change(dict(USUAL))
+
+    def _change(self, values: dict[str, float]) -> None:
+        """Give the top and its surroundings these values.  Raises CommandRefused, SceneError."""
+        keys = keys_of(self._usual_scene, values)
+        with announce_compilation(partial(self._report, "message")):
+            self.world.change_scene({**_changeable(self._usual_scene), **keys})
+        self.scene, self._what_if = self._usual_scene.changed(keys), values
 
     def _saw(self, channel: str, value: float | None) -> None:
         if value is None:
@@ -378,7 +430,9 @@ class PracticeProcess:
         """Return the state for the views."""
         speed = self.clock.speed if math.isfinite(self.clock.speed) else None
         here: dict[str, Any] = {"virtual": True, "speed": speed, "paused": self._paused, "probe_m": self._probe_m}
-        here |= {"took_hold": self._took_hold, "tuned_up": self._tuned_up}
+        here |= {"took_hold": self._took_hold, "tuned_up": self._tuned_up, "what_if": dict(self._what_if)}
+        here |= {"task_share": self._task_share, "tasks_done": tuple(self._tasks_done)}
+        here["task"] = self._task.name if self._task else ""
         if self._session is not None:
             if self._session.writer.record.experiment in MOVE_THE_PROBE:
                 here["probe_m"] = None
@@ -435,6 +489,42 @@ class PracticeProcess:
         self._free_bench()
         self._put_back()
         return "the top floats again"
+
+    @_carry_out.register
+    def _(self, command: ChangeBench) -> str:
+        self._free_bench()
+        self._change(self._what_if | command.values if command.values else dict(USUAL))
+        changed = {name: value for name, value in self._what_if.items() if value != USUAL[name]}
+        return (
+            ", ".join(f"{WHAT_IF[name].title} {value:g} {WHAT_IF[name].unit}" for name, value in changed.items())
+            or "all as usual"
+        )
+
+    @_carry_out.register
+    def _(self, command: BeginTask) -> str:
+        self._free_bench()
+        if command.task and command.task not in TASKS:
+            raise CommandRefused(f"task = {command.task}: one of {', '.join(TASKS)} is expected")
+        self._leave_task()
+        if not command.task:
+            return "the task is left"
+        self._task = Progress(command.task, float(self._chance.uniform()))
+        if hides := TASKS[command.task].hidden(self._task.chance):
+            self._usual_scene = self._usual_scene.changed(hides)
+            self._change(dict(USUAL))
+        if hides or not self._floats():
+            self._put_back()
+        return f"the task: {TASKS[command.task].does}"
+
+    @_carry_out.register
+    def _(self, command: AnswerTask) -> str:
+        if self._task is None or not TASKS[self._task.name].answers:
+            raise CommandRefused("no task asks for an answer: begin one that does")
+        truth = exponent_of(self._task.chance)
+        if command.value != truth:
+            raise CommandRefused(f"n = {command.value:g} is not it: put the top back, and watch it once more")
+        self._look_at_task(command.value)
+        return f"n = {truth:g} is right"
 
     def _put_back(self) -> None:
         self._tops += 1

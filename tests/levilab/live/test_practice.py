@@ -10,6 +10,7 @@ import pytest
 
 from levilab.live.desk import Desk
 from levilab.live.practice.bench import PracticeBench
+from levilab.live.practice.what_if import WHAT_IF
 from levilab.simulator import preset
 from levilab.telemetry.address import Address, write_address
 from levilab.telemetry.messages import Poses, State
@@ -127,6 +128,21 @@ def type_into_the_fields(page: Page) -> None:
     page.keyboard.press("Tab")
 
 
+def change_what_if(page: Page) -> None:
+    """A slider has its effect at once; the task under way stands in the place of the guide."""
+    slider = "document.querySelector('#quantities input')"
+    assert page.locator("#quantities input").count() == len(WHAT_IF)
+    page.evaluate(f"{slider}.value = 0.02, {slider}.dispatchEvent(new Event('input'))")
+    until(page, "levilab.data.bench.what_if.washers_g === 0.02")
+    page.evaluate("document.getElementById('usual').click()")
+    until(page, f"levilab.data.bench.what_if.washers_g === 0 && {slider}.value === '0'")
+    page.click("#tasks summary")
+    page.get_by_role("button", name="Hold it for three minutes").click()
+    until(page, "document.getElementById('guide').hidden && document.getElementById('task-share').value > 0")
+    page.click("#leave-task")
+    until(page, "!document.getElementById('guide').hidden && document.getElementById('task').hidden")
+
+
 #: Another top is drawn while the motion stands still and its poses, a tenth of a millimetre apart, have begun anew.
 ANOTHER_TOP = """() => {
   const space = levilab.space, parts = space.parts, upright = [0, 0, 0, 1, 0, 0, 0, 1];
@@ -170,6 +186,7 @@ def test_a_student_drives_records_and_analyzes(
     page.keyboard.press(".")  # from a spin that was counted, which lies between the steps of the field
     until(page, "Math.abs(levilab.data.bench.drive.frequency_hz - levilab.data.before - 0.05) < 0.006")
     type_into_the_fields(page)
+    change_what_if(page)
     assert page.evaluate("[levilab.seen.run, document.getElementById('run').value, levilab.data.count]") == ["", ".", 0]
     can_be_analyzed = "!document.getElementById('analyze').disabled"
     page.select_option("#run", OLDER)  # of another bench, and it is there like one of this

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
 import pytest
 
 from instruments.clock import PacedClock
 from levilab.interruption import End
 from levilab.live.practice.commands import (
+    AnswerTask,
+    BeginTask,
+    ChangeBench,
     Command,
     MatchDrive,
     PlaceProbe,
@@ -26,6 +30,7 @@ from levilab.live.practice.commands import (
 from levilab.live.practice.experiments import PRACTICE
 from levilab.live.practice.fall import cause_of_fall
 from levilab.live.practice.process import PracticeOptions, PracticeProcess
+from levilab.live.practice.tasks import TASKS, Look, Progress, exponent_of
 from levilab.runs.run import Run
 from levilab.simulator.scene import read_scene
 from levilab.telemetry.publisher import Publisher
@@ -278,13 +283,93 @@ def test_a_held_top_that_falls_for_want_of_spin_is_not_said_to_be_lost_by_the_dr
         ({}, 82.0, "near 83.7 Hz the top is too stiff for its axis to follow the field"),
         ({}, 40.0, "the spin could hold it, from 20.9 to 83.7 Hz, so it swung too far: it fell at 40.0 Hz after 7 s"),
         ({"base.tilt_rad": 0.02}, 22.0, "below 20.9 Hz the spin cannot hold the top"),
-        ({"top.mass_kg": 0.0252}, 30.0, "it could not float here, however it spins (a top of 25.2 g does not float"),
+        (
+            {"top.mass_kg": 0.0252},
+            30.0,
+            "the top is too heavy for this base: 25.20 g, and 24.25 to 24.97 g float, howev",
+        ),
+        (
+            {"top.mass_kg": 0.0242},
+            30.0,
+            "the top is too light for this base: 24.20 g, and 24.25 to 24.97 g float, howev",
+        ),
         ({}, None, "it fell after 7 s, before its spin was counted"),
     ],
 )
 def test_a_fall_is_told_with_its_cause(changes: dict[str, float], spin: float | None, said: str) -> None:
     scene = read_scene("practice").changed(changes)
     assert cause_of_fall(scene, spin, 7.0, driven=False).startswith(said)
+
+
+def test_what_a_person_changes_has_immediate_effect(tmp_path: Path) -> None:
+    script = carry_out(
+        tmp_path,
+        (2.0, ChangeBench(values={"pressure": 0.0})),
+        (10.0, ChangeBench(values={"base_tilt_deg": 9.0})),
+        (10.0, ChangeBench(values={"mood": 1.0})),
+        (12.0, ChangeBench(values={"washers_g": 0.8})),
+        (18.0, ChangeBench()),
+        (18.1, PutBack()),
+        (25.0, RecordRun(experiment="field")),
+        (26.0, StopRun()),
+        (26.0, None),
+        script=Patient,
+    )
+    spins = [spin for _, _, spin in script.spins(4.0, 12.0)]
+    assert np.ptp(spins) < 0.1  # counts of a wobbling top; in air it would lose 0.9 Hz
+    assert [text.partition(":")[0] for text in script.said("refused")] == ["tilt of the base", "mood"]
+    assert script.states[-1].what_if["washers_g"] == 0.0
+    (heavy,) = [text for text in script.said("message") if text.startswith("the top is too heavy")]
+    assert "25.10 g" in heavy  # of 24.3 g
+    assert script.spins(20.0, 25.0)[-1][2] == pytest.approx(29.4, abs=0.3)  # it floats again, in air
+    assert script.process
+    assert script.process.scene.changed({}).as_table() == read_scene("practice").as_table()
+
+
+def test_the_mass_that_floats_is_found(tmp_path: Path) -> None:
+    less = ChangeBench(values={"washers_g": -0.2})
+    script = carry_out(tmp_path, (1.0, BeginTask(task="mass")), (8.0, less), (8.1, PutBack()), (40.0, None))
+    said = script.said("message")
+    assert said[0].startswith("the top is too heavy for this base, however it spins: it fell after")  # and no mass
+    assert said[1].startswith("reached: Find the mass that floats. It shows: ")
+    reached = next(state for state in script.states if state.tasks_done)
+    assert 28.0 < reached.time_s < 31.0  # 20 s after it floats
+    assert (reached.task, reached.tasks_done) == ("", ("mass",))
+    assert 0 < max(state.task_share for state in script.states if state.task) < 1
+
+
+def test_the_exponent_is_guessed(tmp_path: Path) -> None:
+    answers = [(2.0 + n, AnswerTask(value=n)) for n in (1.0, 1.5, 2.0)]
+    script = carry_out(tmp_path, (0.5, AnswerTask(value=1.0)), (1.0, BeginTask(task="guess")), *answers, (6.0, None))
+    right = [text for text in script.said("done") if text.endswith("is right")]
+    wrong = [text for text in script.said("refused") if "is not it" in text]
+    # after the right one no task is under way
+    assert len(right) == 1
+    assert len(wrong) + len([text for text in script.said("refused") if text.startswith("no task asks")]) == 3
+    assert script.states[-1].tasks_done == ("guess",)
+    assert script.process
+    assert script.process.scene.drag.law == "disc"  # as usual again
+
+
+@pytest.mark.parametrize(("chance", "n"), [(0.0, 1.0), (0.5, 1.5), (0.99, 2.0)])
+def test_each_hidden_drag_slows_the_top_as_the_usual_one_at_first(chance: float, n: float) -> None:
+    assert exponent_of(chance) == n
+    drag = TASKS["guess"].hidden(chance)
+    rate = drag["drag.coefficient"] * (2 * math.pi * 30.0) ** n
+    assert rate == pytest.approx(0.70, rel=0.02)
+
+
+def test_a_goal_has_to_be_there_without_a_break() -> None:
+    held = Look(0.0, floats=True, spin_hz=30.0, drive_hz=30.1, follows=True)
+    hold = Progress("hold", 0.0)
+    shares = [
+        hold.share(replace(held, time_s=time, follows=time != 90.0)) for time in (0.0, 89.0, 90.0, 91.0, 181.0, 271.0)
+    ]
+    assert shares == pytest.approx([0.0, 89 / 180, 0.0, 0.0, 0.5, 1.0])
+    fast = replace(held, spin_hz=57.1, drive_hz=57.2)
+    assert [Progress("fast", 0.0).share(look) for look in (held, fast, replace(fast, floats=False))] == [0.0, 1.0, 0.0]
+    free = replace(held, drive_hz=None)
+    assert [Progress("catch", 0.0).share(look) for look in (free, held)] == [0.0, 1.0]
 
 
 def test_what_the_bench_cannot_do_is_refused_with_what_to_do(session: Script) -> None:

@@ -1,0 +1,135 @@
+"""Tasks with a goal that the bench recognizes: a row a task."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+#: A held top swings about its drive by less than this [Hz].
+_HELD_HZ = 0.5
+
+
+@dataclass(frozen=True)
+class Look:
+    """What the bench sees at a moment.
+
+    Attributes:
+        time_s: bench time [s].
+        floats: whether the top is up.
+        spin_hz: that was counted last [Hz]; None: no light pulses.
+        drive_hz: None while the output is off [Hz].
+        follows: whether the drive holds the top.
+        answer: that a person gave.
+    """
+
+    time_s: float
+    floats: bool
+    spin_hz: float | None
+    drive_hz: float | None
+    follows: bool
+    answer: float | None = None
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the top is up, and counted near a drive that holds it."""
+        near = None not in (self.spin_hz, self.drive_hz) and abs(self.spin_hz - self.drive_hz) < _HELD_HZ  # type: ignore[operator]
+        return self.floats and self.follows and near
+
+
+@dataclass(frozen=True)
+class Task:
+    """A row.
+
+    Attributes:
+        title, does: the goal, and what to do.
+        teaches: said once it is reached.
+        holds: whether the goal is there at a moment.
+        for_s: how long it has to be there without a break [s].
+        hidden: what the bench changes, and does not say: keys of a scene by a random number from 0 to 1.
+        answers: to choose from; none: no answer is asked.
+    """
+
+    title: str
+    does: str
+    teaches: str
+    holds: Callable[[Look], bool]
+    for_s: float = 0.0
+    hidden: Callable[[float], dict[str, Any]] = lambda _: {}
+    answers: Mapping[str, float] = field(default_factory=dict)
+
+
+def _mass(chance: float) -> dict[str, Any]:
+    """Return a mass above those that float, 24.25 to 24.97 g, from which washers of -0.2 to 0.8 g lead into them."""
+    return {"top.mass_kg": 25.0e-3 + 0.1e-3 * chance}
+
+
+#: A drag that slows 30 Hz by 0.11 Hz/s: exponent → law and coefficient.  C ω^n = 0.7 rad/s² at 188 rad/s.
+_LAWS = {1.0: ("stokes", 3.7e-3), 1.5: ("disc", 2.7e-4), 2.0: ("newton", 2.0e-5)}
+
+
+def exponent_of(chance: float) -> float:
+    """Return the exponent that a random number hides."""
+    return [*_LAWS][min(int(3 * chance), 2)]
+
+
+def _law(chance: float) -> dict[str, Any]:
+    law, coefficient = _LAWS[exponent_of(chance)]
+    return {"drag.law": law, "drag.coefficient": coefficient}
+
+
+TASKS: dict[str, Task] = {
+    "catch": Task(
+        "Catch it", "Let the drive take hold of the top: match the spin, then drive on.",
+        "a drive holds a top only near its own spin, since the torque must not change its sense in every turn",
+        lambda look: look.is_held,
+    ),
+    "hold": Task(
+        "Hold it for three minutes", "A free top is down after 90 s. Keep this one up, with a drive that holds it.",
+        "the drive gives back what the air takes: the tape lags behind it by as much as that needs",
+        lambda look: look.is_held, for_s=180.0,
+    ),
+    "mass": Task(
+        "Find the mass that floats", "This top is too heavy by some tenths of a gram. Take washers off (What if), and "
+        "put it back, until it floats for 20 s.",
+        "of 25 g only some tenths are free: field and weight balance at a height at which the field also holds the top",
+        lambda look: look.floats, for_s=20.0, hidden=_mass,
+    ),
+    "fast": Task(
+        "Reach 57 Hz", "Take the top up with the drive. At 0.1 Hz/s it is lost near 57 Hz: more slowly it goes on.",
+        "the air takes the more the faster the top spins, and a ramp takes its part of the drive's torque, too",
+        lambda look: look.is_held and (look.spin_hz or 0.0) >= 57.0,
+    ),
+    "guess": Task(
+        "Guess n", "The drag goes as ω to the n. Watch the top slow down in air of another kind, and say n.",
+        "with n = 1 the spin halves in equal times; the higher n, the more the curve flattens; a fit tells best",
+        lambda look: look.answer is not None, hidden=_law,
+        answers={"n = 1": 1.0, "n = 3/2": 1.5, "n = 2": 2.0},
+    ),
+}  # fmt: skip
+
+
+@dataclass
+class Progress:
+    """A task under way.
+
+    Attributes:
+        name: in TASKS.
+        chance: the random number that hides what is hidden.
+        since: when the goal was there first, without a break, bench time [s].
+    """
+
+    name: str
+    chance: float
+    since: float | None = None
+
+    def share(self, look: Look) -> float:
+        """Return the part of the way to the goal, from 0 to 1, at which it is reached."""
+        task = TASKS[self.name]
+        if not task.holds(look):
+            self.since = None
+            return 0.0
+        self.since = look.time_s if self.since is None else self.since
+        return 1.0 if not task.for_s else min(1.0, (look.time_s - self.since) / task.for_s)

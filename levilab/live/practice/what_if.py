@@ -1,0 +1,84 @@
+"""What a person can change at the bench for practice, with immediate effect: a row a quantity."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from levilab.live.practice.commands import CommandRefused
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from levilab.simulator.scene import Scene
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A row.
+
+    Attributes:
+        title, unit: for people.
+        shows: what one learns by it, in a sentence.
+        low, high, step: of its slider.
+        usual: its value at first.
+        keys: (the usual scene, value) → keys of a scene and their values.
+    """
+
+    title: str
+    unit: str
+    shows: str
+    low: float
+    high: float
+    step: float
+    usual: float
+    keys: Callable[[Scene, float], dict[str, Any]]
+
+
+#: Name → row.  The washers of a set have 0.02 to 0.1 g.  The drag of a laminar boundary layer goes as √(ρη), and the
+#: air's viscosity η does not change with its pressure.
+WHAT_IF: dict[str, Quantity] = {
+    "washers_g": Quantity(
+        "washers", "g", "The mass that floats is known to some tenths of a gram.", -0.2, 0.8, 0.02, 0.0,
+        lambda scene, value: {"top.mass_kg": scene.top.mass_kg + 1e-3 * value},
+    ),
+    "base_tilt_deg": Quantity(
+        "tilt of the base", "°", "The top slides off a base that leans.", -2.0, 2.0, 0.05, 0.0,
+        lambda _, value: {"base.tilt_rad": math.radians(value)},
+    ),
+    "temperature_k": Quantity(
+        "warmer by", "K", "Warm magnets are weaker, by 0.2 % per kelvin each: the same top is then too heavy.",
+        -10.0, 10.0, 0.5, 0.0, lambda _, value: {"temperature_rise_k": value},
+    ),
+    "pressure": Quantity(
+        "air pressure", "bar", "The air alone slows a free top.", 0.0, 2.0, 0.1, 1.0,
+        lambda scene, value: {"drag.coefficient": scene.drag.constants[0] * math.sqrt(value)},
+    ),
+    "moment_tilt": Quantity(
+        "tilt of the moment", "", "What lies across the axis is what the drive holds the top by.",
+        0.0, 0.04, 0.005, 0.02, lambda _, value: {"top.moment_tilt": [value, 1.0 - value]},
+    ),
+}  # fmt: skip
+USUAL = {name: row.usual for name, row in WHAT_IF.items()}
+
+
+def keys_of(scene: Scene, values: Mapping[str, float]) -> dict[str, Any]:
+    """Return the keys of a scene with these values.
+
+    Args:
+        scene: the usual one.
+        values: names in WHAT_IF.
+
+    Raises:
+        CommandRefused: a name is unknown, or a value beyond its limits.
+    """
+    keys: dict[str, Any] = {}
+    for name, value in values.items():
+        row = WHAT_IF.get(name)
+        if row is None:
+            raise CommandRefused(f"{name}: one of {', '.join(WHAT_IF)} is expected")
+        if not row.low <= value <= row.high:
+            raise CommandRefused(f"{row.title}: from {row.low:g} to {row.high:g} {row.unit} is expected, not {value:g}")
+        keys |= row.keys(scene, value)
+    return keys
