@@ -27,6 +27,6 @@ def test_every_extra_that_a_message_names_is_declared() -> None:
     declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
     texts = [path.read_text(encoding="utf-8") for path in (ROOT / "levilab").rglob("*.py")]
     named = {name for text in texts for name in re.findall(r"how_to_install\([\'\"](\w+)", text)}
-    assert named == {"cluster", "live", "parquet", "pdf", "peers", "scope", "video"}
+    assert named == {"cluster", "live", "parquet", "pdf", "peers", "scope", "video", "xarray"}
     assert named <= declared.keys()
     assert not [text for text in texts if re.search(r"pip install \S*levilab\\*\[", text)]
