@@ -219,6 +219,7 @@ def analyze(
     base_m: float | None = None,
     scale_m: float | None = None,
     camera_m: float | None = None,
+    stem_m: float | None = None,
     start_s: float | None = None,
     stop_s: float | None = None,
     line_time_s: float | None = None,
@@ -261,7 +262,8 @@ def analyze(
         rim_m: scale of a film: diameter of the top's rim [m] (video).
         base_m: scale of a film: outer diameter of the base [m] (video).
         scale_m: scale of a film: length of a pixel [m] (video).
-        camera_m: its distance from the base, with base_m and height_m, here of the rim [m] (video).
+        camera_m: its distance from the base, with base_m or rim_m, and height_m, here of the rim [m] (video).
+        stem_m: height of a light dot on the stem above the rim [m] (video).
         start_s: time in the film from which the top floats [s] (video).
         stop_s: time until which [s] (video).
         line_time_s: from a row of the sensor to the next one [s] (video).

@@ -154,7 +154,7 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, *, start: floa
     speed = chebval(late, chebder(smooth)) / half
     readings = np.array([
         _reading(times[part], rest[part], u[part], nuisance[part], covariance[order + 1 :, order + 1 :])
-        for part in _windows(times)
+        for part in windows_of(times)
     ]).reshape(-1, 3)  # fmt: skip
     return Turning(
         smooth=np.asarray(speed),
@@ -211,7 +211,7 @@ def _fit(basis: NDArray[np.floating], turns: Array, u: Array, nuisance: Array) -
     return found, np.linalg.inv(information), rest
 
 
-def _windows(times: Array) -> list[NDArray[np.intp]]:
+def windows_of(times: Array) -> list[NDArray[np.intp]]:
     """Return the pictures of readings of the spin, one after another."""
     count = max(round(float(np.ptp(times)) / WINDOW_S), 1)
     edges = np.searchsorted(times, np.linspace(times[0], times[-1], count + 1)[1:-1])

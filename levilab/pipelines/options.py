@@ -112,7 +112,7 @@ _RATE = _about(
     kind=float, metavar="HZ", unit="Hz", above=0.0,
 )  # fmt: skip
 _HEIGHT = _about(
-    "Height at which the top floats; with a scan its moment follows, if its mass is known.  Of the rim, with --base.",
+    "Height at which the top floats; with a scan its moment follows, if its mass is known.  Of the rim, with --camera.",
     kind=float, metavar="MM", typed="height", unit="mm", factor=1e-3, low=-1.0, high=2.0,
 )  # fmt: skip
 _CLOCK_U = _about(
@@ -272,7 +272,8 @@ class VideoOptions(InputOptions):
     scale_m: float | None = field(default=None, metadata=_about(
         "Scale: metres in a pixel, at the top.", kind=float, metavar="M", typed="scale", unit="m", above=0.0,
     ))  # fmt: skip
-    camera_m: float | None = _length("With --base: distance of the camera from it.", "camera")
+    camera_m: float | None = _length("With --height: distance of the camera from the base.", "camera")
+    stem_m: float | None = _length("Height above the rim of a light dot on the stem, which shows the tilt.", "stem")
     height_m: float | None = field(default=None, metadata=_HEIGHT)
     start_s: float | None = field(default=None, metadata=_about(
         "Time in the film from which the top floats.", kind=float, metavar="S", typed="start", unit="s", low=0.0,

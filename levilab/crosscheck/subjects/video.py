@@ -16,11 +16,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from levilab.animation.camera import Array
+    from levilab.animation.camera import Array, Flight
     from levilab.pipelines.video.analysis import Video
 
 #: Least and greatest length of a film [s].
 SECONDS = (0.8, 4.0)
+#: Height of the dot on the stem above the rim, and of the rim above the base [m].
+STEM_M, RIM_M = 0.02, 0.07
+#: Where the precession is [Hz].
+_PRECESSION_HZ = (3.0, 20.0)
 #: Half of the second of which a reading of the spin is the mean [s].
 _HALF_S = 0.5
 
@@ -36,6 +40,8 @@ def draw_camera(by: np.random.Generator) -> Camera:
         blur=float(by.uniform(1.0, 3.0)),
         noise=float(by.uniform(1.0, 4.0)),
         away=tuple(by.uniform(-4, 4, 2).tolist()),
+        stem=STEM_M,
+        distance=float(by.uniform(0.25, 0.6)),
     )
 
 
@@ -50,7 +56,8 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     analysis = ANALYSES["video"]
     known = {"line_time_s": camera.line_time} if by.random() < 0.5 else {}
     late = 0.0 if known else camera.line_time * camera.middle[1]  # of the rows of the top, after the first row
-    (found,) = analysis.analyze([path], analysis.options_from({"rim_m": 2 * RIM, **known})).runs
+    seen = {"rim_m": 2 * RIM, "stem_m": STEM_M, "camera_m": camera.distance + RIM_M, "height_m": RIM_M}
+    (found,) = analysis.analyze([path], analysis.options_from(seen | known)).runs
     if found.turning is None or found.scale.value is None:
         raise TrialFailed("no spin is found")
     turns = np.abs(flight.yaw) / (2 * np.pi)
@@ -61,7 +68,24 @@ def trial(seed: int, folder: Path) -> list[Pull]:
         pull_of("spin", found.spin, _slope(flight.times, turns, found.turning.middle + late, seconds / 2)),
         pull_of("spin of a second", Estimate(second, u, "Hz"), _slope(flight.times, turns, time + late, _HALF_S)),
         *_places(found, picture, flight.at(found.time[picture : picture + 1] + late), camera),
+        *_precession(found, flight, late),
     ]
+
+
+def _precession(found: Video, flight: Flight, late: float) -> Iterator[Pull]:
+    """Yield the pull of the first reading of the precession, its mean over a second, where it stands out."""
+    if (lean := found.leaning) is None or not lean.time.size:
+        return
+    middle = float(lean.time[0]) + late
+    axis = flight.lean[:, 0] + 1j * flight.lean[:, 1]
+    frequency = np.fft.fftfreq(axis.size, flight.times[1] - flight.times[0])
+    kept = (frequency > _PRECESSION_HZ[0]) & (frequency < _PRECESSION_HZ[1])
+    turning = np.fft.ifft(np.fft.fft((axis - axis.mean()) * np.hanning(axis.size)) * kept)
+    turns = np.unwrap(np.angle(turning)) / (2 * np.pi)
+    whole = float(np.ptp(found.time))
+    near = np.abs(flight.times - middle) <= whole / max(round(whole), 1) / 2
+    true = np.polyfit(flight.times[near] - middle, turns[near], 1)[0]
+    yield pull_of("precession", Estimate(float(lean.precession[0]), float(lean.u[0]), "Hz"), float(true))
 
 
 def _slope(times: Array, turns: Array, middle: float, half: float) -> float:

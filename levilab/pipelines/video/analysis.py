@@ -23,6 +23,7 @@ from levilab.formats.table import file_errors
 from levilab.pipelines.analyzed import EachAlone, Method
 from levilab.pipelines.options import VideoOptions
 from levilab.pipelines.sources import Needs, Readings
+from levilab.pipelines.video.leaning import Leaning, Rising, leaning_of, rising_of
 from levilab.pipelines.video.tracking import Followed, follow
 from levilab.present.numbers import with_uncertainty
 from levilab.present.progress import ShareBar
@@ -93,8 +94,8 @@ def read_film(path: Path, options: VideoOptions) -> FilmReadings:
     camera, height = options.camera_m, options.height_m
     if (camera is None) != (height is None):
         raise UsageError("camera", "goes with `height`: the top is nearer to the camera than the base")
-    if camera is not None and (options.base_m is None or not 0 < (height or 0) < camera):
-        raise UsageError("camera", "goes with `base`, and is greater than `height`")
+    if camera is not None and (options.scale_m is not None or not 0 < (height or 0) < camera):
+        raise UsageError("camera", "goes with `base` or `rim`, and is greater than `height`")
     if options.stop_s is not None and (options.start_s or 0.0) >= options.stop_s:
         raise UsageError("stop", f"a time after `start` = {options.start_s:g} is expected", value=options.stop_s)
     return FilmReadings(open_film(path), np.array([*head, path.stat().st_size], dtype=np.float64))
@@ -117,7 +118,9 @@ class Video:
         mark: angle of the mark in the first picture; None: none turns.
         turning: None: no mark turns, or the spin is in doubt.
         choices: spins that describe the mark, seen from above, counter-clockwise is positive [Hz].
-        precession: in the middle of the film; None: it does not stand out [Hz].
+        precession: in the middle of the film, by the place; None: it does not stand out [Hz].
+        leaning: by a dot on the stem; None: not seen.
+        rising: by the size of the rim; None: the distance of the camera is not known.
         fall: when the top fell; None: it floats to the end [s].
         spin_at_fall: None: not known [Hz].
         warnings: doubts about the numbers, and parts of the film that are left out.
@@ -136,6 +139,8 @@ class Video:
     turning: Turning | None
     choices: tuple[float, ...]
     precession: Estimate | None
+    leaning: Leaning | None
+    rising: Rising | None
     fall: Estimate | None
     spin_at_fall: Estimate | None
     warnings: tuple[str, ...]
@@ -169,6 +174,11 @@ class Video:
             text += f" The spin is {with_uncertainty(self.spin)} in the middle of the film, {sense} seen from above."
         if self.precession:
             text += f" The precession is {with_uncertainty(self.precession)}."
+        if self.leaning and self.leaning.middle and self.leaning.tilt:
+            about = f"{with_uncertainty(self.leaning.middle)}, with a tilt of {with_uncertainty(self.leaning.tilt)}"
+            text += f" By the dot on the stem it is {about}."
+        if self.rising and self.rising.swing:
+            text += f" The top swings up and down at {with_uncertainty(self.rising.swing)}."
         if self.fall:
             spin = f", at a spin of {with_uncertainty(self.spin_at_fall)}" if self.spin_at_fall else ""
             text += f" The top falls at {with_uncertainty(self.fall)} of the film{spin}."
@@ -185,7 +195,7 @@ def analyze_source(source: Source[FilmReadings], options: VideoOptions) -> Video
     bar = ShareBar("following the top", line_every=30.0)
     try:
         start, stop = options.start_s or 0.0, np.inf if options.stop_s is None else options.stop_s
-        return _video(film, options, follow(film, start, stop, bar))
+        return _video(film, options, follow(film, start, stop, bar, with_dot=bool(options.stem_m)))
     except AnalysisError as error:
         raise DataError(f"{film.path}: {error}") from error
     finally:
@@ -225,12 +235,31 @@ def _video(film: Film, options: VideoOptions, followed: Followed) -> Video:
     centred = options.base_m is not None and base is not None
     left, up = (base.x, base.y) if centred and base else (float(followed.x.mean()), float(followed.y.mean()))
     times, x, y = times + line_time * followed.y, size * (followed.x - left), size * (up - followed.y)
+    away = _distance(options)
+    leaning = leaning_of(times, _lean(film, options, followed, phases, size)) if options.stem_m else None
+    rising = rising_of(times, followed.radius, away) if away else None
     fall, at_fall = _fall(times, x, y, turning, 1 / rate) if followed.ended == "lost" else (None, None)
     return Video(
         float(followed.times[0]), times, x, y, size * followed.u, scale, (left, up), float(np.median(followed.radius)),
-        base, float(angles[0]) if choices else None, turning, choices, _precession(times, x + 1j * y), fall, at_fall,
-        (*_notes(options, followed), *_notes_on_spin(turning, choices, problem, rate, options)),
+        base, float(angles[0]) if choices else None, turning, choices, _precession(times, x + 1j * y), leaning, rising,
+        fall, at_fall, (*_notes(options, followed, leaning), *_notes_on_spin(turning, choices, problem, rate, options)),
     )  # fmt: skip
+
+
+def _distance(options: VideoOptions) -> float | None:
+    """Return the distance of the camera from the rim [m]; None: not known."""
+    return options.camera_m - options.height_m if options.camera_m and options.height_m else None
+
+
+def _lean(film: Film, options: VideoOptions, followed: Followed, phases: Phases, size: float) -> NDArray[np.complex128]:
+    """Return how far the dot is from the middle of the rim, over its height, y upwards, shape (n,)."""
+    middle, stem, away = complex(film.width - 1, film.height - 1) / 2, options.stem_m or 1.0, _distance(options)
+    nearer = 1 - stem / away if away else 1.0  # the dot is nearer to the camera than the rim
+    dots = middle + nearer * (followed.dots - middle)
+    offset = dots - followed.x - 1j * followed.y
+    seen = np.isfinite(offset)
+    offset[seen] = without_pull(offset[seen], phases.phase[seen]) if seen.sum() > _FEWEST else offset[seen]
+    return np.asarray(offset.conj() * size / stem)
 
 
 def _fall(times: Array, x: Array, y: Array, turning: Turning | None, step: float) -> tuple[Estimate, Estimate | None]:
@@ -301,12 +330,17 @@ def _scale(film: Film, options: VideoOptions, followed: Followed) -> Estimate:
     return Estimate(value, value * _EDGE_U / radius, "m")
 
 
-def _notes(options: VideoOptions, seen: Followed) -> Iterator[str]:
+def _notes(options: VideoOptions, seen: Followed, leaning: Leaning | None) -> Iterator[str]:
     if seen.ended:
         why = {"lost": "the rim is lost", "hand": "a large part of the view changes, as by a hand,"}[seen.ended]
         yield f"{why} after {seen.times[-1]:.2f} s: the rest of the film is left out"
     if seen.missed:
         yield f"no rim is seen in {seen.missed} pictures in between; they are left out"
+    if options.stem_m is not None and leaning is None:
+        yield (
+            "no dot is seen on the stem: a light one is expected near the middle of the rim, with dark round it, and "
+            "the mark beyond a third of the radius"
+        )
     if options.base_m is not None and options.camera_m is None:
         yield (
             "the scale is that of the base, and the top is nearer to the camera: places are too large by height over "

@@ -32,7 +32,9 @@ def video_columns(analysis: VideoAnalysis) -> Iterator[Mapping[str, np.ndarray]]
     """Yield place and smooth spin in the pictures of each film."""
     for run in analysis.runs:
         spin = {"spin_frequency_hz": np.abs(run.turning.smooth)} if run.turning else {}
-        yield {"time_s": run.time, "x_m": run.x, "x_u_m": run.u, "y_m": run.y, "y_u_m": run.u, **spin}
+        lean = {"axis_x": run.leaning.x, "axis_y": run.leaning.y} if run.leaning else {}
+        rise = {"z_m": run.rising.z} if run.rising else {}
+        yield {"time_s": run.time, "x_m": run.x, "x_u_m": run.u, "y_m": run.y, "y_u_m": run.u, **rise, **lean, **spin}
 
 
 def video_files(analysis: VideoAnalysis) -> dict[str, str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.film.circles import Circle, coarse, find_base, find_top
+from analysis.film.dot import find_dot
 from analysis.film.errors import CameraMoved, HandInView
 from analysis.film.rim import Rim, fit_rim
 from analysis.film.view import compare_views
@@ -58,6 +59,7 @@ class Followed:
         u: standard uncertainty of each, shape (n,) [pixels].
         radius: of the rim, shape (n,) [pixels].
         profiles: shape (n, bands, rays).
+        dots: x + iy of the dot on the stem, NaN where it is not seen; zeros: not looked for, shape (n,) [pixels].
         base: the circle of the base; None: not seen.
         rate: pictures in a second, by their times.
         missed: pictures in between in which no rim was seen.
@@ -70,13 +72,16 @@ class Followed:
     u: Array
     radius: Array
     profiles: Array
+    dots: NDArray[np.complex128]
     base: Circle | None
     rate: float
     missed: int
     ended: str
 
 
-def follow(film: Film, start: float, stop: float, progress: Callable[[float], None]) -> Followed:
+def follow(
+    film: Film, start: float, stop: float, progress: Callable[[float], None], *, with_dot: bool = False
+) -> Followed:
     """Follow the top through a film.
 
     Args:
@@ -84,6 +89,7 @@ def follow(film: Film, start: float, stop: float, progress: Callable[[float], No
         start: where it floats from [s].
         stop: until when [s].
         progress: called with the share that is done.
+        with_dot: a dot on the stem is followed, too.
 
     Raises:
         NoFilm: it cannot be read.
@@ -97,7 +103,7 @@ def follow(film: Film, start: float, stop: float, progress: Callable[[float], No
     watch = _Watch(background, top, factor)
     if watch.share_of_background < _LEAST_BACKGROUND:
         raise DataError(f"{film.path}: the top fills the picture: film it from farther away, with the base round it")
-    track = _Track(top.scaled(factor))
+    track = _Track(top.scaled(factor), with_dot=with_dot)
     span = min(stop, film.duration or np.inf) - start
     for time, picture in pictures(film, start, stop):
         rim = track.add(time, picture)
@@ -167,12 +173,14 @@ class _Watch:
 class _Track:
     """The rim from picture to picture."""
 
-    def __init__(self, circle: Circle) -> None:
+    def __init__(self, circle: Circle, *, with_dot: bool) -> None:
+        self._with_dot = with_dot
         self._radius, self._contrast = circle.radius, 0.0
         self._now, self._speed = circle, (0.0, 0.0)
         self.last = np.nan
         self.times: list[float] = []
         self.rims: list[Rim] = []
+        self.dots: list[complex] = []
         self.ended = ""
         self.missed: list[float] = []
 
@@ -192,6 +200,8 @@ class _Track:
         self._now, self.last = rim.circle, time
         self.times.append(time)
         self.rims.append(rim)
+        dot = find_dot(picture, rim.circle) if self._with_dot else 0.0
+        self.dots.append(complex(np.nan) if dot is None else dot)
         return rim
 
     def _same(self, rim: Rim | None) -> Rim | None:
@@ -203,7 +213,7 @@ class _Track:
     def forget_after(self, time: float) -> None:
         """Leave out the pictures after a time."""
         count = int(np.searchsorted(self.times, time, side="right"))
-        del self.times[count:], self.rims[count:]
+        del self.times[count:], self.rims[count:], self.dots[count:]
 
 
 def _followed(film: Film, track: _Track, watch: _Watch, base: Circle | None) -> Followed:
@@ -225,6 +235,7 @@ def _followed(film: Film, track: _Track, watch: _Watch, base: Circle | None) -> 
         radius=radius,
         u=np.hypot([rim.u for rim in track.rims], CODEC_U),
         profiles=np.stack([rim.profiles for rim in track.rims]),
+        dots=np.array(track.dots, dtype=np.complex128),
         base=base,
         rate=(times.size - 1 + missed) / span,
         missed=missed,

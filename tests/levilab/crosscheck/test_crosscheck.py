@@ -123,7 +123,7 @@ def test_a_trial_films_a_top_and_finds_spin_and_place(tmp_path, monkeypatch):
     pytest.importorskip("av")
     monkeypatch.setattr("levilab.crosscheck.subjects.video.SECONDS", (0.8, 0.9))
     pulls = SUBJECTS["video"].trial(1, tmp_path)
-    assert [pull.quantity for pull in pulls] == ["spin", "spin of a second", "place", "place"]
+    assert [pull.quantity for pull in pulls] == ["spin", "spin of a second", "place", "place", "precession"]
     # a slip in a sign or a unit would be thousands of u away, another picture's place tens
     assert max(abs(pull.value) for pull in pulls) < 5
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from importlib import util
 from itertools import islice
 from runpy import run_path
@@ -72,6 +73,31 @@ def test_a_tilted_top_under_a_rolling_shutter_has_its_place_and_spin(folder):
         assert np.std(errors / found.u) == pytest.approx(1, abs=0.5)
         assert np.abs(pulls * found.turning.u).max() < 1e-3
         assert found.spin.u < 1e-3
+
+
+def test_a_dot_on_the_stem_shows_the_precession_and_the_size_of_the_rim_the_rise(folder, path):
+    level = level_flight(2.3, 31.0)
+    lean = 0.02 * np.exp(2j * np.pi * 7.3 * level.times) + 0.01 * np.exp(2j * np.pi * 1.1 * level.times)
+    rise = 2e-3 * np.sin(2 * np.pi * 1.3 * level.times)
+    flight = replace(level, lean=np.stack([lean.real, lean.imag], axis=1), rise=rise)
+    camera = Camera(stem=0.02, distance=0.4)
+    stem = film(folder / "stem.mp4", camera, flight, phone_times(2.2))
+    options = VideoOptions(rim_m=2 * RIM, stem_m=0.02, camera_m=0.47, height_m=0.07)
+    video = ANALYSES["video"]
+    analysis = video.analyze([stem], options)
+    leaning, rising = analysis.runs[0].leaning, analysis.runs[0].rising
+    assert leaning.precession == pytest.approx(7.3, abs=3 * leaning.u.max())
+    assert leaning.middle.value == pytest.approx(7.3, abs=3 * leaning.middle.u)
+    assert leaning.tilt.value == pytest.approx(0.02, rel=0.05)  # an edge is off by 0.3 pixels, the dot by a twentieth
+    assert rising.swing.value == pytest.approx(1.3, abs=3 * rising.swing.u)
+    assert rising.amplitude.value == pytest.approx(2e-3, abs=3 * rising.amplitude.u)
+    assert np.std(rising.z - np.interp(analysis.runs[0].time, flight.times, rise)) < 4e-4  # 0.03 of 30 pixels at 0.4 m
+    save(video, analysis)
+    tracks = np.genfromtxt(folder / "stem.tracks.csv", delimiter=",", names=True)
+    assert {"z_m", "axis_x", "axis_y"} <= set(tracks.dtype.names)
+    without = analyze_film(path, VideoOptions(rim_m=2 * RIM, stem_m=0.02, stop_s=0.5))
+    assert without.leaning is None
+    assert "no dot is seen on the stem" in without.warnings[0]
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of trackpy 0.7 with pandas 3
