@@ -7,7 +7,7 @@ DEMO   := demo
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test quick explore fuzz mutants lint all-pythons wheel peers site bench clean
+.PHONY: help setup demo test quick explore fuzz mutants lint all-pythons wheel peers classroom site bench clean
 
 help:  ## list the targets
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -66,6 +66,11 @@ wheel: setup  ## build the wheel into dist/ and try it in a clean environment, b
 
 peers: setup  ## other people's drivers, in an environment of their own, on the virtual bench
 	$(BIN)/nox --session peers
+
+classroom: setup  ## what a teacher hands out for Windows, in dist/classroom: wheel and script, see docs/class.md
+	rm -rf dist/classroom
+	$(BIN)/python -m pip wheel --disable-pip-version-check --no-deps --wheel-dir dist/classroom .
+	cp constraints.txt docs/install-levilab.cmd dist/classroom
 
 site: setup  ## the pages as a site in build/site, in an environment of its own; a warning or a dead link is an error
 	$(BIN)/nox --session site

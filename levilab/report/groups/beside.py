@@ -136,7 +136,7 @@ def _model(part: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 def _constants(document: Mapping[str, Any], law: str) -> list[str]:
     """Return the constants of a law, without the start of a run, which no two share."""
     found = _model(document, law).get("parameters", {})
-    return [name for name in found if law not in LAWS or name in LAWS[law].parameters[1:]]
+    return [name for name in found if law not in LAWS or name in LAWS[law].constants]
 
 
 def _common(parts: Sequence[Mapping[str, Any]]) -> list[str]:
