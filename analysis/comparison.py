@@ -1,4 +1,9 @@
-"""Values of one quantity by several groups: their weighted mean, whether they agree, how far each lies off."""
+"""Values of one quantity by several groups: their mean, whether they agree, how far each lies off.
+
+Each group has a top of its own: value = mean + difference of its top + error, the differences normal with a standard
+deviation τ that the values tell themselves (R. C. Paule & J. Mandel, J. Res. NBS 87, 377 (1982)).  Where the values
+agree within their u, τ is zero, and the mean is the usual one.
+"""
 
 from __future__ import annotations
 
@@ -17,17 +22,20 @@ class Comparison:
     """What several values with standard uncertainties say together.
 
     Attributes:
-        mean: weighted by 1/u².
-        u: of the mean, from the u of the values alone.
-        chi_square: Σ((value − mean)/u)².
+        mean: weighted by 1/(u² + τ²).
+        u: of the mean, with τ.
+        between: τ, the standard deviation of the groups beyond their u.
+        chi_square: Σ((value − mean)/u)² about the mean weighted by 1/u².
         freedom: its degrees of freedom.
         p: the probability that chance makes it so large.
         scatter: standard deviation of the values, unweighted; None of one value.
-        distances: from each value to the mean of the others, in units of the u of that difference; None of one value.
+        distances: from each value to the mean of the others, in units of the u of that difference, with τ; None of one
+            value.
     """
 
     mean: float
     u: float
+    between: float
     chi_square: float
     freedom: int
     p: float
@@ -38,8 +46,8 @@ class Comparison:
 def compare(values: ArrayLike, u: ArrayLike) -> Comparison:
     """Compare values.
 
-    The distance (x − m)/√(u² − u_m²) from the mean m of all is that from the mean of the others: m holds a part
-    u_m²/u² of the value itself.
+    The distance (x − m)/√(u² + τ² − u_m²) from the mean m of all is that from the mean of the others: m holds a part
+    u_m²/(u² + τ²) of the value itself.
 
     Args:
         values: shape (n,), n at least 1.
@@ -49,19 +57,38 @@ def compare(values: ArrayLike, u: ArrayLike) -> Comparison:
 
     x: NDArray[np.float64] = np.asarray(values, float)
     of_x: NDArray[np.float64] = np.asarray(u, float)
-    weights = (of_x.min() / of_x) ** 2
-    mean = float(weights @ x / weights.sum())
-    of_mean = float(of_x.min() / math.sqrt(weights.sum()))
-    chi_square, freedom = float((((x - mean) / of_x) ** 2).sum()), len(x) - 1
+    chi_square, freedom = _about_mean(x, of_x)[2], len(x) - 1
+    between = _between(x, of_x)
+    total = np.hypot(of_x, between)
+    mean, of_mean, _ = _about_mean(x, total)
     if not freedom:
-        return Comparison(mean, of_mean, chi_square, 0, 1.0, None, (None,))
-    others = np.sqrt(of_x**2 - of_mean**2)
+        return Comparison(mean, of_mean, 0.0, chi_square, 0, 1.0, None, (None,))
     return Comparison(
         mean,
         of_mean,
+        between,
         chi_square,
         freedom,
         float(chdtrc(freedom, chi_square)),
         float(x.std(ddof=1)),
-        tuple(((x - mean) / others).tolist()),
+        tuple(((x - mean) / np.sqrt(total**2 - of_mean**2)).tolist()),
     )
+
+
+def _about_mean(x: NDArray[np.float64], u: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Return the mean weighted by 1/u², its u, and χ² about it."""
+    weights = (u.min() / u) ** 2
+    mean = float(weights @ x / weights.sum())
+    return mean, float(u.min() / math.sqrt(weights.sum())), float((((x - mean) / u) ** 2).sum())
+
+
+def _between(x: NDArray[np.float64], u: NDArray[np.float64]) -> float:
+    """Return τ, with which χ² is its expectation n − 1; zero where it is smaller without."""
+    from scipy.optimize import brentq
+
+    def excess(tau: float) -> float:
+        return _about_mean(x, np.hypot(u, tau))[2] - (len(x) - 1)
+
+    if len(x) < 2 or excess(0.0) <= 0:
+        return 0.0
+    return float(brentq(excess, 0.0, 2 * float(np.ptp(x))))

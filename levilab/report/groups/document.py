@@ -81,7 +81,7 @@ def _values(of: Class, quantity: Quantity) -> Tabular:
             [*map(_distance, quantity.from_truth), ""],
         ]
         heads += [_TRUTH, _FROM_TRUTH]
-    names = [*(group.source.name for group in of.groups), "weighted mean"]
+    names = [*(group.source.name for group in of.groups), "mean"]
     far = [*(one is not None and abs(one) > _FAR for one in quantity.from_truth), False]
     rows = [
         Row(cells, "together" if k == len(of.groups) else "outlier" if far[k] else "")

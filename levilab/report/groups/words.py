@@ -28,7 +28,7 @@ def finding(of: Class) -> str:
 
 def verdict(of: Class) -> str:
     """Return what the class found, quantity by quantity, and how well it met the truth."""
-    texts = [f"{_mean(one)} is the weighted mean of {_count(one)}; {_chi_square(one)}." for one in of.quantities]
+    texts = [f"{_mean(one)} is the mean of {_count(one)}; {_chi_square(one)}." for one in of.quantities]
     return "  ".join([*texts, *([_truth(of)] if of.knows_truth else [])]) or finding(of)
 
 
@@ -62,7 +62,7 @@ def _chi_square(of: Quantity) -> str:
     if together.p < DIFFER:
         return (
             f"{how}: the groups differ by more than their u, by {scatter} (standard deviation), as different tops do; "
-            "a large distance from the class is then no mistake of a group"
+            "that is in u of the mean and in each distance from it"
         )
     return f"{how}: the groups agree within their u; their standard deviation is {scatter}"
 
