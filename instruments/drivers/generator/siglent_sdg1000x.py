@@ -72,8 +72,8 @@ class SiglentSDG1000X(DriveGenerator):
       asked for after it was sent.
     - It prints six digits of a number, ten of a frequency, and none that are zero at the end (measured on an SDG2042X).
     - A burst has its fields only while it is on: ``C1:BTWV?`` answers ``STATE,OFF``, or all of them, then ``CARR`` and
-      those of the waveform; with a trigger from outside ``EDGE`` is among them.  No delay is shorter than the latency,
-      2.4e-07 s or 5.2e-07 s in two public records.
+      those of the waveform; with a trigger from outside ``EDGE`` is among them, with a gate ``PLRT``
+      alone.  No delay is shorter than the latency, 2.4e-07 s or 5.2e-07 s in two public records.
     - A triangle is a ramp of 50 % symmetry; so `waveform` answers RAMP for it.
     """
 
@@ -120,6 +120,7 @@ class SiglentSDG1000X(DriveGenerator):
     output = OutputSwitch("C1:OUTP", bool)
     burst = Setting("C1:BTWV", bool, key="STATE", on_demand=True)
     burst_mode = burst_word("C1:BTWV", "GATE", "NCYC", key="GATE_NCYC")
+    gate_polarity = burst_word("C1:BTWV", "POS", "NEG", key="PLRT")
     burst_cycles = _Whole("C1:BTWV", float, low=1.0, high=1e6, key="TIME", on_demand=True)
     burst_phase = burst_setting("C1:BTWV", 0.0, 360.0, unit="deg", key="STPS")
     trigger_source = burst_word("C1:BTWV", "EXT", "INT", "MAN", key="TRSR")

@@ -8,7 +8,8 @@ load is cut off).  Inferred: which field gives way where amplitude and offset to
 set), that a message has no path memory and changes nothing where one of its fields is unknown, limits of the ramp.
 The fields of a burst and their order are those of public records of ``C1:BTWV?``, the latency among them; inferred: a
 burst that is off takes no other field (guide), one that waits for an edge has EDGE in the place of TRMD (as a public
-record of SWWV has it).  Modulation and sweep are always off, arbitrary waveforms are missing.
+record of SWWV has it); PLRT of a gate as a public record of the guide's §3.7
+has it.  Modulation and sweep are always off, arbitrary waveforms are missing.
 """
 
 from __future__ import annotations
@@ -86,7 +87,10 @@ _BURST: dict[str, tuple[str, float | str, tuple[float, float] | tuple[str, ...],
     "TIME": ("burst_cycles", 1.0, (1.0, 1e6), ""),
     "DLAY": ("trigger_delay", 0.0, (0.0, 100.0), "S"),
     "GATE_NCYC": ("burst_mode", "NCYC", ("GATE", "NCYC"), ""),
+    "PLRT": ("gate_polarity", "POS", ("POS", "NEG"), ""),
 }
+#: Fields that are not answered with the other mode: a gate has no count, no delay, no edge.
+_OF_NCYC, _OF_GATE = frozenset({"TRMD", "EDGE", "TIME", "DLAY"}), frozenset({"PLRT"})
 #: From an edge at the trigger input to the burst, which no delay is shorter than, and its scatter, 1σ (assumed) [s].
 _LATENCY, _JITTER = 2.4e-7, 5e-9
 #: The settings of a channel, with their values after ``*RST``.
@@ -297,15 +301,17 @@ class VirtualSDG1000X(VirtualInstrument):
         self.on_change(_key(n, "burst"))
 
     def burst(self, n: int) -> str:
-        """BTWV?: all fields, and those of the waveform behind them; STATE alone where it is off."""
+        """BTWV?: the fields of its mode, and those of the waveform behind them; STATE alone where it is off."""
         if not self.settings[_key(n, "burst")]:
             return self.off(f"C{n}:BTWV")
         values = {key: self.settings[_key(n, name)] for key, (name, *_) in _BURST.items()}
         values["DLAY"] = self._delay(n)
         del values["TRMD" if values["TRSR"] == "EXT" else "EDGE"]
+        hidden = _OF_NCYC if values["GATE_NCYC"] == "GATE" else _OF_GATE
         fields = (
             f"{key},{self.spell(value) + _BURST[key][3] if isinstance(value, float) else value}"
             for key, value in values.items()
+            if key not in hidden
         )
         wave = self.wave(n, []).partition("WVTP,")[2]
         return self.reply(f"C{n}:BTWV", f"STATE,ON,{','.join(fields)},CARR,WVTP,{wave}")
@@ -364,7 +370,8 @@ class VirtualSDG1000X(VirtualInstrument):
         amplitude = self._number(n, "amplitude") / 2 if on and short != "DC" else 0.0
         bursts = bool(self.settings[_key(n, "burst")]) and short != "DC"
         source, gated = self.settings[_key(n, "trigger_source")], self.settings[_key(n, "burst_mode")] == "GATE"
-        cycles, waits = self._number(n, "burst_cycles"), bursts and (gated or source != "INT")
+        closed = self.settings[_key(n, "gate_polarity")] == "POS" if gated else source != "INT"
+        cycles, waits = self._number(n, "burst_cycles"), bursts and closed
         rising, delay = gated or self.settings[_key(n, "trigger_edge")] == "RISE", _LATENCY if gated else self._delay(n)
         armed = amplitude and waits and source == "EXT"
         return Output(

@@ -120,8 +120,8 @@ def test_every_model_waits_for_the_edges_that_its_driver_names(driver, twin, lat
     gated = device.signal().triggered  # the pulse is shorter than a cycle, which is completed: 33500 guide, page 177
     least = latency or 2.4e-7  # no delay
     assert gated == Triggered(2.0, 1.0, rising=True, delay=pytest.approx(least), jitter=waits.triggered.jitter)
-    if driver in (Keysight33500B, Agilent33220A):
-        generator.gate_polarity = "INVerted"
+    if driver in (Keysight33500B, Agilent33220A, SiglentSDG1000X):
+        generator.gate_polarity = "NEG" if driver is SiglentSDG1000X else "INVerted"
         assert (device.signal().amplitude, device.signal().triggered) == (2.0, None)
     generator.off()
     assert device.signal().triggered is None
@@ -143,6 +143,10 @@ def test_a_siglent_without_bursts_takes_none_of_their_fields():
     assert device.signal().triggered == Triggered(2.0, 5.0, rising=True, delay=0.002, jitter=5e-9)
     send(device, b"C1:BTWV STPS,400,DLAY,0\n")  # beyond the limits
     assert "STPS,360,TRSR,EXT,EDGE,RISE,TIME,5,DLAY,2.4e-07S," in ask(device, "C1:BTWV?")
+    send(device, b"C1:BTWV TRSR,INT,GATE_NCYC,GATE,PLRT,NEG\n")  # a public record of the guide's §3.7
+    assert ask(device, "C1:BTWV?").startswith(
+        "C1:BTWV STATE,ON,PRD,0.01S,STPS,360,TRSR,INT,GATE_NCYC,GATE,PLRT,NEG,CARR,WVTP,SINE"
+    )
     send(device, b"C1:BTWV TRSR,INT,PRD,0.1\n")
     assert (device.signal().amplitude, device.signal().burst.period) == (2.0, 0.1)
 
