@@ -9,6 +9,8 @@ const SHOWN_S = 180, LEAST_S = 60;
 const NOTED_S = 1;
 /** The least height of the plot, and of that of the difference about zero [Hz]. */
 const LEAST_HZ = 2, LEAST_OFF_HZ = 0.2;
+/** The frequencies that are shown while there is neither a top nor a drive [Hz]. */
+const USUAL_HZ = [20, 35];
 /** Changes of the drive's frequency that are kept, to count its turns: a ramp makes two a second. */
 const MOST_CHANGES = 100;
 const LEFT = 58, RIGHT = 84, TOP = 10, BOTTOM = 34, GAP = 24;
@@ -42,6 +44,12 @@ export function openHistory() {
       return start + (Math.floor(before + (time - start) * drive) - before) / drive;
     },
 
+    /** The same as a table of text. */
+    table() {
+      const texts = rows.map((row) => row.map((value) => Number.isFinite(value) ? String(value) : "").join(","));
+      return ["bench_time_s,spin_frequency_hz,drive_frequency_hz", ...texts, ""].join("\n");
+    },
+
     /** Mark what happened at a time. */
     mark(time, text) { marks.push([time, text]); },
   };
@@ -70,7 +78,8 @@ export function drawHistory(paper, {rows, marks}) {
   const bottom = height - BOTTOM, below = driven ? Math.max(44, 0.26 * (bottom - TOP)) : 0;
   const split = bottom - (driven ? below + GAP : 0);
 
-  const ys = atLeast(extent([known(rows.flatMap(([, spin, drive]) => [spin, drive]))], 0.08), LEAST_HZ);
+  const counted = known(rows.flatMap(([, spin, drive]) => [spin, drive]));
+  const ys = atLeast(counted.length ? extent([counted], 0.08) : USUAL_HZ, LEAST_HZ);
   const reach = Math.max(LEAST_OFF_HZ, Math.min(2, 1.15 * Math.max(0, ...known(differences).map(Math.abs))));
   const toX = (time) => width - RIGHT + (time - now) / shown * (width - LEFT - RIGHT);
   const toY = (value) => split - (value - ys[0]) / (ys[1] - ys[0]) * (split - TOP);

@@ -3,8 +3,9 @@
 import {command, connect, read, takeToken} from "./connection.js";
 import {takeDrops} from "./drop.js";
 import {drawHistory, openHistory} from "./history.js";
-import {drawReadings, drawRecords, saidOf, sheet} from "./plot.js";
+import {drawReadings, drawRecords, saidOf, sheet, tableOf} from "./plot.js";
 import {openPractice, watchPractice} from "./practice.js";
+import {openSound} from "./sound.js";
 import {between, by, fixed, lapse, make, option, short, typeset, write} from "./words.js";
 
 /** Least time between spoken news [ms]. */
@@ -32,7 +33,8 @@ const token = takeToken();
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, source: null, records: {}};
 const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
-const history = openHistory();
+const history = openHistory(), sound = openSound();
+let fellAt = NaN;  // a fall whose poses are not kept yet
 let paused = false, drawn = null, pointed = -1, space = null, topOf = "", wanted = "", practice = null, reachable = true;
 let spoken = 0, close = null, dirty = {plot: true, trace: true};
 window.levilab = {frames: 0, drawn: 0, seen, data, history};  // what tests and benchmarks read
@@ -161,6 +163,8 @@ function takePoses(pieces) {
 
 /** Mark the fall in the last minutes, with the spin that was counted last. */
 function markFall() {
+  fellAt = data.lastUp;
+  by("replay").hidden = true;
   const spin = history.rows.findLast((row) => Number.isFinite(row[1]))?.[1];
   history.mark(data.lastUp, spin ? `fell at ${spin.toFixed(1)} Hz` : "fell");
   dirty.plot = true;
@@ -229,6 +233,7 @@ function show() {
   const minutes = isOfMinutes();
   by("empty").hidden = data.count > 0 || minutes;
   by("drawn").parentElement.hidden = !data.count;
+  by("csv").parentElement.hidden = !data.readings && !minutes;
   write("readings-title", minutes ? "The last minutes" : "Readings");
   write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: practice?.guest ? "No run yet: it appears here once one is recorded." : "No run yet: the guide says how to record one.", setup: "The bench is being set up."}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
   document.title = `${state === "running" && data.count ? `${data.count} readings · ` : ""}levilab live`;
@@ -330,9 +335,14 @@ function showFacts(about) {
 
 function showTop(bench) {
   const pose = space?.state;
-  by("strobe-of").hidden = !bench?.drive;
+  by("strobe-of").hidden = by("sound-of").hidden = !bench?.drive;
+  if (Number.isFinite(fellAt) && space?.keepFall?.(fellAt)) {
+    fellAt = NaN;
+    by("replay").hidden = false;
+  }
+  sound.follow(bench);
   if (!pose) return;
-  const said = pose.up ? `floats at ${fixed(pose.place[2] * 1000, 1)} mm` : pose.there ? "lies where it fell" : "is taken away";
+  const said = space.replays ? "falls, 20 times slower" : pose.up ? `floats at ${fixed(pose.place[2] * 1000, 1)} mm` : pose.there ? "lies where it fell" : "is taken away";
   write("top-text", said);
   by("space").setAttribute("aria-label", `the top over its base in three dimensions: it ${said}`);
 }
@@ -461,6 +471,18 @@ function fillScreen() {
 for (const name of ["path", "spin", "height"]) by(`show-${name}`).addEventListener("change", lookAtTop);
 by("lean").addEventListener("change", leanTop);
 by("strobe").addEventListener("change", strobe);
+by("replay").addEventListener("click", () => space?.replay?.());
+if (matchMedia("(prefers-reduced-motion: reduce)").matches) by("motion").value = "0";
+by("sound").addEventListener("change", () => sound.play(by("sound").checked));
+by("csv").addEventListener("click", () => save(new Blob([isOfMinutes() ? history.table() : tableOf(data.readings)], {type: "text/csv"}), "csv"));
+by("png").addEventListener("click", () => by("plot").toBlob((picture) => save(picture, "png")));
+
+/** Let the browser save what is drawn, by the name of the run. */
+function save(blob, ending) {
+  const link = Object.assign(make("a"), {href: URL.createObjectURL(blob), download: `${isOfMinutes() || !seen.run ? "bench" : seen.run}.${ending}`});
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
 by("nearest").addEventListener("click", () => space?.reset?.());
 by("full").addEventListener("click", fillScreen);
 by("space").addEventListener("dblclick", fillScreen);

@@ -12,6 +12,10 @@ const KEPT = 8000;
 /** Least mean time between pictures without a graphics card [ms]: the screen's own times are 17 ms apart. */
 const LEAST_MS = SOFTWARE ? 46 : 0;
 
+/** A fall is kept from so long before it to so long after it [s of bench time], and played so much slower. */
+const BEFORE_S = 1, AFTER_S = 0.4, REPLAY_RATE = 0.05;
+/** Where less motion is wanted, a picture comes after this time [ms]. */
+const STILL_MS = 1000;
 /** The path of the axis' end is drawn over this time [s of bench time]: some turns of the nutation. */
 const TRAIL_S = 1;
 /** Pixels without a graphics card, as a part of those that are shown: half would do, but is coarse to look at. */
@@ -37,45 +41,68 @@ export async function openSpace(canvas, description) {
 
   const [one, two] = [new THREE.Quaternion(), new THREE.Quaternion()];
   const trail = new Float32Array(3 * 2 * KEPT);
-  let times = [], places = [], turns = [], ups = [];
+  let live = {times: [], places: [], turns: [], ups: []}, fall = null, film = live;  // film: what is shown of them
   let playhead = NaN, last = 0, drawnAt = 0, rate = 1, speed = 1, paused = false, frames = 0;
 
   function add(start, step, position, quaternion, up) {
-    if (times.length && start < times.at(-1) - 1e-9) [times, places, turns, ups] = [[], [], [], []];  // a new bench
-    for (let k = 0; k < up.length; k += 1) {
-      times.push(start + k * step);
-      places.push(position.subarray(3 * k, 3 * k + 3));
-      turns.push(quaternion.subarray(4 * k, 4 * k + 4));
-      ups.push(up[k] !== 0);
+    const {times} = live;
+    if (times.length && start < times.at(-1) - 1e-9) {  // a new bench
+      const shows = film === live;
+      live = {times: [], places: [], turns: [], ups: []};
+      if (shows) film = live;
     }
-    if (times.length > KEPT) for (const list of [times, places, turns, ups]) list.splice(0, list.length - KEPT);
+    for (let k = 0; k < up.length; k += 1) {
+      live.times.push(start + k * step);
+      live.places.push(position.subarray(3 * k, 3 * k + 3));
+      live.turns.push(quaternion.subarray(4 * k, 4 * k + 4));
+      live.ups.push(up[k] !== 0);
+    }
+    if (live.times.length > KEPT) for (const list of Object.values(live)) list.splice(0, list.length - KEPT);
+  }
+
+  /** Keep the poses about a fall, once they are there; until then there is none to replay. */
+  function keepFall(at) {
+    const {times} = live, from = times.findIndex((time) => time >= at - BEFORE_S), to = times.findIndex((time) => time >= at + AFTER_S);
+    if (from < 0 || to < 0) return false;
+    fall = Object.fromEntries(Object.entries(live).map(([name, list]) => [name, list.slice(from, to)]));
+    return true;
+  }
+
+  /** Play the fall that was kept, and then go on with what is now. */
+  function replay() {
+    if (fall) [film, playhead] = [fall, fall.times[0]];
   }
 
   /** Move the playhead on by these seconds on the wall [s]. */
   function advance(seconds) {
-    const newest = times.at(-1), late = 0.12 * speed;
-    if (!(playhead >= times[0] && playhead <= newest)) playhead = Math.max(times[0], newest - late);
+    if (film === fall) {
+      playhead += seconds * REPLAY_RATE;
+      if (playhead < fall.times.at(-1)) return;
+      film = live;
+    }
+    const first = live.times[0], newest = live.times.at(-1), late = 0.12 * speed;
+    if (!(playhead >= first && playhead <= newest)) playhead = Math.max(first, newest - late);
     playhead += seconds * speed * rate;
     if (rate === 1) {
       const off = newest - late - playhead;
       playhead += Math.abs(off) > 0.5 * speed ? off : 0.1 * off;
-    } else if (playhead < times[0]) playhead = newest;
-    playhead = Math.min(Math.max(playhead, times[0]), newest);
+    } else if (playhead < first || !rate) playhead = newest;
+    playhead = Math.min(Math.max(playhead, first), newest);
   }
 
   /** The number of the last pose at a time, or before. */
   function poseAt(time) {
-    let low = 0, high = times.length - 1;
+    let low = 0, high = film.times.length - 1;
     while (high - low > 1) {
       const middle = (low + high) >> 1;
-      if (times[middle] <= time) low = middle;
+      if (film.times[middle] <= time) low = middle;
       else high = middle;
     }
     return low;
   }
 
   function place() {
-    const {view} = stage, time = flashes ? Math.max(flashes(playhead), times[0]) : playhead;
+    const {view} = stage, {times, places, turns, ups} = film, time = flashes ? Math.max(flashes(playhead), times[0]) : playhead;
     const low = poseAt(time), high = Math.min(low + 1, times.length - 1);
     const share = times[high] > times[low] ? Math.min((time - times[low]) / (times[high] - times[low]), 1) : 0;
     one.fromArray(turns[low]);
@@ -100,13 +127,15 @@ export async function openSpace(canvas, description) {
     return {place: here, up: ups[low], there, time: playhead};
   }
 
-  let state = null;
+  let state = null, stilled = 0;
   function draw(now) {
     requestAnimationFrame(draw);
     if (document.hidden || now - drawnAt < LEAST_MS) return;
     const seconds = Math.min((now - last) / 1000, 0.25);
     last = now;
-    if (times.length && !paused && rate > 0) {
+    const calm = !rate && film === live;
+    if (live.times.length && !paused && !(calm && state && now - stilled < STILL_MS)) {
+      if (calm) stilled = now;
       const before = playhead;
       advance(seconds);
       if (playhead !== before || !state) {
@@ -124,7 +153,8 @@ export async function openSpace(canvas, description) {
   requestAnimationFrame(draw);
 
   return {
-    add,
+    add, keepFall, replay,
+    get replays() { return film === fall && fall !== null; },
     get parts() { return parts; },
     setParts: (described) => {
       if (JSON.stringify(described) === JSON.stringify(parts)) return;

@@ -206,6 +206,17 @@ export function saidOf(data, drawn, k) {
   return `${value}${u} ${unit} at ${x}${left}`;
 }
 
+/** What is drawn of readings as a table of text, in the units of the axes; of many readings the lowest and the highest. */
+export function tableOf({x, low, high, u, single, xAxis, yAxis}) {
+  const name = ([label, unit]) => `${label}${unit ? ` [${unit}]` : ""}`.replaceAll(",", "");
+  const heads = single ? [name(xAxis), name(yAxis), ...u ? [`u of ${name(yAxis)}`] : []] : [name(xAxis), `lowest ${name(yAxis)}`, `highest ${name(yAxis)}`];
+  const rows = Array.from(x, (value, k) => {
+    const values = single ? [low[k] * yAxis[2], ...u ? [u[k] * yAxis[2]] : []] : [low[k] * yAxis[2], high[k] * yAxis[2]];
+    return [value * xAxis[2], ...values].map((one) => Number(one.toPrecision(8))).join(",");
+  });
+  return [heads.join(","), ...rows, ""].join("\n");
+}
+
 function nearest(x, toX, px) {
   let best = -1, least = 40;
   for (let k = 0; k < x.length; k += 1) {

@@ -54,12 +54,11 @@ export function openPractice(about, command, run, isOwn, allowed) {
   const pair = (id, slider, key) => {
     const field = by(id), {min, max, step: size} = field.dataset;  // a value between the steps is as good: the drive takes any
     const pass = () => {
-      const value = numberIn(field.value), name = field.getAttribute("aria-label");
-      if (field.value.trim() === "") return;
-      if (!(value >= Number(min) && value <= Number(max))) {
-        write("said", `${name}: ${Number.isFinite(value) ? "" : "a number "}from ${min} to ${max}, not ${field.value.trim()}`);
-        return;
-      }
+      const value = numberIn(field.value), empty = field.value.trim() === "";
+      const wrong = !empty && !(value >= Number(min) && value <= Number(max));
+      write(`${id}-wrong`, wrong ? `${Number.isFinite(value) ? "" : "a number "}from ${min} to ${max}, not ${field.value.trim()}` : "");
+      field.setAttribute("aria-invalid", String(wrong));
+      if (wrong || empty) return;
       field.value = by(slider).value = String(value);
       tune({[key]: value});
     };
@@ -72,6 +71,8 @@ export function openPractice(about, command, run, isOwn, allowed) {
     });
     by(slider).addEventListener("input", () => {
       field.value = by(slider).value;
+      write(`${id}-wrong`, "");
+      field.setAttribute("aria-invalid", "false");
       tune({[key]: Number(field.value)});
     });
   };
@@ -223,7 +224,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
   }
 
   function follow(id, value, decimals) {
-    if (!(value > 0)) return;
+    if (!(value > 0) || by(id).getAttribute("aria-invalid") === "true") return;  // what is wrong stays beside its message
     const text = String(Number(value.toFixed(decimals)));
     if (by(id).value !== text) by(id).value = by(`${id}-slider`).value = text;
   }

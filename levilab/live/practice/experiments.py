@@ -36,15 +36,19 @@ def _prefixed(table: str, *settings: str) -> tuple[str, ...]:
 #: A drive that has the top up in half a minute.  A square wave holds it better than a sine, by 4/π.
 _DRIVE = ("drive_waveform=SQU", "ramp_hz_per_s=0.1")
 
+#: What a count over 1 s scatters by here, by second differences of readings: the light wobbles with the top [Hz].
+_WOBBLE, _CALM = "reading_u_hz=0.012", "reading_u_hz=0.003"
+
 #: Name → row; the experiment of the guide first.
 PRACTICE: dict[str, PracticeExperiment] = {
     "spin": PracticeExperiment(
         "spin-down", "How does the air slow the top? Driven up and let go, until it falls.", "spin",
-        _prefixed("spin", *_DRIVE, "drive_frequency_hz=33", "hold_s=10", "interval_s=2"), 190.0,
+        _prefixed("spin", *_DRIVE, "drive_frequency_hz=33", "hold_s=10", "interval_s=2", _WOBBLE), 190.0,
     ),
     "triggered": PracticeExperiment(
         "spin-down, triggered drive", "Can the top drive itself? Its own tape starts each cycle of the drive.", "spin",
-        _prefixed("spin", "drive=triggered", "drive_frequency_hz=33", "hold_s=5", "interval_s=2"), 150.0,
+        _prefixed("spin", "drive=triggered", "drive_frequency_hz=33", "hold_s=5", "interval_s=2",
+                  _WOBBLE), 150.0,
     ),
     "hold": PracticeExperiment(
         "held spin", "How much drive balances the air at 33 Hz? The amplitude says it.", "hold",
@@ -70,7 +74,8 @@ PRACTICE: dict[str, PracticeExperiment] = {
     ),
     "loose washers": PracticeExperiment(
         "loose washers", "What if the tape slips? The counter then sees the washers, and not the top.", "spin",
-        _prefixed("spin", *_DRIVE, "drive_frequency_hz=32", "hold_s=20", "interval_s=2"), 160.0, scene="loose-washers",
+        _prefixed("spin", *_DRIVE, "drive_frequency_hz=32", "hold_s=20", "interval_s=2", _CALM), 160.0,
+        scene="loose-washers",
     ),
     "trace": PracticeExperiment(
         "records of the light", "What does the counter count? Five records of the oscilloscope.", "trace",

@@ -284,6 +284,49 @@ def test_the_last_minutes_of_the_bench_are_drawn_before_the_first_reading(
         until(page, "document.getElementById('plot').getAttribute('aria-label').startsWith('the last ')")
 
 
+def test_a_fall_is_replayed_and_what_is_drawn_is_saved(
+    served: Hall, watched: Callable[..., Page], tmp_path: Path
+) -> None:
+    """Where less motion is wanted the page shows a picture a second, and a replay all the same."""
+    run = GrowingRun(tmp_path)
+    page = watched(reduced_motion="reduce")
+    page.goto(address(served, run.folder.name))
+    until(page, "levilab.frames > 0")
+    assert page.input_value("#motion") == "0"
+    n = 1200  # 3 s; it falls after 1.5 s, by 1 mm a pose
+    up = np.arange(n) < n / 2
+    position = np.zeros((n, 3))
+    position[:, 2] = 0.075 - 1e-3 * np.clip(np.arange(n) - n / 2, 0, 55)
+    upright = np.tile([0.0, 0.0, 0.0, 1.0], (n, 1))
+    watch = served.watches[run.folder.name]
+    publish(watch, State(1.0, last={"spin_frequency_hz": 22.6}, virtual=True, speed=1.0))
+    until(page, "levilab.history.rows.length")
+    publish(watch, *(Poses(k / 400, 1 / 400, position[k : k + 300], upright[k : k + 300], up[k : k + 300])
+                     for k in range(0, n, 300)))  # fmt: skip
+    until(page, "levilab.space?.state && !levilab.space.state.up && document.getElementById('replay').offsetParent")
+    assert page.inner_text("#top-text") == "lies where it fell"
+    assert page.evaluate("levilab.history.marks.map(([, text]) => text)") == ["fell at 22.6 Hz"]
+    page.click("#replay")
+    until(page, "levilab.space.state.up && levilab.space.state.time < 1.5")  # and not 3 s, the newest
+    publish(watch, State(2.0, last={"spin_frequency_hz": 22.6}, virtual=True, speed=1.0))
+    until(page, "document.getElementById('top-text').textContent === 'falls, 20 times slower'")
+    with page.expect_download() as saved:
+        page.click("#csv")
+    rows = saved.value.path().read_text().splitlines()
+    assert rows[0] == "bench_time_s,spin_frequency_hz,drive_frequency_hz"
+    assert rows[1:] == ["1,22.6,", "2,22.6,"]
+    run.readings(spin_down(3))
+    until(page, "levilab.data.count === 3")
+    with page.expect_download() as saved:
+        page.click("#csv")
+    assert saved.value.suggested_filename == f"{run.folder.name}.csv"
+    table = np.loadtxt(saved.value.path(), delimiter=",", skiprows=1)
+    np.testing.assert_allclose(table, spin_down(3), rtol=1e-6)  # single precision on the way to the page
+    with page.expect_download() as saved:
+        page.click("#png")
+    assert saved.value.path().read_bytes().startswith(b"\x89PNG")
+
+
 #: When a pulse that passes half of its height at t triggers the page, from records that began at other times.
 TRIGGERED = """async (source) => {
   const {triggerOf, drawRecords, sheet} = await import("/page/plot.js");

@@ -118,7 +118,8 @@ def type_into_the_fields(page: Page) -> None:
     for typed, said in (("333", "from 1 to 100, not 333"), ("3o,5", "a number from 1 to 100, not 3o,5")):
         page.fill("#frequency", typed)
         page.keyboard.press("Enter")
-        until(page, f"document.getElementById('said').textContent === 'drive frequency in hertz: {said}'")
+        until(page, f"document.getElementById('frequency-wrong').textContent === '{said}'")
+        assert page.get_attribute("#frequency", "aria-invalid") == "true"
     for typed, vpp in (("9,5", 9.5), ("9.75", 9.75)):
         page.fill("#amplitude", typed)
         page.keyboard.press("Enter")

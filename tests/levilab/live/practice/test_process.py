@@ -159,6 +159,10 @@ def test_each_experiment_can_be_recorded_and_takes_as_long_as_is_said(tmp_path: 
     assert ended["time_s"] - began["time_s"] == pytest.approx(plan.length_s, rel=0.1, abs=2.0)
     assert run.record.configuration["scene"]["name"] == began["scene"]["name"] == (plan.scene or "practice")
     assert ended["scene"]["name"] == "practice"
+    if any("reading_u_hz" in setting for setting in plan.settings):
+        spin, u = (run.readings().column(f"spin_frequency_{one}hz") for one in ("", "u_"))
+        scatter = np.std(np.diff(spin, 2)) / math.sqrt(6)  # of a smooth course nothing else is left
+        assert u[0] == pytest.approx(scatter, rel=0.35)  # 20 to 60 readings, and a wobble that comes and goes
     assert ("the top is taken off: the probe goes where it floats" in script.said("message")) == (name == "field")
     assert (script.floated[-1] is False) == (name == "field")
 
