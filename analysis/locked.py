@@ -50,24 +50,9 @@ class Slip:
         return self.spin - self.drive
 
     @property
-    def warning(self) -> str:
-        """What it means, empty where the tape turns with the drive."""
-        if abs(self.difference) <= max(_SIGNIFICANT * self.u, self.least):
-            return ""
-        seen = f"the drive holds the top at {self.drive:.2f} Hz, but the counter sees {self.spin:.2f}({_u(self.u)}) Hz"
-        if self.difference > 0:
-            return (
-                f"{seen}: no tape overtakes the drive; is there a second bright mark, or is the trigger level too low?"
-            )
-        return (
-            f"{seen}: LOOSE WASHERS, the tape slips by {-self.difference:.2f} Hz; fix the washers to the top, for the "
-            "readings are of the tape and not of the top"
-        )
-
-
-def _u(u: float) -> str:
-    """Return a standard uncertainty in the second digit behind the point."""
-    return f"{max(round(100 * u), 1)}"
+    def significant(self) -> bool:
+        """Whether the tape does not turn with the drive."""
+        return abs(self.difference) > max(_SIGNIFICANT * self.u, self.least)
 
 
 def slip_of(spins: Sequence[float], drives: float | Sequence[float], *, least: float = LEAST_HZ) -> Slip:

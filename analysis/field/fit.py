@@ -8,7 +8,7 @@ the field at that height (effective variance: Orear, Am. J. Phys. 50, 912 (1982)
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -19,7 +19,7 @@ from analysis.errors import NotFinite, NotPositive, ShapesDiffer
 from analysis.field.errors import FieldStandsStill, FieldTurnsOver, ImpossibleRing, NoField, NotFitted, TooFewHeights
 from analysis.field.ring import Ring, on_axis, reversal, slopes
 from analysis.least_squares import solve
-from analysis.numbers import digits
+from analysis.remarks import Remark
 from analysis.residuals import durbin_watson, gross_errors, runs_test_p, studentise
 from analysis.uncertainty import Estimate, curvature
 
@@ -133,7 +133,7 @@ class FieldScan:
         height: of the readings, rising [m], shape (n,).
         flux_density: of the readings [T], shape (n,).
         u: of each reading against the model, with that of its height [T], shape (n,).
-        warnings: what to know before using the numbers.
+        remarks: what to know before using the numbers.
     """
 
     parameters: Mapping[str, Estimate]
@@ -144,7 +144,7 @@ class FieldScan:
     height: Array
     flux_density: Array
     u: Array
-    warnings: tuple[str, ...] = field(default=())
+    remarks: tuple[Remark, ...] = ()
 
     @cached_property
     def values(self) -> Array:
@@ -412,7 +412,7 @@ def _describe_scan(problem: _Problem, values: Array, sigma: Array) -> FieldScan:
     if found.covariance is None:
         raise NotFitted(what="flux density against height", advice="the readings do not tell the parameters apart")
     statistics = _statistics(problem, values, sigma)
-    factor, warnings = _misfit(statistics)
+    factor, misfit = _misfit(statistics)
     covariance = _whole_covariance(jacobian, found.covariance * factor, moved, known)
     covariance[0, 0] += (known.gain_u * values[0]) ** 2
     u = np.sqrt(np.diagonal(covariance))
@@ -422,7 +422,7 @@ def _describe_scan(problem: _Problem, values: Array, sigma: Array) -> FieldScan:
     }
     scan = FieldScan(parameters, covariance, free, known, statistics, problem.z, problem.b, sigma)
     leverage = found.leverage[: len(problem.z)]
-    return replace(scan, warnings=(*warnings, *_doubts(scan), *_outliers(scan, leverage)))
+    return replace(scan, remarks=(*misfit, *_doubts(scan), *_outliers(scan, leverage)))
 
 
 def _statistics(problem: _Problem, values: Array, sigma: Array) -> Statistics:
@@ -440,26 +440,17 @@ def _statistics(problem: _Problem, values: Array, sigma: Array) -> Statistics:
     )
 
 
-def _misfit(statistics: Statistics) -> tuple[float, list[str]]:
-    """Return the factor by which residuals beyond the uncertainties widen variances, and a warning."""
+def _misfit(statistics: Statistics) -> tuple[float, list[Remark]]:
+    """Return the factor by which residuals beyond the uncertainties widen variances, and a remark."""
     from scipy.special import chdtr, chdtrc
 
     reduced = statistics.reduced_chi_square
     if reduced is None or statistics.chi_square is None:
         return 1.0, []
     if float(chdtrc(statistics.degrees_of_freedom, statistics.chi_square)) < NO_FIT:
-        text = (
-            f"the fit leaves more than the stated uncertainties explain (χ²/dof = {digits(reduced, 3)}): all "
-            f"uncertainties are enlarged by {digits(math.sqrt(reduced), 3)}; is the probe on the axis, and are the "
-            "radii right?"
-        )
-        return reduced, [text]
+        return reduced, [Remark("scan scatters", (reduced,))]
     if float(chdtr(statistics.degrees_of_freedom, statistics.chi_square)) < _TOO_GOOD:
-        text = (
-            f"the readings scatter far less than their stated uncertainties (χ²/dof = {digits(reduced)}): what is "
-            "common to all of them, such as the scale of the instrument, belongs into gain_u and background_u_t"
-        )
-        return 1.0, [text]
+        return 1.0, [Remark("scan overstated", (reduced,))]
     return 1.0, []
 
 
@@ -538,41 +529,22 @@ def parts_of(scan: FieldScan, height_u: ArrayLike | float) -> dict[str, tuple[UP
     }
 
 
-_WORDS = {
-    "origin": "origin", "thickness": "thickness", "inner_radius": "inner radius", "outer_radius": "outer radius",
-    "background": "background",
-}  # fmt: skip
-#: Unit → unit in messages, and their ratio.
-_SHOWN = {"m": ("mm", 1e3), "T": ("µT", 1e6)}
-
-
-def _doubts(scan: FieldScan) -> list[str]:
-    """Return warnings: scan and calliper contradict each other, or the strength is not significant."""
-    texts = []
+def _doubts(scan: FieldScan) -> list[Remark]:
+    """Return remarks: scan and calliper contradict each other, or the strength is not significant."""
+    said = []
     for name in scan.fitted:
-        prior, found = scan.known.prior(name), scan.parameters[name]
-        if prior is None or found.value is None or found.u is None:
-            continue
-        unit, times = _SHOWN[found.unit]
-        if abs(found.value - prior.value) > APART * prior.u:
-            texts.append(
-                f"the scan wants {_WORDS[name]} = {times * found.value:.4g} {unit}, which lies "
-                f"{abs(found.value - prior.value) / prior.u:.1f} u from the stated {times * prior.value:.4g} {unit} "
-                f"(u = {digits(times * prior.u)} {unit}): measure it again, and where the heights are counted from"
-            )
-    low, strength = scan.parameters["strength"].value, scan.parameters["strength"].u
-    if low is not None and strength is not None and abs(low) < 3 * strength:
-        texts.append("the strength is not significantly different from zero: was the probe near the base?")
-    return texts
+        prior, found = scan.known.prior(name), scan.parameters[name].value
+        if prior is not None and found is not None and abs(found - prior.value) > APART * prior.u:
+            said.append(Remark("contradicts", (found, prior.value, prior.u), name))
+    strength = scan.parameters["strength"]
+    if strength.value is not None and strength.u is not None and abs(strength.value) < 3 * strength.u:
+        said.append(Remark("no strength"))
+    return said
 
 
-def _outliers(scan: FieldScan, leverage: Array) -> list[str]:
+def _outliers(scan: FieldScan, leverage: Array) -> list[Remark]:
     if scan.statistics.n - scan.statistics.n_parameters < 3:
         return []
     scaled = scan.residuals / scan.u
     found = gross_errors(studentise(scaled, leverage, scan.statistics.n_parameters, 1e-9), scan.statistics.n_parameters)
-    return [
-        f"the reading at {1e3 * scan.height[i]:.4g} mm lies {abs(scaled[i]):.1f} u off the others: "
-        "measure that height again"
-        for i in found
-    ]
+    return [Remark("stray reading", (float(scan.height[i]), float(abs(scaled[i])))) for i in found]

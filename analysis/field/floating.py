@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from analysis.field.fit import FieldScan
 from analysis.field.magnet import Disc, axial_field, stiffnesses
 from analysis.field.ring import Ring
-from analysis.numbers import digits
+from analysis.remarks import Remark
 from analysis.stability import AxialField, SymmetricTop, Window, equilibria, windows
 from analysis.uncertainty import Estimate, propagate
 
@@ -83,11 +83,11 @@ class Floating:
         values: name → estimate, of RESULTS: the heights and masses of the window far above the base; the spins of a top
             of mass_to_set, floating at height_at_mass; height_per_mass, the slope of height by mass; mass_to_add
             only if the top's mass is known, moment only if its height is, too.
-        warnings: what to know before using the numbers.
+        remarks: what to know before using the numbers.
     """
 
     values: Mapping[str, Estimate]
-    warnings: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
 
     def __getitem__(self, name: str) -> float:
         value = self.values[name].value
@@ -120,7 +120,7 @@ def follow(scan: FieldScan, top: KnownTop) -> Floating | None:
         if math.isfinite(value)
     }
     floating = Floating(estimates)
-    return replace(floating, warnings=tuple(_doubts(floating, top)))
+    return replace(floating, remarks=tuple(_doubts(floating, top)))
 
 
 def _input(scan: FieldScan, top: KnownTop) -> tuple[Array, Array]:
@@ -243,21 +243,14 @@ def _upper_window(field: AxialField, top: SymmetricTop, ring: Ring, near: list[W
     return lifted[-1]
 
 
-def _doubts(found: Floating, top: KnownTop) -> list[str]:
-    texts = []
+def _doubts(found: Floating, top: KnownTop) -> list[Remark]:
+    said = []
     if top.height is not None and top.height.value is not None:
-        height = top.height.value
-        low, high = found["lowest_height"], found["highest_height"]
+        height, low, high = top.height.value, found["lowest_height"], found["highest_height"]
         if not low <= height <= high:
-            texts.append(
-                f"the top is said to float at {1e3 * height:.4g} mm, by this scan tops float from {1e3 * low:.4g} to "
-                f"{1e3 * high:.4g} mm: are both counted from the same zero?"
-            )
+            said.append(Remark("another zero", (height, low, high)))
     width = found["heaviest_mass"] - found["lightest_mass"]
     u = found.values["mass_to_set"].u
     if u is not None and u > width / 4:
-        texts.append(
-            f"the mass to set is known to {digits(1e3 * u)} g only, and the window is {digits(1e3 * width)} g wide: "
-            "try masses about it; the height at which one floats gives the moment"
-        )
-    return texts
+        said.append(Remark("rough mass", (u, width)))
+    return said

@@ -289,13 +289,3 @@ def whole_counts(gates: Gates, expected: float) -> int:
     as_rate = float(np.sum((off - rate * some.length) ** 2))
     pulses = round(mean)
     return pulses if pulses and abs(mean - pulses) < _OF_A_PULSE and as_counts < as_rate else 0
-
-
-def pulses_too_many(pulses: int) -> str:
-    """Return a miscount as text.
-
-    >>> pulses_too_many(1), pulses_too_many(-2)
-    ('1 pulse too many', '2 pulses too few')
-    """
-    size = abs(pulses)
-    return f"{size} pulse{'s' * (size > 1)} too {'many' if pulses > 0 else 'few'}"

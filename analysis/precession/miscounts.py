@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.precession.gates import Gates, pulses_too_many, whole_counts
+from analysis.precession.gates import Gates, whole_counts
 from analysis.uncertainty import Estimate
 
 if TYPE_CHECKING:
@@ -64,17 +64,6 @@ class Miscount:
     def named(self) -> bool:
         """Whether a miscount explains it."""
         return self.times is not None or self.counts is not None
-
-    @property
-    def text(self) -> str:
-        """The miscount as text."""
-        if self.times is not None:
-            above, below = self.times
-            part = {(1, 2): "half", (2, 1): "twice"}.get(self.times, f"{above}/{below} of")
-            return f"{part} the frequency was counted"
-        if self.counts is not None:
-            return f"{pulses_too_many(self.counts)} in each gate"
-        return "far off the line, and no miscount explains it"
 
 
 def robust_line(x: Array, y: Array) -> Robust:

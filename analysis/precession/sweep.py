@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import NotFinite, NotPositive, ShapesDiffer
-from analysis.numbers import digits
 from analysis.precession.line import FEWEST, NO_FIT, Line, fit_line, fit_orthogonal, influence
 from analysis.precession.miscounts import Miscount, Robust, find_miscounts, robust_line
 from analysis.precession.power import Power, power_of
+from analysis.remarks import Remark
 
 if TYPE_CHECKING:
     from analysis.precession.gates import Gates
@@ -47,7 +47,7 @@ class Point:
         spin, u_spin: [Hz], where they were measured.
         leverage, residual, studentised, slope_change, intercept_change: see `analysis.precession.line.Influence`; None
             for a point that is left out, and if undefined.  A point that is left out has a residual, too.
-        miscount: text of a count of something else than the precession; None: the point is sound.
+        miscount: a count of something else than the precession, as it seems; None: the point is sound.
         used: whether the line goes through it.
     """
 
@@ -62,7 +62,7 @@ class Point:
     studentised: float | None
     slope_change: float | None
     intercept_change: float | None
-    miscount: str | None
+    miscount: Miscount | None
     used: bool
 
 
@@ -77,7 +77,7 @@ class SweepFit:
         power: what the test needs to distinguish a slope of 1.05 from 1.
         points: in the order given.
         spin_offset, u_spin_offset: mean of spin − drive [Hz], where the spin was measured.
-        warnings: what to know before using the numbers.
+        remarks: what to know before using the numbers.
     """
 
     line: Line
@@ -87,7 +87,7 @@ class SweepFit:
     points: tuple[Point, ...]
     spin_offset: float | None
     u_spin_offset: float | None
-    warnings: tuple[str, ...]
+    remarks: tuple[Remark, ...]
 
     @property
     def locked(self) -> bool | None:
@@ -136,7 +136,7 @@ def fit_sweep(sweep: Sweep, *, orthogonal: bool = False, keep_miscounts: bool = 
     fit_line(sweep.drive, sweep.precession)  # raises if no line goes through the points
     robust = robust_line(sweep.drive, sweep.precession)
     found = find_miscounts(sweep.drive, sweep.precession, sweep.u, robust, gate_s=sweep.gate_s, gates=sweep.gates)
-    used, warnings = _used_points(sweep, found, keep=keep_miscounts)
+    used, remarks = _used_points(sweep, found, keep=keep_miscounts)
     chosen = _part(sweep, used)
     line = _fit(chosen, orthogonal=orthogonal)
     spin_offset, u_spin_offset = _spin_offset(chosen)
@@ -148,9 +148,9 @@ def fit_sweep(sweep: Sweep, *, orthogonal: bool = False, keep_miscounts: bool = 
         points=_points(sweep, used, found, line),
         spin_offset=spin_offset,
         u_spin_offset=u_spin_offset,
-        warnings=(),
+        remarks=(),
     )
-    return replace(fit, warnings=(*warnings, *_doubts(fit, chosen, found)))
+    return replace(fit, remarks=(*remarks, *_doubts(fit, chosen, found)))
 
 
 # --- the points ---
@@ -178,8 +178,8 @@ def _check(sweep: Sweep) -> None:
             raise NotPositive(quantity=quantity, unit="Hz", index=int(below[0]), value=float(values[below[0]]))
 
 
-def _used_points(sweep: Sweep, found: list[Miscount], *, keep: bool) -> tuple[NDArray[np.bool_], list[str]]:
-    """Return which points the line uses, all but those whose miscount has a name; and warnings."""
+def _used_points(sweep: Sweep, found: list[Miscount], *, keep: bool) -> tuple[NDArray[np.bool_], list[Remark]]:
+    """Return which points the line uses, all but those whose miscount has a name; and remarks."""
     used = np.ones(sweep.drive.size, dtype=np.bool_)
     named = [one.index for one in found if one.named]
     if keep or not named:
@@ -187,11 +187,7 @@ def _used_points(sweep: Sweep, found: list[Miscount], *, keep: bool) -> tuple[ND
     used[named] = False
     if used.sum() >= max(FEWEST, sweep.drive.size / 2) and np.ptp(sweep.drive[used]) > 0:
         return used, []
-    text = (
-        f"{len(named)} of {sweep.drive.size} points look like miscounts: too many to leave out, so the line goes "
-        "through all of them; look at the laser's signal and the trigger level"
-    )
-    return np.ones_like(used), [text]
+    return np.ones_like(used), [Remark("many miscounts", (len(named), sweep.drive.size))]
 
 
 def _part(sweep: Sweep, used: NDArray[np.bool_]) -> Sweep:
@@ -238,7 +234,7 @@ def _points(sweep: Sweep, used: NDArray[np.bool_], found: list[Miscount], line: 
     chosen = _part(sweep, used)
     effects = influence(chosen.drive, chosen.precession, line, _weight(chosen, line))
     place = np.cumsum(used) - 1
-    texts = {one.index: one.text for one in found}
+    miscounts = {one.index: one for one in found}
     left = sweep.precession - line.at(sweep.drive)
 
     def at(values: Array | None, i: int) -> float | None:
@@ -260,7 +256,7 @@ def _points(sweep: Sweep, used: NDArray[np.bool_], found: list[Miscount], line: 
             studentised=of_used(effects.studentised, i),
             slope_change=of_used(effects.slope_change, i),
             intercept_change=of_used(effects.intercept_change, i),
-            miscount=texts.get(i),
+            miscount=miscounts.get(i),
             used=bool(used[i]),
         )
         for i in range(sweep.drive.size)
@@ -279,59 +275,47 @@ def _spin_offset(sweep: Sweep) -> tuple[float | None, float | None]:
     return mean, max(scatter, own)
 
 
-# --- warnings ---
+# --- remarks ---
 
 
-def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[str]:
-    texts = []
-    for one in found:
-        point = fit.points[one.index]
-        gate = (
-            ""
-            if sweep.gate_s or sweep.gates
-            else "; whether whole pulses are missing only the counter's gate could say"
-        )
-        what = one.text if one.named else f"{one.text}{gate} (it stays in)"
-        out = "" if point.used or not one.named else ", left out of the line"
-        texts.append(
-            f"point {one.index + 1}, {point.precession:.5g} Hz at a drive of {point.drive:.5g} Hz: {what}{out}"
-        )
+def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[Remark]:
+    gates_known = float(bool(sweep.gate_s or sweep.gates))
+    said = [
+        Remark("miscount", (one.index,)) if one.named else Remark("unexplained", (one.index, gates_known))
+        for one in found
+    ]
     line = fit.line
     if line.p_fit is not None and line.p_fit < NO_FIT:
-        texts.append(
-            f"the points scatter {digits(line.scale)} times as much as their u says (p = {digits(line.p_fit, 1)}): "
-            "all uncertainties are enlarged by that"
-        )
+        said.append(Remark("sweep scatters", (line.scale, line.p_fit)))
     if line.chi_square is not None and line.p_fit is not None and 1 - line.p_fit < NO_FIT:
-        texts.append(
-            f"the points scatter much less than their u says (χ² of {digits(line.chi_square)} for "
-            f"{line.degrees_of_freedom} degrees of freedom): their u is too large, and so is that of the line; gates "
-            "in a row scatter more than their mean, for a locked top swings about its drive and comes back"
-        )
+        said.append(Remark("sweep overstated", (line.chi_square, line.degrees_of_freedom)))
     if fit.p_locked is None:
-        texts.append("the points lie on the line to the last digit: without their u nothing can be tested; give it")
-    texts += [
-        f"point {k}, at {p.drive:.5g} Hz, alone moves the slope by {digits(abs(p.slope_change))}, {share:.1f} of its u"
-        for k, p in enumerate(fit.points, 1)
-        if p.slope_change is not None and line.u_slope and (share := abs(p.slope_change) / line.u_slope) > _FAR
+        said.append(Remark("sweep exact"))
+    said += [
+        Remark("moves the slope", (k, change, share))
+        for k, p in enumerate(fit.points)
+        if p.slope_change is not None
+        and line.u_slope
+        and (share := (change := abs(p.slope_change)) / line.u_slope) > _FAR
     ]
-    heavy = _HEAVY * 2 / line.n
-    texts += [
-        f"point {k}, at {p.drive:.5g} Hz, holds the line nearly by itself (leverage {p.leverage:.2f}): measure more "
-        "points near it"
-        for k, p in enumerate(fit.points, 1)
-        if p.leverage is not None and p.leverage > max(heavy, 0.9)
+    heavy = max(_HEAVY * 2 / line.n, 0.9)
+    said += [
+        Remark("holds the line", (k, p.leverage))
+        for k, p in enumerate(fit.points)
+        if p.leverage is not None and p.leverage > heavy
     ]
     if not line.orthogonal and sweep.u is not None and sweep.u_drive is not None:
-        texts += _about_drive(sweep.drive, sweep.u_drive, sweep.u, line)
+        said += _about_drive(sweep.drive, sweep.u_drive, sweep.u, line)
     if line.orthogonal and (sweep.u is None or sweep.u_drive is None):
-        texts.append("u of the drive's frequency is not known and taken as large as that of the precession")
-    texts += _about_spin(fit, sweep)
-    return texts
+        said.append(Remark("drive u unknown"))
+    off, u = fit.spin_offset, fit.u_spin_offset
+    if off is not None and u is not None and abs(off) >= max(_SPIN_SHARE * sweep.drive.mean(), _SPIN_FAR * u):
+        said.append(Remark("spin off", (off,)))
+    return said
 
 
-def _about_drive(drive: Array, u_drive: Array, u: Array, line: Line) -> list[str]:
-    """Return a warning if u of the drive's frequency matters.
+def _about_drive(drive: Array, u_drive: Array, u: Array, line: Line) -> list[Remark]:
+    """Return a remark if u of the drive's frequency matters.
 
     A relative u that is the same at all points is that of a clock.  It scales all frequencies by one factor, which
     changes the slope and moves no point off the line, so it needs no other regression.
@@ -339,27 +323,8 @@ def _about_drive(drive: Array, u_drive: Array, u: Array, line: Line) -> list[str
     share = float(np.median(u_drive / drive))
     if np.ptp(u_drive / drive) > _ONE_CLOCK * share:
         worst = float(np.max(u_drive / u))
-        text = f"u of the drive's frequency is up to {digits(worst)} u of the precession"
-        return [f"{text}: let it count with `orthogonal` = True"] if worst > _MATTERS else []
+        return [Remark("uncertain drive", (worst,))] if worst > _MATTERS else []
     of_slope = share * abs(line.slope)
     if line.u_slope is None or of_slope <= _MATTERS * line.u_slope:
         return []
-    text = f"u of the drive's frequency is {digits(share)} of it at all points, as that of a clock"
-    return [f"{text}: the slope is uncertain by {digits(of_slope)} beside its u of {digits(line.u_slope)}"]
-
-
-def _about_spin(fit: SweepFit, sweep: Sweep) -> list[str]:
-    offset, u = fit.spin_offset, fit.u_spin_offset
-    if (
-        offset is None
-        or u is None
-        or abs(offset) < _SPIN_SHARE * float(sweep.drive.mean())
-        or abs(offset) < _SPIN_FAR * u
-    ):
-        return []
-    where = "below" if offset < 0 else "above"
-    text = (
-        f"the spin that was counted lies {digits(abs(offset), 3)} Hz {where} the drive: a locked top spins with it; is "
-        "the tape on a loose washer, or was the top not locked?"
-    )
-    return [text]
+    return [Remark("uncertain clock", (share, of_slope, line.u_slope))]

@@ -362,8 +362,20 @@ def compare_with_drive(session: Session[D], slip: Slip) -> None:
     difference = with_sign(slip.difference, 3)
     text = f"held at {slip.drive:.2f} Hz: counted {slip.spin:.3f} Hz, {difference} Hz beside the drive"
     session.event(RunEvent.HELD, text, spin_frequency_hz=slip.spin, drive_frequency_hz=slip.drive, u_hz=slip.u)
-    if slip.warning:
-        session.warn(slip.warning)
+    if slip.significant:
+        session.warn(slip_in_words(slip))
+
+
+def slip_in_words(slip: Slip) -> str:
+    """Return the meaning of a tape that does not turn with the drive."""
+    counted = f"{slip.spin:.2f}({max(round(100 * slip.u), 1)})"
+    seen = f"the drive holds the top at {slip.drive:.2f} Hz, but the counter sees {counted} Hz"
+    if slip.difference > 0:
+        return f"{seen}: no tape overtakes the drive; is there a second bright mark, or is the trigger level too low?"
+    return (
+        f"{seen}: LOOSE WASHERS, the tape slips by {-slip.difference:.2f} Hz; fix the washers to the top, for the "
+        "readings are of the tape and not of the top"
+    )
 
 
 # --- a top, and time, for a series or a sweep ---

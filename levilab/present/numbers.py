@@ -103,6 +103,16 @@ def enumeration(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
+def pulses_too_many(pulses: int) -> str:
+    """Return a miscount as text.
+
+    >>> pulses_too_many(1), pulses_too_many(-2)
+    ('1 pulse too many', '2 pulses too few')
+    """
+    size = abs(pulses)
+    return f"{size} pulse{'s' * (size > 1)} too {'many' if pulses > 0 else 'few'}"
+
+
 def list_in_words(names: Sequence[str]) -> str:
     """Return the names, or the first of them.
 

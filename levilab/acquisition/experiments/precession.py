@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 from pydantic_core import PydanticCustomError
 
-from analysis.precession.gates import FEWEST, Gates, Rate, Swing, pulses_too_many, rates_at_point, swing_of
+from analysis.precession.gates import FEWEST, Gates, Rate, Swing, rates_at_point, swing_of
 from instruments.drivers.counter import LIGHT
 from instruments.errors import InstrumentError
 from levilab.acquisition.counting import gate_began, prepare_counter, prepare_counter_again
@@ -21,6 +21,7 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.bench.kinds import COUNTER
 from levilab.bench.person import Task
+from levilab.present.numbers import pulses_too_many
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.runs.gates import gates_event

@@ -9,7 +9,7 @@ import numpy as np
 from analysis.precession.sweep import EXCLUDED_P, Sweep, fit_sweep
 from levilab.crosscheck.own.model import Own
 from levilab.crosscheck.subject import Trial, pull_of
-from levilab.pipelines.precession.analysis import intercept_of, slope_of
+from levilab.pipelines.precession.words import intercept_of, slope_of
 
 if TYPE_CHECKING:
     from levilab.pipelines.precession.analysis import PrecessionAnalysis

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from levilab.crosscheck.subject import Pull, Subject, acquire_mock, pull_of
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.precession.analysis import intercept_of, slope_of
+from levilab.pipelines.precession.words import intercept_of, slope_of
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from analysis.errors import AnalysisError
-from analysis.field.fit import LEARNS_NOTHING, FieldScan, fit_scan
-from analysis.field.floating import FERRITE_PER_K, Floating, KnownTop, follow
-from analysis.numbers import digits
+from analysis.field.fit import FieldScan, fit_scan
+from analysis.field.floating import Floating, KnownTop, follow
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.field.device import known_of, known_top, usual
-from levilab.pipelines.field.quantities import QUANTITIES
 from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
+from levilab.pipelines.field.words import remark, scan_in_words, scans_in_words
 from levilab.pipelines.options import FieldOptions
 from levilab.pipelines.sources import Needs
-from levilab.present.numbers import enumeration, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -34,8 +32,6 @@ NEEDS = Needs(
     read_run=read_scan_run,
     particular=True,
 )
-#: Correlations above this are worth a word.
-_STRONG = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +43,7 @@ class FieldRun:
         top: of which top what follows is.
         floating: what follows, None where no top floats.
         text: what it says, in a few sentences.
-        warnings: what to know before using the numbers.
+        warnings: what else to know before using the numbers.
     """
 
     scan: FieldScan
@@ -88,13 +84,13 @@ class FieldAnalysis(Analyzed[FieldReadings, FieldRun, None, FieldOptions]):
         """What the data say, in a few sentences."""
         if len(self.runs) == 1:
             return self.runs[0].text
-        strength = self.values["strength"]
-        agree = _scatter_in_words(strength)
-        return f"{len(self.runs)} scans: {_format('strength', strength)} in the mean; {agree}. {_advice(self.values)}"
+        found = means([run.values for run in self.runs])
+        return scans_in_words(found, len(self.runs), found["strength"].scatter)
 
     def about_run(self, run: FieldRun) -> Iterable[str]:
         """Return what to know of one scan."""
-        return run.warnings
+        of_top = run.floating.remarks if run.floating else ()
+        return (*map(remark, run.scan.remarks), *run.warnings, *map(remark, of_top))
 
 
 def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> FieldRun:
@@ -120,8 +116,7 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
         warnings.append("no uncertainty of the readings is given: their scatter about the fit stands for it")
     if readings.height_u is None:
         warnings.append("no uncertainty of the heights is given: they are taken as exact")
-    every = (*scan.warnings, *warnings, *(floating.warnings if floating else ()))
-    return FieldRun(scan, top, floating, _in_words(scan, floating), every)
+    return FieldRun(scan, top, floating, scan_in_words(scan, floating), tuple(warnings))
 
 
 METHOD = Method(
@@ -149,87 +144,3 @@ def means(runs: Sequence[Mapping[str, Estimate]]) -> dict[str, Mean]:
         u = max(math.sqrt(sum(size**2 for size in sizes) / n), scatter / math.sqrt(n))
         found[name] = Mean(mean, u, runs[0][name].unit, scatter=scatter, runs=n)
     return found
-
-
-# --- in words ------------------------------------------------------------------------------------------
-
-
-def _format(name: str, estimate: Estimate) -> str:
-    return with_uncertainty(QUANTITIES[name].show(estimate))
-
-
-def _scatter_in_words(strength: Estimate) -> str:
-    assert isinstance(strength, Mean)
-    share = 100 * strength.scatter / abs(strength.value or 1.0)
-    return f"one differs from another by {digits(share)} %"
-
-
-def _in_words(scan: FieldScan, floating: Floating | None) -> str:
-    base = (
-        f"The base has ρ = {_format('strength', scan.parameters['strength'])}, its middle at "
-        f"{_format('origin', scan.parameters['origin'])}; its field points {_pole(scan)} above it."
-    )
-    parts = [base, _learned_in_words(scan)]
-    parts.append(_advice(floating.values) if floating else "No top floats above it.")
-    return " ".join(part for part in parts if part)
-
-
-def _pole(scan: FieldScan) -> str:
-    return "up" if scan.values[0] > 0 else "down (by the sign of the probe)"
-
-
-def _learned_in_words(scan: FieldScan) -> str:
-    """Return what the scan can tell, and what it cannot."""
-    words = {
-        "origin": "origin",
-        "thickness": "thickness",
-        "inner_radius": "inner radius",
-        "outer_radius": "outer radius",
-    }
-    of_calliper = [
-        words[name] for name in scan.fitted if name in words and (scan.learned(name) or 0.0) > LEARNS_NOTHING
-    ]
-    said = []
-    if of_calliper:
-        said.append(f"The scan does not tell {enumeration(of_calliper)} better than the calliper.")
-    pairs = [
-        (one, other)
-        for k, one in enumerate(scan.fitted)
-        for other in scan.fitted[k + 1 :]
-        if abs(scan.correlation(one, other)) > _STRONG
-    ]
-    said += [
-        f"{one.replace('_', ' ').capitalize()} and {other.replace('_', ' ')} can hardly be told apart "
-        f"(correlation {digits(scan.correlation(one, other))})."
-        for one, other in pairs
-    ]
-    return " ".join(said)
-
-
-def _advice(values: Mapping[str, Estimate]) -> str:
-    """Return the mass to set, and what to mind."""
-    if "mass_to_set" not in values:
-        return ""
-    shown = {name: _format(name, value) for name, value in values.items() if name in QUANTITIES}
-    per_mass = QUANTITIES["height_per_mass"].show(values["height_per_mass"]).value or 0.0  # mm/g
-    mass = values["mass_to_set"].value or 0.0
-    per_kelvin = 2 * FERRITE_PER_K * mass * 1e3
-    tops = (
-        f"Tops float from {shown['lowest_height']} to {shown['highest_height']} if they weigh {shown['lightest_mass']} "
-        f"to {shown['heaviest_mass']}. Set {shown['mass_to_set']}: such a top floats at {shown['height_at_mass']}, "
-        f"0.1 g more lowers it by {0.1 * abs(per_mass):.2f} mm, and it must spin at {shown['slowest_spin']} to "
-        f"{shown['fastest_spin']}."
-    )
-    texts = [tops]
-    if "moment" in values:
-        texts.append(f"From the height at which it floats its moment is {shown['moment']}.")
-    if "mass_to_add" in values:
-        add = values["mass_to_add"].value or 0.0
-        word = "add" if add > 0 else "take off"
-        amount = with_uncertainty(QUANTITIES["mass_to_add"].show(Estimate(abs(add), values["mass_to_add"].u, "kg")))
-        texts.append(f"To this top {word} {amount}." if add > 0 else f"From this top {word} {amount}.")
-    texts.append(
-        f"Ferrite loses 0.2 % of its strength per kelvin, base and top alike: 1 K warmer, and the mass to set is "
-        f"{abs(per_kelvin):.2f} g less."
-    )
-    return " ".join(texts)

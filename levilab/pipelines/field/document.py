@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import unquote
 from levilab.pipelines.document import Document, result_model, statistics_of, value_of, values_of
 from levilab.pipelines.field.analysis import METHOD, FieldAnalysis, FieldRun, Mean
 from levilab.pipelines.field.budget import budget_of_all, budget_of_run
+from levilab.pipelines.field.words import remark
 
 if TYPE_CHECKING:
     from analysis.uncertainty import Estimate
@@ -38,7 +38,7 @@ def _model(run: FieldRun) -> dict[str, Any]:
         "parameters": values_of(run.scan.parameters),
         "covariance": run.scan.covariance.tolist(),
         "statistics": statistics_of(run.scan.statistics),
-        "warnings": [unquote(text) for text in run.scan.warnings],
+        "warnings": [remark(each) for each in run.scan.remarks],
     }
 
 

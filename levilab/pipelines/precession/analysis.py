@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -10,22 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.errors import AnalysisError
-from analysis.numbers import digits
 from analysis.precession.coherence import Coherence, coherence, pulse_times
-from analysis.precession.sweep import EXCLUDED_P, Sweep, SweepFit, fit_sweep
-from analysis.uncertainty import Estimate
+from analysis.precession.sweep import Sweep, SweepFit, fit_sweep
+from analysis.remarks import Remark
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.options import PrecessionOptions
 from levilab.pipelines.precession.readings import SweepReadings, read_sweep_file, read_sweep_run
+from levilab.pipelines.precession.words import remarks_of, verdict
 from levilab.pipelines.sources import Needs
-from levilab.present.numbers import plain, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from analysis.precession.power import Power
     from levilab.pipelines.sources import Source
     from levilab.runs.traces import StoredTrace
 
@@ -84,11 +81,11 @@ class PrecessionAnalysis(Analyzed[SweepReadings, PrecessionRun, SweepFit, Preces
 
     def about_all(self) -> Iterable[str]:
         """Return what to know of the line through all points."""
-        return self.combined.warnings if len(self.runs) > 1 else ()
+        return remarks_of(self.combined) if len(self.runs) > 1 else ()
 
     def about_run(self, run: PrecessionRun) -> Iterable[str]:
         """Return what to know of one sweep."""
-        return (*run.fit.warnings, *run.warnings)
+        return (*remarks_of(run.fit), *run.warnings)
 
 
 def fit_source(source: Source[SweepReadings], options: PrecessionOptions) -> PrecessionRun:
@@ -130,11 +127,11 @@ def combine(runs: Sequence[PrecessionRun], options: PrecessionOptions) -> SweepF
     assert precession is not None
     sweep = Sweep(drive, precession, joined("u"), joined("u_drive"), joined("spin"), joined("u_spin"))
     fit = fit_sweep(sweep, orthogonal=options.orthogonal, keep_miscounts=True)
-    return replace(fit, warnings=(*fit.warnings, *_about_slopes(fits)))
+    return replace(fit, remarks=(*fit.remarks, *_about_slopes(fits)))
 
 
-def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[str]:
-    """Yield a word where the slopes of the runs differ by more than their u."""
+def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[Remark]:
+    """Yield a remark where the slopes of the runs differ by more than their u."""
     slopes = [(fit.line.slope, fit.line.u_slope) for fit in fits if fit.line.u_slope]
     if len(slopes) < 2:
         return
@@ -144,10 +141,7 @@ def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[str]:
     mean = np.sum(slope / u**2) / np.sum(u**-2.0)
     p = float(chdtrc(len(slope) - 1, float(np.sum(((slope - mean) / u) ** 2))))
     if p < DIFFERENT_P:
-        yield (
-            f"the slopes of the {len(slope)} runs differ by more than their u says (p = {digits(p, 1)}): the line "
-            "through all points has too small a u; look at the runs one by one"
-        )
+        yield Remark("slopes differ", (len(slope), p))
 
 
 METHOD = Method(
@@ -194,61 +188,3 @@ def _coherence(laser: StoredTrace, drive: StoredTrace, frequency: float) -> Cohe
     record, beside = laser.trace, drive.trace
     pulses = pulse_times(record.volts, record.dt_s, record.t0_s)
     return coherence(pulses, beside.volts, beside.dt_s, frequency, beside.t0_s)
-
-
-# --- in words ------------------------------------------------------------------------------------------
-
-
-def slope_of(fit: SweepFit) -> Estimate:
-    """Return the slope."""
-    return Estimate(fit.line.slope, fit.line.u_slope, "1")
-
-
-def intercept_of(fit: SweepFit) -> Estimate:
-    """Return the intercept."""
-    return Estimate(fit.line.intercept, fit.line.u_intercept, "Hz")
-
-
-def verdict(fit: SweepFit) -> str:
-    """Return what a sweep says, in a few sentences."""
-    head = f"Slope {with_uncertainty(slope_of(fit))}, intercept {with_uncertainty(intercept_of(fit))}."
-    return " ".join((head, _about_lock(fit), *([_about_power(fit.power)] if fit.power else [])))
-
-
-def _about_lock(fit: SweepFit) -> str:
-    p = fit.p_locked
-    if p is None:
-        return "Whether the top was locked to the drive cannot be tested without the u of the points."
-    if p >= EXCLUDED_P:
-        return f"A locked top, slope 1 and intercept 0, agrees with the {fit.line.n} points (p = {plain(p, 2)})."
-    return (
-        f"A locked top, slope 1 and intercept 0, is excluded (p = {plain(p, 1)}): the precession that was counted lies "
-        f"{digits(abs(_offset(fit)))} Hz {'above' if _offset(fit) > 0 else 'below'} the drive at "
-        f"{fit.line.centre:.4g} Hz."
-    )
-
-
-def _offset(fit: SweepFit) -> float:
-    return fit.line.height - fit.line.centre
-
-
-def _about_power(power: Power) -> str:
-    aim = f"a slope of {power.slope:g} from 1"
-    if power.enough:
-        return (
-            f"These points distinguish {aim} with a probability of {at_most(power.now)}; the smallest difference "
-            f"that they show in nine cases of ten is {plain(power.smallest_difference, 2)}. A range of "
-            f"{plain(power.range_needed_hz, 2)} Hz, or a u of {plain(power.u_needed_hz, 2)} Hz a point, would do."
-        )
-    points = "more than a million points" if power.points_needed is None else f"{power.points_needed} points"
-    return (
-        f"These points would distinguish {aim} in {100 * power.now:.0f} % of cases only. It takes {points} such as "
-        f"these ({power.points} now), a range of {plain(power.range_needed_hz, 2)} Hz ({plain(power.range_hz, 2)} Hz "
-        f"now), or a u of {plain(power.u_needed_hz, 2)} Hz a point ({plain(power.u_hz, 2)} Hz now), for nine cases of "
-        "ten."
-    )
-
-
-def at_most(probability: float) -> str:
-    """Return a probability, never shown as certainty."""
-    return "more than 0.999" if probability > 0.999 else f"{math.floor(1000 * probability) / 1000:.3f}"

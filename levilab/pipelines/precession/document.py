@@ -9,16 +9,10 @@ import numpy as np
 
 from analysis.precession.sweep import SweepFit
 from levilab.pipelines.document import Document, number, result_model, values_of
-from levilab.pipelines.precession.analysis import (
-    METHOD,
-    PrecessionAnalysis,
-    PrecessionRun,
-    intercept_of,
-    slope_of,
-    verdict,
-)
+from levilab.pipelines.precession.analysis import METHOD, PrecessionAnalysis, PrecessionRun
 from levilab.pipelines.precession.budget import budget_of_all, budget_of_run
 from levilab.pipelines.precession.quantities import QUANTITIES
+from levilab.pipelines.precession.words import intercept_of, slope_of, verdict
 from levilab.pipelines.row import find_all
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from levilab.pipelines.precession.analysis import intercept_of, slope_of
+from levilab.pipelines.precession.words import intercept_of, slope_of
 from levilab.pipelines.row import Quantity, columns_of, entry, statistic
 
 #: Of `analysis.precession.sweep.SweepFit`.

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from analysis.numbers import digits
-from analysis.precession.gates import pulses_too_many, rates_at_point, shared_scatter
+from analysis.precession.gates import rates_at_point, shared_scatter
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, read_table
 from levilab.pipelines.sources import SAME, Readings
+from levilab.present.numbers import pulses_too_many
 from levilab.runs.gates import gates_of
 
 if TYPE_CHECKING:

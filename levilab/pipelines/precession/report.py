@@ -19,8 +19,8 @@ from levilab.pipelines.part import (
     points_of,
     size_of_u,
 )
-from levilab.pipelines.precession.analysis import slope_of, verdict
 from levilab.pipelines.precession.table import coherence_table, lines_table, named_runs, points_table, power_table
+from levilab.pipelines.precession.words import slope_of, verdict
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Note, Paragraph, Tabular
 from levilab.present.numbers import off, plain, with_uncertainty

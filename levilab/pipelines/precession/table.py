@@ -9,7 +9,7 @@ import numpy as np
 
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import title_of
-from levilab.pipelines.precession.analysis import at_most, intercept_of, slope_of
+from levilab.pipelines.precession.words import at_most, intercept_of, slope_of
 from levilab.present.numbers import column, plain, short_name, with_decimals, with_sign, without_unit
 from levilab.present.tables import Row, Table, table
 

@@ -55,7 +55,7 @@ def test_a_scan_without_noise_gives_the_ring_back():
     # with a u of 1 nT; the prior of the background, 0 ± 50 µT, draws by its share of that, 1e-8
     assert found.values == pytest.approx(expected, rel=1e-5)
     assert found.fitted == PARAMETERS[:4]
-    assert found.warnings == () or "scatter far less" in found.warnings[0]
+    assert [of.kind for of in found.remarks] in ([], ["scan overstated"])
 
 
 def test_a_pole_that_points_down_is_the_same_but_for_the_sign():
@@ -108,19 +108,19 @@ def test_without_uncertainties_the_scatter_stands_for_them():
 def test_a_base_that_is_no_such_ring_enlarges_the_uncertainties():
     bent = scan() * (1 + 3 * Z)
     found = fit_scan(Z, bent, KNOWN, U_B, U_Z)
-    assert "leaves more than the stated uncertainties explain" in found.warnings[0]
-    assert any("the scan wants origin" in text for text in found.warnings)
+    assert found.remarks[0].kind == "scan scatters"
+    assert ("contradicts", "origin") in [(of.kind, of.name) for of in found.remarks]
 
 
 def test_a_slip_of_the_probe_is_named():
     slipped = scan()
     slipped[9] = on_axis(TRUTH, np.array([Z[9] + 0.004]))[0, 0]
-    texts = fit_scan(Z, slipped, KNOWN, U_B, U_Z).warnings
-    assert any("the reading at 75 mm lies" in text for text in texts)
+    said = fit_scan(Z, slipped, KNOWN, U_B, U_Z).remarks
+    assert ("stray reading", Z[9]) in [(of.kind, *of.values[:1]) for of in said]
 
 
 def test_an_uncertainty_that_is_common_to_all_is_recognised():
-    assert any("scatter far less" in text for text in fit_scan(Z, scan(), KNOWN, 2e-4, U_Z).warnings)
+    assert any(of.kind == "scan overstated" for of in fit_scan(Z, scan(), KNOWN, 2e-4, U_Z).remarks)
 
 
 @pytest.mark.parametrize(
@@ -161,4 +161,4 @@ def test_the_sign_may_change_where_that_of_the_base_does():
 def test_a_strength_within_three_of_its_uncertainties_is_doubted(strength, doubted):
     rough = 1e-4  # of a reading [T]: as noise of this size alone may make
     found = fit_scan(Z, scan(1, replace(TRUTH, strength=strength), u_b=rough), KNOWN, rough, U_Z)
-    assert any("not significantly different from zero" in text for text in found.warnings) is doubted
+    assert any(of.kind == "no strength" for of in found.remarks) is doubted

@@ -10,9 +10,10 @@ from scipy import stats
 from analysis.errors import NotPositive, ShapesDiffer
 from analysis.precession.gates import Gates
 from analysis.precession.line import fit_line
-from analysis.precession.miscounts import robust_line
+from analysis.precession.miscounts import Miscount, robust_line
 from analysis.precession.power import power_of
 from analysis.precession.sweep import Sweep, fit_sweep
+from analysis.remarks import Remark
 
 DRIVE = np.arange(26.0, 46.0, 2.0)
 NOISE = 0.02
@@ -31,6 +32,10 @@ def sweep(precession, **known):
     return Sweep(DRIVE, precession, np.full(DRIVE.size, NOISE), **known)
 
 
+def kinds(fit):
+    return [remark.kind for remark in fit.remarks]
+
+
 # --- miscounts ---
 
 
@@ -45,20 +50,20 @@ def test_the_median_line_has_the_median_of_all_slopes():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "text"),
+    ("wrong", "miscount"),
     [
-        ({"p3": 0.5}, "half the frequency was counted"),
-        ({"p3": 2.0}, "twice the frequency was counted"),
-        ({"n3": 1.0}, "2 pulses too many in each gate"),
-        ({"n3": -0.5}, "1 pulse too few in each gate"),
+        ({"p3": 0.5}, Miscount(3, (1, 2))),
+        ({"p3": 2.0}, Miscount(3, (2, 1))),
+        ({"n3": 1.0}, Miscount(3, counts=2)),
+        ({"n3": -0.5}, Miscount(3, counts=-1)),
     ],
 )
-def test_a_miscount_is_named_and_the_line_goes_on_without_it(wrong, text):
+def test_a_miscount_is_named_and_the_line_goes_on_without_it(wrong, miscount):
     fit = fit_sweep(sweep(counted(**wrong), gate_s=2.0))
     others = np.arange(DRIVE.size) != 3
-    assert fit.points[3].miscount == text
+    assert fit.points[3].miscount == miscount
     assert [point.used for point in fit.points] == others.tolist()
-    assert any("point 4" in w and text in w and "left out" in w for w in fit.warnings)
+    assert Remark("miscount", (3,)) in fit.remarks
     assert fit.line == fit_line(DRIVE[others], counted()[others], np.full(9, NOISE))
     kept = fit_sweep(sweep(counted(**wrong), gate_s=2.0), keep_miscounts=True)
     assert kept.line.n == DRIVE.size
@@ -67,7 +72,7 @@ def test_a_miscount_is_named_and_the_line_goes_on_without_it(wrong, text):
 def test_a_point_that_no_miscount_explains_stays_in_the_line():
     fit = fit_sweep(sweep(counted(n3=0.3), gate_s=2.0))
     assert fit.points[3].used
-    assert "no miscount explains it" in fit.warnings[0]
+    assert fit.remarks[0] == Remark("unexplained", (3, 1))
     assert fit.line.scale > 2  # and says that the points scatter more than their u
 
 
@@ -81,7 +86,7 @@ def test_counts_that_are_mostly_alike_have_a_line():
     exact = fit_sweep(Sweep(drive, drive))
     assert exact.line.slope == pytest.approx(1)
     assert exact.p_locked is None
-    assert "nothing can be tested" in exact.warnings[-1]
+    assert exact.remarks[-1] == Remark("sweep exact")
     many = np.append(np.full(2000, 30.0), [36.0, 37.0])
     assert robust_line(many, many).slope.value == pytest.approx(1)
 
@@ -133,13 +138,13 @@ def test_a_spin_beside_the_drive_is_warned_of():
     slow = DRIVE - 0.4 + NOISE * np.random.default_rng(1).standard_normal(DRIVE.size)
     fit = fit_sweep(sweep(counted(), spin=slow))
     assert fit.spin_offset == pytest.approx(-0.4, abs=0.03)
-    assert any("below the drive" in warning for warning in fit.warnings)
-    assert not fit_sweep(sweep(counted(), spin=DRIVE + (slow - DRIVE + 0.4))).warnings
+    assert fit.remarks == (Remark("spin off", (fit.spin_offset,)),)
+    assert not fit_sweep(sweep(counted(), spin=DRIVE + (slow - DRIVE + 0.4))).remarks
 
 
 def test_an_uncertain_drive_asks_for_the_orthogonal_line():
     u_drive = np.full(DRIVE.size, NOISE)
-    assert any("`orthogonal`" in w for w in fit_sweep(sweep(counted(), u_drive=u_drive)).warnings)
+    assert kinds(fit_sweep(sweep(counted(), u_drive=u_drive))) == ["uncertain drive"]
     both = fit_sweep(sweep(counted(), u_drive=u_drive), orthogonal=True)
     assert both.line.orthogonal
     one, two = fit_sweep(sweep(counted())).line, both.line
@@ -155,10 +160,11 @@ def test_what_is_no_sweep_is_named():
 
 def test_a_clock_that_is_off_by_one_share_does_not_ask_for_the_orthogonal_line():
     exact = fit_sweep(sweep(counted(), u_drive=2e-5 * DRIVE))
-    assert not exact.warnings
-    (text,) = fit_sweep(sweep(counted(), u_drive=2e-3 * DRIVE)).warnings
-    assert "as that of a clock: the slope is uncertain by 0.002 beside its u" in text
-    assert "orthogonal" not in text
+    assert not exact.remarks
+    fit = fit_sweep(sweep(counted(), u_drive=2e-3 * DRIVE))
+    (remark,) = fit.remarks
+    assert remark.kind == "uncertain clock"
+    assert remark.values == pytest.approx((2e-3, 2e-3 * fit.line.slope, fit.line.u_slope))
 
 
 def test_whole_counts_are_judged_by_the_gates_where_they_are_known():
@@ -168,6 +174,6 @@ def test_whole_counts_are_judged_by_the_gates_where_they_are_known():
     missed = [*gates[:3], Gates(begin, begin + length, DRIVE[3] - 1 / length), *gates[4:]]
     precession = counted(n3=-1.0)
     fit = fit_sweep(sweep(precession, gates=tuple(missed)))
-    assert fit.points[3].miscount == "1 pulse too few in each gate"
+    assert fit.points[3].miscount == Miscount(3, counts=-1)
     slower = [*gates[:3], Gates(begin, begin + length, np.full(10, DRIVE[3] - 1.0)), *gates[4:]]
     assert fit_sweep(sweep(precession, gates=tuple(slower))).points[3].used  # 1 Hz less in all gates: no whole counts

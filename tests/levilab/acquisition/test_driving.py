@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from analysis.locked import Slip
 from instruments.clock import VirtualClock
 from instruments.errors import NoAnswer
 from levilab.acquisition.counting import prepare_counter
@@ -16,6 +17,7 @@ from levilab.acquisition.driving import (
     _ramp_end,
     has_drifted,
     held_spin,
+    slip_in_words,
     sweep_drive,
 )
 from levilab.acquisition.experiment import Experiment
@@ -186,3 +188,10 @@ def test_ctrl_c_ends_a_hold_after_the_count_under_way(monkeypatch):
     with pytest.raises(Interrupted):
         _hold(session, 30.0)
     assert len(counts) == 1
+
+
+def test_a_tape_that_leads_its_drive_is_no_loose_washer():
+    behind, ahead = (slip_in_words(Slip(spin, 30.0, u=0.02, least=0.02)) for spin in (29.83, 30.17))
+    assert "the counter sees 29.83(2) Hz: LOOSE WASHERS, the tape slips by 0.17 Hz" in behind
+    assert "no tape overtakes the drive" in ahead
+    assert "LOOSE" not in ahead

@@ -1,0 +1,160 @@
+"""What a scan says, and what to know before using its numbers, as sentences."""
+
+from __future__ import annotations
+
+import math
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from analysis.field.fit import LEARNS_NOTHING, UNITS
+from analysis.field.floating import FERRITE_PER_K
+from analysis.numbers import digits
+from analysis.uncertainty import Estimate
+from levilab.pipelines.field.quantities import QUANTITIES
+from levilab.present.numbers import enumeration, with_uncertainty
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from analysis.field.fit import FieldScan
+    from analysis.field.floating import Floating
+    from analysis.remarks import Remark
+
+#: Correlations above this are worth a word.
+_STRONG = 0.9
+#: The parameters that a calliper measures.
+_OF_CALLIPER = ("origin", "thickness", "inner_radius", "outer_radius")
+
+
+def _format(name: str, estimate: Estimate) -> str:
+    return with_uncertainty(QUANTITIES[name].show(estimate))
+
+
+def scans_in_words(means: Mapping[str, Estimate], runs: int, scatter: float) -> str:
+    """Return what several scans say together, in a few sentences.
+
+    Args:
+        means: over the scans.
+        runs: number of scans.
+        scatter: of their strengths [T m].
+    """
+    strength = means["strength"]
+    share = 100 * scatter / abs(strength.value or 1.0)
+    return (
+        f"{runs} scans: {_format('strength', strength)} in the mean; one differs from another by {digits(share)} %. "
+        f"{_advice(means)}"
+    )
+
+
+def scan_in_words(scan: FieldScan, floating: Floating | None) -> str:
+    """Return what a scan says, in a few sentences."""
+    base = (
+        f"The base has ρ = {_format('strength', scan.parameters['strength'])}, its middle at "
+        f"{_format('origin', scan.parameters['origin'])}; its field points {_pole(scan)} above it."
+    )
+    parts = [base, _learned_in_words(scan)]
+    parts.append(_advice(floating.values) if floating else "No top floats above it.")
+    return " ".join(part for part in parts if part)
+
+
+def _pole(scan: FieldScan) -> str:
+    return "up" if scan.values[0] > 0 else "down (by the sign of the probe)"
+
+
+def _learned_in_words(scan: FieldScan) -> str:
+    """Return what the scan can tell, and what it cannot."""
+    of_calliper = [
+        name.replace("_", " ")
+        for name in scan.fitted
+        if name in _OF_CALLIPER and (scan.learned(name) or 0.0) > LEARNS_NOTHING
+    ]
+    said = []
+    if of_calliper:
+        said.append(f"The scan does not tell {enumeration(of_calliper)} better than the calliper.")
+    pairs = [
+        (one, other)
+        for k, one in enumerate(scan.fitted)
+        for other in scan.fitted[k + 1 :]
+        if abs(scan.correlation(one, other)) > _STRONG
+    ]
+    said += [
+        f"{one.replace('_', ' ').capitalize()} and {other.replace('_', ' ')} can hardly be told apart "
+        f"(correlation {digits(scan.correlation(one, other))})."
+        for one, other in pairs
+    ]
+    return " ".join(said)
+
+
+def _advice(values: Mapping[str, Estimate]) -> str:
+    """Return the mass to set, and what to mind."""
+    if "mass_to_set" not in values:
+        return ""
+    shown = {name: _format(name, value) for name, value in values.items() if name in QUANTITIES}
+    per_mass = QUANTITIES["height_per_mass"].show(values["height_per_mass"]).value or 0.0  # mm/g
+    mass = values["mass_to_set"].value or 0.0
+    per_kelvin = 2 * FERRITE_PER_K * mass * 1e3
+    tops = (
+        f"Tops float from {shown['lowest_height']} to {shown['highest_height']} if they weigh {shown['lightest_mass']} "
+        f"to {shown['heaviest_mass']}. Set {shown['mass_to_set']}: such a top floats at {shown['height_at_mass']}, "
+        f"0.1 g more lowers it by {0.1 * abs(per_mass):.2f} mm, and it must spin at {shown['slowest_spin']} to "
+        f"{shown['fastest_spin']}."
+    )
+    texts = [tops]
+    if "moment" in values:
+        texts.append(f"From the height at which it floats its moment is {shown['moment']}.")
+    if "mass_to_add" in values:
+        add = values["mass_to_add"].value or 0.0
+        word = "add" if add > 0 else "take off"
+        amount = with_uncertainty(QUANTITIES["mass_to_add"].show(Estimate(abs(add), values["mass_to_add"].u, "kg")))
+        texts.append(f"To this top {word} {amount}." if add > 0 else f"From this top {word} {amount}.")
+    texts.append(
+        f"Ferrite loses 0.2 % of its strength per kelvin, base and top alike: 1 K warmer, and the mass to set is "
+        f"{abs(per_kelvin):.2f} g less."
+    )
+    return " ".join(texts)
+
+
+# --- remarks -------------------------------------------------------------------------------------------
+
+#: SI unit → unit in messages, and their ratio.
+_SHOWN = {"m": ("mm", 1e3), "T": ("µT", 1e6)}
+
+
+def remark(of: Remark) -> str:
+    """Return a remark as a sentence, without its full stop."""
+    text = _REMARKS[of.kind]
+    return text if isinstance(text, str) else text(*of.values, **({"name": of.name} if of.name else {}))
+
+
+def _contradicts(found: float, stated: float, u: float, name: str) -> str:
+    unit, times = _SHOWN[UNITS[name]]
+    return (
+        f"the scan wants {name.replace('_', ' ')} = {times * found:.4g} {unit}, which lies "
+        f"{abs(found - stated) / u:.1f} u from the stated {times * stated:.4g} {unit} (u = {digits(times * u)} "
+        f"{unit}): measure it again, and where the heights are counted from"
+    )
+
+
+_REMARKS: Mapping[str, str | Callable[..., str]] = MappingProxyType({
+    "scan scatters": lambda reduced: (
+        f"the fit leaves more than the stated uncertainties explain (χ²/dof = {digits(reduced, 3)}): all uncertainties "
+        f"are enlarged by {digits(math.sqrt(reduced), 3)}; is the probe on the axis, and are the radii right?"
+    ),
+    "scan overstated": lambda reduced: (
+        f"the readings scatter far less than their stated uncertainties (χ²/dof = {digits(reduced)}): what is common "
+        "to all of them, such as the scale of the instrument, belongs into gain_u and background_u_t"
+    ),
+    "contradicts": _contradicts,
+    "no strength": "the strength is not significantly different from zero: was the probe near the base?",
+    "stray reading": lambda height, off: (
+        f"the reading at {1e3 * height:.4g} mm lies {off:.1f} u off the others: measure that height again"
+    ),
+    "another zero": lambda height, low, high: (
+        f"the top is said to float at {1e3 * height:.4g} mm, by this scan tops float from {1e3 * low:.4g} to "
+        f"{1e3 * high:.4g} mm: are both counted from the same zero?"
+    ),
+    "rough mass": lambda u, width: (
+        f"the mass to set is known to {digits(1e3 * u)} g only, and the window is {digits(1e3 * width)} g wide: try "
+        "masses about it; the height at which one floats gives the moment"
+    ),
+})  # fmt: skip

@@ -1,0 +1,153 @@
+"""What a sweep says, and what to know before using its numbers, as sentences."""
+
+from __future__ import annotations
+
+import math
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from analysis.numbers import digits
+from analysis.precession.sweep import EXCLUDED_P
+from analysis.uncertainty import Estimate
+from levilab.present.numbers import plain, pulses_too_many, with_uncertainty
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from analysis.precession.miscounts import Miscount
+    from analysis.precession.power import Power
+    from analysis.precession.sweep import Point, SweepFit
+
+
+def slope_of(fit: SweepFit) -> Estimate:
+    """Return the slope."""
+    return Estimate(fit.line.slope, fit.line.u_slope, "1")
+
+
+def intercept_of(fit: SweepFit) -> Estimate:
+    """Return the intercept."""
+    return Estimate(fit.line.intercept, fit.line.u_intercept, "Hz")
+
+
+def verdict(fit: SweepFit) -> str:
+    """Return what a sweep says, in a few sentences."""
+    head = f"Slope {with_uncertainty(slope_of(fit))}, intercept {with_uncertainty(intercept_of(fit))}."
+    return " ".join((head, _about_lock(fit), *([_about_power(fit.power)] if fit.power else [])))
+
+
+def _about_lock(fit: SweepFit) -> str:
+    p = fit.p_locked
+    if p is None:
+        return "Whether the top was locked to the drive cannot be tested without the u of the points."
+    if p >= EXCLUDED_P:
+        return f"A locked top, slope 1 and intercept 0, agrees with the {fit.line.n} points (p = {plain(p, 2)})."
+    return (
+        f"A locked top, slope 1 and intercept 0, is excluded (p = {plain(p, 1)}): the precession that was counted lies "
+        f"{digits(abs(_offset(fit)))} Hz {'above' if _offset(fit) > 0 else 'below'} the drive at "
+        f"{fit.line.centre:.4g} Hz."
+    )
+
+
+def _offset(fit: SweepFit) -> float:
+    return fit.line.height - fit.line.centre
+
+
+def _about_power(power: Power) -> str:
+    aim = f"a slope of {power.slope:g} from 1"
+    if power.enough:
+        return (
+            f"These points distinguish {aim} with a probability of {at_most(power.now)}; the smallest difference "
+            f"that they show in nine cases of ten is {plain(power.smallest_difference, 2)}. A range of "
+            f"{plain(power.range_needed_hz, 2)} Hz, or a u of {plain(power.u_needed_hz, 2)} Hz a point, would do."
+        )
+    points = "more than a million points" if power.points_needed is None else f"{power.points_needed} points"
+    return (
+        f"These points would distinguish {aim} in {100 * power.now:.0f} % of cases only. It takes {points} such as "
+        f"these ({power.points} now), a range of {plain(power.range_needed_hz, 2)} Hz ({plain(power.range_hz, 2)} Hz "
+        f"now), or a u of {plain(power.u_needed_hz, 2)} Hz a point ({plain(power.u_hz, 2)} Hz now), for nine cases of "
+        "ten."
+    )
+
+
+def at_most(probability: float) -> str:
+    """Return a probability, never shown as certainty."""
+    return "more than 0.999" if probability > 0.999 else f"{math.floor(1000 * probability) / 1000:.3f}"
+
+
+# --- remarks -------------------------------------------------------------------------------------------
+
+
+def miscount_in_words(of: Miscount) -> str:
+    """Return a miscount as text."""
+    if of.times is not None:
+        above, below = of.times
+        part = {(1, 2): "half", (2, 1): "twice"}.get(of.times, f"{above}/{below} of")
+        return f"{part} the frequency was counted"
+    if of.counts is not None:
+        return f"{pulses_too_many(of.counts)} in each gate"
+    return "far off the line, and no miscount explains it"
+
+
+def remarks_of(fit: SweepFit) -> tuple[str, ...]:
+    """Return the remarks on a sweep as sentences, without their full stops."""
+    return tuple(
+        text if isinstance(text := _REMARKS[of.kind], str) else text(fit.points, *of.values) for of in fit.remarks
+    )
+
+
+def _miscount(points: tuple[Point, ...], k: float, gates_known: float = 1.0) -> str:
+    point = points[int(k)]
+    assert point.miscount is not None
+    gate = "" if gates_known else "; whether whole pulses are missing only the counter's gate could say"
+    end = ("" if point.used else ", left out of the line") if point.miscount.named else f"{gate} (it stays in)"
+    return (
+        f"point {k + 1:.0f}, {point.precession:.5g} Hz at a drive of {point.drive:.5g} Hz: "
+        f"{miscount_in_words(point.miscount)}{end}"
+    )
+
+
+def _point(points: tuple[Point, ...], k: float) -> str:
+    return f"point {k + 1:.0f}, at {points[int(k)].drive:.5g} Hz"
+
+
+_REMARKS: Mapping[str, str | Callable[..., str]] = MappingProxyType({
+    "many miscounts": lambda _, named, n: (
+        f"{named:.0f} of {n:.0f} points look like miscounts: too many to leave out, so the line goes through all of "
+        "them; look at the laser's signal and the trigger level"
+    ),
+    "miscount": _miscount,
+    "unexplained": _miscount,
+    "sweep scatters": lambda _, scale, p: (
+        f"the points scatter {digits(scale)} times as much as their u says (p = {digits(p, 1)}): all uncertainties are "
+        "enlarged by that"
+    ),
+    "sweep overstated": lambda _, chi_square, freedom: (
+        f"the points scatter much less than their u says (χ² of {digits(chi_square)} for {freedom:.0f} degrees of "
+        "freedom): their u is too large, and so is that of the line; gates in a row scatter more than their mean, for "
+        "a locked top swings about its drive and comes back"
+    ),
+    "sweep exact": "the points lie on the line to the last digit: without their u nothing can be tested; give it",
+    "moves the slope": lambda points, k, change, share: (
+        f"{_point(points, k)}, alone moves the slope by {digits(change)}, {share:.1f} of its u"
+    ),
+    "holds the line": lambda points, k, leverage: (
+        f"{_point(points, k)}, holds the line nearly by itself (leverage {leverage:.2f}): measure more points near it"
+    ),
+    "uncertain drive": lambda _, worst: (
+        f"u of the drive's frequency is up to {digits(worst)} u of the precession: let it count with `orthogonal` = "
+        "True"
+    ),
+    "uncertain clock": lambda _, share, of_slope, u: (
+        f"u of the drive's frequency is {digits(share)} of it at all points, as that of a clock: the slope is "
+        f"uncertain by {digits(of_slope)} beside its u of {digits(u)}"
+    ),
+    "drive u unknown": "u of the drive's frequency is not known and taken as large as that of the precession",
+    "spin off": lambda _, off: (
+        f"the spin that was counted lies {digits(abs(off), 3)} Hz {'below' if off < 0 else 'above'} the drive: a "
+        "locked top spins with it; is the tape on a loose washer, or was the top not locked?"
+    ),
+    "slopes differ": lambda _, n, p: (
+        f"the slopes of the {n:.0f} runs differ by more than their u says (p = {digits(p, 1)}): the line through all "
+        "points has too small a u; look at the runs one by one"
+    ),
+})  # fmt: skip
