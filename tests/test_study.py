@@ -89,7 +89,7 @@ def test_points_of_the_lock_map_come_out_again() -> None:
 
 
 def test_the_page_begins_with_the_commands_of_both_maps() -> None:
-    shown = [line for line in TEXT.splitlines() if line.startswith("levilab sweep")]
+    shown = [line[2:] for line in TEXT.splitlines() if line.startswith("$ levilab sweep")]
     assert shown == [FOUND["commands"]["survival"], FOUND["commands"]["lock-sine"]]
     assert "'" not in "".join(FOUND["commands"].values())  # a quote that Windows does not know
 
