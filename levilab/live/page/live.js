@@ -27,7 +27,7 @@ const OWN_BENCH = ".";
 /** What a practice bench's oscilloscope shows, from above. */
 const CHANNELS = ["tape", "drive", "laser"];
 const PAUSED = "The view is paused, and shows nothing of what the bench would do: “Go on” first.";
-const SLIP_HZ = 0.05, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive; while it swings, or the drive moves
+const SLIP_HZ = 0.2, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive, on a ramp, too, which a count is 0.1 Hz behind; while it swings
 
 const token = takeToken();
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, source: null, records: {}};

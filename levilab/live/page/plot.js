@@ -92,7 +92,7 @@ export function drawReadings(paper, data, pointed) {
 
   const ends = u ? [low.map((value, k) => value - u[k]), high.map((value, k) => value + u[k])] : [low, high];
   const xs = extent(fit ? [x, fit.x] : [x], 0.02), ys = extent(fit ? [...ends, fit.y] : ends, 0.06);
-  const yMarks = ticks(ys[0] * fy, ys[1] * fy, split / 46), yTexts = yMarks.map((mark) => fixed(mark, decimals(yMarks)));
+  const yMarks = ticks(ys[0] * fy, ys[1] * fy, Math.max(2, split / 46)), yTexts = yMarks.map((mark) => fixed(mark, decimals(yMarks)));
   const edge = Math.max(LEFT, ASIDE + Math.max(...yTexts.map((text) => c.measureText(text).width)));
   const toX = (value) => edge + (value - xs[0]) / (xs[1] - xs[0]) * (width - edge - RIGHT);
   const toY = (value) => split - (value - ys[0]) / (ys[1] - ys[0]) * (split - TOP);

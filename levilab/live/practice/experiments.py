@@ -42,7 +42,7 @@ _WOBBLE, _CALM = "reading_u_hz=0.012", "reading_u_hz=0.003"
 #: Name → row; the experiment of the guide first.
 PRACTICE: dict[str, PracticeExperiment] = {
     "spin": PracticeExperiment(
-        "spin-down", "How does the air slow the top? Driven up and let go, until it falls.", "spin",
+        "spin-down", "How does the air slow the top? Driven to 33 Hz and let go, until it falls.", "spin",
         _prefixed("spin", *_DRIVE, "drive_frequency_hz=33", "hold_s=10", "interval_s=2", _WOBBLE), 190.0,
     ),
     "triggered": PracticeExperiment(

@@ -269,6 +269,8 @@ class PracticeProcess:
         self._tops = 0
         self._up_since: float | None = 0.0  # when the top that floats was put there, bench time [s]
         self._last_spin: float | None = None  # of that top [Hz]
+        self._looked = 0.0  # when it was looked at, bench time [s]
+        self._fell = ""  # why it fell while a run was recorded
         self._probe_m: float | None = None
 
     # --- the bench ---
@@ -324,6 +326,7 @@ class PracticeProcess:
     def _look_at_top(self) -> None:
         """See whether the top has fallen since the last look, and say why."""
         floats, now = self._floats(), self.clock.now()
+        self._looked = now
         if self._up_since is None:
             self._up_since = now if floats else None
         elif not floats:
@@ -332,7 +335,11 @@ class PracticeProcess:
             if self._hold is not None:
                 self._hold.is_lost = True
             hides = self._task is not None
-            self._say(cause_of_fall(self.scene, self._last_spin, after, driven=driven, hides=hides))
+            text = cause_of_fall(self.scene, self._last_spin, after, driven=driven, hides=hides)
+            if self._session is None:
+                self._say(text)
+            else:
+                self._fell = text  # the run says in its own words that it ended
 
     def _look_at_task(self, answer: float | None = None) -> None:
         """See whether the goal of the task under way is reached."""
@@ -380,11 +387,19 @@ class PracticeProcess:
         self._looking = True
         try:
             self._read_commands()
+            self._look_meanwhile()
             self._move_drive()
             self._publish()
             self._rest()
         finally:
             self._looking = False
+
+    def _look_meanwhile(self) -> None:
+        """See whether the top has fallen while a run is recorded."""
+        if self._session is None or self.clock.now() < self._looked + GATE_S:
+            return
+        self._last_spin = self._session.doing.seen.get("spin_frequency_hz", self._last_spin)
+        self._look_at_top()
 
     def _rest(self) -> None:
         """Let time stand still where a person says so, and while no view looks, lest the top be down when one comes."""
@@ -740,7 +755,12 @@ class PracticeProcess:
         else:
             text, status, folder = f"{run.status}: {run.count()} readings", run.status, str(run.folder)
         self._report("recorded", text, self._number, status=status, folder=folder, scene=self.scene.as_table())
-        self._up_since = self.clock.now() if self._floats() else None
+        if self._floats():
+            self._up_since = self.clock.now() if self._up_since is None else self._up_since
+        elif self._fell:
+            self._say(self._fell)
+            self._up_since = None
+        self._fell = ""
         self._place_probe(self._probe_m)  # a run may have moved it
         if AFTER_A_RUN < self.clock.speed < math.inf:
             self.clock.speed = AFTER_A_RUN
@@ -752,12 +772,14 @@ class PracticeProcess:
         """Have the top of an experiment on the bench meanwhile, or none where its probe goes; then the usual one."""
         if plan.experiment in MOVE_THE_PROBE:
             self.world.take_top()
+            self._up_since = None
             self._report("message", "the top is taken off: the probe goes where it floats")
         usual = self.world, self.scene, self._wiring
         if plan.scene:
             self.scene = read_scene(plan.scene)
             self.world = scene_world(self.scene, lambda: self.clock, partial(self._report, "message"))
             self._wiring = virtual_wiring(self.world, Limits())
+            self._up_since = self.clock.now()
         try:
             yield
         finally:

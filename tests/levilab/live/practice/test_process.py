@@ -163,6 +163,10 @@ def test_each_experiment_can_be_recorded_and_takes_as_long_as_is_said(tmp_path: 
         spin, u = (run.readings().column(f"spin_frequency_{one}hz") for one in ("", "u_"))
         scatter = np.std(np.diff(spin, 2)) / math.sqrt(6)  # of a smooth course nothing else is left
         assert u[0] == pytest.approx(scatter, rel=0.35)  # 20 to 60 readings, and a wobble that comes and goes
+    down = [text for text in script.said("message") if text.startswith("below 20.9 Hz")]
+    # a top that ends its run says why in the head of the page; the others are held, or put back by then
+    assert len(down) == (name in {"spin", "triggered", "lower limit"})
+    assert script.states[-1].text == (down[-1] if down else "")
     assert ("the top is taken off: the probe goes where it floats" in script.said("message")) == (name == "field")
     assert (script.floated[-1] is False) == (name == "field")
 
