@@ -181,6 +181,7 @@ class Method(Generic[S, R, Opt, A]):
         skips: whether of several inputs one that cannot be used is skipped with a warning.
         budget_of_run: what the uncertainties of one input's numbers are made of.
         budget_of_all: those of all inputs together, from what was found of each; of one input they are its own.
+        set_beside: puts a path that goes beside the inputs into the options.
     """
 
     needs: Needs[Any]
@@ -193,10 +194,11 @@ class Method(Generic[S, R, Opt, A]):
     skips: bool = False
     budget_of_run: Callable[[Source[S], R, Opt], tuple[Budget, ...]] = lambda *_: ()
     budget_of_all: Callable[[A], tuple[Budget, ...]] = lambda _: ()
+    set_beside: Callable[[Sequence[Path], Opt], tuple[Sequence[Path], Opt]] = lambda paths, options: (paths, options)
 
     def analyze(self, paths: Sequence[Path], options: Opt) -> A:
         """Analyze the inputs at the paths.  Raises DataError for what cannot be used; it names the file."""
-        paths = [find_run(path) for path in paths]
+        paths, options = self.set_beside([find_run(path) for path in paths], options)
         return self.analyze_found(paths, collect(paths, self.needs, lambda _: options), options)
 
     def analyze_found(self, paths: Sequence[Path], found: Found[S], options: Opt) -> A:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,9 +17,11 @@ from levilab.pipelines.sources import Needs
 from levilab.pipelines.spindown.document import DOCUMENT as SPINDOWN
 from levilab.pipelines.spindown.laws import SYMBOLS
 from levilab.present.numbers import list_in_words, plain, with_uncertainty
+from levilab.runs.run import read_record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+    from pathlib import Path
 
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
@@ -133,6 +135,14 @@ def _compare(laws: Sequence[HeldLaw], beside: SpinDownAnalysis) -> Iterable[tupl
                 yield law.name, (other, float((held.value - other.value) / np.hypot(held.u, other.u)))
 
 
+def set_spindown_beside(paths: Sequence[Path], options: HoldOptions) -> tuple[Sequence[Path], HoldOptions]:
+    """Take a single spin-down run among the paths for the one that the held spins are compared with."""
+    spindowns = [path for path in paths if (path / "run.json").exists() and read_record(path).experiment == "spin"]
+    if options.spindown or len(spindowns) != 1 or len(paths) == 1:
+        return paths, options
+    return [path for path in paths if path != spindowns[0]], replace(options, spindown=spindowns[0])
+
+
 METHOD = Method(
     needs=NEEDS,
     kind=HoldAnalysis,
@@ -141,4 +151,5 @@ METHOD = Method(
     combine=combine,
     mixed="a drag law through both says nothing about a real top",
     skips=True,
+    set_beside=set_spindown_beside,
 )

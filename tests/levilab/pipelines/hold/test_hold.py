@@ -64,6 +64,9 @@ def test_a_spin_down_is_compared():
     spindown, pull = found.combined.beside["disc"]
     assert pull == pytest.approx((disc.value - 2.371e-4) / np.hypot(disc.u, spindown.u), abs=0.3)
     assert "DISAGREES with" in found.text
+    among = analyzed([*RUNS, SAMPLE_DATA / "spin-down-1"])
+    assert among.combined.beside == found.combined.beside
+    assert len(among.runs) == len(found.runs)
 
 
 def test_a_result_is_as_the_interface_has_it(tmp_path):
