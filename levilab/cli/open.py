@@ -52,18 +52,18 @@ def open_files(
     **given: Any,
 ) -> None:
     """Show how files are understood, and analyze them."""
-    from levilab.pipelines.correction import read_correction, write_correction
-    from levilab.pipelines.look import look_at
+    from levilab.pipelines.correction import write_correction
+    from levilab.pipelines.look import look_as_kept
 
     files, options = paths or [], read_options(given, typed=True)
     shows = _has_browser() and not (keep or out or as_json) if browser is None else browser
     if not files and not shows:
         raise UsageError("FILE", "name a data file, as levilab open my.csv: there is no browser here to choose one")
-    looks = [look_at(path, {**read_correction(path), **options}, plots=False) for path in files]
+    looks = [look_as_kept(path, options, plots=False) for path in files]
     _print_looks(context, looks, as_json=as_json)
     readable = [look.path for look in looks if not look.problem]
     for path in readable if keep else []:
-        message(f"kept in {write_correction(path, {**read_correction(path), **options})}")
+        message(f"kept in {write_correction(path, options)}")
     if shows:
         _serve([(path, options) for path in files])
     if not readable:

@@ -389,14 +389,14 @@ def _looks(path: Path, request: Request) -> Iterator[_Look]:
     """Yield what is seen of each table at a path.  Raises TableError, OSError."""
     file, inside = locate(path)
     found = [look for text in texts_of(file) for look in _looks_at(file, text, request)]
-    taken = [look for look in found if _is_named(inside, look.name)]
+    taken = [look for look in found if is_named(inside, look.name)]
     if not taken:
         names = quote_names(look.name for look in found if look.name) or "none"
         raise TableError(file, f"has no sheet, file or run '{shorten(inside)}'; it has {names}")
     yield from taken
 
 
-def _is_named(inside: str, name: str) -> bool:
+def is_named(inside: str, name: str) -> bool:
     """Return whether a name in a file, such as "Tabelle1/Messung 2", is that of a run: all or one end of it."""
     return not inside or f"/{name}/".startswith(f"/{inside}/") or f"/{name}/".endswith(f"/{inside}/")
 

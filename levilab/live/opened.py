@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import hashlib
 import re
@@ -12,8 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError, UsageError
-from levilab.pipelines.correction import ENDING, CorrectionError, read_correction, read_file_options, write_correction
-from levilab.pipelines.look import look_at
+from levilab.formats.understanding import understand
+from levilab.pipelines.correction import ENDING, read_correction, read_file_options, write_correction
+from levilab.pipelines.look import look_as_kept, look_at
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Mapping
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
 MOST_BYTES = 400 << 20
 #: Files that are open at once, the oldest goes; and bytes of a name: those of its results are longer, 255 at most.
 MOST_FILES, LONGEST_NAME = 64, 120
+#: Sheets of a file that are opened beside it, at most.
+MOST_SHEETS = 16
 #: What no system takes in the name of a file, and names that Windows keeps for devices.
 _REFUSED = re.compile(r'[<>:"/\\|?*\x00-\x1f\x7f]')
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
@@ -87,7 +91,7 @@ class Opened:
         return key
 
     async def receive(self, name: str, pieces: AsyncIterator[bytes]) -> str:
-        """Keep a file that is sent, under a free name, and open it.  Returns its id.
+        """Keep a file that is sent, under a free name, and open it, and each of its sheets.  Returns its id.
 
         One of the same name and bytes is there already: that is opened.  Raises CannotTake.
         """
@@ -113,6 +117,9 @@ class Opened:
         finally:  # the file is closed by now: Windows removes none that is open
             with contextlib.suppress(OSError):
                 part.unlink()
+        runs = (await asyncio.to_thread(understand, place)).runs
+        for run in runs[:MOST_SHEETS] if len(runs) > 1 else ():  # each can be chosen, and corrected alone
+            self.add(run.path)
         return self.add(place)
 
     def _place(self, name: str, sha256: str) -> Path:
@@ -139,23 +146,17 @@ class Opened:
         one = self.get(key)
         if options is not None:
             one.options = read_file_options({name: value for name, value in options.items() if value is not None})
-        kept: dict[str, Any] = {}
-        problem = ""
+        problem: dict[str, Any] = {}
         try:
-            kept = read_correction(one.path)
+            used, look = {**read_correction(one.path), **one.options}, look_as_kept(one.path, one.options)
         except LevilabError as error:
-            problem = str(error)
-        used = {**kept, **one.options}
-        about = look_at(one.path, used).as_dict() | {"file": key, "options": used, "words": one.words}
-        return about | ({"problem": problem} if problem else {})
+            used, look, problem = one.options, look_at(one.path, one.options), {"problem": str(error)}
+        return look.as_dict() | {"file": key, "options": used, "words": one.words} | problem
 
     def keep(self, key: str) -> str:
         """Write how a file is read beside it.  Returns the name of that file.  Raises UsageError, CannotWrite."""
         one = self.get(key)
-        kept: dict[str, Any] = {}
-        with contextlib.suppress(CorrectionError):  # a broken one is replaced
-            kept = read_correction(one.path)
-        return write_correction(one.path, {**kept, **one.options}).name
+        return write_correction(one.path, one.options).name
 
     def get(self, key: object) -> OpenedFile:
         """Return an open file.  Raises UsageError."""

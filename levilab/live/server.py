@@ -30,7 +30,7 @@ from levilab.live.desk import parts_for, scene_of_run
 from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
 from levilab.live.opened import Opened
 from levilab.live.watch import Watch
-from levilab.pipelines.look import QUANTITIES
+from levilab.pipelines.look import QUANTITIES, name_of
 from levilab.pipelines.result import beside
 from levilab.runs.find import RECORD
 
@@ -428,7 +428,7 @@ def _analyze(hall: Hall, name: str) -> tuple[dict[str, Any], int]:
 
 
 def _list_files(hall: Hall, _: dict[str, Any]) -> dict[str, Any]:
-    files = [{"file": key, "name": one.path.name} for key, one in hall.opened.files.items()]
+    files = [{"file": key, "name": name_of(one.path)} for key, one in hall.opened.files.items()]
     units = {name: {"words": words, "units": units} for name, (words, units) in QUANTITIES.items()}
     return {"files": files, "folder": str(hall.opened.folder), "quantities": units}
 

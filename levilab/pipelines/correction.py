@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import difflib
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DataError, UsageError
 from levilab.files import parse_toml, replace_atomically, toml_value, writing
 from levilab.formats.columns import SHORTHANDS
-from levilab.formats.texts import locate
+from levilab.formats.texts import locate, texts_of
 from levilab.formats.titles import CANONICAL
+from levilab.formats.understanding import is_named, understand
 from levilab.pipelines.options import OF_FILES, read_options
 
 if TYPE_CHECKING:
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 ENDING = ".levilab.toml"
+#: The table of tables of what holds for one sheet or run of a file alone.
+_SHEET = "sheet"
 _HEAD = "# How levilab reads {name}; options on the command line go before.  levilab open --help\n"
 #: The values of each key, as text.
 _EXPECTED = {
@@ -44,8 +48,36 @@ def place_of_correction(file: Path) -> Path:
 def read_correction(file: Path) -> dict[str, Any]:
     """Return the options kept beside a data file, by the names of their fields; empty without any.
 
-    Raises CorrectionError, which names the file and the key.
+    Of a sheet or run in it those for that alone go before those of the whole file.  Raises CorrectionError, which names
+    the file and the key.
     """
+    inside = locate(file)[1]
+    found: dict[str, Any] = {}
+    for name, options in sorted(_read_all(file).items(), key=lambda each: len(each[0])):
+        found |= options if is_named(name, inside) else {}
+    return found
+
+
+def corrected_parts(file: Path) -> list[Path]:
+    """Return the file itself; where sheets or runs in it have corrections of their own, all its sheets and these runs.
+
+    Raises:
+        CorrectionError: the correction cannot be used.
+        DataError, OSError: the file cannot be read.
+    """
+    names = {} if locate(file)[1] or not file.is_file() else {file / name for name in _read_all(file) if name}
+    if not names:
+        return [file]
+    parts: list[Path] = []
+    for sheet in (text.path for text in texts_of(file)):
+        own = [name for name in names if name != sheet and name.is_relative_to(sheet)]
+        others = (run.path for run in understand(sheet).runs if not run.problem) if own else [sheet]
+        parts += [sheet] if sheet in names else dict.fromkeys([*own, *others])
+    return parts
+
+
+def _read_all(file: Path) -> dict[str, dict[str, Any]]:
+    """Return the options kept beside a data file by the sheet or run in it, "" for the whole file."""
     path = place_of_correction(file)
     if not path.is_file():
         return {}
@@ -55,8 +87,11 @@ def read_correction(file: Path) -> dict[str, Any]:
         raise CorrectionError(f"{path}: cannot be read ({error.strerror})") from error
     except ValueError as error:
         raise CorrectionError(f"{path}: is no TOML ({error}): correct it, or delete it") from error
+    sheets = table.pop(_SHEET, {})
+    if not isinstance(sheets, dict) or not all(isinstance(one, dict) for one in sheets.values()):
+        raise CorrectionError(f'{path}: [{_SHEET}."NAME"] is expected, and below it {", ".join(OF_FILES)}')
     try:
-        return read_file_options(table)
+        return {name: read_file_options(options) for name, options in {"": table, **sheets}.items()}
     except UsageError as error:
         raise CorrectionError(f"{path}: {error}") from error
 
@@ -89,16 +124,25 @@ def _is_of_kind(key: str, value: object) -> bool:
 
 
 def write_correction(file: Path, options: Mapping[str, Any]) -> Path:
-    """Keep how a data file is read, in place of an earlier correction.  Returns the file.
+    """Keep how a data file, or a sheet or run in it alone, is read, beside what was kept.  Returns the file.
+
+    A correction that cannot be used is replaced.
 
     Raises:
         UsageError: there is nothing to keep.
         CannotWrite: of the file.
     """
-    lines = [f"{key} = {toml_value(options[key])}\n" for key in OF_FILES if options.get(key) is not None]
-    if not lines:
+    path, inside = place_of_correction(file), locate(file)[1]
+    kept: dict[str, dict[str, Any]] = {"": {}}
+    with suppress(CorrectionError):
+        kept |= _read_all(file)
+    kept[inside] = {**kept.get(inside, {}), **{key: options[key] for key in OF_FILES if options.get(key) is not None}}
+    if not kept[inside]:
         raise UsageError("keep", "goes with `columns`, `channel` or `rate`: without one the file is read as it is")
-    path = place_of_correction(file)
+    lines = []
+    for name, those in kept.items():
+        lines += [f"\n[{_SHEET}.{toml_value(name)}]\n"] if name else []
+        lines += [f"{key} = {toml_value(value)}\n" for key, value in those.items()]
     with writing(f"{path}: could not be written", "copy the data file to a folder of yours"):
         replace_atomically(path, _HEAD.format(name=path.name.removesuffix(ENDING)) + "".join(lines))
     return path

@@ -12,10 +12,12 @@ import numpy as np
 from analysis.numbers import digits
 from levilab.errors import LevilabError
 from levilab.formats.table import read_table
+from levilab.formats.texts import locate
 from levilab.formats.understanding import UnderstoodColumn, UnderstoodRun, understand
 from levilab.formats.waveforms.header import NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes
+from levilab.pipelines.correction import corrected_parts, read_correction
 from levilab.pipelines.field import readings as scan
 from levilab.pipelines.limit import readings as limit
 from levilab.pipelines.precession import readings as precession
@@ -91,8 +93,19 @@ class Look:
         """Return it as JSON has it."""
         runs = [{**asdict(run), "path": str(run.path)} for run in self.runs]
         plots = {str(number): asdict(plot) for number, plot in self.plots.items()}
-        about = {"path": str(self.path), "name": self.path.name, "holds": self.holds, "problem": self.problem}
+        about = {"path": str(self.path), "name": name_of(self.path), "holds": self.holds, "problem": self.problem}
         return about | {"channels": list(self.channels), "rate": self.rate, "runs": runs, "plots": plots}
+
+
+def name_of(path: Path) -> str:
+    """Return the name of a file, with that of a sheet or run in it.
+
+    >>> from pathlib import Path
+    >>> name_of(Path("a/my.csv"))
+    'my.csv'
+    """
+    file, inside = locate(path)
+    return f"{file.name}/{inside}" if inside else file.name
 
 
 def look_at(path: Path, options: Mapping[str, Any], *, plots: bool = True) -> Look:
@@ -115,6 +128,26 @@ def look_at(path: Path, options: Mapping[str, Any], *, plots: bool = True) -> Lo
         return _look_at_record(path, record, options.get("channel"))
     except LevilabError as error:
         return Look(path, record.format, (), str(error))
+
+
+def look_as_kept(path: Path, options: Mapping[str, Any], *, plots: bool = True) -> Look:
+    """Return how a file is understood with the corrections kept beside it, of the file and of its sheets alone.
+
+    Args:
+        path: the file, or a sheet or run in it.
+        options: as `look_at` takes them; they go before those that are kept.
+        plots: whether small plots are made.
+
+    Raises:
+        CorrectionError: a correction cannot be used.
+    """
+    looks = [look_at(part, {**read_correction(part), **options}, plots=plots) for part in corrected_parts(path)]
+    if len(looks) == 1:
+        return looks[0]
+    runs = tuple(replace(run, name=locate(run.path)[1]) for look in looks for run in look.runs)
+    drawn = [look.plots.get(k) for look in looks for k in range(len(look.runs))]
+    problem = "" if any(not look.problem for look in looks) else looks[0].problem
+    return Look(path, _count_tables(runs), runs, problem, plots={k: plot for k, plot in enumerate(drawn) if plot})
 
 
 def _look_at_table(path: Path, columns: Mapping[str, str] | None, *, plots: bool) -> Look:

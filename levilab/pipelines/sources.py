@@ -23,7 +23,7 @@ from levilab.formats.understanding import SeveralRuns
 from levilab.formats.waveforms.audio import advice_on_sound
 from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.record import SEARCHED
-from levilab.pipelines.correction import describe, place_of_correction, read_correction
+from levilab.pipelines.correction import corrected_parts, describe, place_of_correction, read_correction
 from levilab.present.clock import local
 from levilab.present.numbers import list_in_words, short_name
 from levilab.runs.find import RECORD, find_runs, no_such_path
@@ -371,11 +371,26 @@ def in_one_line(text: str) -> str:
 
 def _at(path: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) -> Iterator[Source[R]]:
     """Yield the input at a path, or the runs in a file that holds several.  Raises DataError."""
-    try:
-        yield _one(path, needs, options(path))
-    except SeveralRuns as several:
-        for run in several.paths:
-            yield _of_file(run, needs, options(run))
+    parts = corrected_parts(path)
+    if parts == [path]:
+        try:
+            yield _one(path, needs, options(path))
+        except SeveralRuns as several:
+            for run in several.paths:
+                yield _of_file(run, needs, options(run))
+        return
+    sources: list[Source[R]] = []
+    errors: list[DataError] = []
+    for part in parts:
+        try:
+            sources += _at(part, needs, options)
+        except DataError as error:
+            errors.append(error)
+    damage = [error for error in errors if not isinstance(error, DoesNotSuit)]
+    if not sources:
+        raise [*damage, *errors][0]
+    notes = (f"not read: {error}" for error in damage)
+    yield from (replace(sources[0], warnings=(*sources[0].warnings, *notes)), *sources[1:])
 
 
 def _one(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
@@ -395,9 +410,7 @@ def _one(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
 
 def _of_file(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
     """Read a data file.  Options that are given go before those of the correction beside it."""
-    kept = {
-        key: value for key, value in read_correction(locate(path)[0]).items() if getattr(options, key) in (None, value)
-    }
+    kept = {key: value for key, value in read_correction(path).items() if getattr(options, key) in (None, value)}
     readings = needs.read_file(path, replace(options, **kept))
     note = [f"{path.name}: is read as {place_of_correction(path).name} says: {describe(kept)}"] if kept else []
     return Source(path, path, sha256_of(path), None, readings, path.name, (*readings.warnings, *note), kept)

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
+import xlsxwriter
 
 import levilab
 from levilab.errors import UsageError
+from levilab.live.opened import Opened
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.correction import CorrectionError, place_of_correction, read_correction, write_correction
+from levilab.pipelines.look import look_as_kept, name_of
 from levilab.pipelines.many.table import write_table
 from support.commands import command
+from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
 
 if TYPE_CHECKING:
+    from collections.abc import AsyncIterator
     from pathlib import Path
 
 #: A frequency in the first column and the time in the second, in turns a minute: not what a reader would guess.
@@ -63,6 +70,50 @@ def test_the_correction_is_used_named_and_recorded(swapped: Path) -> None:
     assert written["settings"]["columns"] == READ["columns"]
 
 
+def test_a_correction_of_a_sheet_holds_for_that_sheet_alone(tmp_path: Path) -> None:
+    """The first sheet has turns a minute first and the time behind, the second is as a reader expects it."""
+    times, spins = 4.0 * np.arange(30), 40.0 - 0.1 * np.arange(30)
+    with xlsxwriter.Workbook(path := tmp_path / "my.xlsx") as book:
+        for name, columns in (("Mine", [60 * spins, times]), ("Right", [["t [s]", *times], ["f [Hz]", *(spins - 1)]])):
+            sheet = book.add_worksheet(name)
+            for k, column in enumerate(columns):
+                sheet.write_column(0, k, column)
+    kept = command("open", "my.xlsx/Mine", "--columns", "t=2,f=1 [rpm]", "--keep", cwd=tmp_path)
+    assert kept.status == 0, kept.err
+    assert (
+        place_of_correction(path).read_text("utf-8").endswith('\n[sheet."Mine"]\ncolumns = {t = "2", f = "1 [rpm]"}\n')
+    )
+    assert read_correction(path) == {}
+    assert read_correction(path / "Mine") == READ
+    assert read_correction(path / "Right") == {}
+    found = levilab.analyze(path, "spindown").found
+    assert [source.path for source in found.sources] == [path / "Mine", path / "Right"]
+    assert [first(found, k) for k in (0, 1)] == pytest.approx([40, 39])
+    assert first(levilab.analyze(path / "Mine", "spindown").found) == pytest.approx(40)
+    shown = look_as_kept(path, {})
+    assert [(run.name, run.columns[0].quantity) for run in shown.runs] == [
+        ("Mine", "spin_frequency_hz"),
+        ("Right", "time_s"),
+    ]
+    write_correction(path, {"rate": 100.0})  # of the whole file: what is kept of the sheet stays
+    assert read_correction(path / "Mine") == {**READ, "rate": 100.0}
+
+
+def test_a_dropped_workbook_opens_with_its_sheets_to_be_corrected_alone(tmp_path: Path) -> None:
+    async def pieces() -> AsyncIterator[bytes]:
+        yield (SAMPLE_DATA / "student-files" / "excel-sheets.xlsx").read_bytes()
+
+    opened = Opened(tmp_path)
+    whole = asyncio.run(opened.receive("my.xlsx", pieces()))
+    keys = {name_of(one.path): key for key, one in opened.files.items()}
+    assert [*keys] == ["my.xlsx/Run 1", "my.xlsx/Run 2", "my.xlsx"]
+    opened.look(keys["my.xlsx/Run 2"], {"columns": {"t": "1", "f": "2 [rad/s]"}})
+    assert opened.keep(keys["my.xlsx/Run 2"]) == "my.xlsx.levilab.toml"
+    again = opened.look(whole)
+    assert [run["columns"][1]["unit"] for run in again["runs"]] == ["Hz", "rad/s"]
+    assert again["options"] == {}
+
+
 def test_options_that_are_given_go_before_it(swapped: Path) -> None:
     kept(swapped, 'columns = "t=1,f=2"\n')
     result = levilab.analyze(swapped, "spindown", columns=READ["columns"])
@@ -100,6 +151,8 @@ def test_a_report_follows_a_changed_correction(swapped: Path) -> None:
         ('columns = {speed = "2"}', "columns"),
         ('columns = "t"', "columns"),
         ("columns = {t = 1", "is no TOML"),
+        ("sheet = 3", "sheet"),
+        ('[sheet."A"]\nrate = -5', "rate"),
         ("\xff", "is no TOML"),
     ],
 )
