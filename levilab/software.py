@@ -2,8 +2,9 @@
 
 import platform
 import sys
+from contextlib import suppress
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 #: The libraries that compute or speak to instruments.
@@ -35,8 +36,8 @@ def software_versions() -> dict[str, str]:
 @cache
 def _versions() -> dict[str, str]:
     """Look them up once: that takes 5 ms, a third of what the analysis of a run does."""
-    return {
-        "python": platform.python_version(),
-        "platform": platform.platform(),
-        **{name: version(name) for name in LIBRARIES},
-    }
+    found = {"python": platform.python_version(), "platform": platform.platform()}
+    for name in LIBRARIES:
+        with suppress(PackageNotFoundError):  # numba is of an extra
+            found[name] = version(name)
+    return found

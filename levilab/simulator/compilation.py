@@ -6,6 +6,9 @@ import contextlib
 import time
 from typing import TYPE_CHECKING
 
+import levilab.simulator.kernels  # noqa: F401 - first, since its error says what to do without numba
+
+# isort: split
 from numba.core.event import Event, Listener, install_listener
 
 from levilab.simulator.kernels.splitting import advance

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import tomllib
 from typing import TYPE_CHECKING
 
 from levilab.software import how_to_install
 from support.paths import ROOT
+from support.waiting import HANG_GUARD_S
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,6 +30,32 @@ def test_every_extra_that_a_message_names_is_declared() -> None:
     declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
     texts = [path.read_text(encoding="utf-8") for path in (ROOT / "levilab").rglob("*.py")]
     named = {name for text in texts for name in re.findall(r"how_to_install\([\'\"](\w+)", text)}
-    assert named == {"cluster", "live", "parquet", "pdf", "peers", "scope", "video", "xarray"}
+    assert named == {"cluster", "live", "parquet", "pdf", "peers", "scope", "simulate", "video", "xarray"}
     assert named <= declared.keys()
     assert not [text for text in texts if re.search(r"pip install \S*levilab\\*\[", text)]
+
+
+#: Commands in one process that lacks what the extra simulate installs; each prints its exit status.
+WITHOUT_EXTRAS = """
+import sys
+sys.modules |= dict.fromkeys(("numba", "llvmlite", "zarr", "numcodecs", "xarray", "nicegui", "typst", "pyarrow"))
+from levilab.cli.main import main
+for words in ("acquire spin --mock --seed 1", "analyze spindown runs", "report runs --no-crosscheck",
+              "simulate undriven", "acquire precession --mock"):
+    sys.argv = ["levilab", *words.split()]
+    try:
+        main()
+        status = 0
+    except SystemExit as end:
+        status = end.code or 0
+    print("status", status)
+"""
+
+
+def test_without_extras_runs_are_acquired_analyzed_and_reported(tmp_path: Path) -> None:
+    words = [sys.executable, "-c", WITHOUT_EXTRAS]
+    options = {"capture_output": True, "text": True, "encoding": "utf-8", "timeout": HANG_GUARD_S}
+    done = subprocess.run(words, cwd=tmp_path, check=False, **options)
+    assert re.findall(r"status (\d)", done.stdout) == ["0", "0", "0", "1", "1"], done.stderr
+    assert done.stderr.count("need the extra simulate (numba and zarr, not installed)") == 2
+    assert "Traceback" not in done.stderr

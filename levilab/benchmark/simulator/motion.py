@@ -11,6 +11,9 @@ import math
 from importlib.resources import files
 from typing import Any
 
+import levilab.simulator.kernels  # noqa: F401 - first, since its error says what to do without numba
+
+# isort: split
 import numba
 import numpy as np
 from numpy.typing import NDArray
