@@ -46,7 +46,7 @@ def worksheet(
         list[str] | None,
         typer.Argument(metavar="[EXPERIMENT]…", help="spin, limit, field or precession; by default all."),
     ] = None,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the files are written.")] = Path("worksheets"),
+    out: Annotated[Path, place("DIR", "Where the files are written.")] = Path("worksheets"),
     groups: Annotated[int, typer.Option(min=1, max=500, metavar="N", help="How many, each with its seed.")] = 20,
     seed: Annotated[int, typer.Option(min=0, metavar="N", help="Of the first group; the next ones count up.")] = 1,
     language: Annotated[str, typer.Option(metavar="CODE", help="en or de.")] = "en",
