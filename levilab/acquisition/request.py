@@ -21,7 +21,7 @@ from levilab.bench.wiring import described_wiring
 from levilab.errors import DataError, LevilabError, UsageError
 from levilab.formats.typed import read_masses, read_temperature
 from levilab.runs.find import run_to_resume
-from levilab.runs.run import Run
+from levilab.runs.run import LONGEST_GROUP, Run
 from levilab.settings import in_one_line
 from levilab.simulator.keys import parse_setting
 from levilab.simulator.scene import SceneError, read_scene, scene_of
@@ -171,15 +171,11 @@ def _typed(name: str, text: str | None, read: Callable[[str], T]) -> T | None:
         raise UsageError(name, str(error), value=text) from error
 
 
-#: Letters of the name of a group, so that it has room in tables and figures.
-_LONGEST_GROUP = 24
-
-
 def _group(typed: str) -> str:
     """Return the name of a group.  Raises UsageError."""
     group = " ".join(typed.split())
-    if len(group) > _LONGEST_GROUP or not group.isprintable():
-        raise UsageError("group", f"a name of at most {_LONGEST_GROUP} letters is expected, as Group 7", value=typed)
+    if len(group) > LONGEST_GROUP or not group.isprintable():
+        raise UsageError("group", f"a name of at most {LONGEST_GROUP} letters is expected, as Group 7", value=typed)
     return group
 
 

@@ -273,6 +273,7 @@ def _about(followed: Followed, failure: str) -> dict[str, Any]:
         "experiment": record.experiment,
         "started_utc": record.started_utc,
         "ended_utc": record.ended_utc,
+        "group": record.group[:500],
         "note": record.note[:500],
         "synthetic": record.synthetic,
         "instruments": {

@@ -41,6 +41,8 @@ READINGS, STATES, EVENTS, LOCK, WIRE, PACKAGE = (
     "datapackage.json",
 )
 
+#: Letters of the name of a group, so that it has room in tables and figures.
+LONGEST_GROUP = 24
 #: Rows of readings that a notebook shows.
 SHOWN_ROWS = 5
 _NUMBERS = re.compile(r"[\d.]+(\(\d+\))?")

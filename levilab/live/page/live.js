@@ -319,7 +319,7 @@ let facts = "";
 function showFacts(about) {
   const rows = about ? [
     ["experiment", about.experiment], ["started", (about.started_utc || "").replace("T", " ").replace(/\..*/, " UTC")],
-    ["ended", (about.ended_utc || "").replace("T", " ").replace(/\..*/, " UTC")], ["note", about.note],
+    ["ended", (about.ended_utc || "").replace("T", " ").replace(/\..*/, " UTC")], ["group", about.group], ["note", about.note],
     ...Object.entries(about.instruments || {}).map(([kind, one]) => [kind, one.identity || one.driver]),
     ["folder", seen.run],
   ].filter(([, text]) => text) : [];

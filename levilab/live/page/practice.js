@@ -84,7 +84,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     match: () => send("match the drive"),
     back: () => send("put the top back"),
     hold: () => send("pause", {on: !now.paused}),
-    record: () => now.busy ? send("stop the run") : send("record a run", {experiment: by("experiment").value}),
+    record: () => now.busy ? send("stop the run") : send("record a run", {experiment: by("experiment").value, group: by("group").value}),
     analyze: () => openResult(run()),
     report: () => { now.read = run(); },
   };

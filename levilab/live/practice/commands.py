@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, StrictBool, TypeAdapter, ValidationError
 
 from levilab.errors import LevilabError
+from levilab.runs.run import LONGEST_GROUP
 from levilab.settings import Settings, in_one_line
 
 #: The speeds of the bench: seconds of it in one of the wall.
@@ -110,12 +111,13 @@ class RecordRun(Settings):
     Attributes:
         experiment: its name in PRACTICE, or of `levilab acquire`.
         settings: as for the command line, such as "spin.interval_s=5"; none: those of PRACTICE.
-        note: kept with the run.
+        group, note: kept with the run.
     """
 
     do: Literal["record a run"] = "record a run"
     experiment: str
     settings: tuple[Annotated[str, Field(max_length=200)], ...] = Field(default=(), max_length=50)
+    group: str = Field(default="", max_length=LONGEST_GROUP)
     note: str = Field(default="", max_length=1000)
 
 

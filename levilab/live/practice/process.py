@@ -491,7 +491,7 @@ class PracticeProcess:
     def _(self, command: RecordRun) -> str:
         self._free_bench()
         plan = plan_of(command)
-        self._request(plan, command.note)  # raises where it is not possible
+        self._request(plan, command)  # raises where it is not possible
         if plan.experiment in NEED_A_TOP and not plan.scene and not self._floats():
             raise CommandRefused(
                 f"the top is down, and a {plan.experiment} run begins with one that floats: put the top back first"
@@ -734,9 +734,14 @@ class PracticeProcess:
 
     # --- runs ---
 
-    def _request(self, plan: PracticeExperiment, note: str) -> Any:
+    def _request(self, plan: PracticeExperiment, command: RecordRun) -> Any:
         options = AcquisitionOptions(
-            mock=True, out=Path(self._options.out), seed=self._options.seed, note=note, settings=plan.settings
+            mock=True,
+            out=Path(self._options.out),
+            seed=self._options.seed,
+            group=command.group,
+            note=command.note,
+            settings=plan.settings,
         )
         scene = read_scene(plan.scene) if plan.scene else self.scene
         return request_at(self._wiring, scene, plan.experiment, options)
@@ -748,7 +753,7 @@ class PracticeProcess:
         self._folder = ""  # a run may fail before it has one
         try:
             with self._top_for(plan):
-                request = self._request(plan, command.note)
+                request = self._request(plan, command)
                 run = acquire(request, LinesToReport(partial(self._report, "message")), self._watching)
         except (LevilabError, InstrumentError) as error:
             text, status, folder = unquote(str(error)), "failed", self._folder

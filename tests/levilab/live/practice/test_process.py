@@ -201,7 +201,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Script:
         (88.0, PlaceProbe(height_m=0.05)),
         (92.0, RecordRun(experiment="dance")),
         (92.0, RecordRun(experiment="spin", settings=("spin.gate_s=-1",))),
-        (92.0, RecordRun(experiment="spin", settings=QUICK, note="<b>first</b>")),
+        (92.0, RecordRun(experiment="spin", settings=QUICK, group="Group 7", note="<b>first</b>")),
         (93.0, SwitchDrive(on=True)),
         (93.0, RecordRun(experiment="field")),
         (154.0, StopRun()),
@@ -417,6 +417,7 @@ def test_a_run_that_is_stopped_is_kept_and_the_bench_goes_on(session: Script) ->
     assert recorded == [13, 13, 17, 17]  # those of the two commands that were not refused
     run = Run.load(Path(first["folder"]))
     assert (run.status, run.record.synthetic, run.record.note) == ("interrupted", True, "<b>first</b>")
+    assert run.record.group == "Group 7"
     assert run.count() > 3
     assert run.record.configuration["scene"]["name"] == "practice"
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
