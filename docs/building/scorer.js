@@ -1,7 +1,18 @@
-// How the search of the site ranks pages: those of users before those of developers and the reference.
+// How the search of the site ranks pages: that of the typed word first, users' pages before those of developers.
 // The weights are those of Sphinx (searchtools.js); `score` adds the page's own factor.
 var Scorer = {
+  // words that people type → the page for them
+  pages: {
+    excel: "open-my-file", spreadsheet: "open-my-file", xlsx: "open-my-file", csv: "open-my-file",
+    labview: "open-my-file", arduino: "open-my-file", audio: "open-my-file", smartphone: "phone", phyphox: "phone",
+    microphone: "sound-card", "sound card": "sound-card", jupyter: "notebook", python: "notebook", grading: "class",
+    students: "class", windows: "install", oscilloscope: "instruments/oscilloscope", washers: "experiments/washers",
+    pdf: "report", tutorial: "tutorial", wav: "open-my-file", mp3: "open-my-file", film: "video", animation: "animation",
+  },
   score: ([page, title, anchor, description, score, file]) => {
+    const typed = (new URLSearchParams(location.search).get("q") || "").trim().toLowerCase();
+    if (Scorer.pages[typed] === page) return 1000 + score;
+    if (typed && !anchor && title.toLowerCase().includes(typed)) score += 100;
     if (/^(decisions\/|reference\/|speed$|mutants$|fuzzing$|contributing$|changes$)/.test(page)) return 0.2 * score;
     if (/^(reproduce$|sweeps-at-scale$)/.test(page)) return 0.4 * score;
     if (/^(data|install|bench|experiments\/|report|notebook)/.test(page)) return 1.5 * score;
