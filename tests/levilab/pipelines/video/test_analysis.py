@@ -63,18 +63,6 @@ def compare(found, flight):
     return errors - errors.mean(axis=1, keepdims=True), np.array(pulls)
 
 
-def test_a_tilted_top_under_a_rolling_shutter_has_its_place_and_spin(folder):
-    flight = flight_of(preset("tilted"), 0.8)
-    path = film(folder / "tilted.mp4", Camera(line_time=10e-6), flight, phone_times(0.8))
-    for line_time in (0.0, 10e-6):  # not known and known
-        found = analyze_film(path, VideoOptions(rim_m=2 * RIM, line_time_s=line_time))
-        errors, pulls = compare(found, flight)
-        assert np.abs(errors).max() < 1e-4
-        assert np.std(errors / found.u) == pytest.approx(1, abs=0.5)
-        assert np.abs(pulls * found.turning.u).max() < 1e-3
-        assert found.spin.u < 1e-3
-
-
 def test_a_dot_on_the_stem_shows_the_precession_and_the_size_of_the_rim_the_rise(folder, path):
     level = level_flight(2.3, 31.0)
     lean = 0.02 * np.exp(2j * np.pi * 7.3 * level.times) + 0.01 * np.exp(2j * np.pi * 1.1 * level.times)
@@ -192,7 +180,8 @@ def test_a_film_in_slow_motion_asks_for_its_rate(folder):
         analyze_film(said, VideoOptions(rim_m=0.03))
     found = analyze_film(said, VideoOptions(rim_m=0.03, rate=240.0))
     assert found.spin.value == pytest.approx(31 - 0.05 * found.turning.middle, rel=2e-3)  # mean rate of a piece
-    unsaid = analyze_film(filmed(folder, "slow.mp4", slowly, times), VideoOptions(rim_m=0.03))
+    again = write_film(folder / "unsaid.mp4", (picture for _, picture in pictures(open_film(said))), times)
+    unsaid = analyze_film(again, VideoOptions(rim_m=0.03))
     assert unsaid.spin is None
     assert "if the film is in slow motion, the true `rate`" in unsaid.warnings[0]
 
@@ -254,17 +243,17 @@ def test_a_film_is_recalled_from_its_result_and_reported_with_its_still(path, tm
 
 @pytest.mark.slow
 def test_a_top_that_falls_has_its_spin_then_as_a_limit_that_others_read(folder):
-    flight = level_flight(3.6, 22.0, chirp=-0.06)
-    shown, times = Pictures(CAMERA, flight), phone_times(3.4)
+    flight = level_flight(3.0, 22.0, chirp=-0.06)
+    shown, times = Pictures(CAMERA, flight), phone_times(2.9)
     path = write_film(
-        folder / "falls.mp4", (shown.noisy(shown.take(t) if t < 3.1 else shown.background) for t in times), times
+        folder / "falls.mp4", (shown.noisy(shown.take(t) if t < 2.6 else shown.background) for t in times), times
     )
     video = ANALYSES["video"]
     analysis = video.analyze([path], VideoOptions(rim_m=2 * RIM))
     fall, spin = analysis.runs[0].fall, analysis.runs[0].spin_at_fall
-    assert fall.value == pytest.approx(3.1, abs=2 * fall.u)
+    assert fall.value == pytest.approx(2.6, abs=2 * fall.u)
     assert fall.u < 0.1
-    assert spin.value == pytest.approx(22 - 0.06 * 3.1, abs=3 * spin.u)
+    assert spin.value == pytest.approx(22 - 0.06 * 2.6, abs=3 * spin.u)
     assert spin.u < 0.01
     save(video, analysis)
     (limit,) = ANALYSES["limit"].analyze([folder / "falls.limit.csv"], LimitOptions()).runs
