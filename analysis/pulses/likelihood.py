@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from analysis.pulses.regression import Fit, Scatter
 
 Array = NDArray[np.float64]
-Spectra = NDArray[np.complex128]
 
 #: What is searched: frequency [Hz] and slope [Hz/s].
 LOWEST, HIGHEST, STEEPEST = 5.0, 200.0, 0.6

@@ -72,14 +72,7 @@ def sniff(source: Text) -> Layout:
         whole = not stream.read(1)
     refuse_other_kinds(path, head)
     encoding = _encoding(head)
-    text = codecs.getincrementaldecoder(encoding)(errors="replace").decode(head, final=whole)
-    if CONTROL.search(text):
-        raise NoTable(path, f"is a binary file; {EXPORT}")
-    lines = list(io.StringIO(text, newline=None))
-    if not whole and lines and not lines[-1].endswith("\n"):
-        lines.pop()
-    if not any(line.strip() for line in lines):
-        raise NoTable(path, f"is {'empty' if whole else 'one line without end'}; {EXPORT}")
+    lines = lines_of(path, head, encoding, whole=whole)
     dialect = ALIGNED if source.aligned else find_dialect(lines[-SAMPLE:], lines[:SAMPLE])
     if dialect is None and (words := _of_words(lines, encoding, head)):
         return words
@@ -113,6 +106,31 @@ def _with_units_of_numbers(layout: Layout, sample: Sequence[tuple[str, ...]]) ->
             clock = layout.dialect.kind(first) == "clock"
             units[k] = "s" if clock else unit_behind(first)
     return tuple(units) if any(units) else ()
+
+
+def lines_of(path: Path, head: bytes, encoding: str, *, whole: bool, padding: str = "") -> list[str]:
+    """Return the first lines of a text.
+
+    Args:
+        path: of the file.
+        head: its first bytes.
+        encoding: of the text.
+        whole: whether these are all; else the last line is left out, which may be torn.
+        padding: characters that are no part of the text.
+
+    Raises:
+        NoTable: it is no text, or empty.
+    """
+    text = codecs.getincrementaldecoder(encoding)(errors="replace").decode(head, final=whole)
+    text = text.replace(padding, "") if padding else text
+    if CONTROL.search(text):
+        raise NoTable(path, f"is a binary file; {EXPORT}")
+    lines = list(io.StringIO(text, newline=None))
+    if not whole and lines and not lines[-1].endswith("\n"):
+        lines.pop()
+    if not any(line.strip() for line in lines):
+        raise NoTable(path, f"is {'empty' if whole else 'one line without end'}; {EXPORT}")
+    return lines
 
 
 def refuse_other_kinds(path: Path, head: bytes) -> None:

@@ -65,8 +65,7 @@ class ReportPart:
         subject: in the title of the page.
         heading: of the page.
         lead: how much was used.
-        verdict: what the data say, in a few sentences.
-        result: what follows the verdict: numbers with their uncertainties, what they mean, the models compared.
+        result: what follows its text: numbers with their uncertainties, what they mean, the models compared.
         figure: its words.
         runs_title: of the section with `runs`.
         runs: what belongs to each run rather than to all.
@@ -76,7 +75,6 @@ class ReportPart:
     subject: str
     heading: str
     lead: str
-    verdict: str
     result: tuple[Block, ...]
     figure: FigureText
     runs_title: str

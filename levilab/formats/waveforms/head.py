@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import codecs
-import io
-import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from levilab.formats.columns import NoTable, TableError
-from levilab.formats.layout import BYTE_ORDER_MARKS, EXPORT, HEAD, refuse_other_kinds
+from levilab.formats.columns import TableError
+from levilab.formats.layout import BYTE_ORDER_MARKS, EXPORT, HEAD, lines_of, refuse_other_kinds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,8 +17,6 @@ if TYPE_CHECKING:
 PIECE = 1 << 20
 #: No line of a table is longer.
 LONGEST_LINE = 1 << 16
-#: Files are padded with NULs at their end; text has none of the other control characters.
-_CONTROL = re.compile("[\x01-\x08\x0e-\x19]")
 
 
 @dataclass(frozen=True)
@@ -51,14 +47,7 @@ def read_head(path: Path) -> Head:
         whole = not stream.read(1)
     refuse_other_kinds(path, head)
     encoding = _encoding(head)
-    text = codecs.getincrementaldecoder(encoding)(errors="replace").decode(head, final=whole).replace("\0", "")
-    if _CONTROL.search(text):
-        raise NoTable(path, f"is a binary file; {EXPORT}")
-    lines = list(io.StringIO(text, newline=None))
-    if not whole and lines and not lines[-1].endswith("\n"):
-        lines.pop()
-    if not any(line.strip() for line in lines):
-        raise NoTable(path, f"is {'empty' if whole else 'one line without end'}; {EXPORT}")
+    lines = lines_of(path, head, encoding, whole=whole, padding="\0")  # some oscilloscopes pad a file with NULs
     return Head(path, encoding, tuple(lines), whole)
 
 

@@ -37,7 +37,6 @@ def field_part(analysis: FieldAnalysis) -> ReportPart:
         subject="field of the base",
         heading="Field of the base on its axis",
         lead=f"{sum(run.scan.statistics.n for run in analysis.runs)} heights measured",
-        verdict=analysis.text,
         result=(
             Paragraph(" ".join(_meaning(analysis)), "What it means."),
             Tabular("field-follows", follows_table(analysis.values), f"{_FOLLOWS}{means}"),

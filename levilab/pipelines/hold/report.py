@@ -31,7 +31,6 @@ def hold_part(analysis: HoldAnalysis) -> ReportPart:
         subject="held spin",
         heading="Held spins: the drag by the amplitude that balances it",
         lead=f"{len(analysis.runs)} held spins",
-        verdict=analysis.text,
         result=(
             Paragraph(_MEANING, "What it means."), Tabular("hold-spins", spins_table(analysis), VALUE_U), *laws,
         ),

@@ -35,7 +35,6 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
         subject="limits of the spin",
         heading="Limits of the spin of a levitated top",
         lead=f"{n} tops",
-        verdict=analysis.text,
         result=(
             Paragraph(" ".join(text for group in analysis.groups for text in _meaning(group)), "What it means."),
             Tabular("limit-statistics", runs_table(analysis), _STATISTICS, first_column_wraps=True),

@@ -46,7 +46,6 @@ def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
         subject="precession",
         heading="Precession of a driven top",
         lead=f"{analysis.combined.line.n} points used",
-        verdict=analysis.text,
         result=(
             Paragraph(" ".join(_meaning(analysis.combined)), "What it means."),
             Tabular("precession-lines", lines_table(analysis), _LINES, first_column_wraps=True),

@@ -32,7 +32,6 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
         subject="spin frequency",
         heading="Spin frequency of a top",
         lead=_count_pulses(analysis),
-        verdict=analysis.text,
         result=(
             Paragraph(" ".join(meaning(analysis)), "What it means."),
             Tabular("spin-frequencies", frequency_table(analysis), _FREQUENCIES, first_column_wraps=True),

@@ -65,7 +65,6 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
         subject="spin-down",
         heading="Spin-down of a levitated top",
         lead=f"{n} readings used",
-        verdict=analysis.text,
         result=(*_meaning(analysis), *_falls(analysis), *_laws(analysis), *_count(analysis)),
         figure=FigureText(
             title="Spin-down.",

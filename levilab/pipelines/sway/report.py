@@ -33,7 +33,6 @@ def sway_part(analysis: SwayAnalysis) -> ReportPart:
         subject="slow swings",
         heading="Slow swings of a floating top: geometric magnetism",
         lead=f"{sum(len(run.swings) for run in analysis.runs)} windows",
-        verdict=analysis.text,
         result=(
             Paragraph(" ".join(_meaning(analysis)), "What it means."),
             Tabular("sway-values", quantities_table(analysis), _VALUES, first_column_wraps=True),

@@ -23,7 +23,6 @@ def video_part(analysis: VideoAnalysis) -> ReportPart:
         subject="film of a top",
         heading="A floating top, filmed from above",
         lead=f"{sum(run.time.size for run in analysis.runs)} pictures",
-        verdict=analysis.text,
         result=(Tabular("video-values", values, f"{VALUE_U} The scale is common to all places, and not in their u."),),
         figure=FigureText(
             title="First picture.",
