@@ -60,7 +60,7 @@ def fuzz(session: nox.Session) -> None:
 @nox.session
 def peers(session: nox.Session) -> None:
     """Other people's drivers, unmodified, on the virtual bench; and PyMeasure's own suite for a real instrument."""
-    install_wheel(session)
+    install_wheel(session, "[simulate]")  # tests/conftest.py looks after the compiler
     wanted = PEERS / "requirements.txt"
     constrained = ("--constraint", str(CONSTRAINTS))
     session.install("--requirement", str(wanted), "pytest", "pytest-xdist", "hypothesis", *constrained)

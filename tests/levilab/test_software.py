@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -59,3 +60,11 @@ def test_without_extras_runs_are_acquired_analyzed_and_reported(tmp_path: Path) 
     assert re.findall(r"status (\d)", done.stdout) == ["0", "0", "0", "1", "1"], done.stderr
     assert done.stderr.count("need the extra simulate (numba and zarr, not installed)") == 2
     assert "Traceback" not in done.stderr
+
+
+def test_the_citation_has_the_version_of_the_program() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    codemeta = json.loads((ROOT / "codemeta.json").read_text(encoding="utf-8"))
+    assert re.findall(r"^version: (.*)$", citation, re.MULTILINE) == [project["version"]]
+    assert (codemeta["version"], codemeta["description"]) == (project["version"], project["description"])
