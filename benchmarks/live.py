@@ -87,7 +87,7 @@ def main() -> None:
 
 
 def practice(browser, out: Path, seconds: float) -> dict[str, float]:
-    """Return the top in motion, records twice a second."""
+    """Return the top in motion, with the signals of the oscilloscope six times a second."""
     import subprocess
 
     import psutil

@@ -119,11 +119,12 @@ function takeEvents(events) {
   }
 }
 
-/** The latest stands first.  Events of a run have its time; before its start, and at a bench without one, they have that of the clock. */
+/** The latest stands first, each with the time of this computer's clock, and that of the run in brackets. */
 function listEvent({time_s, utc}, text, loud) {
-  const list = by("event-list"), item = make("li", "", loud);
-  const ofRun = typeof time_s === "number", clock = ofRun ? "" : /T(\d\d:\d\d:\d\d)/.exec(utc)?.[1] || "";
-  const when = make("time", ofRun ? `at ${lapse(time_s).replace(" min", "")}` : clock && `${clock} UTC`);
+  const list = by("event-list"), item = make("li", "", loud), moment = new Date(utc || NaN);
+  const ofRun = typeof time_s === "number" ? `(${lapse(time_s).replace(" min", "")})` : "";
+  const clock = Number.isNaN(moment.valueOf()) ? "" : moment.toLocaleTimeString("en-GB");
+  const when = make("time", [clock, ofRun].filter(Boolean).join(" "));
   if (clock) when.dateTime = utc;
   by("events-key").hidden &&= !ofRun;
   item.append(when, " ", make("span", text));

@@ -48,7 +48,7 @@ def hall(runs: Path) -> Iterator[Hall]:
 @pytest.fixture(scope="module")
 def shown(browser: Browser, hall: Hall) -> Iterator[Page]:
     """A page that shows a finished run whose texts are hostile."""
-    with watch(browser) as page:
+    with watch(browser, timezone_id="Asia/Kolkata") as page:
         page.goto(address(hall, NAME))
         until(page, "levilab.drawn > 0 && levilab.data.fit")
         yield page
@@ -71,10 +71,10 @@ def test_nothing_that_a_run_contains_becomes_markup(shown: Page) -> None:
     assert HOSTILE in shown.text_content("#counter-model")
 
 
-def test_events_before_the_start_have_the_time_of_the_clock(shown: Page) -> None:
+def test_events_have_the_time_of_the_clock_on_the_wall_and_that_of_the_run(shown: Page) -> None:
     times = shown.evaluate("[...document.querySelectorAll('#event-list time')].map((one) => one.textContent)")
-    assert times == ["at 2:10", "09:00:05 UTC", "08:00:00 UTC"]  # the latest first, also where it came before
-    assert shown.inner_text("#events-key") == "“at”: time of the run"
+    assert times == ["14:33:00 (2:10)", "14:30:05", "13:30:00"]  # the latest first, also where it came before
+    assert shown.inner_text("#events-key") == "in brackets: time of the run"
 
 
 def test_on_a_desk_nothing_scrolls(shown: Page) -> None:
@@ -325,6 +325,23 @@ def test_a_fall_is_replayed_and_what_is_drawn_is_saved(
     with page.expect_download() as saved:
         page.click("#png")
     assert saved.value.path().read_bytes().startswith(b"\x89PNG")
+
+
+#: When the lamp flashed last before some times, of a drive that goes on at 1 s with 30 Hz, and to 40 Hz at 2.01 s.
+FLASHES = """async () => {
+  const {openHistory} = await import("/page/history.js");
+  const history = openHistory();
+  const drives = [[0, null], [1, 30], [2.01, 40], [3, null]];
+  for (const [time_s, hz] of drives) history.add({time_s, last: {}, drive: {output: hz !== null, frequency_hz: hz}});
+  return [0.5, 1.001, 1.999, 2.02, 2.5, 3.2].map((time) => history.flash(time));
+}"""
+
+
+def test_the_strobe_lamp_flashes_once_in_each_period_of_the_drive(shown: Page) -> None:
+    found = shown.evaluate(FLASHES)
+    # 30.3 turns by 2.01 s: turn 31 comes 0.7/40 s later, and turn 50 at 2.5025 s
+    ramp = [2.01 - 0.3 / 40, 2.01 + (49 - 30.3) / 40]
+    assert found == pytest.approx([0.5, 1.0, 1.0 + 29 / 30, *ramp, 3.2], abs=1e-9)
 
 
 #: When a pulse that passes half of its height at t triggers the page, from records that began at other times.
