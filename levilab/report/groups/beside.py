@@ -122,7 +122,7 @@ def class_of(analysis: Analysis[Any], found: Any) -> Class:
         Group(source, _model(part, model).get("statistics", {}), part.get("best_model", ""), _warnings(part))
         for source, part in zip(found.sources, parts, strict=True)
     )
-    names = analysis.compared or (_constants(document, model) if model else _common(parts))
+    names = analysis.compared or (_constants(document, model) if parts[0]["models"] else []) or _common(parts)
     quantities = (_quantity(name, analysis, model, parts, truths) for name in names)
     return Class(analysis, found, model, groups, tuple(one for one in quantities if one.together))
 
@@ -135,7 +135,7 @@ def _model(part: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 
 def _constants(document: Mapping[str, Any], law: str) -> list[str]:
     """Return the constants of a law, without the start of a run, which no two share."""
-    found = _model(document, law).get("parameters", {})
+    found = _model(document, law).get("parameters", {}) if law else {}
     return [name for name in found if law not in LAWS or name in LAWS[law].constants]
 
 
@@ -152,7 +152,7 @@ def _warnings(part: Mapping[str, Any]) -> tuple[str, ...]:
 def _quantity(
     name: str, analysis: Analysis[Any], model: str, parts: Sequence[Mapping[str, Any]], truths: Sequence[Truth]
 ) -> Quantity:
-    found = [(_model(part, model).get("parameters", {}) if model else part["values"]).get(name) for part in parts]
+    found = [_model(part, model).get("parameters", {}).get(name) or part["values"].get(name) for part in parts]
     good = [one if one and one["u"] and one["value"] is not None else None for one in found]
     estimates = tuple(Estimate(one["value"], one["u"], one["unit"]) if one else None for one in good)
     known = [one for one in good if one]

@@ -63,7 +63,8 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
 
     tables = (_values(of, one) for one in of.quantities)
     yield section("Result", "result", Verdict(verdict(of)), *tables, _groups(of))
-    yield section("Figure", "figure", _picture(of))
+    if of.quantities:
+        yield section("Figure", "figure", _picture(of))
     if any(group.warnings or group.source.note for group in of.groups):
         yield section("Notes", "notes", Facts(tuple(_notes(of))))
 

@@ -17,6 +17,7 @@ from levilab.report.groups.write import write_class
 from levilab.runs.find import RECORD
 from levilab.world.spin_world import SpinScene, random_scene
 from support.acquisitions import RAISED_QUICKLY, Silent
+from support.paths import SAMPLE_DATA
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -91,6 +92,13 @@ def test_page_and_pdf_begin_with_the_result(of_three: Path, tmp_path: Path) -> N
     assert "3 of 3 values lie within 2 u of it" in page
     assert HOSTILE not in page
     assert write_class([of_three], tmp_path / "class.pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize("sample", ["hold", "sway", "trace-tape", "precession-sweep", "upper-limits"])
+def test_every_analysis_can_be_compared(sample: str, tmp_path: Path) -> None:
+    page = write_class([SAMPLE_DATA / sample], tmp_path / "class.html").read_text(encoding="utf-8")
+    assert ">Result<" in page
+    assert ">Figure<" in page
 
 
 def test_the_spreadsheet_has_numbers_texts_and_each_reading(of_three: Path, tmp_path: Path) -> None:
