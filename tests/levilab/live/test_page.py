@@ -287,7 +287,7 @@ def test_the_last_minutes_of_the_bench_are_drawn_before_the_first_reading(
 def test_a_fall_is_replayed_and_what_is_drawn_is_saved(
     served: Hall, watched: Callable[..., Page], tmp_path: Path
 ) -> None:
-    """Where less motion is wanted the page shows a picture a second, and a replay all the same."""
+    """Where less motion is wanted the page shows a picture a second, a replay too."""
     run = GrowingRun(tmp_path)
     page = watched(reduced_motion="reduce")
     page.goto(address(served, run.folder.name))

@@ -164,7 +164,7 @@ def test_places_in_a_wrong_unit_are_named(tmp_path):
 
 
 def test_report_figure_and_table_of_many_show_it(found):
-    part = SWAY.part(found)
+    assert SWAY.part(found).result
     assert "geometric magnetism" in found.text
     assert SWAY.png(found)[:4] == b"\x89PNG"
     row = analyze_one(Task(TRACK, False, True, "sway", SWAY.options_from({"device": DEVICE}), TRACK.parent))
