@@ -231,7 +231,12 @@ _NAMED = 2
 
 
 def in_words(left_out: Sequence[LeftOut]) -> str:
-    """Return the files by kind and number, with what to do, as one line."""
+    """Return that the files are left out, as one line."""
+    return f"left out: {files_by_kind(left_out)}"
+
+
+def files_by_kind(left_out: Sequence[LeftOut]) -> str:
+    """Return the files by kind and number, with what to do."""
     kinds: dict[Kind, list[str]] = {}
     for one in left_out:
         kinds.setdefault(one.kind, []).append(one.path.name)
@@ -241,7 +246,7 @@ def in_words(left_out: Sequence[LeftOut]) -> str:
         count = f"{len(names)} {kind.several}" if len(names) > 1 else kind.name
         texts.append(f"{count} ({named}{f': {kind.advice}' if kind.advice else ''})")
     all_named = "" if max(map(len, kinds.values()), default=0) <= _NAMED else "; levilab analyze --json names all"
-    return f"left out: {'; '.join(texts)}{all_named}"
+    return f"{'; '.join(texts)}{all_named}"
 
 
 #: What lies in a folder and is no input, without a cause for a warning.
@@ -555,7 +560,7 @@ def _nothing_found(
 ) -> str:
     seen = [f"{one.count} {one.experiment} run{'s' * (one.count > 1)}" for one in others]
     seen += [f"{len(broken)} that cannot be used, as {broken[0].reason}"] if broken else []
-    seen += [in_words(left_out).removeprefix("left out: ")] if any(one.kind is not OTHER for one in left_out) else []
+    seen += [files_by_kind(left_out)] if any(one.kind is not OTHER for one in left_out) else []
     if not seen:
         return "holds no run and no data file; name a run folder, a data file, or a folder with some of them"
     return f"no {needs.runs} to analyze in this folder (found only {'; '.join(seen)}); name a run folder or a data file"
