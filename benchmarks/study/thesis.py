@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import statistics
 from typing import Any
 
-from levilab.simulator.published.printed import published
-from levilab.stability.thesis import MEASURED_HZ, MEASURED_U_HZ, SCATTER_HZ, SIMULATED_HZ, WITH_DRAG_HZ
+from levilab.simulator.published.printed import published, several
+from levilab.stability.thesis import MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, WITH_DRAG_HZ
 
 THESIS: dict[str, Any] = {
     # simulated from each start: lower and upper limit without drag, and the spin at the fall with drag from 30 Hz [Hz]
@@ -16,7 +17,7 @@ THESIS: dict[str, Any] = {
     # the lower limit, measured ten times: mean, its standard error, and the scatter of one [Hz]
     "measured_hz": MEASURED_HZ,
     "measured_u_hz": MEASURED_U_HZ,
-    "scatter_hz": SCATTER_HZ,
+    "scatter_hz": round(statistics.stdev(one.value for one in several("thesis", "measured.limits")), 2),
     # what a counter of turns reads too much at the end of a spin-down, at most [Hz] (docs/experiments/limit.md)
     "counter_hz": 0.19,
     # where its top floated [cm]
