@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from levilab.live.practice.commands import CommandRefused
+from levilab.simulator.laws import LAWS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -36,8 +37,14 @@ class Quantity:
     keys: Callable[[Scene, float], dict[str, Any]]
 
 
-#: Name → row.  The washers of a set have 0.02 to 0.1 g.  The drag of a laminar boundary layer goes as √(ρη), and the
-#: air's viscosity η does not change with its pressure.
+def _drag_at(scene: Scene, pressure: float) -> float:
+    """Return the drag's constant at a pressure [bar], from that of a scene at 1 bar."""
+    return scene.drag.constants[0] * math.pow(pressure, (LAWS[scene.drag.law].exponent or 1.0) - 1.0)
+
+
+#: Name → row.  The washers of a set have 0.02 to 0.1 g.  The air's viscosity η does not change with its
+#: pressure, and its density ρ does: a drag in proportion to ωⁿ goes as ρ^(n − 1), as η for n = 1, √(ρη) for n = 3/2 (a
+#: laminar boundary layer), ρ for n = 2.
 WHAT_IF: dict[str, Quantity] = {
     "washers_g": Quantity(
         "washers", "g", "The mass that floats is known to some tenths of a gram.", -0.2, 0.8, 0.02, 0.0,
@@ -53,7 +60,7 @@ WHAT_IF: dict[str, Quantity] = {
     ),
     "pressure": Quantity(
         "air pressure", "bar", "The air alone slows a free top.", 0.0, 2.0, 0.1, 1.0,
-        lambda scene, value: {"drag.coefficient": scene.drag.constants[0] * math.sqrt(value)},
+        lambda scene, value: {"drag.coefficient": _drag_at(scene, value)},
     ),
     "moment_tilt": Quantity(
         "tilt of the moment", "", "What lies across the axis is what the drive holds the top by.",
