@@ -47,7 +47,7 @@ def compare(values: ArrayLike, u: ArrayLike) -> Comparison:
     """Compare values.
 
     The distance (x − m)/√(u² + τ² − u_m²) from the mean m of all is that from the mean of the others: m holds a part
-    u_m²/(u² + τ²) of the value itself.
+    u_m²/(u² + τ²) of the value itself.  It is worked out from the others, for a value that holds nearly all of m.
 
     Args:
         values: shape (n,), n at least 1.
@@ -71,8 +71,14 @@ def compare(values: ArrayLike, u: ArrayLike) -> Comparison:
         freedom,
         float(chdtrc(freedom, chi_square)),
         float(x.std(ddof=1)),
-        tuple(((x - mean) / np.sqrt(total**2 - of_mean**2)).tolist()),
+        tuple(_from_others(x, total, k) for k in range(len(x))),
     )
+
+
+def _from_others(x: NDArray[np.float64], u: NDArray[np.float64], k: int) -> float:
+    """Return the distance of a value from the mean of the others, in units of the u of their difference."""
+    mean, of_mean, _ = _about_mean(np.delete(x, k), np.delete(u, k))
+    return float(x[k] - mean) / math.hypot(u[k], of_mean)
 
 
 def _about_mean(x: NDArray[np.float64], u: NDArray[np.float64]) -> tuple[float, float, float]:
@@ -91,4 +97,5 @@ def _between(x: NDArray[np.float64], u: NDArray[np.float64]) -> float:
 
     if len(x) < 2 or excess(0.0) <= 0:
         return 0.0
-    return float(brentq(excess, 0.0, 2 * float(np.ptp(x))))
+    widest = float(np.ptp(x))
+    return widest * float(brentq(lambda part: excess(part * widest), 0.0, 2.0))

@@ -39,6 +39,18 @@ def test_one_group_has_nothing_to_be_compared_with():
     assert (found.mean, found.u, found.scatter, found.distances) == (2.0, pytest.approx(0.1), None, (None,))
 
 
+def test_values_of_any_size_are_compared_alike():
+    x, u = np.array([1.0, 1.2, 0.9]), np.full(3, 0.02)
+    large, small = compare(x, u), compare(1e-15 * x, 1e-15 * u)
+    assert small.between == pytest.approx(1e-15 * large.between, rel=1e-9)
+    assert small.distances == pytest.approx(large.distances, rel=1e-9)
+
+
+def test_a_value_that_holds_the_whole_mean_is_compared_with_the_others():
+    distances = compare([1.0, 1.001], [1e-12, 1e-3]).distances
+    assert distances == pytest.approx((-1.0, 1.0), rel=1e-9)
+
+
 def test_tops_that_differ_are_in_u_of_the_mean_and_in_the_distances():
     """Forty classes of twelve tops that differ by 2 %, measured to 0.1 to 0.3 %."""
     random = np.random.default_rng(25)
