@@ -100,13 +100,13 @@ class LawFit:
         return frequency * count_of(self.law, tau, self.solution, self.top)
 
     def forecast(self, time: ArrayLike, last: float) -> Array:
-        """Return the spin [Hz] of a top that the law alone slows, from the fitted curve at the last reading on.
+        """Return the spin [Hz] of a top that the law alone slows, through the fitted curve at one reading.
 
         The count's tilt is left out: beyond the readings its curve runs into the resonance, which no top reaches.
 
         Args:
             time: on the clock of the readings, shape (n,) [s].
-            last: time of the last reading [s].
+            last: time of the last reading, or of the first one for times before it [s].
         """
         frequency, duration = self.reference
         now = self.spin_frequency([last]) / frequency

@@ -45,4 +45,4 @@ class RunList(list[RecordedRun]):
 def runs_in(folder: str | PathLike[str], last: int | None) -> RunList:
     """Return the runs at or below a folder.  Raises DataError."""
     found = list_runs(Path(folder))
-    return RunList(found if last is None else found[-last:])
+    return RunList(found if last is None else found[max(len(found) - last, 0) :])

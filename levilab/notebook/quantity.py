@@ -48,7 +48,7 @@ class Quantity(Estimate):
     def __format__(self, spec: str) -> str:
         if not spec:
             return repr(self)
-        number = format(self.to_ufloat() if self.u else float(self), spec)
+        number = format(self.to_ufloat() if self.u else float(self), spec if self.u else _of_float(spec))
         return number if self.unit == "1" else f"{number} {self.unit}"
 
     @property
@@ -71,10 +71,14 @@ class Quantity(Estimate):
 
     # --- arithmetic ---
 
+    def _check_unit(self, other: object, what: str) -> None:
+        """Raise UsageError for a quantity in another unit."""
+        if isinstance(other, Estimate) and other.unit != self.unit:
+            raise UsageError(what, f"{self!r} and {other!r} have unlike units: convert one, or take its `to_ufloat()`")
+
     def _sum(self, other: object, sign: int) -> Any:
         """Return this plus or minus a number in the same unit."""
-        if isinstance(other, Estimate) and other.unit != self.unit:
-            raise UsageError("sum", f"{self!r} and {other!r} have unlike units: convert one, or take its `to_ufloat()`")
+        self._check_unit(other, "sum")
         return _of(self.to_ufloat() + sign * _plain(other), self.unit)
 
     def __add__(self, other: object) -> Any:
@@ -89,8 +93,11 @@ class Quantity(Estimate):
     def __neg__(self) -> Any:
         return _of(-self.to_ufloat(), self.unit)
 
+    def __pos__(self) -> Any:
+        return self
+
     def __abs__(self) -> Any:
-        return _of(abs(self.to_ufloat()), self.unit)
+        return -self if float(self) < 0 else self
 
     def __mul__(self, other: object) -> Any:
         product = self.to_ufloat() * _plain(other)
@@ -108,15 +115,31 @@ class Quantity(Estimate):
 
     __radd__, __rmul__ = __add__, __mul__
 
+    def _compared(self, other: Any) -> tuple[float, float]:
+        """Return the values of this and of a number in the same unit."""
+        self._check_unit(other, "comparison")
+        return float(self), float(other.nominal_value if hasattr(other, "nominal_value") else other)
+
     def __lt__(self, other: object) -> bool:
-        return float(self) < float(_value(other))
+        one, two = self._compared(other)
+        return one < two
+
+    def __le__(self, other: object) -> bool:
+        one, two = self._compared(other)
+        return one <= two
 
     def __gt__(self, other: object) -> bool:
-        return float(self) > float(_value(other))
+        one, two = self._compared(other)
+        return one > two
+
+    def __ge__(self, other: object) -> bool:
+        one, two = self._compared(other)
+        return one >= two
 
 
-def _value(of: Any) -> Any:
-    return of.nominal_value if hasattr(of, "nominal_value") else of
+def _of_float(spec: str) -> str:
+    """Return the format of a number without u: `uncertainties` has letters of its own, and its u counts the digits."""
+    return "" if "u" in spec else spec.rstrip("SLP")
 
 
 def _may_have_unit(number: object) -> bool:

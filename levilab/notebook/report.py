@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import UsageError
+from levilab.errors import DataError, UsageError
 from levilab.notebook.result import AnalysisResult
 from levilab.report.page import write_report
 from levilab.runs.find import find_run
@@ -28,6 +28,8 @@ def report_on(data: Any, output: str | PathLike[str], *, tables: bool, crosschec
     """
     several = isinstance(data, list | tuple | set)
     items = [*data] if several else [data]
+    if not items:
+        raise DataError("there is nothing to report: a run, a result or a path is expected")
     paths, given = [], dict[str, Any]()
     for item in items:
         paths += _paths(item)

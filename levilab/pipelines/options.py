@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
+from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -72,7 +73,10 @@ class Option:
             return value in self.choices
         if self.kind is not float:
             return True
-        return self.low <= value <= self.high and math.isfinite(value) and (self.above is None or value > self.above)
+        if not isinstance(value, Real):
+            return False
+        number = float(value)
+        return self.low <= number <= self.high and math.isfinite(number) and (self.above is None or number > self.above)
 
 
 def _about(help: str, **more: Any) -> dict[str, Option]:  # noqa: A002 - as the attribute

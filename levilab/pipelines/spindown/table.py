@@ -223,5 +223,13 @@ def spindown_columns(analysis: SpinDownAnalysis) -> Iterator[Mapping[str, np.nda
 
 
 def spindown_curve(analysis: SpinDownAnalysis, number: int, law: str) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the spin frequency [Hz] of a law fitted to one run, of times [s]."""
-    return analysis.runs[number].fit(law).spin_frequency
+    """Return the spin frequency [Hz] of a law fitted to one run, of times [s]; beyond the readings by the law alone."""
+    run = analysis.runs[number]
+    fit, first, last = run.fit(law), float(run.time[0]), float(run.time[-1])
+
+    def curve(time: np.ndarray) -> np.ndarray:
+        inside = fit.spin_frequency(np.clip(time, first, last))
+        beyond = np.where(time < first, fit.forecast(time, first), fit.forecast(time, last))
+        return np.where((time >= first) & (time <= last), inside, beyond)
+
+    return curve

@@ -56,6 +56,10 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "float(result['c32'])": lambda value: value == pytest.approx(2.3686e-4, abs=1e-8),
     "result['c32'].n, result['c32'].s": lambda pair: pair[0] > 600 * pair[1] > 0,
     "result['c32'] * 2": lambda twice: f"{twice}" == "0.0004737(8) (rad/s)^-1/2/s",
+    "(+abs(-result['c32'])).n == result['c32'].n": bool,
+    "result['c32'] <= result['c32'] < 1": bool,
+    "f\"{result['c32'] - result['c32']:.1uS}\"": lambda text: text == "0.0 (rad/s)^-1/2/s",
+    "levilab.runs(folder, last=0)": lambda runs: list(runs) == [],
     # a motion
     "motion._repr_html_()": lambda html: "undriven" in html,
     "motion.to_dataframe().plot(x='time_s', y='z_m')": lambda axes: len(axes.lines) == 1,
@@ -93,6 +97,9 @@ REFUSED = {
     "result.models['disk']": "known are stokes, newton, disc",
     "result.predict(0.0, 'disk')": "known are stokes, newton, disc",
     "result.models['disc']['c32'] + result.models['stokes']['c1']": "unlike units",
+    "result.models['disc']['c32'] < result.models['stokes']['c1']": "unlike units",
+    "levilab.report([])": "nothing to report",
+    "levilab.analyze((t, f), reading_u='5 mHz')": "a number above 0 [Hz] is expected",
     "levilab.analyze((t,))": "arrays of time_s, spin_frequency_hz",
     "levilab.analyze((t, f[1:]))": "arrays of one length",
 }
@@ -124,6 +131,15 @@ def test_a_wrong_guess_is_told_the_right_one(typed: str, names: dict[str, Any]) 
     with pytest.raises(levilab.LevilabError) as raised:
         eval(typed, names)
     assert REFUSED[typed] in str(raised.value)
+
+
+def test_a_curve_goes_on_beyond_the_readings_as_its_law_says(names: dict[str, Any]) -> None:
+    """The count's tilt bends its curve into a resonance that no top reaches, and lifts it before the first reading."""
+    found = levilab.analyze((T, 30 * np.exp(-3e-3 * T) + np.random.default_rng(2).normal(0.0, 0.005, T.size)))
+    assert "moment_tilt" in found.models["stokes"]
+    at = np.array([-300.0, -50.0, T[0], T[-1], 400.0, 1000.0, np.nan])
+    np.testing.assert_allclose(found.predict(at, "stokes"), 30 * np.exp(-3e-3 * at), rtol=0.01)  # u(c1) is 0.1 %
+    assert found.predict(T, "stokes") + found.residuals == pytest.approx(found.to_dataframe("readings").iloc[:, 2])
 
 
 def test_parameters_of_a_fit_are_correlated_as_it_says(names: dict[str, Any]) -> None:
