@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: Columns that a notebook's cell shows.
-_SHOWN = ("path", "experiment", "status", "readings", "note")
+_SHOWN = ("path", "group", "experiment", "status", "readings", "note")
 
 
 class RunList(list[RecordedRun]):

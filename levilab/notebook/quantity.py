@@ -79,6 +79,8 @@ class Quantity(Estimate):
     def _sum(self, other: object, sign: int) -> Any:
         """Return this plus or minus a number in the same unit."""
         self._check_unit(other, "sum")
+        if isinstance(other, np.ndarray):
+            return NotImplemented  # numpy does it element by element
         return _of(self.to_ufloat() + sign * _plain(other), self.unit)
 
     def __add__(self, other: object) -> Any:
@@ -100,10 +102,14 @@ class Quantity(Estimate):
         return -self if float(self) < 0 else self
 
     def __mul__(self, other: object) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented
         product = self.to_ufloat() * _plain(other)
         return product if _may_have_unit(other) else _of(product, self.unit)
 
     def __truediv__(self, other: object) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented
         ratio = self.to_ufloat() / _plain(other)
         return ratio if _may_have_unit(other) else _of(ratio, self.unit)
 

@@ -59,6 +59,10 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "(+abs(-result['c32'])).n == result['c32'].n": bool,
     "result['c32'] <= result['c32'] < 1": bool,
     "f\"{result['c32'] - result['c32']:.1uS}\"": lambda text: text == "0.0 (rad/s)^-1/2/s",
+    "[(result['c32'] * t[1:])[0].unit, (result['c32'] / t[1:])[0].unit, (result['c32'] - t)[0].unit]": lambda units: (
+        set(units) == {"(rad/s)^-1/2/s"}
+    ),
+    "levilab.runs(folder)._repr_html_()": lambda html: ">group<" in html,
     "levilab.runs(folder, last=0)": lambda runs: list(runs) == [],
     # a motion
     "motion._repr_html_()": lambda html: "undriven" in html,
