@@ -57,7 +57,8 @@ def read_number(text: str, unit: str) -> float:
     own = plain_unit(unit)
     units = next((one for one in TYPED if own in one), {own: 1.0})
     typed = factor_of(found[2] or unit, units)
-    if typed is None:
+    is_mega = (found[2] or "").startswith("M") and plain_unit(found[2]) not in units  # and no m in another case
+    if typed is None or is_mega:
         raise ValueError(f"{text.strip()!r}: a number in {_words_for(unit, units)} is expected")
     number, factor = float(found[1]), typed / units[own]
     # with the 15 digits that a float has: 25.4 g are 0.0254 kg, and not 0.025399999999999999

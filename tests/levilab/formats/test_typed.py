@@ -53,3 +53,9 @@ def test_endings_of_keys_have_the_units_of_results() -> None:
     assert {ending: rows[ending] for ending in OF_KEYS} == OF_KEYS
     assert all(any(plain_unit(unit) in one for one in TYPED) for unit in OF_KEYS.values())
     assert unit_of_key("drive.ramp_hz_per_s") == "Hz/s"
+
+
+@pytest.mark.parametrize(("typed", "unit"), [("25Mg", "kg"), ("5 MT", "T"), ("5 MM", "m")])
+def test_mega_is_not_taken_for_milli(typed: str, unit: str) -> None:
+    with pytest.raises(ValueError, match="is expected"):
+        read_number(typed, unit)
