@@ -29,8 +29,8 @@ class Comparison:
         freedom: its degrees of freedom.
         p: the probability that chance makes it so large.
         scatter: standard deviation of the values, unweighted; None of one value.
-        distances: from each value to the mean of the others, in units of the u of that difference, with τ; None of one
-            value.
+        distances: from each value to the mean of the others, in units of the u of that difference, with the τ of
+            the others; None of one value.
     """
 
     mean: float
@@ -46,11 +46,8 @@ class Comparison:
 def compare(values: ArrayLike, u: ArrayLike) -> Comparison:
     """Compare values.
 
-    The distance (x − m)/√(u² + τ² − u_m²) from the mean m of all is that from the mean of the others: m holds a part
-    u_m²/(u² + τ²) of the value itself.  It is worked out from the others, for a value that holds nearly all of m.
-
     Args:
-        values: shape (n,), n at least 1.
+        values: shape (n,), n at least 1, finite.
         u: their standard uncertainties, shape (n,), positive.
     """
     from scipy.special import chdtrc
@@ -71,14 +68,28 @@ def compare(values: ArrayLike, u: ArrayLike) -> Comparison:
         freedom,
         float(chdtrc(freedom, chi_square)),
         float(x.std(ddof=1)),
-        tuple(_from_others(x, total, k) for k in range(len(x))),
+        tuple(_from_others(x, of_x, k) for k in range(len(x))),
     )
 
 
 def _from_others(x: NDArray[np.float64], u: NDArray[np.float64], k: int) -> float:
-    """Return the distance of a value from the mean of the others, in units of the u of their difference."""
-    mean, of_mean, _ = _about_mean(np.delete(x, k), np.delete(u, k))
-    return float(x[k] - mean) / math.hypot(u[k], of_mean)
+    """Return the distance of a value from the mean of the others, in units of the u of their difference.
+
+    τ is that of the others, which a value far off does not widen.  It is known from their n − 2 differences alone: the
+    distance is that of a normal number as improbable as this one of Student's t (degrees of freedom by Welch and
+    Satterthwaite, GUM G.4).
+    """
+    from scipy.special import ndtri, stdtr
+
+    others, of_others = np.delete(x, k), np.delete(u, k)
+    between = _between(others, of_others)
+    mean, of_mean, _ = _about_mean(others, np.hypot(of_others, between))
+    variance, of_tops = u[k] ** 2 + of_mean**2 + between**2, between**2 * (1 + 1 / len(others))
+    distance = float(x[k] - mean) / math.sqrt(variance)
+    if not of_tops:
+        return distance
+    p = stdtr((len(others) - 1) * max(variance / of_tops, 1.0) ** 2, -abs(distance))
+    return math.copysign(-float(ndtri(p)), distance) if p > 0 else distance
 
 
 def _about_mean(x: NDArray[np.float64], u: NDArray[np.float64]) -> tuple[float, float, float]:

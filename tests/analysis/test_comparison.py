@@ -60,3 +60,18 @@ def test_tops_that_differ_are_in_u_of_the_mean_and_in_the_distances():
     assert np.mean([one.between for one in found]) == pytest.approx(2, rel=0.1)
     assert pulls.std() == pytest.approx(1, abs=0.34)  # three standard errors of a standard deviation from 40
     assert np.array([one.distances for one in found]).std() == pytest.approx(1, abs=0.1)
+
+
+def test_a_group_far_off_does_not_hide_itself():
+    *near, far = compare([10, 10.1, 9.9, 10.05, 14.0], [0.1] * 5).distances
+    assert far > 10
+    assert all(abs(one) < 1.5 for one in near)
+
+
+@pytest.mark.parametrize(("n", "expected"), [(3, 0.12), (4, 0.07), (6, 0.046)])
+def test_distances_of_few_tops_that_differ_are_as_improbable_as_they_say(n, expected):
+    """4.6 % of normal numbers are beyond 2; more of three or four tops, two of which may be alike by chance."""
+    random = np.random.default_rng(26)
+    found = [compare(100 + 2 * random.standard_normal(n), np.full(n, 0.2)).distances for _ in range(400)]
+    share = np.mean(np.abs(np.array(found)) > 2)
+    assert share == pytest.approx(expected, abs=0.03)  # 400 classes; the n distances of a class are not independent

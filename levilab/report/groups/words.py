@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Below it chance does not make groups differ so much.
 DIFFER = 0.01
+#: Degrees of freedom from which on a scatter is known well enough, to a third.
+_FEW = 5
 #: Share of groups within 2 u of their truth, where u is right.
 _WITHIN_2_U = 0.954
 
@@ -62,9 +65,19 @@ def _chi_square(of: Quantity) -> str:
     if together.p < DIFFER:
         return (
             f"{how}: the groups differ by more than their u, by {scatter} (standard deviation), as different tops do; "
-            "that is in u of the mean and in each distance from it"
+            f"that is in u of the mean and in each distance from it{_known_to(together.freedom)}"
         )
     return f"{how}: the groups agree within their u; their standard deviation is {scatter}"
+
+
+def _known_to(freedom: int) -> str:
+    """Return how well few groups give their scatter, with the interval that holds the mean in 68 % of all classes."""
+    from scipy.special import stdtrit
+
+    if freedom >= _FEW:
+        return ""
+    known, factor = 100 / math.sqrt(2 * freedom), float(stdtrit(freedom, 0.5 + 0.6827 / 2))
+    return f"; {freedom + 1} groups give their scatter to {known:.0f} % only: a 68 % interval is {digits(factor, 2)} u"
 
 
 def _truth(of: Class) -> str:
