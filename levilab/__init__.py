@@ -188,6 +188,7 @@ def analyze(
     | PathLike[str]
     | pd.DataFrame
     | ArrayLike
+    | Mapping[str, ArrayLike]
     | Sequence[Run | str | PathLike[str] | pd.DataFrame] = (),
     kind: Literal["spindown", "spin", "field", "limit", "precession", "sway", "hold", "video"] | None = None,
     *,
@@ -229,8 +230,9 @@ def analyze(
     Args:
         data: a run, the path of a run folder, of a data file or of a folder to search, a DataFrame with columns as in
             data files (`time_s`, `spin_frequency_hz`, …, or titles that files may have, with their units), or several;
-            or arrays: (times [s], spin frequencies [Hz]) and, third, their standard uncertainties; of other kinds
-            (times, light), (heights [m], flux densities [T]), (drive, precession [Hz]), or limits alone [Hz].
+            a dictionary of such columns; or arrays: (times [s], spin frequencies [Hz]) and, third, their standard
+            uncertainties; of other kinds (times, light), (heights [m], flux densities [T]), (drive, precession [Hz]),
+            or limits alone [Hz].
         kind: the analysis; None for the one that is made for the data.
         time: times of readings [s], which with frequency take the place of data.
         frequency: spin frequencies at these times [Hz].
@@ -284,7 +286,7 @@ def analyze(
 
 def simulate(
     scene: Scene | str | PathLike[str],
-    duration: float = 30.0,
+    duration: float | str = 30.0,
     *,
     settings: Mapping[str, Any] | None = None,
     tolerance: float = 1e-7,
@@ -297,8 +299,8 @@ def simulate(
 
     Args:
         scene: the name of one that ships (`levilab.scenes()`), a TOML file, or a `levilab.simulator.Scene`.
-        duration: how much is simulated [s].
-        settings: changes of the scene by dotted keys, as {"top.mass_kg": 0.0255}.
+        duration: how much is simulated [s], or with its unit: "2min".
+        settings: changes of the scene by dotted keys, as {"top.mass_kg": 0.0255} or {"top.mass_kg": "25.5 g"}.
         tolerance: wanted error at the end, of the place [m] and of the axis [rad].
         rate: states per second [1/s].
         out: folder in which a run folder is made; None writes nothing.
@@ -315,11 +317,11 @@ def simulate(
         SimulationError: the motion cannot be followed.
     """
     from levilab.notebook.motion import simulate_motion
-    from levilab.notebook.scene import chosen_scene
+    from levilab.notebook.scene import chosen_scene, in_seconds
 
     with _border:
-        chosen = chosen_scene(scene, settings or {}, changes)
-        return simulate_motion(chosen, duration, tolerance=tolerance, rate=rate, out=out, animate=animate)
+        chosen, lasts = chosen_scene(scene, settings or {}, changes), in_seconds("duration", duration)
+        return simulate_motion(chosen, lasts, tolerance=tolerance, rate=rate, out=out, animate=animate)
 
 
 def scenes() -> dict[str, str]:
@@ -384,7 +386,7 @@ def stability(
     Args:
         scene: its name (`levilab.scenes()`), a TOML file, or a `levilab.simulator.Scene`.
         settings: changes of the scene by dotted keys, as {"top.mass_kg": 0.0255}.
-        **changes: the same by the last parts of keys, as mass_kg=0.0255.
+        **changes: the same by the last parts of keys, as mass_kg=0.0255 or mass_kg="25.5 g".
 
     Returns:
         What was found: `floats`, `height`, `spins`, `values`, `summary()`.

@@ -10,10 +10,17 @@ from dataclasses import fields, replace
 from functools import partial
 from os import PathLike
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DoesNotSuit, LevilabError, UsageError
-from levilab.notebook.frame import are_arrays, frame_of_arrays, has_numbers_for_titles, in_rows, is_frame, write_frame
+from levilab.notebook.frame import (
+    frame_of,
+    has_numbers_for_titles,
+    in_rows,
+    is_frame,
+    write_frame,
+)
 from levilab.notebook.result import AnalysisResult
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import read_options
@@ -36,7 +43,8 @@ def analyze_data(data: Any, kind: str | None, given: Mapping[str, Any]) -> Analy
     """Analyze data by one analysis.
 
     Args:
-        data: a run, a path, a DataFrame, or several of them; or arrays, see `frame_of_arrays`.
+        data: a run, a path, a DataFrame, or several of them; or arrays, see `frame_of_arrays`; or a dictionary of
+            columns.
         kind: of the analysis; None for the one that is made for the data.
         given: options by their names; None, or what an analysis has by itself, is not given.
 
@@ -44,16 +52,14 @@ def analyze_data(data: Any, kind: str | None, given: Mapping[str, Any]) -> Analy
         UsageError: an option or `kind` is wrong, or the data suit several analyses equally.
         DataError: the data suit none, or cannot be used.
     """
+    _check_kind(kind)
     options = read_options(given)
     if data is None or (isinstance(data, tuple) and any(item is None for item in data)):
         raise UsageError("data", "data, or `time` and `frequency` together, are expected", value="nothing")
-    if are_arrays(data):
-        data = frame_of_arrays(data, kind)
+    data = frame_of(data, kind)
     items: list[Any] = [data] if _is_one(data) else list(data)
     if not items:
         raise UsageError("data", "a run, a path or a DataFrame is expected", value="nothing")
-    if kind is not None and kind not in ANALYSES:
-        raise UsageError("kind", f"{', '.join(ANALYSES)} or None is expected", value=kind)
     frames = [item for item in items if is_frame(item)]
     if not frames:
         return _analyze_paths([_path(item) for item in items], kind, options, str)
@@ -94,6 +100,14 @@ def _analyze_paths(
     return AnalysisResult(analysis, _translate_warnings(found, in_words), copies)
 
 
+def _check_kind(kind: object) -> None:
+    if not (kind is None or isinstance(kind, str)):
+        expected = "two lists go into one pair, analyze(([…], […])), or by name, analyze(time=[…], frequency=[…])"
+        raise UsageError("kind", f"the name of an analysis is expected; {expected}", value=kind)
+    if kind is not None and kind not in ANALYSES:
+        raise UsageError("kind", f"{', '.join(ANALYSES)} or None is expected", value=kind)
+
+
 def _is_one(data: object) -> bool:
     return isinstance(data, str | PathLike | Run) or not hasattr(data, "__iter__") or is_frame(data)
 
@@ -108,7 +122,11 @@ def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
         file = folder / f"{_FRAME}{number}.csv"
         write_frame(item, file)
         return file
-    raise UsageError("data", "a run, a path, a DataFrame or several of them are expected", value=type(item).__name__)
+    raise UsageError("data", "a run, a path, a DataFrame or several of them are expected", value=_name_type(item))
+
+
+def _name_type(item: object) -> str:
+    return f"the module {item.__name__}" if isinstance(item, ModuleType) else type(item).__name__
 
 
 # --- options -------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,21 +27,26 @@ ARRAYS: dict[str, tuple[str, ...]] = {
 
 
 def are_arrays(data: Any) -> bool:
-    """Return whether data are numbers: an array, or several arrays or lists of numbers."""
+    """Return whether data are numbers: an array or a list of numbers, or several of them."""
     if hasattr(data, "dtype") and not is_frame(data):
         return True
     items = list(data) if isinstance(data, list | tuple) else []
     return bool(items) and all(
-        hasattr(item, "dtype") or (isinstance(item, list | tuple) and item and isinstance(item[0], int | float))
+        hasattr(item, "dtype") or _is_number(item) or (isinstance(item, list | tuple) and item and _is_number(item[0]))
         for item in items
     )
+
+
+def _is_number(item: Any) -> bool:
+    return isinstance(item, int | float)
 
 
 def frame_of_arrays(data: Any, kind: str | None) -> pd.DataFrame:
     """Return arrays as a DataFrame with the columns of data files.
 
     Args:
-        data: one array, shape (n,) or (n, columns); or several of one length, as (t, f) or (t, f, u): see `ARRAYS`.
+        data: one array or list, shape (n,) or (n, columns); or several of one length, as (t, f) or (t, f, u): see
+            `ARRAYS`.
         kind: of the analysis, which decides what they are.
 
     Raises:
@@ -49,6 +55,8 @@ def frame_of_arrays(data: Any, kind: str | None) -> pd.DataFrame:
     import pandas as pd
 
     names = ARRAYS.get(kind or "", ARRAYS[""])
+    if not hasattr(data, "dtype") and all(np.ndim(item) == 0 for item in data):
+        data = np.asarray(data)  # numbers alone
     if hasattr(data, "dtype"):
         data = [data] if data.ndim == 1 else data.T  # an array of two dimensions has a row a reading
     columns = [np.asarray(item) for item in data]
@@ -59,6 +67,24 @@ def frame_of_arrays(data: Any, kind: str | None) -> pd.DataFrame:
         shapes = " and ".join(str(one.shape) for one in columns)
         raise UsageError("data", "arrays of one length are expected", value=f"arrays of the shapes {shapes}")
     return pd.DataFrame(dict(zip(names, columns, strict=False)))
+
+
+def frame_of(data: Any, kind: str | None) -> Any:
+    """Return arrays, or a dictionary of columns, as a DataFrame, and all else as it is.  Raises UsageError."""
+    if isinstance(data, Mapping):
+        return _frame_of_mapping(data)
+    return frame_of_arrays(data, kind) if are_arrays(data) else data
+
+
+def _frame_of_mapping(data: Mapping[Any, Any]) -> pd.DataFrame:
+    import pandas as pd
+
+    try:
+        return pd.DataFrame(data)
+    except ValueError as error:
+        expected = "columns of one length are expected, as {'time_s': […], 'spin_frequency_hz': […]}"
+        given = f"a dictionary with {', '.join(map(str, data))}"
+        raise UsageError("data", f"{expected} ({error})", value=given) from None
 
 
 def write_frame(frame: pd.DataFrame, path: Path) -> None:
@@ -77,7 +103,7 @@ def write_frame(frame: pd.DataFrame, path: Path) -> None:
     if any(name is not None for name in frame.index.names):
         frame = frame.reset_index()
     if not len(frame.columns):
-        raise UsageError("data", "columns as time_s and spin_frequency_hz are expected", value="a DataFrame with none")
+        raise UsageError("data", "columns as time_s and spin_frequency_hz are expected", value="an empty table")
     numbered = has_numbers_for_titles(frame)
     titles = [" ".join(str(title).split()) for title in frame.columns]
     frame.to_csv(path, index=False, header=False if numbered else titles, encoding="utf-8", lineterminator="\n")
@@ -94,7 +120,7 @@ def has_numbers_for_titles(frame: pd.DataFrame) -> bool:
 
 
 def in_rows(text: str, folder: Path, *, titles: int) -> str:
-    r"""Translate a message about such a file for a DataFrame: rows, counted from 0, and no folder.
+    r"""Translate a message about such a file for who gave a DataFrame or arrays: no file, and rows, counted from 0.
 
     Args:
         text: of the message.
@@ -103,12 +129,13 @@ def in_rows(text: str, folder: Path, *, titles: int) -> str:
 
     >>> from pathlib import Path
     >>> in_rows("folder/DataFrame.csv, line 5: the time 3 s is repeated", Path("folder"), titles=1)
-    'DataFrame.csv, row 3: the time 3 s is repeated'
+    'the data, row 3: the time 3 s is repeated'
     >>> in_rows("folder/DataFrame.csv, line 1: no title is known", Path("folder"), titles=1)
-    'DataFrame.csv: no title is known'
+    'the data: no title is known'
     """
     for separator in ("/", "\\"):
         text = text.replace(f"{folder}{separator}", "")
+    text = re.sub(r"\bDataFrame(\d*)\.csv\b", lambda name: f"DataFrame {name[1]}" if name[1] else "the data", text)
     if titles:
         text = re.sub(r", line 1\b", "", text)
 

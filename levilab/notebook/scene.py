@@ -5,6 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from levilab.errors import UsageError
+from levilab.formats.typed import read_number, unit_of_key
+from levilab.simulator.keys import parse_setting
 from levilab.simulator.scene import Scene, leaves, preset, presets, read_scene
 
 if TYPE_CHECKING:
@@ -29,7 +32,21 @@ def chosen_scene(scene: Scene | str | PathLike[str], settings: Mapping[str, Any]
         SceneError: there is no such scene, key or value.
     """
     read = scene if isinstance(scene, Scene) else read_scene(Path(scene))
-    return read.changed({**settings, **{whole_key(read, name): value for name, value in by_name.items()}})
+    whole = {**settings, **{whole_key(read, name): value for name, value in by_name.items()}}
+    return read.changed({key: _with_unit(key, value) for key, value in whole.items()})
+
+
+def _with_unit(key: str, value: Any) -> Any:
+    """Return a value that may be typed with its unit, as "25 g", where its key ends in one."""
+    return parse_setting(f"{key}={value}")[1] if isinstance(value, str) and unit_of_key(key) else value
+
+
+def in_seconds(name: str, value: float | str) -> float:
+    """Return a duration [s] that may be typed with its unit, as "2min".  Raises UsageError."""
+    try:
+        return read_number(value, "s") if isinstance(value, str) else value
+    except ValueError as error:
+        raise UsageError(name, str(error)) from None
 
 
 def whole_key(scene: Scene, name: str) -> str:

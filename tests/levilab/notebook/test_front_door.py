@@ -25,6 +25,7 @@ from levilab.errors import DataError, DoesNotSuit, UsageError
 from levilab.motion.simulation import SimulationRequest
 from levilab.notebook.acquisition import ask_with_input
 from levilab.notebook.analysis import write_frame
+from levilab.notebook.scene import chosen_scene, in_seconds
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.runs.run import Run
 from levilab.simulator.keys import SceneError, UnknownKey
@@ -243,12 +244,12 @@ def spin_down() -> pd.DataFrame:
 def test_messages_about_a_dataframe_name_its_rows() -> None:
     frame = spin_down()
     frame.loc[3, "time_s"] = 20.0
-    with pytest.raises(DataError, match=r"^DataFrame.csv, row 3: the time 20 s is repeated after 20 s in row 2"):
+    with pytest.raises(DataError, match=r"^the data, row 3: the time 20 s is repeated after 20 s in row 2"):
         levilab.analyze(frame)
     frame.loc[3, "time_s"] = 30.0
     frame.loc[5, "spin_frequency_hz"] = np.nan
     result = levilab.analyze(frame, reading_u=0.03)
-    assert any(text.startswith("DataFrame.csv: 1 of 8 rows is left out") for text in result.warnings)
+    assert any(text.startswith("the data: 1 of 8 rows is left out") for text in result.warnings)
     assert any(text.endswith("row 5") for text in result.document["warnings"])
 
 
@@ -256,7 +257,7 @@ def test_several_dataframes_are_told_apart_by_their_place() -> None:
     frames = [spin_down(), spin_down() * 1.01]
     assert levilab.analyze(frames, reading_u=0.03).inputs == ("DataFrame1.csv", "DataFrame2.csv")
     frames[1].loc[2, "spin_frequency_hz"] = -1.0
-    with pytest.raises(DataError, match=r"^DataFrame2.csv, row 2: the frequency is -1"):
+    with pytest.raises(DataError, match=r"^DataFrame 2, row 2: the frequency is -1"):
         levilab.analyze(frames)
 
 
@@ -284,6 +285,8 @@ WRONG: dict[str, tuple[Callable[[], Any], str | type[levilab.LevilabError]]] = {
     "several suit": (lambda: levilab.analyze(SAMPLE_DATA), "kind"),
     "no such kind": (lambda: levilab.analyze(spin_down(), "spin-down"), "kind"),
     "no such data": (lambda: levilab.analyze(5), "data"),
+    "two lists": (lambda: levilab.analyze([0, 1, 2], [3, 4, 5]), "kind"),  # type: ignore[arg-type]
+    "no equal columns": (lambda: levilab.analyze({"time_s": [0.0, 1.0], "spin_frequency_hz": [40.0]}), "data"),
     "nothing": (lambda: levilab.analyze([]), "data"),
     "no columns": (lambda: levilab.analyze(pd.DataFrame()), "data"),
     "unknown titles": (lambda: levilab.analyze(frame_of("a", "b")), DoesNotSuit),
@@ -304,6 +307,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str | type[levilab.LevilabError]]] = {
     "no scene": (lambda: levilab.simulate("undrivn"), SceneError),
     "no key": (lambda: levilab.simulate("undriven", settings={"top.mas_kg": 1}), UnknownKey),
     "no duration": (lambda: levilab.simulate("undriven", -1), "duration"),
+    "no time": (lambda: levilab.simulate("undriven", "5 m"), "duration"),
 }
 
 
@@ -314,6 +318,32 @@ def test_a_wrong_call_names_the_argument_or_the_kind_of_failure(case: str) -> No
         call()
     assert getattr(raised.value, "name", expected) == expected
     assert "--" not in str(raised.value).replace("--settings", "")
+
+
+@pytest.mark.parametrize(("call", "said"), [
+    (lambda: levilab.analyze([0, 1, 2], [3, 4, 5]), r"^kind = \[3, 4, 5\]: .*analyze\(\(\[…\], \[…\]\)\)"),
+    (lambda: levilab.analyze(([0, 1], [40, 39])), "^the data: holds 2 readings, at least 3"),
+    (lambda: levilab.analyze(levilab), "^data = the module levilab: a run,"),
+])  # fmt: skip
+def test_a_natural_but_wrong_call_is_told_how_to_call(call: Callable[[], Any], said: str) -> None:
+    with pytest.raises(levilab.LevilabError, match=said):
+        call()
+
+
+def test_a_dictionary_and_a_list_are_taken_as_dataframe_and_array_are() -> None:
+    frame = spin_down()
+    by_name: dict[str, Any] = {str(name): frame[name].tolist() for name in frame}
+    expected = levilab.analyze(frame, reading_u=0.03).values
+    assert str(levilab.analyze(by_name, reading_u=0.03).values) == str(expected)
+    limits = [21.9, 22.0, 21.7, 21.8]
+    assert str(levilab.analyze(limits, "limit").values) == str(levilab.analyze(np.array(limits), "limit").values)
+
+
+def test_numbers_are_taken_with_their_units_as_on_the_command_line() -> None:
+    assert in_seconds("duration", "2min") == 120
+    assert chosen_scene("undriven", {"start.spin_hz": "1800 rpm"}, {"mass_kg": "25 g", "law": "stokes"}).changed(
+        {}
+    ) == chosen_scene("undriven", {"start.spin_hz": 30.0}, {"mass_kg": 0.025, "law": "stokes"})
 
 
 def test_every_option_is_a_keyword_with_its_default() -> None:
