@@ -22,6 +22,7 @@ from levilab.notebook.frame import (
     write_frame,
 )
 from levilab.notebook.result import AnalysisResult
+from levilab.pipelines.analyzed import refuse_columns_of_runs
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import read_options
 from levilab.pipelines.suits import suiting
@@ -95,7 +96,9 @@ def _analyze_paths(
             one = _only_suiting(paths, options)
             analysis = one.analysis
             _refuse_foreign(analysis, options)
-            found = analysis.result.method.analyze_found(one.paths, one.found, analysis.options_from(options))
+            chosen = analysis.options_from(options)
+            refuse_columns_of_runs(one.found, chosen)
+            found = analysis.result.method.analyze_found(one.paths, one.found, chosen)
     copies = tuple(path for path in paths if path.parent == folder)
     return AnalysisResult(analysis, _translate_warnings(found, in_words), copies)
 

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from levilab.errors import DataError
+from levilab.errors import DataError, UsageError
 from levilab.pipelines.options import OF_FILES, InputOptions
 from levilab.pipelines.result import Place, place_of
 from levilab.pipelines.sources import Needs, Readings, Remark, Skipped, Source, collect
@@ -166,6 +166,15 @@ def _with_name(source: Source[Any], text: str) -> str:
     return text if source.path.name in text.partition(": ")[0] else f"{source.name}: {text}"
 
 
+def refuse_columns_of_runs(found: Found[Any], options: InputOptions) -> None:
+    """Raise UsageError where names of columns are given, and all inputs are runs, whose columns are known."""
+    runs = [source.run for source in found.sources if source.run]
+    if options.columns and len(runs) == len(found.sources):
+        names = ", ".join(str(channel["name"]) for channel in runs[0].record.channels if "name" in channel)
+        known = f"{runs[0].folder} is a run, whose columns are known{f' ({names})' * bool(names)}"
+        raise UsageError("columns", f"goes with a data file, and {known}: leave it out")
+
+
 @dataclass(frozen=True)
 class Method(Generic[S, R, Opt, A]):
     """How an analysis is carried out.
@@ -197,9 +206,16 @@ class Method(Generic[S, R, Opt, A]):
     set_beside: Callable[[Sequence[Path], Opt], tuple[Sequence[Path], Opt]] = lambda paths, options: (paths, options)
 
     def analyze(self, paths: Sequence[Path], options: Opt) -> A:
-        """Analyze the inputs at the paths.  Raises DataError for what cannot be used; it names the file."""
+        """Analyze the inputs at the paths.
+
+        Raises:
+            DataError: one of them cannot be used; it names the file.
+            UsageError: names of columns are given, and all inputs are runs.
+        """
         paths, options = self.set_beside([find_run(path) for path in paths], options)
-        return self.analyze_found(paths, collect(paths, self.needs, lambda _: options), options)
+        found = collect(paths, self.needs, lambda _: options)
+        refuse_columns_of_runs(found, options)
+        return self.analyze_found(paths, found, options)
 
     def analyze_found(self, paths: Sequence[Path], found: Found[S], options: Opt) -> A:
         """Do the same for inputs that were found already."""

@@ -159,6 +159,8 @@ def _read_record(task: Task, analysis: Analysis[Any], about: dict[str, Any]) -> 
 def _analyze(task: Task, analysis: Analysis[Any], about: dict[str, Any]) -> dict[str, Any]:
     """Return the input's part of result.json.  Raises DataError, CannotWrite."""
     options = replace(task.options, guess=False) if task.searched and not task.is_run else task.options
+    if task.is_run and task.searched:
+        options = replace(options, columns=None)  # they are those of the files beside it
     found = analysis.analyze([task.path], options)
     if len(found.sources) > 1:
         raise DataError(f"{task.path}: holds several runs: name each, as {found.sources[0].path}")

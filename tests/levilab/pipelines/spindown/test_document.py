@@ -12,7 +12,7 @@ import pytest
 
 from analysis.spindown import drag
 from analysis.spindown.drag import LAWS
-from levilab.errors import DataError
+from levilab.errors import DataError, UsageError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import save
@@ -157,6 +157,12 @@ def test_names_of_columns_do_not_matter_to_a_run(runs: Path, fitted: list[str]) 
     recall_spindowns([runs], SpinDownOptions(columns={"t": "1"}))
     recall_spindowns([runs / "run-1", runs / "run-2"], SpinDownOptions(columns={"t": "1"}))
     assert fitted == []
+
+
+@pytest.mark.parametrize("path", ["run-1", "run-1/readings.csv"])
+def test_names_of_columns_of_runs_alone_are_refused_with_those_of_the_run(runs: Path, path: str) -> None:
+    with pytest.raises(UsageError, match=r"run-1 is a run, whose columns are known \(time_s, spin_frequency_hz"):
+        METHOD.analyze([runs / path], SpinDownOptions(columns={"f": "zz"}))
 
 
 def test_nothing_is_written_where_results_are_recalled(runs: Path) -> None:
