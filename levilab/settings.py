@@ -32,7 +32,8 @@ def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> st
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
     if first["type"] == "extra_forbidden":
         return f"{where} is no key known here{_suggest_key(first['loc'], of)}{more}"
-    hint = "" if first["type"] == "literal_error" else hint_about(first["input"])  # where words are expected
+    named = ("",) if "_" not in where else ()  # a unit in a key stands behind _
+    hint = "" if first["type"] == "literal_error" else hint_about(first["input"], *named)  # where words are expected
     whole_table = first["type"] == "missing" or isinstance(first["input"], dict)
     seen = "" if whole_table else f" = {str(first['input'])[:60]!r}"
     return f"{where}{seen}: {explain_message(first['msg'])}{hint}{more}"
@@ -92,17 +93,17 @@ _NUMBERS = (
     (re.compile(r"\s*[+-]?\d+,\d+\s*"), "; write a decimal point, not a comma"),
     (
         re.compile(r"\s*[+-]?\d*\.?\d+(e[+-]?\d+)?\s*[A-Za-zµ°%][\w/²^*°]*\s*", re.IGNORECASE),
-        "; write the number without its unit, {unit}",
+        "; write the number without its unit{unit}",
     ),
 )
 
 
-def hint_about(seen: object, unit: str = "which is in the key's name") -> str:
+def hint_about(seen: object, unit: str = ", which is in the key's name") -> str:
     """Return the fault of a text that is nearly a number, as the rest of a sentence; empty for any other.
 
     Args:
         seen: what was given.
-        unit: where the unit stands.
+        unit: where the unit stands, as the rest of the sentence.
     """
     found = (text for pattern, text in _NUMBERS if isinstance(seen, str) and pattern.fullmatch(seen))
     return next(found, "").format(unit=unit)

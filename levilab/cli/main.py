@@ -61,7 +61,7 @@ def explain_bad_value(text: str, seen: object = None) -> str:
     said = explain_message(text)
     if not said.endswith(" is expected") or said.startswith(repr(seen)):
         return said
-    return (f"{seen!r}: " if seen is not None else "") + said + hint_about(seen, "which --help names")
+    return (f"{seen!r}: " if seen is not None else "") + said + hint_about(seen, ", which --help names")
 
 
 app = typer.Typer(

@@ -59,19 +59,21 @@ def read_number(text: str, unit: str) -> float:
     typed = factor_of(found[2] or unit, units)
     is_mega = (found[2] or "").startswith("M") and plain_unit(found[2]) not in units  # and no m in another case
     if typed is None or is_mega:
-        raise ValueError(f"{text.strip()!r}: a number in {_words_for(unit, units)} is expected")
+        raise ValueError(f"{text.strip()!r}: {_words_for(unit, units)} is expected")
     number, factor = float(found[1]), typed / units[own]
     # with the 15 digits that a float has: 25.4 g are 0.0254 kg, and not 0.025399999999999999
     return number if factor == 1 else float(f"{number * factor:.15g}")
 
 
 def _words_for(unit: str, units: Mapping[str, float]) -> str:
-    """Return a unit and some other ones for the same quantity, each size once."""
+    """Return a number in a unit or some other ones for the same quantity, each size once."""
     sizes = {units[plain_unit(unit)]: unit} if unit else {}
     for name, factor in units.items():
         sizes.setdefault(factor, name)
     *some, last = list(sizes.values())[:_SHOWN]
-    return f"{', '.join(some)} or {last}" if some else last or "no unit"
+    if not last:
+        return "a plain number"
+    return f"a number in {', '.join(some)} or {last}" if some else f"a number in {last}"
 
 
 def _float(text: str, unit: str) -> float:
@@ -122,7 +124,7 @@ def read_temperature(text: str) -> float:
 
 
 def read_masses(text: str) -> tuple[float, ...]:
-    """Return masses [kg] with commas or + between them; a unit at the end is that of all without one.
+    """Return masses [kg] with commas or + between them; a unit at the end alone is that of all.
 
     Raises ValueError.
 
@@ -139,7 +141,12 @@ def read_masses(text: str) -> tuple[float, ...]:
         raise ValueError("a comma is expected between two masses, as 0.06, 0.1 g")
     last = _NUMBER.fullmatch(pieces[-1])
     unit = (last[2] or "") if last else ""
-    return tuple(read_mass(f"{piece} {unit}" if piece[-1:].isdigit() else piece) for piece in pieces)
+    bare = [piece[-1:] in "0123456789." for piece in pieces]
+    if any(bare) and not all(bare[:-1] if unit else bare):  # 60 mg + 0.1 may be 0.1 mg or 0.1 g
+        raise ValueError("a unit behind each mass is expected, as 60 mg + 0.1 g, or one at the end for all")
+    return tuple(
+        read_mass(f"{piece} {unit}" if is_bare else piece) for piece, is_bare in zip(pieces, bare, strict=True)
+    )
 
 
 def _in_range(value: float, low: float, high: float, expected: str) -> float:

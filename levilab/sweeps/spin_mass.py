@@ -51,7 +51,7 @@ def span_of(name: str, text: str) -> Span:
     try:
         low, high, step = (read_number(part, unit) for part in text.split(":"))
     except ValueError:
-        hints = (hint_about(part, f"which is {unit}") for part in text.split(":"))
+        hints = (hint_about(part, f", which is {unit}") for part in text.split(":"))
         raise UsageError(name, expected + next(filter(None, hints), ""), value=text) from None
     finite = all(map(math.isfinite, (low, high, step)))
     steps = (high - low) / step * (1 + 1e-9) if finite and step > 0 else 0.0  # rounding must not lose the last one

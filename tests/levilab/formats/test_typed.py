@@ -39,7 +39,7 @@ def test_a_number_is_read_with_any_unit_of_its_quantity(text: str, unit: str, va
         ("0,03", "Hz", "write a decimal point, not a comma"),
         ("long", "s", "'long': a number is expected, which may have its unit, as 5 s"),
         ("30 mhz", "Hz", "'30 mhz': a number in Hz, kHz, MHz, mHz"),  # which of the two is not known
-        ("5kg", "", "a number in no unit is expected"),
+        ("5kg", "", "'5kg': a plain number is expected"),
     ],
 )
 def test_another_unit_is_refused_with_those_that_are_read(text: str, unit: str, said: str) -> None:

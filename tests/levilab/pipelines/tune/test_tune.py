@@ -53,8 +53,8 @@ def test_what_is_no_temperature_of_a_room_is_refused(text: str) -> None:
         read_temperature(text)
 
 
-@pytest.mark.parametrize("text", ["0,06", "0,06 + 0,1 g", "0.06,,0.1", "0.06 mm"])
-def test_a_decimal_comma_does_not_become_two_washers(text: str) -> None:
+@pytest.mark.parametrize("text", ["0,06", "0,06 + 0,1 g", "0.06,,0.1", "0.06 mm", "60 mg + 0.1", "60 mg, 0.1, 0.2 g"])
+def test_washers_that_can_be_read_in_two_ways_are_refused(text: str) -> None:
     with pytest.raises(ValueError, match="expected"):
         read_masses(text)
 
