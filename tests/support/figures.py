@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 from typing import TYPE_CHECKING
 
@@ -28,11 +29,17 @@ _EDGE = 1.5
 _STARTS, _ENDS = slice(None, -1), slice(1, None)
 
 
+#: The smallest picture that can be read.
+ONE_PIXEL = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg=="
+)
+
+
 @contextlib.contextmanager
 def without_drawing() -> Iterator[None]:
     """Figures are made, but matplotlib does not draw them: that is most of what a result or a page costs."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("levilab.present.style.as_png", lambda *_, **__: b"\x89PNG\r\n\x1a\n")
+        patch.setattr("levilab.present.style.as_png", lambda *_, **__: ONE_PIXEL)
         patch.setattr("levilab.present.style.as_svg", lambda *_, **__: "<svg/>")
         yield
 
