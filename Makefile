@@ -18,7 +18,7 @@ setup: .venv/ready  ## make the environment in .venv
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "levilab needs Python 3.11 or newer, this is " + sys.version.split()[0] + ": make PYTHON=python3.12 …")'
 	@echo 'making an environment in .venv (2.0 GB, with the tools of the tests) and installing into it: one to three minutes'
 	@$(PYTHON) -m venv .venv
-	@$(BIN)/python -m pip install --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
 	@touch $@
 
 demo: setup  ## the main job on the virtual bench: acquire, analyze, report (into demo/, made anew)
@@ -26,6 +26,7 @@ demo: setup  ## the main job on the virtual bench: acquire, analyze, report (int
 	$(BIN)/levilab acquire spin --mock --out $(DEMO)
 	$(BIN)/levilab analyze spindown $(DEMO)
 	$(BIN)/levilab report $(DEMO) --output $(DEMO)/report.html
+	@echo 'the report is $(DEMO)/report.html: open it in a browser'
 
 # mypy works beside the tests: alone it would leave a core idle
 test: setup  ## everything that must pass: style, types, imports, tests

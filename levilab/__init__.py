@@ -93,7 +93,7 @@ def acquire(
     out: str | PathLike[str] = "runs",
     seed: int | None = None,
     scene: str | PathLike[str] | None = None,
-    group: str = "",
+    group: str | None = None,
     note: str = "",
     temperature: float | str | None = None,
     washers: str | None = None,

@@ -89,7 +89,7 @@ class AcquisitionOptions:
     out: Path = Path("runs")
     seed: int | None = None
     scene: str | None = None
-    group: str = ""
+    group: str | None = None
     note: str = ""
     temperature: str | None = None
     washers: str | None = None
@@ -158,7 +158,7 @@ def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: boo
         if getattr(options, name) is not None and (run or not options.mock):
             raise UsageError(name, f"goes with `mock`, and not with `resume`: a run keeps its {name}")
     for name in ("settings", "group", "temperature", "washers"):
-        if getattr(options, name) and run:
+        if getattr(options, name) not in {None, ()} and run:
             raise UsageError(name, f"goes with a new run: a resumed run keeps its {name}")
     if options.realtime and not virtual:
         raise UsageError("realtime", "goes with `mock`: a real bench always keeps to the wall clock")
@@ -171,11 +171,13 @@ def _typed(name: str, text: str | None, read: Callable[[str], T]) -> T | None:
         raise UsageError(name, str(error), value=text) from error
 
 
-def _group(typed: str) -> str:
-    """Return the name of a group.  Raises UsageError."""
+def _group(typed: str | None) -> str:
+    """Return the name of a group, empty for none.  Raises UsageError."""
+    if typed is None:
+        return ""
     group = " ".join(typed.split())
-    if len(group) > LONGEST_GROUP or not group.isprintable():
-        raise UsageError("group", f"a name of at most {LONGEST_GROUP} letters is expected, as Group 7", value=typed)
+    if not 0 < len(group) <= LONGEST_GROUP or not group.isprintable():
+        raise UsageError("group", f"a name of 1 to {LONGEST_GROUP} letters is expected, as Group 7", value=typed)
     return group
 
 

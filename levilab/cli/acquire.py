@@ -93,8 +93,9 @@ def acquire_experiment(
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Makes a virtual run repeatable.")] = None,
     group: Annotated[
-        str, typer.Option(metavar="NAME", help="Who measures, as 'Group 7': the run's name in tables and figures.")
-    ] = "",
+        str | None,
+        typer.Option(metavar="NAME", help="Who measures, as 'Group 7': the run's name in tables and figures."),
+    ] = None,
     note: Annotated[str, typer.Option(help="Kept with the run.")] = "",
     temperature: Annotated[
         str | None, typer.Option(metavar="T", help="Of the magnets, as 21.5 C; kept with the run.")

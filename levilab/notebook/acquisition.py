@@ -13,7 +13,7 @@ from levilab.acquisition.table import EXPERIMENTS
 from levilab.errors import DataError, UsageError
 from levilab.notebook.run import RecordedRun
 from levilab.present.progress import Display
-from levilab.runs.find import RECORD, find_run
+from levilab.runs.find import RECORD, find_run, no_such_path
 from levilab.runs.run import Run
 from levilab.simulator.keys import plain
 
@@ -63,6 +63,8 @@ def ask_with_input(task: Task) -> str:
 def load_run(path: str | PathLike[str]) -> RecordedRun:
     """Load the run in a run folder, or of a name in runs/.  Raises DataError."""
     folder = find_run(Path(path))
+    if not folder.exists():
+        raise no_such_path(folder)
     if folder.is_file():
         raise DataError(f"{folder}: is a file; a run folder is expected, a data file goes to levilab.analyze as it is")
     if folder.is_dir() and not (folder / RECORD).exists():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -57,7 +58,9 @@ def write_worksheets(
     form.check()
     for name in experiments:
         if name not in SHEETS:
-            raise UsageError("experiment", f"one of {', '.join(SHEETS)} is expected", value=name)
+            near = get_close_matches(name, SHEETS, n=1)
+            known = f"did you mean {near[0]}?" if near else f"one of {', '.join(SHEETS)} is expected"
+            raise UsageError("experiment", known, value=name)
     files = []
     for sheet in (SHEETS[name] for name in experiments or SHEETS):
         contents = {sheet.experiment: worksheet(sheet, texts, seeds)}

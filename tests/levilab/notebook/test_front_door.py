@@ -299,6 +299,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str | type[levilab.LevilabError]]] = {
     "height alone": (lambda: levilab.analyze(SAMPLE_DATA / "field-scan", height_m=0.07), DataError),
     "no table": (lambda: levilab.analyze(spin_down()).to_dataframe("fits"), "table"),
     "no run": (lambda: levilab.load("nowhere"), DataError),
+    "no name of a group": (lambda: levilab.acquire("spin", mock=True, group=" "), "group"),
     "a file": (lambda: levilab.load(RECORD), DataError),
     "many runs": (lambda: levilab.load(SAMPLE_DATA), DataError),
     "no experiment": (lambda: levilab.acquire("spinn", mock=True), "experiment"),
@@ -323,6 +324,7 @@ def test_a_wrong_call_names_the_argument_or_the_kind_of_failure(case: str) -> No
 @pytest.mark.parametrize(("call", "said"), [
     (lambda: levilab.analyze([0, 1, 2], [3, 4, 5]), r"^kind = \[3, 4, 5\]: .*analyze\(\(\[…\], \[…\]\)\)"),
     (lambda: levilab.analyze(([0, 1], [40, 39])), "^the data: holds 2 readings, at least 3"),
+    (lambda: levilab.load("nowhere"), "^nowhere: there is no such file or folder in .*levilab runs lists"),
     (lambda: levilab.analyze(levilab), "^data = the module levilab: a run,"),
 ])  # fmt: skip
 def test_a_natural_but_wrong_call_is_told_how_to_call(call: Callable[[], Any], said: str) -> None:

@@ -92,7 +92,7 @@ def test_a_key_has_the_values_and_truths_of_each_seed_and_the_worksheet_none(tmp
     assert "×10⁻⁴" not in Page(sheet.read_text(encoding="utf-8")).text
 
 
-@pytest.mark.parametrize(("experiment", "language"), [("spni", "en"), ("spin", "xx")])
+@pytest.mark.parametrize(("experiment", "language"), [("orbit", "en"), ("spin", "xx"), ("precesion", "en")])
 def test_what_is_unknown_is_refused_with_what_there_is(experiment: str, language: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"precession|de, en"):
         write_worksheets([experiment], tmp_path, {"A": 1}, language=language)
