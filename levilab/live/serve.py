@@ -19,7 +19,7 @@ from levilab.live.doors import Doors, doors_for_guests
 from levilab.live.practice.bench import PracticeBench
 from levilab.live.server import Hall, application
 from levilab.live.share import address_in_network
-from levilab.runs.find import RECORD, run_or_folder
+from levilab.runs.find import RECORD, must_take_runs, run_or_folder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping
@@ -106,7 +106,7 @@ def serve_live(
     Raises:
         UsageError: a run and a bench for practice at once.
         MissingThree: the extra is not installed.
-        DataError: there is no such run.
+        DataError: there is no such run, or the bench would record into a file.
         CannotShow: the port is taken.
         NoNetwork: the view is to be shared, and this machine is in no network.
     """
@@ -194,6 +194,8 @@ def farewell(bench: PracticeBench | None, analyzed: Collection[Path] = ()) -> st
 def _where(options: LiveOptions) -> tuple[Path, str]:
     """Return the folder with the runs, and the name of the run to show at first."""
     if options.run is None:
+        if options.mock:
+            must_take_runs(options.out)
         return options.out.absolute(), ""
     if options.mock:
         raise UsageError("mock", "a run and a bench for practice exclude each other: it records runs of its own")

@@ -104,6 +104,13 @@ def run_or_folder(name: Path, root: Path = RUNS) -> Path:
     return folder
 
 
+def must_take_runs(root: Path) -> None:
+    """Raise DataError for a file in the place of the folder that is to hold runs, or of one above it."""
+    there = next((path for path in (root, *root.parents) if path.exists()), root)
+    if there.is_file():
+        raise DataError(f"{there}: is a file, a folder is expected; choose another with `out`")
+
+
 def must_be_searchable(root: Path) -> None:
     """Raise DataError for what is no folder that may be searched."""
     if root.is_file():

@@ -24,7 +24,7 @@ from levilab.errors import DataError
 from levilab.files import CannotWrite, replace_atomically, sync_folder
 from levilab.runs import traces
 from levilab.runs.events import RunEvent
-from levilab.runs.find import RECORD
+from levilab.runs.find import RECORD, must_take_runs
 from levilab.runs.run import EVENTS, LOCK, PACKAGE, READINGS, STATES, WIRE, RunRecord, lock_of, read_record, utc_now
 
 if TYPE_CHECKING:
@@ -81,7 +81,9 @@ class RunWriter:
 
         Raises:
             CannotWrite: it cannot be made.
+            DataError: `out` is a file.
         """
+        must_take_runs(out)
         with _explain_errors("create the run folder", out, safe=""):
             _make_folder(out)
             writer = cls(_new_folder(out, record.experiment), record, tell)

@@ -4,7 +4,8 @@
         page.goto(path.as_uri())
         assert page.get_by_role("heading", name="Readings").is_visible()
 
-``page`` is 1280 × 800 in light colours; ``watched(viewport=PHONE, color_scheme="dark")`` opens others.  Each
+``page`` is 1280 × 800 in light colours; ``watched(viewport=PHONE, color_scheme="dark")`` opens others.  All ask for
+reduced motion, which costs less processor time, unless a test says ``reduced_motion="no-preference"``.  Each
 fails the test at its end if the page has written an error to the console, raised one, or asked for anything that is not
 on this machine.  A module may share a page in a fixture of its own:
 
@@ -149,7 +150,7 @@ def watch(browser: Browser, **options: Any) -> Iterator[Page]:
         options: of Playwright's ``new_context``: viewport, color_scheme, reduced_motion, java_script_enabled, ...
     """
     problems: list[str] = []
-    context = browser.new_context(**{"viewport": DESK, "locale": "en-GB", **options})
+    context = browser.new_context(**{"viewport": DESK, "locale": "en-GB", "reduced_motion": "reduce", **options})
     context.set_default_timeout(PATIENCE_MS)
     page = context.new_page()
 

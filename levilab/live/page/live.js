@@ -14,10 +14,10 @@ const NEWS_EVERY_MS = 6000;
 const MOST_EVENTS = 200;
 const STATES = {
   none: "no run yet", running: "running", finished: "finished", interrupted: "interrupted", failed: "failed",
-  setup: "the bench is being set up", silent: "bench silent", lost: "instrument lost", missing: "no run", unreachable: "server gone", idle: "ready",
+  setup: "starting", slow: "the bench is slow", silent: "bench silent", lost: "instrument lost", missing: "no run", unreachable: "server gone", idle: "ready",
 };
 const LONGER = {  // what stands beside the state
-  setup: "some seconds; up to a minute at the first start, which compiles",
+  slow: "this computer has other work; the bench goes on by itself",
   unreachable: "it is tried again; start levilab live again if it was ended",
 };
 /** A record of the oscilloscope that is older is marked with its age [s of bench time; where that is faster, of the wall]: without pulses a count takes 2.5 s. */
@@ -26,6 +26,7 @@ const OLD_S = 3;
 const OWN_BENCH = ".";
 /** What a practice bench's oscilloscope shows, from above. */
 const CHANNELS = ["tape", "drive", "laser"];
+const SET_UP = "The bench is being set up: some seconds, up to a minute at the first start, which compiles.";
 const PAUSED = "The view is paused, and shows nothing of what the bench would do: “Go on” first.";
 const SLIP_HZ = 0.2, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive, on a ramp, too, which a count is 0.1 Hz behind; while it swings
 
@@ -35,6 +36,7 @@ const data = {readings: null, fit: null, records: new Map(), about: null, bench:
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
 const history = openHistory(), sound = openSound();
 let fellAt = NaN;  // a fall whose poses are not kept yet
+let isReady = false;  // whether the bench for practice has measured something yet
 let paused = false, drawn = null, pointed = -1, space = null, topOf = "", wanted = "", practice = null, reachable = true;
 let spoken = 0, close = null, dirty = {plot: true, trace: true};
 window.levilab = {frames: 0, drawn: 0, seen, data, history};  // what tests and benchmarks read
@@ -178,6 +180,7 @@ const partsNow = async () => (await fetch(`parts?run=${encodeURIComponent(seen.r
 async function openTop() {
   const early = [];
   space = {add: (...pieces) => early.length < 50 && early.push(pieces)};
+  by("no-space").hidden = true;
   document.body.classList.remove("no-top");
   try {
     const parts = await partsNow();
@@ -201,15 +204,22 @@ function stateOf() {
   const {about, bench} = data;
   if (!reachable) return "unreachable";
   if (bench?.lost?.length && !bench.silent) return "lost";
-  if (about?.status === "running" && bench?.silent) return "silent";
-  if (practice && !bench) return practice.ended ? "silent" : "setup";
-  if (practice && !bench.busy && (!about || about.status === "missing")) return bench.silent ? "silent" : "idle";
+  // a bench for practice is a program of this computer: it may be slow, and is silent once it has ended
+  const quiet = !practice || practice.ended || (bench?.folder && !bench.busy) ? "silent" : "slow";
+  if (about?.status === "running" && bench?.silent) return quiet;
+  if (practice && (!bench || !isReady)) return practice.ended ? "silent" : "setup";
+  if (practice && !bench.busy && (!about || about.status === "missing")) return bench.silent ? quiet : "idle";
   return about ? about.status : "none";
 }
 
 function show() {
   const {about, bench, last} = data;
+  isReady ||= Boolean(bench) && (bench.busy || Object.keys(bench.last).length > 0);
   const state = stateOf();
+  if (practice && !space) {
+    by("no-space").hidden = state !== "setup";
+    write("no-space", SET_UP);
+  }
   document.body.dataset.state = state;
   write("state-word", STATES[state] || state);
   const lost = bench?.lost?.length ? `the ${bench.lost.join(" and the ")} does not answer` : "";
@@ -236,9 +246,9 @@ function show() {
   by("drawn").parentElement.hidden = !data.count;
   by("csv").parentElement.hidden = !data.readings && !minutes;
   write("readings-title", minutes ? "The last minutes" : "Readings");
-  write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: practice?.guest ? "No run yet: it appears here once one is recorded." : "No run yet: the guide says how to record one.", setup: "The bench is being set up."}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
+  write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: practice?.guest ? "No run yet: it appears here once one is recorded." : "No run yet: the guide says how to record one.", setup: " "}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
   document.title = `${state === "running" && data.count ? `${data.count} readings · ` : ""}levilab live`;
-  practice?.show(bench, about, data.count, down);
+  if (isReady) practice?.show(bench, about, data.count, down);
   by("own").hidden = !practice || wanted === OWN_BENCH || !seen.run || (isOwn(seen.run) ?? !wanted);  // a run that begins is listed in a moment
   space?.setSpeed?.(bench?.speed, bench?.paused || bench?.silent);
   showTop(bench);
@@ -295,7 +305,7 @@ function showGenerator(bench, last) {
   write("signal", drive?.waveform ? `${drive.waveform}, ${short(drive.amplitude_vpp)} Vpp${drive.offset_v ? `, offset ${short(drive.offset_v)} V` : ""}` : "–");
   const spin = bench?.last?.spin_frequency_hz;
   const off = Number.isFinite(spin) && drive?.output ? spin - drive.frequency_hz : NaN;
-  write("lock", Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? "follows" : Math.abs(off) < SWINGS_HZ ? "near it" : "beside it"}, ${off >= 0 ? "+" : ""}${fixed(off, 3)} Hz` : "–");
+  write("lock", Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? (practice && !bench.busy && !bench.took_hold ? "takes hold" : "follows") : Math.abs(off) < SWINGS_HZ ? "near it" : "beside it"}, ${off >= 0 ? "+" : ""}${fixed(off, 3)} Hz` : "–");
   write("generator-model", modelOf("generator"));
 }
 
@@ -513,7 +523,7 @@ const KEYS = {
   ";": () => practice?.step(-0.5), "<": () => practice?.step(-0.5),
 };
 document.addEventListener("keydown", (event) => {
-  const fields = event.key === "?" ? "dialog[open]" : "input:not([type=checkbox]):not([type=range]), select, dialog[open]";  // no number and no option has a "?"
+  const fields = `input:not([type=checkbox]):not([type=range]), dialog[open]${event.key === "?" ? "" : ", select"}`;  // no option begins with a "?"
   const typing = event.target.closest?.(fields);
   const pressing = event.key === " " && event.target.closest?.("button, a, input, [role=button]");
   if (typing || pressing || event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.key]) return;

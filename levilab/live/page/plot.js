@@ -26,11 +26,12 @@ export function sheet(canvas) {
   };
 }
 
-/** Return about `count` round numbers from low to high. */
+/** Return about `count` round numbers from low to high, and no fewer than two. */
 export function ticks(low, high, count) {
   if (!(high > low)) return [low];
   const raw = (high - low) / Math.max(count, 1), power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= raw * 0.999);
+  const steps = [0.1, 0.2, 0.5, 1, 2, 5, 10].map((k) => k * power), most = (high - low) / 2;
+  const step = Math.min(steps.find((k) => k >= raw * 0.999), steps.findLast((k) => k <= most) ?? Infinity);
   const found = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k += 1) found.push(k * step);
   return found;

@@ -22,9 +22,9 @@ export function openPractice(about, command, run, isOwn, allowed) {
   document.body.classList.add("practice");
   by("practice").hidden = false;
   for (const {name, title} of about.experiments) by("experiment").append(option(title, name));
-  const now = {drive: false, busy: false, paused: false, analyzed: "", ended: false, elsewhere: false, bench: null};
+  const now = {drive: false, busy: false, paused: false, analyzed: "", ended: false, elsewhere: null, bench: null};
 
-  by("controls").disabled = !allowed;
+  by("controls").disabled = true;  // until the bench is there
   if (!allowed) write("said", "This page may only look: open the address that the terminal shows.");
 
   async function send(what, values = {}) {
@@ -180,7 +180,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
 
   /** Tune by a step, as with the keys. */
   function step(hz) {
-    if (!now.elsewhere) stepBy("frequency", hz);
+    if (!by("controls").disabled) stepBy("frequency", hz);
   }
 
   function press(id, on, text) {
@@ -193,9 +193,9 @@ export function openPractice(about, command, run, isOwn, allowed) {
     if (!bench) return;
     const elsewhere = Boolean(bench.folder) && !bench.busy;  // another program's bench records the run that is shown
     if (elsewhere !== now.elsewhere) {
-      now.elsewhere = elsewhere;
       by("controls").disabled = !allowed || elsewhere;
-      if (allowed) write("said", elsewhere ? "Another program records this run: the practice bench rests until it ends, or until you go back to it." : "");
+      if (allowed && (elsewhere || now.elsewhere)) write("said", elsewhere ? "Another program records this run: the practice bench rests until it ends, or until you go back to it." : "");
+      now.elsewhere = elsewhere;
     }
     now.bench = elsewhere ? now.bench || bench : bench;
     guide(now.bench, about_run, readings);
@@ -235,8 +235,8 @@ export function openPractice(about, command, run, isOwn, allowed) {
       drive: bench.took_hold, tune: bench.tuned_up, record: recorded, analyze: recorded && now.analyzed === name, report: recorded && now.read === name,
     };
     const items = [...by("guide").children], last = items.map((item) => Boolean(done[item.dataset.step])).lastIndexOf(true);
-    items.forEach((item, k) => {  // a step may be left out: what comes next is the one behind the last that was done
-      item.className = done[item.dataset.step] ? "done" : k === last + 1 ? "now" : "";
+    items.forEach((item, k) => {  // a run drives the top itself: it has done the steps before it
+      item.className = k <= last ? "done" : k === last + 1 ? "now" : "";
       if (item.className === "now") item.setAttribute("aria-current", "step");
       else item.removeAttribute("aria-current");
     });

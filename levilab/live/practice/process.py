@@ -18,7 +18,7 @@ import numpy as np
 from instruments.clock import PacedClock
 from instruments.errors import InstrumentError
 from levilab.acquisition.failures import DidNotFollow, NoLight
-from levilab.acquisition.grip import Grip
+from levilab.acquisition.grip import COUNTS, Grip
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.onlooker import Sent, counting_of, drive_of, state_of
 from levilab.acquisition.request import AcquisitionOptions, request_at
@@ -672,7 +672,8 @@ class PracticeProcess:
             return
         self._switch_on(bench, spin)
         hold.grip = Grip(spin, bench.generator.limits.drive_lowest_hz, bench.generator.limits.drive_frequency_hz)
-        self._say(f"drive on at the top's spin, {spin:.2f} Hz; for some seconds it yields to the top")
+        within = COUNTS * GATE_S + COMPARED_S
+        self._say(f"drive on at the top's spin, {spin:.2f} Hz; it takes hold within about {within:.0f} s")
 
     def _yield(self, bench: Bench, hold: Hold, grip: Grip, spin: float | None) -> None:
         bench.generator.frequency = grip.follow(spin)
@@ -739,7 +740,7 @@ class PracticeProcess:
             mock=True,
             out=Path(self._options.out),
             seed=self._options.seed,
-            group=command.group,
+            group=command.group.strip() or None,
             note=command.note,
             settings=plan.settings,
         )

@@ -43,7 +43,7 @@ def path(page_of_top, tmp_path_factory):
 @pytest.fixture(scope="module")
 def opened(browser, path):
     """One page for the tests that change nothing for good; it does not start by itself."""
-    with watch(browser, viewport=WINDOW, reduced_motion="reduce") as page:
+    with watch(browser, viewport=WINDOW) as page:
         page.goto(path.as_uri())
         page.wait_for_selector("#stage[data-drawn]")
         yield page
@@ -202,7 +202,7 @@ def test_a_lean_is_exaggerated_and_goes_no_further_than_a_limit(opened):
 
 
 def test_on_a_telephone_in_the_dark_nothing_is_wider_than_the_screen(watched, path):
-    page = watched(viewport=PHONE, color_scheme="dark", has_touch=True)
+    page = watched(viewport=PHONE, color_scheme="dark", has_touch=True, reduced_motion="no-preference")
     page.goto(path.as_uri())
     page.wait_for_selector("#stage[data-drawn]")
     # it begins by itself

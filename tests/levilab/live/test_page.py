@@ -144,7 +144,7 @@ def test_the_keys_go_from_reading_to_reading_and_pause(shown: Page) -> None:
 
 
 def test_a_phone_scrolls_down_and_not_sideways(watched: Callable[..., Page], hall: Hall) -> None:
-    page = watched(viewport=PHONE, color_scheme="dark", reduced_motion="reduce")
+    page = watched(viewport=PHONE, color_scheme="dark")
     page.goto(address(hall, NAME))
     until(page, "levilab.drawn > 0")
     assert page.evaluate("[document.documentElement.scrollWidth, innerWidth]") == [PHONE["width"], PHONE["width"]]
@@ -289,7 +289,7 @@ def test_a_fall_is_replayed_and_what_is_drawn_is_saved(
 ) -> None:
     """Where less motion is wanted the page shows a picture a second, a replay too."""
     run = GrowingRun(tmp_path)
-    page = watched(reduced_motion="reduce")
+    page = watched()
     page.goto(address(served, run.folder.name))
     until(page, "levilab.frames > 0")
     assert page.input_value("#motion") == "0"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import time
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,16 +13,20 @@ import pytest
 from levilab.live.desk import Desk
 from levilab.live.practice.bench import PracticeBench
 from levilab.live.practice.what_if import WHAT_IF
+from levilab.live.watch import SILENT_AFTER_S
 from levilab.simulator import preset
 from levilab.telemetry.address import Address, write_address
-from levilab.telemetry.messages import Poses, State
+from levilab.telemetry.messages import Drive, Poses, State
+from support.browser import PHONE
 from support.live_pages import GrowingRun, address, publish, serving, spin_down, until
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     from playwright.sync_api import Page, Route
 
+    from levilab.live.practice.commands import PracticeEvent
     from levilab.live.server import Hall
 
 
@@ -213,10 +219,63 @@ def test_a_student_drives_records_and_analyzes(
     until(page, "levilab.data.bench.paused")
     page.click("#analyze")
     until(page, "document.querySelectorAll('#figures img').length && document.getElementById('verdict').innerText")
-    until(page, f"{DONE} === 'drive,record,analyze'")  # the drive was not tuned up by hand
+    until(page, f"{DONE} === 'drive,tune,record,analyze'")  # the run tuned the drive up
     assert sorted(path.name for path in served.root.iterdir()) == [OLDER, name]
     assert (served.root / name / "result.json").exists()
     turn_by_itself(page, served, older)
+
+
+class Starting:
+    """A bench that is not ready."""
+
+    address = None
+    may_record = False
+
+    def events(self) -> list[PracticeEvent]:
+        return []
+
+
+@pytest.fixture
+def starting(tmp_path: Path) -> Iterator[Hall]:
+    with serving(tmp_path, desk=Desk(Starting())) as hall:  # type: ignore[arg-type]
+        yield hall
+
+
+def test_nothing_can_be_pressed_before_the_bench_is_there(starting: Hall, watched: Callable[..., Page]) -> None:
+    page = watched(viewport=PHONE)
+    page.goto(address(starting, token=True))
+    until(page, "document.body.dataset.state === 'setup' && levilab.frames > 0")
+    publish(starting.watches[""], State(1.0))  # it answers, and has measured nothing
+    until(page, "levilab.data.bench")
+    assert page.inner_text("body").count("being set up") == 1
+    assert page.is_disabled("#drive")
+    assert page.is_disabled("#record")
+    measured = State(2.0, last={"spin_frequency_hz": 30.0}, drive=Drive("SQU", 30.0, 10.0, output=True))
+    publish(starting.watches[""], measured)
+    until(page, "document.body.dataset.state === 'idle' && !document.getElementById('controls').disabled")
+    assert "being set up" not in page.inner_text("body")
+    assert page.inner_text("#lock").startswith("takes hold")
+    publish(starting.watches[""], replace(measured, took_hold=True))
+    until(page, f"document.getElementById('lock').textContent.startsWith('follows') && {DONE} === 'drive'")
+    page.focus("#group")
+    page.keyboard.type("d?")
+    assert page.input_value("#group") == "d?"
+    assert not page.locator("#keys").is_visible()
+    assert page.evaluate("document.querySelector('header').offsetHeight") < 90  # two lines of 30 pixels, and room
+    counter, practice = (
+        page.evaluate(f"document.getElementById('{one}').offsetTop") for one in ("counter", "practice")
+    )
+    assert counter < practice
+    starting.watches[""].clock = lambda: time.monotonic() + 2 * SILENT_AFTER_S
+    until(page, "document.body.dataset.state === 'slow'")  # and not silent: it has not ended
+
+
+def test_an_axis_has_two_numbers_at_least(starting: Hall, page: Page) -> None:
+    page.goto(address(starting))
+    for low, high in ((29.1, 31.5), (29.6, 30.4), (20.0, 35.0), (0.0, 1e-3)):
+        found = page.evaluate(f"import('/page/plot.js').then(({{ticks}}) => ticks({low}, {high}, 2))")
+        assert 2 <= len(found) <= 6
+        assert low - 1e-9 < found[0] < found[-1] < high + 1e-9  # rounding
 
 
 def test_a_page_without_the_token_may_only_look(served: Hall, page: Page) -> None:

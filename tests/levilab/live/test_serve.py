@@ -211,3 +211,15 @@ def test_a_signal_ends_the_view_in_one_line(tmp_path: Path, name: str) -> None:
     assert process.returncode == 130
     assert err.splitlines()[-1] == "levilab: the view is closed"
     assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("words", [("live", "--mock", "--no-open", "--port", "0"), ("acquire", "field", "--mock")])
+@pytest.mark.parametrize("out", ["taken", "taken/runs"])
+def test_a_file_in_the_place_of_the_folder_of_runs_is_refused(
+    tmp_path: Path, words: tuple[str, ...], out: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(PracticeBench, "start", lambda _: pytest.fail("the bench starts"))
+    (tmp_path / "taken").touch()
+    ended = command(*words, "--out", out, cwd=tmp_path)
+    assert ended.status != 0
+    assert "taken: is a file, a folder is expected; choose another with --out" in ended.err
