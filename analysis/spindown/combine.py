@@ -112,7 +112,7 @@ def combine(runs: Sequence[SpinDown]) -> Combined:
         raise NothingToCombine(runs=len(runs))
     joint = joint_exponent(runs)
     weighed, criterion = weigh({name: _statistics(runs, name, joint) for name in names})
-    correlation, tilt = _correlation(runs), _tilt(runs, next(iter(weighed)))
+    correlation = _correlation(runs)
     fits = tuple(_combine_law(name, [run.fit(name) for run in runs], weighed[name]) for name in names)
     changes = tuple(1.0 if run.verdict.change is None else run.verdict.change.p for run in runs)
     decision = runs[0].verdict if len(runs) == 1 else verdict(weighed, criterion, changes=changes)
@@ -123,7 +123,7 @@ def combine(runs: Sequence[SpinDown]) -> Combined:
         *(Remark("changed", values=(k + 1, len(runs), changes[k])) for k in decision.changed if len(runs) > 1),
         *_about_number(runs),
     ]
-    return Combined(fits, decision.best, decision, len(runs), tuple(said), correlation, tilt)
+    return Combined(fits, decision.best, decision, len(runs), tuple(said), correlation, _tilt(runs, decision.best))
 
 
 def _correlation(runs: Sequence[SpinDown]) -> Estimate | None:

@@ -164,6 +164,7 @@ def fit_spin_down(
             break
         outliers = outliers[~agree]
     decision = verdict(stats, criterion, change=_change(found[best], found.get("power")))
+    best = decision.best
     return SpinDown(
         fits=tuple(replace(fits[name], statistics=stats[name]) for name in chosen),
         best=best,

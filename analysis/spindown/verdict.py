@@ -21,10 +21,11 @@ class Verdict:
     """The verdict; every law is in one of the four lists.
 
     Attributes:
-        best: name of the law with the smallest criterion.
+        best: name of the law that results are shown by: of those that fit as well as the one with the smallest
+            criterion, that with the fewest constants.
         decided: whether the readings single out one of the simple laws, or a general one before all of them: no law
             with fewer constants fits as well.
-        indistinguishable: names of the laws that fit as well as the best one, which comes first.
+        indistinguishable: names of the laws that fit as well as the best one, which comes first; fewest constants first.
         needless: names of laws that fit as well, but need more constants.
         weak: names of laws disfavoured but not excluded.
         excluded: names of laws the readings exclude.
@@ -56,21 +57,22 @@ def verdict(
     Args:
         fits: statistics by the law's name, weighed, best law first.
         criterion: by which.
-        change: the most improbable one about the best law, of one run.
+        change: the most improbable one about the law with the smallest criterion, of one run.
         changes: probabilities of the most improbable change in each of several runs.
     """
-    best = next(iter(fits))
-    telling = criterion == "aicc" or (criterion == "bic" and fits[best].sigma_known)
-    kinds = {name: _kind(fits, name, best) if telling else "tied" for name in fits}
+    first = next(iter(fits))
+    telling = criterion == "aicc" or (criterion == "bic" and fits[first].sigma_known)
+    kinds = {name: _kind(fits, name, first) if telling else "tied" for name in fits}
     listed = {k: tuple(n for n in fits if kinds[n] == k) for k in ("tied", "needless", "weak", "excluded")}
+    listed["tied"] = tuple(sorted(listed["tied"], key=lambda name: fits[name].n_parameters))
     probabilities = changes or ((change.p,) if change else ())
     changed = tuple(k for k, p in enumerate(probabilities) if p * len(probabilities) < CHANGED)  # Bonferroni
     describes = 2 * len(changed) <= len(probabilities) - (len(probabilities) == 1)
     simple = [name for name in (*listed["tied"], *listed["weak"]) if is_simple(name)]
-    simpler = min(fits[name].n_parameters for name in listed["tied"]) < fits[best].n_parameters
+    best = listed["tied"][0]
     return Verdict(
         best,
-        telling and len(simple) <= 1 and describes and not simpler,
+        telling and len(simple) <= 1 and describes and best == first,
         indistinguishable=listed["tied"],
         needless=listed["needless"],
         weak=listed["weak"],

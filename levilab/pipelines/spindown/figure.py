@@ -16,7 +16,8 @@ from matplotlib.lines import Line2D
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
 from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
-from levilab.pipelines.spindown.table import laws_of, tilt_part
+from levilab.pipelines.spindown.table import is_best, laws_of, tilt_part
+from levilab.pipelines.spindown.words import finding
 from levilab.present.drawing import (
     SMALL,
     band,
@@ -30,7 +31,7 @@ from levilab.present.drawing import (
     write,
 )
 from levilab.present.looks import GREY, LOOKS, MARKERS
-from levilab.present.numbers import enumeration, short_name
+from levilab.present.numbers import short_name
 from levilab.present.style import STYLE, WIDE
 from levilab.present.units import unit as unit_row
 
@@ -91,18 +92,8 @@ def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
 
 def _finding(analysis: SpinDownAnalysis) -> str:
     """Return the verdict in one sentence."""
-    verdict, best = analysis.combined.verdict, analysis.combined.best
     together = f" of {len(analysis.runs)} runs" if len(analysis.runs) > 1 else ""
-    equation = in_mathtext(LAWS[best].equation)
-    if not verdict.describes:
-        return f"Spin-down{together}: no drag law describes these readings; the {best} law comes nearest"
-    if not verdict.decided:
-        others = [name for name in (*verdict.indistinguishable, *verdict.needless, *verdict.weak) if name != best]
-        also = f"; {enumeration(others)} cannot be excluded" if others else ""
-        return f"Spin-down{together}: the readings do not single out a drag law, {best} comes first{also}"
-    excluded = [name for name in laws_of(analysis) if name in verdict.excluded]
-    also = f"; {enumeration(excluded)} {'is' if len(excluded) == 1 else 'are'} excluded" if excluded else ""
-    return f"Spin-down{together}: the {best} law, {equation}, describes the readings{also}"
+    return f"Spin-down{together}: {finding(analysis.combined)}"
 
 
 def _unit(analysis: SpinDownAnalysis) -> _Unit:
@@ -113,7 +104,7 @@ def _unit(analysis: SpinDownAnalysis) -> _Unit:
     residuals = [run.fit(analysis.combined.best).residuals for run in analysis.runs]
     floor = 1e-12 * float(analysis.runs[0].frequency[0])  # readings that a law describes exactly
     scatter = max(float(np.sqrt(np.mean(np.concatenate(residuals) ** 2))), floor)
-    words = f"the best law's scatter ({digits(scatter)} Hz)"
+    words = f"the scatter about the {analysis.combined.best} law ({digits(scatter)} Hz)"
     return _Unit([np.full(len(one), scatter) for one in residuals], scatter, "scatter", words)
 
 
@@ -127,7 +118,8 @@ def _draw_spin(axes: Axes, analysis: SpinDownAnalysis) -> None:
     for k, run in enumerate(analysis.runs):
         t = np.linspace(run.time[0], run.time[-1], 200)
         width = 1.4 if several == 1 else 0.9 if several <= len(MARKERS) else 0.4
-        label = f"best law: {best}, {in_mathtext(LAWS[best].equation)}" if k == 0 else None
+        kind = "best law: " if is_best(analysis, best) else ""
+        label = f"{kind}{best}, {in_mathtext(LAWS[best].equation)}" if k == 0 else None
         axes.plot(t, run.fit(best).spin_frequency(t), linewidth=width, zorder=2.5, label=label, **LOOKS[best].as_line)
         name = _run_label(analysis, k)
         _draw_readings(axes, analysis, k, run.frequency, span=span, label=name, gid=f"readings-{k}")
@@ -216,7 +208,7 @@ def _note(analysis: SpinDownAnalysis, name: str, *, short: bool = False) -> str:
     if name in verdict.excluded:
         return "excluded"
     if best:
-        return "best" if verdict.decided else "first" if verdict.describes else "nearest"
+        return "best" if verdict.decided else "fits" if verdict.describes else "nearest"
     if not verdict.describes:
         return ""
     if name in verdict.needless:
@@ -290,7 +282,7 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
         ends.append((float(difference[-1]), name, f"{name}: {said}{shaded}{where}"))
     _name_laws(axes, [end for end in ends if math.isfinite(end[0])])
     of = "" if several == 1 else f"; curves of {'the longest run' if several > 1 else 'the run'}"
-    axes.set_title(f"Readings and laws less the best law{of}", pad=3)
+    axes.set_title(f"Readings and laws less the {best} law{of}", pad=3)
 
 
 def _with_sign(difference: Array) -> str:

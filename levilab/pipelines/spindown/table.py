@@ -184,7 +184,7 @@ def _lines_table(analysis: SpinDownAnalysis) -> Table:
         Row((name, *cells), "together" if several and name is names[-1] else "")
         for name, *cells in zip(names, *columns, strict=True)
     ]
-    title = "Run by run: unweighted straight lines, and the fit of the best law"
+    title = f"Run by run: unweighted straight lines, and the fit of the {best.name} law"
     return table(title, ("run", *heads, f"{best.name} fit\n{_head(best.constants)}"), rows)
 
 

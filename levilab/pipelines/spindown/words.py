@@ -47,6 +47,29 @@ def is_seen(tilt: Estimate | None) -> bool:
     return tilt is not None and tilt.value is not None and bool(tilt.u) and tilt.value > SEEN * (tilt.u or 0.0)
 
 
+def finding(found: Combined) -> str:
+    """Return the verdict of all runs in a few words, for the head of a figure."""
+    said, best = found.verdict, found.best
+    if not said.describes:
+        return f"no drag law describes these readings; the {best} law comes nearest"
+    if said.decided:
+        excluded = f"; {enumeration(said.excluded)} {_are(said.excluded)} excluded" if said.excluded else ""
+        return f"the {best} law describes the readings{excluded}"
+    simple = _simple(said)
+    if len(simple) == 1:
+        return f"{enumeration(said.indistinguishable)} cannot be distinguished; {best} has the fewest constants"
+    return f"the readings cannot distinguish {enumeration(simple) if simple else 'the laws'}"
+
+
+def _are(laws: Sequence[str]) -> str:
+    return "is" if len(laws) == 1 else "are"
+
+
+def _simple(said: Verdict) -> list[str]:
+    """Return the laws that contain no other one and are not excluded."""
+    return [name for name in (*said.indistinguishable, *said.weak) if is_simple(name)]
+
+
 def _verdict(
     found: SpinDown | Combined,
     fits: Sequence[LawFit | CombinedLaw],
@@ -60,7 +83,7 @@ def _verdict(
     def names(laws: Sequence[str]) -> str:
         return enumeration([f"power ({_exponent(exponent)})" if name == "power" else name for name in laws])
 
-    simple = [name for name in (*said.indistinguishable, *said.weak) if is_simple(name)]
+    simple = _simple(said)
     if not said.describes:
         first = _no_law(found, runs, digits(best.rms_residual))
     elif said.decided and said.best == "power":
@@ -68,10 +91,9 @@ def _verdict(
     elif said.decided:
         first = f"The {said.best} law fits best" + _also(said.indistinguishable[1:], names)
     elif len(simple) == 1:
-        alike = sorted(said.indistinguishable, key=lambda name: stats[name].n_parameters)
         first = (
-            f"The laws {names(alike)} cannot be distinguished: {alike[0]} has the fewest constants. More runs, or a "
-            "longer fall of the spin, can decide"
+            f"The laws {names(said.indistinguishable)} cannot be distinguished: {said.best} has the fewest constants. "
+            "More runs, or a longer fall of the spin, can decide"
         )
     else:
         fall = max(float(1 - run.frequency[-1] / run.frequency[0]) for run in runs)
@@ -90,7 +112,9 @@ def _verdict(
         f"They speak against {enumeration(weak)}, without excluding {'them' if len(weak) > 1 else 'it'}"
         if weak
         else "",
-        _needless(said, names(said.needless)) if said.needless and said.decided else "",
+        _needless(said, names(said.needless))
+        if said.needless and (said.decided or len(simple) == 1) and said.describes
+        else "",
         _wobble(tilt),
     ]
     return " ".join(f"{text}." for text in sentences if text)

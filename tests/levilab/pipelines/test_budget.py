@@ -78,11 +78,11 @@ def test_a_budget_is_of_the_value_that_the_result_has(found: dict[str, Any], cas
             assert budget["u"] == values[budget["quantity"]]["u"]
 
 
-def test_a_law_as_good_with_fewer_constants_has_its_budget_too(tmp_path: Path):
+def test_of_laws_that_fit_alike_that_with_the_fewest_constants_has_the_budget(tmp_path: Path):
     analysis = analyzed("spindown", [spin_down_csv(tmp_path / "run.csv", seed=7)])
-    assert analysis.combined.best == "mixed"
+    assert analysis.combined.best == "disc"
     assert not analysis.combined.verdict.decided
-    assert {(one.model, one.quantity) for one in analysis.budget} >= {("disc", "c32"), ("mixed", "c1"), ("mixed", "c2")}
+    assert {(one.model, one.quantity) for one in analysis.budget} >= {("disc", "c32")}
     assert of(analysis.budget, "c32").closes
 
 
