@@ -25,7 +25,7 @@ class Verdict:
             criterion, that with the fewest constants.
         decided: whether the readings single out one of the simple laws, or a general one before all of them: no law
             with fewer constants fits as well.
-        indistinguishable: names of the laws that fit as well as the best one, which comes first; fewest constants first.
+        indistinguishable: names of the laws that fit as well as the best one, with the fewest constants first.
         needless: names of laws that fit as well, but need more constants.
         weak: names of laws disfavoured but not excluded.
         excluded: names of laws the readings exclude.
