@@ -218,10 +218,10 @@ def banner_of(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner 
     files = sum(source.run is None for source in sources)
     if not made_up:
         return None
-    below = "How it was made stands below, under its name."
     if total == 1:
-        return Banner("SYNTHETIC.", f"This run did not come from a real bench. {below}")
-    where = ("How each was made stands below its name.", "How each was made stands in its run.json.")
+        return Banner("SYNTHETIC.", "This run did not come from a real bench. How it was made stands in its run.json.")
+    how = "How each was made stands in its run.json."
+    where = (how, how)  # on the screen and on paper
     if len(made_up) == total:
         return Banner("SYNTHETIC.", f"None of these {total} runs came from a real bench.", *where)
     said = f"{len(made_up)} of {total} runs did not come from a real bench ({list_in_words(made_up)})."
