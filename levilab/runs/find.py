@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 from levilab.errors import DataError
+from levilab.files import CannotWrite
 from levilab.formats.texts import locate
 
 RECORD = "run.json"
@@ -105,10 +106,10 @@ def run_or_folder(name: Path, root: Path = RUNS) -> Path:
 
 
 def must_take_runs(root: Path) -> None:
-    """Raise DataError for a file in the place of the folder that is to hold runs, or of one above it."""
+    """Raise CannotWrite for a file in the place of the folder that is to hold runs, or of one above it."""
     there = next((path for path in (root, *root.parents) if path.exists()), root)
     if there.is_file():
-        raise DataError(f"{there}: is a file, a folder is expected; choose another with `out`")
+        raise CannotWrite(f"{there}: is a file, a folder is expected; choose another place with `out`")
 
 
 def must_be_searchable(root: Path) -> None:

@@ -81,7 +81,6 @@ class RunWriter:
 
         Raises:
             CannotWrite: it cannot be made.
-            DataError: `out` is a file.
         """
         must_take_runs(out)
         with _explain_errors("create the run folder", out, safe=""):

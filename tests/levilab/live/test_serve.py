@@ -222,4 +222,4 @@ def test_a_file_in_the_place_of_the_folder_of_runs_is_refused(
     (tmp_path / "taken").touch()
     ended = command(*words, "--out", out, cwd=tmp_path)
     assert ended.status != 0
-    assert "taken: is a file, a folder is expected; choose another with --out" in ended.err
+    assert "taken: is a file, a folder is expected; choose another place with --out" in ended.err
