@@ -33,10 +33,7 @@ def test_text_figure_and_tables_have_one_verdict(tmp_path: Path) -> None:
     assert "disc leaves" in analysis.text
     figure = spindown_figure(analysis)
     written = [text.get_text() for text in figure.findobj(Text)]
-    assert any(
-        "cannot be distinguished; disc has the fewest constants" in " ".join(one.split())
-        for one in written
-    )
+    assert any("cannot be distinguished; disc has the fewest constants" in " ".join(one.split()) for one in written)
     assert not any("best" in one or "first" in one for one in written)
     assert any("less the disc law" in one for one in written)
     (shown,) = [one.title for one in spindown_tables(analysis) if one.title.startswith("Run by run")]
