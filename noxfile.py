@@ -87,7 +87,7 @@ def unpacked_source(session: nox.Session, package: str) -> Path:
 @nox.session
 def site(session: nox.Session) -> None:
     """Build the pages as a site in build/site; a warning is an error, and no page asks another host for anything."""
-    session.install("--editable", ".[docs]", "--constraint", str(CONSTRAINTS))
+    session.install("--editable", ".[docs,simulate]", "--constraint", str(CONSTRAINTS))
     session.run(
         "sphinx-build", "--fail-on-warning", "--keep-going", "--jobs", "2", "docs", "build/site", *session.posargs
     )
