@@ -26,7 +26,7 @@ demo: setup  ## the main job on the virtual bench: acquire, analyze, report (int
 	$(BIN)/levilab acquire spin --mock --out $(DEMO)
 	$(BIN)/levilab analyze spindown $(DEMO)
 	$(BIN)/levilab report $(DEMO) --output $(DEMO)/report.html
-	@echo 'the report is $(DEMO)/report.html: open it in a browser'
+	@echo 'open $(DEMO)/report.html in a browser'
 
 # mypy works beside the tests: alone it would leave a core idle
 test: setup  ## everything that must pass: style, types, imports, tests
