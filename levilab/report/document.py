@@ -113,7 +113,7 @@ def blocks_of_part(
     more = [block for supplement in supplements for block in supplement(analysis, found)]
     more.append(section(part.runs_title, "runs", *part.runs))
     blocks = [
-        section("Result", "result", Verdict(_verdict(found)), *part.result),
+        section("Result", "result", Verdict(_verdict(found, part)), *part.result),
         section("Figure", "figure", picture_of(analysis, found, part)),
         *notes,
         *([] if short else more),
@@ -121,12 +121,13 @@ def blocks_of_part(
     return with_marks(blocks, mark_of(found.sources))
 
 
-def _verdict(found: Analyzed[Any, Any, Any, Any]) -> str:
-    """Return the verdict; it is read alone, and says itself that real and synthetic inputs are mixed."""
+def _verdict(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
+    """Return the answer and the verdict; it is read alone, and says itself that real and synthetic inputs are mixed."""
+    text = f"{part.answer} {found.text}".lstrip()
     if not _mixes(found):
-        return found.text
+        return text
     made_up = sum(source.synthetic for source in found.sources)
-    return f"MIXED, and so no measurement ({made_up} of {len(found.sources)} inputs are SYNTHETIC): {found.text}"
+    return f"MIXED, and so no measurement ({made_up} of {len(found.sources)} inputs are SYNTHETIC): {text}"
 
 
 def picture_of(analysis: Analysis[A], found: A, part: ReportPart) -> Picture:

@@ -74,10 +74,27 @@ def _loss(analysis: SpinDownAnalysis) -> Iterator[str]:
     yield f"{which} top loses {first}, and {last}."
 
 
+def answer(analysis: SpinDownAnalysis) -> str:
+    """Return the constants of the best law with their u, as a sentence; empty where no law describes the readings."""
+    verdict = analysis.combined.verdict
+    known = [
+        f"{SYMBOLS[name]} = {with_uncertainty(value)}"
+        for name, value in _constants(analysis).items()
+        if value.value is not None and value.u
+    ]
+    if not verdict.describes or not known:
+        return ""
+    law = f"by the {verdict.best} law" if verdict.decided else f"if the {verdict.best} law holds"
+    return f"{enumeration(known)} {law}."
+
+
 def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
-    """Yield the meaning of the constant of a law of one power."""
+    """Yield the constants of the best law, and the meaning of that of a law of one power."""
+    if not (named := answer(analysis)):
+        return
+    yield named
     combined = analysis.combined
-    if not combined.verdict.describes or combined.best not in _POWERS:
+    if combined.best not in _POWERS:
         return
     ((name, value),) = _constants(analysis).items()
     if value.value is None or not value.u or value.value <= 0:
@@ -89,10 +106,10 @@ def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
         off = value.value / KARMAN - 1
         u = value.u / KARMAN
         way = "above" if off > 0 else "below"
-        compared = f"{SYMBOLS[name]} = {with_uncertainty(value)} lies {digits(100 * abs(off))} % {way}"
+        compared = f"{SYMBOLS[name]} lies {digits(100 * abs(off))} % {way}"
         karman = "von Kármán's value for a bare disc as large as the thesis's top, 2.235×10⁻⁴"
         if abs(off) < _DIFFERS * u:
-            yield f"{SYMBOLS[name]} = {with_uncertainty(value)} agrees with {karman}."
+            yield f"{SYMBOLS[name]} agrees with {karman}."
         elif off > 0:
             yield f"{compared} {karman}: rim, stem and washers drag, too, if this top is as large."
         else:
@@ -165,4 +182,4 @@ def _constants(analysis: SpinDownAnalysis) -> Mapping[str, Estimate]:
     return {name: parameters[name] for name in LAWS[combined.best].constants}
 
 
-_PARTS = (_law, _loss, _constant, _exponent, _tilt, _runs)
+_PARTS = (_constant, _law, _loss, _exponent, _tilt, _runs)

@@ -19,7 +19,7 @@ from levilab.pipelines.part import (
     size_of_u,
 )
 from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
-from levilab.pipelines.spindown.meaning import meaning
+from levilab.pipelines.spindown.meaning import answer, meaning
 from levilab.pipelines.spindown.quantities import OF_RUN
 from levilab.pipelines.spindown.table import (
     QUALITY_IN_WORDS,
@@ -65,6 +65,7 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
         subject="spin-down",
         heading="Spin-down of a levitated top",
         lead=f"{n} readings used",
+        answer=answer(analysis),
         result=(*_meaning(analysis), *_falls(analysis), *_laws(analysis), *_count(analysis)),
         figure=FigureText(
             title="Spin-down.",

@@ -1,17 +1,23 @@
 """What the fits mean: no sentence contradicts another."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from matplotlib.text import Text
 
 from analysis.spindown.drag import LAWS
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
 from levilab.pipelines.spindown.figure import spindown_figure
 from levilab.pipelines.spindown.laws import SYMBOLS
-from levilab.pipelines.spindown.meaning import meaning
+from levilab.pipelines.spindown.meaning import answer, meaning
+from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
+from levilab.present.document.blocks import Block, Section, Verdict
+from levilab.present.numbers import with_uncertainty
+from levilab.report.document import blocks_of_part
 
 U = 0.027
 
@@ -38,6 +44,26 @@ def test_text_figure_and_tables_have_one_verdict(tmp_path: Path) -> None:
     assert any("less the disc law" in one for one in written)
     (shown,) = [one.title for one in spindown_tables(analysis) if one.title.startswith("Run by run")]
     assert "the fit of the disc law" in shown
+
+
+def test_the_report_begins_with_the_constant_and_its_u(tmp_path: Path) -> None:
+    analysis = undecided(tmp_path)
+    c32 = analysis.combined.fit("disc").constants["c32"]
+    assert answer(analysis) == f"{SYMBOLS['c32']} = {with_uncertainty(c32)} if the disc law holds."
+    assert meaning(analysis)[0] == answer(analysis)
+    decided = replace(analysis.combined, verdict=replace(analysis.combined.verdict, decided=True))
+    found = replace(analysis, combined=decided)
+    assert answer(found).endswith(" by the disc law.")
+    (box,) = [one for one in result_of(found) if isinstance(one, Verdict)]
+    assert box.text == f"{answer(found)} {found.text}"
+    none = replace(decided, verdict=replace(decided.verdict, describes=False))
+    assert answer(replace(analysis, combined=none)) == ""
+
+
+def result_of(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
+    section = blocks_of_part(ANALYSES["spindown"], analysis, spindown_part(analysis))[0]
+    assert isinstance(section, Section)
+    return section.blocks
 
 
 def undecided(tmp_path: Path) -> SpinDownAnalysis:
