@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from levilab.runs.events import RunEvent
 from levilab.simulator.laws import LAWS
 from levilab.world.spin_world import SpinScene, random_scene
 
@@ -30,18 +31,27 @@ class Truth:
 def truth_of(run: Run | None, analysis: str) -> Truth:
     """Return the truth of a run, empty for a real one and for what is not known.
 
+    A locked top wobbles at the drive's frequency; one that lost its lock, or has loose washers, need not.
+
     The mean of limits is that of the law which the seed draws each of them from.
     """
     record = run.record if run else None
     if record is None or not record.synthetic or record.seed is None:
         return Truth()
-    if analysis == "precession":  # a locked top wobbles at the drive's frequency
-        return Truth({"slope": 1.0, "intercept": 0.0})
+    scene = record.configuration.get("scene")
+    if analysis == "precession":
+        lost = any(event["kind"] == RunEvent.LOCK_LOST for event in run.events()) if run else False
+        return Truth() if lost or _is_loose(scene) else Truth({"slope": 1.0, "intercept": 0.0})
     if record.world == "spin":
         known = _OF_SPIN_WORLD.get(analysis)
         return known(random_scene(record.seed), record.configuration) if known else Truth()
-    scene = record.configuration.get("scene")
     return _of_scene(scene.get("drag")) if analysis == "spindown" and isinstance(scene, dict) else Truth()
+
+
+def _is_loose(scene: Any) -> bool:
+    """Return whether washers turn on the top: the tape is on them, and their spin is not the drive's frequency."""
+    washers = scene.get("washers") if isinstance(scene, dict) else None
+    return isinstance(washers, dict) and bool(washers.get("inertia_kg_m2"))
 
 
 def _of_scene(drag: Any) -> Truth:

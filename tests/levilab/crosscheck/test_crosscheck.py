@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import signal
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,7 @@ from levilab.crosscheck.study import study_world
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquire_mock, pull_of
 from levilab.crosscheck.subjects.motion import nutation
 from levilab.crosscheck.table import crosscheck_table, failures_as_text
+from levilab.crosscheck.truth import truth_of
 from levilab.present.style import as_png
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
@@ -40,6 +42,17 @@ def made_up(off: float = 0.0, scale: float = 1.0) -> Subject:
 
 
 BY_MASS = {"mass to set", "mass by height"}
+
+
+@pytest.mark.parametrize(
+    ("inertia", "events", "known"),
+    [(0.0, ["locked", "counted"], True), (1e-7, ["locked", "counted"], False), (0.0, ["locked", "lock lost"], False)],
+)
+def test_a_top_that_does_not_follow_its_drive_has_no_true_precession(inertia, events, known):
+    scene = {"washers": {"inertia_kg_m2": inertia}}
+    record = SimpleNamespace(synthetic=True, seed=1, world=None, configuration={"scene": scene})
+    run = SimpleNamespace(record=record, events=lambda: [{"kind": kind} for kind in events])
+    assert truth_of(run, "precession").values == ({"slope": 1.0, "intercept": 0.0} if known else {})
 
 
 def of(subject: Subject, trials: int = 400):
