@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -97,7 +99,8 @@ class Class:
     Attributes:
         analysis: the row of the catalogue.
         found: what it found.
-        model: the law whose constants are compared; empty where the analysis has one model.
+        model: the law whose constants are compared, that of most seeds; empty where the analysis has one model.
+        others: the law of each group's seed where that is another one, by the group's name.
     """
 
     analysis: Analysis[Any]
@@ -105,6 +108,7 @@ class Class:
     model: str
     groups: tuple[Group, ...]
     quantities: tuple[Quantity, ...]
+    others: Mapping[str, str]
 
     @property
     def knows_truth(self) -> bool:
@@ -116,7 +120,8 @@ def class_of(analysis: Analysis[Any], found: Any) -> Class:
     """Put the groups of a class beside each other."""
     document = analysis.document(found, Path())
     truths = [truth_of(source.run, analysis.name) for source in found.sources]
-    model = next((one.model for one in truths if one.model), "") or document.get("best_model", "")
+    laws = Counter(one.model for one in truths if one.model)
+    model = max(laws, key=lambda law: laws[law], default="") or document.get("best_model", "")
     parts = document["runs"]
     groups = tuple(
         Group(source, _model(part, model).get("statistics", {}), part.get("best_model", ""), _warnings(part))
@@ -124,7 +129,12 @@ def class_of(analysis: Analysis[Any], found: Any) -> Class:
     )
     names = analysis.compared or (_constants(document, model) if parts[0]["models"] else []) or _common(parts)
     quantities = (_quantity(name, analysis, model, parts, truths) for name in names)
-    return Class(analysis, found, model, groups, tuple(one for one in quantities if one.together))
+    others = {
+        group.source.name: truth.model
+        for group, truth in zip(groups, truths, strict=True)
+        if truth.model not in {"", model}
+    }
+    return Class(analysis, found, model, groups, tuple(one for one in quantities if one.together), others)
 
 
 def _model(part: Mapping[str, Any], name: str) -> Mapping[str, Any]:
@@ -141,7 +151,7 @@ def _constants(document: Mapping[str, Any], law: str) -> list[str]:
 
 def _common(parts: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the first quantities that all inputs have with their u."""
-    first, *others = ([name for name, value in part["values"].items() if value["u"]] for part in parts)
+    first, *others = ([name for name, value in part["values"].items() if _has_u(value)] for part in parts)
     return [name for name in first if all(name in other for other in others)][:_MOST_QUANTITIES]
 
 
@@ -149,11 +159,18 @@ def _warnings(part: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(map(unquote, part["warnings"]))
 
 
+def _has_u(value: Mapping[str, Any]) -> bool:
+    """Return whether a value of result.json is a number with an uncertainty."""
+    return (
+        bool(value["u"]) and value["value"] is not None and math.isfinite(value["u"]) and math.isfinite(value["value"])
+    )
+
+
 def _quantity(
     name: str, analysis: Analysis[Any], model: str, parts: Sequence[Mapping[str, Any]], truths: Sequence[Truth]
 ) -> Quantity:
     found = [_model(part, model).get("parameters", {}).get(name) or part["values"].get(name) for part in parts]
-    good = [one if one and one["u"] and one["value"] is not None else None for one in found]
+    good = [one if one and _has_u(one) else None for one in found]
     estimates = tuple(Estimate(one["value"], one["u"], one["unit"]) if one else None for one in good)
     known = [one for one in good if one]
     return Quantity(

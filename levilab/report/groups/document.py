@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from levilab.present.document.blocks import Document, Fact, Facts, Note, Picture, Section, Tabular, Verdict
-from levilab.present.numbers import column, plain, with_sign, without_unit
+from levilab.present.numbers import column, enumeration, plain, with_sign, without_unit
 from levilab.present.tables import Row, table
 from levilab.report.document import banner_of, count_inputs
 from levilab.report.groups.words import finding, verdict
@@ -125,6 +125,9 @@ def _groups(of: Class) -> Tabular:
     full = [k for k in range(len(heads)) if any(row[k] not in {"", "—"} for row in rows)]
     heads, rows = [heads[k] for k in full], [tuple(row[k] for k in full) for row in rows]  # type: ignore[misc]
     note = f"Residuals are those of the law {of.model}, whose constants are compared." if of.model else ""
+    if of.others:
+        laws = enumeration([f"{name} ({law})" for name, law in of.others.items()])
+        note += f" The seeds of these groups have another law, and so no truth to compare with: {laws}."
     numbers = [head for head in heads if head not in {"group", "run", "best law"}]
     return Tabular(f"{of.analysis.name}-groups", table("", heads, rows, numbers=numbers), note, first_column_wraps=True)
 

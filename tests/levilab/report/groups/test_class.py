@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -10,9 +12,10 @@ from python_calamine import CalamineWorkbook
 
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.crosscheck.truth import Truth
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.report.groups.beside import class_of
+from levilab.report.groups.beside import _quantity, class_of
 from levilab.report.groups.write import write_class
 from levilab.runs.find import RECORD
 from levilab.world.spin_world import SpinScene, random_scene
@@ -61,15 +64,41 @@ def test_twenty_groups_lie_within_two_u_of_their_truths(tmp_path: Path) -> None:
     assert max(map(abs, c32.from_truth)) < 3.5
 
 
+def with_changes(root: Path, into: Path, group: str, changes: dict[str, Any]) -> Path:
+    """Copy runs, and change the record of one group's."""
+    for folder in root.glob("2*"):
+        shutil.copytree(folder, into / folder.name)
+        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        changed = record | (changes if record["group"] == group else {})
+        (into / folder.name / RECORD).write_text(json.dumps(changed), encoding="utf-8")
+    return into
+
+
 def test_a_real_run_has_no_truth(of_three: Path, tmp_path: Path) -> None:
-    for k, folder in enumerate(sorted(of_three.glob("2*"))):
-        (tmp_path / folder.name).mkdir()
-        for file in folder.iterdir():
-            (tmp_path / folder.name / file.name).write_bytes(file.read_bytes())
-        record = json.loads((folder / RECORD).read_text(encoding="utf-8")) | {"synthetic": k > 0}
-        (tmp_path / folder.name / RECORD).write_text(json.dumps(record), encoding="utf-8")
-    truths = compared(tmp_path).quantities[0].truths
-    assert [truth is None for truth in truths].count(True) == 1
+    of = compared(with_changes(of_three, tmp_path, "Group 10", {"synthetic": False}))
+    assert of.quantities[0].truths.count(None) == 1
+    assert not of.others
+
+
+@pytest.mark.parametrize("group", [HOSTILE, "Group 10"])
+def test_the_page_names_groups_whose_seed_has_another_law(of_three: Path, tmp_path: Path, group: str) -> None:
+    scene = {"drag": {"law": "stokes", "coefficient": 0.003}}
+    root = with_changes(of_three, tmp_path, group, {"world": None, "configuration": {"scene": scene}})
+    of = compared(root)
+    assert of.model == "disc"
+    assert of.quantities[0].truths.count(None) == 1
+    assert of.others == {group: "stokes"}
+    page = write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")
+    assert f"have another law, and so no truth to compare with: {escape(group)} (stokes)." in page
+
+
+@pytest.mark.parametrize(("value", "u"), [(1.0, float("nan")), (1.0, 0.0), (1.0, None), (float("nan"), 1.0)])
+def test_a_value_without_a_finite_u_is_not_compared(value: float, u: float | None) -> None:
+    parts = [{"values": {"mean": {"value": one, "u": of, "unit": "Hz"}}} for one, of in [(1.0, 0.1), (value, u)]]
+    quantity = _quantity("mean", ANALYSES["limit"], "", parts, [Truth(), Truth()])
+    assert [one is None for one in quantity.estimates] == [False, True]
+    assert quantity.together
+    assert quantity.together.mean == 1.0
 
 
 @pytest.mark.parametrize(("experiment", "names"), [("field", ["strength", "origin", "thickness"]), ("limit", ["mean"])])
