@@ -3,6 +3,33 @@
 from dataclasses import dataclass
 from typing import Literal
 
+#: About spin-downs.
+SpinDownKind = Literal[
+    # of the fit of a law
+    "not converged",
+    "no freedom",  # as many readings as parameters: how many
+    "not separated",
+    "out of range",  # the constant
+    "negative",  # the constant; how many u below zero
+    "undetermined",  # the constant
+    "factor",  # the constant; the factor to which it is known
+    # of a spin-down
+    "outlier",  # time [s], frequency [Hz], distance [Hz] from the law, the same in units; stated, kept, falling: 0 or 1
+    "calculated",  # rms residual [Hz]
+    "no u",
+    "understated",  # scatter in units of the stated u
+    "overstated",  # the same
+    "few readings",  # the laws that no AICc compares; number of readings
+    "correlated",  # correlation, its u, number of readings
+    # of several spin-downs
+    "changed",  # number of the run from 1 on, number of runs, probability of such a change anywhere
+    "mixed u",  # runs without stated u, runs
+    "one run",
+    "few runs",  # runs, half a 68 % interval in u
+    "missing",  # the constant; runs without it, runs
+    "scatters",  # the constant; scatter of the runs in units of their own u
+]
+#: About sweeps, scans, and the tops that float.
 Kind = Literal[
     # of a sweep; points are numbered from 0 on
     "many miscounts",  # points that look like miscounts, points
@@ -36,10 +63,12 @@ class Remark:
 
     Attributes:
         kind: of which kind.
-        values: what was seen, as listed with each `Kind`.
-        name: the parameter that it is about; empty: none.
+        law: the law that it is about; empty: none.
+        name: the constant or parameter that it is about; empty: none.
+        values: what was seen, as listed with each kind.
     """
 
-    kind: Kind
-    values: tuple[float, ...] = ()
+    kind: SpinDownKind | Kind
+    law: str = ""
     name: str = ""
+    values: tuple[float, ...] = ()

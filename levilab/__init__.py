@@ -406,7 +406,7 @@ def runs(folder: str | PathLike[str] = "runs", *, last: int | None = None) -> Ru
 
     Args:
         folder: that is searched.
-        last: the latest ones alone, so many.
+        last: the number of runs, the latest ones; None: all.
 
     Raises:
         DataError: there is no such folder.

@@ -448,9 +448,9 @@ def _misfit(statistics: Statistics) -> tuple[float, list[Remark]]:
     if reduced is None or statistics.chi_square is None:
         return 1.0, []
     if float(chdtrc(statistics.degrees_of_freedom, statistics.chi_square)) < NO_FIT:
-        return reduced, [Remark("scan scatters", (reduced,))]
+        return reduced, [Remark("scan scatters", values=(reduced,))]
     if float(chdtr(statistics.degrees_of_freedom, statistics.chi_square)) < _TOO_GOOD:
-        return 1.0, [Remark("scan overstated", (reduced,))]
+        return 1.0, [Remark("scan overstated", values=(reduced,))]
     return 1.0, []
 
 
@@ -535,7 +535,7 @@ def _doubts(scan: FieldScan) -> list[Remark]:
     for name in scan.fitted:
         prior, found = scan.known.prior(name), scan.parameters[name].value
         if prior is not None and found is not None and abs(found - prior.value) > APART * prior.u:
-            said.append(Remark("contradicts", (found, prior.value, prior.u), name))
+            said.append(Remark("contradicts", name=name, values=(found, prior.value, prior.u)))
     strength = scan.parameters["strength"]
     if strength.value is not None and strength.u is not None and abs(strength.value) < 3 * strength.u:
         said.append(Remark("no strength"))
@@ -547,4 +547,4 @@ def _outliers(scan: FieldScan, leverage: Array) -> list[Remark]:
         return []
     scaled = scan.residuals / scan.u
     found = gross_errors(studentise(scaled, leverage, scan.statistics.n_parameters, 1e-9), scan.statistics.n_parameters)
-    return [Remark("stray reading", (float(scan.height[i]), float(abs(scaled[i])))) for i in found]
+    return [Remark("stray reading", values=(float(scan.height[i]), float(abs(scaled[i])))) for i in found]

@@ -248,9 +248,9 @@ def _doubts(found: Floating, top: KnownTop) -> list[Remark]:
     if top.height is not None and top.height.value is not None:
         height, low, high = top.height.value, found["lowest_height"], found["highest_height"]
         if not low <= height <= high:
-            said.append(Remark("another zero", (height, low, high)))
+            said.append(Remark("another zero", values=(height, low, high)))
     width = found["heaviest_mass"] - found["lightest_mass"]
     u = found.values["mass_to_set"].u
     if u is not None and u > width / 4:
-        said.append(Remark("rough mass", (u, width)))
+        said.append(Remark("rough mass", values=(u, width)))
     return said

@@ -187,7 +187,7 @@ def _used_points(sweep: Sweep, found: list[Miscount], *, keep: bool) -> tuple[ND
     used[named] = False
     if used.sum() >= max(FEWEST, sweep.drive.size / 2) and np.ptp(sweep.drive[used]) > 0:
         return used, []
-    return np.ones_like(used), [Remark("many miscounts", (len(named), sweep.drive.size))]
+    return np.ones_like(used), [Remark("many miscounts", values=(len(named), sweep.drive.size))]
 
 
 def _part(sweep: Sweep, used: NDArray[np.bool_]) -> Sweep:
@@ -281,18 +281,18 @@ def _spin_offset(sweep: Sweep) -> tuple[float | None, float | None]:
 def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[Remark]:
     gates_known = float(bool(sweep.gate_s or sweep.gates))
     said = [
-        Remark("miscount", (one.index,)) if one.named else Remark("unexplained", (one.index, gates_known))
+        Remark("miscount", values=(one.index,)) if one.named else Remark("unexplained", values=(one.index, gates_known))
         for one in found
     ]
     line = fit.line
     if line.p_fit is not None and line.p_fit < NO_FIT:
-        said.append(Remark("sweep scatters", (line.scale, line.p_fit)))
+        said.append(Remark("sweep scatters", values=(line.scale, line.p_fit)))
     if line.chi_square is not None and line.p_fit is not None and 1 - line.p_fit < NO_FIT:
-        said.append(Remark("sweep overstated", (line.chi_square, line.degrees_of_freedom)))
+        said.append(Remark("sweep overstated", values=(line.chi_square, line.degrees_of_freedom)))
     if fit.p_locked is None:
         said.append(Remark("sweep exact"))
     said += [
-        Remark("moves the slope", (k, change, share))
+        Remark("moves the slope", values=(k, change, share))
         for k, p in enumerate(fit.points)
         if p.slope_change is not None
         and line.u_slope
@@ -300,7 +300,7 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[Remark]:
     ]
     heavy = max(_HEAVY * 2 / line.n, 0.9)
     said += [
-        Remark("holds the line", (k, p.leverage))
+        Remark("holds the line", values=(k, p.leverage))
         for k, p in enumerate(fit.points)
         if p.leverage is not None and p.leverage > heavy
     ]
@@ -310,7 +310,7 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[Remark]:
         said.append(Remark("drive u unknown"))
     off, u = fit.spin_offset, fit.u_spin_offset
     if off is not None and u is not None and abs(off) >= max(_SPIN_SHARE * sweep.drive.mean(), _SPIN_FAR * u):
-        said.append(Remark("spin off", (off,)))
+        said.append(Remark("spin off", values=(off,)))
     return said
 
 
@@ -323,8 +323,8 @@ def _about_drive(drive: Array, u_drive: Array, u: Array, line: Line) -> list[Rem
     share = float(np.median(u_drive / drive))
     if np.ptp(u_drive / drive) > _ONE_CLOCK * share:
         worst = float(np.max(u_drive / u))
-        return [Remark("uncertain drive", (worst,))] if worst > _MATTERS else []
+        return [Remark("uncertain drive", values=(worst,))] if worst > _MATTERS else []
     of_slope = share * abs(line.slope)
     if line.u_slope is None or of_slope <= _MATTERS * line.u_slope:
         return []
-    return [Remark("uncertain clock", (share, of_slope, line.u_slope))]
+    return [Remark("uncertain clock", values=(share, of_slope, line.u_slope))]

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
+from analysis.remarks import Remark
 from analysis.residuals import durbin_watson, runs_test_p
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown, comparison_remarks, correlation_remarks
 from analysis.spindown.joint import JointExponent, joint_exponent
 from analysis.spindown.lawfit import LawFit
-from analysis.spindown.remarks import Remark
 from analysis.spindown.selection import NO_FIT, Statistics, statistics, weigh
 from analysis.spindown.verdict import Verdict, verdict
 from analysis.uncertainty import Estimate

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.errors import AnalysisError
+from analysis.remarks import Remark
 from analysis.residuals import Change, gross_errors, gross_limit, largest_change
 from analysis.spindown.drag import LAWS, DragLaw, power_law
 from analysis.spindown.lawfit import LawFit, Solution, fit_law, solution
 from analysis.spindown.posterior import INDEPENDENT, RHO
 from analysis.spindown.readings import Readings, check_readings
-from analysis.spindown.remarks import Remark
 from analysis.spindown.selection import NO_FIT, Statistics, weigh
 from analysis.spindown.tilt import CALM, DRIVEN, THESIS_TOP, Nutation, Top
 from analysis.spindown.verdict import Verdict, verdict

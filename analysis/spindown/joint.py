@@ -43,7 +43,7 @@ _MOST_STEPS = 5
 
 
 def joint_exponent(runs: Sequence[SpinDown]) -> JointExponent | None:
-    """Return the exponent of one power law for all runs; None where a run has none, or of one run.
+    """Return the exponent of one power law for all runs; None where a run has no exponent with u, or of one run.
 
     By parabolas through three exponents, a u apart, at which every run is fitted again.  The runs' own exponents and
     their u would not do: averaged over the noise, they tell less than the misfits do (Cochran's Q was 10 too small for
@@ -60,11 +60,11 @@ def joint_exponent(runs: Sequence[SpinDown]) -> JointExponent | None:
     shared = float(weights @ [fit.shared_u.get("exponent", 0.0) for fit in fits] / weights.sum())
     for _ in range(_MOST_STEPS):
         below, here, above = (sum(run.misfit(n) for run in runs) for n in (centre - step, centre, centre + step))
-        bend = (below + above) / 2 - here
-        if not bend > 0:
-            return None
-        move = (below - above) / (4 * bend)
+        # the runs' u are no smaller than those of their misfits: a bend below a tenth of theirs is one of rounding
+        bend = max((below + above) / 2 - here, 0.1)
+        move = min(max((below - above) / (4 * bend), -3.0), 3.0)
+        found = JointExponent(centre + move * step, bend / step**2, here - bend * move**2, shared, len(runs))
         if abs(move) < _CLOSE:
-            return JointExponent(centre + move * step, bend / step**2, here - bend * move**2, shared, len(runs))
-        centre += min(max(move, -3.0), 3.0) * step
-    return None
+            break
+        centre = found.value
+    return found

@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.budget import gate_bias
 from analysis.least_squares import solve
+from analysis.remarks import Remark
 from analysis.residuals import durbin_watson, runs_test_p, studentise
 from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.posterior import RHO, Posterior, posterior
 from analysis.spindown.readings import Readings
-from analysis.spindown.remarks import Remark
 from analysis.spindown.selection import Statistics, statistics
 from analysis.spindown.tilt import CALM, MORE, THESIS_TOP, CountedLaw, Nutation, Top, count_of
 from analysis.uncertainty import ROUNDING, Estimate, propagate

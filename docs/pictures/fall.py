@@ -29,7 +29,7 @@ from levilab.simulator.single import simulate  # noqa: E402
 DRIVE_HZ, BESIDE_HZ, OFF_S = 27.0, 0.3, 10.0
 #: Pictures a second of the film, its speed, and poses for each picture, for the path of the axis.
 RATE, SPEED, POSES = 10, 5.0, 60
-#: Poses of the fall, every so many of which is a picture.
+#: Poses of the fall from one picture to the next.
 FALL, FALL_STEP = 160, 8
 #: The last picture stays for this time [s].
 END_S = 2.0

@@ -363,10 +363,10 @@ def compare_with_drive(session: Session[D], slip: Slip) -> None:
     text = f"held at {slip.drive:.2f} Hz: counted {slip.spin:.3f} Hz, {difference} Hz beside the drive"
     session.event(RunEvent.HELD, text, spin_frequency_hz=slip.spin, drive_frequency_hz=slip.drive, u_hz=slip.u)
     if slip.significant:
-        session.warn(slip_in_words(slip))
+        session.warn(slip_as_text(slip))
 
 
-def slip_in_words(slip: Slip) -> str:
+def slip_as_text(slip: Slip) -> str:
     """Return the meaning of a tape that does not turn with the drive."""
     counted = f"{slip.spin:.2f}({max(round(100 * slip.u), 1)})"
     seen = f"the drive holds the top at {slip.drive:.2f} Hz, but the counter sees {counted} Hz"

@@ -177,7 +177,9 @@ def _group(typed: str | None) -> str:
         return ""
     group = " ".join(typed.split())
     if not 0 < len(group) <= LONGEST_GROUP or not group.isprintable():
-        raise UsageError("group", f"a name of 1 to {LONGEST_GROUP} letters is expected, as Group 7", value=typed)
+        raise UsageError(
+            "group", f"a name of 1 to {LONGEST_GROUP} letters is expected, as Group 7", value=typed or "an empty one"
+        )
     return group
 
 

@@ -1,6 +1,6 @@
 """A camera that films a simulated top from above: exposure, rolling shutter, blur, noise, codec, uneven times.
 
-It draws a dark base, and a lighter top with a light mark.  Lenses and perspective are not modelled.
+It draws a dark base, and a lighter top with a light mark.  Errors of lenses are not modelled.
 """
 
 from __future__ import annotations
@@ -199,11 +199,6 @@ def _edge(distance: Any) -> Any:
     """Return a soft edge: 1 within, 0 outside."""
     near = np.clip(distance, -1, 1)
     return 0.5 + 0.25 * near * (3 - near * near)
-
-
-def even_times(duration: float, rate: float) -> Array:
-    """Return the times of pictures at even distances [s]."""
-    return np.arange(round(duration * rate)) / rate
 
 
 def phone_times(duration: float) -> Array:

@@ -30,7 +30,7 @@ const NEAREST = 6, FARTHEST = 120;  // distance of the camera, in drawn units
  *   setPath(points, count): the line that the axis' end has drawn, a Float32Array of x, y, z [m];
  *   setSpin(sense): which way the arrow turns, 1, −1 or 0;
  *   setTheme(theme); show({path, axis, spin, drive, top, height}): what is seen, each true or false;
- *   setLean(factor): the axis is drawn so many times as far from upright, up to LEAN_MOST, and so is its path;
+ *   setLean(factor): the angle of the axis from upright is drawn enlarged by the factor, up to LEAN_MOST, and so is its path;
  *   setPixel(size): lines are drawn no thinner than pixels of this size, as pixelOf returns it;
  *   axisEnd(position, quaternion): where the end of the drawn axis is then [m]; dispose(): free the graphics' memory.
  */

@@ -58,17 +58,19 @@ COMMANDS = {
 _EXAMPLES = {"sway": "sway/", "hold": "hold/", "video": "video/top.mp4 --rim 30"}
 
 
-def takes_options(names: Iterable[str]) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Return a decorator that puts options of analyses into the signature of a command, where typer reads them.
+def takes_options(
+    names: Iterable[str], more: Sequence[inspect.Parameter] = ()
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that puts options into the signature of a command, where typer reads them.
 
-    They stand behind the paths, and the command has them in `**given`.
+    Those of analyses stand behind the paths, more of them at the end; the command has all in `**given`.
     """
     own = [_parameter(typed_name(name), OPTIONS[name]) for name in names if OPTIONS[name].typed is not None]
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         context, paths, *shared, _ = inspect.signature(command).parameters.values()
         shared = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in shared]
-        command.__signature__ = inspect.Signature([context, paths, *own, *shared])  # type: ignore[attr-defined]
+        command.__signature__ = inspect.Signature([context, paths, *own, *shared, *more])  # type: ignore[attr-defined]
         return command
 
     return decorate

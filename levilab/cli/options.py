@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -82,10 +83,22 @@ def named_scene(scene: str | None) -> str:
 
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else on standard output.")]
-Title = Annotated[str, typer.Option(metavar="TEXT", help="In place of the report's own title.")]
-Course = Annotated[str, typer.Option(metavar="TEXT", help="Below the title, as 'Physics lab 2'.")]
-Author = Annotated[str, typer.Option(metavar="NAMES", help="Below the title.")]
-Date = Annotated[str, typer.Option(metavar="TEXT", help="Below the title, as it is to stand there.")]
+#: The heading of a report: name → metavar and help.
+_HEADING = {
+    "title": ("TEXT", "In place of the report's own title."),
+    "course": ("TEXT", "Below the title, as 'Physics lab 2'."),
+    "author": ("NAMES", "Below the title."),
+    "date": ("TEXT", "Below the title, as it is to stand there."),
+}
+HEADING = tuple(
+    inspect.Parameter(
+        name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default="",
+        annotation=Annotated[str, typer.Option(metavar=metavar, help=text)],
+    )
+    for name, (metavar, text) in _HEADING.items()
+)
 #: readable=False here and elsewhere: what may not be read is said by the reader, in one line, with what to do.
 Paths = Annotated[
     list[Path] | None,

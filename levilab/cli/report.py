@@ -6,13 +6,13 @@ from typing import Annotated, Any
 import typer
 
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import Author, Course, Date, Json, Paths, Title, existing_path, place, writable
+from levilab.cli.options import HEADING, Json, Paths, existing_path, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.pipelines.options import OF_REPORT, read_options
 
 
-@takes_options(OF_REPORT)
+@takes_options(OF_REPORT, HEADING)
 def report(
     context: typer.Context,
     paths: Paths = None,
@@ -40,17 +40,13 @@ def report(
         ),
     ] = True,
     short: Annotated[bool, typer.Option("--short", help="Result, figure and notes alone.")] = False,
-    title: Title = "",
-    course: Course = "",
-    author: Author = "",
-    date: Date = "",
     **given: Any,
 ) -> None:
     """Write the report."""
     from levilab.report.heading import Heading
     from levilab.report.page import write_report
 
-    app = context.find_root().command
+    app, heading = context.find_root().command, Heading(**{one.name: given.pop(one.name) for one in HEADING})
     place = place_of_report(out)
     with interruptible("no report is written"):
         written = write_report(
@@ -61,7 +57,7 @@ def report(
             tables=tables,
             crosscheck=crosscheck,
             short=short,
-            heading=Heading(title, course, author, date),
+            heading=heading,
         )
     result(place)
     if tables:

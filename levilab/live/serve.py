@@ -106,7 +106,8 @@ def serve_live(
     Raises:
         UsageError: a run and a bench for practice at once.
         MissingThree: the extra is not installed.
-        DataError: there is no such run, or the bench would record into a file.
+        DataError: there is no such run.
+        CannotWrite: the bench would record into a file.
         CannotShow: the port is taken.
         NoNetwork: the view is to be shared, and this machine is in no network.
     """

@@ -16,7 +16,7 @@ import numpy as np
 
 from levilab.errors import UsageError, unquote
 from levilab.files import CannotWrite, replace_atomically
-from levilab.notebook.labels import as_dataset
+from levilab.notebook.labels import as_dataset, head_as_html
 from levilab.notebook.quantity import Named, Quantity, correlate
 from levilab.pipelines.catalogue import ANALYSES, print_analysis
 from levilab.pipelines.result import Place
@@ -95,7 +95,7 @@ class AnalysisResult:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The inputs, by names as short as tells them apart."""
+        """The inputs, each by the shortest name that no other one has."""
         return tuple(source.name for source in self.found.sources)
 
     @property
@@ -253,17 +253,16 @@ class AnalysisResult:
             for name, frame in zip(self.inputs, frames, strict=True):
                 frame.insert(0, "input", name)
             return pd.concat(frames, ignore_index=True)
-        if table == "models":
-            return self._models()
-        if table != "values":
-            raise UsageError("table", "values, models or readings is expected", value=table)
         together = {"together": self.values} if len(self.inputs) > 1 and self.values else {}
+        parts: dict[str, tuple[str, Mapping[str, Mapping[str, Quantity]]]]
+        parts = {"values": ("input", together | dict(self.by_input)), "models": ("model", self.models)}
+        if table not in parts:
+            raise UsageError("table", "values, models or readings is expected", value=table)
+        whose, quantities = parts[table]
         rows = [
-            (of, name, one.value, one.u, one.unit)
-            for of, values in (together | dict(self.by_input)).items()
-            for name, one in values.items()
+            (of, name, one.value, one.u, one.unit) for of, values in quantities.items() for name, one in values.items()
         ]
-        frame = pd.DataFrame(rows, columns=["input", "name", "value", "u", "unit"])
+        frame = pd.DataFrame(rows, columns=[whose, "name", "value", "u", "unit"])
         return frame.astype({"value": float, "u": float})
 
     def to_xarray(self) -> xarray.Dataset:
@@ -320,15 +319,6 @@ class AnalysisResult:
         lines += ["", *(f"  {name} = {quantity!r}" for name, quantity in fitted.items()), ""]
         lines += [f"  correlation of {one} and {other} = {r:+.3f}" for one, other, r in _correlations(fitted)]
         return "\n".join(lines).strip()
-
-    def _models(self) -> pd.DataFrame:
-        import pandas as pd
-
-        rows = [
-            (model, name, one.value, one.u, one.unit) for model, of in self.models.items() for name, one in of.items()
-        ]
-        frame = pd.DataFrame(rows, columns=["model", "name", "value", "u", "unit"])
-        return frame.astype({"value": float, "u": float})
 
     def plot(self, what: Literal["all", "residuals"] = "all") -> Figure:
         """Draw the figure; it needs no display, a notebook shows it, and `savefig` writes it.
@@ -411,8 +401,7 @@ def _parts(result: AnalysisResult) -> Iterator[str]:
     warnings = result.warnings
     yield fold(f"{len(warnings)} note{'s' * (len(warnings) > 1)}", paragraphs(warnings[:_MOST_INPUTS]))
     frame = result.to_dataframe("readings")
-    head = frame.head(_MOST_READINGS).map(lambda cell: f"{cell:.6g}" if isinstance(cell, float) else str(cell))
-    yield fold(f"{len(frame)} readings", table_as_html([*map(str, head.columns)], head.to_numpy().tolist()))
+    yield fold(f"{len(frame)} readings", head_as_html(frame, _MOST_READINGS))
     yield fold(
         "how it was made",
         paragraphs(
@@ -425,12 +414,12 @@ def _parts(result: AnalysisResult) -> Iterator[str]:
 
 
 def _values(values: Mapping[str, Quantity]) -> str:
-    rows = [(name, _in_words(quantity)) for name, quantity in [*values.items()][:_MOST_ROWS]]
+    rows = [(name, _as_text(quantity)) for name, quantity in [*values.items()][:_MOST_ROWS]]
     more = [("…", f"{len(values) - _MOST_ROWS} more")] * (len(values) > _MOST_ROWS)
     return table_as_html((), [*rows, *more], texts=2)
 
 
-def _in_words(quantity: Quantity) -> str:
+def _as_text(quantity: Quantity) -> str:
     return f"{without_unit(quantity)} {unit(quantity.unit).text}".strip()
 
 
@@ -439,7 +428,7 @@ def _models(result: AnalysisResult) -> str:
     rows = []
     for model in result.document["models"]:
         name, statistics = model["name"], model.get("statistics", {})
-        found = ", ".join(f"{of} = {_in_words(one)}" for of, one in result.models[name].items())
+        found = ", ".join(f"{of} = {_as_text(one)}" for of, one in result.models[name].items())
         numbers = (statistics.get(key) for key in ("reduced_chi_square", "weight"))
         best = " (best)" if name == result.best_model else ""
         rows.append((f"{name}{best}", found, *("" if one is None else plain(one, 3) for one in numbers)))

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.errors import UsageError
-from levilab.notebook.labels import as_dataset, dataset_of
+from levilab.notebook.labels import as_dataset, dataset_of, head_as_html
 from levilab.notebook.scene import chosen_scene, whole_key
-from levilab.present.html import facts_as_html, fold, table_as_html
+from levilab.present.html import facts_as_html, fold
 from levilab.sweeps.adaptive import is_adaptive, run_adaptive
 from levilab.sweeps.request import SweepRequest, store_for
 from levilab.sweeps.run import compile_for, run, workers_for
@@ -67,8 +67,7 @@ class SimulatedMap:
     def _repr_html_(self) -> str:
         """Return the HTML that a notebook shows."""
         frame = self.to_dataframe()
-        head = frame.head(_MOST_ROWS).map(lambda cell: f"{cell:.6g}" if isinstance(cell, float) else str(cell))
-        rows = table_as_html([*map(str, head.columns)], head.to_numpy().tolist(), texts=0)
+        rows = head_as_html(frame, _MOST_ROWS, texts=0)
         facts = [("axis", line) for line in axes_lines(summarise(self.store))]
         return facts_as_html(headline(summarise(self.store)), facts, fold(f"{len(frame)} points", rows, opened=True))
 

@@ -222,17 +222,16 @@ def banner_of(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner 
     if total == 1:
         return Banner("SYNTHETIC.", "This run did not come from a real bench. How it was made stands in its run.json.")
     how = "How each was made stands in its run.json."
-    where = (how, how)  # on the screen and on paper
     if len(made_up) == total:
-        return Banner("SYNTHETIC.", f"None of these {total} runs came from a real bench.", *where)
+        return Banner("SYNTHETIC.", f"None of these {total} runs came from a real bench. {how}")
     said = f"{len(made_up)} of {total} runs did not come from a real bench ({list_in_words(made_up)})."
     if not mixed and files:
         said = f"Of {count_inputs(sources)} {len(made_up)} did not come from a real bench ({list_in_words(made_up)})."
-        return Banner("SYNTHETIC IN PART.", f"{said} A data file does not say where it is from.", *where)
+        return Banner("SYNTHETIC IN PART.", f"{said} A data file does not say where it is from. {how}")
     if not mixed:
-        return Banner("REAL AND SYNTHETIC RUNS.", said, *where)
+        return Banner("REAL AND SYNTHETIC RUNS.", f"{said} {how}")
     consequence = "Means, comparisons and figure are of both together and so no measurement: report the real runs "
-    return Banner("REAL AND SYNTHETIC RUNS MIXED.", f"{said} {consequence}by themselves.", *where)
+    return Banner("REAL AND SYNTHETIC RUNS MIXED.", f"{said} {consequence}by themselves. {how}")
 
 
 # --- a part in a notebook ------------------------------------------------------------------------------

@@ -88,7 +88,7 @@ TASKS: dict[str, Task] = {
     ),
     "hold": Task(
         "Hold it for three minutes", "A free top is down after 90 s. Keep this one up, with a drive that holds it.",
-        "the drive gives back what the air takes: the tape lags behind it by as much as that needs",
+        "the drive gives back what the air takes: the tape lags behind it until the two are equal",
         lambda look: look.is_held, for_s=180.0,
     ),
     "mass": Task(

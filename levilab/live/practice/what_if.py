@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Change:
     """A row.
 
     Attributes:
@@ -45,24 +45,24 @@ def _drag_at(scene: Scene, pressure: float) -> float:
 #: Name → row.  The washers of a set have 0.02 to 0.1 g.  The air's viscosity η does not change with its
 #: pressure, and its density ρ does: a drag in proportion to ωⁿ goes as ρ^(n − 1), as η for n = 1, √(ρη) for n = 3/2 (a
 #: laminar boundary layer), ρ for n = 2.
-WHAT_IF: dict[str, Quantity] = {
-    "washers_g": Quantity(
+WHAT_IF: dict[str, Change] = {
+    "washers_g": Change(
         "washers", "g", "The mass that floats is known to some tenths of a gram.", -0.2, 0.8, 0.02, 0.0,
         lambda scene, value: {"top.mass_kg": scene.top.mass_kg + 1e-3 * value},
     ),
-    "base_tilt_deg": Quantity(
+    "base_tilt_deg": Change(
         "tilt of the base", "°", "The top slides off a base that leans.", -2.0, 2.0, 0.05, 0.0,
         lambda _, value: {"base.tilt_rad": math.radians(value)},
     ),
-    "temperature_k": Quantity(
+    "temperature_k": Change(
         "warmer by", "K", "Warm magnets are weaker, by 0.2 % per kelvin each: the same top is then too heavy.",
         -10.0, 10.0, 0.5, 0.0, lambda _, value: {"temperature_rise_k": value},
     ),
-    "pressure": Quantity(
+    "pressure": Change(
         "air pressure", "bar", "The air alone slows a free top.", 0.0, 2.0, 0.1, 1.0,
         lambda scene, value: {"drag.coefficient": _drag_at(scene, value)},
     ),
-    "moment_tilt": Quantity(
+    "moment_tilt": Change(
         "tilt of the moment", "", "What lies across the axis is what the drive holds the top by.",
         0.0, 0.04, 0.005, 0.02, lambda _, value: {"top.moment_tilt": [value, 1.0 - value]},
     ),

@@ -14,7 +14,7 @@ from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.field.device import known_of, known_top, usual
 from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
-from levilab.pipelines.field.words import remark, scan_in_words, scans_in_words
+from levilab.pipelines.field.words import remark, scan_as_text, scans_as_text
 from levilab.pipelines.options import FieldOptions
 from levilab.pipelines.sources import Needs
 
@@ -85,7 +85,7 @@ class FieldAnalysis(Analyzed[FieldReadings, FieldRun, None, FieldOptions]):
         if len(self.runs) == 1:
             return self.runs[0].text
         found = means([run.values for run in self.runs])
-        return scans_in_words(found, len(self.runs), found["strength"].scatter)
+        return scans_as_text(found, len(self.runs), found["strength"].scatter)
 
     def about_run(self, run: FieldRun) -> Iterable[str]:
         """Return what to know of one scan."""
@@ -116,7 +116,7 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
         warnings.append("no uncertainty of the readings is given: their scatter about the fit stands for it")
     if readings.height_u is None:
         warnings.append("no uncertainty of the heights is given: they are taken as exact")
-    return FieldRun(scan, top, floating, scan_in_words(scan, floating), tuple(warnings))
+    return FieldRun(scan, top, floating, scan_as_text(scan, floating), tuple(warnings))
 
 
 METHOD = Method(

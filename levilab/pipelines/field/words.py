@@ -30,7 +30,7 @@ def _format(name: str, estimate: Estimate) -> str:
     return with_uncertainty(QUANTITIES[name].show(estimate))
 
 
-def scans_in_words(means: Mapping[str, Estimate], runs: int, scatter: float) -> str:
+def scans_as_text(means: Mapping[str, Estimate], runs: int, scatter: float) -> str:
     """Return what several scans say together, in a few sentences.
 
     Args:
@@ -46,13 +46,13 @@ def scans_in_words(means: Mapping[str, Estimate], runs: int, scatter: float) -> 
     )
 
 
-def scan_in_words(scan: FieldScan, floating: Floating | None) -> str:
+def scan_as_text(scan: FieldScan, floating: Floating | None) -> str:
     """Return what a scan says, in a few sentences."""
     base = (
         f"The base has ρ = {_format('strength', scan.parameters['strength'])}, its middle at "
         f"{_format('origin', scan.parameters['origin'])}; its field points {_pole(scan)} above it."
     )
-    parts = [base, _learned_in_words(scan)]
+    parts = [base, _learned_as_text(scan)]
     parts.append(_advice(floating.values) if floating else "No top floats above it.")
     return " ".join(part for part in parts if part)
 
@@ -61,7 +61,7 @@ def _pole(scan: FieldScan) -> str:
     return "up" if scan.values[0] > 0 else "down (by the sign of the probe)"
 
 
-def _learned_in_words(scan: FieldScan) -> str:
+def _learned_as_text(scan: FieldScan) -> str:
     """Return what the scan can tell, and what it cannot."""
     of_calliper = [
         name.replace("_", " ")
@@ -78,7 +78,7 @@ def _learned_in_words(scan: FieldScan) -> str:
         if abs(scan.correlation(one, other)) > _STRONG
     ]
     said += [
-        f"{one.replace('_', ' ').capitalize()} and {other.replace('_', ' ')} can hardly be told apart "
+        f"{one.replace('_', ' ').capitalize()} and {other.replace('_', ' ')} can hardly be distinguished "
         f"(correlation {digits(scan.correlation(one, other))})."
         for one, other in pairs
     ]

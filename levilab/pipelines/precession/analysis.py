@@ -141,7 +141,7 @@ def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[Remark]:
     mean = np.sum(slope / u**2) / np.sum(u**-2.0)
     p = float(chdtrc(len(slope) - 1, float(np.sum(((slope - mean) / u) ** 2))))
     if p < DIFFERENT_P:
-        yield Remark("slopes differ", (len(slope), p))
+        yield Remark("slopes differ", values=(len(slope), p))
 
 
 METHOD = Method(

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.numbers import digits
-from levilab.pipelines.precession.words import intercept_of, miscount_in_words, slope_of
+from levilab.pipelines.precession.words import intercept_of, miscount_as_text, slope_of
 from levilab.present.drawing import SMALL, band, headline, panel, run_look, synthetic_mark
 from levilab.present.looks import GREY, LOOKS
 from levilab.present.numbers import plain, without_unit
@@ -144,7 +144,7 @@ def _draw_left_out(axes: Axes, fit: SweepFit) -> None:
         axes.plot(
             point.drive, y, marker=marker, color=LOOKS["left out"].colour, markersize=6, linestyle="none", zorder=5
         )
-        text = f"{point.precession:.4g} Hz: " * beyond + miscount_in_words(point.miscount)
+        text = f"{point.precession:.4g} Hz: " * beyond + miscount_as_text(point.miscount)
         last = point.drive > float(fit.column("drive").mean())
         axes.annotate(
             text, (point.drive, y), (-8 if last else 8, -3), textcoords="offset points", fontsize=SMALL,

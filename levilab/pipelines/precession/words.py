@@ -77,7 +77,7 @@ def at_most(probability: float) -> str:
 # --- remarks -------------------------------------------------------------------------------------------
 
 
-def miscount_in_words(of: Miscount) -> str:
+def miscount_as_text(of: Miscount) -> str:
     """Return a miscount as text."""
     if of.times is not None:
         above, below = of.times
@@ -102,7 +102,7 @@ def _miscount(points: tuple[Point, ...], k: float, gates_known: float = 1.0) -> 
     end = ("" if point.used else ", left out of the line") if point.miscount.named else f"{gate} (it stays in)"
     return (
         f"point {k + 1:.0f}, {point.precession:.5g} Hz at a drive of {point.drive:.5g} Hz: "
-        f"{miscount_in_words(point.miscount)}{end}"
+        f"{miscount_as_text(point.miscount)}{end}"
     )
 
 

@@ -14,10 +14,10 @@ from levilab.present.numbers import enumeration
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from analysis.remarks import Remark
     from analysis.spindown.combine import Combined, CombinedLaw
     from analysis.spindown.fit import SpinDown
     from analysis.spindown.lawfit import LawFit
-    from analysis.spindown.remarks import Remark
     from analysis.spindown.verdict import Verdict
     from analysis.uncertainty import Estimate
 

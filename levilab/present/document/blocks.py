@@ -57,14 +57,10 @@ class Banner:
     Attributes:
         lead: in capitals and bold, such as "SYNTHETIC.".
         text: what that means here; in the same line, after the lead.
-        on_screen: what is added on the page for a screen.
-        on_paper: what is added on paper instead.
     """
 
     lead: str
     text: str
-    on_screen: str = ""
-    on_paper: str = ""
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Compared:
     """One quantity of all groups, in SI.
 
     Attributes:
@@ -107,7 +107,7 @@ class Class:
     found: Any
     model: str
     groups: tuple[Group, ...]
-    quantities: tuple[Quantity, ...]
+    quantities: tuple[Compared, ...]
     others: Mapping[str, str]
 
     @property
@@ -168,12 +168,12 @@ def _has_u(value: Mapping[str, Any]) -> bool:
 
 def _quantity(
     name: str, analysis: Analysis[Any], model: str, parts: Sequence[Mapping[str, Any]], truths: Sequence[Truth]
-) -> Quantity:
+) -> Compared:
     found = [_model(part, model).get("parameters", {}).get(name) or part["values"].get(name) for part in parts]
     good = [one if one and _has_u(one) else None for one in found]
     estimates = tuple(Estimate(one["value"], one["u"], one["unit"]) if one else None for one in good)
     known = [one for one in good if one]
-    return Quantity(
+    return Compared(
         name,
         analysis.symbols.get(name, name.replace("_", " ")),
         known[0]["unit"] if known else "1",

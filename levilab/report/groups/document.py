@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from analysis.uncertainty import Estimate
     from levilab.present.document.blocks import Block
     from levilab.present.style import Figure
-    from levilab.report.groups.beside import Class, Quantity
+    from levilab.report.groups.beside import Class, Compared
 
-#: A group so many u from its truth is named in red: one in four hundred is so by chance.
+#: Distance from the truth, in u, beyond which a group is named in red: one in four hundred is by chance.
 _FAR = 3.0
 _FROM_CLASS, _TRUTH, _FROM_TRUTH = "from the others [u]", "truth", "from the truth [u]"
 
@@ -69,7 +69,7 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
         yield section("Notes", "notes", Facts(tuple(_notes(of))))
 
 
-def _values(of: Class, quantity: Quantity) -> Tabular:
+def _values(of: Class, quantity: Compared) -> Tabular:
     """Return a row for each group: its value, how far it lies from the others, and from the truth."""
     estimates = [quantity.show(one.value, one.u) if one else None for one in quantity.estimates]
     together = quantity.together

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from levilab.report.groups.beside import Class, Group, Quantity
+    from levilab.report.groups.beside import Class, Compared, Group
 
 #: Left edge of the panels, their right edge, from panel to panel, above them, below them, and a group's row [inch].
 _LEFT, _RIGHT, _GAP, _HEAD, _FOOT, _ROW = 1.75, 6.85, 0.25, 0.85, 0.55, 0.135
@@ -63,7 +63,7 @@ def _label(group: Group) -> str:
     return name if len(name) <= _LETTERS else f"{name[: _LETTERS - 1]}…"
 
 
-def _draw_values(axes: Axes, of: Quantity) -> None:
+def _draw_values(axes: Axes, of: Compared) -> None:
     factor, together = unit(of.unit).shown.factor, of.together
     power = _power(of)
     scale = factor / 10.0**power
@@ -80,14 +80,14 @@ def _draw_values(axes: Axes, of: Quantity) -> None:
     axes.set_xlabel(f"{of.symbol}  [{times}{shown}]" if times or shown else of.symbol, fontsize=8)
 
 
-def _power(of: Quantity) -> int:
+def _power(of: Compared) -> int:
     """Return the power of ten in the label of the axis."""
     factor = unit(of.unit).shown.factor
     largest = max((abs(one.value * factor) for one in of.estimates if one and one.value), default=1.0)
     return 0 if 0.01 <= largest < 1e4 else int(np.floor(np.log10(largest)))
 
 
-def _draw_distances(axes: Axes, quantities: Sequence[Quantity]) -> None:
+def _draw_distances(axes: Axes, quantities: Sequence[Compared]) -> None:
     axes.axvspan(-2, 2, color="black", alpha=0.07, linewidth=0)
     axes.axvline(0, color=VERMILION, linewidth=1)
     for of, colour, marker in zip(quantities, (GREEN, BLUE, "black"), "o^s", strict=False):

@@ -11,7 +11,7 @@ from levilab.present.numbers import plain, with_uncertainty
 from levilab.present.units import unit
 
 if TYPE_CHECKING:
-    from levilab.report.groups.beside import Class, Quantity
+    from levilab.report.groups.beside import Class, Compared
 
 #: Below it chance does not make groups differ so much.
 DIFFER = 0.01
@@ -35,7 +35,7 @@ def verdict(of: Class) -> str:
     return "  ".join([*texts, *([_truth(of)] if of.knows_truth else [])]) or finding(of)
 
 
-def _mean(of: Quantity) -> str:
+def _mean(of: Compared) -> str:
     together = of.together
     if together is None:
         return of.symbol
@@ -43,19 +43,19 @@ def _mean(of: Quantity) -> str:
     return f"{of.symbol} = {with_uncertainty(Estimate(together.mean * factor, together.u * factor, of.shown_unit))}"
 
 
-def _count(of: Quantity) -> str:
+def _count(of: Compared) -> str:
     n = sum(one is not None for one in of.estimates)
     return f"{n} group{'s' * (n > 1)}"
 
 
-def _agreement(of: Quantity) -> str:
+def _agreement(of: Compared) -> str:
     together = of.together
     if together is None or together.scatter is None:
         return "there is nothing to compare it with"
     return "the groups differ by more than their u" if together.p < DIFFER else "the groups agree within their u"
 
 
-def _chi_square(of: Quantity) -> str:
+def _chi_square(of: Compared) -> str:
     together = of.together
     if together is None or together.scatter is None:
         return "there is no other group to compare it with"

@@ -83,9 +83,7 @@ def _verdict(_: Writer, block: Verdict, __: int) -> Html:
 
 
 def _banner(_: Writer, block: Banner, __: int) -> Html:
-    media = (("on-screen", block.on_screen), ("on-paper", block.on_paper))
-    added = [element("span", " ", words(text), class_=medium) for medium, text in media if text]
-    return element("div", element("strong", block.lead), " ", words(block.text), added, class_="synthetic", role="note")
+    return element("div", element("strong", block.lead), " ", words(block.text), class_="synthetic", role="note")
 
 
 def _bullets(_: Writer, block: Bullets, __: int) -> Html:

@@ -326,7 +326,7 @@ def _details(block: Details, drawing: _Drawing) -> Drawn | None:
 
 
 def _banner(block: Banner, _: _Drawing) -> Drawn:
-    return {"kind": "banner", "lead": _text(block.lead), "text": _text(f"{block.text} {block.on_paper}".strip())}
+    return {"kind": "banner", "lead": _text(block.lead), "text": _text(block.text)}
 
 
 def _warnings(block: Warnings, _: _Drawing) -> Drawn:

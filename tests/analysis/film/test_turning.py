@@ -9,7 +9,7 @@ from analysis.errors import TooFewReadings
 from analysis.film.errors import NoMark
 from analysis.film.mark import phases_of, without_pull
 from analysis.film.turning import Turning, choices_of, spins_of_start, turning_of
-from levilab.animation.camera import even_times, phone_times
+from levilab.animation.camera import phone_times
 
 NOISE = 1e-3  # of a phase [turns]
 
@@ -42,14 +42,14 @@ def test_spin_and_slope_scatter_as_u_says():
 @pytest.mark.parametrize("sense", [1, -1])
 def test_uneven_times_tell_a_spin_far_above_half_the_rate(sense):
     random = np.random.default_rng(12)
-    times = even_times(2.0, 30.0) + random.uniform(-4e-3, 4e-3, 60)
+    times = np.arange(60) / 30 + random.uniform(-4e-3, 4e-3, 60)
     found = spins_of_start(times, seen(random, times, 47.0 * sense), np.full(60, NOISE))
     assert choices_of(found, None)[0] == [pytest.approx(47.0 * sense, abs=0.02)]
 
 
 def test_even_times_leave_choices():
     random = np.random.default_rng(13)
-    times = even_times(2.0, 60.0)
+    times = np.arange(120) / 60
     found = spins_of_start(times, seen(random, times, 25.0), np.full(times.size, NOISE))
     choices, slow = choices_of(found, None)
     assert sorted(choices) == [pytest.approx(-35.0, abs=0.02), pytest.approx(25.0, abs=0.02)]

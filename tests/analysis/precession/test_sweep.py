@@ -63,7 +63,7 @@ def test_a_miscount_is_named_and_the_line_goes_on_without_it(wrong, miscount):
     others = np.arange(DRIVE.size) != 3
     assert fit.points[3].miscount == miscount
     assert [point.used for point in fit.points] == others.tolist()
-    assert Remark("miscount", (3,)) in fit.remarks
+    assert Remark("miscount", values=(3,)) in fit.remarks
     assert fit.line == fit_line(DRIVE[others], counted()[others], np.full(9, NOISE))
     kept = fit_sweep(sweep(counted(**wrong), gate_s=2.0), keep_miscounts=True)
     assert kept.line.n == DRIVE.size
@@ -72,7 +72,7 @@ def test_a_miscount_is_named_and_the_line_goes_on_without_it(wrong, miscount):
 def test_a_point_that_no_miscount_explains_stays_in_the_line():
     fit = fit_sweep(sweep(counted(n3=0.3), gate_s=2.0))
     assert fit.points[3].used
-    assert fit.remarks[0] == Remark("unexplained", (3, 1))
+    assert fit.remarks[0] == Remark("unexplained", values=(3, 1))
     assert fit.line.scale > 2  # and says that the points scatter more than their u
 
 
@@ -138,7 +138,7 @@ def test_a_spin_beside_the_drive_is_warned_of():
     slow = DRIVE - 0.4 + NOISE * np.random.default_rng(1).standard_normal(DRIVE.size)
     fit = fit_sweep(sweep(counted(), spin=slow))
     assert fit.spin_offset == pytest.approx(-0.4, abs=0.03)
-    assert fit.remarks == (Remark("spin off", (fit.spin_offset,)),)
+    assert fit.remarks == (Remark("spin off", values=(fit.spin_offset,)),)
     assert not fit_sweep(sweep(counted(), spin=DRIVE + (slow - DRIVE + 0.4))).remarks
 
 

@@ -17,7 +17,7 @@ from levilab.acquisition.driving import (
     _ramp_end,
     has_drifted,
     held_spin,
-    slip_in_words,
+    slip_as_text,
     sweep_drive,
 )
 from levilab.acquisition.experiment import Experiment
@@ -191,7 +191,7 @@ def test_ctrl_c_ends_a_hold_after_the_count_under_way(monkeypatch):
 
 
 def test_a_tape_that_leads_its_drive_is_no_loose_washer():
-    behind, ahead = (slip_in_words(Slip(spin, 30.0, u=0.02, least=0.02)) for spin in (29.83, 30.17))
+    behind, ahead = (slip_as_text(Slip(spin, 30.0, u=0.02, least=0.02)) for spin in (29.83, 30.17))
     assert "the counter sees 29.83(2) Hz: LOOSE WASHERS, the tape slips by 0.17 Hz" in behind
     assert "no tape overtakes the drive" in ahead
     assert "LOOSE" not in ahead

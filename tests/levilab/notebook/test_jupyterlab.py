@@ -85,7 +85,7 @@ def test_cells_in_jupyterlab_show_results_and_fold(browser: Browser, tmp_path: P
         page = browser.new_page(viewport={"width": 1000, "height": 4000})
         page.set_default_timeout(PATIENCE_MS)
         page.goto(f"{address}lab/tree/cells.ipynb")
-        page.get_by_text("| Idle").wait_for()  # a kernel that is starting drops what it is given
+        page.get_by_text("| Idle").wait_for()  # a kernel that is starting drops its input
         page.get_by_role("menuitem", name="Run", exact=True).click()
         page.locator(".lm-Menu-itemLabel", has_text="Run All Cells").first.click()
         outputs = page.locator(".jp-Cell-outputArea")

@@ -11,6 +11,10 @@ from levilab.pipelines.field import words as of_field
 from levilab.pipelines.precession import words as of_sweep
 
 
+def of(kind, *values, name=""):
+    return Remark(kind, name=name, values=values)
+
+
 def point(miscount=None, *, used=True):
     return SimpleNamespace(drive=32.0, precession=16.001, miscount=miscount, used=used)
 
@@ -18,44 +22,46 @@ def point(miscount=None, *, used=True):
 SOUND, HALF, OFF = point(), point(Miscount(1, (1, 2)), used=False), point(Miscount(2))
 #: Remark → what its sentence holds; of points 1 (sound), 2 (half of the line) and 3 (off it).
 OF_SWEEP = {
-    Remark("many miscounts", (4.0, 6.0)): "4 of 6 points look like miscounts: too many to leave out",
-    Remark("miscount", (1.0,)): "point 2, 16.001 Hz at a drive of 32 Hz: half the frequency was counted, left out of",
-    Remark("unexplained", (2.0, 0.0)): "no miscount explains it; whether whole pulses are missing only the counter's "
-    "gate could say (it stays in)",
-    Remark("unexplained", (2.0, 1.0)): "no miscount explains it (it stays in)",
-    Remark("sweep scatters", (2.0, 1e-5)): "the points scatter 2 times as much as their u says (p = 1×10⁻⁵)",
-    Remark("sweep overstated", (0.1, 8.0)): "much less than their u says (χ² of 0.1 for 8 degrees of freedom)",
-    Remark("sweep exact"): "without their u nothing can be tested",
-    Remark("moves the slope", (0.0, 0.01, 4.0)): "point 1, at 32 Hz, alone moves the slope by 0.01, 4.0 of its u",
-    Remark("holds the line", (0.0, 0.95)): "point 1, at 32 Hz, holds the line nearly by itself (leverage 0.95)",
-    Remark("uncertain drive", (1.0,)): "up to 1 u of the precession: let it count with `orthogonal` = True",
-    Remark("uncertain clock", (2e-3, 2e-3, 1e-3)): "as that of a clock: the slope is uncertain by 0.002 beside its u",
-    Remark("drive u unknown"): "taken as large as that of the precession",
-    Remark("spin off", (-0.4,)): "the spin that was counted lies 0.4 Hz below the drive",
-    Remark("slopes differ", (2.0, 1e-3)): "the slopes of the 2 runs differ by more than their u says (p = 0.001)",
+    of("many miscounts", 4.0, 6.0): "4 of 6 points look like miscounts: too many to leave out",
+    of("miscount", 1.0): "point 2, 16.001 Hz at a drive of 32 Hz: half the frequency was counted, left out of",
+    of(
+        "unexplained", 2.0, 0.0
+    ): "no miscount explains it; whether whole pulses are missing only the counter's gate could say (it stays in)",
+    of("unexplained", 2.0, 1.0): "no miscount explains it (it stays in)",
+    of("sweep scatters", 2.0, 1e-5): "the points scatter 2 times as much as their u says (p = 1×10⁻⁵)",
+    of("sweep overstated", 0.1, 8.0): "much less than their u says (χ² of 0.1 for 8 degrees of freedom)",
+    of("sweep exact"): "without their u nothing can be tested",
+    of("moves the slope", 0.0, 0.01, 4.0): "point 1, at 32 Hz, alone moves the slope by 0.01, 4.0 of its u",
+    of("holds the line", 0.0, 0.95): "point 1, at 32 Hz, holds the line nearly by itself (leverage 0.95)",
+    of("uncertain drive", 1.0): "up to 1 u of the precession: let it count with `orthogonal` = True",
+    of("uncertain clock", 2e-3, 2e-3, 1e-3): "as that of a clock: the slope is uncertain by 0.002 beside its u",
+    of("drive u unknown"): "taken as large as that of the precession",
+    of("spin off", -0.4): "the spin that was counted lies 0.4 Hz below the drive",
+    of("slopes differ", 2.0, 1e-3): "the slopes of the 2 runs differ by more than their u says (p = 0.001)",
 }
 OF_FIELD = {
-    Remark("scan scatters", (4.0,)): "(χ²/dof = 4): all uncertainties are enlarged by 2",
-    Remark("scan overstated", (0.1,)): "the readings scatter far less than their stated uncertainties (χ²/dof = 0.1)",
-    Remark("contradicts", (0.0021, 0.0, 5e-4), "inner_radius"): "the scan wants inner radius = 2.1 mm, which lies "
-    "4.2 u from the stated 0 mm (u = 0.5 mm)",
-    Remark("no strength"): "the strength is not significantly different from zero",
-    Remark("stray reading", (0.075, 6.0)): "the reading at 75 mm lies 6.0 u off the others",
-    Remark("another zero", (0.06, 0.07, 0.075)): "said to float at 60 mm, by this scan tops float from 70 to 75 mm",
-    Remark("rough mass", (1e-3, 5e-4)): "the mass to set is known to 1 g only, and the window is 0.5 g wide",
+    of("scan scatters", 4.0): "(χ²/dof = 4): all uncertainties are enlarged by 2",
+    of("scan overstated", 0.1): "the readings scatter far less than their stated uncertainties (χ²/dof = 0.1)",
+    of(
+        "contradicts", 0.0021, 0.0, 5e-4, name="inner_radius"
+    ): "the scan wants inner radius = 2.1 mm, which lies 4.2 u from the stated 0 mm (u = 0.5 mm)",
+    of("no strength"): "the strength is not significantly different from zero",
+    of("stray reading", 0.075, 6.0): "the reading at 75 mm lies 6.0 u off the others",
+    of("another zero", 0.06, 0.07, 0.075): "said to float at 60 mm, by this scan tops float from 70 to 75 mm",
+    of("rough mass", 1e-3, 5e-4): "the mass to set is known to 1 g only, and the window is 0.5 g wide",
 }
 
 
-@pytest.mark.parametrize(("of", "text"), OF_SWEEP.items(), ids=lambda each: getattr(each, "kind", ""))
-def test_a_remark_on_a_sweep_is_a_sentence(of, text):
-    (said,) = of_sweep.remarks_of(SimpleNamespace(points=(SOUND, HALF, OFF), remarks=(of,)))
+@pytest.mark.parametrize(("remark", "text"), OF_SWEEP.items(), ids=lambda each: getattr(each, "kind", ""))
+def test_a_remark_on_a_sweep_is_a_sentence(remark, text):
+    (said,) = of_sweep.remarks_of(SimpleNamespace(points=(SOUND, HALF, OFF), remarks=(remark,)))
     assert text in said
 
 
-@pytest.mark.parametrize(("of", "text"), OF_FIELD.items(), ids=lambda each: getattr(each, "kind", ""))
-def test_a_remark_on_a_scan_is_a_sentence(of, text):
-    assert text in of_field.remark(of)
+@pytest.mark.parametrize(("remark", "text"), OF_FIELD.items(), ids=lambda each: getattr(each, "kind", ""))
+def test_a_remark_on_a_scan_is_a_sentence(remark, text):
+    assert text in of_field.remark(remark)
 
 
 def test_all_kinds_are_tried_above():
-    assert {of.kind for of in (*OF_SWEEP, *OF_FIELD)} == set(get_args(Kind))
+    assert {remark.kind for remark in (*OF_SWEEP, *OF_FIELD)} == set(get_args(Kind))

@@ -23,7 +23,6 @@ from levilab.present.document.blocks import (
 )
 from levilab.present.style import as_pdf as as_pdf_page
 from levilab.present.tables import table
-from levilab.report.html.page import page_of
 from levilab.report.page import write_report
 from levilab.report.pdf.renderer import NoTypst, as_pdf, files_of, fonts, with_places
 from support.commands import command
@@ -165,19 +164,6 @@ def test_a_first_page_of_several_chapters_says_what_each_found() -> None:
 def test_what_is_synthetic_is_marked_on_every_page() -> None:
     assert data_of(Document("t", "", (), Banner("SYNTHETIC.", "of a model")))["mark"] == "SYNTHETIC"
     assert data_of(Document("t", "", ()))["mark"] == ""
-
-
-def test_where_more_stands_is_said_for_paper_on_paper_and_for_the_screen_on_the_screen() -> None:
-    banner = Banner("SYNTHETIC.", "None is real.", "It stands below its name.", "It stands in its run.json.")
-    document = Document("t", "", (), banner)
-    assert data_of(document)["banner"]["text"] == "None is real. It stands in its run.json."
-    page = page_of(document)
-    assert '<span class="on-screen"> It stands below its name.</span>' in page
-    assert '<span class="on-paper"> It stands in its run.json.</span>' in page
-    before, _, on_paper = page.partition("@media print {")
-    assert ".on-paper { display: none; }" in before
-    assert ".on-paper { display: inline; }" in on_paper
-    assert ".on-screen { display: none; }" in on_paper
 
 
 def test_a_figure_that_stands_alone_below_its_heading_stays_there() -> None:

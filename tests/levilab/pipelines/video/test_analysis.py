@@ -11,7 +11,7 @@ from runpy import run_path
 import numpy as np
 import pytest
 
-from levilab.animation.camera import BASE, RIM, Camera, Pictures, even_times, film, flight_of, phone_times, write_film
+from levilab.animation.camera import BASE, RIM, Camera, Pictures, film, flight_of, phone_times, write_film
 from levilab.errors import DataError, UsageError
 from levilab.formats.film import open_film, pictures
 from levilab.pipelines.catalogue import ANALYSES
@@ -187,7 +187,7 @@ def test_a_film_in_slow_motion_asks_for_its_rate(folder):
 
 
 def test_even_times_that_fold_the_spin_are_named_and_near_chooses(folder):
-    path = filmed(folder, "thirty.mp4", Pictures.take, even_times(1.0, 30.0))
+    path = filmed(folder, "thirty.mp4", Pictures.take, np.arange(30) / 30)
     analysis = ANALYSES["video"].analyze([path], VideoOptions(rim_m=0.03))
     (doubtful,) = analysis.runs
     assert doubtful.spin is None
@@ -198,7 +198,7 @@ def test_even_times_that_fold_the_spin_are_named_and_near_chooses(folder):
 
 def test_of_spins_that_look_the_same_the_one_that_slows_down_is_taken(folder):
     flight = level_flight(1.2, 31.0, chirp=-0.6)
-    path = film(folder / "sixty.mp4", CAMERA, flight, even_times(1.2, 60.0))
+    path = film(folder / "sixty.mp4", CAMERA, flight, np.arange(72) / 60)
     found = analyze_film(path, VideoOptions(rim_m=0.03))
     assert found.spin.value == pytest.approx(31 - 0.6 * found.turning.middle, abs=5e-3)
     (note,) = (note for note in found.warnings if "slows down" in note)
