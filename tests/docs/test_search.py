@@ -37,7 +37,7 @@ QUERIES = {
     "worksheet": ("class",),
     "washers": ("experiments/washers",),
     "oscilloscope": ("instruments/oscilloscope",),
-    "pymeasure": ("practise",),
+    "pymeasure": ("pymeasure",),
     "jupyter": ("notebook",),
     "animation": ("animation",),
     "first experiment": ("tutorial",),
