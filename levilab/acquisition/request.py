@@ -178,7 +178,7 @@ def _group(typed: str | None) -> str:
     group = " ".join(typed.split())
     if not 0 < len(group) <= LONGEST_GROUP or not group.isprintable():
         raise UsageError(
-            "group", f"a name of 1 to {LONGEST_GROUP} letters is expected, as Group 7", value=typed or "an empty one"
+            "group", f"a name of 1 to {LONGEST_GROUP} letters is expected, as Group 7", value=typed or None
         )
     return group
 
