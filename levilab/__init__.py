@@ -7,7 +7,7 @@ For scripts and notebooks, each with `help`:
     result = levilab.analyze(run)                # a run, a file, a DataFrame or arrays → a result
     levilab.report(result, "report.html")        # its report
     motion = levilab.simulate("undriven", 5)     # a scene → a trajectory; levilab.scenes() lists them
-    levilab.sweep("undriven", {"spin_hz": …})    # a scene over its parameters → a map
+    levilab.sweep("undriven", spin_hz=…)         # a scene over its parameters → a map
     levilab.stability("undriven")                # where its top floats
 
 What they need is imported when they are called.  Known failures are `levilab.LevilabError`s.
@@ -333,10 +333,10 @@ def scenes() -> dict[str, str]:
 
 def sweep(
     scene: Scene | str | PathLike[str],
-    sweep: Mapping[str, ArrayLike | str] | Sequence[str],
+    sweep: Mapping[str, ArrayLike | Sequence[str] | str] | Sequence[str] = (),
     *,
     observe: str | Sequence[str] = ("survived", "lifetime_s"),
-    duration: float = 30.0,
+    duration: float | str = 30.0,
     settings: Mapping[str, Any] | None = None,
     tolerance: float = 1e-6,
     out: str | PathLike[str] | None = None,
@@ -344,15 +344,16 @@ def sweep(
     adaptive: bool = False,
     seed: int = 0,
     cores: int | None = None,
+    **axes: ArrayLike | Sequence[str] | str,
 ) -> SimulatedMap:
     """Simulate a scene over two or three of its parameters.
 
     Args:
         scene: its name (`levilab.scenes()`), a TOML file, or a `levilab.simulator.Scene`.
-        sweep: key of the scene, whole or its last part, → values, as {"spin_hz": np.linspace(20, 40, 21)}; or the text
-            "20:40:21".
+        sweep: key of the scene, whole or its last part, → values that increase, as {"top.mass_kg": [0.0249, 0.025]}, or
+            with units, ["24.9 g", "25 g"]; or a text "20:40:21".
         observe: names of what is observed at each point; `levilab sweep --help` lists them.
-        duration: of each motion [s].
+        duration: of each motion [s], or with its unit: "2min".
         settings: changes of the scene by dotted keys.
         tolerance: wanted error at the end, of the place [m] and of the axis [rad].
         out: folder STORE.zarr, which xarray.open_zarr reads, too; None keeps the map in memory.
@@ -360,6 +361,7 @@ def sweep(
         adaptive: compute points along the boundary alone, and fill in the rest.
         seed: of the points that `adaptive` checks at random.
         cores: processes; None: one for each core, where that pays.
+        **axes: axes by the last parts of keys, as spin_hz=np.linspace(20, 40, 21).
 
     Returns:
         The map: `values`, `axes`, `to_dataframe()`, `to_xarray()`, `plot(column)`, `summary()`.
@@ -369,12 +371,12 @@ def sweep(
         SceneError: a key of the scene, or the scene.
         SimulationError: a motion cannot be followed.
     """
-    given: dict[str, Any] = {"observe": observe, "duration": duration, "tolerance": tolerance}
+    given: dict[str, Any] = {"observe": observe, "duration": duration, "resume": resume, "cores": cores}
     from levilab.notebook.sweep import sweep_scene
 
     with _border:
         return sweep_scene(
-            scene, sweep, settings or {}, out, resume=resume, cores=cores, adaptive=adaptive, seed=seed, **given
+            scene, sweep, axes, settings or {}, out, adaptive=adaptive, seed=seed, tolerance=tolerance, **given
         )
 
 

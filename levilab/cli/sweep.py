@@ -131,10 +131,17 @@ def _begin_store(name: str, given: dict[str, Any], *, resume: bool) -> Store:
 
     scene = chosen_scene(name, given["settings"])
 
+    from levilab.simulator.keys import parse_setting
+    from levilab.sweeps.axes import parse_axis
     from levilab.sweeps.request import SweepRequest, store_for
 
-    out = given.pop("out") or Path(f"{Path(name).stem}.zarr")
-    request = SweepRequest(scene, **{name: value for name, value in given.items() if value is not None})
+    given = {name: value for name, value in given.items() if value is not None}
+    given["sweep"] = tuple(map(parse_axis, given.get("sweep", ())))
+    given["settings"] = {parse_setting(one)[0] for one in given.get("settings", ())}
+    if "observe" in given:
+        given["observe"] = given["observe"].split(",")
+    out = given.pop("out", None) or Path(f"{Path(name).stem}.zarr")
+    request = SweepRequest(scene, **given)
     with interruptible("nothing was written"):
         return store_for(request, out, message, resume=resume)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 V = TypeVar("V")
+#: Functions of numpy that are taken of a quantity, as a number without a unit.
+_FUNCTIONS = frozenset({"sqrt", "exp", "log", "log10", "sin", "cos", "tan"})
 
 
 @dataclass(frozen=True, repr=False)
@@ -33,6 +36,8 @@ class Quantity(Estimate):
     (0.003262(23) 1/s, 0.00652(5) 1/s, 0 1/s)
     >>> print(f"{c:.1uS}", c * c)
     0.00326(2) 1/s (1.064+/-0.015)e-05
+    >>> print(np.sqrt(c), 2**c, round(c, 4))
+    0.05711+/-0.00020 1.002264+/-0.000016 0.0033
     >>> float(c), c.n, c.s
     (0.003262, 0.003262, 2.3e-05)
     """
@@ -118,6 +123,20 @@ class Quantity(Estimate):
 
     def __pow__(self, other: object) -> Any:
         return self.to_ufloat() ** _plain(other)
+
+    def __rpow__(self, other: object) -> Any:
+        return _plain(other) ** self.to_ufloat()
+
+    def __round__(self, digits: int | None = None) -> float:
+        return round(float(self), digits)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a method such as sqrt, which numpy.sqrt calls."""
+        if name not in _FUNCTIONS:
+            raise AttributeError(f"a Quantity has no {name!r}", name=name, obj=self)
+        from uncertainties import umath
+
+        return partial(getattr(umath, name), self.to_ufloat())
 
     __radd__, __rmul__ = __add__, __mul__
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,15 +12,16 @@ import numpy as np
 
 from levilab.errors import UsageError
 from levilab.notebook.labels import as_dataset, dataset_of, head_as_html
-from levilab.notebook.scene import chosen_scene, whole_key
+from levilab.notebook.scene import chosen_scene, in_seconds, whole_key
 from levilab.present.html import facts_as_html, fold
 from levilab.sweeps.adaptive import is_adaptive, run_adaptive
+from levilab.sweeps.axes import axis_of, parse_axis
 from levilab.sweeps.request import SweepRequest, store_for
 from levilab.sweeps.run import compile_for, run, workers_for
 from levilab.sweeps.summary import axes_lines, columns_table, headline, summarise
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
     from os import PathLike
 
     import pandas as pd
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
     from levilab.present.style import Figure
     from levilab.simulator.scene import Scene
+    from levilab.sweeps.plan import Axis
     from levilab.sweeps.store import Store
 
 #: Rows of a table that a notebook's cell shows.
@@ -110,9 +113,12 @@ class SimulatedMap:
 def sweep_scene(
     scene: Scene | str | PathLike[str],
     axes: Mapping[str, Any] | Sequence[str],
+    by_name: Mapping[str, Any],
     settings: Mapping[str, Any],
     out: str | PathLike[str] | None,
     *,
+    observe: str | Sequence[str],
+    duration: float | str,
     resume: bool,
     cores: int | None,
     **given: Any,
@@ -122,8 +128,11 @@ def sweep_scene(
     Args:
         scene: that is simulated.
         axes: key → values, or texts KEY=FROM:TO:N.
+        by_name: last part of a key → values.
         settings: changes of the scene by dotted keys.
         out: folder of the store; None: it stays in memory.
+        observe: names of what is observed, in a text with commas between them.
+        duration: of each motion [s], or with its unit.
         resume: go on with the store that is there.
         cores: processes; None: one for each core, where that pays.
         given: the other attributes of a `SweepRequest`.
@@ -133,11 +142,12 @@ def sweep_scene(
         SceneError, SimulationError: a scene of the sweep cannot be simulated.
     """
     chosen = chosen_scene(scene, settings, {})
-    spans = axes if not hasattr(axes, "items") else [_axis(whole_key(chosen, key), one) for key, one in axes.items()]
-    observe = given.pop("observe")
-    names = observe if isinstance(observe, str) else ",".join(observe)
-    keys = [f"{key}=0" for key in settings]
-    request = SweepRequest(chosen, sweep=spans, settings=keys, observe=names, **given)
+    named: Mapping[str, Any] = axes if isinstance(axes, Mapping) else {}
+    spans = [] if named else [parse_axis(text) for text in ([axes] if isinstance(axes, str) else axes)]
+    spans += [_axis(whole_key(chosen, key), values) for key, values in {**named, **by_name}.items()]
+    names = observe.split(",") if isinstance(observe, str) else observe
+    lasts = in_seconds("duration", duration)
+    request = SweepRequest(chosen, sweep=spans, settings=settings, observe=names, duration=lasts, **given)
     store = store_for(request, None if out is None else Path(out), resume=resume)
     carry_out = partial(run_adaptive if is_adaptive(store) else run, store)
     with store.lock():
@@ -146,21 +156,6 @@ def sweep_scene(
     return SimulatedMap(store)
 
 
-def _axis(key: str, values: Any) -> str:
-    """Return an axis as `levilab sweep` takes it, KEY=FROM:TO:N: of such a text, or of values.  Raises UsageError."""
-    if isinstance(values, str):
-        return f"{key}={values}"
-    expected = "numbers are expected that numpy.linspace or geomspace gives, or a text FROM:TO:N"
-    try:
-        numbers = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise UsageError("sweep", expected, value=f"{key}: {values}") from None
-    if numbers.ndim != 1 or len(numbers) < 2 or not np.isfinite(numbers).all():
-        raise UsageError("sweep", expected, value=f"{key}: {values}")
-    first, last = float(numbers[0]), float(numbers[-1])
-    spaced = {"": np.linspace(first, last, len(numbers))}
-    spaced |= {":log": np.geomspace(first, last, len(numbers))} if first > 0 and last > 0 else {}
-    for ending, even in spaced.items():
-        if np.allclose(numbers, even, rtol=1e-9, atol=0):  # rounding of one who spaced them in another way
-            return f"{key}={first!r}:{last!r}:{len(numbers)}{ending}"
-    raise UsageError("sweep", expected, value=f"{key}: {values}")
+def _axis(key: str, values: Any) -> Axis:
+    """Return an axis of values, or of a text FROM:TO:N.  Raises UsageError."""
+    return parse_axis(f"{key}={values}") if isinstance(values, str) else axis_of(key, values)

@@ -1,4 +1,4 @@
-"""The axes of a sweep from KEY=FROM:TO:N or from a table of points, checked in the scene before any simulation."""
+"""The axes of a sweep from KEY=FROM:TO:N, values or a table of points, checked in the scene before any simulation."""
 
 from __future__ import annotations
 
@@ -56,6 +56,42 @@ def parse_axis(text: str) -> Axis:
     _check_span(key, (first, last, count), scale, text)
     values = np.geomspace(first, last, count) if scale == "log" else np.linspace(first, last, count)
     return Axis(key, values, scale)
+
+
+def axis_of(key: str, values: Iterable[Any]) -> Axis:
+    """Return the axis of a key with any values that increase: numbers in its unit, or texts with their units.
+
+    Raises:
+        UsageError: they make no axis.
+
+    >>> axis = axis_of("top.mass_kg", ["24.9 g", 0.025, "25.3g"])
+    >>> axis.values.tolist(), axis.scale, axis_of("start.spin_hz", range(18, 41, 2)).scale
+    ([0.0249, 0.025, 0.0253], 'list', 'linear')
+    """
+    try:
+        unit = unit_of_key(key)
+        numbers = np.array([read_number(one, unit) if isinstance(one, str) else float(one) for one in values])
+    except (TypeError, ValueError) as error:
+        expected = f"numbers are expected, or texts with units; {error}"
+        raise UsageError("sweep", expected, value=f"{key} = {short_text(values)}") from None
+    given = f"{key} = {short_text(numbers)}"
+    if not (len(numbers) and np.isfinite(numbers).all()):
+        raise UsageError("sweep", "finite numbers are expected, two or more", value=given)
+    if len(numbers) == 1:
+        raise UsageError("sweep", f"one value is no axis: set it by `settings` = {key}={numbers[0]:g}", value=given)
+    if len(numbers) > MOST_VALUES:
+        raise UsageError("sweep", f"at most {MOST_VALUES:.0e} values of a key are possible", value=given)
+    if not (np.diff(numbers) > 0).all():
+        raise UsageError("sweep", "values that increase are expected: numpy.unique sorts them", value=given)
+    return Axis(key, numbers, _spacing(numbers))
+
+
+def _spacing(numbers: NDArray[Any]) -> Scale:
+    """Return the scale on which values are spaced evenly but for rounding, else "list"."""
+    first, last, count = numbers[0], numbers[-1], len(numbers)
+    spaced: dict[Scale, NDArray[Any]] = {"linear": np.linspace(first, last, count)}
+    spaced |= {"log": np.geomspace(first, last, count)} if first > 0 else {}
+    return next((scale for scale, even in spaced.items() if np.allclose(numbers, even, rtol=1e-9, atol=0)), "list")
 
 
 def _number(part: str, unit: str, text: str) -> float:

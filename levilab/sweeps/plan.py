@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-Scale = Literal["linear", "log", "table"]
+Scale = Literal["linear", "log", "list", "table"]
 #: The dimension of a plan whose points are the rows of a table.
 ROWS = "point"
 #: A chunk takes about this long on one core [s] ...
@@ -42,7 +42,8 @@ class Axis:
     Attributes:
         key: dotted key of the scene, such as ``start.spin_hz``.
         values: shape (n,), float64, or text where a table has words.
-        scale: how they are spaced; all axes of a table have the scale "table" and one length, a point a row.
+        scale: how they are spaced, "list" for any other way; all axes of a table have the scale "table" and one length,
+            a point a row.
     """
 
     key: str
@@ -52,7 +53,7 @@ class Axis:
     def as_table(self) -> dict[str, Any]:
         """Return what distinguishes it from another axis, in a size that does not grow with the values."""
         table = {"key": self.key, "unit": unit_of(self.key), "scale": self.scale, "points": len(self.values)}
-        if self.scale == "table":
+        if self.scale in {"list", "table"}:
             return table | {"sha256": _digest(self.values)}
         return table | {"from": float(self.values[0]), "to": float(self.values[-1])}
 

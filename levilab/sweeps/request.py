@@ -7,20 +7,20 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from levilab.errors import UsageError
-from levilab.simulator.keys import parse_setting
 from levilab.simulator.single import LONGEST_S
 from levilab.sweeps.adaptive import begin_adaptive, is_adaptive
-from levilab.sweeps.axes import check_axes, parse_axis, read_points
+from levilab.sweeps.axes import check_axes, read_points
 from levilab.sweeps.observables import check_observables, columns_of, cut
 from levilab.sweeps.plan import Plan
 from levilab.sweeps.run import with_step
 from levilab.sweeps.store import Store, differences
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
     from pathlib import Path
 
     from levilab.simulator.scene import Scene
+    from levilab.sweeps.plan import Axis
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,10 @@ class SweepRequest:
 
     Attributes:
         scene: with its settings.
-        sweep: its axes, KEY=FROM:TO:N each.
+        sweep: its axes, of `axes.parse_axis` or `axes.axis_of`.
         points: a table of points instead.
-        settings: KEY=VALUE each, which the scene has already.
-        observe: names of what is observed, with commas between them.
+        settings: keys that are set in the scene.
+        observe: names of what is observed.
         duration: of each motion [s].
         tolerance: wanted error of place [m] and axis [rad].
         seed: of the random choices.
@@ -40,10 +40,10 @@ class SweepRequest:
     """
 
     scene: Scene
-    sweep: Sequence[str] = ()
+    sweep: Sequence[Axis] = ()
     points: Path | None = None
-    settings: Sequence[str] = ()
-    observe: str = "survived,lifetime_s"
+    settings: Collection[str] = ()
+    observe: Sequence[str] = ("survived", "lifetime_s")
     duration: float = 30.0
     tolerance: float = 1e-6
     seed: int = 0
@@ -59,12 +59,12 @@ def plan_of(request: SweepRequest) -> Plan:
             raise UsageError(name, f"a number above 0 and up to {LONGEST_S:.0e} is expected", value=value)
     if request.seed and not request.adaptive:
         raise UsageError("seed", "goes with `adaptive` alone: nothing else of a sweep is left to chance")
-    names = tuple(dict.fromkeys(filter(None, (name.strip() for name in request.observe.split(",")))))
+    names = tuple(dict.fromkeys(filter(None, (name.strip() for name in request.observe))))
     columns_of(names)
     if not names:
-        raise UsageError("observe", "names are expected, such as survived,lifetime_s", value=request.observe)
-    axes = read_points(request.points) if request.points else tuple(map(parse_axis, request.sweep))
-    check_axes(request.scene, axes, {parse_setting(one)[0] for one in request.settings})
+        raise UsageError("observe", "names are expected, such as survived,lifetime_s", value=",".join(request.observe))
+    axes = read_points(request.points) if request.points else tuple(request.sweep)
+    check_axes(request.scene, axes, request.settings)
     plan = Plan.of(request.scene, axes, names, request.duration, tolerance=request.tolerance, seed=request.seed)
     check_observables(plan)
     return cut(plan)

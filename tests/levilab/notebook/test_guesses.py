@@ -85,6 +85,12 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "levilab.scenes()": lambda scenes: "drive" in scenes["driven"],
     "levilab.stability('undriven')": lambda found: 21 < found.spins[0][0] < 22 and found.floats,
     "levilab.sweep('undriven', {'spin_hz': [18, 30]}, duration=0.5)": lambda m: m["survived"].tolist() == [False, True],
+    "levilab.sweep('undriven', mass_kg=['24.9 g', 0.025, '25.3 g'], spin_hz=[19, 30], duration='0.5 s').axes": (
+        lambda axes: axes["top.mass_kg"].tolist() == [0.0249, 0.025, 0.0253]
+    ),
+    "np.sqrt(result['c32']) ** 2 / result['c32'] - 1": lambda number: abs(number.n) + number.s < 1e-12,
+    "2 ** result['c32']": lambda number: 1 < number.n < 1.001 and number.s > 0,
+    "round(result['c32'], 5)": lambda number: number == 0.00024,
     "levilab.report(result, new / 'r.html', crosscheck=False)": lambda path: path.stat().st_size > 50_000,
 }
 #: Wrong guesses → what the error says instead.
@@ -93,7 +99,11 @@ REFUSED = {
     "levilab.acquire('spinn', mock=True)": "spin, trace, field",
     "levilab.load(folder)": "levilab.runs lists",
     "levilab.simulate('undriven', spin=20)": "did you mean start.spin_hz?",
-    "levilab.sweep('undriven', {'spin_hz': [18, 19, 30]})": "numpy.linspace",
+    "levilab.sweep('undriven', {'spin_hz': [18, 30, 19]})": "numpy.unique sorts them",
+    "levilab.sweep('undriven', spin_hz=['18 Hz', '19 kg'])": "a number in Hz, kHz",
+    "levilab.sweep('undriven', spin_hz=30)": "texts with units",
+    "levilab.sweep('undriven', mass=[0.0249, 0.0253])": "did you mean top.mass_kg?",
+    "levilab.sweep('undriven', mass_kg=[24.9, 25.0, 25.3])": "Were grams meant?",
     "levilab.report(5)": "runs, results or paths are expected",
     "levilab.runs(folder / 'none')": "there is no such folder",
     "levilab.analyze(time=t)": "`time` and `frequency` together",
@@ -114,6 +124,7 @@ def names() -> dict[str, Any]:
     run = levilab.load(SAMPLE_DATA / "spin-down-1")
     return {
         "levilab": levilab,
+        "np": np,
         "pickle": pickle,
         "run": run,
         "result": levilab.analyze(run),
@@ -215,7 +226,7 @@ def test_rooms_are_found_where_a_function_has_their_name() -> None:
 
 
 def test_a_sweep_is_a_table_a_dataset_and_a_figure(tmp_path: Path) -> None:
-    axes = {"spin_hz": np.linspace(18, 26, 3), "top.mass_kg": "0.0245:0.0250:2"}
+    axes = {"spin_hz": [18.0, 25.0, 26.0], "top.mass_kg": "0.0245:0.0250:2"}
     swept = levilab.sweep("undriven", axes, observe="survived", duration=0.3, out=tmp_path / "map.zarr")
     assert swept.to_dataframe().shape == (6, 3)
     data = swept.to_xarray()
@@ -227,3 +238,6 @@ def test_a_sweep_is_a_table_a_dataset_and_a_figure(tmp_path: Path) -> None:
         swept.plot("lifetime_s")
     again = levilab.sweep("undriven", axes, observe="survived", duration=0.3, out=tmp_path / "map.zarr", resume=True)
     assert np.array_equal(again["survived"], swept["survived"])
+    other = axes | {"spin_hz": [18.0, 24.0, 26.0]}
+    with pytest.raises(levilab.LevilabError, match=r"of another sweep: the axis start\.spin_hz is Hz, list, 3"):
+        levilab.sweep("undriven", other, observe="survived", duration=0.3, out=tmp_path / "map.zarr", resume=True)

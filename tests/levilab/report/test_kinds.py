@@ -18,6 +18,7 @@ from levilab.runs.run import Run
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset, with_settings
 from levilab.stability.table import as_document
+from levilab.sweeps.axes import axis_of
 from levilab.sweeps.request import SweepRequest, store_for
 from levilab.sweeps.run import compile_for, run
 from levilab.sweeps.store import SCHEMA
@@ -42,7 +43,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scene = with_settings(preset("undriven"), ["top.mass_kg=0.0252", "start.spin_hz=31"])
     with without_drawing():
         run_simulation(SimulationRequest(scene, 1.2, 1e-6, 100.0, place / "runs"), silent)
-    request = SweepRequest(scene, ("start.spin_hz=18:40:3", "start.position_m.2=0.070:0.072:2"), duration=0.3)
+    axes = axis_of("start.spin_hz", [18, 29, 40]), axis_of("start.position_m.2", ["70 mm", "72 mm"])
+    request = SweepRequest(scene, axes, duration=0.3)
     store = store_for(request, place / "map.zarr")
     compile_for(store.plan)
     run(store, this_process())
