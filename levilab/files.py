@@ -10,10 +10,10 @@ import math
 import os
 import re
 import tempfile
-import time
 import tomllib
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from levilab.computer import computer
 from levilab.errors import LevilabError
 
 if TYPE_CHECKING:
@@ -206,19 +206,19 @@ def replace_atomically(path: Path, content: str | bytes) -> None:
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """Yield a file that replaces another one as a whole when the context ends without an error.  Raises OSError."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part = path.with_name(f".{path.name}.{computer().process}.part")
     _remove_parts_of_the_dead(path)
     try:
-        part.unlink(missing_ok=True)  # of an earlier process of this number
-        with part.open("xb") as file:  # never through a link that stands there
+        computer().remove(part)  # of an earlier process of this number
+        with computer().open(part, "xb") as file:  # never through a link that stands there
             yield file
             file.flush()
-            os.fsync(file.fileno())
-        move(part, path)
-        sync_folder(path.parent)
+            computer().sync(file)
+        computer().move(part, path)
+        computer().sync_folder(path.parent)
     except BaseException:
         with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
+            computer().remove(part)
         raise
 
 
@@ -226,22 +226,9 @@ def _remove_parts_of_the_dead(path: Path) -> None:
     """Remove the parts of a file that killed processes have left."""
     for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         number = part.name.removesuffix(".part").rpartition(".")[2]
-        if number.isdecimal() and not _is_alive(int(number)):
+        if number.isdecimal() and not computer().is_alive(int(number)):
             with contextlib.suppress(OSError):  # Windows: its process has it open
-                part.unlink()
-
-
-def _is_alive(process: int) -> bool:
-    """Return whether a process may be alive; False on Windows, where asking by a signal would end it."""
-    if os.name != "posix":
-        return False
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:
-        pass
-    return True
+                computer().remove(part)
 
 
 @contextlib.contextmanager
@@ -256,9 +243,9 @@ def locked(path: Path, busy: str) -> Iterator[None]:
         CannotWrite: another process holds it.
         OSError: the lock cannot be made.
     """
-    from filelock import FileLock, Timeout
+    from filelock import Timeout
 
-    lock = FileLock(path.with_name(f".{path.name}.lock"))
+    lock = computer().lock(path.with_name(f".{path.name}.lock"))
     try:
         lock.acquire(blocking=False)
     except Timeout:
@@ -269,27 +256,3 @@ def locked(path: Path, busy: str) -> Iterator[None]:
         with contextlib.suppress(OSError):  # while it is held, so that no file is removed that another one holds
             os.unlink(lock.lock_file)  # noqa: PTH108 - the path is text
         lock.release()
-
-
-def sync_folder(folder: Path) -> None:
-    """Write a folder's new names to the disk; Windows does so by itself."""
-    if os.name != "posix":
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
-def move(part: Path, path: Path) -> None:
-    """Give a file or folder another name: os.replace, which Windows refuses while another program reads either."""
-    for attempt in range(10):
-        try:
-            part.replace(path)
-        except PermissionError:
-            if os.name != "nt" or attempt == 9:
-                raise
-            time.sleep(0.02)
-        else:
-            return

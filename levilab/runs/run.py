@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from levilab.computer import computer
 from levilab.errors import DataError
 from levilab.files import parse_json
 from levilab.formats.table import read_run_readings
@@ -90,14 +91,12 @@ def utc_now() -> str:
     >>> utc_now()[-1]
     'Z'
     """
-    return datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+    return computer().utc().strftime("%Y-%m-%dT%H:%M:%S.%fZ")
 
 
 def lock_of(folder: Path) -> Any:
     """Return the lock of the process that writes.  The operating system drops it when that ends, however it ends."""
-    from filelock import FileLock
-
-    return FileLock(folder / LOCK)
+    return computer().lock(folder / LOCK)
 
 
 @dataclass(frozen=True)
@@ -196,7 +195,7 @@ class Run:
         except ValueError as error:
             raise DataError(f"{self.folder / RECORD}: time_zero_utc: {error}; correct it or start again") from error
         zero = zero if zero.tzinfo else zero.replace(tzinfo=UTC)
-        elapsed = (datetime.now(UTC) - zero).total_seconds()
+        elapsed = (computer().utc() - zero).total_seconds()
         last = float(self.readings().column("time_s")[-1]) if self.count() else 0.0
         if elapsed <= last:
             raise DataError(

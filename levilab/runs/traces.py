@@ -7,9 +7,9 @@ killed leaves them behind, and with them what had come.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
-import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -17,8 +17,9 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from instruments.drivers.oscilloscope import Trace
+from levilab.computer import computer
 from levilab.errors import DataError
-from levilab.files import parse_json, replace_atomically, sync_folder
+from levilab.files import parse_json, replace_atomically
 from levilab.settings import Settings, in_one_line
 
 if TYPE_CHECKING:
@@ -107,17 +108,17 @@ def head_of(trace: Trace, number: int, time_s: float, channel: str, announced: i
 def begin_arriving(folder: Path, head: Head, codes: Codes) -> None:
     """Say how to read a record whose codes are about to come.  Raises OSError."""
     _make_folder(folder)
-    (folder / ARRIVING_CODES).unlink(missing_ok=True)
+    computer().remove(folder / ARRIVING_CODES)
     about = Arriving.model_validate(head.model_dump() | {"dtype": str(codes.dtype)})
     replace_atomically(folder / ARRIVING, about.model_dump_json() + "\n")
 
 
 def append_arriving(folder: Path, codes: Codes) -> None:
     """Append the next codes of the record that is on its way; they are on the disk afterwards.  Raises OSError."""
-    with (folder / ARRIVING_CODES).open("ab") as file:
+    with computer().open(folder / ARRIVING_CODES, "ab") as file:
         file.write(codes.tobytes())
         file.flush()
-        os.fsync(file.fileno())
+        computer().sync(file)
 
 
 def is_arriving(folder: Path) -> bool:
@@ -128,7 +129,7 @@ def is_arriving(folder: Path) -> bool:
 def forget_arriving(folder: Path) -> None:
     """Remove the part of a record on its way, which is kept elsewhere, or of no use.  Raises OSError."""
     for name in (ARRIVING, ARRIVING_CODES):
-        (folder / name).unlink(missing_ok=True)
+        computer().remove(folder / name)
 
 
 def partial_record(folder: Path) -> StoredTrace | None:
@@ -179,8 +180,9 @@ def _path(number: int) -> str:
 
 def _make_folder(folder: Path) -> None:
     if not (folder / FOLDER).is_dir():
-        (folder / FOLDER).mkdir(exist_ok=True)
-        sync_folder(folder)
+        with contextlib.suppress(FileExistsError):
+            computer().make_folder(folder / FOLDER)
+        computer().sync_folder(folder)
 
 
 def has_codes(folder: Path, line: str) -> bool:

@@ -14,14 +14,13 @@ import json
 import math
 import os
 import re
-import secrets
 import shutil
-from datetime import UTC, datetime
 from itertools import count
 from typing import TYPE_CHECKING, Any, Self
 
+from levilab.computer import computer
 from levilab.errors import DataError
-from levilab.files import CannotWrite, replace_atomically, sync_folder
+from levilab.files import CannotWrite, replace_atomically
 from levilab.runs import traces
 from levilab.runs.events import RunEvent
 from levilab.runs.find import RECORD, must_take_runs
@@ -91,7 +90,7 @@ class RunWriter:
                 writer._lock.acquire(blocking=False)
                 writer._append(table, writer._header())
                 writer._write_record()
-                sync_folder(out)
+                computer().sync_folder(out)
             except BaseException:
                 writer.discard()
                 raise
@@ -154,7 +153,7 @@ class RunWriter:
         gone = self._created and not self._holds_readings()
         self._close()
         if gone:
-            shutil.rmtree(self.folder, ignore_errors=True)
+            computer().remove_folder(self.folder)
         return gone
 
     def _holds_readings(self) -> bool:
@@ -378,7 +377,7 @@ class RunWriter:
             self._files[name].sync()
         self.record = self.record.model_copy(update={"rescued_from": str(old)})
         self._write_record()
-        sync_folder(self.folder.parent)
+        computer().sync_folder(self.folder.parent)
         self._leave_readable(old, kept)
         readings = self._lines_kept(READINGS) - 1
         text = (
@@ -421,7 +420,7 @@ class _GrowingFile:
     def __init__(self, path: Path) -> None:
         _refuse_special(path)
         self._path = path
-        self._file = path.open("ab")
+        self._file = computer().open(path, "ab")
         self._opened = os.fstat(self._file.fileno())
         self._size = self._opened.st_size
         # some file systems give their files new numbers at each look
@@ -433,7 +432,7 @@ class _GrowingFile:
         self._size += len(data)
 
     def sync(self) -> None:
-        os.fsync(self._file.fileno())
+        computer().sync(self._file)
 
     def close(self) -> None:
         self._file.close()
@@ -462,9 +461,10 @@ def _refuse_special(path: Path) -> None:
 def _make_folder(folder: Path) -> None:
     """Make a folder and those above it, all of them on the disk."""
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
-    folder.mkdir(parents=True, exist_ok=True)
-    for path in missing:
-        sync_folder(path.parent)
+    for path in reversed(missing):
+        with contextlib.suppress(FileExistsError):
+            computer().make_folder(path)
+        computer().sync_folder(path.parent)
 
 
 def _folder_beside(old: Path) -> Path:
@@ -474,7 +474,7 @@ def _folder_beside(old: Path) -> Path:
     for number in count(1):
         folder = old.with_name(f"{name}-rescued" + (f"-{number}" if number > 1 else ""))
         with contextlib.suppress(FileExistsError):
-            folder.mkdir()
+            computer().make_folder(folder)
             return folder
     raise AssertionError
 
@@ -495,7 +495,7 @@ def _cut_foreign_tail(path: Path, ours: bytes) -> None:
     differ = (k for k, pair in enumerate(zip(data, ours, strict=False)) if pair[0] != pair[1])
     same = next(differ, min(len(data), len(ours)))
     if ours.endswith(data[same:]):  # else another program wrote it
-        with path.open("rb+") as file:
+        with computer().open(path, "rb+") as file:
             file.truncate(data.rfind(b"\n", 0, same) + 1)
 
 
@@ -514,11 +514,11 @@ def _copy_others(old: Path, new: Path, ours: set[str]) -> None:
 
 def _new_folder(out: Path, experiment: str) -> Path:
     """Create a new folder ``<UTC>-<experiment>-<four hex digits>``."""
-    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
+    stamp = computer().utc().strftime("%Y%m%dT%H%M%SZ")
     while True:
-        folder = out / f"{stamp}-{experiment}-{secrets.token_hex(2)}"
+        folder = out / f"{stamp}-{experiment}-{computer().token()}"
         with contextlib.suppress(FileExistsError):
-            folder.mkdir()
+            computer().make_folder(folder)
             return folder
 
 
@@ -529,7 +529,7 @@ def _cell(value: float | None) -> str:
 def _cut_torn_line(path: Path) -> None:
     if not path.exists():
         return
-    with path.open("rb+") as file:
+    with computer().open(path, "rb+") as file:
         data = file.read()
         file.truncate(data.rfind(b"\n") + 1)
 

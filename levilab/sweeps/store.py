@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import shutil
 import sys
 from dataclasses import dataclass, field
@@ -17,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from levilab.computer import computer
 from levilab.errors import DataError
-from levilab.files import CannotWrite, locked, move, sync_folder, writing
+from levilab.files import CannotWrite, locked, writing
 from levilab.runs.run import utc_now
 from levilab.simulator.keys import short_text
 from levilab.software import software_versions
@@ -103,19 +103,19 @@ class Store:
         taken = f"{path} is there already: give another place with `out`, or go on with it by `resume`"
         if path.exists():
             raise CannotWrite(taken)
-        part = path.with_name(f".{path.name}.{os.getpid()}.part")
+        part = path.with_name(f".{path.name}.{computer().process}.part")
         with writing(f"{path} cannot be made"):
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 cls._in(str(part), part, plan, begin)
-                move(part, path)
+                computer().move(part, path)
             except OSError as error:
                 if path.exists():  # another process was quicker
                     raise CannotWrite(taken) from error
                 raise
             finally:
                 shutil.rmtree(part, ignore_errors=True)
-            sync_folder(path.parent)
+            computer().sync_folder(path.parent)
         return cls.open(path, writable=True)
 
     @classmethod
@@ -250,9 +250,9 @@ class Store:
         for column in columns_of(self.plan.observables):
             file = self.path.joinpath(column.name, "c", *place)
             if file.exists():  # a chunk without any value has none
-                with file.open("r+b") as open_file:
-                    os.fsync(open_file.fileno())
-                sync_folder(file.parent)
+                with computer().open(file, "r+b") as open_file:
+                    computer().sync(open_file)
+                computer().sync_folder(file.parent)
 
     def known_points(self, chunk: Chunk) -> NDArray[np.bool_]:
         """Return which points of a chunk are computed, or filled in."""

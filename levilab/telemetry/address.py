@@ -9,7 +9,8 @@ import secrets
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from levilab.files import move, parse_json
+from levilab.computer import computer
+from levilab.files import parse_json
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -51,7 +52,7 @@ def write_address(folder: Path, address: Address) -> None:
         descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
             json.dump({"port": address.port, "token": address.token.hex()}, file)
-        move(part, path)
+        computer().move(part, path)
     except BaseException:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)

@@ -16,6 +16,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from levilab.computer import Computer
 from levilab.errors import DataError
 from levilab.files import CannotWrite, replace_atomically
 from levilab.runs.find import find_run, find_runs
@@ -307,7 +308,7 @@ def test_a_list_of_many_runs_looks_like_one_of_a_few(capsys: pytest.CaptureFixtu
 
 def test_every_new_folder_above_a_run_is_on_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     synchronised: list[Path] = []
-    monkeypatch.setattr("levilab.runs.writer.sync_folder", synchronised.append)
+    monkeypatch.setattr(Computer, "sync_folder", lambda _, folder: synchronised.append(folder))
     with RunWriter.create(tmp_path / "a" / "b" / "c", record()):
         pass
     assert {tmp_path, tmp_path / "a", tmp_path / "a" / "b", tmp_path / "a" / "b" / "c"} <= set(synchronised)
