@@ -115,10 +115,14 @@ def begin_arriving(folder: Path, head: Head, codes: Codes) -> None:
 
 def append_arriving(folder: Path, codes: Codes) -> None:
     """Append the next codes of the record that is on its way; they are on the disk afterwards.  Raises OSError."""
-    with computer().open(folder / ARRIVING_CODES, "ab") as file:
+    path = folder / ARRIVING_CODES
+    is_new = not path.exists()
+    with computer().open(path, "ab") as file:
         file.write(codes.tobytes())
         file.flush()
         computer().sync(file)
+    if is_new:
+        computer().sync_folder(path.parent)
 
 
 def is_arriving(folder: Path) -> bool:

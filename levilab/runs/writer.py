@@ -363,6 +363,12 @@ class RunWriter:
         return True
 
     def _rescue(self) -> None:
+        """Write the run again, beside.  Raises CannotWrite: what was removed is lost, and the message says so."""
+        readings = max(self._lines_kept(READINGS) - 1, 0)
+        with _explain_errors(f"write {readings} readings again that were removed", self.folder, safe=""):
+            self._write_again()
+
+    def _write_again(self) -> None:
         old = self.folder
         self._close()
         self.folder = _folder_beside(old)
@@ -419,7 +425,7 @@ class _GrowingFile:
 
     def __init__(self, path: Path) -> None:
         _refuse_special(path)
-        self._path = path
+        self._path, self._is_new = path, not path.exists()
         self._file = computer().open(path, "ab")
         self._opened = os.fstat(self._file.fileno())
         self._size = self._opened.st_size
@@ -433,6 +439,9 @@ class _GrowingFile:
 
     def sync(self) -> None:
         computer().sync(self._file)
+        if self._is_new:  # else a loss of power takes the name, and the file with it
+            computer().sync_folder(self._path.parent)
+            self._is_new = False
 
     def close(self) -> None:
         self._file.close()

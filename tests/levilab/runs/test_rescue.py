@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
@@ -10,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from levilab.computer import Computer
+from levilab.files import CannotWrite
 from levilab.runs.run import Run, RunRecord
 from levilab.runs.writer import RunWriter
 from support.acquisitions import QUICKLY
@@ -172,6 +175,24 @@ def test_a_resumed_run_is_rescued_with_its_earlier_readings(tmp_path: Path) -> N
 
 
 @posix_only
+@posix_only
+def test_readings_that_cannot_be_written_again_are_not_said_to_be_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with create(tmp_path, []) as writer:
+        for k in range(3):
+            writer.reading(row(k))
+        shutil.rmtree(writer.folder)
+        monkeypatch.setattr(Computer, "make_folder", full)
+        with pytest.raises(CannotWrite, match="could not write 4 readings again that were removed") as refused:
+            writer.reading(row(3))
+    assert "kept" not in str(refused.value)
+
+
+def full(*_: object) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
 def test_what_else_lies_in_the_folder_is_rescued_with_it(tmp_path: Path) -> None:
     with create(tmp_path, []) as writer:
         writer.wire("GPIB0::1::INSTR", ">", b"*IDN?\n")

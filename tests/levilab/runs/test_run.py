@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from levilab.computer import Computer
 from levilab.errors import DataError
 from levilab.files import CannotWrite, replace_atomically
+from levilab.runs.events import RunEvent
 from levilab.runs.find import find_run, find_runs
 from levilab.runs.listing import Listed, list_runs, print_runs
 from levilab.runs.run import Run, RunRecord
@@ -312,6 +313,18 @@ def test_every_new_folder_above_a_run_is_on_the_disk(tmp_path: Path, monkeypatch
     with RunWriter.create(tmp_path / "a" / "b" / "c", record()):
         pass
     assert {tmp_path, tmp_path / "a", tmp_path / "a" / "b", tmp_path / "a" / "b" / "c"} <= set(synchronised)
+
+
+def test_a_file_that_begins_under_way_keeps_its_name_when_power_is_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its content alone is not enough: POSIX promises the name of a new file only when its folder is synchronised."""
+    synchronised: list[Path] = []
+    with RunWriter.create(tmp_path, record()) as writer:
+        monkeypatch.setattr(Computer, "sync_folder", lambda _, folder: synchronised.append(folder))
+        writer.event(None, RunEvent.DRIVE_ON, "drive on")
+        writer.event(None, RunEvent.DRIVE_OFF, "drive off")
+    assert synchronised == [writer.folder]
 
 
 @pytest.mark.parametrize(
