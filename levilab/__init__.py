@@ -9,6 +9,7 @@ For scripts and notebooks, each with `help`:
     motion = levilab.simulate("undriven", 5)     # a scene → a trajectory; levilab.scenes() lists them
     levilab.sweep("undriven", spin_hz=…)         # a scene over its parameters → a map
     levilab.stability("undriven")                # where its top floats
+    levilab.export(run, "run.nc")                # readings, traces and result for other programs
 
 What they need is imported when they are called.  Known failures are `levilab.LevilabError`s.
 """
@@ -41,7 +42,8 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
 
 __all__ = [
-    "LevilabError", "acquire", "analyze", "load", "report", "runs", "scenes", "simulate", "stability", "sweep",
+    "LevilabError", "acquire", "analyze", "export", "load", "open_sweep", "report", "runs", "scenes", "simulate",
+    "stability", "sweep",
 ]  # fmt: skip
 
 
@@ -380,6 +382,24 @@ def sweep(
         )
 
 
+def open_sweep(path: str | PathLike[str]) -> SimulatedMap:
+    """Return the map in a store that `sweep` or `levilab sweep` has written.
+
+    Args:
+        path: of its folder, NAME.zarr.
+
+    Returns:
+        The map: `values`, `axes`, `to_dataframe()`, `to_xarray()`, `plot(column)`, `summary()`.
+
+    Raises:
+        DataError: there is no store, or it is damaged.
+    """
+    from levilab.notebook.sweep import stored_map
+
+    with _border:
+        return stored_map(path)
+
+
 def stability(
     scene: Scene | str | PathLike[str], *, settings: Mapping[str, Any] | None = None, **changes: Any
 ) -> FloatingTop:
@@ -446,6 +466,37 @@ def report(
 
     with _border:
         return report_on(data, output, tables=tables, crosscheck=crosscheck)
+
+
+def export(
+    data: Run | AnalysisResult | SimulatedMap | str | PathLike[str],
+    output: str | PathLike[str],
+    *,
+    creator: str = "",
+    licence: str = "",
+    force: bool = False,
+) -> list[Path]:
+    """Write a run, a data file, a result or a map for other programs.
+
+    Args:
+        data: one of them; readings, traces in volts and seconds, and the result with its uncertainties are written.
+        output: the file; its ending chooses the format: .nc (netCDF), .h5 (HDF5), .csv, .zip (a data package).
+        creator: who measured; by default the run's group.
+        licence: under which others may use the data, as "CC-BY-4.0".
+        force: replace files that are there.
+
+    Returns:
+        The files; of .csv one for each table.
+
+    Raises:
+        UsageError: an argument is wrong.
+        DataError: there is nothing to export, or several runs.
+        CannotWrite: a file is there already, or cannot be written.
+    """
+    from levilab.notebook.export import export_data
+
+    with _border:
+        return export_data(data, output, creator=creator, licence=licence, force=force)
 
 
 sys.modules[__name__].__class__ = _FrontDoor

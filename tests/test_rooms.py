@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 #: What takes so long to load that it is imported where it is used: at least 10 ms, or not everywhere installed.
 HEAVY = {
-    "PIL", "RigolWFM", "av", "dask", "distributed", "filelock", "grp", "heyoka", "imageio_ffmpeg", "jinja2", "llvmlite",
-    "lmfit", "matplotlib", "nicegui", "numba", "pandas", "playwright", "pyarrow", "pyvisa", "rich", "scipy", "serial",
-    "sounddevice", "starlette", "typst", "uncertainties", "uvicorn", "xarray", "xlsxwriter",
+    "PIL", "RigolWFM", "av", "dask", "distributed", "filelock", "grp", "h5py", "heyoka", "imageio_ffmpeg", "jinja2",
+    "llvmlite", "lmfit", "matplotlib", "nicegui", "numba", "pandas", "playwright", "pyarrow", "pyvisa", "rich", "scipy",
+    "serial", "sounddevice", "starlette", "typst", "uncertainties", "uvicorn", "xarray", "xlsxwriter",
     "zarr",
 }  # fmt: skip
 

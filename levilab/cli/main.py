@@ -115,6 +115,15 @@ COMMANDS = {
         than the given, is analyzed for the page.""",
         "levilab report sample_data/ -o report.html, or -o report.pdf --tables",
     ),
+    "export": Row(
+        "export.export_data",
+        r"""Write a run, file or sweep for other programs: readings, traces in volts and seconds, results with u.
+
+        The ending of the name chooses: .nc is netCDF with the CF conventions, .h5 the same as HDF5 (needs
+        levilab\[hdf5]), .csv a table and one more for each trace and the result, .zip a data package.  The result is
+        the one that levilab analyze wrote; what has none is analyzed.""",
+        "levilab export sample_data/spin-down-1 -o spin-down.nc, or -o spin-down.zip --licence CC-BY-4.0",
+    ),
     "class": Row(
         "groups.of_class",
         """Put the groups of a class beside each other: values with u, residuals, warnings, distance from the class.

@@ -8,29 +8,31 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from levilab.errors import UsageError
-from levilab.notebook.labels import as_dataset, dataset_of, head_as_html
+from levilab.notebook.labels import dataset_of, head_as_html
 from levilab.notebook.scene import chosen_scene, in_seconds, whole_key
 from levilab.present.html import facts_as_html, fold
+from levilab.report.export.contents import contents_of
+from levilab.report.export.variables import attributes_of
 from levilab.sweeps.adaptive import is_adaptive, run_adaptive
 from levilab.sweeps.axes import axis_of, parse_axis
+from levilab.sweeps.plan import ROWS
 from levilab.sweeps.request import SweepRequest, store_for
 from levilab.sweeps.run import compile_for, run, workers_for
+from levilab.sweeps.store import Store
 from levilab.sweeps.summary import axes_lines, columns_table, headline, summarise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from os import PathLike
 
+    import numpy as np
     import pandas as pd
     import xarray
 
     from levilab.present.style import Figure
     from levilab.simulator.scene import Scene
     from levilab.sweeps.plan import Axis
-    from levilab.sweeps.store import Store
 
 #: Rows of a table that a notebook's cell shows.
 _MOST_ROWS = 10
@@ -85,17 +87,20 @@ class SimulatedMap:
         """Return a row for each point: its place on the axes, and what was observed."""
         import pandas as pd
 
-        if self.store.plan.is_table:
-            return pd.DataFrame({**self.axes, **self.values})
-        grids = np.meshgrid(*self.axes.values(), indexing="ij")
-        places = dict(zip(self.axes, grids, strict=True))
-        return pd.DataFrame({name: values.ravel() for name, values in {**places, **self.values}.items()})
+        return pd.DataFrame(self.store.load().columns())
 
     def to_xarray(self) -> xarray.Dataset:
         """Return a Dataset with the axes as coordinates, and units; needs xarray.  Raises MissingXarray."""
-        if self.store.plan.is_table:
-            return as_dataset(self.to_dataframe(), "point")
-        return dataset_of(self.values, [*self.axes]).assign_coords(self.axes)
+        contents = contents_of(self.store)
+        rows = contents.tables[0].columns
+        keys = [axis.name for axis in contents.axes] or [ROWS]
+        data = dataset_of({one.name: one.values for one in contents.arrays or rows}, keys)
+        data = data.assign_coords({axis.name: axis.values for axis in contents.axes})
+        for axis in contents.axes:
+            data[axis.name].encoding["_FillValue"] = None  # CF: coordinates are never missing
+        for one in (*contents.axes, *contents.arrays) or rows:
+            data[one.name].attrs = {"units": one.unit, "long_name": one.meaning}
+        return data.assign_attrs(attributes_of(contents))
 
     def plot(self, column: str | None = None) -> Figure:
         """Draw a map of an observable, by default of the first one, over two axes or more.  Raises UsageError."""
@@ -108,6 +113,11 @@ class SimulatedMap:
         if not has_figure(self.store.plan):
             raise UsageError("plot", "a table of points is no map: draw columns of to_dataframe()")
         return for_notebooks(map_figure(self.store.load(), column or names[0]))
+
+
+def stored_map(path: str | PathLike[str]) -> SimulatedMap:
+    """Return the map in a store.  Raises DataError."""
+    return SimulatedMap(Store.open(Path(path)))
 
 
 def sweep_scene(

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import hashlib
 import json
 import math
 import os
@@ -24,6 +23,7 @@ from levilab.files import CannotWrite, replace_atomically
 from levilab.runs import traces
 from levilab.runs.events import RunEvent
 from levilab.runs.find import RECORD, must_take_runs
+from levilab.runs.package import field, package, resource
 from levilab.runs.run import EVENTS, LOCK, PACKAGE, READINGS, STATES, WIRE, RunRecord, lock_of, read_record, utc_now
 
 if TYPE_CHECKING:
@@ -557,31 +557,16 @@ def _explain_errors(what: str, where: Path, safe: str = "all earlier readings ar
 
 
 def _datapackage(folder: Path, record: RunRecord) -> str:
-    """Return the Frictionless description of the folder: fields with units, and the hash of each file."""
-    fields = [
-        {
-            "name": channel["name"],
-            "type": "number",
-            "unit": channel.get("unit", ""),
-            "description": channel.get("source", ""),
-        }
-        for channel in record.channels
-    ]
-    resources: list[dict[str, Any]] = []
+    """Return the description of the folder: columns with units, and the hash of each file."""
+    columns = [field(one["name"], one.get("unit", ""), one.get("source", "")) for one in record.channels]
+    # the columns are those of the readings, or else of the states
+    described = READINGS if (folder / READINGS).exists() else STATES
     records = sorted(path.relative_to(folder).as_posix() for path in (folder / traces.FOLDER).glob("*.npy"))
-    for name in (READINGS, STATES, EVENTS, WIRE, traces.INDEX, *records):
-        path = folder / name
-        if path.exists():
-            data = path.read_bytes()
-            about = {"path": name, "name": name.replace(".", "-").replace("/", "-"), "bytes": len(data)}
-            about["hash"] = "sha256:" + hashlib.sha256(data).hexdigest()
-            # the fields are those of the readings, or else of the states
-            described = name == READINGS or (name == STATES and not (folder / READINGS).exists())
-            resources.append(about | ({"schema": {"fields": fields}} if described else {}))
-    package = {
-        "name": folder.name.lower(),
-        "title": f"levilab {record.experiment} run",
-        "created": record.started_utc,
-        "resources": resources,
-    }
-    return json.dumps(package, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    names = (READINGS, STATES, RECORD, EVENTS, WIRE, traces.INDEX, *records)
+    resources = [
+        resource(name, (folder / name).read_bytes(), columns if name == described else ())
+        for name in names
+        if (folder / name).exists()
+    ]
+    title = f"levilab {record.experiment} run"
+    return package(folder.name, title, resources, created=record.started_utc, creator=record.group)

@@ -66,6 +66,13 @@ class Map:
     computed: NDArray[np.bool_]
     filled: NDArray[np.bool_] | None = None
 
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return a row for each point: its place on the axes, and what was observed."""
+        axes = {axis.key: axis.values for axis in self.plan.axes}
+        if not self.plan.is_table:
+            axes = dict(zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True))
+        return {name: values.ravel() for name, values in {**axes, **self.values}.items()}
+
 
 @dataclass(frozen=True)
 class Store:

@@ -31,7 +31,7 @@ def test_every_extra_that_a_message_names_is_declared() -> None:
     declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
     texts = [path.read_text(encoding="utf-8") for path in (ROOT / "levilab").rglob("*.py")]
     named = {name for text in texts for name in re.findall(r"how_to_install\([\'\"](\w+)", text)}
-    assert named == {"cluster", "live", "parquet", "pdf", "peers", "scope", "simulate", "video", "xarray"}
+    assert named == {"cluster", "hdf5", "live", "parquet", "pdf", "peers", "scope", "simulate", "video", "xarray"}
     assert named <= declared.keys()
     assert not [text for text in texts if re.search(r"pip install \S*levilab\\*\[", text)]
 
@@ -39,7 +39,8 @@ def test_every_extra_that_a_message_names_is_declared() -> None:
 #: Commands in one process that lacks what the extra simulate installs; each prints its exit status.
 WITHOUT_EXTRAS = """
 import sys
-sys.modules |= dict.fromkeys(("numba", "llvmlite", "zarr", "numcodecs", "xarray", "nicegui", "typst", "pyarrow"))
+absent = "numba", "llvmlite", "zarr", "numcodecs", "xarray", "nicegui", "typst", "pyarrow", "h5py"
+sys.modules |= dict.fromkeys(absent)
 from levilab.cli.main import main
 for words in ("acquire spin --mock --seed 1", "analyze spindown runs", "report runs --no-crosscheck",
               "simulate undriven", "acquire precession --mock"):

@@ -54,8 +54,8 @@ def test_a_run_folder_holds_the_states_in_full_precision_the_scene_and_a_figure(
     assert run.record.configuration["tolerance"] == 1e-7
     assert (run.record.model_extra or {})["simulation"]["states"] == 201
     package = json.loads((done.folder / "datapackage.json").read_text(encoding="utf-8"))
-    (resource,) = package["resources"]
-    assert resource["path"] == "states.csv"
+    resource, record = package["resources"]
+    assert (resource["path"], record["path"]) == ("states.csv", "run.json")
     assert [field["name"] for field in resource["schema"]["fields"]] == HEADER.split(",")
     assert (done.folder / "motion.png").stat().st_size > 20_000
 

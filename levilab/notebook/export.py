@@ -1,0 +1,37 @@
+"""Export of what scripts and notebooks have: runs, results, maps, paths."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from levilab.errors import UsageError, unquote
+from levilab.notebook.result import AnalysisResult
+from levilab.notebook.sweep import SimulatedMap
+from levilab.report.export.contents import contents_of, contents_of_results
+from levilab.report.export.write import export
+from levilab.runs.run import Run
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from levilab.report.export.contents import Contents
+
+
+def export_data(data: Any, output: str | PathLike[str], **options: Any) -> list[Path]:
+    """Write data for other programs; see `levilab.export`."""
+    return export(lambda: _contents(data), Path(output), **options)
+
+
+def _contents(data: Any) -> Contents:
+    """Return what is exported.  Raises UsageError, DataError."""
+    if isinstance(data, AnalysisResult):
+        return contents_of_results(data.found.sources[0].path, None, [(data.analysis, data.found)])
+    if isinstance(data, SimulatedMap):
+        return contents_of(data.store)
+    try:
+        path = data.folder if isinstance(data, Run) else Path(data)
+    except TypeError:
+        raise UsageError("data", "a run, a result, a map or a path is expected", value=type(data).__name__) from None
+    return contents_of(path, lambda text: print(unquote(text), file=sys.stderr))  # noqa: T201 - as warnings are

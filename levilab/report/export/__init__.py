@@ -1,0 +1,1 @@
+"""Runs, data files and sweeps as files of other programs: netCDF, HDF5, CSV, a data package."""

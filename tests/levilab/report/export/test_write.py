@@ -1,0 +1,162 @@
+"""Exports hold the numbers that were measured and found, with units, as independent readers see them."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+from typing import TYPE_CHECKING
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+import xarray
+
+import levilab as door
+from levilab.errors import LevilabError
+from levilab.report.export.contents import contents_of
+from levilab.report.export.write import FORMATS, export
+from support.paths import SAMPLE_DATA
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+RUN, TRACES = SAMPLE_DATA / "spin-down-1", SAMPLE_DATA / "trace-tape"
+
+
+def written(source: Path, out: Path, **options: str) -> list[Path]:
+    return export(lambda: contents_of(source), out, **options)
+
+
+def test_netcdf_has_readings_and_result_with_units_and_uncertainties(tmp_path: Path) -> None:
+    written(RUN, tmp_path / "run.nc", creator="Group 7", licence="CC-BY-4.0")
+    readings = np.genfromtxt(RUN / "readings.csv", delimiter=",", names=True)
+    found = door.analyze(RUN)
+    with xarray.open_dataset(tmp_path / "run.nc") as data:
+        assert (data.Conventions, data.creator_name, data.license) == ("CF-1.8", "Group 7", "CC-BY-4.0")
+        assert (data.synthetic, json.loads(data.run)["experiment"]) == ("true", "spin")
+        spin = data["spin_frequency_hz"]
+        assert (spin.dims, spin.units, spin.ancillary_variables) == (("time_s",), "Hz", "spin_frequency_u_hz")
+        assert np.array_equal(spin, readings["spin_frequency_hz"])
+        assert np.array_equal(data["time_s"], readings["time_s"])
+        assert np.array_equal(data["spindown_residual_hz"], found.residuals)
+        c, u = data["spindown_disc_c32"], data["spindown_disc_c32_u"]
+        assert (float(c), float(u)) == (found["c32"].value, found["c32"].u)
+        assert (c.attrs["unit"], "units" in c.attrs) == ("(rad/s)^-1/2/s", False)  # no unit of UDUNITS
+        assert data["spindown_stokes_c1"].units == "1/s"
+
+
+def test_traces_are_in_volts_and_seconds(tmp_path: Path) -> None:
+    head = json.loads((TRACES / "traces.jsonl").read_text(encoding="utf-8").splitlines()[1])
+    volts = np.load(TRACES / head["path"]) * head["volts_per_code"] + head["offset_v"]
+    written(TRACES, tmp_path / "run.nc")
+    with xarray.open_dataset(tmp_path / "run.nc") as data:
+        trace = data["trace_000002_tape_v"]
+        assert (trace.units, data["trace_000002_time_s"].units) == ("V", "s")
+        assert np.abs(trace - volts).max() < 1e-6  # a code is 8 mV, and a float of 32 bits has 24
+        assert np.diff(data["trace_000002_time_s"]) == pytest.approx(head["dt_s"], rel=1e-6)
+        assert float(data["trace_000002_time_s"][-1]) == pytest.approx(head["time_s"], abs=2 * head["dt_s"])
+
+
+def test_hdf5_has_the_same_variables_over_scales(tmp_path: Path) -> None:
+    for ending in ("nc", "h5"):
+        written(RUN, tmp_path / f"run.{ending}")
+    with xarray.open_dataset(tmp_path / "run.nc", mask_and_scale=False) as data, h5py.File(tmp_path / "run.h5") as file:
+        assert set(file) == set(data.variables)
+        assert all(np.array_equal(file[name][()], one, equal_nan=True) for name, one in data.variables.items())
+        assert file["spin_frequency_hz"].dims[0][0] == file["time_s"]
+        assert file["spin_frequency_hz"].attrs["units"] == "Hz"
+
+
+def test_csv_is_a_file_for_each_table(tmp_path: Path) -> None:
+    files = written(RUN, tmp_path / "run.csv")
+    assert [path.name for path in files] == ["run.csv", "run.spindown.csv", "run.result.csv"]
+    assert pd.read_csv(files[0]).equals(pd.read_csv(RUN / "readings.csv", dtype=float))
+    result = pd.read_csv(files[2]).set_index(["model", "name"])
+    assert result.loc["disc", "c32"][["value", "u"]].tolist() == [*door.analyze(RUN)["c32"].__dict__.values()][:2]
+
+
+def test_a_package_describes_its_files_with_units_and_hashes(tmp_path: Path) -> None:
+    written(TRACES, tmp_path / "run.zip", creator="Group 7", licence="CC0-1.0")
+    with zipfile.ZipFile(tmp_path / "run.zip") as archive:
+        package = json.loads(archive.read("datapackage.json"))
+        files = {one["path"]: one for one in package["resources"]}
+        assert {*files, "datapackage.json"} == {*archive.namelist()}
+        assert {"readings.csv", "trace-000001.csv", "result.csv", "result.json", "run.json"} <= files.keys()
+        for name, one in files.items():
+            assert one["hash"] == f"sha256:{hashlib.sha256(archive.read(name)).hexdigest()}"
+        trace = pd.read_csv(io.BytesIO(archive.read("trace-000001.csv")))
+    assert (package["contributors"][0]["title"], package["licenses"]) == ("Group 7", [{"name": "CC0-1.0"}])
+    fields = files["trace-000001.csv"]["schema"]["fields"]
+    assert [(one["name"], one["unit"]) for one in fields] == [("time_s", "s"), ("tape_v", "V")]
+    assert list(trace.columns) == ["time_s", "tape_v"]
+
+
+def test_a_file_without_a_run_is_exported_with_its_samples(tmp_path: Path) -> None:
+    written(SAMPLE_DATA / "scope-files" / "recording.wav", tmp_path / "sound.nc")
+    with xarray.open_dataset(tmp_path / "sound.nc") as data:
+        assert data["spin_frequency"].units == "Hz"
+        assert float(data["spin_frequency"]) == pytest.approx(30.0, abs=0.01)  # sample_data/README.md
+        assert any(name.startswith("trace_000001_") and one.size > 1000 for name, one in data.variables.items())
+
+
+@pytest.mark.parametrize(
+    ("source", "name", "said"),
+    [
+        ("spin-down-1", "run.xlsx", "ends in .nc, .h5, .csv, .zip is expected"),
+        ("spin-down-1", "there.zip", "is there already: give another name with `out`, or `force` to replace it"),
+        (".", "run.zip", "one is exported at a time: name one of them"),
+        ("README.md", "run.zip", "README.md"),
+    ],
+)
+def test_what_cannot_be_exported_says_what_to_do(source: str, name: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "there.zip").write_bytes(b"kept")
+    with pytest.raises(LevilabError) as refused:
+        written(SAMPLE_DATA / source, tmp_path / name)
+    assert said in str(refused.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["there.zip"]
+    assert (tmp_path / "there.zip").read_bytes() == b"kept"
+
+
+def test_no_table_of_a_csv_replaces_a_file(tmp_path: Path) -> None:
+    (tmp_path / "run.result.csv").write_text("kept", encoding="utf-8")
+    with pytest.raises(LevilabError, match=r"run\.result\.csv is there already"):
+        written(RUN, tmp_path / "run.csv")
+    assert not (tmp_path / "run.csv").exists()
+
+
+def test_a_missing_library_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "h5py", None)
+    with pytest.raises(LevilabError, match=r'pip install "\.\[hdf5\]"'):
+        written(RUN, tmp_path / "run.h5")
+
+
+def test_a_map_is_over_its_axes_in_every_format(tmp_path: Path) -> None:
+    swept = door.sweep(
+        "undriven", spin_hz=[18, 29, 40], mass_kg=["25 g", "25.2 g"], duration=0.3, out=tmp_path / "map.zarr"
+    )
+    for ending in FORMATS:
+        door.export(tmp_path / "map.zarr", tmp_path / f"map{ending}")
+    again = door.open_sweep(tmp_path / "map.zarr")
+    again.to_xarray().to_netcdf(tmp_path / "own.nc")
+    with xarray.open_dataset(tmp_path / "map.nc") as data, xarray.open_dataset(tmp_path / "own.nc") as own:
+        lifetime = data["lifetime_s"]
+        assert (lifetime.dims, lifetime.units) == (("start_spin_hz", "top_mass_kg"), "s")
+        assert np.array_equal(lifetime, swept["lifetime_s"], equal_nan=True)
+        assert np.array_equal(data["survived"], swept["survived"])
+        assert data["survived"].flag_meanings == "no yes"
+        assert data["top_mass_kg"].values.tolist() == [0.025, 0.0252]
+        assert data["top_mass_kg"].long_name == own["top.mass_kg"].long_name == "mass"
+        assert (own.Conventions, own["lifetime_s"].units) == ("CF-1.8", "s")
+        assert np.array_equal(own["lifetime_s"], swept["lifetime_s"], equal_nan=True)
+        assert "_FillValue" not in own["top.mass_kg"].encoding
+    assert pd.read_csv(tmp_path / "map.csv").equals(swept.to_dataframe())
+
+
+def test_the_command_names_its_file(levilab, tmp_path: Path) -> None:
+    done = levilab("export", str(RUN), "--licence", "CC-BY-4.0")
+    assert done.stdout == "wrote spin-down-1.zip\n"
+    refused = levilab("export", str(RUN), check=1)
+    assert "spin-down-1.zip is there already: give another name with --out, or --force to replace it" in refused.stderr
