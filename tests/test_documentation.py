@@ -167,10 +167,10 @@ def test_make_demo_and_make_test_stand_at_the_top_of_the_readme_and_in_the_makef
     assert readme.index("make demo") < 1000
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_links_between_the_pages_lead_somewhere(page: Path) -> None:
-    for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text(encoding="utf-8")):
-        assert (page.parent / target).exists(), target
+def test_links_between_the_pages_lead_somewhere() -> None:
+    for page in PAGES:
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text(encoding="utf-8")):
+            assert (page.parent / target).exists(), (page, target)
 
 
 def test_the_bench_of_the_page_is_a_valid_one(tmp_path: Path) -> None:

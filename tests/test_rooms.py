@@ -7,8 +7,6 @@ from collections import Counter
 from functools import cache
 from typing import TYPE_CHECKING
 
-import pytest
-
 from support.paths import ROOT
 from support.sources import modules, sources
 
@@ -70,10 +68,9 @@ def is_a_door(name: str) -> bool:
     return name in {"levilab", "levilab.pipelines.options"} or name.startswith("levilab.cli")
 
 
-@pytest.mark.parametrize("name", [name for name, _ in modules() if not is_a_door(name)])
-def test_only_what_is_heavy_is_imported_where_it_is_used(name: str) -> None:
-    late = [(line, names) for line, names in late_imports(sources()[name])]
-    assert [(line, names) for line, names in late if not any(map(loads_something_heavy, names))] == []
+def test_only_what_is_heavy_is_imported_where_it_is_used() -> None:
+    late = [(name, *found) for name, _ in modules() if not is_a_door(name) for found in late_imports(sources()[name])]
+    assert [(name, line, names) for name, line, names in late if not any(map(loads_something_heavy, names))] == []
 
 
 def rooms(folder: Path) -> list[str]:

@@ -64,7 +64,7 @@ def read(row, answer):
 def refused(row, answer):
     """The error; the link is cleared, for the answer may have been another question's."""
     with conversation(row.make, (row.question, answer), (CLEAR, None)) as part, pytest.raises(BadAnswer) as bad:
-        getattr(part, row.setting.name)
+        pytest.fail(f"{answer!r} was taken for {getattr(part, row.setting.name)!r}")
     assert (bad.value.question, bad.value.answer) == (row.question, answer)
     assert "ask again" in str(bad.value)
     return bad.value
@@ -74,10 +74,10 @@ def refused(row, answer):
 NO_WORDS = ["", "+5.0E-02", "~xxz!yDC", "DC;DC", '"SIN', "SI", "SINU", "XPOS", "POS ITIVE", '+0,"No error"', "\u0660"]
 
 
-@pytest.mark.parametrize("answer", NO_WORDS)
 @pytest.mark.parametrize("row", of_kind(str))
-def test_a_word_that_is_none_of_the_choices_is_refused(row, answer):
-    refused(row, answer)
+def test_a_word_that_is_none_of_the_choices_is_refused(row):
+    for answer in NO_WORDS:
+        refused(row, answer)
 
 
 #: The gaussmeters print numbers for words.
@@ -89,30 +89,26 @@ def test_a_word_is_read_in_its_short_and_long_form_in_any_case(row):
             assert read(row, answer) == short
 
 
-@pytest.mark.parametrize("row", WORDS)
-def test_the_error_of_a_refused_word_has_the_choices(row):
-    expected = refused(row, "BANANA").expected
-    assert expected.startswith(("one of ", "a number from "))
-
-
-@pytest.mark.parametrize("answer", ["", "2", "+1", "01", "1.0", "ON", "TRUE", "0,0", "\u0661", "+1.000E+00"])
-@pytest.mark.parametrize("row", of_kind(bool))
-def test_a_switch_is_0_or_1_and_nothing_else(row, answer):
-    assert refused(row, answer).expected == "0 or 1"
+def test_the_error_of_a_refused_word_has_the_choices():
+    for parameter in WORDS:
+        (row,) = parameter.values
+        assert refused(row, "BANANA").expected.startswith(("one of ", "a number from ")), parameter.id
 
 
 @pytest.mark.parametrize("row", of_kind(bool))
-def test_a_switch_is_read(row):
+def test_a_switch_is_0_or_1_and_nothing_else(row):
     assert [read(row, answer) for answer in "01"] == [False, True]
+    for answer in ("", "2", "+1", "01", "1.0", "ON", "TRUE", "0,0", "\u0661", "+1.000E+00"):
+        assert refused(row, answer).expected == "0 or 1"
 
 
 NO_NUMBERS = ["", "DC", "3", "4", "nan", "inf", "1_0", "\u0662", "1e400", "2.5E+01,2.5E+01", "+2.5E", "--2.5E+01"]
 
 
-@pytest.mark.parametrize("answer", NO_NUMBERS)
 @pytest.mark.parametrize("row", of_kind(float))
-def test_what_is_no_number_of_the_instruments_form_is_refused(row, answer):
-    assert (row.setting.form or row.driver.NUMBER).example in refused(row, answer).expected
+def test_what_is_no_number_of_the_instruments_form_is_refused(row):
+    for answer in NO_NUMBERS:
+        assert (row.setting.form or row.driver.NUMBER).example in refused(row, answer).expected
 
 
 #: Settings of few values: how real instruments print them is not confirmed, so all these are taken.
@@ -209,14 +205,11 @@ def test_a_word_without_choices_cannot_be_declared():
 
 
 @pytest.mark.parametrize("driver", DRIVERS)
-@pytest.mark.parametrize("answer", ["", "1", "53230A", "a,b", "a,b,c", "a,b,c,d,e", ",b,c,d", "a,,c,d", "a,b,c,\x07d"])
-def test_an_identity_has_four_fields(driver, answer):
-    with (
-        conversation(driver, ("*IDN?", answer), (CLEAR, None)) as instrument,
-        pytest.raises(BadAnswer) as bad,
-    ):
-        instrument.identity()
-    assert bad.value.answer == answer
+def test_an_identity_has_four_fields(driver):
+    for answer in ("", "1", "53230A", "a,b", "a,b,c", "a,b,c,d,e", ",b,c,d", "a,,c,d", "a,b,c,\x07d"):
+        with conversation(driver, ("*IDN?", answer), (CLEAR, None)) as instrument, pytest.raises(BadAnswer) as bad:
+            pytest.fail(f"{answer!r} was taken for {instrument.identity()}")
+        assert bad.value.answer == answer
 
 
 NO_ENTRIES = ["", "+2.5E+01", "No error", "DC", "0", "+0", "0,", '+0,No error"', '+0,"No err', '0,"No error']
