@@ -33,6 +33,14 @@ def crosscheck(
         int | None,
         typer.Option(min=0, help="Of the first trial; the next have the next.", show_default="0"),
     ] = None,
+    calibrate: Annotated[
+        bool,
+        typer.Option(
+            "--calibrate",
+            help="Judge the whole distribution of the ranks of the truths, which is uniform where values and "
+            "uncertainties are right, by a simultaneous band; --out writes calibration.png, too.  With 200 trials.",
+        ),
+    ] = False,
     out: Annotated[Path | None, place("DIR", "Write crosscheck.json and .png there.", callback=writable)] = None,
     as_json: Json = False,
 ) -> None:
@@ -41,20 +49,23 @@ def crosscheck(
     from levilab.crosscheck.stored import as_json as as_text
 
     if like:
+        if calibrate:
+            raise UsageError("calibrate", "does not go with `like`: it is of worlds at random")
         if seed is not None:
             raise UsageError("seed", "does not go with `like`: its trials follow from the readings")
         found = command.study_results(subjects or [], like, trials)
         studies, written = [one for one, _ in found], command.store_beside(found, out)
     else:
+        trials = trials or (command.CALIBRATION if calibrate else None)
         studies = command.study_worlds(subjects or [], trials, seed or 0)
-        written = [] if out is None else command.write(studies, out)
+        written = [] if out is None else command.write(studies, out, calibrate=calibrate)
     if as_json:
         result(as_text(studies))
     else:
-        command.print_studies(studies)
+        command.print_studies(studies, calibrate=calibrate)
     for path in written:
         message(f"wrote {path}")
-    if not all(one.holds for one in studies):
+    if not all(command.is_as_wanted(one, calibrate=calibrate) for one in studies):
         raise typer.Exit(exit_codes.FAILED)
 
 

@@ -14,7 +14,7 @@ from levilab.present.numbers import enumeration, with_sign
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from levilab.crosscheck.study import Study
     from levilab.present.document.blocks import Block
@@ -24,22 +24,32 @@ _NUMBERS = ("pulls", "mean pull", "s.d. of pulls\n(wanted)", "within 1 u\n(wante
 _MANY = 30
 
 
-def crosscheck_table(studies: Sequence[Study], symbols: Mapping[str, str] | None = None) -> Table:
+def verdict_of(spread: Spread) -> Verdict:
+    """Judge the mean, the width and the coverage of the pulls."""
+    return spread.verdict
+
+
+def crosscheck_table(
+    studies: Sequence[Study],
+    symbols: Mapping[str, str] | None = None,
+    judge: Callable[[Spread], Verdict] = verdict_of,
+) -> Table:
     """Return a table with a row a quantity; behind ± stands the standard error, in parentheses what is wanted.
 
     Args:
         studies: with their trials.
         symbols: quantity → its symbol.
+        judge: from the pulls of a quantity to the last column.
     """
     return table(
         "Pulls: (estimate − truth)/u",
         ("", "quantity", *_NUMBERS, "as wanted"),
-        _rows(studies, symbols or {}),
+        _rows(studies, symbols or {}, judge),
         numbers=_NUMBERS,
     )
 
 
-def _rows(studies: Sequence[Study], symbols: Mapping[str, str]) -> Iterator[Row]:
+def _rows(studies: Sequence[Study], symbols: Mapping[str, str], judge: Callable[[Spread], Verdict]) -> Iterator[Row]:
     for study in studies:
         for k, one in enumerate(study.spreads):
             cells = (
@@ -50,7 +60,7 @@ def _rows(studies: Sequence[Study], symbols: Mapping[str, str]) -> Iterator[Row]
                 _deviation(one),
                 f"{100 * one.coverage:.0f} ± {100 * one.u_coverage:.0f} % ({100 * one.wanted_coverage:.0f} %)",
                 "–" if one.relative_u is None else _percent(one.relative_u),
-                one.verdict.value,
+                judge(one).value,
             )
             yield Row(cells, "together" if k == 0 else "")
 

@@ -175,6 +175,9 @@ def test_the_command_prints_writes_and_judges(levilab: Callable[..., object], tm
     document = json.loads((tmp_path / "kept/crosscheck.json").read_text(encoding="utf-8"))
     assert document["checks"][0]["holds"] is True
     assert (tmp_path / "kept/crosscheck.png").stat().st_size > 5000
+    levilab("crosscheck", "good", "--calibrate", "--trials", "40", "--out", "ranks")
+    assert (tmp_path / "ranks/calibration.png").stat().st_size > 5000
+    levilab("crosscheck", "bad", "--calibrate", "--trials", "40", check=1)
     failed = levilab("crosscheck", "bad", "--json", "--trials", "40", check=1)
     assert json.loads(failed.stdout)["checks"][0]["spreads"][0]["mean"] > 1.5
     refused = levilab("crosscheck", "nonsense", check=2)
