@@ -43,7 +43,7 @@ def band_of(n: int, chance: float) -> tuple[Array, Array]:
 def _quantiles(n: int, level: float) -> tuple[Array, Array]:
     """Return the bounds of each of n uniform numbers in rising order, each of which leaves them with `level`."""
     k = np.arange(1, n + 1)
-    lower, upper = (np.asarray(betaincinv(k, n + 1 - k, share)) for share in (level / 2, 1 - level / 2))
+    lower, upper = (np.asarray(betaincinv(k, n + 1 - k, q), dtype=float) for q in (level / 2, 1 - level / 2))
     return lower, upper
 
 
