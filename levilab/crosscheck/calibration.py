@@ -74,9 +74,9 @@ def probability_within(lower: Array, upper: Array) -> float:
 
 
 def calibration_of(spread: Spread) -> Verdict:
-    """Judge the ranks: too many in a tail is a bias or a u that is too small, too few a u that is too large."""
-    if spread.n < 2:
-        return Verdict.RIGHT
+    """Judge pulls and ranks: too many ranks in a tail are a u that is too small, too few a u that is too large."""
+    if spread.n < 2 or spread.verdict is Verdict.WRONG:
+        return spread.verdict
     ranks = ranks_of(spread)
     lower, upper = band_of(spread.n, FALSE_ALARM / spread.among)
     low, high = ranks < lower, ranks > upper
