@@ -43,7 +43,7 @@ def crosscheck_figure(checked: Sequence[Study]) -> Figure:
 def calibration_figure(checked: Sequence[Study]) -> Figure:
     """Draw the distribution of the ranks of the truths less the uniform one, within the simultaneous band."""
     about = (
-        "Line: share of trials below a rank, less the rank (vermilion where it is not as wanted); grey: within chance.\n"
+        "Line: share of trials below a rank, less the rank (vermilion: not as wanted); grey: within chance.\n"
         "Low on the left and high on the right: u is too large; high on the left and low on the right: too small."
     )
     return _panels(checked, calibration_of, _draw_ranks, about, ("rank of the truth", ""))
