@@ -8,7 +8,7 @@ import typer
 
 from levilab.cli import exit_codes
 from levilab.cli.importing import importing
-from levilab.cli.options import place
+from levilab.cli.options import Language, place
 from levilab.cli.output import message, result
 
 
@@ -28,6 +28,7 @@ def live(
         bool,
         typer.Option("--share", help="Let phones in the same network look on, by a second address with a QR code."),
     ] = False,
+    language: Language = "en",
     no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser: print the address only.")] = False,
 ) -> None:
     """Serve the view until Ctrl-C."""
@@ -37,7 +38,7 @@ def live(
         run_or_folder(run, out)
     bench = " and the bench for practice, whose time stands still while no page is open"
     said = f"Ctrl-C ends the view{bench if mock else '; a run goes on without it'}"
-    serve(said, opens=not no_open, run=run, out=out, mock=mock, port=port, share=share)
+    serve(said, opens=not no_open, run=run, out=out, mock=mock, port=port, share=share, language=language)
 
 
 def serve(said: str, *, opens: bool, **options: Any) -> NoReturn:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from levilab.cli.analyze import takes_options, write_and_print
-from levilab.cli.options import Json, existing_paths, place, writable
+from levilab.cli.options import Json, Language, existing_paths, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.errors import NoneUsable, UsageError
@@ -48,6 +48,7 @@ def open_files(
             show_default="a browser where there is one, but not with --keep, -o or --json",
         ),
     ] = None,
+    language: Language = "en",
     as_json: Json = False,
     **given: Any,
 ) -> None:
@@ -65,7 +66,7 @@ def open_files(
     for path in readable if keep else []:
         message(f"kept in {write_correction(path, options)}")
     if shows:
-        _serve([(path, options) for path in files])
+        _serve([(path, options) for path in files], language)
     if not readable:
         raise _refusal(looks[0])
     if not as_json:
@@ -108,11 +109,11 @@ def _has_browser() -> bool:
     return bool(screen) and sys.stdout.isatty() and bool(find_spec("nicegui"))
 
 
-def _serve(files: "list[tuple[Path, Mapping[str, Any]]]") -> NoReturn:
+def _serve(files: "list[tuple[Path, Mapping[str, Any]]]", language: str) -> NoReturn:
     """Show files in the browser until Ctrl-C."""
     from levilab.cli.live import serve
 
-    serve("Ctrl-C ends the page", opens=True, port=0, files=tuple(files))
+    serve("Ctrl-C ends the page", opens=True, port=0, files=tuple(files), language=language)
 
 
 def _print_looks(context: typer.Context, looks: "Sequence[Look]", *, as_json: bool) -> None:

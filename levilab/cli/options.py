@@ -83,6 +83,10 @@ def named_scene(scene: str | None) -> str:
 
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else on standard output.")]
+#: Not the machine's own: a script that reads messages finds the same on each.
+Language = Annotated[
+    str, typer.Option("--language", metavar="CODE", envvar="LEVILAB_LANGUAGE", help="Of what people read: en or de.")
+]
 #: The heading of a report: name → metavar and help.
 _HEADING = {
     "title": ("TEXT", "In place of the report's own title."),

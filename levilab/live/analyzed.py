@@ -16,6 +16,7 @@ from analysis.uncertainty import Estimate
 from levilab.files import stamp
 from levilab.pipelines.result import RESULT, beside
 from levilab.present.numbers import with_uncertainty
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -82,8 +83,9 @@ class Analyses:
                     self.failed[path] = err.strip()[-600:] or f"levilab {words[0]} failed"
                     return
         except subprocess.TimeoutExpired:
-            self.failed[path] = (
-                f"the analysis took longer than {_LONGEST_S / 60:g} min, and was given up; levilab analyze has no limit"
+            self.failed[path] = Text(
+                "the analysis took longer than {minutes:g} min, and was given up; levilab analyze has no limit",
+                minutes=_LONGEST_S / 60,
             )
         except (OSError, subprocess.SubprocessError) as error:
             self.failed[path] = str(error)

@@ -92,7 +92,7 @@ class Desk:
             if event.kind in {"done", "refused"} and event.number is not None:
                 self.answers[event.number] = event
                 self.answers.pop(event.number - _MOST_ANSWERS, None)
-            text = event.text[:_LONGEST_TEXT]
+            text = event.text if len(event.text) <= _LONGEST_TEXT else event.text[:_LONGEST_TEXT]
             self._records = event.kind == "recording" or (self._records and event.kind != "recorded")
             about = {"n": self.count, "kind": event.kind, "text": text, "status": event.status, "utc": utc_now()}
             self.said.append(about | {"of_run": self._records and event.kind == "message"})

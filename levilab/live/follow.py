@@ -17,6 +17,7 @@ from levilab.live.envelope import Envelope
 from levilab.live.tail import Tail
 from levilab.runs.find import RECORD
 from levilab.runs.run import EVENTS, READINGS, Run, RunRecord
+from levilab.texts.text import text_from
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -173,9 +174,15 @@ def _event(line: bytes, number: int) -> dict[str, Any]:
         time_s, kind, text = event["time_s"], str(event["kind"]), str(event["text"])
         time_s = float(time_s) if time_s is not None else None
         utc, top = str(event.get("utc", "")), event.get("top")
+        text = text_from(event.get("says"), text)
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
         time_s, kind, text, utc, top = None, "damaged", "a line of events.jsonl is damaged", "", None
     if time_s is not None and not np.isfinite(time_s):
         time_s = None
-    shown = {"time_s": time_s, "utc": utc[:40], "kind": kind[:60], "text": text[:_MOST_CHARACTERS]}
+    shown = {
+        "time_s": time_s,
+        "utc": utc[:40],
+        "kind": kind[:60],
+        "text": text if len(text) <= _MOST_CHARACTERS else text[:_MOST_CHARACTERS],
+    }
     return {"n": number, **shown, "top": top if isinstance(top, int) else None}

@@ -16,6 +16,7 @@ from levilab.errors import LevilabError, UsageError
 from levilab.formats.understanding import understand
 from levilab.pipelines.correction import ENDING, read_correction, read_file_options, write_correction
 from levilab.pipelines.look import look_as_kept, look_at
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Mapping
@@ -97,7 +98,9 @@ class Opened:
         """
         name = plain_name(name)
         if name.casefold().endswith(ENDING):
-            raise CannotTake(f"{name} says how a data file is read: drop the data file, and correct it here")
+            raise CannotTake(
+                Text("{name} says how a data file is read: drop the data file, and correct it here", name=name)
+            )
         size, digest, part = 0, hashlib.sha256(), self.folder / f".incoming-{secrets.token_hex(8)}"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -106,14 +109,24 @@ class Opened:
                 async for piece in pieces:
                     size += len(piece)
                     if size > MOST_BYTES:
-                        raise CannotTake(f"{name}: is larger than {MOST_BYTES >> 20} MB: levilab open reads it")
+                        raise CannotTake(
+                            Text(
+                                "{name}: is larger than {most} MB: levilab open reads it",
+                                name=name,
+                                most=MOST_BYTES >> 20,
+                            )
+                        )
                     digest.update(piece)
                     file.write(piece)
             place = self._place(name, digest.hexdigest())
             if not place.exists():
                 part.rename(place)
         except OSError as error:
-            raise CannotTake(f"{name}: cannot be kept in {self.folder} ({error.strerror})") from error
+            raise CannotTake(
+                Text(
+                    "{name}: cannot be kept in {folder} ({why})", name=name, folder=str(self.folder), why=error.strerror
+                )
+            ) from error
         finally:  # the file is closed by now: Windows removes none that is open
             with contextlib.suppress(OSError):
                 part.unlink()

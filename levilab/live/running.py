@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ from analysis.spindown.fit import fit_spin_down
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.uncertainty import Estimate
 from levilab.present.numbers import plain, with_uncertainty
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -33,8 +33,6 @@ _POINTS = 400
 _BEYOND = 4.0
 #: Parameters that no law is known by: the start, and what the counter sees of the wobble.
 _NOT_OF_THE_LAW = {"start_frequency", *WOBBLE}
-#: What a head says while readings come, and no more once the run has ended.
-_SO_FAR = re.compile(r"(, the best)? so far")
 
 
 @dataclass(frozen=True)
@@ -64,6 +62,7 @@ class Running:
         end_s: between which times the run is expected to end, on its own clock; None where that is not known [s].
         look: name of its colour, that of a law or "fit".
         dashed: what the curve is beyond the readings, where that is not what the head names.
+        final: the head once the run has ended, where it is another one then.
     """
 
     head: str
@@ -72,6 +71,7 @@ class Running:
     end_s: tuple[float, float] | None = None
     look: str = "fit"
     dashed: str = ""
+    final: str = ""
 
 
 Columns = dict[str, "Array"]
@@ -105,7 +105,7 @@ def fit_so_far(
     except TooFewReadings as error:
         return Running("no fit", (str(error),)) if ended else Running("no fit yet", ("it begins after some readings",))
     except (AnalysisError, KeyError) as error:
-        text = str(error) if isinstance(error, AnalysisError) else f"there is no column {error}"
+        text = str(error) if isinstance(error, AnalysisError) else Text("there is no column {name}", name=str(error))
         return Running("no fit" if ended else "no fit yet", (text,))
     return _without_forecast(found) if ended else found
 
@@ -116,7 +116,7 @@ def _without_forecast(found: Running) -> Running:
     if curve is not None and np.isfinite(curve.solid_to):
         x = np.append(curve.x[curve.x < curve.solid_to], curve.solid_to)
         curve = replace(curve, x=x, y=np.interp(x, curve.x, curve.y), solid_to=np.inf)
-    return replace(found, head=_SO_FAR.sub("", found.head), curve=curve, end_s=None, dashed="")
+    return replace(found, head=found.final or found.head, curve=curve, end_s=None, dashed="")
 
 
 def spin_down(columns: Mapping[str, Array], size: int, *_: object) -> Running:
@@ -133,17 +133,18 @@ def spin_down(columns: Mapping[str, Array], size: int, *_: object) -> Running:
     constants = [with_uncertainty(value) for name, value in best.parameters.items() if name not in _NOT_OF_THE_LAW]
     others = [name for name in found.verdict.indistinguishable if name != found.best]
     lines = [
-        ", ".join(constants),
-        f"as good: {', '.join(others)}" if others else "",
-        f"excluded: {', '.join(found.verdict.excluded)}" if found.verdict.excluded else "",
+        Text("{constants:n}", constants=tuple(constants)),
+        Text("as good: {laws}", laws=", ".join(others)) if others else "",
+        Text("excluded: {laws}", laws=", ".join(found.verdict.excluded)) if found.verdict.excluded else "",
     ]
     return Running(
-        f"{found.best} law, the best so far   {LAWS[found.best].equation}",
+        Text("{law} law, the best so far   {equation}", law=found.best, equation=LAWS[found.best].equation),
         tuple(filter(None, lines)),
         Curve(x, y, solid_to=last),
         end,
         found.best,
         "dashed: the law alone, without the tilt, which is in the count" if best.has_tilt and end else "",
+        Text("{law} law   {equation}", law=found.best, equation=LAWS[found.best].equation),
     )
 
 
@@ -161,11 +162,13 @@ def locked_line(columns: Mapping[str, Array], size: int, *_: object) -> Running:
     fit = fit_sweep(Sweep(drive[used], precession[used], None if u is None else u[used] / np.sqrt(size)))
     line = fit.line
     x = np.linspace(drive[used].min(), drive[used].max(), _POINTS)
-    p = "" if fit.p_locked is None else f"p = {plain(fit.p_locked, 2)} for b = 1, a = 0"
+    b, a = _value(line.slope, line.u_slope), _value(line.intercept, line.u_intercept, "Hz")
+    p = "" if fit.p_locked is None else Text("p = {p:n} for b = 1, a = 0", p=plain(fit.p_locked, 2))
     return Running(
         "line so far   ν_p = a + b ν_d",
-        (f"b = {_value(line.slope, line.u_slope)}, a = {_value(line.intercept, line.u_intercept, 'Hz')}", p),
+        (Text("b = {b:n}, a = {a:n}", b=b, a=a), p),
         Curve(x, line.at(x), np.nan_to_num(line.confidence_band(x))),
+        final="line   ν_p = a + b ν_d",
     )
 
 
@@ -187,12 +190,13 @@ def mean_limit(
         sample = replace(sample, common=U_OF_WAY * (spin - columns["spin_seen_hz"][used]))
         note = "the drive pulls no further: no limits of the top"
     elif levels.any():
-        note = f"without {levels.sum()} of {levels.size} tops that only got no faster"
+        note = Text("without {some} of {all} tops that only got no faster", some=int(levels.sum()), all=levels.size)
     found = summarize(sample)
     students = float(stdtrit(np.inf if found.freedom is None else found.freedom, 0.975))
     band = np.empty(0) if found.mean.u is None else np.full(2, students * found.mean.u)
     curve = Curve(np.array([time[0], time[-1]]), np.full(2, found.mean.value), band)
-    return Running("mean so far", tuple(filter(None, (with_uncertainty(found.mean), note))), curve)
+    mean = Text("{mean:n}", mean=with_uncertainty(found.mean))
+    return Running("mean so far", tuple(filter(None, (mean, note))), curve, final="mean")
 
 
 def _value(value: float, u: float | None, unit: str = "") -> str:

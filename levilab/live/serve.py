@@ -20,6 +20,7 @@ from levilab.live.practice.bench import PracticeBench
 from levilab.live.server import Hall, application
 from levilab.live.share import address_in_network
 from levilab.runs.find import RECORD, must_take_runs, run_or_folder
+from levilab.texts.text import ENGLISH, language_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping
@@ -49,6 +50,7 @@ class LiveOptions:
         port: of the loopback address; 0: any that is free.
         seed: of the light's noise on the bench for practice.
         share: whether phones in the network may look, too.
+        language: of pages at which none was chosen.
         files: data files to open, with the options by which they are read; None: the view is of runs.
     """
 
@@ -58,6 +60,7 @@ class LiveOptions:
     port: int = 8765
     seed: int = 0
     share: bool = False
+    language: str = ENGLISH
     files: tuple[tuple[Path, Mapping[str, Any]], ...] | None = None
 
 
@@ -104,13 +107,14 @@ def serve_live(
         say: is called with a line for the person at the terminal.
 
     Raises:
-        UsageError: a run and a bench for practice at once.
+        UsageError: a run and a bench for practice at once; there is no such language.
         MissingThree: the extra is not installed.
         DataError: there is no such run.
         CannotWrite: the bench would record into a file.
         CannotShow: the port is taken.
         NoNetwork: the view is to be shared, and this machine is in no network.
     """
+    language_of(options.language)
     root, shown = _where(options)
     with contextlib.ExitStack() as at_end:
         hosts = [HOST, address_in_network()] if options.share else [HOST]
@@ -118,7 +122,7 @@ def serve_live(
         ports = [opened.getsockname()[1] for opened in sockets]
         doors, guests = Doors(ports[0]), doors_for_guests(hosts[1], ports[1]) if options.share else None
         bench = at_end.enter_context(PracticeBench(root, seed=options.seed)) if options.mock else None
-        hall = Hall(root, shown, doors, Desk(bench) if bench else None, guests)
+        hall = Hall(root, shown, doors, Desk(bench) if bench else None, guests, options.language)
         config = configuration(hall)
         at_end.callback(hall.analyses.end)
         server = ViewServer(config, lambda: farewell(bench, hall.analyses.running), say)

@@ -18,21 +18,24 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
 from starlette.applications import Starlette
-from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
 from levilab.animation.three import three_js
 from levilab.errors import LevilabError
+from levilab.errors import unquote as unquote_names
 from levilab.live.analyzed import Analyses, is_shown
 from levilab.live.choice import choices, newest, running_run
 from levilab.live.desk import parts_for, scene_of_run
 from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
 from levilab.live.opened import Opened
 from levilab.live.watch import Watch
+from levilab.live.words import page_in
 from levilab.pipelines.look import QUANTITIES, name_of
 from levilab.pipelines.result import beside
 from levilab.runs.find import RECORD
+from levilab.texts.text import ENGLISH, in_language, languages, text_of
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Iterator
@@ -58,6 +61,8 @@ _OTHERS_EVERY_S = 2.0
 OWN_BENCH = "."
 #: The longest question of a page [bytes].
 _LONGEST_ASK = 4096
+#: The language that was chosen in a browser, and for how long it is kept [s].
+_COOKIE, _KEPT_S = "levilab_language", 365 * 86400
 PAGE = Path(__file__).parent / "page"
 _ONLY_LOOK = "this page may only look: open the address that the terminal shows"
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".png": "image/png",
@@ -74,6 +79,7 @@ class Hall:
         doors: who may come in.
         desk: the bench for practice; None where runs are only looked at.
         guests: who may come in from the network; None where the view is not shared.
+        language: of pages at which none was chosen.
         opened: data files that were opened, and the folder for dropped ones, beside that with the runs.
     """
 
@@ -82,6 +88,7 @@ class Hall:
     doors: Doors
     desk: Desk | None = None
     guests: Doors | None = None
+    language: str = ENGLISH
     watches: dict[str, Watch] = field(default_factory=dict)
     pages: dict[str, int] = field(default_factory=dict)  # name of a run → how many look at it
     new: asyncio.Event = field(default_factory=asyncio.Event)
@@ -237,13 +244,23 @@ class Pages:
     def _json(self, document: Any, status: int = 200) -> Response:
         return JSONResponse(document, status, headers=self.doors.headers())
 
-    async def page(self, _: Request) -> Response:
+    async def page(self, request: Request) -> Response:
         """Return the page."""
-        return self._file(self.files["live.html"])
+        return self._page("live.html", request)
 
-    async def open(self, _: Request) -> Response:
+    async def open(self, request: Request) -> Response:
         """Return the page on which data files are opened."""
-        return self._file(self.files["open.html"])
+        return self._page("open.html", request)
+
+    def _page(self, name: str, request: Request) -> Response:
+        """Return a page in the language of its address, else as it was chosen last in this browser."""
+        asked = request.query_params.get("language")
+        known = [code for code in (asked, request.cookies.get(_COOKIE)) if code in languages()]
+        code = known[0] if known else self.hall.language
+        answer = HTMLResponse(page_in(self.files[name].read_text("utf-8"), code), headers=self.doors.headers())
+        if code == asked:
+            answer.set_cookie(_COOKIE, code, _KEPT_S, samesite="strict", httponly=True)
+        return answer
 
     async def part(self, request: Request) -> Response:
         """Return a module or the style sheet of the page."""
@@ -284,17 +301,18 @@ class Pages:
     async def analysis(self, request: Request) -> Response:
         """Return the progress of an input's analysis, and its answer."""
         path = self._input(request)
-        return self._json(self.hall.analyses.about(path) if path else {})
+        about = self.hall.analyses.about(path) if path else {"failed": ""}
+        return self._json(about | {"failed": in_language(about["failed"], _language(request, self.hall))})
 
     async def take(self, request: Request) -> Response:
         """Keep a file that is dropped into a page, and open it."""
         if not self.doors.knows(request.headers.get("x-levilab-token")):
-            return self._json({"error": _ONLY_LOOK}, 403)
+            return self._json({"error": in_language(_ONLY_LOOK, _language(request, self.hall))}, 403)
         name = unquote(request.headers.get("x-levilab-name", ""))
         try:
             key = await self.hall.opened.receive(name, request.stream())
         except LevilabError as error:
-            return self._json({"error": str(error)}, 400)
+            return self._json({"error": in_language(text_of(error), _language(request, self.hall))}, 400)
         return self._json({"file": key})
 
     async def do(self, request: Request) -> Response:
@@ -304,14 +322,17 @@ class Pages:
             body += piece
             if len(body) > _LONGEST_ASK:
                 return self._json({"error": "the command is too long"}, 413)
-        return self._json(*await _carry_out(self.hall, request.headers.get("x-levilab-token"), body))
+        answer, status = await _carry_out(self.hall, request.headers.get("x-levilab-token"), body)
+        if error := answer.get("error"):
+            answer["error"] = unquote_names(in_language(error, _language(request, self.hall)))
+        return self._json(answer, status)
 
     async def frames(self, socket: WebSocket) -> None:
         """Send a frame for each question, FRAMES_PER_S at most, until the page goes.
 
         Questions that come faster wait: uvicorn reads no further while one is unread.
         """
-        hall, name = self.hall, socket.query_params.get("run", "")
+        hall, name, language = self.hall, socket.query_params.get("run", ""), _language(socket, self.hall)
         await socket.accept()
         if not (name in {"", OWN_BENCH if hall.desk else ""} or hall.is_run(name)):
             await socket.close(4404)
@@ -330,9 +351,10 @@ class Pages:
                 again = time.monotonic() + 1 / frames_per_s
                 await hall.wait_for_news(watch, ask.get("tick"))
                 said = hall.desk.events_after(ask.get("said")) if hall.desk else []
+                said = [one | {"text": unquote_names(in_language(one["text"], language))} for one in said]
                 if self.for_guests:  # where the runs lie is no concern of theirs
                     said = [one | {"text": one["text"].replace(f"{hall.root}{os.sep}", "")} for one in said]
-                await socket.send_bytes(watch.frame(ask, said))
+                await socket.send_bytes(watch.frame(ask, said, language))
             await socket.close(1003 if text is None else 1009)
 
     @contextlib.contextmanager
@@ -379,6 +401,12 @@ def _views(pages: Pages) -> list[BaseRoute]:
     ]
 
 
+def _language(request: Request | WebSocket, hall: Hall) -> str:
+    """Return the language of the page that asks."""
+    asked = request.query_params.get("language", "")
+    return asked if asked in languages() else hall.language
+
+
 def _nothing() -> Response:
     return PlainTextResponse("there is no such file", 404)
 
@@ -399,7 +427,7 @@ async def _carry_out(hall: Hall, token: str | None, body: bytes) -> tuple[dict[s
     try:
         return await _do(hall, _table(body.decode("utf-8", "replace")))
     except LevilabError as error:
-        return {"error": str(error)}, 400
+        return {"error": text_of(error)}, 400
 
 
 async def _do(hall: Hall, wanted: dict[str, Any]) -> tuple[dict[str, Any], int]:

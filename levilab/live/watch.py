@@ -21,6 +21,7 @@ from levilab.telemetry.address import read_address
 from levilab.telemetry.codec import pack
 from levilab.telemetry.messages import Poses, Record, State
 from levilab.telemetry.subscriber import Subscriber
+from levilab.texts.text import ENGLISH, Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -93,7 +94,8 @@ class Watch:
         try:
             yield
         except Exception as error:  # noqa: BLE001 - whatever it is, the other runs are read on
-            failure = f"this run cannot be read in full: {type(error).__name__}: {error}"[:_LONGEST_FAILURE]
+            why = f"{type(error).__name__}: {error}"[:_LONGEST_FAILURE]
+            failure = Text("this run cannot be read in full: {why}", why=why)
             if failure != self._failure:
                 self._failure = failure
                 self.tick += 1
@@ -202,44 +204,46 @@ class Watch:
 
     # --- what the page asks for ---
 
-    def frame(self, ask: dict[str, Any], said: Sequence[Mapping[str, Any]] = ()) -> bytes:
+    def frame(self, ask: dict[str, Any], said: Sequence[Mapping[str, Any]] = (), language: str = ENGLISH) -> bytes:
         """Return the news for a page.
 
         Args:
             ask: the page's state: "run" (name), "readings", "events", "fit", "poses" (numbers), "records" (channel →
                 number); and its wishes: "columns" of its picture, and whether the "latest" readings alone.
             said: the events of the bench for practice.
+            language: of the texts, beside those that the page looks up itself.
         """
         followed = self.followed
         name = followed.folder.name if followed else ""
         ask = ask if ask.get("run") == name else {key: ask.get(key) for key in ("columns", "latest", "poses")}
-        head: dict[str, Any] = {"tick": self.tick, "run": name, "bench": self._about_bench(), "said": said}
+        head: dict[str, Any] = {"tick": self.tick, "run": name, "bench": self._about_bench(language), "said": said}
         head["source"] = self._subscriber.address.port if self._subscriber else None
         if followed:
-            head["about"] = _about(followed, self._failure)
+            head["about"] = _about(followed, in_language(self._failure, language))
             if ask.get("readings") != followed.version or ask.get("changed"):
                 head["readings"] = _readings(followed, ask)
             seen = _count_or_zero(ask.get("events"))
-            head["events"] = followed.texts_after(seen if seen <= followed.event_count else 0)
+            events = followed.texts_after(seen if seen <= followed.event_count else 0)
+            head["events"] = [one | {"text": in_language(one["text"], language)} for one in events]
         if ask.get("fit") != self.fit_version:
-            head["fit"] = self._about_fit()
+            head["fit"] = self._about_fit(language)
         head["records"] = self._new_records(ask.get("records"))
         head["poses"] = self._new_poses(_count_or_zero(ask.get("poses")))
         return pack(head)
 
-    def _about_bench(self) -> dict[str, Any] | None:
+    def _about_bench(self, language: str) -> dict[str, Any] | None:
         if self.state is None:
             return None
-        about = asdict(self.state) | {"silent": self._silent}
+        about = asdict(self.state) | {"silent": self._silent, "text": in_language(self.state.text, language)}
         return about | {"folder": Path(self.state.folder).name}  # where it lies is no concern of a page
 
-    def _about_fit(self) -> dict[str, Any]:
+    def _about_fit(self, language: str) -> dict[str, Any]:
         fit = self.fit
         if fit is None:
             return {"version": self.fit_version}
-        lines = (*fit.lines, fit.dashed) if fit.dashed else fit.lines
+        head, *lines = (in_language(line, language) for line in (fit.head, *fit.lines, fit.dashed) if line)
         curve = vars(fit.curve) if fit.curve else None
-        about = {"head": fit.head, "lines": lines, "end_s": fit.end_s, "look": fit.look, "curve": curve}
+        about = {"head": head, "lines": lines, "end_s": fit.end_s, "look": fit.look, "curve": curve}
         return about | {"version": self.fit_version}
 
     def _new_records(self, seen: Any) -> list[dict[str, Any]]:

@@ -25,6 +25,7 @@ from levilab.runs.events import RunEvent
 from levilab.runs.find import RECORD, must_take_runs
 from levilab.runs.package import field, package, resource
 from levilab.runs.run import EVENTS, LOCK, PACKAGE, READINGS, STATES, WIRE, RunRecord, lock_of, read_record, utc_now
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -290,6 +291,8 @@ class RunWriter:
     def event(self, time_s: float | None, kind: RunEvent, text: str, **data: Any) -> None:
         """Append a line to events.jsonl."""
         event = {"utc": utc_now(), "time_s": time_s, "kind": kind, "text": text} | data
+        if isinstance(text, Text):  # for views in other languages
+            event |= {"says": text.as_table()}
         with _explain_errors(f"write the event {text!r}", self.folder):
             self._append(EVENTS, json.dumps(event, ensure_ascii=False, allow_nan=False))
             self.events += 1

@@ -15,6 +15,7 @@ from levilab.simulator.field import flux_density, flux_gradient, on_axis
 from levilab.simulator.keys import SceneError
 from levilab.simulator.model import base_field
 from levilab.simulator.numbers import Numbers, uniform
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -341,9 +342,10 @@ def advice(found: Stability) -> str:
             "(top.moment_a_m2 of the other sign)"
         )
     kilograms = found.scene.top.mass_kg
-    said = (
-        f"a top of {1000 * kilograms:.6g} g does not float over this base; the nearest that does has "
-        f"{1000 * found.nearest:.2f} g"
+    said = Text(
+        "a top of {mass:.6g} g does not float over this base; the nearest that does has {nearest:.2f} g",
+        mass=1000 * kilograms,
+        nearest=1000 * found.nearest,
     )
     asked = f".  Were grams meant?  {kilograms:g} g are top.mass_kg = {kilograms / 1000:g}"
-    return said + (asked if kilograms > HEAVIEST_KG else "")
+    return said + asked if kilograms > HEAVIEST_KG else said

@@ -5,7 +5,8 @@
 the head              JSON in UTF-8, filled up with blanks; in the place of an array stands
                       ``{"$array": [type, shape, first byte]}``, counted from the end of the head
 the arrays            little-endian, row by row, each filled up to a multiple of 4 bytes;
-                      ``<f4`` is float32, ``|b1`` is one byte for each truth value
+                      ``<f4`` is float32, ``|b1`` is one byte for each truth value; in the place of a `Text` stands
+                      ``{"$text": {"template": …, "values": …}}``
 ====================  ==================================================================================
 
 `levilab/live/page/connection.js` reads the same bytes.
@@ -20,11 +21,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.files import parse_json
+from levilab.texts.text import Text, text_from
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_REFERENCE = "$array"
+_REFERENCE, _TEXT = "$array", "$text"
 _KINDS = ("<f4", "|b1")
 
 
@@ -51,6 +53,8 @@ def _with_references(value: Any, parts: list[bytes]) -> Any:
         first = sum(map(len, parts))
         parts.append(data + bytes(-len(data) % 4))
         return {_REFERENCE: [kind, value.shape, first]}
+    if isinstance(value, Text):
+        return {_TEXT: value.as_table()}
     if isinstance(value, dict):
         return {key: _with_references(item, parts) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -71,6 +75,8 @@ def unpack(data: bytes) -> Any:
 def _with_arrays(value: Any, data: bytes) -> Any:
     if isinstance(value, dict) and value.keys() == {_REFERENCE}:
         return _array(data, *value[_REFERENCE])
+    if isinstance(value, dict) and value.keys() == {_TEXT}:
+        return text_from(value[_TEXT])
     if isinstance(value, dict):
         return {key: _with_arrays(item, data) for key, item in value.items()}
     return [_with_arrays(item, data) for item in value] if isinstance(value, list) else value

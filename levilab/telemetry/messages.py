@@ -35,6 +35,13 @@ def _must_be(kind: type[np.generic], *width: int) -> PlainValidator:
     return PlainValidator(check)
 
 
+def _must_be_text(value: Any) -> str:
+    """Return a text as it is: pydantic would make a plain one of a `Text`."""
+    if not isinstance(value, str):
+        raise TypeError("a text is expected")
+    return value
+
+
 def _same_length(*arrays: NDArray[Any]) -> None:
     if len({len(one) for one in arrays}) > 1:
         raise ValueError("arrays of one length are expected")
@@ -114,7 +121,7 @@ class State:
     elapsed_s: float | None = None
     experiment: str = ""
     folder: str = ""
-    text: str = ""
+    text: Annotated[str, PlainValidator(_must_be_text)] = ""
     share: float | None = None
     time_left_s: float | None = None
     least_left_s: float | None = None

@@ -1,6 +1,8 @@
 // The connection to the server: the page asks for a frame, draws it, and asks for the next. Nothing queues.
 
-export const GONE = "the server is gone: start levilab live again";
+import {LANGUAGE, phrase} from "./words.js";
+
+export const GONE = phrase("the server is gone: start levilab live again");
 
 /** A frame with its arrays, row by row, as levilab/telemetry/codec.py packs it. */
 export function unpack(buffer) {
@@ -30,7 +32,7 @@ export function connect({run, ask, show, changed}) {
 
   function open() {
     if (closed) return;
-    socket = new WebSocket(`ws://${location.host}${location.pathname}frames?run=${encodeURIComponent(run)}`);
+    socket = new WebSocket(`ws://${location.host}${location.pathname}frames?run=${encodeURIComponent(run)}&language=${LANGUAGE}`);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
       pause = 250;
@@ -73,7 +75,7 @@ export async function read(path) {
 /** Send something to the server, with the token. Returns its answer; {error} says what is wrong. */
 export async function send(path, body, headers) {
   try {
-    return await (await fetch(path, {method: "POST", body, headers})).json();
+    return await (await fetch(`${path}?language=${LANGUAGE}`, {method: "POST", body, headers})).json();
   } catch {
     return {error: GONE};
   }

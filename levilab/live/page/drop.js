@@ -1,6 +1,7 @@
 // Files that are dropped into a page, or chosen in it: they go to the server, which keeps and reads them.
 
 import {send} from "./connection.js";
+import {phrase} from "./words.js";
 
 /** Send a file. Returns its id on the server, or {error}. */
 export const sendFile = (file, token) =>
@@ -34,7 +35,7 @@ export function takeDrops(token, opened, say) {
 export async function takeFiles(files, token, opened, say) {
   let last = "";
   for (const file of files) {
-    say(`Reading ${file.name}…`);
+    say(phrase("Reading {name}…", {name: file.name}));
     const {file: id, error} = await sendFile(file, token);
     if (error) return say(error);
     last = id;

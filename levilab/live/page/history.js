@@ -1,7 +1,7 @@
 // The last minutes of a bench, run or no run: the spin as it is counted, the drive, and their difference.
 
 import {decimals, extent, line, ticks, upright} from "./plot.js";
-import {colours, fixed, lapse} from "./words.js";
+import {colours, fixed, lapse, phrase} from "./words.js";
 
 /** The time that is shown, at most and at least [s of bench time]: a free top is down 90 s after it was put up. */
 const SHOWN_S = 180, LEAST_S = 60;
@@ -13,7 +13,7 @@ const LEAST_HZ = 2, LEAST_OFF_HZ = 0.2;
 const USUAL_HZ = [20, 35];
 /** Changes of the drive's frequency that are kept, to count its turns: a ramp makes two a second. */
 const MOST_CHANGES = 100;
-const LEFT = 58, RIGHT = 84, TOP = 10, BOTTOM = 34, GAP = 24;
+const LEFT = 58, LEAST_RIGHT_PX = 84, TOP = 10, BOTTOM = 34, GAP = 24;
 
 /** The values of the last minutes, each [time, spin, drive]; NaN where no top is counted, or the drive is off. */
 export function openHistory() {
@@ -71,6 +71,7 @@ export function openHistory() {
 export function drawHistory(paper, {rows, marks}) {
   const paint = colours(), {context: c} = paper;
   const [width, height] = paper.fit();
+  const right = Math.max(LEAST_RIGHT_PX, 10 + Math.max(...["top", "drive"].map((name) => c.measureText(`${phrase(name)} 00.00`).width)));
   const now = rows.at(-1)[0], shown = Math.min(Math.max(now - rows[0][0], LEAST_S), SHOWN_S);
   const differences = rows.map(([, spin, drive]) => spin - drive);
   const known = (values) => values.filter(Number.isFinite);
@@ -81,7 +82,7 @@ export function drawHistory(paper, {rows, marks}) {
   const counted = known(rows.flatMap(([, spin, drive]) => [spin, drive]));
   const ys = atLeast(counted.length ? extent([counted], 0.08) : USUAL_HZ, LEAST_HZ);
   const reach = Math.max(LEAST_OFF_HZ, Math.min(2, 1.15 * Math.max(0, ...known(differences).map(Math.abs))));
-  const toX = (time) => width - RIGHT + (time - now) / shown * (width - LEFT - RIGHT);
+  const toX = (time) => width - right + (time - now) / shown * (width - LEFT - right);
   const toY = (value) => split - (value - ys[0]) / (ys[1] - ys[0]) * (split - TOP);
   const middle = bottom - below / 2, toOff = (value) => middle - value / reach * below / 2;
 
@@ -94,28 +95,28 @@ export function drawHistory(paper, {rows, marks}) {
   for (const [from, to] of driven ? [[TOP, split], [bottom - below, bottom]] : [[TOP, bottom]]) {
     line(c, times.map((time) => [toX(now + time), from, toX(now + time), to]));
   }
-  line(c, yMarks.map((mark) => [LEFT, toY(mark), width - RIGHT, toY(mark)]));
+  line(c, yMarks.map((mark) => [LEFT, toY(mark), width - right, toY(mark)]));
   c.textAlign = "right";
   for (const mark of yMarks) c.fillText(fixed(mark, decimals(yMarks)), LEFT - 7, toY(mark));
   c.textAlign = "center";
-  for (const time of times) c.fillText(time ? lapse(time).replace(" min", "") : "now", toX(now + time), bottom + 11);
-  c.fillText("bench time before now", (LEFT + width - RIGHT) / 2, height - 8);
-  upright(c, "frequency [Hz]", 11, (TOP + split) / 2);
+  for (const time of times) c.fillText(time ? lapse(time).replace(" min", "") : phrase("now"), toX(now + time), bottom + 11);
+  c.fillText(phrase("bench time before now"), (LEFT + width - right) / 2, height - 8);
+  upright(c, phrase("frequency [Hz]"), 11, (TOP + split) / 2);
   c.strokeStyle = paint.line;
-  c.strokeRect(LEFT + 0.5, TOP + 0.5, width - LEFT - RIGHT - 1, split - TOP - 1);
+  c.strokeRect(LEFT + 0.5, TOP + 0.5, width - LEFT - right - 1, split - TOP - 1);
   if (driven) {
-    c.strokeRect(LEFT + 0.5, bottom - below + 0.5, width - LEFT - RIGHT - 1, below - 1);
+    c.strokeRect(LEFT + 0.5, bottom - below + 0.5, width - LEFT - right - 1, below - 1);
     c.strokeStyle = paint.soft;
-    line(c, [[LEFT, middle, width - RIGHT, middle]]);
+    line(c, [[LEFT, middle, width - right, middle]]);
     c.textAlign = "right";
     for (const mark of [-reach, 0, reach]) c.fillText(fixed(0.8 * mark, 2), LEFT - 7, toOff(0.8 * mark));
     c.textAlign = "left";
-    c.fillText("top − drive [Hz]", LEFT, bottom - below - 11);
+    c.fillText(phrase("top − drive [Hz]"), LEFT, bottom - below - 11);
   }
 
   c.save();
   c.beginPath();
-  c.rect(LEFT, 0, width - LEFT - RIGHT, bottom);
+  c.rect(LEFT, 0, width - LEFT - right, bottom);
   c.clip();
   course(c, rows, (row) => row[2], toX, toY, paint.newton, 3.5);
   course(c, rows, (row) => row[1], toX, toY, paint.reading, 1.8);
@@ -134,15 +135,15 @@ export function drawHistory(paper, {rows, marks}) {
 
   // what each line is stands at its end
   c.textAlign = "left";
-  const [, spin, drive] = rows.at(-1), ends = [["top", spin, paint.reading], ["drive", drive, paint.newton]].filter((one) => Number.isFinite(one[1]));
+  const [, spin, drive] = rows.at(-1), ends = [[phrase("top"), spin, paint.reading], [phrase("drive"), drive, paint.newton]].filter((one) => Number.isFinite(one[1]));
   const [one, two] = ends.map(([, value]) => toY(value));
   const apart = two === undefined || Math.abs(one - two) >= 15 ? 0 : (15 - Math.abs(one - two)) / 2 * (one <= two ? -1 : 1);
   ends.forEach(([name, value, colour], k) => {
     c.fillStyle = colour;
-    c.fillText(`${name} ${value.toFixed(2)}`, width - RIGHT + 6, Math.min(Math.max(toY(value) + (k ? -apart : apart), TOP + 6), split - 6));
+    c.fillText(`${name} ${fixed(value, 2)}`, width - right + 6, Math.min(Math.max(toY(value) + (k ? -apart : apart), TOP + 6), split - 6));
   });
-  const said = ends.map(([name, value]) => `${name} at ${value.toFixed(2)} hertz`).join(", ") || "no top is counted";
-  return `the last ${lapse(now - rows[0][0])} of the bench: ${said}`;
+  const said = ends.map(([name, value]) => phrase("{name} at {value} hertz", {name, value: fixed(value, 2)})).join(", ") || phrase("no top is counted");
+  return phrase("the last {time} of the bench: {said}", {time: lapse(now - rows[0][0]), said});
 }
 
 /** Widen a range about its middle to a least width. */

@@ -6,19 +6,20 @@ import {drawHistory, openHistory} from "./history.js";
 import {drawReadings, drawRecords, saidOf, sheet, tableOf} from "./plot.js";
 import {openPractice, watchPractice} from "./practice.js";
 import {openSound} from "./sound.js";
-import {between, by, fixed, lapse, make, option, short, typeset, write} from "./words.js";
+import {between, by, fixed, lapse, make, option, phrase, short, turnLanguage, typeset, write} from "./words.js";
 
 /** Least time between spoken news [ms]. */
 const NEWS_EVERY_MS = 6000;
 /** Events in the list. */
 const MOST_EVENTS = 200;
 const STATES = {
-  none: "no run yet", running: "running", finished: "finished", interrupted: "interrupted", failed: "failed",
-  setup: "starting", slow: "the bench is slow", silent: "bench silent", lost: "instrument lost", missing: "no run", unreachable: "server gone", idle: "ready",
+  none: phrase("no run yet"), running: phrase("running"), finished: phrase("finished"), interrupted: phrase("interrupted"), failed: phrase("failed"),
+  setup: phrase("starting"), slow: phrase("the bench is slow"), silent: phrase("bench silent"), lost: phrase("instrument lost"), missing: phrase("no run"),
+  unreachable: phrase("server gone"), idle: phrase("ready"), unreadable: phrase("unreadable"),
 };
 const LONGER = {  // what stands beside the state
-  slow: "this computer has other work; the bench goes on by itself",
-  unreachable: "it is tried again; start levilab live again if it was ended",
+  slow: phrase("this computer has other work; the bench goes on by itself"),
+  unreachable: phrase("it is tried again; start levilab live again if it was ended"),
 };
 /** A record of the oscilloscope that is older is marked with its age [s of bench time; where that is faster, of the wall]: without pulses a count takes 2.5 s. */
 const OLD_S = 3;
@@ -26,8 +27,9 @@ const OLD_S = 3;
 const OWN_BENCH = ".";
 /** What a practice bench's oscilloscope shows, from above. */
 const CHANNELS = ["tape", "drive", "laser"];
-const SET_UP = "The bench is being set up: some seconds, up to a minute at the first start, which compiles.";
-const PAUSED = "The view is paused, and shows nothing of what the bench would do: “Go on” first.";
+const SET_UP = phrase("The bench is being set up: some seconds, up to a minute at the first start, which compiles.");
+const PAUSED = phrase("The view is paused, and shows nothing of what the bench would do: “Go on” first.");
+const NO_VALUE = phrase("––.––––");
 const SLIP_HZ = 0.2, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive, on a ramp, too, which a count is 0.1 Hz behind; while it swings
 
 const token = takeToken();
@@ -169,7 +171,7 @@ function markFall() {
   fellAt = data.lastUp;
   by("replay").hidden = true;
   const spin = history.rows.findLast((row) => Number.isFinite(row[1]))?.[1];
-  history.mark(data.lastUp, spin ? `fell at ${spin.toFixed(1)} Hz` : "fell");
+  history.mark(data.lastUp, spin ? phrase("fell at {spin} Hz", {spin: fixed(spin, 1)}) : phrase("fell"));
   dirty.plot = true;
 }
 
@@ -193,7 +195,7 @@ async function openTop() {
   } catch (error) {
     space = {add: () => {}};
     by("no-space").hidden = false;
-    write("no-space", `This browser draws no three dimensions: ${error.message}`);
+    write("no-space", phrase("This browser draws no three dimensions: {why}", {why: error.message}));
   }
   dirty = {plot: true, trace: true};
 }
@@ -222,32 +224,36 @@ function show() {
   }
   document.body.dataset.state = state;
   write("state-word", STATES[state] || state);
-  const lost = bench?.lost?.length ? `the ${bench.lost.join(" and the ")} does not answer` : "";
+  const lost = bench?.lost?.length ? phrase("the {instruments} does not answer", {instruments: bench.lost.map((kind) => phrase(kind)).join(phrase(" and the "))}) : "";
   const running = about?.status === "running" || practice;
   const down = Boolean(practice) && data.up === false && Boolean(bench) && !bench.silent && !bench.folder;
-  const advice = !down ? "" : [bench.text || "the top is down", ...practice.guest ? [] : [data.count ? "“Analyze” the run, or “Top back”" : "“Top back” floats it again"]].join("; ");
+  const advice = !down ? "" : [bench.text || phrase("the top is down"), ...practice.guest ? [] : [data.count ? phrase("“Analyze” the run, or “Top back”") : phrase("“Top back” floats it again")]].join("; ");
   write("state-text", lost || LONGER[state] || advice || about?.problem || ended(about) || (running && !bench?.silent && bench?.text) || "");
   by("synthetic").hidden = !(about?.synthetic || (!about && bench?.virtual));
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
   write("elapsed", Number.isFinite(elapsed) ? lapse(elapsed) : "");
   const left = leftOf(about, bench, elapsed);
-  const pace = practice && bench?.speed !== 1 ? " of bench time" : "";
-  write("left", left ? `${left}${pace} left` : "");
+  const isPaced = practice && bench?.speed !== 1;
+  write("left", !left ? "" : isPaced ? phrase("{time} of bench time left", {time: left}) : phrase("{time} left", {time: left}));
   showBar(about, bench);
   showCounter(bench, last);
   showGenerator(bench, last);
   showMagnetometer(bench, last);
   showFacts(about);
   document.body.classList.toggle("no-scope", !data.records.size && !practice && Boolean(about) && about.status !== "running");
-  write("count", isOfMinutes() ? "the spin as it is counted, and the drive" : data.count ? `${data.count.toLocaleString("en").replaceAll(",", "\u202f")}${data.readings?.single === false ? ", each stroke from the lowest to the highest of many" : ""}` : "");
+  write("count", isOfMinutes() ? phrase("the spin as it is counted, and the drive") : data.count ? `${data.count.toLocaleString("en").replaceAll(",", "\u202f")}${data.readings?.single === false ? phrase(", each stroke from the lowest to the highest of many") : ""}` : "");
   by("fit-head").parentElement.hidden = !data.count || !by("fit-head").textContent || isOfMinutes();
   const minutes = isOfMinutes();
   by("empty").hidden = data.count > 0 || minutes;
   by("drawn").parentElement.hidden = !data.count;
   by("csv").parentElement.hidden = !data.readings && !minutes;
-  write("readings-title", minutes ? "The last minutes" : "Readings");
-  write("empty", {none: "No run yet: levilab acquire starts one, here or in another terminal, and it appears.", idle: practice?.guest ? "No run yet: it appears here once one is recorded." : "No run yet: the guide says how to record one.", setup: " "}[state] || (about?.status === "running" ? "No reading yet: the top is being driven up." : "This run has no readings."));
-  document.title = `${state === "running" && data.count ? `${data.count} readings · ` : ""}levilab live`;
+  write("readings-title", minutes ? phrase("The last minutes") : phrase("Readings"));
+  write("empty", {
+    none: phrase("No run yet: levilab acquire starts one, here or in another terminal, and it appears."),
+    idle: practice?.guest ? phrase("No run yet: it appears here once one is recorded.") : phrase("No run yet: the guide says how to record one."),
+    setup: " ",
+  }[state] || (about?.status === "running" ? phrase("No reading yet: the top is being driven up.") : phrase("This run has no readings.")));
+  document.title = `${state === "running" && data.count ? `${phrase("{count} readings", {count: data.count})} · ` : ""}levilab live`;
   if (isReady) practice?.show(bench, about, data.count, down);
   by("own").hidden = !practice || wanted === OWN_BENCH || !seen.run || (isOwn(seen.run) ?? !wanted);  // a run that begins is listed in a moment
   space?.setSpeed?.(bench?.speed, bench?.paused || bench?.silent);
@@ -265,7 +271,7 @@ function leftOf(about, bench, elapsed) {
 
 /** How a run ended that did not finish: its last event, less the word that is its state. */
 function ended(about) {
-  return /failed|interrupted/.test(about?.status) ? (data.ended || "").replace(/^interrupted /, "") : "";
+  return /failed|interrupted/.test(about?.status) ? (data.ended || "").replace(`${STATES.interrupted} `, "") : "";
 }
 
 function showBar(about, bench) {
@@ -285,27 +291,27 @@ function showCounter(bench, last) {
   const live = bench && !bench.silent ? bench.last : {};
   const before = ofRun(bench, last);
   const spin = live.spin_frequency_hz ?? before.spin_frequency_hz ?? live.spin_seen_hz ?? before.spin_seen_hz;
-  write("spin-value", Number.isFinite(spin) ? spin.toFixed(4) : "––.––––");
+  write("spin-value", Number.isFinite(spin) ? fixed(spin, 4) : NO_VALUE);
   stale("spin-value", !bench || bench.silent);
   const trend = practice && data.about?.status !== "running" ? NaN : data.trend;  // that of the run, while it is recorded
   const much = Math.abs(trend) >= 0.0005;
   write("trend", Number.isFinite(trend) ? `${much ? (trend < 0 ? "↓ " : "↑ ") : "→ "}${fixed(trend, 4)} Hz/s` : "–");
   const counting = bench?.counting ?? data.about?.settings?.counter;
   write("gate", Number.isFinite(counting?.gate_s) ? `${short(counting.gate_s)} s` : "–");
-  write("trigger", Number.isFinite(counting?.trigger_level_v) ? `${short(counting.trigger_level_v)} V${counting.input ? `, input ${counting.input}` : ""}` : "–");
+  write("trigger", Number.isFinite(counting?.trigger_level_v) ? `${short(counting.trigger_level_v)} V${counting.input ? phrase(", input {number}", {number: counting.input}) : ""}` : "–");
   write("counter-model", modelOf("counter"));
 }
 
 function showGenerator(bench, last) {
   const drive = bench?.drive ?? data.about?.settings?.generator;
-  write("drive-value", drive?.frequency_hz ? drive.frequency_hz.toFixed(4) : Number.isFinite(last.drive_frequency_hz) ? last.drive_frequency_hz.toFixed(4) : "––.––––");
+  write("drive-value", drive?.frequency_hz ? fixed(drive.frequency_hz, 4) : Number.isFinite(last.drive_frequency_hz) ? fixed(last.drive_frequency_hz, 4) : NO_VALUE);
   stale("drive-value", !drive?.output || !bench || bench.silent);
-  write("drive-on", drive?.output ? "on" : "off");
+  write("drive-on", drive?.output ? phrase("on") : phrase("off"));
   by("drive-on").classList.toggle("on", Boolean(drive?.output));
-  write("signal", drive?.waveform ? `${drive.waveform}, ${short(drive.amplitude_vpp)} Vpp${drive.offset_v ? `, offset ${short(drive.offset_v)} V` : ""}` : "–");
+  write("signal", drive?.waveform ? `${drive.waveform}, ${short(drive.amplitude_vpp)} Vpp${drive.offset_v ? phrase(", offset {volts} V", {volts: short(drive.offset_v)}) : ""}` : "–");
   const spin = bench?.last?.spin_frequency_hz;
   const off = Number.isFinite(spin) && drive?.output ? spin - drive.frequency_hz : NaN;
-  write("lock", Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? (practice && !bench.busy && !bench.took_hold ? "takes hold" : "follows") : Math.abs(off) < SWINGS_HZ ? "near it" : "beside it"}, ${off >= 0 ? "+" : ""}${fixed(off, 3)} Hz` : "–");
+  write("lock", Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? (practice && !bench.busy && !bench.took_hold ? phrase("takes hold") : phrase("follows")) : Math.abs(off) < SWINGS_HZ ? phrase("near it") : phrase("beside it")}, ${off >= 0 ? "+" : ""}${fixed(off, 3)} Hz` : "–");
   write("generator-model", modelOf("generator"));
 }
 
@@ -315,7 +321,7 @@ function showMagnetometer(bench, last) {
   const field = from.flux_density_t, height = from.height_m ?? bench?.probe_m;
   write("field-value", Number.isFinite(field) ? fixed(field * 1000, 3) : "–");
   stale("field-value", !bench || bench.silent);
-  write("probe", Number.isFinite(height) ? `${short(height * 100)} cm above the base` : bench?.virtual ? "in its chamber" : "–");
+  write("probe", Number.isFinite(height) ? phrase("{height} cm above the base", {height: short(height * 100)}) : bench?.virtual ? phrase("in its chamber") : "–");
   write("magnetometer-model", modelOf("magnetometer"));
   write("scope-model", modelOf("oscilloscope"));
 }
@@ -329,10 +335,10 @@ function modelOf(kind) {
 let facts = "";
 function showFacts(about) {
   const rows = about ? [
-    ["experiment", about.experiment], ["started", (about.started_utc || "").replace("T", " ").replace(/\..*/, " UTC")],
-    ["ended", (about.ended_utc || "").replace("T", " ").replace(/\..*/, " UTC")], ["group", about.group], ["note", about.note],
-    ...Object.entries(about.instruments || {}).map(([kind, one]) => [kind, one.identity || one.driver]),
-    ["folder", seen.run],
+    [phrase("experiment"), about.experiment], [phrase("started"), (about.started_utc || "").replace("T", " ").replace(/\..*/, " UTC")],
+    [phrase("ended"), (about.ended_utc || "").replace("T", " ").replace(/\..*/, " UTC")], [phrase("group"), about.group], [phrase("note"), about.note],
+    ...Object.entries(about.instruments || {}).map(([kind, one]) => [phrase(kind), one.identity || one.driver]),
+    [phrase("folder"), seen.run],
   ].filter(([, text]) => text) : [];
   const now = JSON.stringify(rows);
   if (now === facts) return;
@@ -353,18 +359,18 @@ function showTop(bench) {
   }
   sound.follow(bench);
   if (!pose) return;
-  const said = space.replays ? "falls, 20 times slower" : pose.up ? `floats at ${fixed(pose.place[2] * 1000, 1)} mm` : pose.there ? "lies where it fell" : "is taken away";
+  const said = space.replays ? phrase("falls, 20 times slower") : pose.up ? phrase("floats at {height} mm", {height: fixed(pose.place[2] * 1000, 1)}) : pose.there ? phrase("lies where it fell") : phrase("is taken away");
   write("top-text", said);
-  by("space").setAttribute("aria-label", `the top over its base in three dimensions: it ${said}`);
+  by("space").setAttribute("aria-label", phrase("the top over its base in three dimensions: it {said}", {said}));
 }
 
 /** Say beside the oscilloscope that no top is up, that no instrument is read, and of each record how old it is, where it is old. */
 function showAge(bench) {
   const used = Object.keys(data.about?.instruments || {}), runs = data.about?.status === "running";
   const drawn = [...data.records.values()].some((one) => one.drawn);
-  const still = runs && used.length && !used.includes("oscilloscope") ? `a ${data.about.experiment} run does not read it` : "";
-  const why = still && drawn ? `${still}: the simulated signals` : still;
-  write("scope-key", [data.up === false ? "the top is down" : "", why].filter(Boolean).join("; "));
+  const still = runs && used.length && !used.includes("oscilloscope") ? phrase("a {experiment} run does not read it", {experiment: data.about.experiment}) : "";
+  const why = still && drawn ? `${still}: ${phrase("the simulated signals")}` : still;
+  write("scope-key", [data.up === false ? phrase("the top is down") : "", why].filter(Boolean).join("; "));
   by("trigger-of").hidden = !drawn;
   for (const one of data.records.values()) {
     const said = ageOf(one, bench);
@@ -376,9 +382,9 @@ function showAge(bench) {
 
 /** A run need not record all channels, and a counter that sees no pulse keeps the oscilloscope waiting. */
 function ageOf(record, bench) {
-  if (data.up === false && record.time_s <= data.lastUp) return "before the fall";
+  if (data.up === false && record.time_s <= data.lastUp) return phrase("before the fall");
   const age = bench ? bench.time_s - record.time_s : 0;
-  return age > OLD_S * Math.max(1, bench?.speed || 1) ? `${lapse(age)} ago` : "";
+  return age > OLD_S * Math.max(1, bench?.speed || 1) ? phrase("{time} ago", {time: lapse(age)}) : "";
 }
 
 /** Say the last reading to those who listen, at most every few seconds. */
@@ -386,7 +392,8 @@ function speak(state, left) {
   const now = performance.now();
   if (now - spoken < NEWS_EVERY_MS) return;
   const spin = data.last.spin_frequency_hz;
-  const text = data.count ? `${STATES[state] || state}: reading ${data.count}${Number.isFinite(spin) ? `, ${spin.toFixed(2)} hertz` : ""}${left ? `, ${left} left` : ""}` : STATES[state] || state;
+  const parts = [phrase("reading {number}", {number: data.count}), Number.isFinite(spin) ? `${fixed(spin, 2)} hertz` : "", left ? phrase("{time} left", {time: left}) : ""];
+  const text = (STATES[state] || state) + (data.count ? `: ${parts.filter(Boolean).join(", ")}` : "");
   if (by("news").textContent !== text) {
     spoken = now;
     write("news", text);
@@ -406,8 +413,8 @@ function draw() {
       drawn = null;
     } else if (data.readings) {
       drawn = drawReadings(papers.plot, {...data.readings, fit: data.fit}, pointed);
-      const said = `${data.count} readings of the ${data.readings.yAxis[0]} against ${data.readings.xAxis[0]}`;
-      by("plot").setAttribute("aria-label", pointed >= 0 ? `${said}: ${saidOf({...data.readings, fit: data.fit}, drawn, pointed)}` : `${said}; the arrow keys go from one to the next`);
+      const said = phrase("{count} readings of the {y} against {x}", {count: data.count, y: phrase(data.readings.yAxis[0]), x: phrase(data.readings.xAxis[0])});
+      by("plot").setAttribute("aria-label", pointed >= 0 ? `${said}: ${saidOf({...data.readings, fit: data.fit}, drawn, pointed)}` : phrase("{said}; the arrow keys go from one to the next", {said}));
       window.levilab.drawn += 1;
     } else papers.plot.fit();
     showPointer();
@@ -458,7 +465,7 @@ by("plot").addEventListener("keydown", (event) => {
 function pause() {
   paused = !paused;
   by("pause").setAttribute("aria-pressed", String(paused));
-  write("pause", paused ? "Go on" : "Pause view");
+  write("pause", paused ? phrase("Go on") : phrase("Pause view"));
   space?.pause?.(paused);
   if (!paused && by("said").textContent === PAUSED) write("said", "");
 }
@@ -564,16 +571,17 @@ async function listRuns(chosen) {
   const select = by("run");
   select.replaceChildren(...listed.runs.map((run) => {
     const when = run.started_utc.slice(0, 16).replace("T", " ");
-    return option(`${when} ${run.experiment || run.name}${run.status === "finished" ? "" : `, ${run.status}`}`, run.name);
+    return option(`${when} ${run.experiment || run.name}${run.status === "finished" ? "" : `, ${STATES[run.status] || run.status}`}`, run.name);
   }));
   if (listed.practice && !listed.practice.runs.length && listed.runs.length) {  // the runs are older than this bench
-    select.prepend(option("no run of this bench yet", OWN_BENCH));
+    select.prepend(option(phrase("no run of this bench yet"), OWN_BENCH));
     select.value = OWN_BENCH;
   }
-  if (!listed.runs.length) select.append(option("none yet"));
+  if (!listed.runs.length) select.append(option(phrase("none yet")));
   select.value = chosen || select.value;
   return listed;
 }
+by("language").addEventListener("change", turnLanguage);
 by("run").addEventListener("focus", () => listRuns(by("run").value));
 
 async function begin() {

@@ -4,10 +4,11 @@ import {ask, takeToken} from "./connection.js";
 import {takeDrops, takeFiles} from "./drop.js";
 import {drawReadings, sheet} from "./plot.js";
 import {showResult} from "./result.js";
-import {by, make, numberIn, option, write} from "./words.js";
+import {by, local, make, numberIn, option, phrase, turnLanguage, write} from "./words.js";
 
 /** Least height of a small plot [px]. */
 const PLOT_PX = 240;
+const HEADS = [phrase("Column"), phrase("Understood as"), phrase("Unit"), phrase("First values")];
 const token = takeToken();
 let quantities = {}, look = null;
 window.levilab = {get look() { return look; }};  // what tests read
@@ -15,11 +16,11 @@ window.levilab = {get look() { return look; }};  // what tests read
 // --- what the server knows ---
 
 async function begin() {
-  if (!token) return write("said", "This page may only look: open the address that the terminal shows.");
+  if (!token) return write("said", phrase("This page may only look: open the address that the terminal shows."));
   const {files, folder, quantities: known, error} = await ask({do: "list files"}, token);
   if (error) return write("said", error);
   quantities = known;
-  write("kept-in", `Dropped files are kept in ${folder}`);
+  write("kept-in", phrase("Dropped files are kept in {folder}", {folder}));
   listFiles(files);
   takeDrops(token, open, (text) => write("said", text));
   by("chosen").disabled = false;
@@ -47,7 +48,7 @@ async function open(file) {
 async function lookAt(wanted) {
   const answer = await ask(wanted, token);
   if (answer.error) {
-    if (look) hold("It was not taken, as said above: correct it, or undo corrections.");
+    if (look) hold(phrase("It was not taken, as said above: correct it, or undo corrections."));
     return write(look ? "problem" : "said", answer.error);
   }
   look = answer;
@@ -74,15 +75,15 @@ function show() {
   by("channel").replaceChildren(...look.channels.map((name) => option(name)));
   by("channel").closest("label").hidden = look.channels.length < 2;
   by("channel").selectedIndex = Math.max(0, look.runs[0]?.columns.findIndex(({quantity}) => quantity === "signal") ?? 0);
-  by("rate").value = look.rate === null ? "" : String(Number(look.rate.toPrecision(9)));
+  by("rate").value = look.rate === null ? "" : local(String(Number(look.rate.toPrecision(9))));
   const notes = [...new Set(look.runs.flatMap(({warnings}) => warnings))];
   by("notes").replaceChildren(...notes.map((text) => make("li", inWords(text))));
   const asks = look.runs.some(({problem, doubts}) => problem && doubts.length);
-  hold(asks ? "Answer the question above first." : look.problem ? "It is not read; the reason stands above." : "");
+  hold(asks ? phrase("Answer the question above first.") : look.problem ? phrase("It is not read; the reason stands above.") : "");
   by("keep").disabled = Boolean(look.problem) || !look.words.length;
   by("again").disabled = !look.words.length;
   write("command", ["levilab analyze", look.name, ...look.words].map((word, k) => k && /[^\w.,=/-]/.test(word) ? `"${word}"` : word).join(" "));
-  const used = look.runs.flatMap(({columns}) => columns).filter(({quantity}) => quantity).map(({title, quantity, unit}) => `${title || "a column"} is ${wordsOf(quantity)} in ${unit}`);
+  const used = look.runs.flatMap(({columns}) => columns).filter(({quantity}) => quantity).map(({title, quantity, unit}) => phrase("{column} is {quantity} in {unit}", {column: title || phrase("a column"), quantity: wordsOf(quantity), unit}));
   write("news", inWords(look.problem) || `${look.name}: ${used.join(", ")}`);
 }
 
@@ -92,7 +93,7 @@ function hold(why) {
   write("why", why);
 }
 
-const wordsOf = (quantity) => quantities[quantity]?.words || quantity;
+const wordsOf = (quantity) => phrase(quantities[quantity]?.words || quantity);
 
 /** A question with a button for each answer. */
 function doubtOf({kind, text, choices}) {
@@ -101,7 +102,7 @@ function doubtOf({kind, text, choices}) {
   box.setAttribute("aria-label", text);
   box.append(make("p", text));
   if (kind === "titles") {  // each column could be each of them: the table below has the choice
-    box.append(make("p", "Choose below what the columns are."));
+    box.append(make("p", phrase("Choose below what the columns are.")));
     return box;
   }
   const row = make("div", "", "row");
@@ -125,41 +126,41 @@ function runOf(run, number) {
   if (run.problem && !run.doubts.length) box.append(make("p", inWords(run.problem), "said"));
   if (!run.columns.length) return box;
   const table = make("table"), head = make("tr"), body = make("tbody"), top = make("thead");
-  for (const text of ["Column", "Understood as", "Unit", "First values"]) head.append(Object.assign(make("th", text), {scope: "col"}));
+  for (const text of HEADS) head.append(Object.assign(make("th", text), {scope: "col"}));
   top.append(head);
   body.append(...run.columns.map((column) => rowOf(column, run)));
-  table.append(make("caption", `columns of ${run.name || look.name}`, "hidden"), top, body);
+  table.append(make("caption", phrase("columns of {name}", {name: run.name || look.name}), "hidden"), top, body);
   box.append(table);
   if (look.plots[number]) {
     const canvas = make("canvas");
     canvas.id = `plot-${number}`;
     canvas.setAttribute("role", "img");
     const {x, x_axis: [xName], y_axis: [yName]} = look.plots[number];
-    canvas.setAttribute("aria-label", `${x.length} points: ${yName} against ${xName}`);
+    canvas.setAttribute("aria-label", phrase("{count} points: {y} against {x}", {count: x.length, y: phrase(yName), x: phrase(xName)}));
     box.append(canvas);
   }
   return box;
 }
 
 function rowOf(column, run) {
-  const row = make("tr", "", column.quantity ? "used" : ""), title = column.title || `column ${column.index + 1}`;
+  const row = make("tr", "", column.quantity ? "used" : ""), title = column.title || phrase("column {number}", {number: column.index + 1});
   const cells = [Object.assign(make("th", title), {scope: "row"}), make("td"), make("td"), make("td", column.values.join("  "), "values")];
   if (look.channels.length || !quantities[column.quantity || "time_s"]) {
-    cells[1].textContent = column.quantity ? `${column.quantity}, is analyzed` : "not used";
+    cells[1].textContent = column.quantity ? phrase("{quantity}, is analyzed", {quantity: column.quantity}) : phrase("not used");
     cells[2].textContent = column.unit;
   } else {
-    const quantity = selectOf(`what ${title} is`, {"": "not used", ...Object.fromEntries(Object.entries(quantities).map(([name, {words}]) => [name, words]))}, column.quantity || "");
+    const quantity = selectOf(phrase("what {title} is", {title}), {"": phrase("not used"), ...Object.fromEntries(Object.keys(quantities).map((name) => [name, wordsOf(name)]))}, column.quantity || "");
     quantity.addEventListener("change", () => change(column, run, {quantity: quantity.value, unit: ""}));
     cells[1].append(quantity);
     if (column.quantity) {
       const names = [...new Set([column.unit, ...quantities[column.quantity].units])];
-      const words = (unit) => unit === column.unit && column.inverse ? `${unit} a turn` : unit;
-      const unit = selectOf(`unit of ${title}`, Object.fromEntries(names.map((name) => [name, words(name)])), column.unit);
+      const words = (unit) => unit === column.unit && column.inverse ? phrase("{unit} a turn", {unit}) : unit;
+      const unit = selectOf(phrase("unit of {title}", {title}), Object.fromEntries(names.map((name) => [name, words(name)])), column.unit);
       unit.addEventListener("change", () => change(column, run, {quantity: column.quantity, unit: unit.value}));
       cells[2].append(unit);
     }
   }
-  for (const [k, name] of ["Column", "Understood as", "Unit", "First values"].entries()) cells[k].dataset.head = name;
+  for (const [k, name] of HEADS.entries()) cells[k].dataset.head = name;
   row.append(...cells);
   return row;
 }
@@ -199,12 +200,12 @@ by("channel").addEventListener("change", () => correct({...optionsNow(), channel
 by("rate").addEventListener("change", () => {
   const rate = numberIn(by("rate").value);
   if (rate > 0) correct({...optionsNow(), rate});
-  else write("problem", `samples a second: a number above 0, not ${by("rate").value}`);
+  else write("problem", phrase("samples a second: a number above 0, not {seen}", {seen: by("rate").value}));
 });
 by("again").addEventListener("click", () => correct({}));
 by("keep").addEventListener("click", async () => {
   const {kept, error} = await ask({do: "keep", file: look.file}, token);
-  write("news", error || `kept in ${kept}`);
+  write("news", error || phrase("kept in {file}", {file: kept}));
   if (error) write("problem", error);
   else await lookAt({do: "look at a file", file: look.file});
 });
@@ -216,6 +217,7 @@ by("analyze").addEventListener("click", async () => {
     async () => (await ask({do: "analyze a file", file}, token)).error || "", `file/${file}`, () => look.file === file, () => {});
 });
 
+by("language").addEventListener("change", turnLanguage);
 by("files").addEventListener("change", () => open(by("files").value));
 by("chosen").addEventListener("change", async () => {
   await takeFiles(by("chosen").files, token, open, (text) => write("said", text));

@@ -1,7 +1,7 @@
 // Pictures of readings and of records on a canvas. They are drawn when there is something new, and not otherwise.
 
 import {drawnBySoftware} from "./top.js";
-import {colours, fixed, short} from "./words.js";
+import {colours, fixed, phrase, short} from "./words.js";
 
 /** Without a graphics card an accelerated canvas costs four times as much as one in memory. */
 export const SOFTWARE = drawnBySoftware();
@@ -134,7 +134,7 @@ export function drawReadings(paper, data, pointed) {
     const one = [5, 2, 1].map((k) => k * power).find((k) => k <= 0.8 * reach * fy);
     for (const mark of [-one, 0, one]) c.fillText(short(mark, 2), edge - 7, toLeft(mark / fy));
     c.textAlign = "left";
-    c.fillText("readings − fit", edge, bottom - below - 10);
+    c.fillText(phrase("readings − fit"), edge, bottom - below - 10);
     c.strokeStyle = paint.line;
     c.strokeRect(edge + 0.5, bottom - below + 0.5, width - edge - RIGHT - 1, below - 1);
   }
@@ -201,10 +201,10 @@ export function saidOf(data, drawn, k) {
   const [fx, fy] = [data.xAxis[2], data.yAxis[2]];
   const unit = data.yAxis[1], digits = unit === "Hz" ? 4 : 3;
   const x = `${short(data.x[k] * fx, 6)} ${data.xAxis[1]}`;
-  const value = data.single ? fixed(data.low[k] * fy, digits) : `${fixed(data.low[k] * fy, digits)} to ${fixed(data.high[k] * fy, digits)}`;
+  const value = data.single ? fixed(data.low[k] * fy, digits) : phrase("{first} to {last}", {first: fixed(data.low[k] * fy, digits), last: fixed(data.high[k] * fy, digits)});
   const u = data.single && data.u ? ` ± ${short(data.u[k] * fy, 2)}` : "";
-  const left = data.fit && Number.isFinite(drawn.left[k]) ? `, ${drawn.left[k] >= 0 ? "+" : ""}${short(drawn.left[k] * fy, 2)} from the fit` : "";
-  return `${value}${u} ${unit} at ${x}${left}`;
+  const left = data.fit && Number.isFinite(drawn.left[k]) ? phrase(", {residual} from the fit", {residual: `${drawn.left[k] >= 0 ? "+" : ""}${short(drawn.left[k] * fy, 2)}`}) : "";
+  return phrase("{value} at {x}", {value: `${value}${u} ${unit}`, x}) + left;
 }
 
 /** What is drawn of readings as a table of text, in the units of the axes; of many readings the lowest and the highest. */
@@ -227,7 +227,7 @@ function nearest(x, toX, px) {
   return best;
 }
 
-const named = ([label, unit]) => unit ? `${label} [${unit}]` : label;
+const named = ([label, unit]) => unit ? `${phrase(label)} [${unit}]` : phrase(label);
 
 export function upright(c, text, x, y) {
   c.save();
@@ -314,8 +314,8 @@ export function drawRecords(paper, records, source) {
     c.fillStyle = paint.dim;
     c.textAlign = "center";
     c.textBaseline = "middle";
-    c.fillText("no record yet", width / 2, height / 2);
-    return "no record yet";
+    c.fillText(phrase("no record yet"), width / 2, height / 2);
+    return phrase("no record yet");
   }
   const [by, triggered] = trigger(records, source), first = Math.min(...records.map((one) => one.start_s));
   const begin = by ? triggered - BEFORE_S : first;
@@ -350,13 +350,14 @@ export function drawRecords(paper, records, source) {
     c.fillStyle = c.strokeStyle;
     c.textAlign = "left";
     c.textBaseline = "top";
-    c.fillText(`${one.channel}  ${short(from, 2)} … ${short(to, 2)} V${old}`, 8, channel * band + 6);
-    said.push(`${one.channel} from ${short(from, 2)} to ${short(to, 2)} volts${old}`);
+    c.fillText(`${phrase(one.channel)}  ${short(from, 2)} … ${short(to, 2)} V${old}`, 8, channel * band + 6);
+    said.push(phrase("{channel} from {low} to {high} volts", {channel: phrase(one.channel), low: short(from, 2), high: short(to, 2)}) + old);
   });
   c.fillStyle = paint.dim;
   c.textAlign = "right";
   c.textBaseline = "top";
   const division = `${short((end - begin) * 100, 3)} ms`;
-  c.fillText(width < 400 ? `${division}/div` : `${division} a division${by ? `, triggered by the ${by}` : ""}`, width - 8, 6);
-  return `${said.join(", ")}, over ${short((end - begin) * 1000, 3)} milliseconds${by ? `, triggered by the ${by}` : ""}`;
+  const triggeredBy = by ? phrase(", triggered by the {channel}", {channel: phrase(by)}) : "";
+  c.fillText(width < 400 ? phrase("{time}/div", {time: division}) : phrase("{time} a division", {time: division}) + triggeredBy, width - 8, 6);
+  return `${said.join(", ")}${phrase(", over {time} milliseconds", {time: short((end - begin) * 1000, 3)})}${triggeredBy}`;
 }

@@ -1,7 +1,7 @@
 // The bench for practice: controls that send commands, and the guide that shows how far one is.
 
 import {showResult} from "./result.js";
-import {by, fixed, lapse, make, numberIn, option, write} from "./words.js";
+import {by, fixed, lapse, local, make, numberIn, option, phrase, short, write} from "./words.js";
 
 /** Least time between two messages of a slider [ms]. */
 const SENDS_EVERY_MS = 120;
@@ -21,11 +21,11 @@ export function watchPractice() {
 export function openPractice(about, command, run, isOwn, allowed) {
   document.body.classList.add("practice");
   by("practice").hidden = false;
-  for (const {name, title} of about.experiments) by("experiment").append(option(title, name));
+  for (const {name, title} of about.experiments) by("experiment").append(option(phrase(title), name));
   const now = {drive: false, busy: false, paused: false, analyzed: "", ended: false, elsewhere: null, bench: null};
 
   by("controls").disabled = true;  // until the bench is there
-  if (!allowed) write("said", "This page may only look: open the address that the terminal shows.");
+  if (!allowed) write("said", phrase("This page may only look: open the address that the terminal shows."));
 
   async function send(what, values = {}) {
     if (allowed) write("said", "");  // and not later: what the bench says may come before the answer
@@ -56,10 +56,11 @@ export function openPractice(about, command, run, isOwn, allowed) {
     const pass = () => {
       const value = numberIn(field.value), empty = field.value.trim() === "";
       const wrong = !empty && !(value >= Number(min) && value <= Number(max));
-      write(`${id}-wrong`, wrong ? `${Number.isFinite(value) ? "" : "a number "}from ${min} to ${max}, not ${field.value.trim()}` : "");
+      write(`${id}-wrong`, wrong ? phrase(Number.isFinite(value) ? "from {min} to {max}, not {seen}" : "a number from {min} to {max}, not {seen}", {min, max, seen: field.value.trim()}) : "");
       field.setAttribute("aria-invalid", String(wrong));
       if (wrong || empty) return;
-      field.value = by(slider).value = String(value);
+      by(slider).value = String(value);
+      field.value = local(String(value));
       tune({[key]: value});
     };
     field.addEventListener("change", pass);
@@ -70,10 +71,10 @@ export function openPractice(about, command, run, isOwn, allowed) {
       stepBy(id, way * Number(size));
     });
     by(slider).addEventListener("input", () => {
-      field.value = by(slider).value;
+      field.value = local(by(slider).value);
       write(`${id}-wrong`, "");
       field.setAttribute("aria-invalid", "false");
-      tune({[key]: Number(field.value)});
+      tune({[key]: Number(by(slider).value)});
     });
   };
   pair("frequency", "frequency-slider", "frequency_hz");
@@ -98,10 +99,10 @@ export function openPractice(about, command, run, isOwn, allowed) {
 
   // what if
   const knobs = Object.entries(about.what_if).map(([name, row]) => {
-    const label = make("label", "", "quantity"), value = make("output"), input = make("input"), small = make("small", row.shows);
+    const label = make("label", "", "quantity"), value = make("output"), input = make("input"), small = make("small", phrase(row.shows)), title = phrase(row.title);
     Object.assign(input, {type: "range", min: row.low, max: row.high, step: row.step, value: row.usual});
-    input.setAttribute("aria-label", `${row.title}, ${row.unit || "as a part of the moment"}`);
-    label.append(make("span", row.title), value, input, small);
+    input.setAttribute("aria-label", `${title}, ${row.unit || phrase("as a part of the moment")}`);
+    label.append(make("span", title), value, input, small);
     by("quantities").append(label);
     const decimals = row.step < 0.01 ? 3 : row.step < 0.1 ? 2 : 1;
     let wait = 0;
@@ -130,7 +131,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
 
   // tasks
   const tasks = Object.fromEntries(about.tasks.map((row) => {
-    const item = make("li"), button = make("button", row.title);
+    const item = make("li"), button = make("button", phrase(row.title));
     button.addEventListener("click", () => send("begin a task", {task: row.name}));
     item.append(button);
     by("task-list").append(item);
@@ -144,13 +145,13 @@ export function openPractice(about, command, run, isOwn, allowed) {
     by("guide").hidden = Boolean(row);
     by("task").inert = !allowed;
     by("task-share").value = bench.task_share;
-    write("tasks-done", bench.tasks_done.length ? `${bench.tasks_done.length} of ${about.tasks.length} done` : "");
+    write("tasks-done", bench.tasks_done.length ? phrase("{done} of {all} done", {done: bench.tasks_done.length, all: about.tasks.length}) : "");
     for (const [name, {item}] of Object.entries(tasks)) item.className = bench.tasks_done.includes(name) ? "done" : "";
     if (bench.task === shownTask) return;
     shownTask = bench.task;
     if (!row) return;
-    write("task-title", row.title);
-    write("task-does", row.does);
+    write("task-title", phrase(row.title));
+    write("task-does", phrase(row.does));
     const answers = Object.entries(row.answers);
     by("task-share").hidden = answers.length > 0;
     by("answers").replaceChildren(...answers.map(([text, value]) => {
@@ -164,8 +165,9 @@ export function openPractice(about, command, run, isOwn, allowed) {
   /** Say what the chosen experiment finds out, and how long it takes at the present speed of the bench. */
   function sayWhatItAsks() {
     const {asks, length_s} = about.experiments.find(({name}) => name === by("experiment").value);
-    const speed = Number(by("speed").value), soon = speed === 1 ? "" : `, ${lapse(length_s / speed)} at ${speed} ×`;
-    write("asks", `${asks} About ${lapse(length_s)} of the bench${soon}.`);
+    const speed = Number(by("speed").value), length = lapse(length_s);
+    const soon = speed === 1 ? phrase("About {length} of the bench.", {length}) : phrase("About {length} of the bench, {time} at {speed} ×.", {length, time: lapse(length_s / speed), speed: short(speed)});
+    write("asks", `${phrase(asks)} ${soon}`);
   }
   for (const id of ["experiment", "speed"]) by(id).addEventListener("change", sayWhatItAsks);
   sayWhatItAsks();
@@ -174,7 +176,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
   function stepBy(id, step) {
     const field = by(id), value = numberIn(field.value) + step;
     const {min, max} = field.dataset;
-    if (Number.isFinite(value)) field.value = Math.min(Math.max(value, Number(min)), Number(max)).toFixed(2);
+    if (Number.isFinite(value)) field.value = fixed(Math.min(Math.max(value, Number(min)), Number(max)), 2);
     field.dispatchEvent(new Event("change"));
   }
 
@@ -194,7 +196,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     const elsewhere = Boolean(bench.folder) && !bench.busy;  // another program's bench records the run that is shown
     if (elsewhere !== now.elsewhere) {
       by("controls").disabled = !allowed || elsewhere;
-      if (allowed && (elsewhere || now.elsewhere)) write("said", elsewhere ? "Another program records this run: the practice bench rests until it ends, or until you go back to it." : "");
+      if (allowed && (elsewhere || now.elsewhere)) write("said", elsewhere ? phrase("Another program records this run: the practice bench rests until it ends, or until you go back to it.") : "");
       now.elsewhere = elsewhere;
     }
     now.bench = elsewhere ? now.bench || bench : bench;
@@ -203,9 +205,9 @@ export function openPractice(about, command, run, isOwn, allowed) {
     const {drive} = bench;
     Object.assign(now, {drive: Boolean(drive?.output), busy: bench.busy, paused: bench.paused});
     by("back").classList.toggle("main", down);
-    press("drive", now.drive, now.drive ? "Drive off" : "Drive on");
-    press("hold", now.paused, now.paused ? "Let time go on" : "Stop time");
-    write("record", now.busy ? "End run" : "Record");
+    press("drive", now.drive, now.drive ? phrase("Drive off") : phrase("Drive on"));
+    press("hold", now.paused, now.paused ? phrase("Let time go on") : phrase("Stop time"));
+    write("record", now.busy ? phrase("End run") : phrase("Record"));
     for (const id of ["drive", "match", "back", "frequency", "frequency-slider", "amplitude", "amplitude-slider", "experiment"]) {
       by(id).disabled = now.busy;
     }
@@ -226,7 +228,9 @@ export function openPractice(about, command, run, isOwn, allowed) {
   function follow(id, value, decimals) {
     if (!(value > 0) || by(id).getAttribute("aria-invalid") === "true") return;  // what is wrong stays beside its message
     const text = String(Number(value.toFixed(decimals)));
-    if (by(id).value !== text) by(id).value = by(`${id}-slider`).value = text;
+    if (by(id).value === local(text)) return;
+    by(id).value = local(text);
+    by(`${id}-slider`).value = text;
   }
 
   function guide(bench, run_now, readings) {
@@ -258,6 +262,6 @@ export function openPractice(about, command, run, isOwn, allowed) {
 /** Choose the option nearest to a value; one that is not there is added. */
 function choose(select, value) {
   const text = String(value);
-  if (![...select.options].some(({value: there}) => there === text)) select.append(option(`${text} ×`, text));
+  if (![...select.options].some(({value: there}) => there === text)) select.append(option(`${local(text)} ×`, text));
   select.value = text;
 }

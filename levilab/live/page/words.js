@@ -2,6 +2,23 @@
 
 export const by = (id) => document.getElementById(id);
 
+/** What the server has put into the page: the language's decimal sign, and English text → text. */
+const TABLE = JSON.parse(by("texts").textContent);
+export const LANGUAGE = document.documentElement.lang;
+
+/** A text in the language of the page; {name} stands for a value. */
+export const phrase = (english, values = {}) => (TABLE.texts[english] ?? english).replace(/\{(\w+)\}/g, (_, name) => values[name]);
+
+/** Load the page again in the language that was chosen; the server keeps it. */
+export function turnLanguage({target}) {
+  const address = new URL(location);
+  address.searchParams.set("language", target.value);
+  location.replace(address);
+}
+
+/** Numbers in a text with the decimal sign of the language. */
+export const local = (text) => text.replace(/(?<=\d)\.(?=\d)/g, TABLE.decimal);
+
 /** Write a text into an element, and touch the page only where it changes. */
 export function write(id, text) {
   const element = by(id);
@@ -10,11 +27,11 @@ export function write(id, text) {
 
 /** Return a number with these decimals; a dash where there is none. */
 export const fixed = (value, decimals) =>
-  Number.isFinite(value) ? value.toFixed(decimals).replace("-", "−") : "–";
+  Number.isFinite(value) ? local(value.toFixed(decimals)).replace("-", "−") : "–";
 
 /** Return a number to these digits, without zeros at the end. */
 export const short = (value, digits = 4) =>
-  Number.isFinite(value) ? String(Number(value.toPrecision(digits))).replace("-", "−") : "–";
+  Number.isFinite(value) ? local(String(Number(value.toPrecision(digits)))).replace("-", "−") : "–";
 
 /** Seconds as 34 s, 2:05 min or 1:02:05. */
 export function lapse(seconds) {
@@ -33,11 +50,11 @@ export const numberIn = (text) => /^[+\u2212-]?(\d+[.,]?\d*|[.,]\d+)$/.test(text
 export function between(from, to) {
   const round = (seconds) => Math.round(seconds / 5) * 5;
   if (to < 0) return "";
-  if (round(from) <= 0) return `at most ${lapse(Math.max(5, Math.ceil(to / 5) * 5))}`;
+  if (round(from) <= 0) return phrase("at most {time}", {time: lapse(Math.max(5, Math.ceil(to / 5) * 5))});
   const [first, last] = [lapse(round(from)), lapse(round(to))];
-  if (first === last) return `about ${first}`;
+  if (first === last) return phrase("about {time}", {time: first});
   const unit = / (s|min)$/.exec(first)?.[0];
-  return `about ${unit && last.endsWith(unit) ? first.slice(0, -unit.length) : first} to ${last}`;
+  return phrase("about {first} to {last}", {first: unit && last.endsWith(unit) ? first.slice(0, -unit.length) : first, last});
 }
 
 /** Write plain notation: what follows ^ in brackets, or as a number, is raised. */

@@ -14,6 +14,7 @@ from pydantic import Field, StrictBool, TypeAdapter, ValidationError
 from levilab.errors import LevilabError
 from levilab.runs.run import LONGEST_GROUP
 from levilab.settings import Settings, in_one_line
+from levilab.texts.text import Text
 
 #: The speeds of the bench: seconds of it in one of the wall.
 SLOWEST, FASTEST = 0.1, 10.0
@@ -143,7 +144,7 @@ def command_of(table: Any) -> Command:
     try:
         return _COMMANDS.validate_python(table)
     except ValidationError as error:
-        raise CommandRefused(f"not carried out: {in_one_line(error)}") from error
+        raise CommandRefused(Text("not carried out: {why}", why=in_one_line(error))) from error
 
 
 EventKind = Literal["ready", "done", "refused", "message", "recording", "recorded", "ended"]

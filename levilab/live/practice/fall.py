@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from levilab.simulator.equilibrium import advice, stability_of
 from levilab.simulator.scene import Scene
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from levilab.simulator.equilibrium import Stability
@@ -27,10 +28,19 @@ def _why_not(found: Stability, *, hides: bool) -> str:
     """Return why no top like this floats; where the mass is to be found, without the masses that do."""
     mass, window = found.scene.top.mass_kg, found.lifted[-1] if found.lifted else None
     if window is None or window.light <= mass <= window.heavy:
-        return f"it cannot float here ({advice(found)})"
+        return Text("it cannot float here ({advice})", advice=advice(found))
     too = "too heavy" if mass > window.heavy else "too light"
-    masses = "" if hides else f": {1e3 * mass:.2f} g, and {1e3 * window.light:.2f} to {1e3 * window.heavy:.2f} g float"
-    return f"the top is {too} for this base{masses}"
+    masses = (
+        ""
+        if hides
+        else Text(
+            ": {mass:.2f} g, and {light:.2f} to {heavy:.2f} g float",
+            mass=1e3 * mass,
+            light=1e3 * window.light,
+            heavy=1e3 * window.heavy,
+        )
+    )
+    return Text("the top is {too} for this base{masses}", too=too, masses=masses)
 
 
 def cause_of_fall(
@@ -45,19 +55,33 @@ def cause_of_fall(
         driven: whether a drive held it.
         hides: whether the masses that float are to be found.
     """
-    after = f"after {after_s:.0f} s"
+    after = Text("after {seconds:.0f} s", seconds=after_s)
     if scene.base.tilt_rad:
         scene = scene.changed({"base.tilt_rad": 0.0})  # the theory is of an upright base
     found = _stability(scene.model_dump_json())
     if found.floating is None or not found.floating.spins:
-        return f"{_why_not(found, hides=hides)}, however it spins: it fell {after}"
+        return Text("{why}, however it spins: it fell {after}", why=_why_not(found, hides=hides), after=after)
     low, high = found.floating.spins[0]
     if spin_hz is None:
-        return f"it fell {after}, before its spin was counted"
-    fell = f"it fell at {spin_hz:.1f} Hz {after}"
+        return Text("it fell {after}, before its spin was counted", after=after)
+    fell = Text("it fell at {spin:.1f} Hz {after}", spin=spin_hz, after=after)
     if spin_hz < _NEAR_LOW * low:
         held = ", held down there by its drive" if driven else ""
-        return f"below {low:.1f} Hz the spin cannot hold the top, and one that wobbles falls sooner: {fell}{held}"
+        return Text(
+            "below {low:.1f} Hz the spin cannot hold the top, and one that wobbles falls sooner: {fell}{held}",
+            low=low,
+            fell=fell,
+            held=held,
+        )
     if spin_hz > _NEAR_HIGH * high:
-        return f"near {high:.1f} Hz the top is too stiff for its axis to follow the field, which alone keeps it: {fell}"
-    return f"the spin could hold it, from {low:.1f} to {high:.1f} Hz, so it swung too far: {fell}"
+        return Text(
+            "near {high:.1f} Hz the top is too stiff for its axis to follow the field, which alone keeps it: {fell}",
+            high=high,
+            fell=fell,
+        )
+    return Text(
+        "the spin could hold it, from {low:.1f} to {high:.1f} Hz, so it swung too far: {fell}",
+        low=low,
+        high=high,
+        fell=fell,
+    )

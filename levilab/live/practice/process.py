@@ -25,7 +25,7 @@ from levilab.acquisition.request import AcquisitionOptions, request_at
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.bench import open_bench
 from levilab.bench.config import Limits
-from levilab.errors import LevilabError, unquote
+from levilab.errors import LevilabError
 from levilab.interruption import watching_for_end
 from levilab.live.practice.commands import (
     AnswerTask,
@@ -52,6 +52,7 @@ from levilab.simulator.compilation import announce_compilation
 from levilab.simulator.scene import read_scene
 from levilab.telemetry.messages import State
 from levilab.telemetry.publisher import Publisher
+from levilab.texts.text import Text, text_of
 from levilab.world.bench import scene_world, virtual_wiring
 
 if TYPE_CHECKING:
@@ -179,7 +180,7 @@ def _changeable(scene: Scene) -> dict[str, Any]:
 
 
 def _in_words(spin: float | None) -> str:
-    return "no light pulses" if spin is None else f"{spin:.2f} Hz"
+    return "no light pulses" if spin is None else Text("{spin:.2f} Hz", spin=spin)
 
 
 def work(options: PracticeOptions, pipe: Connection) -> None:
@@ -192,7 +193,7 @@ def work(options: PracticeOptions, pipe: Connection) -> None:
             with Publisher() as publisher:
                 PracticeProcess(options, scene, world, pipe, publisher=publisher, end=end).run()
         except (LevilabError, InstrumentError) as error:
-            _report(pipe, "ended", unquote(str(error)))
+            _report(pipe, "ended", text_of(error))
         except Exception as error:
             _report(pipe, "ended", f"{type(error).__name__}: {error}")
             raise
@@ -352,7 +353,7 @@ class PracticeProcess:
         if self._task_share >= 1:
             task = TASKS[self._task.name]
             self._tasks_done += [self._task.name] * (self._task.name not in self._tasks_done)
-            self._say(f"reached: {task.title}. It shows: {task.teaches}", "")
+            self._say(Text("reached: {title}. It shows: {teaches}", title=task.title, teaches=task.teaches), "")
             self._leave_task()
 
     def _leave_task(self) -> None:
@@ -427,7 +428,7 @@ class PracticeProcess:
         try:
             text = self._carry_out(command)
         except (LevilabError, InstrumentError) as error:
-            self._report("refused", unquote(str(error)), number)
+            self._report("refused", text_of(error), number)
         else:
             if command is self._wanted:
                 self._number = number
@@ -466,7 +467,7 @@ class PracticeProcess:
     @singledispatchmethod
     def _carry_out(self, command: Command) -> str:
         """Carry out a command.  Returns a text of what was done; raises CommandRefused and InstrumentError."""
-        raise CommandRefused(f"{command!r}: this bench cannot do that")
+        raise CommandRefused(Text("{command}: this bench cannot do that", command=repr(command)))
 
     @_carry_out.register
     def _(self, command: SetSpeed) -> str:
@@ -494,7 +495,10 @@ class PracticeProcess:
         self._request(plan, command)  # raises where it is not possible
         if plan.experiment in NEED_A_TOP and not plan.scene and not self._floats():
             raise CommandRefused(
-                f"the top is down, and a {plan.experiment} run begins with one that floats: put the top back first"
+                Text(
+                    "the top is down, and a {experiment} run begins with one that floats: put the top back first",
+                    experiment=plan.experiment,
+                )
             )
         self._wanted, self._stopped = command, ""
         return f"the run begins: {plan.title}"
@@ -519,7 +523,9 @@ class PracticeProcess:
     def _(self, command: BeginTask) -> str:
         self._free_bench()
         if command.task and command.task not in TASKS:
-            raise CommandRefused(f"task = {command.task}: one of {', '.join(TASKS)} is expected")
+            raise CommandRefused(
+                Text("{name}: one of {known} is expected", name=f"task = {command.task}", known=", ".join(TASKS))
+            )
         self._leave_task()
         if not command.task:
             return "the task is left"
@@ -537,7 +543,9 @@ class PracticeProcess:
             raise CommandRefused("no task asks for an answer: begin one that does")
         truth = exponent_of(self._task.chance)
         if command.value != truth:
-            raise CommandRefused(f"n = {command.value:g} is not it: put the top back, and watch it once more")
+            raise CommandRefused(
+                Text("n = {value:g} is not it: put the top back, and watch it once more", value=command.value)
+            )
         self._look_at_task(command.value)
         return f"n = {truth:g} is right"
 
@@ -607,9 +615,17 @@ class PracticeProcess:
             self._hold = Hold(knobs.frequency_hz)
             return f"the drive comes on after the next count, at the top's spin, {spin:.2f} Hz"
         self._switch_on(bench, knobs.frequency_hz)
-        beside = "the counter sees no top" if spin is None else f"the top spins at {spin:.2f} Hz"
+        beside = "the counter sees no top" if spin is None else Text("the top spins at {spin:.2f} Hz", spin=spin)
         takes = "it takes hold of one that spins as fast"
-        self._say(f"drive on at {knobs.frequency_hz:g} Hz, but {beside}: {takes}", f"the drive holds no top: {takes}")
+        self._say(
+            Text(
+                "drive on at {frequency_hz:g} Hz, but {beside}: {takes}",
+                frequency_hz=knobs.frequency_hz,
+                beside=beside,
+                takes=takes,
+            ),
+            Text("the drive holds no top: {takes}", takes=takes),
+        )
         return f"the drive is on at {knobs.frequency_hz:g} Hz"
 
     def _say(self, text: str, lasting: str = "") -> None:
@@ -637,7 +653,13 @@ class PracticeProcess:
             unit = "Vpp" if found.name == "drive_amplitude_vpp" else "Hz"
             allowed = "at most" if found.is_highest else "at least"
             raise CommandRefused(
-                f"{found.value:g} {unit}: the coil of this bench stands {allowed} {found.limit:g} {unit}"
+                Text(
+                    "{value:g} {unit}: the coil of this bench stands {allowed} {limit:g} {unit}",
+                    value=found.value,
+                    unit=unit,
+                    allowed=allowed,
+                    limit=found.limit,
+                )
             )
 
     # --- the drive ---
@@ -673,7 +695,13 @@ class PracticeProcess:
         self._switch_on(bench, spin)
         hold.grip = Grip(spin, bench.generator.limits.drive_lowest_hz, bench.generator.limits.drive_frequency_hz)
         within = COUNTS * GATE_S + COMPARED_S
-        self._say(f"drive on at the top's spin, {spin:.2f} Hz; it takes hold within about {within:.0f} s")
+        self._say(
+            Text(
+                "drive on at the top's spin, {spin:.2f} Hz; it takes hold within about {within:.0f} s",
+                spin=spin,
+                within=within,
+            )
+        )
 
     def _yield(self, bench: Bench, hold: Hold, grip: Grip, spin: float | None) -> None:
         bench.generator.frequency = grip.follow(spin)
@@ -693,24 +721,36 @@ class PracticeProcess:
                 self._give_up(bench, spin, drive)
                 return
             hold.at_hz, self._took_hold = drive, True
-            self._say(f"the top follows the drive at {drive:.2f} Hz", "the top follows the drive")
+            self._say(Text("the top follows the drive at {drive:.2f} Hz", drive=drive), "the top follows the drive")
         elif off > LOST_HZ:
             hold.is_lost = True
             again = AGAIN[int(np.sign(self._knobs.frequency_hz - drive))]
             self._say(
-                f"the drive has lost the top, {_in_words(spin)} under a drive of {drive:.2f} Hz: {again}",
-                f"the drive has lost the top: {again}",
+                Text(
+                    "the drive has lost the top, {spin} under a drive of {drive:.2f} Hz: {again}",
+                    spin=_in_words(spin),
+                    drive=drive,
+                    again=again,
+                ),
+                Text("the drive has lost the top: {again}", again=again),
             )
         elif off <= SWINGS_HZ and drive >= hold.at_hz + TUNED_UP_HZ and not self._tuned_up:
             self._tuned_up = True
-            self._say(f"the top follows the drive up, to {drive:.2f} Hz by now", "the top follows the drive up")
+            self._say(
+                Text("the top follows the drive up, to {drive:.2f} Hz by now", drive=drive),
+                "the top follows the drive up",
+            )
 
     def _give_up(self, bench: Bench, spin: float | None, drive: float) -> None:
         bench.outputs_off()
         self._hold, self._knobs.on = None, False
         self._say(
-            f"the drive does not hold the top, {_in_words(spin)} under a drive of {drive:.2f} Hz, and it is off: "
-            "match the spin and switch it on again, with more volts"
+            Text(
+                "the drive does not hold the top, {spin} under a drive of {drive:.2f} Hz, and it is "
+                "off: match the spin and switch it on again, with more volts",
+                spin=_in_words(spin),
+                drive=drive,
+            )
         )
 
     @staticmethod
@@ -757,9 +797,13 @@ class PracticeProcess:
                 request = self._request(plan, command)
                 run = acquire(request, LinesToReport(partial(self._report, "message")), self._watching)
         except (LevilabError, InstrumentError) as error:
-            text, status, folder = unquote(str(error)), "failed", self._folder
+            text, status, folder = text_of(error), "failed", self._folder
         else:
-            text, status, folder = f"{run.status}: {run.count()} readings", run.status, str(run.folder)
+            text, status, folder = (
+                Text("{status}: {count} readings", status=run.status, count=run.count()),
+                run.status,
+                str(run.folder),
+            )
         self._report("recorded", text, self._number, status=status, folder=folder, scene=self.scene.as_table())
         if self._floats():
             self._up_since = self.clock.now() if self._up_since is None else self._up_since
@@ -770,7 +814,7 @@ class PracticeProcess:
         self._place_probe(self._probe_m)  # a run may have moved it
         if AFTER_A_RUN < self.clock.speed < math.inf:
             self.clock.speed = AFTER_A_RUN
-            text = f"the run is over: speed {AFTER_A_RUN:g}\u00a0× again"
+            text = Text("the run is over: speed {speed:g}\u00a0× again", speed=AFTER_A_RUN)
             self._report("message", text)  # not in the page's head: the speed may be changed
 
     @contextlib.contextmanager

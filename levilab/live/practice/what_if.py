@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.live.practice.commands import CommandRefused
 from levilab.simulator.laws import LAWS
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -84,8 +85,17 @@ def keys_of(scene: Scene, values: Mapping[str, float]) -> dict[str, Any]:
     for name, value in values.items():
         row = WHAT_IF.get(name)
         if row is None:
-            raise CommandRefused(f"{name}: one of {', '.join(WHAT_IF)} is expected")
+            raise CommandRefused(Text("{name}: one of {known} is expected", name=name, known=", ".join(WHAT_IF)))
         if not row.low <= value <= row.high:
-            raise CommandRefused(f"{row.title}: from {row.low:g} to {row.high:g} {row.unit} is expected, not {value:g}")
+            raise CommandRefused(
+                Text(
+                    "{title}: from {low:g} to {high:g} {unit} is expected, not {value:g}",
+                    title=row.title,
+                    low=row.low,
+                    high=row.high,
+                    unit=row.unit,
+                    value=value,
+                )
+            )
         keys |= row.keys(scene, value)
     return keys

@@ -1,0 +1,160 @@
+"""A text in the language of a person.
+
+English stands in the program where it is used, and is the key: `in_language` looks it up in the table of a language,
+and returns it as it is where it is not there.  A sentence with values is a `Text`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Self
+
+from levilab.errors import UsageError
+from levilab.files import parse_toml
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+FOLDER = Path(__file__).parent
+ENGLISH = "en"
+#: A value in a template: its name, and how it is written, as in an f-string; ``n`` is a text of numbers.
+_FIELD = re.compile(r"\{(\w+)(?::([+,]?[0-9]{0,2}(?:\.[0-9]{1,2})?[a-z%]?))?\}")
+_POINT = re.compile(r"(?<=\d)\.(?=\d)")
+
+
+@dataclass(frozen=True)
+class Language:
+    """A language.
+
+    Attributes:
+        name: in the language itself.
+        decimal: its decimal sign.
+        page: English text → text of the live view's pages, which they look up themselves.
+        texts: English text → text, of all.
+    """
+
+    name: str
+    decimal: str
+    page: Mapping[str, str]
+    texts: Mapping[str, str]
+
+
+def languages() -> tuple[str, ...]:
+    """Return the codes of the languages that there are, such as "de"."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+@cache
+def language_of(code: str) -> Language:
+    """Return a language.  Raises UsageError."""
+    if code not in languages():
+        raise UsageError("language", f"one of {', '.join(languages())} is expected", value=code)
+    table = parse_toml((FOLDER / f"{code}.toml").read_text(encoding="utf-8"))
+    parts = [part for part in table.values() if isinstance(part, dict)]
+    texts = {english: text for part in parts for english, text in part.items()}
+    return Language(table["name"], table["decimal"], table.get("page", {}), texts)
+
+
+class Text(str):
+    """A sentence with values.  It is the English sentence, and `in_language` says it in others.
+
+    >>> said = Text("the top follows the drive at {drive:.2f} Hz", drive=30)
+    >>> said, in_language(said, "de")
+    ('the top follows the drive at 30.00 Hz', 'der Kreisel folgt dem Antrieb bei 30,00 Hz')
+
+    Attributes:
+        template: with the names of the values in braces.
+        values: numbers, texts, or tuples of them.
+    """
+
+    __slots__ = ("template", "values")
+    template: str
+    values: Mapping[str, Any]
+
+    def __new__(cls, template: str, /, **values: Any) -> Self:
+        """Make the English sentence; the value of an error is its text."""
+        values = {name: text_of(one) if isinstance(one, BaseException) else one for name, one in values.items()}
+        self = super().__new__(cls, _fill(template, values, ENGLISH))
+        self.template, self.values = template, MappingProxyType(values)
+        return self
+
+    def __reduce__(self) -> Any:
+        """Return how it is made again in another process."""
+        return text_from, (self.as_table(),)
+
+    def as_table(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        return {"template": self.template, "values": {name: _plain(one) for name, one in self.values.items()}}
+
+
+def text_from(table: Any, otherwise: str = "") -> str:
+    """Return the text of a table that `Text.as_table` made; another text where it is none."""
+    try:
+        return Text(table["template"], **{name: _from_plain(one) for name, one in table["values"].items()})
+    except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
+        return otherwise
+
+
+def text_of(error: BaseException) -> str:
+    """Return the message of an error, a Text where it is one."""
+    if isinstance(error, UsageError):
+        return Text("{name}: {text}" if error.value is None else "{name} = {value}: {text}", **vars(error))
+    said = error.args[0] if error.args else ""
+    return said if isinstance(said, Text) else str(error)
+
+
+def in_language(text: str, code: str | None = None) -> str:
+    """Return a text in a language.
+
+    Args:
+        text: in English.
+        code: of the language; None: that of this process.
+    """
+    code = code or _of_process
+    if isinstance(text, Text):
+        return _fill(language_of(code).texts.get(text.template, text.template), text.values, code)
+    return language_of(code).texts.get(text, text)
+
+
+_of_process = ENGLISH
+
+
+def speak(code: str) -> None:
+    """Let this process speak a language.  Raises UsageError."""
+    global _of_process  # noqa: PLW0603 - a process speaks to one person
+    language_of(code)
+    _of_process = code
+
+
+def _fill(template: str, values: Mapping[str, Any], code: str) -> str:
+    return _FIELD.sub(lambda field: _write(values[field[1]], field[2] or "", code), template)
+
+
+def _write(value: Any, how: str, code: str) -> str:
+    decimal = "." if code == ENGLISH else language_of(code).decimal
+    if isinstance(value, tuple):
+        return ("; " if decimal == "," else ", ").join(_write(one, how, code) for one in value)
+    if isinstance(value, str):
+        said = in_language(value, code)
+        return _POINT.sub(decimal, said) if how == "n" else said
+    return format(value, how).replace(".", decimal)
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON has it."""
+    if isinstance(value, Text):
+        return value.as_table()
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return [_plain(one) for one in value] if isinstance(value, tuple) else value
+
+
+def _from_plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return Text(value["template"], **{name: _from_plain(one) for name, one in value["values"].items()})
+    return tuple(_from_plain(one) for one in value) if isinstance(value, list) else value

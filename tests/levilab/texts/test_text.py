@@ -1,0 +1,138 @@
+"""Texts in other languages: each language has every text with its values, and a new one is a file."""
+
+from __future__ import annotations
+
+import ast
+import json
+import pickle
+import re
+from typing import TYPE_CHECKING
+
+import pytest
+
+from levilab.errors import UsageError
+from levilab.live.practice.experiments import PRACTICE
+from levilab.live.practice.tasks import TASKS
+from levilab.live.practice.what_if import WHAT_IF
+from levilab.live.server import PAGE
+from levilab.live.views import VIEWS
+from levilab.live.words import change_texts
+from levilab.pipelines.look import QUANTITIES
+from levilab.texts.text import Text, in_language, language_of, languages, speak, text_from
+from support.sources import sources
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+LANGUAGES = [code for code in languages() if code != "en"]
+#: Functions whose text a person reads, in the modules of these rooms, and the number of the argument.
+SAYING = {"_say": 0, "CommandRefused": 0}
+ROOMS = ("levilab.live.", "levilab.acquisition.")
+_LITERAL = r'"((?:[^"\\]|\\.)*)"'
+#: In JavaScript: a text, or one of two.
+_PHRASE = re.compile(rf"phrase\((?:[^()\"]*\?)?\s*{_LITERAL}(?:\s*:\s*{_LITERAL})?")
+
+
+def is_worded(text: str) -> bool:
+    """Whether there is a word beside the values: units and letters are the same in all languages."""
+    return bool(re.search(r"[A-Za-z]{3,}", re.sub(r"\{[^}]*\}", "", text)))
+
+
+def fields(text: str) -> set[str]:
+    return set(re.findall(r"\{\w+(?::[^}]*)?\}", text))
+
+
+def strings(node: ast.AST) -> Iterator[str]:
+    """The strings that an argument may be; an f-string, which no table can have, as its beginning."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif isinstance(node, ast.JoinedStr):
+        yield f"f-string: {ast.unparse(node)}"
+    elif isinstance(node, ast.IfExp):
+        yield from strings(node.body)
+        yield from strings(node.orelse)
+
+
+def of_pages() -> set[str]:
+    """What the live view's pages say: HTML, JavaScript, and the rows that they show."""
+    found: set[str] = set()
+    for html in PAGE.glob("*.html"):
+        change_texts(html.read_text("utf-8"), lambda text: found.add(text) or text)  # type: ignore[func-returns-value]
+    for module in PAGE.glob("*.js"):
+        found |= {one for pair in _PHRASE.findall(module.read_text("utf-8")) for one in pair if one}
+    found |= {text for row in PRACTICE.values() for text in (row.title, row.asks)}
+    found |= {text for row in TASKS.values() for text in (row.title, row.does, row.teaches)}
+    found |= {text for change in WHAT_IF.values() for text in (change.title, change.shows)}
+    found |= {label for view in VIEWS.values() for label in (view.x_label, view.y_label)}
+    return found | {words for words, _ in QUANTITIES.values()}
+
+
+def of_program() -> set[str]:
+    """What the program says in sentences: each `Text`, and what the functions of SAYING are given."""
+    found: set[str] = set()
+    for name, tree in sources().items():
+        for call in ast.walk(tree):
+            if not isinstance(call, ast.Call):
+                continue
+            called = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+            if called == "Text" and call.args and name.startswith("levilab."):
+                found |= {*strings(call.args[0])}
+            elif called in SAYING and name.startswith(ROOMS) and len(call.args) > SAYING[called]:
+                found |= {*strings(call.args[SAYING[called]])}
+    return found
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_a_language_has_every_text(code: str) -> None:
+    assert sorted(text for text in of_pages() if is_worded(text) and text not in language_of(code).page) == []
+    assert sorted(text for text in of_program() if is_worded(text) and text not in language_of(code).texts) == []
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_a_text_has_the_values_of_the_english_one(code: str) -> None:
+    texts = language_of(code).texts
+    assert {english: text for english, text in texts.items() if fields(english) != fields(text) or not text} == {}
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_no_text_is_of_a_sentence_that_is_said_no_more(code: str) -> None:
+    nodes = (node for tree in sources().values() for node in ast.walk(tree))
+    said = of_pages() | {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    said |= {text for module in PAGE.glob("*.js") for text in re.findall(_LITERAL, module.read_text("utf-8"))}
+    assert sorted(text for text in language_of(code).texts if text not in said) == []
+
+
+def test_a_text_is_the_english_sentence_and_comes_through_json_and_pickle() -> None:
+    why = Text("the top spins at {spin:.2f} Hz", spin=21.5)
+    said = Text(
+        "drive on at {frequency_hz:g} Hz, but {beside}: {takes}", frequency_hz=30.5, beside=why, takes="no more"
+    )
+    assert said == "drive on at 30.5 Hz, but the top spins at 21.50 Hz: no more"
+    german = "Antrieb ein bei 30,5 Hz, aber der Kreisel dreht sich mit 21,50 Hz: no more"
+    for copy in (said, pickle.loads(pickle.dumps(said)), text_from(json.loads(json.dumps(said.as_table())))):
+        assert copy == said
+        assert in_language(copy, "de") == german
+
+
+def test_numbers_in_a_list_are_apart_from_decimal_commas() -> None:
+    said = Text("{values:.1f} Hz and {text:n}", values=(1.5, 2.0), text="0.12(3) Hz")
+    assert said == "1.5, 2.0 Hz and 0.12(3) Hz"
+    assert in_language(said, "de") == "1,5; 2,0 Hz and 0,12(3) Hz"
+
+
+@pytest.mark.parametrize(
+    "table", [None, {}, {"template": 3, "values": {}}, {"template": "{a}", "values": {}},
+              {"template": "x", "values": [1]},
+              {"template": "{a:d}", "values": {"a": "x"}}, {"template": "{a:99999999}", "values": {"a": [[[[]]]]}}]
+)  # fmt: skip
+def test_a_table_that_a_person_has_changed_is_no_text(table: object) -> None:
+    assert text_from(table, "as it was") in {"as it was", "x", "{a:99999999}"}
+
+
+def test_a_process_speaks_one_language_and_no_unknown_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("levilab.texts.text._of_process", "en")
+    assert in_language("the top follows the drive") == "the top follows the drive"
+    speak("de")
+    assert in_language("the top follows the drive") == "der Kreisel folgt dem Antrieb"
+    with pytest.raises(UsageError, match="language = xx: one of de, en is expected"):
+        speak("xx")
