@@ -271,6 +271,11 @@ class ScpiInstrument:
         rows = (row for owner in reversed(cls.__mro__) for row in vars(owner).values())
         return [row for row in rows if isinstance(row, Setting)]
 
+    @classmethod
+    def describe_settings(cls) -> list[dict[str, Any]]:
+        """Return name, kind, unit and limits of each declared setting; see `Setting.describe`."""
+        return [row.describe() for row in cls.declared_settings()]
+
     def field_of(self, answer: str, header: str, key: str) -> str:
         """Return the part of an answer that is one setting; all of it, where it has neither header nor fields.
 

@@ -114,6 +114,28 @@ class Setting(Generic[T]):
             return f"{low:g} to {high:g}{unit}"
         return "one of " + ", ".join(self.choices) if self.choices else f"a text, as {self.form and self.form.example}"
 
+    def describe(self) -> dict[str, Any]:
+        """Return what an adapter for another program needs to know of it, as JSON has it.
+
+        Returns:
+            name: of the attribute; column: the same with its unit, as in files; kind: number, switch, word or text;
+            unit: empty for none; low, high: None for no limit; values: the only numbers; choices: the words, as they
+            are read; resolution: None where it is not known; header: on the wire.
+        """
+        kind = "switch" if self.kind is bool else "number" if self.kind is float else "word" if self.choices else "text"
+        return {
+            "name": self.name,
+            "column": self.name_with_unit,
+            "kind": kind,
+            "unit": self.unit,
+            "low": self.low if math.isfinite(self.low) else None,
+            "high": self.high if math.isfinite(self.high) else None,
+            "values": list(self.values),
+            "choices": [_short_form(choice, self.choices) for choice in self.choices],
+            "resolution": self.resolution or None,
+            "header": " ".join(filter(None, (self.header, self.key))),
+        }
+
     @property
     def name_with_unit(self) -> str:
         """The name with its unit, as in files: gate_s."""

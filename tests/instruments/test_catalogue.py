@@ -3,11 +3,13 @@
 What messages do to a twin is in virtual/bench/test_fuzz.py, which takes each row, too.
 """
 
+import json
 import re
 
 import pytest
 
 from instruments.catalogue import CATALOGUE
+from instruments.errors import OutOfRange
 from instruments.ieee488 import identity_fields
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bench import VirtualBench
@@ -77,6 +79,22 @@ def test_settings_survive_a_round_trip(name):
             setattr(driver, row, before[row])
     assert {row: getattr(driver, row) for row in rows} == before
     assert driver.changed_settings(driver.settings()) == {}
+
+
+@EACH
+def test_what_a_driver_says_of_its_settings_is_what_it_answers_and_takes(name):
+    driver = Opened(name).driver
+    PREPARE[KIND_OF[name]](driver)
+    asked = driver.settings()
+    kinds = {"number": float, "switch": bool, "word": str, "text": str}
+    for about in json.loads(json.dumps(driver.describe_settings())):
+        if about["column"] in asked:
+            value = asked[about["column"]]
+            assert isinstance(value, kinds[about["kind"]])
+            assert value in (about["choices"] or about["values"] or [value])
+        if about["high"] is not None:
+            with pytest.raises(OutOfRange):
+                setattr(driver, about["name"], 2 * about["high"] + 1)
 
 
 @pytest.mark.parametrize("kind", CATALOGUE)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Self
 from levilab.errors import DataError, UsageError
 from levilab.files import locked, parse_json, replace_atomically, replacing, writing
 from levilab.pipelines.row import text_of, value_of_text
+from levilab.present.units import split
 from levilab.software import how_to_install
 
 if TYPE_CHECKING:
@@ -169,7 +170,8 @@ class TableFile:
 
         types = {"number": pa.float64(), "count": pa.int64(), "truth": pa.bool_(), "text": pa.string()}
         fields = [
-            pa.field(column.name, types[column.kind], metadata={"meaning": column.meaning}) for column in self._columns
+            pa.field(column.name, types[column.kind], metadata={"meaning": column.meaning, **_unit_of(column)})
+            for column in self._columns
         ]
         schema = pa.schema(fields, metadata={"levilab": self._description()})
         with pq.ParquetWriter(file, schema) as writer:
@@ -188,7 +190,10 @@ class TableFile:
     # --- rows of an earlier call ---
 
     def _description(self) -> str:
-        columns = [{"name": column.name, "kind": column.kind, "meaning": column.meaning} for column in self._columns]
+        columns = [
+            {"name": column.name, "kind": column.kind, "meaning": column.meaning, **_unit_of(column)}
+            for column in self._columns
+        ]
         about = {"schema": SCHEMA, **self._made_with, "columns": columns}
         return json.dumps(about, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -253,6 +258,12 @@ class TableFile:
         with pq.ParquetFile(self.table) as file:
             for batch in file.iter_batches(batch_size=GROUP):
                 yield from (list(row.values()) for row in batch.to_pylist())
+
+
+def _unit_of(column: Column) -> dict[str, str]:
+    """Return the unit of a column of numbers, which stands at the end of its name."""
+    unit = split(column.name)[1]
+    return {"unit": unit.si if unit else "1"} if column.kind == "number" else {}
 
 
 def _line(texts: Sequence[str]) -> bytes:

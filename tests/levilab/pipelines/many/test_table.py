@@ -175,6 +175,11 @@ def test_parquet_holds_the_same_numbers_with_their_types(runs: Path) -> None:
     assert exponents == [float(row["power_exponent"]) if row["power_exponent"] else None for row in texts]
     first = table.slice(0, 1).to_pylist()[0]
     assert (first["synthetic"], first["outliers"], first["best_model"]) == (True, 0, texts[0]["best_model"])
+    units = {field.name: (field.metadata or {}).get(b"unit") for field in table.schema}
+    numbers = {name: unit for name, unit in units.items() if table.schema.field(name).type == "double"}
+    assert (units["path"], units["synthetic"], None in numbers.values()) == (None, None, False)
+    wanted = {"stokes_c1_per_s": b"1/s", "stokes_c1_u_per_s": b"1/s", "power_exponent": b"1"}
+    assert {name: numbers[name] for name in wanted} == wanted
 
 
 def test_a_run_that_kills_its_process_has_a_row(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
