@@ -154,6 +154,7 @@ def state_of(session: Session[Any], *, virtual: bool) -> State:
         last=dict(doing.seen),
         drive=drive_of(bench),
         counting=counting_of(bench),
+        count=doing.count,
         lost=tuple(sorted(doing.lost)),
         virtual=virtual,
         speed=bench.clock.speed if virtual and math.isfinite(bench.clock.speed) else None,

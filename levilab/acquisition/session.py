@@ -14,6 +14,7 @@ from levilab.present.units import unit
 from levilab.runs.events import RunEvent
 from levilab.runs.run import utc_now
 from levilab.settings import Settings
+from levilab.telemetry.messages import Count
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -76,6 +77,7 @@ class Doing:
         share: of the way to the first reading; None once readings come.
         end: bench times between which it is expected to end [s]; None where that is not known.
         seen: channel → what an instrument answered last, in a reading or outside of one.
+        count: the last count of the spin, in a reading or outside of one; None where there was nothing to count.
         records: channel → the oscilloscope's latest record, with its number and the bench time [s].
         lost: kinds of instruments that do not answer.
     """
@@ -84,8 +86,15 @@ class Doing:
     share: float | None = 0.0
     end: tuple[float, float] | None = None
     seen: dict[str, float] = field(default_factory=dict)
+    count: Count | None = None
     records: dict[str, tuple[int, float, Trace]] = field(default_factory=dict)
     lost: set[str] = field(default_factory=set)
+
+
+def last_count(bench: Bench, spin: float | None) -> Count | None:
+    """Return a count of the spin that ends now, with its gate; None where there was nothing to count."""
+    gate_s = float(bench.counter.last_set.get("gate_s", 0.0))
+    return None if spin is None else Count(spin, bench.clock.now(), gate_s)
 
 
 @dataclass
@@ -242,6 +251,8 @@ class Session(Generic[S]):
             self.doing.seen.pop(channel, None)
         else:
             self.doing.seen[channel] = value
+        if channel == "spin_frequency_hz":
+            self.doing.count = last_count(self.bench, value)
 
     def ask(self, task: Task) -> str:
         """Let the person at the bench do or answer something.  Both stand in the events.

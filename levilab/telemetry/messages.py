@@ -86,6 +86,23 @@ class Counting:
 
 
 @dataclass(frozen=True)
+class Count:
+    """What the counter counted last of the spin.
+
+    Attributes:
+        frequency_hz: mean over the gate [Hz].
+        end_s: end of the gate, on the clock of the bench [s].
+        gate_s: its length [s].
+    """
+
+    __pydantic_config__: ClassVar[ConfigDict] = _READ
+
+    frequency_hz: float
+    end_s: float
+    gate_s: float
+
+
+@dataclass(frozen=True)
 class State:
     """What the bench does now.
 
@@ -103,6 +120,7 @@ class State:
         last: channel, as in readings.csv → what the bench measured last, in a reading or outside of one.
         drive: the generator; None without one.
         counting: the counter; None before it was set up.
+        count: its last count of the spin; None where it sees no light pulses.
         lost: kinds of instruments that do not answer now.
         virtual: whether the bench is simulated.
         speed: of a virtual bench: seconds of the bench in one of the wall; None: it does not keep to the wall clock.
@@ -130,6 +148,7 @@ class State:
     last: dict[str, float] = field(default_factory=dict)
     drive: Drive | None = None
     counting: Counting | None = None
+    count: Count | None = None
     lost: tuple[str, ...] = ()
     virtual: bool = False
     speed: float | None = None

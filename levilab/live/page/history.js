@@ -11,29 +11,42 @@ const NOTED_S = 1;
 const LEAST_HZ = 2, LEAST_OFF_HZ = 0.2;
 /** The frequencies that are shown while there is neither a top nor a drive [Hz]. */
 const USUAL_HZ = [20, 35];
+/** A count is shown until the next should be there, a gate and this time after its own gate [s]; then, and after a jump
+ * that no top makes [Hz], there is a gap. */
+const COUNTED_S = 2, JUMP_HZ = 1;
 /** Changes of the drive's frequency that are kept, to count its turns: a ramp makes two a second. */
 const MOST_CHANGES = 100;
 const LEFT = 58, LEAST_RIGHT_PX = 84, TOP = 10, BOTTOM = 34, GAP = 24;
 
-/** The values of the last minutes, each [time, spin, drive]; NaN where no top is counted, or the drive is off. */
+/** The last minutes: the drive, and each count at the middle of its gate, beside the drive of that moment. */
 export function openHistory() {
-  let rows = [], marks = [], turns = [];  // of the drive: [time, turns by then, frequency]
+  let drives = [], counts = [], marks = [], turns = [];  // turns of the drive: [time, turns by then, frequency]
   return {
-    get rows() { return rows; },
+    /** Each [time, drive]; NaN while it is off. */
+    get drives() { return drives; },
+    /** Each [time, spin, drive of that time, end of the gate]; NaN where there is a gap, or the drive was off. */
+    get counts() { return counts; },
     get marks() { return marks; },
 
-    /** Take in a state of the bench.  Returns whether the chart has changed. */
-    add(bench) {
-      const now = bench.time_s, last = rows.at(-1);
-      if (last && now < last[0]) [rows, marks, turns] = [[], [], []];  // another bench
-      const spin = bench.last.spin_frequency_hz ?? bench.last.spin_seen_hz ?? NaN;
+    /** Take in a state of the bench, and whether no top floats.  Returns whether the chart has changed. */
+    add(bench, isDown = false) {
+      const now = bench.time_s, last = drives.at(-1);
+      if (last && now < last[0]) [drives, counts, marks, turns] = [[], [], [], []];  // another bench
       const drive = bench.drive?.output ? bench.drive.frequency_hz : NaN;
-      count(now, drive);
-      if (last && Object.is(last[1], spin) && Object.is(last[2], drive) && now - last[0] < NOTED_S) return false;
-      rows.push([now, spin, drive]);
-      while (rows[0][0] < now - SHOWN_S) rows.shift();
+      countTurns(now, drive);
+      const changed = !last || !Object.is(last[1], drive) || now - last[0] >= NOTED_S;
+      if (changed) drives.push([now, drive]);
+      const counted = !isDown && take(bench.count);
+      drives = drives.filter(([time]) => time >= now - SHOWN_S);
+      counts = counts.filter(([time]) => time >= now - SHOWN_S);
       marks = marks.filter(([time]) => time >= now - SHOWN_S);
-      return true;
+      return changed || counted;
+    },
+
+    /** The last count, while it is shown; else null. */
+    get latest() {
+      const last = counts.at(-1);
+      return last && drives.at(-1)[0] - last[3] <= 2 * (last[3] - last[0]) + COUNTED_S ? last : null;
     },
 
     /** When the drive began its last period before a time; the time itself while it is off [s]. */
@@ -46,6 +59,7 @@ export function openHistory() {
 
     /** The same as a table of text. */
     table() {
+      const rows = [...drives.map(([time, drive]) => [time, NaN, drive]), ...counts.map((row) => row.slice(0, 3))].sort((one, two) => one[0] - two[0]);
       const texts = rows.map((row) => row.map((value) => Number.isFinite(value) ? String(value) : "").join(","));
       return ["bench_time_s,spin_frequency_hz,drive_frequency_hz", ...texts, ""].join("\n");
     },
@@ -54,8 +68,26 @@ export function openHistory() {
     mark(time, text) { marks.push([time, text]); },
   };
 
+  /** Take in a count that is new. */
+  function take(count) {
+    const last = counts.at(-1);
+    if (!count || count.end_s === last?.[3]) return false;
+    const middle = count.end_s - count.gate_s / 2;
+    if (last && middle <= last[0]) return false;
+    if (last && (middle - last[0] > count.gate_s + COUNTED_S || Math.abs(count.frequency_hz - last[1]) > JUMP_HZ)) counts.push([middle, NaN, NaN, NaN]);
+    counts.push([middle, count.frequency_hz, driveAt(middle), count.end_s]);
+    return true;
+  }
+
+  /** The drive at a time, between two states on a ramp: at the middle of a gate this is its mean over the gate. */
+  function driveAt(time) {
+    const k = drives.findLastIndex(([start]) => start <= time), [from, before] = drives[k] ?? [NaN, NaN];
+    const [to, after] = drives[k + 1] ?? [Infinity, before];
+    return to === Infinity ? before : before + (after - before) * (time - from) / (to - from);
+  }
+
   /** Count the turns of the drive on, as long as its frequency stays. */
-  function count(now, drive) {
+  function countTurns(now, drive) {
     const last = turns.at(-1);
     if (last && Object.is(last[2], drive)) return;
     turns.push([now, last ? last[1] + (now - last[0]) * (last[2] || 0) : 0, drive]);
@@ -68,18 +100,18 @@ export function openHistory() {
  *
  * @returns the same as text.
  */
-export function drawHistory(paper, {rows, marks}) {
+export function drawHistory(paper, {drives, counts, marks, latest}) {
   const paint = colours(), {context: c} = paper;
   const [width, height] = paper.fit();
   const right = Math.max(LEAST_RIGHT_PX, 10 + Math.max(...["top", "drive"].map((name) => c.measureText(`${phrase(name)} 00.00`).width)));
-  const now = rows.at(-1)[0], shown = Math.min(Math.max(now - rows[0][0], LEAST_S), SHOWN_S);
-  const differences = rows.map(([, spin, drive]) => spin - drive);
+  const now = drives.at(-1)[0], first = drives[0][0], shown = Math.min(Math.max(now - first, LEAST_S), SHOWN_S);
+  const differences = counts.map(([, spin, drive]) => spin - drive);
   const known = (values) => values.filter(Number.isFinite);
-  const driven = known(rows.map((row) => row[2])).length > 0;
+  const driven = known(drives.map((row) => row[1])).length > 0;
   const bottom = height - BOTTOM, below = driven ? Math.max(44, 0.26 * (bottom - TOP)) : 0;
   const split = bottom - (driven ? below + GAP : 0);
 
-  const counted = known(rows.flatMap(([, spin, drive]) => [spin, drive]));
+  const counted = known([...drives.map((row) => row[1]), ...counts.map((row) => row[1])]);
   const ys = atLeast(counted.length ? extent([counted], 0.08) : USUAL_HZ, LEAST_HZ);
   const reach = Math.max(LEAST_OFF_HZ, Math.min(2, 1.15 * Math.max(0, ...known(differences).map(Math.abs))));
   const toX = (time) => width - right + (time - now) / shown * (width - LEFT - right);
@@ -118,9 +150,9 @@ export function drawHistory(paper, {rows, marks}) {
   c.beginPath();
   c.rect(LEFT, 0, width - LEFT - right, bottom);
   c.clip();
-  course(c, rows, (row) => row[2], toX, toY, paint.newton, 3.5);
-  course(c, rows, (row) => row[1], toX, toY, paint.reading, 1.8);
-  if (driven) course(c, rows, (row) => Math.max(-reach, Math.min(reach, row[1] - row[2])), toX, toOff, paint.stokes, 1.6);
+  course(c, drives, (row) => row[1], toX, toY, paint.newton, 3.5);
+  course(c, counts, (row) => row[1], toX, toY, paint.reading, 1.8);
+  if (driven) course(c, counts, (row) => Math.max(-reach, Math.min(reach, row[1] - row[2])), toX, toOff, paint.stokes, 1.6);
   c.strokeStyle = c.fillStyle = paint.bad;
   c.lineWidth = 1;
   c.setLineDash([3, 3]);
@@ -135,7 +167,7 @@ export function drawHistory(paper, {rows, marks}) {
 
   // what each line is stands at its end
   c.textAlign = "left";
-  const [, spin, drive] = rows.at(-1), ends = [[phrase("top"), spin, paint.reading], [phrase("drive"), drive, paint.newton]].filter((one) => Number.isFinite(one[1]));
+  const ends = [[phrase("top"), latest?.[1], paint.reading], [phrase("drive"), drives.at(-1)[1], paint.newton]].filter((one) => Number.isFinite(one[1]));
   const [one, two] = ends.map(([, value]) => toY(value));
   const apart = two === undefined || Math.abs(one - two) >= 15 ? 0 : (15 - Math.abs(one - two)) / 2 * (one <= two ? -1 : 1);
   ends.forEach(([name, value, colour], k) => {
@@ -143,7 +175,7 @@ export function drawHistory(paper, {rows, marks}) {
     c.fillText(`${name} ${fixed(value, 2)}`, width - right + 6, Math.min(Math.max(toY(value) + (k ? -apart : apart), TOP + 6), split - 6));
   });
   const said = ends.map(([name, value]) => phrase("{name} at {value} hertz", {name, value: fixed(value, 2)})).join(", ") || phrase("no top is counted");
-  return phrase("the last {time} of the bench: {said}", {time: lapse(now - rows[0][0]), said});
+  return phrase("the last {time} of the bench: {said}", {time: lapse(now - first), said});
 }
 
 /** Widen a range about its middle to a least width. */

@@ -30,7 +30,7 @@ const CHANNELS = ["tape", "drive", "laser"];
 const SET_UP = phrase("The bench is being set up: some seconds, up to a minute at the first start, which compiles.");
 const PAUSED = phrase("The view is paused, and shows nothing of what the bench would do: “Go on” first.");
 const NO_VALUE = phrase("––.––––");
-const SLIP_HZ = 0.2, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive, on a ramp, too, which a count is 0.1 Hz behind; while it swings
+const SLIP_HZ = 0.2, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive, on a ramp, too; while it swings
 
 const token = takeToken();
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, source: null, records: {}};
@@ -59,7 +59,6 @@ function take(head) {
     dirty.trace = true;
   }
   data.bench = head.bench;
-  if (data.bench && !data.bench.silent && history.add(data.bench) && isOfMinutes()) dirty.plot = true;
   let follows = false;
   for (const one of head.said) {
     seen.said = one.n;
@@ -81,6 +80,7 @@ function take(head) {
     dirty.trace = true;
   }
   if (head.poses.length) takePoses(head.poses);
+  if (data.bench && !data.bench.silent && history.add(data.bench, data.up === false) && isOfMinutes()) dirty.plot = true;
   show();
   if (follows) open(wanted = "");  // an older run was chosen, and a new one begins
 }
@@ -170,7 +170,7 @@ function takePoses(pieces) {
 function markFall() {
   fellAt = data.lastUp;
   by("replay").hidden = true;
-  const spin = history.rows.findLast((row) => Number.isFinite(row[1]))?.[1];
+  const spin = history.counts.at(-1)?.[1];
   history.mark(data.lastUp, spin ? phrase("fell at {spin} Hz", {spin: fixed(spin, 1)}) : phrase("fell"));
   dirty.plot = true;
 }
@@ -309,8 +309,7 @@ function showGenerator(bench, last) {
   write("drive-on", drive?.output ? phrase("on") : phrase("off"));
   by("drive-on").classList.toggle("on", Boolean(drive?.output));
   write("signal", drive?.waveform ? `${drive.waveform}, ${short(drive.amplitude_vpp)} Vpp${drive.offset_v ? phrase(", offset {volts} V", {volts: short(drive.offset_v)}) : ""}` : "–");
-  const spin = bench?.last?.spin_frequency_hz;
-  const off = Number.isFinite(spin) && drive?.output ? spin - drive.frequency_hz : NaN;
+  const [, spin, then] = drive?.output && history.latest || [], off = spin - then;  // of a count and its own time
   write("lock", Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? (practice && !bench.busy && !bench.took_hold ? phrase("takes hold") : phrase("follows")) : Math.abs(off) < SWINGS_HZ ? phrase("near it") : phrase("beside it")}, ${off >= 0 ? "+" : ""}${fixed(off, 3)} Hz` : "–");
   write("generator-model", modelOf("generator"));
 }
@@ -401,7 +400,7 @@ function speak(state, left) {
 }
 
 /** Whether the last minutes of the bench are drawn: where a person wants them, and before the first reading. */
-const isOfMinutes = () => history.rows.length > 0 && Boolean(data.bench) && (by("drawn").value === "minutes" || !data.count);
+const isOfMinutes = () => history.drives.length > 0 && Boolean(data.bench) && (by("drawn").value === "minutes" || !data.count);
 
 function draw() {
   requestAnimationFrame(draw);

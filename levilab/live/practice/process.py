@@ -22,7 +22,7 @@ from levilab.acquisition.grip import COUNTS, Grip
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.onlooker import Sent, counting_of, drive_of, state_of
 from levilab.acquisition.request import AcquisitionOptions, request_at
-from levilab.acquisition.session import ExperimentFailed
+from levilab.acquisition.session import ExperimentFailed, last_count
 from levilab.bench.bench import open_bench
 from levilab.bench.config import Limits
 from levilab.errors import LevilabError
@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from levilab.interruption import End
     from levilab.live.practice.commands import Command, EventKind
     from levilab.simulator.scene import Scene
+    from levilab.telemetry.messages import Count
     from levilab.world.motion_world import MotionWorld
 
 #: Between runs the counter counts for so long [s], as the light of the tape passes this level [V].
@@ -253,6 +254,7 @@ class PracticeProcess:
         self._wiring: Wiring = virtual_wiring(world, Limits())
         self._knobs, self._sent = Knobs(), Sent()
         self._seen: dict[str, float] = {}  # channel → what the instruments answered last, between runs
+        self._count: Count | None = None  # the last count, between runs
         self._bench: Bench | None = None  # open between runs
         self._session: Session[Any] | None = None  # of the run that is recorded
         self._folder = ""
@@ -316,6 +318,7 @@ class PracticeProcess:
         """Read each instrument once."""
         spin = bench.counter.frequency()
         self._saw("spin_frequency_hz", spin)
+        self._count = last_count(bench, spin)
         self._last_spin = self._last_spin if spin is None else spin  # of one that leans the counter sees no light
         self._look_at_top()
         self._look_at_task()
@@ -460,7 +463,8 @@ class PracticeProcess:
             drive = replace(
                 drive, waveform=knobs.waveform, frequency_hz=knobs.frequency_hz, amplitude_vpp=knobs.amplitude_vpp
             )
-        return State(self.clock.now(), text=self._text, last=dict(self._seen), drive=drive, counting=counting, **here)
+        here |= {"last": dict(self._seen), "drive": drive, "counting": counting, "count": self._count}
+        return State(self.clock.now(), text=self._text, **here)
 
     # --- commands ---
 
@@ -791,6 +795,7 @@ class PracticeProcess:
         """Carry out an experiment; whatever ends it, the bench goes on."""
         plan = plan_of(command)
         self._seen.clear()
+        self._count = None
         self._folder = ""  # a run may fail before it has one
         try:
             with self._top_for(plan):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from levilab.telemetry.messages import Counting, Drive, Poses, Record, State
+from levilab.telemetry.messages import Count, Counting, Drive, Poses, Record, State
 from support.browser import DESK, PHONE, watch
 from support.live_pages import GrowingRun, address, publish, serving, spin_down, until
 
@@ -227,10 +227,14 @@ def test_what_the_bench_publishes_is_drawn(served: Hall, page: Page, tmp_path: P
     turn = np.arange(n) * 2 * np.pi * 30 / 400
     quaternion = np.stack([0 * turn, 0 * turn, np.sin(turn / 2), np.cos(turn / 2)], axis=1)
     position = np.tile([0.0, 0.0, 0.075], (n, 1))
+    drive = Drive("SIN", 31.25, 10.0, 0.0, output=True)
+    publish(served.watches[run.folder.name], State(0.5, drive=drive))
+    until(page, "levilab.history.drives.length === 1")
     publish(
         served.watches[run.folder.name],
-        State(1.0, drive=Drive("SIN", 31.25, 10.0, 0.0, output=True), counting=Counting(0.5, 0.6),
-              last={"spin_frequency_hz": 31.25, "flux_density_t": 0.0191}, virtual=True, speed=1.0),
+        State(1.0, drive=drive, counting=Counting(0.5, 0.6),
+              count=Count(31.25, 0.9, 0.5), last={"spin_frequency_hz": 31.25, "flux_density_t": 0.0191},
+              virtual=True, speed=1.0),
         Record(1, "tape", 1.0, -0.1, 2e-4, wave, wave),
         Poses(0.0, 1 / 400, position, quaternion, np.ones(n, dtype=bool)),
     )  # fmt: skip
@@ -268,13 +272,16 @@ def test_the_last_minutes_of_the_bench_are_drawn_before_the_first_reading(
         page.goto(address(served, run.folder.name))
         until(page, "levilab.frames > 0")
         for time, spin, drive in ((1.0, 31.0, False), (2.0, 30.9, False), (3.0, 30.8, True), (200.0, None, True)):
-            last = {} if spin is None else {"spin_frequency_hz": spin}
-            publish(watch[run.folder.name], State(time, last=last, drive=Drive("SIN", 30.75, 10.0, output=drive)))
-            until(page, f"levilab.history.rows.at(-1)?.[0] === {time}")
+            count = None if spin is None else Count(spin, time, 0.5)
+            publish(watch[run.folder.name], State(time, count=count, drive=Drive("SIN", 30.75, 10.0, output=drive)))
+            until(page, f"levilab.history.drives.at(-1)?.[0] === {time}")
             if spin:
                 said = f"top at {spin:.2f} hertz" + ", drive at 30.75 hertz" * drive
                 until(page, f"document.getElementById('plot').getAttribute('aria-label').endsWith(': {said}')")
-        assert page.evaluate("levilab.history.rows.length") == 1  # of the last three minutes
+        assert page.evaluate("[levilab.history.drives.length, levilab.history.counts.length]") == [
+            1,
+            0,
+        ]  # of the last three minutes
         assert page.inner_text("#readings-title") == "The last minutes"
         assert not page.locator("#empty").is_visible()
         run.readings(spin_down(3))
@@ -299,8 +306,8 @@ def test_a_fall_is_replayed_and_what_is_drawn_is_saved(
     position[:, 2] = 0.075 - 1e-3 * np.clip(np.arange(n) - n / 2, 0, 55)
     upright = np.tile([0.0, 0.0, 0.0, 1.0], (n, 1))
     watch = served.watches[run.folder.name]
-    publish(watch, State(1.0, last={"spin_frequency_hz": 22.6}, virtual=True, speed=1.0))
-    until(page, "levilab.history.rows.length")
+    publish(watch, State(1.0, count=Count(22.6, 1.0, 0.5), virtual=True, speed=1.0))
+    until(page, "levilab.history.counts.length")
     publish(watch, *(Poses(k / 400, 1 / 400, position[k : k + 300], upright[k : k + 300], up[k : k + 300])
                      for k in range(0, n, 300)))  # fmt: skip
     until(page, "levilab.space?.state && !levilab.space.state.up && document.getElementById('replay').offsetParent")
@@ -308,13 +315,13 @@ def test_a_fall_is_replayed_and_what_is_drawn_is_saved(
     assert page.evaluate("levilab.history.marks.map(([, text]) => text)") == ["fell at 22.6 Hz"]
     page.click("#replay")
     until(page, "levilab.space.state.up && levilab.space.state.time < 1.5")  # and not 3 s, the newest
-    publish(watch, State(2.0, last={"spin_frequency_hz": 22.6}, virtual=True, speed=1.0))
+    publish(watch, State(2.0, count=Count(22.6, 1.0, 0.5), virtual=True, speed=1.0))
     until(page, "document.getElementById('top-text').textContent === 'falls, 20 times slower'")
     with page.expect_download() as saved:
         page.click("#csv")
     rows = saved.value.path().read_text().splitlines()
     assert rows[0] == "bench_time_s,spin_frequency_hz,drive_frequency_hz"
-    assert rows[1:] == ["1,22.6,", "2,22.6,"]
+    assert rows[1:] == ["0.75,22.6,", "1,,", "2,,"]  # the count at the middle of its gate, and when it was looked
     run.readings(spin_down(3))
     until(page, "levilab.data.count === 3")
     with page.expect_download() as saved:
@@ -342,6 +349,38 @@ def test_the_strobe_lamp_flashes_once_in_each_period_of_the_drive(shown: Page) -
     # 30.3 turns by 2.01 s: turn 31 comes 0.7/40 s later, and turn 50 at 2.5025 s
     ramp = [2.01 - 0.3 / 40, 2.01 + (49 - 30.3) / 40]
     assert found == pytest.approx([0.5, 1.0, 1.0 + 29 / 30, *ramp, 3.2], abs=1e-9)
+
+
+#: What is kept of a top that follows a ramp of 0.1 Hz/s, counted at first, then not, at states of a bench at 10x; then
+#: a top that was put back, without a drive.
+RAMP = """async () => {
+  const {openHistory} = await import("/page/history.js");
+  const history = openHistory(), here = [];
+  const add = (time_s, spin, end_s, output = true) => {
+    const count = {frequency_hz: spin, end_s, gate_s: 1}, drive = {output, frequency_hz: 30 + time_s / 10};
+    history.add({time_s, count, drive});
+    here.push(history.latest?.[0] ?? null);
+  };
+  for (let time = 0; time <= 20; time += 0.5) {
+    const end = Math.min(Math.floor(time), 10);
+    add(time, 30 + (end - 0.5) / 10, end);
+  }
+  add(21, 28.3, 21, false);
+  add(22, 29.95, 22, false);
+  return [history.counts, here];
+}"""
+
+
+def test_a_count_is_compared_with_the_drive_of_its_own_time(shown: Page) -> None:
+    """On a ramp a count that is kept would fall behind a drive that the top follows."""
+    counts, latest = shown.evaluate(RAMP)
+    *of_ramp, gap, low, jump, high = counts  # 28.3 and 29.95 Hz are two tops, and no line joins them
+    ramp = np.array([row for row in of_ramp if np.isfinite(row[2])])
+    assert len(ramp) >= 10
+    np.testing.assert_allclose(ramp[:, 1], ramp[:, 2], atol=1e-9)
+    assert [latest[20], latest[26], latest[27]] == [9.5, 9.5, None]  # 3 s after the gate of 1 s: a gate, and 2 s
+    assert all(np.isnan([gap[1], jump[1]]))
+    assert [low[:2], high[:2]] == [[20.5, 28.3], [21.5, 29.95]]
 
 
 #: When a pulse that passes half of its height at t triggers the page, from records that began at other times.

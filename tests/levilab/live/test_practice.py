@@ -16,7 +16,7 @@ from levilab.live.practice.what_if import WHAT_IF
 from levilab.live.watch import SILENT_AFTER_S
 from levilab.simulator import preset
 from levilab.telemetry.address import Address, write_address
-from levilab.telemetry.messages import Drive, Poses, State
+from levilab.telemetry.messages import Count, Drive, Poses, State
 from support.browser import PHONE
 from support.live_pages import GrowingRun, address, publish, serving, spin_down, until
 
@@ -254,8 +254,10 @@ def test_nothing_can_be_pressed_before_the_bench_is_there(starting: Hall, watche
     publish(starting.watches[""], measured)
     until(page, "document.body.dataset.state === 'idle' && !document.getElementById('controls').disabled")
     assert "being set up" not in page.inner_text("body")
-    assert page.inner_text("#lock").startswith("takes hold")
-    publish(starting.watches[""], replace(measured, took_hold=True))
+    counted = replace(measured, time_s=3.0, count=Count(30.0, 2.75, 0.5))
+    publish(starting.watches[""], counted)
+    until(page, "document.getElementById('lock').textContent.startsWith('takes hold')")
+    publish(starting.watches[""], replace(counted, took_hold=True))
     until(page, f"document.getElementById('lock').textContent.startsWith('follows') && {DONE} === 'drive'")
     page.focus("#group")
     page.keyboard.type("d?")
