@@ -21,6 +21,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal
 
 from levilab.errors import LevilabError
+from levilab.notebook.names import bare
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -47,24 +48,6 @@ __all__ = [
 ]  # fmt: skip
 
 
-class _Border:
-    """Ends the traceback of a known failure at the caller: what lies below explains nothing to a person."""
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
-        if error is None:
-            return
-        from instruments.errors import InstrumentError
-
-        if isinstance(error, LevilabError | InstrumentError):
-            error.__cause__, error.__context__, error.__traceback__ = None, None, None
-
-
-_border = _Border()
-
-
 class _FrontDoor(ModuleType):
     """This package, whose functions stay where the import system would put rooms of their names."""
 
@@ -80,11 +63,14 @@ class _FrontDoor(ModuleType):
 
     def __setattr__(self, name: str, value: object) -> None:
         if name in __all__ and isinstance(value, ModuleType):
-            getattr(self, name).__dict__ = vars(value)  # levilab.report.page is found at the function, too
+            function = getattr(self, name)
+            vars(value)["__wrapped__"] = function.__wrapped__  # for its signature
+            function.__dict__ = vars(value)  # levilab.report.page is found at the function, too
         else:
             super().__setattr__(name, value)
 
 
+@bare
 def acquire(
     experiment: Literal["spin", "trace", "field", "limit", "precession", "hold", "sway"],
     *,
@@ -162,10 +148,10 @@ def acquire(
         person=person or ask_with_input,
         settings=assignments(settings or {}),
     )
-    with _border:
-        return acquire_run(experiment, options)
+    return acquire_run(experiment, options)
 
 
+@bare
 def load(path: str | PathLike[str]) -> RecordedRun:
     """Return the run in a run folder.
 
@@ -180,10 +166,10 @@ def load(path: str | PathLike[str]) -> RecordedRun:
     """
     from levilab.notebook.acquisition import load_run
 
-    with _border:
-        return load_run(path)
+    return load_run(path)
 
 
+@bare
 def analyze(
     data: Run
     | str
@@ -282,10 +268,10 @@ def analyze(
     options = {name: value for name, value in locals().items() if name not in {"data", "kind", "time", "frequency"}}
     from levilab.notebook.analysis import analyze_data
 
-    with _border:
-        return analyze_data(data if time is None and frequency is None else (time, frequency), kind, options)
+    return analyze_data(data if time is None and frequency is None else (time, frequency), kind, options)
 
 
+@bare
 def simulate(
     scene: Scene | str | PathLike[str],
     duration: float | str = 30.0,
@@ -321,9 +307,8 @@ def simulate(
     from levilab.notebook.motion import simulate_motion
     from levilab.notebook.scene import chosen_scene, in_seconds
 
-    with _border:
-        chosen, lasts = chosen_scene(scene, settings or {}, changes), in_seconds("duration", duration)
-        return simulate_motion(chosen, lasts, tolerance=tolerance, rate=rate, out=out, animate=animate)
+    chosen, lasts = chosen_scene(scene, settings or {}, changes), in_seconds("duration", duration)
+    return simulate_motion(chosen, lasts, tolerance=tolerance, rate=rate, out=out, animate=animate)
 
 
 def scenes() -> dict[str, str]:
@@ -333,6 +318,7 @@ def scenes() -> dict[str, str]:
     return list_scenes()
 
 
+@bare
 def sweep(
     scene: Scene | str | PathLike[str],
     sweep: Mapping[str, ArrayLike | Sequence[str] | str] | Sequence[str] = (),
@@ -376,12 +362,12 @@ def sweep(
     given: dict[str, Any] = {"observe": observe, "duration": duration, "resume": resume, "cores": cores}
     from levilab.notebook.sweep import sweep_scene
 
-    with _border:
-        return sweep_scene(
-            scene, sweep, axes, settings or {}, out, adaptive=adaptive, seed=seed, tolerance=tolerance, **given
-        )
+    return sweep_scene(
+        scene, sweep, axes, settings or {}, out, adaptive=adaptive, seed=seed, tolerance=tolerance, **given
+    )
 
 
+@bare
 def open_sweep(path: str | PathLike[str]) -> SimulatedMap:
     """Return the map in a store that `sweep` or `levilab sweep` has written.
 
@@ -396,10 +382,10 @@ def open_sweep(path: str | PathLike[str]) -> SimulatedMap:
     """
     from levilab.notebook.sweep import stored_map
 
-    with _border:
-        return stored_map(path)
+    return stored_map(path)
 
 
+@bare
 def stability(
     scene: Scene | str | PathLike[str], *, settings: Mapping[str, Any] | None = None, **changes: Any
 ) -> FloatingTop:
@@ -419,10 +405,10 @@ def stability(
     from levilab.notebook.scene import chosen_scene
     from levilab.notebook.stability import floating_top
 
-    with _border:
-        return floating_top(chosen_scene(scene, settings or {}, changes))
+    return floating_top(chosen_scene(scene, settings or {}, changes))
 
 
+@bare
 def runs(folder: str | PathLike[str] = "runs", *, last: int | None = None) -> RunList:
     """Return the runs at or below a folder, oldest first; as the last line of a notebook's cell they are a table.
 
@@ -435,10 +421,10 @@ def runs(folder: str | PathLike[str] = "runs", *, last: int | None = None) -> Ru
     """
     from levilab.notebook.listing import runs_in
 
-    with _border:
-        return runs_in(folder, last)
+    return runs_in(folder, last)
 
 
+@bare
 def report(
     data: Run | AnalysisResult | str | PathLike[str] | Sequence[Run | AnalysisResult | str | PathLike[str]],
     output: str | PathLike[str] = "report.html",
@@ -464,10 +450,10 @@ def report(
     """
     from levilab.notebook.report import report_on
 
-    with _border:
-        return report_on(data, output, tables=tables, crosscheck=crosscheck)
+    return report_on(data, output, tables=tables, crosscheck=crosscheck)
 
 
+@bare
 def export(
     data: Run | AnalysisResult | SimulatedMap | str | PathLike[str],
     output: str | PathLike[str],
@@ -495,8 +481,7 @@ def export(
     """
     from levilab.notebook.export import export_data
 
-    with _border:
-        return export_data(data, output, creator=creator, licence=licence, force=force)
+    return export_data(data, output, creator=creator, licence=licence, force=force)
 
 
 sys.modules[__name__].__class__ = _FrontDoor

@@ -160,6 +160,12 @@ class FieldScan:
         """Return the fitted flux density, background included, at heights of shape (n,) [T]."""
         return np.asarray(on_axis(self.ring, height)[0] + self.values[3])
 
+    def u_model(self, height: Array) -> Array:
+        """Return the standard uncertainty of the fitted flux density at heights of shape (n,) [T]."""
+        by_ring = slopes(self.ring, height)
+        rows = np.vstack([by_ring[:3], np.ones_like(height), by_ring[3:]])
+        return np.asarray(np.sqrt(np.einsum("pn,pq,qn->n", rows, self.covariance, rows)))
+
     @property
     def residuals(self) -> Array:
         """Reading less model [T], shape (n,)."""

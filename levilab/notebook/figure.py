@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
+from levilab.notebook.fit import axes_of
 from levilab.present.drawing import headline, panel, run_look, synthetic_mark
 from levilab.present.looks import BLACK
 from levilab.present.style import STYLE, WIDE
@@ -40,7 +41,7 @@ def residuals_figure(
         made_up: whether each input is synthetic.
         curves: input → its fitted curve, None where there is none.
     """
-    x, y = _axes_of(frame, residual)
+    x, y = axes_of(frame, residual)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, _HEIGHT))
         headline(figure, title, synthetic_mark(made_up))
@@ -69,13 +70,6 @@ def _bars(frame: pd.DataFrame, column: str) -> np.ndarray | None:
     u = f"{quantity}_u_{unit.ending}" if unit else ""
     known = u in frame and bool(frame[u].notna().any())
     return frame[u].to_numpy(dtype=float) * _factor(column) if known else None
-
-
-def _axes_of(frame: pd.DataFrame, residual: str) -> tuple[str, str]:
-    """Return the columns that are drawn: the first one, and the first other one in the unit of the residuals."""
-    names = [name for name in map(str, frame.columns) if name not in {"input", residual}]
-    unit = split(residual)[1]
-    return names[0], next(name for name in names[1:] if split(name)[1] == unit and "_u_" not in name)
 
 
 def _label(column: str) -> str:

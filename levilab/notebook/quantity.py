@@ -3,22 +3,36 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 from functools import partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from analysis.uncertainty import Estimate
 from levilab.errors import UsageError
-from levilab.present.numbers import in_one_line
+from levilab.notebook.names import Helpful, NoSuchAttribute, bare, border, meant
+from levilab.present.numbers import in_one_line, without_unit
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping, Sequence, ValuesView
 
     from numpy.typing import ArrayLike
 
 V = TypeVar("V")
+#: Name in another library (uncertainties, lmfit, pint) → attribute.
+ALSO: Mapping[str, str] = MappingProxyType({
+    "nominal_value": "n",
+    "std_dev": "s",
+    "stderr": "s",
+    "error": "s",
+    "uncertainty": "s",
+    "std": "s",
+    "magnitude": "n",
+    "units": "unit",
+})  # fmt: skip
 #: Functions of numpy that are taken of a quantity, as a number without a unit.
 _FUNCTIONS = frozenset({"sqrt", "exp", "log", "log10", "sin", "cos", "tan"})
 
@@ -29,7 +43,9 @@ class Quantity(Estimate):
 
     It prints as value(u); `float` takes its value, a format such as `.3g` or `.1uS` is one of `uncertainties`.  Sums
     of quantities in one unit, and multiples, are quantities; products and powers are numbers of `uncertainties`
-    without a unit.  Quantities of one fit stay correlated: a quantity less itself is 0 without an uncertainty.
+    without a unit.  In sums and comparisons a number counts in the quantity's unit, and a quantity must have the same
+    one.  Quantities of one fit stay correlated: a quantity less itself is 0 without an uncertainty.  `interval` are the
+    ends of a 68 % interval: as the analysis found it, else the value less and plus u.
 
     >>> c = Quantity(0.003262, 2.3e-5, "1/s")
     >>> c, 2 * c, c - c
@@ -44,6 +60,13 @@ class Quantity(Estimate):
 
     number: Any = field(default=None, compare=False)
 
+    def __post_init__(self) -> None:
+        if self.interval is None and self.value is not None and self.u is not None:
+            object.__setattr__(self, "interval", (self.value - self.u, self.value + self.u))
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *ALSO})
+
     def __repr__(self) -> str:
         return in_one_line(self)
 
@@ -55,6 +78,14 @@ class Quantity(Estimate):
             return repr(self)
         number = format(self.to_ufloat() if self.u else float(self), spec if self.u else _of_float(spec))
         return number if self.unit == "1" else f"{number} {self.unit}"
+
+    def _repr_latex_(self) -> str:
+        """Return it as a formula, which a notebook shows."""
+        if self.value is None:
+            return r"\text{not determined}"
+        number = f"{self.to_ufloat():SL}" if self.u else without_unit(self)
+        text = "" if self.unit == "1" else rf"\,\mathrm{{{_latex_unit(self.unit)}}}"
+        return f"${number}{text}$"
 
     @property
     def n(self) -> float:
@@ -88,9 +119,11 @@ class Quantity(Estimate):
             return NotImplemented  # numpy does it element by element
         return _of(self.to_ufloat() + sign * _plain(other), self.unit)
 
+    @bare
     def __add__(self, other: object) -> Any:
         return self._sum(other, 1)
 
+    @bare
     def __sub__(self, other: object) -> Any:
         return self._sum(other, -1)
 
@@ -131,9 +164,13 @@ class Quantity(Estimate):
         return round(float(self), digits)
 
     def __getattr__(self, name: str) -> Any:
-        """Return a method such as sqrt, which numpy.sqrt calls."""
+        """Return value or u by another library's name, or a method such as sqrt, which numpy.sqrt calls."""
+        if name in ALSO:
+            return getattr(self, ALSO[name])
         if name not in _FUNCTIONS:
-            raise AttributeError(f"a Quantity has no {name!r}", name=name, obj=self)
+            known = [*(one for one in dir(self) if not one.startswith("_")), *ALSO]
+            with border:
+                raise NoSuchAttribute(f"a Quantity has no {name!r}: {meant(name, known)}")
         from uncertainties import umath
 
         return partial(getattr(umath, name), self.to_ufloat())
@@ -145,21 +182,34 @@ class Quantity(Estimate):
         self._check_unit(other, "comparison")
         return float(self), float(other.nominal_value if hasattr(other, "nominal_value") else other)
 
+    @bare
     def __lt__(self, other: object) -> bool:
         one, two = self._compared(other)
         return one < two
 
+    @bare
     def __le__(self, other: object) -> bool:
         one, two = self._compared(other)
         return one <= two
 
+    @bare
     def __gt__(self, other: object) -> bool:
         one, two = self._compared(other)
         return one > two
 
+    @bare
     def __ge__(self, other: object) -> bool:
         one, two = self._compared(other)
         return one >= two
+
+
+def _latex_unit(unit: str) -> str:
+    r"""Return a unit as LaTeX has it in a formula.
+
+    >>> _latex_unit("(rad/s)^-1/2/s"), _latex_unit("kg m^2")
+    ('(rad/s)^{-1/2}/s', 'kg\\,m^{2}')
+    """
+    return re.sub(r"\^([-−]?\d+(/\d+)?|\([^)]*\))", r"^{\1}", unit).replace(" ", r"\,")
 
 
 def _of_float(spec: str) -> str:
@@ -215,8 +265,8 @@ class NoSuchName(UsageError, KeyError):
         return str(self.args[0])  # not as KeyError, in quotes
 
 
-class Named(dict[str, V]):
-    """Values by their names; a missing name raises an error that says where it stands instead.
+class Named(Helpful, dict[str, V]):
+    """Values by their names, attributes too; a missing name raises an error that says where it stands instead.
 
     Attributes:
         what: which names these are, for messages.
@@ -227,10 +277,22 @@ class Named(dict[str, V]):
         super().__init__(values)
         self.what, self.elsewhere = what, dict(elsewhere or {})
 
+    def __call__(self) -> ValuesView[V]:
+        """Return the values, for who takes `result.values` for a dictionary's."""
+        return self.values()
+
+    @property
+    def _contents(self) -> Mapping[str, V]:
+        return self
+
+    def _elsewhere(self, name: str) -> str:
+        return f"result.{self.elsewhere[name]}" if name in self.elsewhere else ""
+
     def __missing__(self, name: str) -> V:
-        where = self.elsewhere.get(name)
-        known = f"known are {', '.join(self) or 'none'}"
-        raise NoSuchName(str(name), f"not among {self.what}: {f'take result.{where}' if where else known}")
+        where = self._elsewhere(name)
+        advice = f"take {where}" if where else meant(str(name), self) if len(self) else "there are none"
+        with border:
+            raise NoSuchName(str(name), f"not among {self.what}: {advice}")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (dict(self), self.what, self.elsewhere)

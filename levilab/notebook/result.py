@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import shutil
 import tempfile
 import weakref
@@ -10,13 +11,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-import numpy as np
-
+import levilab
 from levilab.errors import UsageError, unquote
 from levilab.files import CannotWrite, replace_atomically
+from levilab.notebook.fit import FIT, METHODS, FittedModel
 from levilab.notebook.labels import as_dataset, head_as_html
+from levilab.notebook.names import Helpful, bare
 from levilab.notebook.quantity import Named, Quantity, correlate
 from levilab.pipelines.catalogue import ANALYSES, print_analysis
 from levilab.pipelines.result import Place
@@ -25,11 +27,13 @@ from levilab.present.html import facts_as_html, fold, paragraphs, table_as_html
 from levilab.present.numbers import plain, without_unit
 from levilab.present.units import unit
 from levilab.report.page import render_part
+from levilab.report.tables.latex import to_latex
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import ItemsView, Iterator, KeysView, Mapping
     from os import PathLike
 
+    import numpy as np
     import pandas as pd
     import xarray
     from numpy.typing import ArrayLike
@@ -57,8 +61,10 @@ _STATISTICS = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AnalysisResult:
+class AnalysisResult(Helpful):
     """What an analysis found of one or several inputs.  Nothing is written unless `save` is called.
+
+    It is a mapping of its values: `result["c32"]`, `dict(result)`; each is an attribute, too.
 
     Attributes:
         analysis: the row of the catalogue.
@@ -69,6 +75,24 @@ class AnalysisResult:
     analysis: Analysis[Any]
     found: Any
     copies: tuple[Path, ...] = ()
+
+    also: ClassVar[Mapping[str, str]] = {
+        **{name: f"fit.{name}" for name in (*FIT, *METHODS)},
+        "df": "to_dataframe()",
+        "notes": "warnings",
+    }
+    instead: ClassVar[Mapping[str, str]] = {
+        "plot_fit": "plot('fit')",
+        "plot_residuals": "plot('residuals')",
+        "success": "warnings, which has it where a fit did not converge",
+    }
+
+    @property
+    def _contents(self) -> Mapping[str, Any]:
+        return self.values
+
+    def _elsewhere(self, name: str) -> str:
+        return self.values._elsewhere(name)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a pickle holds: the analysis by its name, and the DataFrames' files with their content."""
@@ -124,18 +148,37 @@ class AnalysisResult:
         return self.analysis.result.of(self.found, Place(Path()))  # type: ignore[no-any-return]
 
     @cached_property
-    def models(self) -> Named[Named[Quantity]]:
+    def models(self) -> Named[FittedModel]:
         """Model → parameter → quantity: every drag law that was fitted, whichever is the best; of all inputs together.
 
-        Parameters of one model are correlated as its fit says.
+        Each has its fit: statistics, curve, intervals.
         """
-        return _models_of(self._written, "this result")
+        return self._models_of(self._written, "this result", None if len(self.inputs) > 1 else 0)
 
     @cached_property
-    def models_by_input(self) -> Mapping[str, Named[Named[Quantity]]]:
+    def models_by_input(self) -> Mapping[str, Named[FittedModel]]:
         """Name of the input → the same of that input alone."""
-        runs = zip(self.inputs, self._written.runs, strict=True)
-        return Named({name: _models_of(run, name) for name, run in runs}, "the inputs")
+        runs = enumerate(zip(self.inputs, self._written.runs, strict=True))
+        return Named({name: self._models_of(run, name, number) for number, (name, run) in runs}, "the inputs")
+
+    def _models_of(self, part: Any, of: str, number: int | None) -> Named[FittedModel]:
+        """Return the models of a part of the result, by their names; number: of the input, None of several together."""
+        models = {}
+        for model in part.models:
+            quantities = correlate([_quantity(value) for value in model.parameters.values()], model.covariance)
+            values = dict(zip(model.parameters, quantities, strict=True))
+            models[model.name] = FittedModel(values, model, self, number)
+        return Named(models, f"the models of {of}")
+
+    @property
+    def fit(self) -> FittedModel:
+        """The best model, with the names that lmfit has: `redchi`, `covar`, `eval(t)`, `conf_interval()` and so on.
+
+        Each of them is an attribute of the result, too.  Raises UsageError where no model was fitted.
+        """
+        if self.best_model not in self.models:
+            raise UsageError("fit", f"a result of {self.kind} has none: its values come from no model of the readings")
+        return self.models[self.best_model]
 
     @property
     def best_model(self) -> str:
@@ -149,7 +192,7 @@ class AnalysisResult:
     @property
     def params(self) -> Mapping[str, Quantity]:
         """The parameters of the best model, as lmfit names them."""
-        return self.models[self.best_model]
+        return self.fit
 
     @cached_property
     def values(self) -> Named[Quantity]:
@@ -170,7 +213,7 @@ class AnalysisResult:
             "the inputs",
         )
 
-    def _values_of(self, part: Any, models: Named[Named[Quantity]], where: str, what: str) -> Named[Quantity]:
+    def _values_of(self, part: Any, models: Named[FittedModel], where: str, what: str) -> Named[Quantity]:
         """Return the values of a part of the result, the same numbers as the parameters of its best model."""
         best = getattr(part, "best_model", None) or next(iter(models), "")
         fitted: Mapping[str, Quantity] = models.get(best, {})
@@ -182,8 +225,27 @@ class AnalysisResult:
         }  # the first law that has it
         return Named(values, f"{what}{law}", elsewhere)
 
+    @bare
     def __getitem__(self, name: str) -> Quantity:
         return self.values[name]
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Return a value, or what is given in its place."""
+        return self.values.get(name, default)
+
+    def keys(self) -> KeysView[str]:
+        """Return the names of the values."""
+        return self.values.keys()
+
+    def items(self) -> ItemsView[str, Quantity]:
+        """Return names and values."""
+        return self.values.items()
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __bool__(self) -> bool:
+        return True  # a result without values is one, too
 
     def __contains__(self, name: object) -> bool:
         return name in self.values
@@ -265,6 +327,50 @@ class AnalysisResult:
         frame = pd.DataFrame(rows, columns=[whose, "name", "value", "u", "unit"])
         return frame.astype({"value": float, "u": float})
 
+    @property
+    def data(self) -> pd.DataFrame:
+        """The readings with their residuals, as `to_dataframe("readings")` returns them."""
+        return self.to_dataframe("readings")
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times of the readings [s], shape (n,).  Raises UsageError where they have none."""
+        frame = self.data
+        if "time_s" not in frame:
+            columns = ", ".join(map(str, frame.columns))
+            raise UsageError("time", f"the readings of a result of {self.kind} have none: data has {columns}")
+        return frame["time_s"].to_numpy()
+
+    @property
+    def budget(self) -> pd.DataFrame:
+        """What each u is made of, a row a component; `contribution` is in the unit of the quantity."""
+        import pandas as pd
+
+        columns = ["quantity", "component", "source", "kind", "u", "unit", "contribution", "included", "note"]
+        rows = [
+            (of.quantity, one.name, one.source, one.kind, one.u, one.unit, one.contribution, one.included, one.note)
+            for of in self.found.budget
+            for one in of.components
+        ]
+        return pd.DataFrame(rows, columns=columns)
+
+    def to_dict(self) -> dict[str, dict[str, Any]]:
+        """Return name → value, u, unit, in plain types."""
+        return {name: {"value": one.value, "u": one.u, "unit": one.unit} for name, one in self.items()}
+
+    def to_json(self) -> str:
+        """Return the text of result.json, which has all of it."""
+        return json.dumps(self.document, indent=2, sort_keys=True, ensure_ascii=False)
+
+    def to_latex(self) -> str:
+        """Return the values as a small table of LaTeX; `levilab.report(result, …, tables=True)` writes all tables."""
+        rows = [rf"  {to_latex(name)} & {one._repr_latex_()} \\" for name, one in self.items()]
+        return "\n".join([r"\begin{tabular}{ll}", *rows, r"\end{tabular}"])
+
+    def report(self, output: str | PathLike[str] = "report.html", **options: Any) -> Path:
+        """Write its report; the same as `levilab.report(result, output, …)`."""
+        return levilab.report(self, output, **options)
+
     def to_xarray(self) -> xarray.Dataset:
         """Return the readings with their residuals as a Dataset with units; needs xarray.  Raises MissingXarray."""
         return as_dataset(self.to_dataframe("readings"), "reading")
@@ -273,15 +379,16 @@ class AnalysisResult:
     def residuals(self) -> np.ndarray:
         """Reading less the best model, shape (n,), in SI; NaN for readings that are not used.  Raises UsageError."""
         frame = self.to_dataframe("readings")
-        return frame[self._residual(frame)].to_numpy()
+        return frame[self.residual_column(frame)].to_numpy()
 
-    def _residual(self, frame: pd.DataFrame) -> str:
+    def residual_column(self, frame: pd.DataFrame) -> str:
         """Return the name of the residuals' column in the table of readings.  Raises UsageError."""
         for name in frame.columns:
             if name.startswith("residual"):
                 return str(name)
         raise UsageError("residuals", f"a result of {self.kind} has none: its values come from pulses or pictures")
 
+    @bare
     def predict(self, x: ArrayLike, model: str | None = None, *, input: str | None = None) -> np.ndarray:  # noqa: A002
         """Return a fitted curve at other places, in SI, in the shape of x.
 
@@ -304,8 +411,9 @@ class AnalysisResult:
         chosen = self.best_model if model is None else model
         if chosen not in self.models:
             raise UsageError("model", f"known are {', '.join(self.models)}", value=model)
-        places = np.asarray(x, dtype=float)
-        return self.analysis.curve(self.found, number, chosen)(places.ravel()).reshape(places.shape)
+        if x is None:
+            raise UsageError("x", "a number or an array of numbers in SI is expected", value=x)
+        return self.models_by_input[self.inputs[number]][chosen].eval(x)
 
     def fit_report(self) -> str:
         """Return the fits as text: each model's statistics, parameters of the best one, and their correlations."""
@@ -342,7 +450,7 @@ class AnalysisResult:
         curves = {name: curve(self.found, k, best) if curve else None for k, name in enumerate(self.inputs)}
         title = f"{self.kind}{f', {best}' * bool(best)}: readings, and residuals"
         made_up = [source.synthetic for source in self.found.sources]
-        return residuals_figure(frame, self._residual(frame), title, made_up, curves)
+        return residuals_figure(frame, self.residual_column(frame), title, made_up, curves)
 
     def save(self, folder: str | PathLike[str]) -> list[Path]:
         """Write result.json and the figure into a folder, and beside them the DataFrames that were analyzed.
@@ -363,15 +471,6 @@ class AnalysisResult:
 
 def _quantity(value: Value) -> Quantity:
     return Quantity(value.value, value.u, value.unit, value.interval_68)
-
-
-def _models_of(part: Any, of: str) -> Named[Named[Quantity]]:
-    """Return the models of a part of result.json, by their names."""
-    models = {}
-    for model in part.models:
-        quantities = correlate([_quantity(value) for value in model.parameters.values()], model.covariance)
-        models[model.name] = Named(dict(zip(model.parameters, quantities, strict=True)), f"the {model.name} model's")
-    return Named(models, f"the models of {of}")
 
 
 def _correlations(fitted: Mapping[str, Quantity]) -> Iterator[tuple[str, str, float]]:

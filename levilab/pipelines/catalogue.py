@@ -13,7 +13,7 @@ from levilab.pipelines.field.document import DOCUMENT as FIELD
 from levilab.pipelines.field.quantities import FIELD_ROW
 from levilab.pipelines.field.quantities import QUANTITIES as FIELD_QUANTITIES
 from levilab.pipelines.field.report import field_part
-from levilab.pipelines.field.table import field_columns, field_curve, field_tables
+from levilab.pipelines.field.table import field_columns, field_curve, field_curve_u, field_tables
 from levilab.pipelines.hold.document import DOCUMENT as HOLD
 from levilab.pipelines.hold.quantities import HOLD_ROW
 from levilab.pipelines.hold.quantities import QUANTITIES as HOLD_QUANTITIES
@@ -28,7 +28,12 @@ from levilab.pipelines.precession.document import DOCUMENT as PRECESSION
 from levilab.pipelines.precession.quantities import PRECESSION_ROW
 from levilab.pipelines.precession.quantities import QUANTITIES as PRECESSION_QUANTITIES
 from levilab.pipelines.precession.report import precession_part
-from levilab.pipelines.precession.table import precession_columns, precession_curve, precession_tables
+from levilab.pipelines.precession.table import (
+    precession_columns,
+    precession_curve,
+    precession_curve_u,
+    precession_tables,
+)
 from levilab.pipelines.result import Place
 from levilab.pipelines.row import symbols_of
 from levilab.pipelines.spin.document import DOCUMENT as SPIN
@@ -40,7 +45,7 @@ from levilab.pipelines.spindown.document import DOCUMENT as SPINDOWN
 from levilab.pipelines.spindown.laws import SYMBOLS
 from levilab.pipelines.spindown.quantities import SPINDOWN_ROW
 from levilab.pipelines.spindown.report import spindown_part
-from levilab.pipelines.spindown.table import spindown_columns, spindown_curve, spindown_tables
+from levilab.pipelines.spindown.table import spindown_columns, spindown_curve, spindown_curve_u, spindown_tables
 from levilab.pipelines.sway.document import DOCUMENT as SWAY
 from levilab.pipelines.sway.quantities import QUANTITIES as SWAY_QUANTITIES
 from levilab.pipelines.sway.quantities import SWAY_ROW
@@ -92,6 +97,7 @@ class Analysis(Generic[A]):
         files: tables for other analyses that are saved with the result, by their names.
         curve: the fitted curve of an input, by its number and the model's name, as a function of arrays in SI; None:
             there is none.
+        curve_u: its standard uncertainty, likewise.
     """
 
     result: Document[Any, Any, Any, A, Any]
@@ -103,6 +109,7 @@ class Analysis(Generic[A]):
     files: Callable[[A], Mapping[str, str]] = lambda _: {}
     compared: tuple[str, ...] = ()
     curve: Callable[[A, int, str], Callable[[np.ndarray], np.ndarray]] | None = None
+    curve_u: Callable[[A, int, str], Callable[[np.ndarray], np.ndarray]] | None = None
 
     @property
     def needs(self) -> Needs[Any]:
@@ -174,7 +181,16 @@ class Analysis(Generic[A]):
 
 
 _TABLE: tuple[Analysis[Any], ...] = (
-    Analysis(SPINDOWN, spindown_tables, spindown_part, spindown_columns, SPINDOWN_ROW, SYMBOLS, curve=spindown_curve),
+    Analysis(
+        SPINDOWN,
+        spindown_tables,
+        spindown_part,
+        spindown_columns,
+        SPINDOWN_ROW,
+        SYMBOLS,
+        curve=spindown_curve,
+        curve_u=spindown_curve_u,
+    ),
     Analysis(
         SPIN, spin_tables, spin_part, spin_columns, SPIN_ROW, symbols_of(SPIN_QUANTITIES), compared=("frequency",)
     ),
@@ -186,6 +202,7 @@ _TABLE: tuple[Analysis[Any], ...] = (
         FIELD_ROW,
         symbols_of(FIELD_QUANTITIES.values()),
         curve=field_curve,
+        curve_u=field_curve_u,
         compared=("strength", "origin", "thickness"),
     ),
     Analysis(
@@ -199,6 +216,7 @@ _TABLE: tuple[Analysis[Any], ...] = (
         PRECESSION_ROW,
         symbols_of(PRECESSION_QUANTITIES),
         curve=precession_curve,
+        curve_u=precession_curve_u,
         compared=("slope", "intercept"),
     ),
     Analysis(SWAY, sway_tables, sway_part, sway_columns, SWAY_ROW, symbols_of(SWAY_QUANTITIES)),

@@ -229,7 +229,8 @@ def _budget(budgets: Sequence[Budget]) -> dict[str, Any]:
 
 #: Statistics that a result has of each model; None where a model has no such number.
 _STATISTICS = (
-    "n", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson", "runs_test_p", "difference",
+    "n", "degrees_of_freedom", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson",
+    "runs_test_p", "difference",
 )  # fmt: skip
 
 

@@ -122,3 +122,8 @@ def field_columns(analysis: FieldAnalysis) -> Iterator[Mapping[str, np.ndarray]]
 def field_curve(analysis: FieldAnalysis, number: int, _: str) -> Callable[[np.ndarray], np.ndarray]:
     """Return the flux density [T] of the ring fitted to one scan, of heights [m]."""
     return analysis.runs[number].scan.model
+
+
+def field_curve_u(analysis: FieldAnalysis, number: int, _: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the standard uncertainty [T] of the flux density fitted to one scan, of heights [m]."""
+    return analysis.runs[number].scan.u_model

@@ -69,6 +69,8 @@ def _statistics(fit: SweepFit, residual: np.ndarray, line: Line | None) -> dict[
     chi_square = line.chi_square if line else None
     return {
         "n": residual.size,
+        "degrees_of_freedom": residual.size - 2,
+        "freedom_of_u": line.freedom if line else None,
         "rms_residual": float(np.sqrt(np.mean(residual**2))),
         "reduced_chi_square": None if line is None or chi_square is None else chi_square / line.degrees_of_freedom,
         "p_fit": line.p_fit if line else None,

@@ -179,6 +179,12 @@ def precession_columns(analysis: PrecessionAnalysis) -> Iterator[Mapping[str, np
         yield {name: run.fit.column(attribute) for name, attribute in _COLUMNS.items()} | {"used": used}
 
 
+def precession_curve_u(analysis: PrecessionAnalysis, number: int, model: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the standard uncertainty [Hz] of a line fitted to one sweep, of drive frequencies [Hz]; NaN: undefined."""
+    line = analysis.runs[number].fit.line
+    return line.u_at if model != "robust" else lambda drive: np.full_like(drive, np.nan)
+
+
 def precession_curve(analysis: PrecessionAnalysis, number: int, model: str) -> Callable[[np.ndarray], np.ndarray]:
     """Return the precession frequency [Hz] of a line fitted to one sweep, of drive frequencies [Hz]."""
     fit = analysis.runs[number].fit

@@ -222,6 +222,19 @@ def spindown_columns(analysis: SpinDownAnalysis) -> Iterator[Mapping[str, np.nda
         }
 
 
+def spindown_curve_u(analysis: SpinDownAnalysis, number: int, law: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the standard uncertainty [Hz] of a law's curve, of times [s]; NaN: undefined, or of a tilt elsewhere."""
+    run = analysis.runs[number]
+    fit = run.fit(law)
+
+    def curve_u(time: np.ndarray) -> np.ndarray:
+        u = fit.u_spin_frequency(time)
+        unknown = fit.has_tilt & ((time < run.time[0]) | (time > run.time[-1]))
+        return np.where(unknown, np.nan, np.nan if u is None else u)
+
+    return curve_u
+
+
 def spindown_curve(analysis: SpinDownAnalysis, number: int, law: str) -> Callable[[np.ndarray], np.ndarray]:
     """Return the spin frequency [Hz] of a law fitted to one run, of times [s]; beyond the readings by the law alone."""
     run = analysis.runs[number]

@@ -1,0 +1,119 @@
+"""Names that people guess: those of other libraries, the right one in the place of a wrong one, short tracebacks."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from functools import wraps
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
+
+from instruments.errors import InstrumentError
+from levilab.errors import LevilabError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+F = TypeVar("F", bound="Callable[..., Any]")
+#: Flag of a function's code: it takes any names.
+_TAKES_ANY = 0x08
+#: Names less alike than this are not what was meant.
+_ALIKE = 0.55
+
+
+class NoSuchAttribute(LevilabError, AttributeError):
+    """An attribute that an object lacks; the text has the name that was probably meant."""
+
+
+def meant(name: str, known: Iterable[str]) -> str:
+    """Return the question after what was meant, or all names where none is like it.
+
+    >>> meant("law", ["model", "input"]), meant("modle", ["model", "input"])
+    ('known are model, input', 'did you mean model?')
+    """
+    names = [*known]
+    near = get_close_matches(name, names, n=3, cutoff=_ALIKE)
+    return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(names)}"
+
+
+class _Border:
+    """Ends the traceback of a known failure at the caller: what lies below explains nothing to a person."""
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+        if error is None:
+            return
+        if isinstance(error, LevilabError | InstrumentError):
+            error.__cause__, error.__context__, error.__traceback__ = None, None, None
+
+
+border = _Border()
+
+
+def bare(function: F) -> F:
+    """Let a known failure of a function end its traceback at the caller, and refuse options that it lacks."""
+    code = function.__code__
+    names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+
+    @wraps(function)
+    def call(*args: Any, **named: Any) -> Any:
+        with border:
+            if not code.co_flags & _TAKES_ANY:
+                _refuse_unknown(function.__name__, named, names)
+            return function(*args, **named)
+
+    return cast("F", call)
+
+
+def _refuse_unknown(function: str, named: Iterable[str], names: Iterable[str]) -> None:
+    """Raise UsageError for an option that a function lacks."""
+    known = [name for name in names if name != "self"]
+    for name in named:
+        if name not in known:
+            raise UsageError(name, f"is no option of {function}; {meant(name, known)}")
+
+
+class Helpful:
+    """An object with a table of the names by which its values are also known.
+
+    Attributes:
+        also: another library's name → where the value stands, as "fit.redchi", with "()" a method that is called; or a
+            function of the object.
+        instead: a name that no value has → what to type.
+    """
+
+    also: ClassVar[Mapping[str, str | Callable[[Any], Any]]] = {}
+    instead: ClassVar[Mapping[str, str]] = {}
+
+    @property
+    def _contents(self) -> Mapping[str, Any]:
+        """Values that are attributes, too, where their names are free."""
+        return {}
+
+    def _elsewhere(self, _: str) -> str:
+        """Return what to type for a name that stands elsewhere; empty: it does not."""
+        return ""
+
+    def __dir__(self) -> list[str]:
+        names = [name for name in self._contents if str(name).isidentifier()]
+        return sorted({*super().__dir__(), *self.also, *names} - {"also", "instead"})
+
+    if not TYPE_CHECKING:  # a checker of types is to find a wrong name, not to take it for any
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("_") or not vars(self):  # what copies and pickles ask for, and an empty object
+                raise AttributeError(name)
+            where = type(self).also.get(name)
+            if callable(where):
+                return where(self)
+            if where:
+                value = attrgetter(where.removesuffix("()"))(self)
+                return value() if where.endswith("()") else value
+            if name in self._contents:
+                return self._contents[name]
+            advice = type(self).instead.get(name) or self._elsewhere(name)
+            public = [one for one in dir(self) if not one.startswith("_")]
+            text = f"take {advice}" if advice else meant(name, public)
+            with border:
+                raise NoSuchAttribute(f"{type(self).__name__} has no {name!r}: {text}")
