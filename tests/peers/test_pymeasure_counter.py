@@ -1,12 +1,11 @@
 """PyMeasure's CNT91 class, unmodified, on the virtual counter, by each of the ways that lead there."""
 
-import math
-
 import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
+from support.light import pulses
 
 pytest.importorskip("pymeasure")
 
@@ -15,17 +14,10 @@ from pymeasure.instruments.pendulum import CNT91
 SPIN = 27.3
 
 
-def light(start, step, n):
-    """A top that keeps its spin: pulses of 3 % of a turn, FWHM, between 0.1 V and 1.2 V."""
-    sigma = 0.03 / math.sqrt(8 * math.log(2))
-    place = (SPIN * (start + step * np.arange(n))) % 1.0 - 0.5
-    return 0.1 + 1.1 * np.exp(-0.5 * (place / sigma) ** 2)
-
-
 @pytest.fixture
 def bench(opened):
     """PyMeasure's class, and the virtual instrument that it talks to."""
-    device = VirtualCNT91(VirtualClock(), signal=light)
+    device = VirtualCNT91(VirtualClock(), signal=pulses(SPIN))
     counter = opened(CNT91, device)
     yield counter, device
     assert counter.check_errors() == []

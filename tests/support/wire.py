@@ -34,3 +34,8 @@ def errors(device):
     """The numbers in the error queue, oldest first."""
     none = device.no_error
     return [int(entry.split(",")[0]) for entry in iter(lambda: ask(device, "SYST:ERR?"), none)]
+
+
+def numbers(answer):
+    """The numbers of an answer, between commas."""
+    return [float(word) for word in answer.split(",")]

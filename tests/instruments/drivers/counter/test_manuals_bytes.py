@@ -4,8 +4,6 @@ Sources: Keysight 53220A/53230A Programmer's Reference; Programmer's Handbook of
 both families.
 """
 
-import math
-
 import numpy as np
 import pytest
 import pyvisa
@@ -20,6 +18,7 @@ from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 from support.conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
+from support.light import DARK, pulses
 
 
 def preparation(gate, level, timeout, channel=1):
@@ -258,9 +257,7 @@ PAIRS = [(Keysight53230A, Virtual53230A), (PendulumCNT91, VirtualCNT91)]
 
 def light(start, step, n):
     """25 Hz, pulses of 3 % of a turn between 0.1 V and 1.2 V; from 1000 s on it is dark."""
-    times = start + step * np.arange(n)
-    sigma = 0.03 / math.sqrt(8 * math.log(2))
-    return 0.1 + 1.1 * np.exp(-0.5 * (((25.0 * times) % 1.0 - 0.5) / sigma) ** 2) * (times < 1000.0)
+    return np.where(start + step * np.arange(n) < 1000.0, pulses(25.0)(start, step, n), DARK)
 
 
 def faster_light(start, step, n):

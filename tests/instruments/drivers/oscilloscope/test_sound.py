@@ -14,15 +14,10 @@ from instruments.links.sound import InputDevice, SoundLink, choose_input
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.oscilloscope.sound import VirtualSoundCard
+from support.light import pulses
 
 ADDRESS = "sound://oscilloscope.levilab"
 RATE = 48_000.0
-
-
-def pulses(start, step, n):
-    """Light at 25 Hz: 0.1 V, and pulses of 1.1 V and 1.2 ms."""
-    turns = 25.0 * (start + step * np.arange(n))
-    return 0.1 + 1.1 * np.exp(-0.5 * ((turns % 1.0 - 0.5) / 0.0127) ** 2)
 
 
 def waves(start, step, n):
@@ -34,7 +29,7 @@ class Card:
 
     def __init__(self, seed=0):
         self.clock = VirtualClock()
-        self.twin = VirtualSoundCard(self.clock, signals={1: pulses, 2: waves}, seed=seed)
+        self.twin = VirtualSoundCard(self.clock, signals={1: pulses(25.0), 2: waves}, seed=seed)
         self.bench = VirtualBench({ADDRESS: self.twin})
         self.driver = SoundCard(SoundLink(ADDRESS, library=library_for(self.bench), clock=self.clock), clock=self.clock)
 

@@ -14,25 +14,12 @@ from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from support import hostile
-from support.wire import ask, cable, errors, received, send
+from support.light import DUTY, pulses
+from support.wire import ask, cable, errors, numbers, received, send
 
-DARK, BRIGHT, DUTY = 0.1, 1.2, 0.03
 NO_READING = 9.91e37
 #: What the counter needs at 20 to 60 Hz (INSTRUMENTS.md, 1): a fixed level half way up, direct coupling.
 FIXED_LEVEL = "INP1:COUP DC;LEV:AUTO OFF;:INP1:LEV1 0.65"
-
-
-def pulses(frequency, *, noise=0.0):
-    """Light of a top that keeps its spin: Gaussian pulses of 3 % of a turn, FWHM, evenly spaced."""
-
-    def light(start, step, n):
-        turns = frequency * (start + step * np.arange(n))
-        place = turns % 1.0 - 0.5
-        sigma = DUTY / math.sqrt(8 * math.log(2))
-        random = np.random.default_rng(round(start * 1e6)).standard_normal(n) * noise
-        return DARK + (BRIGHT - DARK) * np.exp(-0.5 * (place / sigma) ** 2) + random
-
-    return light
 
 
 def counter(signal, *messages, start=0.0):
@@ -222,10 +209,6 @@ def test_what_is_out_of_reach_is_not_worked_out():
 
 
 # --- several readings, and the memory ---
-
-
-def numbers(answer):
-    return [float(word) for word in answer.split(",")]
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ Sources of what is expected: Programmer's Handbook of the CNT-90 series, pages a
 drivers send (PyMeasure's CNT91, QMI's Tektronix_FCA3000, QCoDeS's FCA3100).
 """
 
-import math
 import struct
 import tracemalloc
 
@@ -18,21 +17,10 @@ from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
-from support.wire import ask, cable, errors, received, send
+from support.light import pulses
+from support.wire import ask, cable, errors, numbers, received, send
 
 FIXED_LEVEL = "INP:COUP DC;LEV 0.65"
-
-
-def pulses(frequency, *, noise=0.0):
-    """Light of a top that keeps its spin: Gaussian pulses of 3 % of a turn, FWHM."""
-    sigma = 0.03 / math.sqrt(8 * math.log(2))
-
-    def light(start, step, n):
-        place = (frequency * (start + step * np.arange(n))) % 1.0 - 0.5
-        random = np.random.default_rng(round(start * 1e6)).standard_normal(n) * noise
-        return 0.1 + 1.1 * np.exp(-0.5 * (place / sigma) ** 2) + random
-
-    return light
 
 
 def counter(signal, *messages, **settings):
@@ -41,10 +29,6 @@ def counter(signal, *messages, **settings):
         send(device, message.encode() + b"\n")
     assert errors(device) == []
     return device
-
-
-def numbers(answer):
-    return [float(word) for word in answer.split(",")]
 
 
 @pytest.fixture
