@@ -50,12 +50,12 @@ LONGEST = """
 """
 
 
-def pytest_collection() -> None:
+def pytest_collection():
     """Look for no garbage until all tests are collected: there is none, and that took a fifth of the time."""
     gc.disable()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(items):
     """Mark what is slow, and let it go first, the longest before the others."""
     tests = Path(__file__).parent
     slow, longest = ([(tests / name).resolve() for name in names.split()] for names in (SLOW, LONGEST))
@@ -67,7 +67,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: (item.path not in longest, item.get_closest_marker("slow") is None))
 
 
-def pytest_collection_finish() -> None:
+def pytest_collection_finish():
     """Thousands of tests and all that they import stay: the collection of garbage need not look at them each time.
 
     Nor every 700 objects: that took a twentieth of the processor's time.
@@ -94,7 +94,7 @@ def signals_as_at_a_terminal():
 
 
 @pytest.fixture(autouse=True, scope="session")
-def each_kernel_is_compiled_once(tmp_path_factory: pytest.TempPathFactory):
+def each_kernel_is_compiled_once(tmp_path_factory):
     """The processes of xdist have folders of their own in one folder."""
     is_one_of_several = "PYTEST_XDIST_WORKER" in os.environ
     if is_one_of_several:

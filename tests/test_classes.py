@@ -1,15 +1,9 @@
 """Classes are at most three deep, and no constructor calls what a subclass overrides; docs/decisions/0001-rooms.md."""
 
-from __future__ import annotations
-
 import ast
 from functools import cache
-from typing import TYPE_CHECKING
 
 from support.sources import sources
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 DEEPEST = 3
 
@@ -23,7 +17,7 @@ DEEPER = {
 
 
 @cache
-def classes() -> dict[str, ast.ClassDef]:
+def classes():
     """Every class at the top of a module, by its full name."""
     return {
         f"{module}.{node.name}": node
@@ -34,7 +28,7 @@ def classes() -> dict[str, ast.ClassDef]:
 
 
 @cache
-def names_in(module: str) -> dict[str, str]:
+def names_in(module):
     """What the names in a module stand for, as far as they are imported, ``if TYPE_CHECKING`` included."""
     top = sources()[module].body
     within = (node for statement in top if isinstance(statement, ast.If) for node in statement.body)
@@ -43,7 +37,7 @@ def names_in(module: str) -> dict[str, str]:
 
 
 @cache
-def bases(name: str) -> tuple[str, ...]:
+def bases(name):
     """The classes of the house that a class is made of directly."""
     module = name.rpartition(".")[0]
     plain = (base.value if isinstance(base, ast.Subscript) else base for base in classes()[name].bases)
@@ -54,38 +48,38 @@ def bases(name: str) -> tuple[str, ...]:
 
 
 @cache
-def lineage(name: str) -> tuple[str, ...]:
+def lineage(name):
     """A class and all above it."""
     return name, *(above for base in bases(name) for above in lineage(base))
 
 
 @cache
-def depth(name: str) -> int:
+def depth(name):
     above = [base for base in bases(name) if not is_protocol(base)]
     return 1 + max(map(depth, above), default=0)
 
 
-def is_protocol(name: str) -> bool:
+def is_protocol(name):
     return any(isinstance(base, ast.Name) and base.id == "Protocol" for base in classes()[name].bases)
 
 
 @cache
-def methods(name: str) -> dict[str, ast.FunctionDef]:
+def methods(name):
     return {node.name: node for node in classes()[name].body if isinstance(node, ast.FunctionDef)}
 
 
-def is_property(method: ast.FunctionDef) -> bool:
+def is_property(method):
     return any(isinstance(mark, ast.Name) and mark.id.endswith("property") for mark in method.decorator_list)
 
 
 @cache
-def overridden(name: str) -> frozenset[str]:
+def overridden(name):
     """The methods that some class below this one has anew."""
     below = [other for other in classes() if other != name and name in lineage(other)]
     return frozenset(method for other in below for method in methods(other))
 
 
-def used(name: str, method: str, seen: set[str]) -> Iterator[str]:
+def used(name, method, seen):
     """The methods and properties of its own that a method uses, those included that these use."""
     found = next((methods(above)[method] for above in lineage(name) if method in methods(above)), None)
     if found is None or method in seen:
@@ -101,14 +95,14 @@ def used(name: str, method: str, seen: set[str]) -> Iterator[str]:
             yield from used(name, node.attr, seen)
 
 
-def test_classes_are_at_most_three_deep() -> None:
+def test_classes_are_at_most_three_deep():
     deep = {name for name in classes() if depth(name) > DEEPEST}
     assert {name: depth(name) for name in deep if not DEEPER.keys() & lineage(name)} == {}
     deepest = {root: max(depth(name) for name in deep if root in lineage(name)) for root in DEEPER}
     assert deepest == DEEPER  # no tree is allowed more than it needs
 
 
-def test_no_constructor_calls_what_a_subclass_overrides() -> None:
+def test_no_constructor_calls_what_a_subclass_overrides():
     virtual = {
         f"{name}.{method}"
         for name in classes()

@@ -1,13 +1,10 @@
 """What the pages show runs as they show it."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re
 import shlex
 import shutil
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -15,10 +12,6 @@ from support.commands import command
 from support.figures import without_drawing
 from support.paths import ROOT
 from support.trials import with_few_trials
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 PAGES = [
     ROOT / "README.md",
@@ -28,7 +21,7 @@ PAGES = [
 ]
 
 
-def blocks(language: str) -> list[tuple[str, str]]:
+def blocks(language):
     """(page, block) of every fenced block of a language."""
     found = []
     for page in PAGES:
@@ -37,14 +30,14 @@ def blocks(language: str) -> list[tuple[str, str]]:
     return found
 
 
-def copy_samples(text: str, place: Path) -> None:
+def copy_samples(text, place):
     """Copy the sample data to where a text that names them is tried."""
     if "sample_data" in text:
         shutil.copytree(ROOT / "sample_data", place / "sample_data")
 
 
 @pytest.mark.parametrize(("page", "code"), blocks("python"))
-def test_python_in_the_pages_prints_what_it_says(page: str, code: str, tmp_path: Path) -> None:
+def test_python_in_the_pages_prints_what_it_says(page, code, tmp_path):
     copy_samples(code, tmp_path)
     shown = io.StringIO()
     with contextlib.chdir(tmp_path), contextlib.redirect_stdout(shown), reduce_work(page):
@@ -52,13 +45,13 @@ def test_python_in_the_pages_prints_what_it_says(page: str, code: str, tmp_path:
     assert shown.getvalue().splitlines() == re.findall(r"print\(.*\)  # (.*)", code)
 
 
-def steps() -> dict[str, dict[str, list[str]]]:
+def steps():
     """Page → command → what the page shows of its output; in order, each command once.
 
     In a block of ``console`` a command stands after ``$``, above its output.  What is of the reader's own table, and
     shows nothing, is not carried out; nor is a block of ``shell-session``.
     """
-    found: dict[str, dict[str, list[str]]] = {}
+    found = {}
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
         for block in re.findall(r"```console\n(.*?)```", text, re.DOTALL):
@@ -70,7 +63,7 @@ def steps() -> dict[str, dict[str, list[str]]]:
     return found
 
 
-def test_each_command_stands_after_a_dollar() -> None:
+def test_each_command_stands_after_a_dollar():
     """So that a reader tells what is typed from what is printed; tables of settings and programs have other blocks."""
     for page in (*PAGES, ROOT / "CONTRIBUTING.md"):
         text = page.read_text(encoding="utf-8")
@@ -79,7 +72,7 @@ def test_each_command_stands_after_a_dollar() -> None:
             assert block.startswith("$ "), (page, block)
 
 
-def as_pattern(shown: str) -> str:
+def as_pattern(shown):
     """What a page shows of an output; ``…`` stands for any text in a line, alone on a line for any lines."""
     lines = [
         r"(?:.*\n)*" if line == "…" else re.escape(line).replace("…", ".*") + r" *\n" for line in shown.splitlines()
@@ -93,7 +86,7 @@ IN_FULL = "README.md"
 
 
 @contextlib.contextmanager
-def reduce_work(page: str) -> Iterator[None]:
+def reduce_work(page):
     """Draw no figures and make few trials, on all pages but one."""
     if page == IN_FULL:
         yield
@@ -103,13 +96,13 @@ def reduce_work(page: str) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("page", steps())
-def test_the_commands_of_a_page_work_one_after_another(tmp_path: Path, page: str) -> None:
+def test_the_commands_of_a_page_work_one_after_another(tmp_path, page):
     copy_samples(" ".join(steps()[page]), tmp_path)
     with reduce_work(page):
         follow(steps()[page], tmp_path)
 
 
-def follow(steps: dict[str, list[str]], place: Path) -> None:
+def follow(steps, place):
     """Carry out the commands of a page, and compare what they write with what it shows."""
     for line, outputs in steps.items():
         ended = command(*shlex.split(line)[1:], cwd=place)
@@ -119,7 +112,7 @@ def follow(steps: dict[str, list[str]], place: Path) -> None:
             assert re.match(as_pattern(shown), written), (line, shown, written)
 
 
-def test_the_readme_and_the_tutorial_show_commands() -> None:
+def test_the_readme_and_the_tutorial_show_commands():
     assert len(steps()["README.md"]) >= 5
     assert len(steps()["docs/tutorial.md"]) >= 8
 
@@ -127,7 +120,7 @@ def test_the_readme_and_the_tutorial_show_commands() -> None:
 @pytest.mark.parametrize(("shown", "matches"), [
     ("a\nc\n", False), ("a\nb\nc\n", True), ("…\nc\n", True), ("a\n…\n", True), ("a…\nb\nc\n", True), ("…\nb\n", False),
 ])  # fmt: skip
-def test_an_output_is_compared_with_what_a_page_shows_of_it(shown: str, matches: bool) -> None:
+def test_an_output_is_compared_with_what_a_page_shows_of_it(shown, matches):
     assert bool(re.match(as_pattern(shown), "a\nb\nc\n")) is matches
 
 
@@ -135,19 +128,19 @@ def test_an_output_is_compared_with_what_a_page_shows_of_it(shown: str, matches:
 SPECIAL = re.compile(r"\S[\[,](?!…)\S|\*|(?<=\s)\[\S")
 
 
-def unquoted(line: str) -> str:
+def unquoted(line):
     """A command without what stands in quotes and without its comment."""
     return re.sub(r"\"[^\"]*\"|'[^']*'", "", line.split("  #", maxsplit=1)[0])
 
 
-def commands_to_type(text: str) -> list[str]:
+def commands_to_type(text):
     """The commands of a page, in blocks and within a line, and those of a program's help."""
     in_blocks = re.findall(r"^(?:\$ )?((?:levilab|pip|python) .*)", text, re.MULTILINE)
     in_lines = re.findall(r"(?<!`)`((?:levilab|pip|python|--[a-z-]+) [^`\n]*)`", text)
     return in_blocks + in_lines + re.findall(r"Example: (levilab .*)['\"]", text)
 
 
-def test_commands_mean_the_same_in_every_shell() -> None:
+def test_commands_mean_the_same_in_every_shell():
     sources = [*PAGES, *sorted((ROOT / "levilab/cli").glob("*.py"))]
     found = [(page.name, line) for page in sources for line in commands_to_type(page.read_text(encoding="utf-8"))]
     assert len(found) > 100
@@ -159,11 +152,11 @@ def test_commands_mean_the_same_in_every_shell() -> None:
     ("levilab reproduce --only limits,errata  # some", True), ('levilab reproduce --only "limits,errata"', False),
     ("levilab runs  # all, of [any] kind", False), ("pip install 'levilab[pdf]'", False),
 ])  # fmt: skip
-def test_what_a_shell_would_change_is_seen(line: str, special: bool) -> None:
+def test_what_a_shell_would_change_is_seen(line, special):
     assert bool(SPECIAL.search(unquoted(line))) is special
 
 
-def test_make_demo_and_make_test_stand_at_the_top_of_the_readme_and_in_the_makefile() -> None:
+def test_make_demo_and_make_test_stand_at_the_top_of_the_readme_and_in_the_makefile():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     first = blocks("console")[0][1]
     assert [line.split("#")[0].strip("$ ") for line in first.splitlines()] == ["make demo", "make test"]
@@ -173,13 +166,13 @@ def test_make_demo_and_make_test_stand_at_the_top_of_the_readme_and_in_the_makef
     assert readme.index("make demo") < 1000
 
 
-def test_links_between_the_pages_lead_somewhere() -> None:
+def test_links_between_the_pages_lead_somewhere():
     for page in PAGES:
         for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text(encoding="utf-8")):
             assert (page.parent / target).exists(), (page, target)
 
 
-def test_the_bench_of_the_page_is_a_valid_one(tmp_path: Path) -> None:
+def test_the_bench_of_the_page_is_a_valid_one(tmp_path):
     from levilab.acquisition.table import Configuration, settings_of
     from levilab.bench.config import read_bench
 

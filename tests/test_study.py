@@ -1,11 +1,8 @@
 """The study: its page is made from its numbers, says what they say, and points of its maps come out again."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import re
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +13,7 @@ from levilab.sweeps.plan import Axis, Plan
 from support.paths import ROOT
 
 DOCS, STUDY = ROOT / "docs", ROOT / "benchmarks" / "study"
-FOUND: dict[str, Any] = json.loads((ROOT / "benchmarks/results/study.json").read_text(encoding="utf-8"))
+FOUND = json.loads((ROOT / "benchmarks/results/study.json").read_text(encoding="utf-8"))
 TEXT = (DOCS / "study.md").read_text(encoding="utf-8")
 #: Numbers with a point that the template may have: of starts, scans and scenes, which were chosen.
 CHOSEN = {
@@ -41,7 +38,7 @@ CHOSEN = {
 }
 
 
-def page_module() -> Any:
+def page_module():
     spec = importlib.util.spec_from_file_location("study_page", STUDY / "page.py")
     assert spec
     assert spec.loader
@@ -50,22 +47,22 @@ def page_module() -> Any:
     return module
 
 
-def test_the_page_is_made_from_the_numbers() -> None:
+def test_the_page_is_made_from_the_numbers():
     assert page_module().page(FOUND) == TEXT, "run `python benchmarks/study --page`"
 
 
-def test_the_page_says_in_words_what_the_numbers_say() -> None:
+def test_the_page_says_in_words_what_the_numbers_say():
     claims = page_module().claims(FOUND)
     assert [claim for claim, holds in claims.items() if not holds] == []
 
 
-def test_no_result_is_written_into_the_template_by_hand() -> None:
+def test_no_result_is_written_into_the_template_by_hand():
     template = (STUDY / "page.md.j2").read_text(encoding="utf-8")
     prose = re.sub(r"\{\{.*?\}\}|\{%.*?%\}|\{#.*?#\}|```.*?```", "", template, flags=re.DOTALL)
     assert set(re.findall(r"\d+\.\d+", prose)) <= CHOSEN
 
 
-def test_points_of_the_survival_map_come_out_again() -> None:
+def test_points_of_the_survival_map_come_out_again():
     spots = FOUND["spots"]["survival"]
     spins, masses, heights, up, lifetimes = zip(*spots, strict=True)
     keys = {"start.spin_hz": spins, "top.mass_kg": masses, "start.position_m.2": heights}
@@ -77,7 +74,7 @@ def test_points_of_the_survival_map_come_out_again() -> None:
     assert tops.time[fell] == pytest.approx(expected, abs=1e-4)
 
 
-def test_points_of_the_lock_map_come_out_again() -> None:
+def test_points_of_the_lock_map_come_out_again():
     spots = FOUND["spots"]["lock"]
     drives, amplitudes, up, locked = (np.array(column) for column in zip(*spots, strict=True))
     axes = (Axis("drive.frequency_hz", drives, "table"), Axis("drive.amplitude_t", amplitudes, "table"))
@@ -88,14 +85,14 @@ def test_points_of_the_lock_map_come_out_again() -> None:
     assert set(locked.tolist()) == {False, True}
 
 
-def test_the_page_begins_with_the_commands_of_both_maps() -> None:
+def test_the_page_begins_with_the_commands_of_both_maps():
     shown = [line[2:] for line in TEXT.splitlines() if line.startswith("$ levilab sweep")]
     assert shown == [FOUND["commands"]["survival"], FOUND["commands"]["lock-sine"]]
     assert "'" not in "".join(FOUND["commands"].values())  # a quote that Windows does not know
 
 
 @pytest.mark.parametrize("name", ["survival", "tongue", "masses", "edge", "limits", "lock"])
-def test_the_figures_of_the_page_are_small(name: str) -> None:
+def test_the_figures_of_the_page_are_small(name):
     path = DOCS / "study" / f"{name}.png"
     assert 20_000 < path.stat().st_size <= 150_000
     assert f"study/{name}.png" in TEXT

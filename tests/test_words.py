@@ -1,14 +1,8 @@
 """The words of the house: code and pages name the thing that acts."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING
 
 from support.paths import ROOT
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 #: Words that hide what acts, in lower case: in sentences and names, also over the end of a line or a comment's sign.
 MANNERED = re.compile(
@@ -25,7 +19,7 @@ FOLDERS = (
 ENDINGS = {".py", ".md", ".toml", ".j2"}
 
 
-def mannered(text: str) -> list[str]:
+def mannered(text):
     """The mannered words of a text, in their order.
 
     >>> mannered("It waits so long\\n    #: as nobody_listens. # What was\\n# told?  A disbeliever is toldyou.")
@@ -36,12 +30,12 @@ def mannered(text: str) -> list[str]:
     return [" ".join(re.split(r"[\s#:_]+", found)) for found in MANNERED.findall(text.lower())]
 
 
-def files() -> list[Path]:
+def files():
     """All files with code or sentences but this one."""
     found = [*ROOT.iterdir(), *(file for folder in FOLDERS for file in (ROOT / folder).rglob("*"))]
     return [file for file in found if file.suffix in ENDINGS and file.is_file() and file.name != "test_words.py"]
 
 
-def test_no_file_has_a_word_that_hides_what_acts() -> None:
+def test_no_file_has_a_word_that_hides_what_acts():
     texts = {str(file.relative_to(ROOT)): file.read_text(encoding="utf-8") for file in files()}
     assert {name: words for name, text in texts.items() if (words := mannered(text))} == {}

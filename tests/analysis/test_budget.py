@@ -1,7 +1,5 @@
 """Budgets: squares add up, and each row is as large as what its input does to the result."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +17,7 @@ TIME = np.arange(0.0, 200.0, 10.0)
 DISC = spin("disc", TIME, 40.0, 2.34e-4)
 
 
-def component(size: float, *, included: bool = True) -> Component:
+def component(size, *, included=True):
     return Component("row", "a row", "A", size, "Hz", 2.0, included=included)
 
 
@@ -27,7 +25,7 @@ def component(size: float, *, included: bool = True) -> Component:
 
 
 @given(st.lists(st.floats(1e-6, 1e6), min_size=1, max_size=8))
-def test_squares_of_the_rows_add_up_and_shares_are_parts_of_one(sizes: list[float]):
+def test_squares_of_the_rows_add_up_and_shares_are_parts_of_one(sizes):
     rows = tuple(map(component, sizes))
     budget = Budget("x", 1.0, float(np.linalg.norm([2 * size for size in sizes])), "Hz", rows)
     assert budget.closes
@@ -48,7 +46,7 @@ def test_a_budget_whose_rows_do_not_add_up_says_so():
 
 
 @given(st.lists(st.integers(-(10**6), 10**6), min_size=2, max_size=20), st.integers(0, 5))
-def test_the_step_of_printed_numbers_is_that_of_their_last_digit(numbers: list[int], decimals: int):
+def test_the_step_of_printed_numbers_is_that_of_their_last_digit(numbers, decimals):
     step = printed_step([number / 10**decimals for number in [*numbers, 1]])
     assert step == pytest.approx(10.0**-decimals)
 
@@ -75,17 +73,17 @@ def test_rest_is_what_is_left_of_a_sum_of_squares():
 # --- a spin-down ---------------------------------------------------------------------------------------
 
 
-def readings(seed: int = 1, noise: float = 0.03) -> np.ndarray:
+def readings(seed=1, noise=0.03):
     return DISC + noise * np.random.default_rng(seed).standard_normal(len(TIME))
 
 
-def squares(parts) -> float:
+def squares(parts):
     return float(np.linalg.norm([parts.scatter, parts.excess, parts.correlation, parts.tilt]))
 
 
 @pytest.mark.parametrize("u", [0.03, 0.004, None])
 @pytest.mark.parametrize("tilt", [False, True])
-def test_the_parts_of_every_constant_add_up_to_its_u(u: float | None, tilt: bool):
+def test_the_parts_of_every_constant_add_up_to_its_u(u, tilt):
     found = fit_spin_down(TIME, readings(3), u, laws=["disc", "mixed", "power"], tilt=tilt, driven=True)
     for fit in found.fits:
         assert set(fit.parts) == set(fit.parameters)
@@ -138,13 +136,13 @@ HEIGHT = np.arange(0.03, 0.111, 0.005)
 RING = Ring(1.4e-3, 0.0005, 0.015, 0.030, 0.055)
 
 
-def scan_of(known: Known = KNOWN, *, scale: float = 1.0, free_radii: bool = False):
+def scan_of(known=KNOWN, *, scale=1.0, free_radii=False):
     flux = on_axis(RING, HEIGHT)[0] * scale
     return fit_scan(HEIGHT, flux, known, 3e-7, 2e-4, free_radii=free_radii)
 
 
 @pytest.mark.parametrize("free_radii", [False, True])
-def test_the_parts_of_a_scan_add_up_to_the_u_of_each_parameter(free_radii: bool):
+def test_the_parts_of_a_scan_add_up_to_the_u_of_each_parameter(free_radii):
     scan = scan_of(free_radii=free_radii)
     for name, parts in parts_of(scan, 2e-4).items():
         whole = float(np.linalg.norm([part.size for part in parts]))
@@ -152,7 +150,7 @@ def test_the_parts_of_a_scan_add_up_to_the_u_of_each_parameter(free_radii: bool)
 
 
 @pytest.mark.parametrize("moved", ["origin", "thickness", "background", "inner_radius", "outer_radius"])
-def test_what_the_calliper_says_moves_the_strength_by_its_row(moved: str):
+def test_what_the_calliper_says_moves_the_strength_by_its_row(moved):
     prior, part = KNOWN.prior(moved), 0.05
     other = replace(KNOWN, **{moved: Prior(prior.value + part * prior.u, prior.u)})
     scan = scan_of()

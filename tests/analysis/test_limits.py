@@ -1,7 +1,5 @@
 """Limits: the published numbers, a fall's uncertainty against many drawn falls, Grubbs's own table."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -13,7 +11,7 @@ from analysis.limits import Sample, combine, compare, outliers_of, spin_at_fall,
 THESIS = np.array([21.7, 21.4, 21.7, 21.9, 21.8, 22.3, 21.8, 22.0, 22.1, 21.9])
 
 
-def test_an_error_that_all_limits_share_stays_in_the_mean_of_a_run_and_of_runs() -> None:
+def test_an_error_that_all_limits_share_stays_in_the_mean_of_a_run_and_of_runs():
     """Of 400 means; √n would make u a third of the scatter."""
     random, pulls = np.random.default_rng(4), []
     for _ in range(400):
@@ -22,13 +20,13 @@ def test_an_error_that_all_limits_share_stays_in_the_mean_of_a_run_and_of_runs()
             Sample(68.0 + common + 0.3 * random.standard_normal(5), np.full(5, 0.6), common=np.full(5, 0.5))
             for _ in range(2)
         ]
-        pulls.append([(mean.value - 68.0) / mean.u for mean in (summarize(samples[0]).mean, combine(samples).mean)])  # type: ignore[operator]
+        pulls.append([(mean.value - 68.0) / mean.u for mean in (summarize(samples[0]).mean, combine(samples).mean)])
     assert np.std(pulls, axis=0) == pytest.approx(1, abs=0.12)  # 3 standard errors of 400
     single = combine([Sample(np.array([x]), np.array([0.6]), common=np.array([0.5])) for x in (67.8, 68.2)])
     assert single.mean.u == pytest.approx(math.sqrt(0.5**2 + (0.6**2 - 0.5**2) / 2))
 
 
-def test_the_published_limits_have_the_published_statistics() -> None:
+def test_the_published_limits_have_the_published_statistics():
     found = summarize(Sample(THESIS))
     assert found.scatter
     assert found.scatter.value == pytest.approx(0.25, abs=0.005)
@@ -37,7 +35,7 @@ def test_the_published_limits_have_the_published_statistics() -> None:
     assert not found.drifts
 
 
-def test_the_uncertainty_of_a_loss_on_the_way_up_is_its_scatter() -> None:
+def test_the_uncertainty_of_a_loss_on_the_way_up_is_its_scatter():
     """400 tops that gain 0.4 Hz/s less drag, which doubles on the way; a line through the counts would be 3 u high."""
     random, pulls = np.random.default_rng(2), []
     fine = np.arange(0.0, 120.0, 0.05)
@@ -56,7 +54,7 @@ def test_the_uncertainty_of_a_loss_on_the_way_up_is_its_scatter() -> None:
     assert np.std(pulls) == pytest.approx(1, abs=0.12)
 
 
-def test_the_uncertainty_of_a_fall_is_its_scatter() -> None:
+def test_the_uncertainty_of_a_fall_is_its_scatter():
     """400 tops slowed by the disc law, read each 2 s with 0.06 Hz of noise, falling at any moment between two looks."""
     random, pulls = np.random.default_rng(1), []
     start, c = 2 * math.pi * 24.0, 2.34e-4
@@ -74,7 +72,7 @@ def test_the_uncertainty_of_a_fall_is_its_scatter() -> None:
 
 
 @pytest.mark.parametrize("law", ["stokes", "newton"])
-def test_the_uncertainty_of_a_fall_holds_the_law_of_the_drag(law: str) -> None:
+def test_the_uncertainty_of_a_fall_holds_the_law_of_the_drag(law):
     times, rate = np.array([-25.0, -15.0, -5.0]), 2.9e-3  # a phone's windows; loss a second
     spins = 22 * (np.exp(-rate * times) if law == "stokes" else 1 / (1 + rate * times))
     found = spin_at_fall(times, spins, 1e-9, (0.0, 0.0))
@@ -84,10 +82,10 @@ def test_the_uncertainty_of_a_fall_holds_the_law_of_the_drag(law: str) -> None:
 
 
 @pytest.mark.parametrize(("n", "critical"), [(5, 1.764), (10, 2.482), (20, 3.001)])
-def test_outliers_are_those_of_grubbs_table(n: int, critical: float) -> None:
+def test_outliers_are_those_of_grubbs_table(n, critical):
     """Two-sided, 1 %: the printed critical value, a hundredth less and a hundredth more."""
 
-    def with_deviation(wanted: float) -> np.ndarray:
+    def with_deviation(wanted):
         rest = np.linspace(-1, 1, n - 1)
         low, high = 1.0, 1e6
         for _ in range(200):
@@ -102,7 +100,7 @@ def test_outliers_are_those_of_grubbs_table(n: int, critical: float) -> None:
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.02, 0.05, 0.1, 0.4])
-def test_the_standard_error_holds_the_steps_of_the_drive(scatter: float) -> None:
+def test_the_standard_error_holds_the_steps_of_the_drive(scatter):
     """Eight tops, steps of 0.2 Hz, true limits anywhere in a step: u predicts how far the mean is from the truth."""
     random, pulls, naive = np.random.default_rng(7), [], []
     for _ in range(400):
@@ -121,7 +119,7 @@ def test_the_standard_error_holds_the_steps_of_the_drive(scatter: float) -> None
         assert np.mean(naive) > 0.5  # s/√n alone is far too small
 
 
-def test_a_mean_of_runs_holds_the_scatter_between_them() -> None:
+def test_a_mean_of_runs_holds_the_scatter_between_them():
     """Four runs of five tops, which differ by 0.5 Hz from day to day and by 0.25 Hz from top to top."""
     random, wrong, pooled, betweens = np.random.default_rng(3), 0, 0, []
     for _ in range(400):
@@ -136,7 +134,7 @@ def test_a_mean_of_runs_holds_the_scatter_between_them() -> None:
     assert np.sqrt(np.mean(np.square(betweens))) == pytest.approx(0.5, abs=0.05)
 
 
-def test_runs_that_agree_are_as_good_as_one() -> None:
+def test_runs_that_agree_are_as_good_as_one():
     random = np.random.default_rng(4)
     ratios = []
     for _ in range(100):
@@ -148,13 +146,13 @@ def test_runs_that_agree_are_as_good_as_one() -> None:
     assert np.median(ratios) == pytest.approx(1, abs=0.15)  # three runs tell their own scatter to half of it
 
 
-def test_runs_of_a_single_top_are_one_sample() -> None:
+def test_runs_of_a_single_top_are_one_sample():
     found = combine([Sample(THESIS[k : k + 1]) for k in range(10)])
     assert found.mean == summarize(Sample(THESIS)).mean
     assert (found.runs, found.between, found.trend) == (10, None, None)
 
 
-def test_limits_that_go_down_top_by_top_drift() -> None:
+def test_limits_that_go_down_top_by_top_drift():
     limits = 22.0 - 0.1 * np.arange(8) + np.array([0.01, -0.02, 0.02, 0.0, -0.01, 0.01, -0.02, 0.01])
     found = summarize(Sample(limits))
     assert found.drifts
@@ -163,7 +161,7 @@ def test_limits_that_go_down_top_by_top_drift() -> None:
 
 
 @pytest.mark.parametrize("first", [0.1, 21.3, 60.0, 21.86])
-def test_an_even_series_has_a_trend_without_rounding_noise(first: float) -> None:
+def test_an_even_series_has_a_trend_without_rounding_noise(first):
     found = summarize(Sample(first + 0.1 * np.arange(10)))
     assert found.trend
     assert found.trend.value == pytest.approx(0.1, rel=1e-12)
@@ -171,7 +169,7 @@ def test_an_even_series_has_a_trend_without_rounding_noise(first: float) -> None
 
 
 @pytest.mark.parametrize("limit", [0.1, 21.86, 67.1])
-def test_equal_limits_have_no_scatter_however_their_mean_is_rounded(limit: float) -> None:
+def test_equal_limits_have_no_scatter_however_their_mean_is_rounded(limit):
     found = summarize(Sample(np.full(10, limit)))
     assert found.scatter
     assert (found.mean.u, found.scatter.value, found.trend, found.outliers) == (0.0, 0.0, None, ())
@@ -184,14 +182,14 @@ def test_equal_limits_have_no_scatter_however_their_mean_is_rounded(limit: float
     assert apart.between.value == pytest.approx(0.1 / math.sqrt(2))
 
 
-def test_a_scatter_just_above_rounding_counts() -> None:
+def test_a_scatter_just_above_rounding_counts():
     random = np.random.default_rng(1)
     found = summarize(Sample(21.86 * (1 + 1e-12 * random.standard_normal(10))))
     assert found.scatter
     assert found.scatter.value == pytest.approx(21.86e-12, rel=0.6)  # ten tell a scatter to a quarter
 
 
-def test_a_mean_two_standard_errors_off_of_ten_is_no_chance_by_students_t() -> None:
+def test_a_mean_two_standard_errors_off_of_ten_is_no_chance_by_students_t():
     """Student's table: of 9 degrees of freedom 2.262 has 5 %."""
     found = summarize(Sample(THESIS))
     assert found.mean.value
@@ -202,7 +200,7 @@ def test_a_mean_two_standard_errors_off_of_ten_is_no_chance_by_students_t() -> N
     assert not compare(found, "theory", found.mean.value + 2.3 * found.mean.u).agrees
 
 
-def test_one_limit_has_no_scatter_and_none_is_no_statistic() -> None:
+def test_one_limit_has_no_scatter_and_none_is_no_statistic():
     single = summarize(Sample(np.array([21.9]), np.array([0.05])))
     assert (single.mean.u, single.scatter) == (0.05, None)
     assert compare(single, "theory", 21.0).agrees is None

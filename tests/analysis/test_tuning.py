@@ -1,7 +1,5 @@
 """Which mass floats today: against closed forms, a hobbyist's numbers, and simulated owners."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -10,7 +8,7 @@ import pytest
 from scipy.stats import norm
 
 from analysis import tuning
-from analysis.tuning import Outcome, Posterior, Prior, Trial, combinations, learn
+from analysis.tuning import Outcome, Prior, Trial, combinations, learn
 from analysis.uncertainty import Estimate
 
 G = 1e-3
@@ -20,18 +18,18 @@ WASHERS = np.arange(0.0, 1.2, 0.06) * G
 
 
 @pytest.fixture
-def exact(monkeypatch: pytest.MonkeyPatch) -> None:
+def exact(monkeypatch):
     """No lapses, and edges that are sharp."""
     monkeypatch.setattr(tuning, "LAPSE", 0.0)
     monkeypatch.setattr(tuning, "TEMPERATURE_U", 0.0)
 
 
-def middle(posterior: Posterior, temperature: float = 20.0) -> Estimate:
+def middle(posterior, temperature=20.0):
     return posterior.values(temperature)["mass_to_set"]
 
 
 @pytest.mark.usefixtures("exact")
-def test_one_that_floats_leaves_the_middle_evenly_within_the_window() -> None:
+def test_one_that_floats_leaves_the_middle_evenly_within_the_window():
     found = middle(learn([Trial(25 * G, 20.0, Outcome.FLOATS)], NARROW))
     # mass = middle (1 ± 0.008): a uniform distribution; 2 %: the grid's step against its width
     assert found.value == pytest.approx(25 * G, rel=1e-4)
@@ -39,7 +37,7 @@ def test_one_that_floats_leaves_the_middle_evenly_within_the_window() -> None:
 
 
 @pytest.mark.usefixtures("exact")
-def test_one_that_rises_cuts_a_scans_gaussian() -> None:
+def test_one_that_rises_cuts_a_scans_gaussian():
     prior = replace(NARROW, middle=Estimate(25 * G, 0.3 * G, "kg"))
     found = middle(learn([Trial(25 * G, 20.0, Outcome.RISES)], prior))
     # rises ⇔ middle (1 − 0.008) > mass: the mean and variance of a Gaussian above a bound
@@ -49,7 +47,7 @@ def test_one_that_rises_cuts_a_scans_gaussian() -> None:
     assert found.u == pytest.approx(0.3 * G * math.sqrt(1 + z * hazard - hazard**2), rel=0.02)
 
 
-def test_without_trials_the_scan_alone_says_it_at_its_temperature() -> None:
+def test_without_trials_the_scan_alone_says_it_at_its_temperature():
     prior = Prior.of_scan(Estimate(25 * G, 0.05 * G, "kg"), 24.7 * G, 25.3 * G, 20.0)
     warm = learn([], prior).values(30.0)
     assert warm["mass_to_set"].value == pytest.approx(25 * G * math.exp(-0.04), rel=1e-4)
@@ -58,7 +56,7 @@ def test_without_trials_the_scan_alone_says_it_at_its_temperature() -> None:
     assert warm["relative_change"].u == pytest.approx(prior.per_k_u, rel=0.02)
 
 
-def test_a_hobbyists_trials_over_21_kelvin_give_his_coefficient() -> None:
+def test_a_hobbyists_trials_over_21_kelvin_give_his_coefficient():
     """7 tops that floated, at −0.058 g/K about 22 g at 16 °C, and two 0.12 g too heavy and too light there."""
     trials = [Trial((22 - 0.058 * (t - 16)) * G, t, Outcome.FLOATS) for t in np.linspace(5, 26, 7)]
     trials += [Trial(22.12 * G, 16, Outcome.SINKS), Trial(21.88 * G, 16, Outcome.RISES)]
@@ -72,7 +70,7 @@ def test_a_hobbyists_trials_over_21_kelvin_give_his_coefficient() -> None:
     assert within > 0.85
 
 
-def test_outcomes_are_probabilities_that_add_up() -> None:
+def test_outcomes_are_probabilities_that_add_up():
     posterior = learn([Trial(25 * G, 20, Outcome.FLOATS)], Prior(24 * G, 26 * G))
     outcomes = posterior.outcomes(np.linspace(24, 26, 9) * G, 22.0)
     assert (outcomes >= 0).all()
@@ -82,12 +80,12 @@ def test_outcomes_are_probabilities_that_add_up() -> None:
     assert (np.diff(mean[2]) >= 0).all()
 
 
-def test_a_top_that_slides_sideways_says_nothing_of_its_mass() -> None:
+def test_a_top_that_slides_sideways_says_nothing_of_its_mass():
     prior = Prior(24 * G, 26 * G)
     assert middle(learn([Trial(25 * G, 20, Outcome.SIDEWAYS)], prior)) == middle(learn([], prior))
 
 
-def test_the_chance_by_others_is_that_of_a_posterior_without_the_trial() -> None:
+def test_the_chance_by_others_is_that_of_a_posterior_without_the_trial():
     trials = [
         Trial(24.9 * G, 21, Outcome.SINKS),
         Trial(25.06 * G, 21, Outcome.RISES),
@@ -101,7 +99,7 @@ def test_the_chance_by_others_is_that_of_a_posterior_without_the_trial() -> None
         assert learn(trials, prior).chance_by_others(one) == pytest.approx(chance, rel=0.05)  # two grids
 
 
-def test_the_promise_counts_the_best_trial_after_each_outcome() -> None:
+def test_the_promise_counts_the_best_trial_after_each_outcome():
     prior, masses = Prior(24.5 * G, 26 * G), np.linspace(24.6, 25.9, 7) * G
     posterior = learn([], prior)
     rises, floats, sinks = posterior.outcomes(masses[2:3], 20.0)[:, 0] @ posterior.weight
@@ -111,13 +109,13 @@ def test_the_promise_counts_the_best_trial_after_each_outcome() -> None:
 
 
 @pytest.mark.parametrize(("outcome", "sign"), [(Outcome.RISES, 1), (Outcome.SINKS, -1)])
-def test_what_rises_is_made_heavier_and_what_sinks_lighter(outcome: Outcome, sign: int) -> None:
+def test_what_rises_is_made_heavier_and_what_sinks_lighter(outcome, sign):
     masses = 24.4 * G + WASHERS
     posterior = learn([Trial(25 * G, 20, outcome)], Prior(24 * G, 26 * G))
     assert sign * (masses[posterior.promise(masses, 20.0).argmax()] - 25 * G) > 0
 
 
-def test_washers_combine_to_masses_that_a_balance_distinguishes() -> None:
+def test_washers_combine_to_masses_that_a_balance_distinguishes():
     assert combinations([]) == [()]
     assert len(combinations([0.06e-3] * 6 + [0.2e-3] * 2)) == 21
     many = [1e-5 * 1.3**k for k in range(20)]  # 2^20 choices
@@ -132,17 +130,17 @@ def test_washers_combine_to_masses_that_a_balance_distinguishes() -> None:
 class Owner:
     """A base and a top that nature chose, a hand that errs, a thermometer that is off by a day's constant."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed):
         self.rng = np.random.default_rng(seed)
         self.top, self.span = 24.4 * G, 1.2 * G
         self.middle = self.top + self.rng.uniform(0.2, 1.0) * self.span
         self.width = math.exp(self.rng.normal(math.log(0.012), 0.7))
         self.per_k = self.rng.normal(-0.0036, 0.0009)
 
-    def middle_at(self, temperature: float) -> float:
+    def middle_at(self, temperature):
         return self.middle * math.exp(self.per_k * (temperature - 20))
 
-    def lets_go(self, mass: float, temperature: float) -> Outcome:
+    def lets_go(self, mass, temperature):
         middle = self.middle_at(temperature)
         if self.rng.random() < tuning.LAPSE:
             return Outcome.RISES
@@ -150,7 +148,7 @@ class Owner:
             return Outcome.FLOATS
         return Outcome.RISES if mass < middle else Outcome.SINKS
 
-    def days(self, temperatures: list[float], most: int = 6) -> tuple[list[Trial], list[int]]:
+    def days(self, temperatures, most=6):
         """Follow the proposals until the top floats, day after day.  Returns all trials, and the number of each day."""
         prior, trials, numbers = Prior(self.top * 0.99, self.top * 1.01 + self.span), list[Trial](), list[int]()
         masses = self.top + WASHERS
@@ -167,7 +165,7 @@ class Owner:
 
 
 @pytest.mark.slow
-def test_owners_who_follow_the_proposals_float_and_learn_the_truth() -> None:
+def test_owners_who_follow_the_proposals_float_and_learn_the_truth():
     days, pulls, slopes = list[list[int]](), list[float](), list[float]()
     for seed in range(24):
         owner = Owner(seed)

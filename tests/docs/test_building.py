@@ -1,9 +1,5 @@
 """What is done to the pages when they become a site; the site itself is built by `make site`."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 import typer.main
 
@@ -15,21 +11,16 @@ from levilab.cli.main import app
 from levilab.pipelines.catalogue import ANALYSES
 from support.paths import DOCS
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-    from playwright.sync_api import Page
-
-
-def test_the_page_of_commands_has_each_command_with_its_options() -> None:
+def test_the_page_of_commands_has_each_command_with_its_options():
     text = reference()
     group = typer.main.get_command(app)
-    assert [name for name in group.commands if f"\n## `levilab {name}`\n" not in text] == []  # type: ignore[attr-defined]
+    assert [name for name in group.commands if f"\n## `levilab {name}`\n" not in text] == []
     assert "### `levilab acquire spin`" in text
     assert "`--tolerance X`\n: Error that is accepted" in text
 
 
-def test_the_page_of_data_has_each_column_and_each_mark_stands_in_its_page() -> None:
+def test_the_page_of_data_has_each_column_and_each_mark_stands_in_its_page():
     made = columns()
     names = [column.name for analysis in ANALYSES.values() for column in analysis.row]
     assert [name for name in names if f"| `{name}` |" not in made and "_u" not in name] == []
@@ -46,11 +37,11 @@ def test_the_page_of_data_has_each_column_and_each_mark_stands_in_its_page() -> 
     ("instruments/index", "[a](../../CONTRIBUTING.md)", "[a](../contributing.md)"),
     ("instruments/index", "[a](../README.md)", "[a](../README.md)"),
 ])  # fmt: skip
-def test_links_that_leave_the_pages_lead_to_the_site(page: str, written: str, led: str) -> None:
+def test_links_that_leave_the_pages_lead_to_the_site(page, written, led):
     assert lead_to_site(written, page) == led
 
 
-def test_an_indented_block_of_a_docstring_is_code_and_doctests_stay() -> None:
+def test_an_indented_block_of_a_docstring_is_code_and_doctests_stay():
     assert as_markup(["As:", "", "    run()", "As:", "", "    >>> 1"]) == [
         "As::",
         "",
@@ -67,19 +58,19 @@ def test_an_indented_block_of_a_docstring_is_code_and_doctests_stay() -> None:
     ('<link rel="stylesheet" href="//fonts.example/a.css">', ["//fonts.example/a.css"]),
     ('<img src="_images/a.png"><a href="https://example.org">there</a>', []),
 ])  # fmt: skip
-def test_what_a_page_loads_from_elsewhere_is_found(tmp_path: Path, text: str, found: list[str]) -> None:
+def test_what_a_page_loads_from_elsewhere_is_found(tmp_path, text, found):
     (tmp_path / "page.html").write_text(text, encoding="utf-8")
     assert [address for _, address in loaded_from_elsewhere(tmp_path)] == found
 
 
-def test_a_font_from_elsewhere_in_a_style_sheet_is_found(tmp_path: Path) -> None:
+def test_a_font_from_elsewhere_in_a_style_sheet_is_found(tmp_path):
     (tmp_path / "a.css").write_text(
         '@import "https://fonts.example/a.css"; b { background: url(a.png) }', encoding="utf-8"
     )
     assert loaded_from_elsewhere(tmp_path) == [("a.css", "https://fonts.example/a.css")]
 
 
-def test_the_search_ranks_pages_of_users_before_those_of_developers(page: Page) -> None:
+def test_the_search_ranks_pages_of_users_before_those_of_developers(page):
     page.add_script_tag(path=DOCS / "building" / "scorer.js")
     names = ["decisions/0014-records", "reference/python", "pulses", "data"]
     scores = page.evaluate("names => names.map(name => Scorer.score([name, '', '', '', 10, '']))", names)

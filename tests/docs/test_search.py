@@ -1,20 +1,12 @@
 """What people type into the search of the site, and the page that comes first; `make site` runs it on the new site."""
 
-from __future__ import annotations
-
 import threading
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from typing import TYPE_CHECKING
 
 import pytest
 
 from support.paths import ROOT
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from playwright.sync_api import Page
 
 SITE = ROOT / "build/site"
 #: What is typed → one of these pages is the first.
@@ -47,7 +39,7 @@ QUERIES = {
 class Quiet(SimpleHTTPRequestHandler):
     """Serves files and says nothing."""
 
-    def do_GET(self) -> None:
+    def do_GET(self):
         """Send a file; the site has no icon."""
         if self.path == "/favicon.ico":
             self.send_response(204)
@@ -55,12 +47,12 @@ class Quiet(SimpleHTTPRequestHandler):
         else:
             super().do_GET()
 
-    def log_message(self, *_: object) -> None:
+    def log_message(self, *_):
         """Say nothing."""
 
 
 @pytest.fixture(scope="module")
-def site() -> Iterator[str]:
+def site():
     """The address of the site: its search loads pages, which a browser does not allow of files."""
     if not (SITE / "searchindex.js").exists():
         pytest.skip("make site makes it")
@@ -71,7 +63,7 @@ def site() -> Iterator[str]:
 
 
 @pytest.mark.parametrize("words", QUERIES)
-def test_the_search_finds_what_people_type(site: str, page: Page, words: str) -> None:
+def test_the_search_finds_what_people_type(site, page, words):
     page.goto(f"{site}/search.html?q={words.replace(' ', '+')}")
     page.wait_for_selector("#search-results .search-summary:has-text('found')")
     page.wait_for_selector("#search-results ul.search li a")

@@ -1,10 +1,7 @@
 """What the tests of the application share."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -13,30 +10,24 @@ from support.figures import without_figures
 from support.paths import SAMPLE_DATA
 from support.waiting import HANG_GUARD_S
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    Command = Callable[..., subprocess.CompletedProcess[str]]
-
 
 @pytest.fixture
-def sample_data() -> Path:
+def sample_data():
     return SAMPLE_DATA
 
 
 @pytest.fixture
-def undrawn_figures() -> Iterator[None]:
+def undrawn_figures():
     """For a test that looks at no figure; see `without_figures`."""
     with without_figures():
         yield
 
 
 @pytest.fixture
-def levilab(tmp_path: Path) -> Command:
+def levilab(tmp_path):
     """Runs the command in an empty folder, with streams like pipes, in this process: heavy imports cost once."""
 
-    def run(*words: str | Path, cwd: Path = tmp_path, check: int | None = 0) -> subprocess.CompletedProcess[str]:
+    def run(*words, cwd=tmp_path, check=0):
         ended = command(*words, cwd=cwd)
         assert check is None or ended.status == check, ended.err
         return subprocess.CompletedProcess(["levilab", *map(str, words)], ended.status, ended.out, ended.err)
@@ -45,10 +36,10 @@ def levilab(tmp_path: Path) -> Command:
 
 
 @pytest.fixture
-def levilab_process(tmp_path: Path) -> Command:
+def levilab_process(tmp_path):
     """Runs the command as a user does: a process of its own, in an empty folder."""
 
-    def run(*words: str | Path, cwd: Path = tmp_path, check: int | None = 0) -> subprocess.CompletedProcess[str]:
+    def run(*words, cwd=tmp_path, check=0):
         argv = [sys.executable, "-m", "levilab", *map(str, words)]
         done = subprocess.run(
             argv, cwd=cwd, capture_output=True, text=True, encoding="utf-8", timeout=HANG_GUARD_S, check=False

@@ -1,28 +1,22 @@
 """What goes into files that programs read."""
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from levilab.files import finite, parse_json, replace_atomically, stamp
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-
-def test_what_no_number_can_say_is_null_at_any_depth() -> None:
+def test_what_no_number_can_say_is_null_at_any_depth():
     value = {"a": [1.0, math.nan, {"b": (math.inf, np.float64("-inf"))}], "c": "nan", "d": True, "e": 2}
     assert finite(value) == {"a": [1.0, None, {"b": [None, None]}], "c": "nan", "d": True, "e": 2}
 
 
-def test_a_file_that_was_written_or_replaced_has_another_stamp(tmp_path: Path) -> None:
+def test_a_file_that_was_written_or_replaced_has_another_stamp(tmp_path):
     path = tmp_path / "file"
     found = [stamp(path)]
     for change in (lambda: path.write_text("a"), lambda: path.write_text("bb"), lambda: replace_atomically(path, "cc")):
@@ -33,12 +27,12 @@ def test_a_file_that_was_written_or_replaced_has_another_stamp(tmp_path: Path) -
     assert len(set(found)) == 4
 
 
-def test_what_is_not_json_is_said_by_its_place_alone() -> None:
+def test_what_is_not_json_is_said_by_its_place_alone():
     with pytest.raises(ValueError, match=r"^from line 2, column 1 on$"):
         parse_json("{\nx}")
 
 
-def test_a_write_takes_the_part_away_that_a_killed_process_left(tmp_path: Path) -> None:
+def test_a_write_takes_the_part_away_that_a_killed_process_left(tmp_path):
     killed = subprocess.Popen([sys.executable, "-c", ""])
     killed.wait()
     left, of_a_live_process, of_another_file = (

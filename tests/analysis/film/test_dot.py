@@ -1,7 +1,5 @@
 """The dot on the stem, and the line of the precession in how it leans."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The rim and the base in pictures whose circles are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -17,11 +15,11 @@ RADIUS = RIM / CAMERA.scale
 
 
 @pytest.fixture(scope="module")
-def shown() -> Pictures:
+def shown():
     return Pictures(CAMERA, level_flight(1.0, 31.0))
 
 
-def centre(time: float) -> tuple[float, float]:
+def centre(time):
     """The rim's centre in the picture of a time [pixels]."""
     x, y, _, _ = level_flight(1.0, 31.0).at(np.array([time]))
     x0, y0 = CAMERA.middle

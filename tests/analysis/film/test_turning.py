@@ -1,14 +1,12 @@
 """Phase of a mark, and spin by the times of pictures: scatter, folds, and what a camera adds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from analysis.errors import TooFewReadings
 from analysis.film.errors import NoMark
 from analysis.film.mark import phases_of, without_pull
-from analysis.film.turning import Turning, choices_of, spins_of_start, turning_of
+from analysis.film.turning import choices_of, spins_of_start, turning_of
 from levilab.animation.camera import phone_times
 
 NOISE = 1e-3  # of a phase [turns]
@@ -19,7 +17,7 @@ def seen(random, times, spin, chirp=0.0, more=0.0):
     return (0.3 + spin * times + 0.5 * chirp * times**2 + more + random.normal(0, NOISE, times.size)) % 1
 
 
-def turning(times, phase, rows=None) -> Turning:
+def turning(times, phase, rows=None):
     u = np.full(times.size, NOISE)
     (start, *_), _ = choices_of(spins_of_start(times, phase, u), None)
     return turning_of(times, phase, u, np.zeros(times.size) if rows is None else rows, start=start)

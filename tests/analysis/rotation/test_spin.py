@@ -12,7 +12,7 @@ TRIALS = 60
 
 
 @pytest.fixture
-def fresh() -> np.random.Generator:
+def fresh():
     """Random numbers that no constant was chosen with."""
     return np.random.default_rng(20261124)
 

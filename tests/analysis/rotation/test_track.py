@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 from analysis.errors import NotPositive
-from analysis.rotation import FieldTrack, track_of_field
+from analysis.rotation import track_of_field
 from analysis.rotation.errors import NoLine
 from analysis.rotation.synthetic import synthetic_flight
 
 
 @pytest.fixture
-def fresh() -> np.random.Generator:
+def fresh():
     """Random numbers that no constant was chosen with."""
     return np.random.default_rng(20261125)
 
 
-def follow(random: np.random.Generator, **how: object) -> tuple[FieldTrack, np.ndarray]:
+def follow(random, **how):
     """Return a track and the deviations from the truth over u."""
     times, field, spin = synthetic_flight(random, **how)
     track = track_of_field(times, field)

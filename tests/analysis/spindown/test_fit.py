@@ -192,11 +192,7 @@ def test_one_uncertainty_each_weighs_the_readings():
 
 @pytest.mark.parametrize(
     ("law", "straighten", "factor"),
-    [
-        ("stokes", np.log, -1.0),
-        ("newton", lambda w: 1 / w, 1.0),
-        ("disc", lambda w: w**-0.5, 2.0),
-    ],
+    [("stokes", np.log, -1.0), ("newton", lambda w: 1 / w, 1.0), ("disc", lambda w: w**-0.5, 2.0)],
 )
 def test_linearised_constants_are_slopes_of_unweighted_straight_lines(law, straighten, factor):
     y = readings()
@@ -503,7 +499,7 @@ def test_an_uncertainty_stated_far_too_small_or_too_large_is_reported_and_change
 
 
 @pytest.mark.parametrize(("n", "largest"), [(4, 55), (5, 19), (6, 11.5), (7, 8.7)])
-def test_u_of_few_readings_with_a_tilt_is_no_smaller_than_their_noise(n: int, largest: float) -> None:
+def test_u_of_few_readings_with_a_tilt_is_no_smaller_than_their_noise(n, largest):
     # largest: of 30 pulls by Student's t with n − 2 degrees of freedom, exceeded with a probability of 1 %
     rng, time = np.random.default_rng(1), 10.0 * np.arange(n)
     for _ in range(30):

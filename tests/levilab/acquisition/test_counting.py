@@ -1,7 +1,5 @@
 """Counts of a coasting top, one after another, and which of them are readings."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import pytest
@@ -16,8 +14,8 @@ class Bench:
 
     def __init__(self, *spins):
         self.spins, self.time = iter(spins), 90.0
-        self.events: list[tuple[str, str]] = []
-        self.warnings: list[str] = []
+        self.events = []
+        self.warnings = []
 
     def frequency(self):
         self.time += 5.0

@@ -19,7 +19,7 @@ from support.acquisitions import BEFORE, Silent, mock
 
 def acquired(folder, monkeypatch, *faults):
     def with_faults(*given):
-        bus = virtual_bus(*given)  # type: ignore[arg-type]
+        bus = virtual_bus(*given)
         bus.faults.extend(faults)
         return bus
 
@@ -171,7 +171,7 @@ def test_what_was_missed_is_not_caught_up_with(tmp_path, monkeypatch):
     often = settings_of(order.config, "spin").model_copy(update={"interval_s": 2.0})
 
     def with_faults(*given):
-        bus = virtual_bus(*given)  # type: ignore[arg-type]
+        bus = virtual_bus(*given)
         bus.faults.append(Fault("away for 5 s", question=r"READ\?", after=BEFORE + 6))
         return bus
 
@@ -186,7 +186,7 @@ def test_a_drive_that_was_left_on_goes_off_even_if_the_counter_is_not_there(tmp_
     left = []
 
     def left_on(*given):
-        bus = virtual_bus(*given)  # type: ignore[arg-type]
+        bus = virtual_bus(*given)
         generator, counter = (bus.instruments[VIRTUAL[kind].address] for kind in ("generator", "counter"))
         generator.execute("OUTP1 ON")
         bus.unreachable_until[id(counter)] = 1e9

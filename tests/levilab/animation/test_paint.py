@@ -128,7 +128,7 @@ def test_a_gif_has_its_pictures_its_time_and_the_same_bytes_each_time(poses):
     assert content == as_gif(film, lambda _: None)
     with Image.open(io.BytesIO(content)) as picture:
         assert isinstance(picture.info["duration"], int)
-        assert (picture.n_frames, picture.info["duration"], picture.info["loop"]) == (20 + 1, 50, 0)  # type: ignore[attr-defined]
+        assert (picture.n_frames, picture.info["duration"], picture.info["loop"]) == (20 + 1, 50, 0)
         assert picture.size == (480, 480)
     assert len(content) < 3e6 / 400 * 21 + 30_000  # 400 pictures are usual, and the first one is the largest
     assert shares[-1] == 1

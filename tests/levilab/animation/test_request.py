@@ -19,7 +19,7 @@ def test_a_film_of_the_chosen_span_is_written(tmp_path):
     shown = "the motion from 0 s to 0.05 s, at 1/20 of real speed"
     assert ended.err.splitlines()[-1] == f"wrote {Path('films/top.gif')}: {shown}"
     with Image.open(tmp_path / "films/top.gif") as film:
-        assert film.n_frames == 21  # type: ignore[attr-defined]
+        assert film.n_frames == 21
 
 
 def test_a_fall_is_what_is_shown_unless_a_span_is_given(tmp_path):
@@ -69,8 +69,7 @@ def test_a_span_that_is_too_long_for_the_file_names_the_longest_one(words, longe
 
 
 @pytest.mark.parametrize(
-    ("name", "library", "extra"),
-    [("a.html", "nicegui", ".[live]"), ("a.mp4", "imageio_ffmpeg", ".[video]")],
+    ("name", "library", "extra"), [("a.html", "nicegui", ".[live]"), ("a.mp4", "imageio_ffmpeg", ".[video]")]
 )
 def test_a_missing_library_is_named_before_anything_is_simulated(name, library, extra, tmp_path, monkeypatch):
     found = importlib.util.find_spec

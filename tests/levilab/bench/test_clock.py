@@ -140,7 +140,7 @@ def test_a_clock_that_is_known_corrects_the_records_of_a_sound_card_alone():
     wiring = virtual_wiring(practice_world(), models={"oscilloscope": "sound"})
     changed = {"clock_error": 4e-5, "clock_u": 1e-6}
 
-    def with_clock(kind: str) -> Wiring:
+    def with_clock(kind):
         instruments = {**wiring.instruments, kind: wiring.instruments[kind].model_copy(update=changed)}
         return Wiring(instruments, wiring.limits, wiring.library, wiring.clock)
 

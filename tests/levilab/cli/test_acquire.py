@@ -1,7 +1,5 @@
 """What the acquire commands ask of the person at the bench."""
 
-from __future__ import annotations
-
 import io
 import json
 

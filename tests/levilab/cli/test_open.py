@@ -1,10 +1,7 @@
 """levilab open in the terminal: what a file is understood as, corrected, kept, analyzed and reported."""
 
-from __future__ import annotations
-
 import json
 import sys
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -13,14 +10,11 @@ from levilab.pipelines.look import QUANTITIES, look_at
 from support.commands import command
 from support.paths import ROOT
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 OMEGA = ROOT / "sample_data" / "student-files" / "angular-velocity.csv"
 
 
 @pytest.fixture
-def doubtful(tmp_path: Path) -> Path:
+def doubtful(tmp_path):
     """Angular velocities under a title that says nothing."""
     file = tmp_path / "my.csv"
     head, *rows = OMEGA.read_text("utf-8").splitlines()
@@ -29,7 +23,7 @@ def doubtful(tmp_path: Path) -> Path:
     return file
 
 
-def test_a_question_has_its_answers_as_commands(doubtful: Path) -> None:
+def test_a_question_has_its_answers_as_commands(doubtful):
     ended = command("open", doubtful.name, cwd=doubtful.parent)
     assert ended.status == 1
     assert "Zeit" in ended.out
@@ -39,7 +33,7 @@ def test_a_question_has_its_answers_as_commands(doubtful: Path) -> None:
 
 
 @pytest.mark.slow
-def test_an_answer_is_kept_analyzed_and_reported(doubtful: Path) -> None:
+def test_an_answer_is_kept_analyzed_and_reported(doubtful):
     words = ("--columns", "t=1,f=2 [rad/s]", "--keep", "-o", "my.html")
     ended = command("open", "my.csv", *words, cwd=doubtful.parent)
     assert ended.status == 0
@@ -52,7 +46,7 @@ def test_an_answer_is_kept_analyzed_and_reported(doubtful: Path) -> None:
     assert (again.status, "is read as my.csv.levilab.toml says" in again.out) == (0, True)
 
 
-def test_json_is_the_understanding_alone(doubtful: Path) -> None:
+def test_json_is_the_understanding_alone(doubtful):
     ended = command("open", str(OMEGA), "--json", cwd=doubtful.parent)
     (look,) = json.loads(ended.out)
     used = {column["quantity"]: (column["title"], column["unit"]) for column in look["runs"][0]["columns"]}
@@ -70,39 +64,39 @@ def test_json_is_the_understanding_alone(doubtful: Path) -> None:
         (("my.csv", "--rate", "-1"), "--rate"),
     ],
 )
-def test_a_mistake_is_said_in_one_line(doubtful: Path, words: tuple[str, ...], says: str) -> None:
+def test_a_mistake_is_said_in_one_line(doubtful, words, says):
     ended = command("open", *words, cwd=doubtful.parent)
     assert ended.status in {1, 2}
     assert says in ended.err
     assert len(ended.err.splitlines()) == 1
 
 
-def test_no_browser_opens_without_a_terminal(doubtful: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_browser_opens_without_a_terminal(doubtful, monkeypatch):
     monkeypatch.setenv("DISPLAY", ":0")
     monkeypatch.setattr("levilab.cli.open._serve", lambda _: pytest.fail("it serves"))
     monkeypatch.setattr(sys.stdout, "isatty", lambda: False, raising=False)
     assert command("open", doubtful.name, cwd=doubtful.parent).status == 1
 
 
-def test_a_record_shows_its_channels_and_the_chosen_one() -> None:
+def test_a_record_shows_its_channels_and_the_chosen_one():
     look = look_at(ROOT / "sample_data" / "scope-files" / "rigol-ds1000z.csv", {"channel": "2"})
     assert look.problem == ""
     assert [column.quantity for column in look.runs[0].columns][:2] == [None, "signal"]
     assert len(look.plots[0].x) == len(look.plots[0].y) > 100
 
 
-def test_several_runs_side_by_side_are_shown_each() -> None:
+def test_several_runs_side_by_side_are_shown_each():
     look = look_at(ROOT / "sample_data" / "student-files" / "runs-under-one-time.csv", {})
     assert [run.name for run in look.runs] == ["Messung 1", "Messung 2", "Messung 3"]
     assert {*look.plots} == {0, 1, 2}
 
 
-def test_a_field_scan_is_understood_as_one() -> None:
+def test_a_field_scan_is_understood_as_one():
     scan = next((ROOT / "sample_data" / "field-scan").glob("readings.csv"))
     used = {column.quantity for column in look_at(scan, {}).runs[0].columns}
     assert {"height_m", "flux_density_t"} <= used
 
 
-def test_every_unit_to_choose_is_known() -> None:
+def test_every_unit_to_choose_is_known():
     for name, (_, units) in QUANTITIES.items():
         assert {*units} <= {*UNITS[dimension(name)]}, name

@@ -1,35 +1,29 @@
 """levilab tune: a question at a time, or all by options."""
 
-from __future__ import annotations
-
 import io
 import json
 import os
 import signal
 import subprocess
 import sys
-from typing import TYPE_CHECKING
 
 import pytest
 
-from support.commands import Ended, command
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from support.commands import command
 
 BENCH = ("--top", "24.9", "--washers", "0.06,0.06,0.1,0.2")
 
 
 @pytest.fixture
-def answers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    def run(*lines: str, options: tuple[str, ...] = ()) -> Ended:
+def answers(monkeypatch, tmp_path):
+    def run(*lines, options=()):
         monkeypatch.setattr(sys, "stdin", io.StringIO("".join(f"{line}\n" for line in lines)))
         return command("tune", "--ask", *options, cwd=tmp_path)
 
     return run
 
 
-def test_the_next_step_comes_first_and_is_one_sentence(tmp_path: Path) -> None:
+def test_the_next_step_comes_first_and_is_one_sentence(tmp_path):
     ended = command("tune", *BENCH, "--temperature", "21", "--trial", "0.06 g, 21 C, rises", cwd=tmp_path)
     assert ended.status == 0
     first, why, window, *_ = ended.out.splitlines()
@@ -40,7 +34,7 @@ def test_the_next_step_comes_first_and_is_one_sentence(tmp_path: Path) -> None:
     assert ended.err == "kept in tune.toml: 1 trial\n"
 
 
-def test_json_is_one_document_in_si(tmp_path: Path) -> None:
+def test_json_is_one_document_in_si(tmp_path):
     ended = command("tune", *BENCH, "--temperature", "21 °C", "--json", cwd=tmp_path)
     document = json.loads(ended.out)
     assert document["schema"] == "levilab-tune/1"
@@ -48,7 +42,7 @@ def test_json_is_one_document_in_si(tmp_path: Path) -> None:
     assert document["best"] in document["choices"]
 
 
-def test_a_person_is_asked_and_every_answer_is_kept_at_once(answers, tmp_path: Path) -> None:
+def test_a_person_is_asked_and_every_answer_is_kept_at_once(answers, tmp_path):
     ended = answers("24,9", "24.9 g", "0.06, 0.06, 0.1", "21", "rises", "what", "22 C", "floats", "")
     assert ended.status == 0
     asked = ended.err.splitlines()
@@ -61,26 +55,26 @@ def test_a_person_is_asked_and_every_answer_is_kept_at_once(answers, tmp_path: P
     assert (again.status, again.out.startswith("Leave the washers as they are")) == (0, True)
 
 
-def test_what_was_typed_is_kept_where_a_later_question_ends_it(answers, tmp_path: Path) -> None:
+def test_what_was_typed_is_kept_where_a_later_question_ends_it(answers, tmp_path):
     assert answers("24.9").status == 2  # standard input ends, as a person would by Ctrl-C
     assert answers("0.06, 0.1").err.startswith("Which washers have you")
     assert answers().err.startswith("How warm are the magnets")
     assert 'top = "24.9 g"' in (tmp_path / "tune.toml").read_text("utf-8")
 
 
-def test_washers_without_commas_or_as_heavy_as_a_top_are_asked_again(answers) -> None:
+def test_washers_without_commas_or_as_heavy_as_a_top_are_asked_again(answers):
     asked = answers("24.9", "0.06 0.1", "60", "60 mg", "21", "").err.splitlines()
     assert asked[2] == "a comma is expected between two masses, as 0.06, 0.1 g"
     assert asked[4] == "a washer of 60 g on a top of 24.9 g? mg are typed as 60 mg"
 
 
-def test_washers_with_an_outcome_are_no_temperature(answers) -> None:
+def test_washers_with_an_outcome_are_no_temperature(answers):
     ended = answers("0.06 floats", "", options=(*BENCH, "--temperature", "21"))
     assert "a mass or washers, a temperature and an outcome" in ended.err
     assert "temperature of a room" not in ended.err
 
 
-def test_the_end_of_input_ends_as_enter_does(answers) -> None:
+def test_the_end_of_input_ends_as_enter_does(answers):
     assert answers(options=(*BENCH, "--temperature", "21")).status == 0
     ended = answers(options=("--file", "other.toml"))
     assert (ended.status, ended.err.splitlines()[-1]) == (2, "levilab: --top: is needed, and standard input is closed")
@@ -93,13 +87,13 @@ def test_the_end_of_input_ends_as_enter_does(answers) -> None:
     ((*BENCH, "--temperature", "21", "--trial", "25 g, rises"), "levilab: --trial 25 g, rises: a mass or washers, "),
     ((*BENCH, "--temperature", "21", "--device", "x"), "levilab: --device: goes with --scan"),
 ])  # fmt: skip
-def test_a_wrong_call_is_one_line_and_leaves_no_file(options: tuple[str, ...], words: str, tmp_path: Path) -> None:
+def test_a_wrong_call_is_one_line_and_leaves_no_file(options, words, tmp_path):
     ended = command("tune", *options, cwd=tmp_path)
     assert (ended.status, ended.out, words in ended.err, ended.err.count("\n")) == (2, "", True, 1)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_another_top_needs_a_file_of_its_own(tmp_path: Path) -> None:
+def test_another_top_needs_a_file_of_its_own(tmp_path):
     command("tune", *BENCH, "--temperature", "21", "--trial", "0.06 g, 21 C, rises", cwd=tmp_path)
     ended = command("tune", "--top", "22", "--temperature", "21", cwd=tmp_path)
     assert (ended.status, "name another --file" in ended.err) == (2, True)
@@ -107,7 +101,7 @@ def test_another_top_needs_a_file_of_its_own(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="sends SIGINT")
-def test_ctrl_c_at_a_question_keeps_what_was_said(tmp_path: Path) -> None:
+def test_ctrl_c_at_a_question_keeps_what_was_said(tmp_path):
     words = [sys.executable, "-m", "levilab", "tune", "--ask", *BENCH, "--temperature", "21"]
     with subprocess.Popen(words, cwd=tmp_path, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         process.stdin.write("rises\n")

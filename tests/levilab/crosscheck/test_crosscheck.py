@@ -1,12 +1,9 @@
 """The cross-check: it must notice an estimate that is off, and an uncertainty that is too small or too large."""
 
-from __future__ import annotations
-
 import json
 import signal
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -24,15 +21,11 @@ from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 from levilab.simulator.start import nutating_start, steady_rates
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
-
-def made_up(off: float = 0.0, scale: float = 1.0) -> Subject:
+def made_up(off=0.0, scale=1.0):
     """Estimates of 5 that are off by so many u, and whose scatter is so many times u."""
 
-    def trial(seed: int, folder: Path) -> list[Pull]:
+    def trial(seed, folder):
         if seed % 50 == 49:
             raise TrialFailed("the top fell")
         noise = np.random.default_rng(seed).standard_normal()
@@ -55,7 +48,7 @@ def test_a_top_that_does_not_follow_its_drive_has_no_true_precession(inertia, ev
     assert truth_of(run, "precession").values == ({"slope": 1.0, "intercept": 0.0} if known else {})
 
 
-def of(subject: Subject, trials: int = 400):
+def of(subject, trials=400):
     return study_world(subject, trials, 0, lambda _: None)
 
 
@@ -109,7 +102,7 @@ def test_ctrl_c_in_a_trial_ends_the_cross_check():
     """It interrupts the run of the trial; the next trial would go on otherwise."""
     trials = []
 
-    def trial(seed: int, folder: Path) -> list[Pull]:
+    def trial(seed, folder):
         trials.append(seed)
 
         def interrupted(request):
@@ -168,7 +161,7 @@ def test_a_trial_goes_through_drivers_and_analysis(tmp_path, name, seed, quantit
     assert (run / "readings.csv").exists()
 
 
-def test_the_command_prints_writes_and_judges(levilab: Callable[..., object], tmp_path, monkeypatch):
+def test_the_command_prints_writes_and_judges(levilab, tmp_path, monkeypatch):
     monkeypatch.setattr("levilab.crosscheck.command.SUBJECTS", {"good": made_up(), "bad": made_up(2.0)})
     done = levilab("crosscheck", "good", "--trials", "40", "--out", "kept")
     assert "five" in done.stdout

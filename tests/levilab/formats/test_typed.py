@@ -1,7 +1,5 @@
 """Numbers as people type them, with and without units."""
 
-from __future__ import annotations
-
 import pytest
 
 from levilab.formats.titles import plain_unit
@@ -28,7 +26,7 @@ from levilab.present.units import UNITS
         ("−3", "m", -3.0),
     ],
 )
-def test_a_number_is_read_with_any_unit_of_its_quantity(text: str, unit: str, value: float) -> None:
+def test_a_number_is_read_with_any_unit_of_its_quantity(text, unit, value):
     assert read_number(text, unit) == pytest.approx(value, rel=1e-14)
 
 
@@ -42,12 +40,12 @@ def test_a_number_is_read_with_any_unit_of_its_quantity(text: str, unit: str, va
         ("5kg", "", "'5kg': a plain number is expected"),
     ],
 )
-def test_another_unit_is_refused_with_those_that_are_read(text: str, unit: str, said: str) -> None:
+def test_another_unit_is_refused_with_those_that_are_read(text, unit, said):
     with pytest.raises(ValueError, match=said):
         read_number(text, unit)
 
 
-def test_endings_of_keys_have_the_units_of_results() -> None:
+def test_endings_of_keys_have_the_units_of_results():
     """The endings are those of levilab.present.units, which stands on the same floor as the reader."""
     rows = {one.ending: one.si for one in UNITS}
     assert {ending: rows[ending] for ending in OF_KEYS} == OF_KEYS
@@ -56,6 +54,6 @@ def test_endings_of_keys_have_the_units_of_results() -> None:
 
 
 @pytest.mark.parametrize(("typed", "unit"), [("25Mg", "kg"), ("5 MT", "T"), ("5 MM", "m")])
-def test_mega_is_not_taken_for_milli(typed: str, unit: str) -> None:
+def test_mega_is_not_taken_for_milli(typed, unit):
     with pytest.raises(ValueError, match="is expected"):
         read_number(typed, unit)

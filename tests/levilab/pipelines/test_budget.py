@@ -1,9 +1,5 @@
 """Budgets of the results: they add up to u, they are kept with the result, and each row acts as it says."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 import pytest
 
@@ -13,11 +9,6 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.present.document.blocks import Details, Paragraph, Tabular
 from support.paths import ROOT
 from support.spin_downs import spin_down_csv
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from analysis.budget import Budget, Component
 
 CASES = {
     "one spin-down": ("spindown", ("spin-down-1",)),
@@ -35,30 +26,30 @@ CASES = {
 }
 
 
-def analyzed(name: str, paths: list[Path], **given: Any) -> Any:
+def analyzed(name, paths, **given):
     row = ANALYSES[name]
     return row.analyze(paths, row.options_from(given))
 
 
 @pytest.fixture(scope="module")
-def found() -> dict[str, Any]:
+def found():
     return {
         case: analyzed(name, [ROOT / "sample_data" / part for part in parts]) for case, (name, parts) in CASES.items()
     }
 
 
-def row_of(budget: Budget, name: str) -> Component:
+def row_of(budget, name):
     (row,) = [one for one in budget.components if one.name == name]
     return row
 
 
-def of(budgets: Any, quantity: str) -> Budget:
+def of(budgets, quantity):
     (budget,) = [one for one in budgets if one.quantity == quantity]
     return budget
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_rows_of_every_budget_add_up_to_the_u_of_the_result(found: dict[str, Any], case: str):
+def test_the_rows_of_every_budget_add_up_to_the_u_of_the_result(found, case):
     budgets = [one for origin in found[case].origins for one in origin.budget] + list(found[case].budget)
     assert budgets
     for budget in budgets:
@@ -68,7 +59,7 @@ def test_the_rows_of_every_budget_add_up_to_the_u_of_the_result(found: dict[str,
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_a_budget_is_of_the_value_that_the_result_has(found: dict[str, Any], case: str, tmp_path: Path):
+def test_a_budget_is_of_the_value_that_the_result_has(found, case, tmp_path):
     name, _ = CASES[case]
     document = ANALYSES[name].document(found[case], tmp_path)
     values = document["values"] or document["runs"][0]["values"]
@@ -78,7 +69,7 @@ def test_a_budget_is_of_the_value_that_the_result_has(found: dict[str, Any], cas
             assert budget["u"] == values[budget["quantity"]]["u"]
 
 
-def test_of_laws_that_fit_alike_that_with_the_fewest_constants_has_the_budget(tmp_path: Path):
+def test_of_laws_that_fit_alike_that_with_the_fewest_constants_has_the_budget(tmp_path):
     analysis = analyzed("spindown", [spin_down_csv(tmp_path / "run.csv", seed=7)])
     assert analysis.combined.best == "disc"
     assert not analysis.combined.verdict.decided
@@ -89,7 +80,7 @@ def test_of_laws_that_fit_alike_that_with_the_fewest_constants_has_the_budget(tm
 # --- each row acts as it says --------------------------------------------------------------------------
 
 
-def spin_down_file(folder: Path, name: str, *, frequency: float = 1.0, time: float = 1.0, decimals: int = 12) -> Path:
+def spin_down_file(folder, name, *, frequency=1.0, time=1.0, decimals=12):
     t = np.arange(0.0, 200.0, 10.0)
     nu = spin("disc", t, 40.0, 2.34e-4) + 0.003 * np.random.default_rng(2).standard_normal(len(t))
     lines = [f"{time * a:.9f},{frequency * b:.{decimals}f}" for a, b in zip(t, nu, strict=True)]
@@ -98,7 +89,7 @@ def spin_down_file(folder: Path, name: str, *, frequency: float = 1.0, time: flo
     return path
 
 
-def test_a_clock_that_is_wrong_moves_each_constant_by_its_row(tmp_path: Path):
+def test_a_clock_that_is_wrong_moves_each_constant_by_its_row(tmp_path):
     off = 1e-4
     plain, fast, late = (
         analyzed("spindown", [spin_down_file(tmp_path, f"{k}.csv", frequency=f, time=t)], tilt="none", clock_u=off)
@@ -115,7 +106,7 @@ def test_a_clock_that_is_wrong_moves_each_constant_by_its_row(tmp_path: Path):
             assert values[2] - values[0] == pytest.approx(bench.sensitivity * off, rel=1e-3)
 
 
-def test_the_last_digit_is_part_of_the_scatter_and_no_more(tmp_path: Path):
+def test_the_last_digit_is_part_of_the_scatter_and_no_more(tmp_path):
     fine, coarse = (
         analyzed("spindown", [spin_down_file(tmp_path, f"{d}.csv", decimals=d)], tilt="none").budget for d in (12, 2)
     )
@@ -126,41 +117,41 @@ def test_the_last_digit_is_part_of_the_scatter_and_no_more(tmp_path: Path):
     assert budget.closes
 
 
-def test_runs_that_differ_have_their_scatter_as_the_largest_row(found: dict[str, Any]):
+def test_runs_that_differ_have_their_scatter_as_the_largest_row(found):
     budget = of(found["four spin-downs"].budget, "c32")
     assert budget.largest is row_of(budget, "runs")
     assert budget.share(budget.largest) > 0.9
     assert "16 instead of 4" in in_a_sentence(budget)
 
 
-def test_one_run_does_not_hide_that_runs_differ(found: dict[str, Any]):
+def test_one_run_does_not_hide_that_runs_differ(found):
     row = row_of(of(found["one spin-down"].budget, "c32"), "runs")
     assert (row.u, row.included) == (None, False)
     assert "several runs" in in_a_sentence(of(found["one spin-down"].budget, "c32"))
 
 
-def test_a_scope_of_a_known_make_has_its_clock_as_a_row(found: dict[str, Any]):
+def test_a_scope_of_a_known_make_has_its_clock_as_a_row(found):
     row = row_of(of(found["records"].origins[0].budget, "frequency"), "time_base")
     assert row.u == pytest.approx(25e-6 / 3**0.5)
     assert not row.included
     assert "Rigol" in row.note
 
 
-def test_a_clock_that_was_not_stated_is_not_known_rather_than_right(found: dict[str, Any]):
+def test_a_clock_that_was_not_stated_is_not_known_rather_than_right(found):
     budget = of(found["a sound"].budget, "frequency")
     assert row_of(budget, "time_base").u is None
     assert "the option --clock-u gives it" in row_of(budget, "time_base").note  # as it is typed
     assert "Not known: clock of the recording" in in_a_sentence(budget)
 
 
-def test_the_clocks_of_a_sweep_are_a_factor_of_its_slope(found: dict[str, Any]):
+def test_the_clocks_of_a_sweep_are_a_factor_of_its_slope(found):
     row = row_of(of(found["a sweep"].budget, "slope"), "clocks")
     assert (row.u, row.included) == (pytest.approx(2e-5), False)
 
 
 @pytest.mark.parametrize("with_u", [True, False])
 @pytest.mark.parametrize("orthogonal", [True, False])
-def test_a_line_closes_whatever_is_known_of_its_points(tmp_path: Path, with_u: bool, orthogonal: bool):
+def test_a_line_closes_whatever_is_known_of_its_points(tmp_path, with_u, orthogonal):
     random, x = np.random.default_rng(3), np.linspace(28, 44, 9)
     y = x + 0.02 * random.standard_normal(9)
     lines = [f"{a},{b:.4f}" + (",0.004,0.01" if with_u else "") for a, b in zip(x, y, strict=True)]
@@ -180,7 +171,7 @@ def test_a_line_closes_whatever_is_known_of_its_points(tmp_path: Path, with_u: b
 # --- how people are shown it ---------------------------------------------------------------------------
 
 
-def test_a_table_has_u_between_what_is_in_it_and_what_is_not(found: dict[str, Any]):
+def test_a_table_has_u_between_what_is_in_it_and_what_is_not(found):
     table = budget_table(of(found["four spin-downs"].budget, "c32"))
     sources = [row.cells[0] for row in table.rows]
     middle = sources.index("combined: u")
@@ -188,13 +179,13 @@ def test_a_table_has_u_between_what_is_in_it_and_what_is_not(found: dict[str, An
     assert all("(not in u)" in text for text in sources[middle + 1 :] if text != "u with all that is known")
 
 
-def test_a_field_is_shown_in_the_units_of_the_laboratory(found: dict[str, Any]):
+def test_a_field_is_shown_in_the_units_of_the_laboratory(found):
     table = budget_table(of(found["a scan"].budget, "strength"))
     assert "mT cm" in table.title
     assert any("mm" in row.cells[2] for row in table.rows)
 
 
-def test_budgets_are_blocks_with_a_sentence_each_and_their_origins(found: dict[str, Any]):
+def test_budgets_are_blocks_with_a_sentence_each_and_their_origins(found):
     budgets = found["a sweep"].budget
     blocks = budget_blocks(budgets)
     assert [type(block) for block in blocks] == [Tabular, Paragraph, Tabular, Paragraph, Details]

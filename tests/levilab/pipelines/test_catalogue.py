@@ -1,7 +1,5 @@
 """Several analyses of the same inputs: each keeps its result, and only what does not suit one is passed over."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import replace
@@ -26,7 +24,7 @@ from support.spin_downs import spin_down_csv
 SPINDOWN = ANALYSES["spindown"]
 
 
-def second_row(*experiments: str) -> Analysis[Any]:
+def second_row(*experiments):
     """Another analysis that reads spin-downs."""
     needs = replace(SPINDOWN.needs, analysis="second", experiments=frozenset(experiments))
     method = replace(SPINDOWN.result.method, needs=needs)
@@ -37,44 +35,44 @@ def second_row(*experiments: str) -> Analysis[Any]:
 class Content(Analysis[Any]):
     """An analysis that is content with anything."""
 
-    def analyze(self, *_: object) -> Any:
+    def analyze(self, *_):
         return "other"
 
     recall = analyze
 
 
-def content_row(*experiments: str) -> Analysis[Any]:
+def content_row(*experiments):
     row = second_row(*experiments)
     return Content(row.result, row.tables, row.part, row.columns)
 
 
-def use(monkeypatch: pytest.MonkeyPatch, *rows: Analysis[Any]) -> None:
+def use(monkeypatch, *rows):
     """These rows, without drawing."""
     monkeypatch.setattr(Analysis, "png", lambda *_: b"")
     monkeypatch.setattr(catalogue, "ANALYSES", {row.name: row for row in rows})
 
 
 @pytest.fixture
-def two(monkeypatch: pytest.MonkeyPatch) -> None:
+def two(monkeypatch):
     """A second analysis of the same runs and files, below the first."""
     use(monkeypatch, SPINDOWN, second_row("spin"))
 
 
 @pytest.fixture
-def runs(tmp_path: Path, sample_data: Path) -> Path:
+def runs(tmp_path, sample_data):
     for k in (1, 2):
         shutil.copytree(sample_data / f"spin-down-{k}", tmp_path / "runs" / f"run-{k}")
     return tmp_path / "runs"
 
 
-def analyzed(*paths: Path) -> dict[str, str]:
+def analyzed(*paths):
     """Name of each result → the analysis that it says it is of."""
     written = [save_found(row, found)[0] for row, found in analyze_suiting(paths, {})]
     return {file.name: json.loads(file.read_text(encoding="utf-8"))["analysis"] for file in written}
 
 
 @pytest.mark.usefixtures("two")
-def test_two_analyses_of_one_input_have_a_result_each(tmp_path: Path, runs: Path) -> None:
+def test_two_analyses_of_one_input_have_a_result_each(tmp_path, runs):
     both = {"result.json": "spindown", "result.second.json": "second"}
     assert analyzed(runs / "run-1") == both
     assert analyzed(runs) == both
@@ -82,9 +80,7 @@ def test_two_analyses_of_one_input_have_a_result_each(tmp_path: Path, runs: Path
     assert analyzed(file) == {f"my.csv.{name}": analysis for name, analysis in both.items()}
 
 
-def test_a_result_in_a_given_folder_replaces_no_other_analysis(
-    tmp_path: Path, sample_data: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_result_in_a_given_folder_replaces_no_other_analysis(tmp_path, sample_data, monkeypatch):
     monkeypatch.setattr(Analysis, "png", lambda *_: b"")
     for _ in range(2):
         for name, run in (("field", "field-scan"), ("limit", "lower-limits"), ("spindown", "spin-down-1")):
@@ -96,7 +92,7 @@ def test_a_result_in_a_given_folder_replaces_no_other_analysis(
 
 @pytest.mark.usefixtures("two")
 @pytest.mark.parametrize("name", ["runs", "runs/run-1", "my.csv"])
-def test_each_analysis_finds_its_own_result_again(tmp_path: Path, runs: Path, name: str) -> None:
+def test_each_analysis_finds_its_own_result_again(tmp_path, runs, name):
     spin_down_csv(tmp_path / "my.csv")
     path = runs.parent / name
     analyzed(path)
@@ -113,7 +109,7 @@ def test_each_analysis_finds_its_own_result_again(tmp_path: Path, runs: Path, na
     assert earlier.file.name.endswith("result.second.json")
 
 
-def test_result_json_belongs_to_the_first_row_for_the_experiment(monkeypatch: pytest.MonkeyPatch, runs: Path) -> None:
+def test_result_json_belongs_to_the_first_row_for_the_experiment(monkeypatch, runs):
     use(monkeypatch, ANALYSES["field"], second_row("spin"), SPINDOWN)
     found = METHOD.analyze([runs / "run-1"], SpinDownOptions())
     rows = catalogue.ANALYSES
@@ -123,7 +119,7 @@ def test_result_json_belongs_to_the_first_row_for_the_experiment(monkeypatch: py
     assert save_found(rows["second"], together)[0].name == "result.second.json"
 
 
-def test_several_inputs_leave_the_result_of_the_present_run_alone(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_several_inputs_leave_the_result_of_the_present_run_alone(runs, monkeypatch):
     monkeypatch.chdir(runs / "run-1")
     paths = [Path(), Path("../run-2")]
     monkeypatch.setattr(Analysis, "png", lambda *_: b"")
@@ -134,9 +130,7 @@ def test_several_inputs_leave_the_result_of_the_present_run_alone(runs: Path, mo
 
 @pytest.mark.usefixtures("two")
 @pytest.mark.parametrize("name", ["run-1", ""])
-def test_damage_is_not_passed_over_because_another_analysis_runs(
-    monkeypatch: pytest.MonkeyPatch, runs: Path, name: str
-) -> None:
+def test_damage_is_not_passed_over_because_another_analysis_runs(monkeypatch, runs, name):
     """The second row is content with anything; the first one finds its result damaged."""
     use(monkeypatch, SPINDOWN, content_row("spin"))
     (runs / name / "result.json").write_text("{", encoding="utf-8")
@@ -144,19 +138,19 @@ def test_damage_is_not_passed_over_because_another_analysis_runs(
         recall_suiting([runs / name], {})
 
 
-def test_what_one_analysis_cannot_use_keeps_no_other_from_its_own(tmp_path: Path, sample_data: Path) -> None:
+def test_what_one_analysis_cannot_use_keeps_no_other_from_its_own(tmp_path, sample_data):
     root = tmp_path / "runs"
     shutil.copytree(sample_data / "lower-limits", root / "limits")
     for name, rows in (("spin-down-1", 1), ("field-scan", 2)):  # broken off: too few readings
         readings = shutil.copytree(sample_data / name, root / name) / "readings.csv"
         lines = readings.read_text(encoding="utf-8").splitlines(keepends=True)
         readings.write_text("".join(lines[: 1 + rows]), encoding="utf-8")
-    messages: list[str] = []
+    messages = []
     assert [row.name for row, _ in analyze_suiting([root], {}, messages.append)] == ["limit"]
     assert [text.split(": no ")[1].split(" to analyze")[0] for text in messages] == ["spin run", "field run"]
 
 
-def test_of_several_paths_each_analysis_takes_those_that_suit_it(tmp_path: Path, sample_data: Path) -> None:
+def test_of_several_paths_each_analysis_takes_those_that_suit_it(tmp_path, sample_data):
     """Named one by one as in a folder of mixed runs; a path that suits none is refused, and named."""
     paths = [sample_data / name for name in ("lower-limits", "spin-down-1", "spin-down-2")]
     for found in (analyze_suiting(paths, {}), recall_suiting(paths, {})):
@@ -168,19 +162,19 @@ def test_of_several_paths_each_analysis_takes_those_that_suit_it(tmp_path: Path,
         analyze_suiting([sample_data / "lower-limits", sample_data / "spin-down-1", other], {})
 
 
-def test_a_result_beside_a_run_of_another_kind_is_reported(tmp_path: Path, sample_data: Path) -> None:
+def test_a_result_beside_a_run_of_another_kind_is_reported(tmp_path, sample_data):
     limit = ANALYSES["limit"]
     save_found(limit, limit.analyze([sample_data / "lower-limits"], limit.options_from({})), tmp_path)
     found = recall_suiting([sample_data / "spin-down-1", tmp_path], {})
     assert [row.name for row, _ in found] == ["spindown", "limit"]
 
 
-def test_the_analysis_made_for_an_experiment_goes_before_one_that_takes_its_records(sample_data: Path) -> None:
+def test_the_analysis_made_for_an_experiment_goes_before_one_that_takes_its_records(sample_data):
     for name, wanted in (("precession-sweep", "precession"), ("trace-tape", "spin"), ("scope-files", "spin")):
         assert [row.name for row, _ in recall_suiting([sample_data / name], {})] == [wanted], name
 
 
-def test_what_no_analysis_takes_is_refused_with_what_is_there(tmp_path: Path, sample_data: Path) -> None:
+def test_what_no_analysis_takes_is_refused_with_what_is_there(tmp_path, sample_data):
     run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "runs" / "one")
     text = (run / "run.json").read_text(encoding="utf-8")
     (run / "run.json").write_text(text.replace('"experiment": "spin"', '"experiment": "dummy"'), encoding="utf-8")
@@ -193,21 +187,21 @@ def test_what_no_analysis_takes_is_refused_with_what_is_there(tmp_path: Path, sa
         analyze_suiting([tmp_path / "empty"], {})
 
 
-def test_a_damaged_file_is_refused_for_its_damage(tmp_path: Path) -> None:
+def test_a_damaged_file_is_refused_for_its_damage(tmp_path):
     table = tmp_path / "my.csv"
     table.write_text("time_s,spin_frequency_hz\n0,1\n1,two\n2,3\n", encoding="utf-8")
     with pytest.raises(DataError, match="line 3"):
         analyze_suiting([table], {})
 
 
-def test_a_file_with_columns_of_one_analysis_alone_is_for_that_one(tmp_path: Path, sample_data: Path) -> None:
+def test_a_file_with_columns_of_one_analysis_alone_is_for_that_one(tmp_path, sample_data):
     """The readings of a sweep have times and spins, too, as those of a spin-down."""
     file = shutil.copy(sample_data / "precession-sweep" / "readings.csv", tmp_path / "sweep.csv")
     assert [one.analysis.name for one in suiting([Path(file)], {})] == ["precession"]
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_sweep_that_keeps_records_is_a_sweep_first(tmp_path: Path, sample_data: Path) -> None:
+def test_a_sweep_that_keeps_records_is_a_sweep_first(tmp_path, sample_data):
     """Its records suit the analysis of spins, too, if one of them is named; that one stands above that of sweeps."""
     run = shutil.copytree(sample_data / "precession-sweep", tmp_path / "sweep")
     ((row, found),) = recall_suiting([run], {})

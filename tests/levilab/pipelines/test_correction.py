@@ -1,11 +1,8 @@
 """FILE.levilab.toml beside a data file: read by every analysis, below the options that are given."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import math
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -22,16 +19,12 @@ from support.commands import command
 from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
 
-if TYPE_CHECKING:
-    from collections.abc import AsyncIterator
-    from pathlib import Path
-
 #: A frequency in the first column and the time in the second, in turns a minute: not what a reader would guess.
 READ = {"columns": {"t": "2", "f": "1 [rpm]"}}
 
 
 @pytest.fixture
-def swapped(tmp_path: Path) -> Path:
+def swapped(tmp_path):
     """A spin-down whose columns have no titles and stand the other way around."""
     spin_down_csv(file := tmp_path / "my.csv")
     rows = [line.split(",")[:2] for line in file.read_text("utf-8").splitlines()[1:]]
@@ -39,25 +32,25 @@ def swapped(tmp_path: Path) -> Path:
     return file
 
 
-def first(found: Any, number: int = 0) -> float:
+def first(found, number=0):
     """The first spin frequency of an input [Hz]."""
     return float(found.sources[number].readings.frequency[0])
 
 
-def kept(file: Path, text: str) -> Path:
+def kept(file, text):
     path = place_of_correction(file)
     path.write_text(text, encoding="utf-8")
     return path
 
 
-def test_what_was_written_is_read_again(tmp_path: Path) -> None:
+def test_what_was_written_is_read_again(tmp_path):
     options = {"columns": {"t": 'Zeit "t", s', "f": "Drehzahl [1/min] \x7fé\\"}, "channel": "CH2", "rate": 44100.0}
     path = write_correction(tmp_path / "my.csv", options)
     assert path.name == "my.csv.levilab.toml"
     assert read_correction(tmp_path / "my.csv") == options
 
 
-def test_the_correction_is_used_named_and_recorded(swapped: Path) -> None:
+def test_the_correction_is_used_named_and_recorded(swapped):
     with pytest.raises(levilab.errors.DataError):
         levilab.analyze(swapped, "spindown")
     write_correction(swapped, READ)
@@ -70,7 +63,7 @@ def test_the_correction_is_used_named_and_recorded(swapped: Path) -> None:
     assert written["settings"]["columns"] == READ["columns"]
 
 
-def test_a_correction_of_a_sheet_holds_for_that_sheet_alone(tmp_path: Path) -> None:
+def test_a_correction_of_a_sheet_holds_for_that_sheet_alone(tmp_path):
     """The first sheet has turns a minute first and the time behind, the second is as a reader expects it."""
     times, spins = 4.0 * np.arange(30), 40.0 - 0.1 * np.arange(30)
     with xlsxwriter.Workbook(path := tmp_path / "my.xlsx") as book:
@@ -99,8 +92,8 @@ def test_a_correction_of_a_sheet_holds_for_that_sheet_alone(tmp_path: Path) -> N
     assert read_correction(path / "Mine") == {**READ, "rate": 100.0}
 
 
-def test_a_dropped_workbook_opens_with_its_sheets_to_be_corrected_alone(tmp_path: Path) -> None:
-    async def pieces() -> AsyncIterator[bytes]:
+def test_a_dropped_workbook_opens_with_its_sheets_to_be_corrected_alone(tmp_path):
+    async def pieces():
         yield (SAMPLE_DATA / "student-files" / "excel-sheets.xlsx").read_bytes()
 
     opened = Opened(tmp_path)
@@ -114,14 +107,14 @@ def test_a_dropped_workbook_opens_with_its_sheets_to_be_corrected_alone(tmp_path
     assert again["options"] == {}
 
 
-def test_options_that_are_given_go_before_it(swapped: Path) -> None:
+def test_options_that_are_given_go_before_it(swapped):
     kept(swapped, 'columns = "t=1,f=2"\n')
     result = levilab.analyze(swapped, "spindown", columns=READ["columns"])
     assert result.found.options.columns == READ["columns"]
     assert not any("levilab.toml" in text for text in result.warnings)
 
 
-def test_each_file_of_a_folder_has_its_own(swapped: Path) -> None:
+def test_each_file_of_a_folder_has_its_own(swapped):
     write_correction(swapped, READ)
     spin_down_csv(swapped.parent / "other.csv", seed=2)
     found = ANALYSES["spindown"].analyze([swapped.parent], ANALYSES["spindown"].options_from({}))
@@ -130,7 +123,7 @@ def test_each_file_of_a_folder_has_its_own(swapped: Path) -> None:
     assert write_table(ANALYSES["spindown"], [swapped], {}, table, cores=1).failed == 0
 
 
-def test_a_report_follows_a_changed_correction(swapped: Path) -> None:
+def test_a_report_follows_a_changed_correction(swapped):
     analysis = ANALYSES["spindown"]
     write_correction(swapped, {"columns": {"t": "2", "f": "1 [Hz]"}})
     assert command("analyze", "spindown", "my.csv", cwd=swapped.parent).status == 0
@@ -156,7 +149,7 @@ def test_a_report_follows_a_changed_correction(swapped: Path) -> None:
         ("\xff", "is no TOML"),
     ],
 )
-def test_a_broken_correction_is_refused_with_path_and_key(swapped: Path, text: str, key: str) -> None:
+def test_a_broken_correction_is_refused_with_path_and_key(swapped, text, key):
     path = place_of_correction(swapped)
     path.write_bytes(text.encode("latin-1"))
     with pytest.raises(CorrectionError) as refused:
@@ -166,7 +159,7 @@ def test_a_broken_correction_is_refused_with_path_and_key(swapped: Path, text: s
     assert "\n" not in str(refused.value)
 
 
-def test_a_broken_correction_leaves_out_its_file_alone(swapped: Path) -> None:
+def test_a_broken_correction_leaves_out_its_file_alone(swapped):
     path = kept(swapped, "rate = -5")
     spin_down_csv(swapped.parent / "other.csv", seed=2)
     result = levilab.analyze(swapped.parent, "spindown")
@@ -174,6 +167,6 @@ def test_a_broken_correction_leaves_out_its_file_alone(swapped: Path) -> None:
     assert any(str(path) in text for text in result.warnings)
 
 
-def test_nothing_is_kept_without_an_option(tmp_path: Path) -> None:
+def test_nothing_is_kept_without_an_option(tmp_path):
     with pytest.raises(UsageError, match="keep"):
         write_correction(tmp_path / "my.csv", {"columns": None})

@@ -1,18 +1,12 @@
 """Each analysis: what is recalled from result.json is what was found."""
 
-from __future__ import annotations
-
 import shutil
-from typing import TYPE_CHECKING
 
 import pytest
 
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.result import save
 from support.equal import differences
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 #: Inputs of each analysis among the sample data; a folder of several is searched.
 INPUTS = (
@@ -30,9 +24,7 @@ INPUTS = (
 
 
 @pytest.mark.parametrize(("name", "inputs"), INPUTS)
-def test_recalling_a_result_gives_what_was_found(
-    tmp_path: Path, sample_data: Path, name: str, inputs: list[str]
-) -> None:
+def test_recalling_a_result_gives_what_was_found(tmp_path, sample_data, name, inputs):
     paths = [shutil.copytree(sample_data / one, tmp_path / "runs" / one) for one in inputs]
     places = paths if len(paths) == 1 else [tmp_path / "runs"]
     analysis = ANALYSES[name]

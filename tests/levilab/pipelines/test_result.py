@@ -1,12 +1,9 @@
 """result.json on the disk: how it is named, and what happens to one that cannot be used."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import pytest
 from hypothesis import example, given
@@ -23,7 +20,7 @@ from levilab.pipelines.suits import save as save_found
 from support.spin_downs import spin_down_csv
 
 
-def saved(*paths: Path) -> list[str]:
+def saved(*paths):
     return [file.name for file in save_found(ANALYSES["spindown"], METHOD.analyze(paths, SpinDownOptions()))]
 
 
@@ -37,7 +34,7 @@ NAMES = st.lists(WORDS, min_size=1, max_size=4).map(".".join).filter(lambda name
 @example(names={"a.log", "a.prn", "a"})
 @example(names={"x.csv", "x.txt", "x.csv.dat", "x"})
 @example(names={"result", "result.json", "x.result"})
-def test_no_two_files_share_a_result(names: set[str]) -> None:
+def test_no_two_files_share_a_result(names):
     with TemporaryDirectory() as folder:
         paths = [Path(folder) / name for name in sorted(names)]
         before = [beside(path) for path in paths]
@@ -52,7 +49,7 @@ def test_no_two_files_share_a_result(names: set[str]) -> None:
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_files_that_differ_in_their_ending_alone_keep_their_results(tmp_path: Path) -> None:
+def test_files_that_differ_in_their_ending_alone_keep_their_results(tmp_path):
     paths = [spin_down_csv(tmp_path / name, seed=k) for k, name in enumerate(("run.001", "run.002", "run"))]
     assert [saved(path) for path in paths] == [
         ["run.001.result.json", "run.001.spindown.png"],
@@ -62,16 +59,14 @@ def test_files_that_differ_in_their_ending_alone_keep_their_results(tmp_path: Pa
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_the_result_of_a_run_folder_is_result_json_in_it(
-    tmp_path: Path, sample_data: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_result_of_a_run_folder_is_result_json_in_it(tmp_path, sample_data, monkeypatch):
     import shutil
 
-    def write(path: Path, content: str | bytes) -> None:
+    def write(path, content):
         written.append(path.name)
         replace_atomically(path, content)
 
-    written: list[str] = []
+    written = []
     monkeypatch.setattr("levilab.pipelines.result.replace_atomically", write)
     run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
     assert saved(run) == ["result.json", "spindown.png"]
@@ -80,15 +75,15 @@ def test_the_result_of_a_run_folder_is_result_json_in_it(
     assert METHOD.analyze([run / "readings.csv"], SpinDownOptions()).place.result() == run / "result.json"
 
 
-def write_result(tmp_path: Path) -> Path:
+def write_result(tmp_path):
     """The result of a data file, without its figure."""
     analysis = METHOD.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())
     return save(DOCUMENT.of(analysis, analysis.place), analysis.place, picture=b"")[0]
 
 
-def damaged(content: dict[str, Any], *keys: str | int, value: object = ...) -> str:
+def damaged(content, *keys, value=...):
     """The content as text, with one place changed or, without a value, taken out."""
-    place: Any = content
+    place = content
     for key in keys[:-1]:
         place = place[key]
     if value is ...:
@@ -127,7 +122,7 @@ RUN = ["runs", 0, "result"]
         (["settings", "reading_u_hz"], -1.0, "reading_u_hz"),
     ],
 )
-def test_a_damaged_result_is_refused_with_what_is_wrong(tmp_path: Path, keys: Any, value: object, says: str) -> None:
+def test_a_damaged_result_is_refused_with_what_is_wrong(tmp_path, keys, value, says):
     file = write_result(tmp_path)
     file.write_text(damaged(json.loads(file.read_text(encoding="utf-8")), *keys, value=value), encoding="utf-8")
     with pytest.raises(DataError) as caught:
@@ -140,34 +135,34 @@ def test_a_damaged_result_is_refused_with_what_is_wrong(tmp_path: Path, keys: An
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", "[" * 100_000, '{"schema": ' + "1" * 5000 + "}"])
-def test_what_is_no_result_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
+def test_what_is_no_result_is_refused_in_one_line(tmp_path, text):
     file = tmp_path / "result.json"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(DataError, match=r"cut off or not JSON|schema is"):
         read_result(file, DOCUMENT.result)
 
 
-def test_bytes_that_are_no_text_are_refused_too(tmp_path: Path) -> None:
+def test_bytes_that_are_no_text_are_refused_too(tmp_path):
     file = tmp_path / "result.json"
     file.write_bytes(b"\xff\xfe\x00{")
     with pytest.raises(DataError, match="not JSON"):
         read_result(file, DOCUMENT.result)
 
 
-def test_a_result_of_another_analysis_is_none_of_this_one(tmp_path: Path) -> None:
+def test_a_result_of_another_analysis_is_none_of_this_one(tmp_path):
     file = write_result(tmp_path)
     file.write_text(damaged(json.loads(file.read_text(encoding="utf-8")), "analysis", value="field"), encoding="utf-8")
     assert read_result(file, DOCUMENT.result) is None
     assert read_result(tmp_path / "nowhere.json", DOCUMENT.result) is None
 
 
-def test_keys_of_a_newer_version_are_passed_over(tmp_path: Path) -> None:
+def test_keys_of_a_newer_version_are_passed_over(tmp_path):
     file = write_result(tmp_path)
     file.write_text(damaged(json.loads(file.read_text(encoding="utf-8")), "new", value=1), encoding="utf-8")
     assert read_result(file, DOCUMENT.result)
 
 
-def test_a_result_read_and_written_again_is_the_same_text(tmp_path: Path) -> None:
+def test_a_result_read_and_written_again_is_the_same_text(tmp_path):
     file = write_result(tmp_path)
     result = read_result(file, DOCUMENT.result)
     assert result

@@ -1,13 +1,10 @@
 """What is found at paths: each set of readings once, and a warning only where something is wrong."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os
 import shutil
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -20,37 +17,34 @@ from levilab.pipelines.spindown.analysis import METHOD, NEEDS
 from levilab.pipelines.suits import analyze_suiting, left_out_of, remarks, save, texts_of
 from support.spin_downs import spin_down_csv
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
-
-def with_crlf(text: str) -> str:
+def with_crlf(text):
     return text.replace("\n", "\r\n")
 
 
-def with_quotes(text: str) -> str:
+def with_quotes(text):
     rows = [",".join(f'"{cell}"' for cell in row.split(",")) for row in text.split("\n")]
     return "\n".join(rows[:-1]) + "\n"
 
 
-def with_decimal_commas(text: str) -> str:
+def with_decimal_commas(text):
     return text.replace(",", ";").replace(".", ",")
 
 
-def in_other_units(text: str) -> str:
+def in_other_units(text):
     t, nu, u = np.loadtxt(text.splitlines()[1:], delimiter=",", unpack=True)
     rows = [f"{1000 * x!r},{60 * y!r},{60 * z!r}" for x, y, z in zip(t.tolist(), nu.tolist(), u.tolist(), strict=True)]
     return "\n".join(["t [ms],f [rpm],u [rpm]", *rows, ""])
 
 
-def without_uncertainties(text: str) -> str:
+def without_uncertainties(text):
     return "\n".join(row.rpartition(",")[0] for row in text.split("\n"))
 
 
 @pytest.mark.parametrize(
     "rewritten", [with_crlf, with_quotes, with_decimal_commas, in_other_units, without_uncertainties]
 )
-def test_the_same_readings_in_another_file_format_count_once(tmp_path: Path, rewritten: Callable[[str], str]) -> None:
+def test_the_same_readings_in_another_file_format_count_once(tmp_path, rewritten):
     first = spin_down_csv(tmp_path / "first.csv")
     second = tmp_path / "second.csv"
     second.write_bytes(rewritten(first.read_text(encoding="utf-8")).encode())
@@ -59,14 +53,14 @@ def test_the_same_readings_in_another_file_format_count_once(tmp_path: Path, rew
     assert analysis.warnings == (f"{second}: holds the same readings as {first}, counted once",)
 
 
-def test_an_export_beside_the_run_counts_once(tmp_path: Path, sample_data: Path) -> None:
+def test_an_export_beside_the_run_counts_once(tmp_path, sample_data):
     run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
     export = tmp_path / "export.csv"
     export.write_text(with_decimal_commas((run / "readings.csv").read_text(encoding="utf-8")), encoding="utf-8")
     assert len(METHOD.analyze([run, export], SpinDownOptions()).sources) == 1
 
 
-def test_runs_that_differ_in_one_reading_are_two_runs(tmp_path: Path) -> None:
+def test_runs_that_differ_in_one_reading_are_two_runs(tmp_path):
     first = spin_down_csv(tmp_path / "first.csv")
     lines = first.read_text(encoding="utf-8").splitlines()
     time, frequency, u = lines[7].split(",")
@@ -75,7 +69,7 @@ def test_runs_that_differ_in_one_reading_are_two_runs(tmp_path: Path) -> None:
     assert len(METHOD.analyze([first, tmp_path / "second.csv"], SpinDownOptions()).sources) == 2
 
 
-def test_a_run_that_goes_on_in_another_folder_counts_once(tmp_path: Path, sample_data: Path) -> None:
+def test_a_run_that_goes_on_in_another_folder_counts_once(tmp_path, sample_data):
     for name in ("run", "run-rescued"):
         shutil.copytree(sample_data / "spin-down-1", tmp_path / name)
     record = json.loads((tmp_path / "run" / "run.json").read_text(encoding="utf-8"))
@@ -87,19 +81,19 @@ def test_a_run_that_goes_on_in_another_folder_counts_once(tmp_path: Path, sample
     assert analysis.remarks == (Skipped(f"{tmp_path / 'run'}, which was broken off: its run goes on in run-rescued"),)
 
 
-def test_runs_of_another_experiment_are_a_remark_and_no_warning(sample_data: Path) -> None:
+def test_runs_of_another_experiment_are_a_remark_and_no_warning(sample_data):
     analysis = METHOD.analyze([sample_data], SpinDownOptions())
     assert SkippedRuns("limit", 3) in analysis.remarks
     assert not any("skipped" in warning for warning in analysis.all_warnings)
 
 
-def test_what_is_no_regular_file_has_no_hash(tmp_path: Path) -> None:
+def test_what_is_no_regular_file_has_no_hash(tmp_path):
     with pytest.raises(DataError, match="a file is expected"):
         sha256_of(tmp_path)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no such pipes in folders")
-def test_a_pipe_in_the_place_of_readings_is_refused_at_once(tmp_path: Path, sample_data: Path) -> None:
+def test_a_pipe_in_the_place_of_readings_is_refused_at_once(tmp_path, sample_data):
     run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
     (run / "readings.csv").unlink()
     for pipe, paths in ((run / "readings.csv", [run]), (tmp_path / "my.csv", [tmp_path / "my.csv"])):
@@ -117,23 +111,21 @@ def test_the_digest_of_a_file_is_that_of_the_standard(tmp_path):
     assert sha256_of(tmp_path / "readings.csv") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
 
 
-def test_of_many_runs_few_are_compared_with_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_many_runs_few_are_compared_with_each_other(tmp_path, monkeypatch):
     first = spin_down_csv(tmp_path / "0.csv")
     head, *lines = first.read_text(encoding="utf-8").splitlines()
     for k in range(1, 30):
         rows = [f"{time},{float(f) * (1 + k / 1000)!r},{u}" for time, f, u in (line.split(",") for line in lines)]
         (tmp_path / f"{k}.csv").write_text("\n".join([head, *rows, ""]), encoding="utf-8")
     shutil.copy(first, tmp_path / "copy.csv")
-    compared: list[int] = []
+    compared = []
     compare = Readings.same_as
     monkeypatch.setattr(Readings, "same_as", lambda *two: compared.append(1) or compare(*two))
     found = collect([tmp_path], NEEDS, lambda _: SpinDownOptions())
     assert (len(found.sources), len(found.warnings), len(compared)) == (30, 1, 1)
 
 
-def test_a_copy_whose_fingerprint_is_rounded_otherwise_is_found(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_copy_whose_fingerprint_is_rounded_otherwise_is_found(tmp_path, monkeypatch):
     shutil.copy(spin_down_csv(tmp_path / "0.csv"), tmp_path / "copy.csv")
     fingerprints = iter([1.0, 1.0 - 5e-9])  # on both sides of a cell's edge
     monkeypatch.setattr(Readings, "fingerprint", property(lambda _: next(fingerprints)))
@@ -141,7 +133,7 @@ def test_a_copy_whose_fingerprint_is_rounded_otherwise_is_found(
     assert (len(found.sources), len(found.warnings)) == (1, 1)
 
 
-def folder_of_a_student(folder: Path, sample_data: Path) -> None:
+def folder_of_a_student(folder, sample_data):
     spin_down_csv(folder / "run.csv")
     shutil.copy(sample_data / "scope-files" / "recording.wav", folder)
     for name, content in {
@@ -151,7 +143,7 @@ def folder_of_a_student(folder: Path, sample_data: Path) -> None:
         (folder / name).write_bytes(content)
 
 
-def test_a_folder_names_every_file_that_it_leaves_out_by_kind_and_number(tmp_path: Path, sample_data: Path) -> None:
+def test_a_folder_names_every_file_that_it_leaves_out_by_kind_and_number(tmp_path, sample_data):
     folder_of_a_student(tmp_path, sample_data)
     for _ in range(2):  # the second time with results and figures beside the files
         results = analyze_suiting([tmp_path], {})
@@ -169,23 +161,21 @@ def test_a_folder_names_every_file_that_it_leaves_out_by_kind_and_number(tmp_pat
             save(analysis, found)
 
 
-def test_what_another_analysis_reads_is_left_out_of_one_alone(tmp_path: Path, sample_data: Path) -> None:
+def test_what_another_analysis_reads_is_left_out_of_one_alone(tmp_path, sample_data):
     folder_of_a_student(tmp_path, sample_data)
     found = METHOD.analyze([tmp_path], SpinDownOptions())
     (sound,) = [one for one in left_out_of(found.remarks) if one["path"].endswith(".wav")]
     assert (sound["kind"], sound["advice"]) == ("WAV recording", "levilab analyze spin reads it")
 
 
-def test_a_folder_without_anything_to_read_says_of_what_kind_its_files_are(tmp_path: Path) -> None:
+def test_a_folder_without_anything_to_read_says_of_what_kind_its_files_are(tmp_path):
     (tmp_path / "foto.jpg").write_bytes(b"\xff\xd8\xff\xe0")
     (tmp_path / "other.csv").write_text("a,b\n1,2\n", encoding="utf-8")
     with pytest.raises(DoesNotSuit, match=r"left out: a picture \(foto\.jpg: .*; a table with other columns \(other"):
         analyze_suiting([tmp_path], {})
 
 
-def test_sound_without_the_extra_is_counted_with_what_to_install(
-    tmp_path: Path, sample_data: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_sound_without_the_extra_is_counted_with_what_to_install(tmp_path, sample_data, monkeypatch):
     spin_down_csv(tmp_path / "run.csv")
     for name in ("a.m4a", "b.m4a"):
         shutil.copy(sample_data / "scope-files" / "phone.m4a", tmp_path / name)

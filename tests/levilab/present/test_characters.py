@@ -1,7 +1,5 @@
 """Text on streams that cannot carry all of Unicode."""
 
-from __future__ import annotations
-
 import io
 
 import pytest
@@ -29,16 +27,16 @@ ENCODINGS = ["ascii", "cp1252", "cp437", "latin-1", "utf-8"]
         ("1 MΩ", "1 MOhm"),
     ],
 )
-def test_what_the_tables_show_is_spelled_in_ascii(text: str, ascii_text: str) -> None:
+def test_what_the_tables_show_is_spelled_in_ascii(text, ascii_text):
     assert for_encoding(text, "ascii") == ascii_text
 
 
-def test_a_code_page_keeps_what_it_has() -> None:
+def test_a_code_page_keeps_what_it_has():
     assert for_encoding("größe: 3 µs, ν²", "cp1252") == "größe: 3 µs, nu²"
 
 
 @given(st.text(), st.sampled_from(ENCODINGS))
-def test_any_text_can_be_written_afterwards(text: str, encoding: str) -> None:
+def test_any_text_can_be_written_afterwards(text, encoding):
     spelled = for_encoding(text, encoding)
     if encoding != "utf-8":
         spelled.encode(encoding)
@@ -46,12 +44,12 @@ def test_any_text_can_be_written_afterwards(text: str, encoding: str) -> None:
 
 
 @given(st.text(alphabet="0123456789e+-.() abcnu/^\n", max_size=50), st.sampled_from(ENCODINGS))
-def test_plain_text_stays_as_it_is(text: str, encoding: str) -> None:
+def test_plain_text_stays_as_it_is(text, encoding):
     assert for_encoding(text, encoding) == text
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
-def test_a_stream_spells_what_reaches_it_otherwise(encoding: str) -> None:
+def test_a_stream_spells_what_reaches_it_otherwise(encoding):
     raw = io.BytesIO()
     stream = io.TextIOWrapper(raw, encoding=encoding, errors=SPELLED_OUT)
     stream.write("levilab: 3.2×10⁻³ s⁻¹")

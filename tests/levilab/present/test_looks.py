@@ -1,7 +1,5 @@
 """The colours of things: apart for the colour-blind, and apart in print without colours by colour or by form."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np
@@ -30,24 +28,24 @@ LEAST_DIFFERENCE = 15.0
 LEAST_IN_GREY = 12.0
 
 
-def linear(colour: str) -> Array:
+def linear(colour):
     rgb = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255
     return np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
 
 
-def lab(rgb: Array) -> Array:
+def lab(rgb):
     white = TO_XYZ @ np.ones(3)
     ratio = TO_XYZ @ np.clip(rgb, 0, 1) / white
     f = np.where(ratio > (6 / 29) ** 3, np.cbrt(ratio), ratio * (29 / 6) ** 2 / 3 + 4 / 29)
     return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
 
 
-def in_grey(colour: str) -> float:
+def in_grey(colour):
     return float(lab(np.full(3, TO_XYZ[1] @ linear(colour)))[0])
 
 
 @pytest.mark.parametrize("eye", list(SEEN))
-def test_things_of_one_figure_differ_in_colour_or_share_it_knowingly(eye: str) -> None:
+def test_things_of_one_figure_differ_in_colour_or_share_it_knowingly(eye):
     close = {}
     for family in TOGETHER:
         for a, b in combinations(family, 2):
@@ -60,7 +58,7 @@ def test_things_of_one_figure_differ_in_colour_or_share_it_knowingly(eye: str) -
     assert close == {}
 
 
-def test_things_of_one_figure_differ_in_form_or_in_grey() -> None:
+def test_things_of_one_figure_differ_in_form_or_in_grey():
     alike = [
         (a, b)
         for family in TOGETHER
@@ -71,12 +69,12 @@ def test_things_of_one_figure_differ_in_form_or_in_grey() -> None:
     assert alike == []
 
 
-def test_a_line_on_white_is_dark_enough_to_be_seen() -> None:
+def test_a_line_on_white_is_dark_enough_to_be_seen():
     pale = {name: round(in_grey(look.colour)) for name, look in LOOKS.items() if in_grey(look.colour) > 75}
     assert set(pale) <= {"lost"}  # an area, with a hatch
 
 
-def test_letters_stand_out_from_white() -> None:
+def test_letters_stand_out_from_white():
     contrast = {name: 1.05 / (float(TO_XYZ[1] @ linear(look.of_text)) + 0.05) for name, look in LOOKS.items()}
     assert min(contrast.values()) >= 4.49  # of colours in 256 steps
     assert LOOKS["readings"].of_text == "#000000"

@@ -1,13 +1,11 @@
 """What a log says of the way to the first reading."""
 
-from __future__ import annotations
-
 import multiprocessing
 
 from levilab.present.progress import LineDisplay, ShareBar
 
 
-def test_a_log_has_a_line_each_fifth_of_each_part_and_none_twice(capsys) -> None:
+def test_a_log_has_a_line_each_fifth_of_each_part_and_none_twice(capsys):
     display = LineDisplay()
     for k in range(1, 11):
         display.preparing(f"raised by {k} Hz", k / 10)
@@ -16,7 +14,7 @@ def test_a_log_has_a_line_each_fifth_of_each_part_and_none_twice(capsys) -> None
     assert capsys.readouterr().err.splitlines() == [*(f"raised by {k} Hz" for k in (2, 4, 6, 8, 10)), "held"]
 
 
-def test_a_log_calls_the_time_left_of_a_bench_that_jumps_bench_time(capsys) -> None:
+def test_a_log_calls_the_time_left_of_a_bench_that_jumps_bench_time(capsys):
     for bench_time in (False, True):
         LineDisplay(bench_time=bench_time).reading("25 Hz", 10.0, (95.0, 95.0))
     assert capsys.readouterr().err.splitlines() == [
@@ -25,7 +23,7 @@ def test_a_log_calls_the_time_left_of_a_bench_that_jumps_bench_time(capsys) -> N
     ]
 
 
-def test_a_worker_process_shows_no_share_beside_that_of_its_parent(capsys, monkeypatch) -> None:
+def test_a_worker_process_shows_no_share_beside_that_of_its_parent(capsys, monkeypatch):
     ShareBar("films", line_every=0.0)(0.5)
     assert capsys.readouterr().err == "films: 50 %\n"
     monkeypatch.setattr(multiprocessing, "parent_process", lambda: "a process")

@@ -1,10 +1,7 @@
 """Pictures on the disk and in pages."""
 
-from __future__ import annotations
-
 import os
 import re
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 import matplotlib as mpl
@@ -15,16 +12,13 @@ from matplotlib.figure import Figure
 from levilab.present.style import STYLE, WIDE, as_pdf, as_png, as_svg, save_png
 from support.figures import faults
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-
-def test_a_picture_that_cannot_be_written_leaves_the_older_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_picture_that_cannot_be_written_leaves_the_older_one(tmp_path, monkeypatch):
     path = tmp_path / "picture.png"
     save_png(Figure(), path)
     older = path.read_bytes()
 
-    def full(descriptor: int) -> None:
+    def full(descriptor):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
@@ -34,7 +28,7 @@ def test_a_picture_that_cannot_be_written_leaves_the_older_one(tmp_path: Path, m
     assert [found.name for found in tmp_path.iterdir()] == ["picture.png"]
 
 
-def test_a_picture_is_never_written_through_a_link(tmp_path: Path) -> None:
+def test_a_picture_is_never_written_through_a_link(tmp_path):
     precious = tmp_path / "precious"
     precious.write_text("not a picture", encoding="utf-8")
     try:
@@ -45,7 +39,7 @@ def test_a_picture_is_never_written_through_a_link(tmp_path: Path) -> None:
     assert precious.read_text(encoding="utf-8") == "not a picture"
 
 
-def drawing(gid: str = "readings-a") -> Figure:
+def drawing(gid="readings-a"):
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, 3))
         axes = figure.add_axes((0.1, 0.2, 0.8, 0.7))
@@ -56,7 +50,7 @@ def drawing(gid: str = "readings-a") -> Figure:
     return figure
 
 
-def test_two_figures_of_a_page_share_no_id_and_refer_to_their_own() -> None:
+def test_two_figures_of_a_page_share_no_id_and_refer_to_their_own():
     pages = [as_svg(drawing(), prefix) for prefix in ("one", "two")]
     ids, references = (
         [set(re.findall(pattern, page)) for page in pages]
@@ -69,7 +63,7 @@ def test_two_figures_of_a_page_share_no_id_and_refer_to_their_own() -> None:
         assert used <= own
 
 
-def test_each_marker_of_a_named_line_is_one_use_in_the_order_of_the_points() -> None:
+def test_each_marker_of_a_named_line_is_one_use_in_the_order_of_the_points():
     root = ET.fromstring(as_svg(drawing(), "p"))
     (group,) = [one for one in root.iter("{http://www.w3.org/2000/svg}g") if one.get("id") == "p-readings-a"]
     marks = [one for one in group.iter() if one.tag.endswith("}use")]
@@ -79,7 +73,7 @@ def test_each_marker_of_a_named_line_is_one_use_in_the_order_of_the_points() -> 
     assert np.argsort([-y for _, y in places]).tolist() == [0, 2, 1, 3]  # y counts downwards
 
 
-def test_an_inlined_figure_has_no_rule_for_the_page_and_nothing_but_marks() -> None:
+def test_an_inlined_figure_has_no_rule_for_the_page_and_nothing_but_marks():
     page = as_svg(drawing(), "p", title='"><script>')
     assert page.startswith("<svg ")
     assert not re.search(r"<(script|style|!|\?|metadata)", page)
@@ -87,18 +81,18 @@ def test_an_inlined_figure_has_no_rule_for_the_page_and_nothing_but_marks() -> N
     assert root.get("aria-label") == '"><script>'
 
 
-def test_a_prefix_that_would_become_markup_is_refused() -> None:
+def test_a_prefix_that_would_become_markup_is_refused():
     with pytest.raises(ValueError, match="begins with a letter"):
         as_svg(drawing(), 'a" onload="')
 
 
-def test_what_a_person_has_set_in_a_matplotlibrc_changes_nothing() -> None:
+def test_what_a_person_has_set_in_a_matplotlibrc_changes_nothing():
     own = as_svg(drawing())
     with mpl.rc_context({"axes.facecolor": "yellow", "font.size": 20, "lines.linewidth": 9, "text.color": "red"}):
         assert as_svg(drawing()) == own
 
 
-def test_the_same_figure_is_saved_as_the_same_bytes_with_its_fonts_inside() -> None:
+def test_the_same_figure_is_saved_as_the_same_bytes_with_its_fonts_inside():
     page = as_pdf(drawing())
     assert page == as_pdf(drawing())
     assert as_svg(drawing()) == as_svg(drawing())
@@ -107,7 +101,7 @@ def test_the_same_figure_is_saved_as_the_same_bytes_with_its_fonts_inside() -> N
     assert b"/CreationDate" not in page
 
 
-def test_what_lies_over_a_line_or_a_bar_is_found() -> None:
+def test_what_lies_over_a_line_or_a_bar_is_found():
     figure = Figure()
     axes = figure.add_subplot()
     axes.plot([0, 1], [0, 1], label="slope")

@@ -1,7 +1,5 @@
 """Tables on a narrow terminal: no word is cut, no line is wider than the terminal."""
 
-from __future__ import annotations
-
 import io
 import os
 import re
@@ -24,20 +22,20 @@ TABLE = table("Settings of an experiment", HEADS, ROWS, numbers=["now"])
 WORDS = {word for text in (*HEADS[1:], *ROWS[0], *ROWS[1]) for word in text.split()}
 
 
-def drawn(width: int) -> list[str]:
+def drawn(width):
     out = io.StringIO()
     terminal.Terminal(width=width, file=out, highlight=False).print(terminal.draw(TABLE))
     return [line.rstrip() for line in out.getvalue().splitlines()]
 
 
 @pytest.mark.parametrize("width", [200, 80, 60, 40])
-def test_no_line_is_wider_than_the_terminal_and_no_word_is_cut(width: int) -> None:
+def test_no_line_is_wider_than_the_terminal_and_no_word_is_cut(width):
     lines = drawn(width)
     assert max(map(len, lines)) <= width
     assert {word for line in lines for word in line.split()} >= WORDS
 
 
-def test_where_the_words_do_not_fit_beside_each_other_a_row_is_a_list() -> None:
+def test_where_the_words_do_not_fit_beside_each_other_a_row_is_a_list():
     lines = drawn(40)
     assert lines[lines.index("drive_amplitude_vpp") + 1].split() == ["now", "10.0"]
     assert not any("───" in line for line in lines)
@@ -47,11 +45,11 @@ def test_where_the_words_do_not_fit_beside_each_other_a_row_is_a_list() -> None:
 class Screen(io.StringIO):
     """A terminal's stream."""
 
-    def isatty(self) -> bool:
+    def isatty(self):
         return True
 
 
-def test_a_table_is_as_wide_as_the_terminal_and_wider_into_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_table_is_as_wide_as_the_terminal_and_wider_into_a_file(monkeypatch):
     monkeypatch.setattr(shutil, "get_terminal_size", lambda: os.terminal_size((57, 24)))
     monkeypatch.setattr(sys, "stdout", Screen())
     assert terminal.terminal().width == 57
@@ -59,7 +57,7 @@ def test_a_table_is_as_wide_as_the_terminal_and_wider_into_a_file(monkeypatch: p
     assert terminal.terminal().width == 160
 
 
-def test_at_the_end_the_bench_is_taken_away_and_the_lines_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_at_the_end_the_bench_is_taken_away_and_the_lines_stay(monkeypatch):
     for name, value in {"TERM": "xterm", "COLUMNS": "100", "LINES": "24"}.items():
         monkeypatch.setenv(name, value)
     monkeypatch.setattr(sys, "stderr", screen := Screen())
@@ -77,13 +75,13 @@ def test_at_the_end_the_bench_is_taken_away_and_the_lines_stay(monkeypatch: pyte
 @pytest.mark.parametrize(
     ("encoding", "expected"), [("utf-8", "─"), ("cp437", "---"), ("ascii", "---"), ("cp1252", "---")]
 )
-def test_the_bench_is_drawn_in_the_characters_of_the_stream(encoding: str, expected: str) -> None:
+def test_the_bench_is_drawn_in_the_characters_of_the_stream(encoding, expected):
     stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)  # it raises for what it cannot carry
     display = BarDisplay(terminal.Terminal(file=stream, force_terminal=True, width=60, color_system=None))
     for k in range(5):
         display.state(State(1.0 * k, elapsed_s=1.0, time_left_s=9.0, last={"spin_frequency_hz": 25.0 - 0.1 * k}))
     stream.flush()
-    shown = stream.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
+    shown = stream.buffer.getvalue().decode(encoding)
     display.close()
     assert "spin 24.600 Hz" in shown
     assert "0.10 Hz/s" in shown
@@ -91,12 +89,12 @@ def test_the_bench_is_drawn_in_the_characters_of_the_stream(encoding: str, expec
     assert not re.search("\x1b\\[[0-9;]*m", shown)  # no colour was asked for
 
 
-def test_a_terminal_that_is_gone_ends_no_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_terminal_that_is_gone_ends_no_measurement(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(sys, "stderr", screen := Screen())
     display = BarDisplay()
 
-    def gone(_: str) -> int:
+    def gone(_):
         raise OSError(5, "Input/output error")
 
     monkeypatch.setattr(screen, "write", gone)

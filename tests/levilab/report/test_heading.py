@@ -1,9 +1,5 @@
 """The order of a report, its short form, and what a person writes above it."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
 
 from levilab.report.heading import Heading
@@ -11,20 +7,17 @@ from levilab.report.page import write_report
 from support.pages import Page
 from support.paths import SAMPLE_DATA
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 RUNS = [SAMPLE_DATA / "spin-down-1", SAMPLE_DATA / "spin-down-2"]
 
 
-def test_a_report_begins_with_the_result_and_notes_follow_the_figure(tmp_path: Path) -> None:
+def test_a_report_begins_with_the_result_and_notes_follow_the_figure(tmp_path):
     page = Page(write_report(RUNS, tmp_path / "report.html").read_text(encoding="utf-8"))
     found = page.of_level(2)
     assert found[:3] == ["Result", "Figure", "Notes"]
     assert {"Uncertainty budget", "What was measured, and with what", "How to reproduce this"} <= set(found)
 
 
-def test_a_short_one_has_no_more_and_names_the_command_that_makes_it(tmp_path: Path) -> None:
+def test_a_short_one_has_no_more_and_names_the_command_that_makes_it(tmp_path):
     heading = Heading("It's <7>", "Physics lab 2", "A. Kim", "28 November")
     text = write_report(RUNS, tmp_path / "report.html", short=True, heading=heading).read_text(encoding="utf-8")
     page = Page(text)
@@ -37,7 +30,7 @@ def test_a_short_one_has_no_more_and_names_the_command_that_makes_it(tmp_path: P
 
 
 @pytest.mark.parametrize("ending", ["html", "pdf"])
-def test_the_same_heading_makes_the_same_bytes(ending: str, tmp_path: Path) -> None:
+def test_the_same_heading_makes_the_same_bytes(ending, tmp_path):
     heading = Heading(course="a", author="b")
     made = [
         write_report(RUNS[:1], tmp_path / f"{name}.{ending}", short=True, heading=heading).read_bytes() for name in "ab"

@@ -1,22 +1,13 @@
 """The report in a browser: readings answer, nothing overflows, nothing that a run contains is markup or script."""
 
-from __future__ import annotations
-
 import json
 import shutil
-from typing import TYPE_CHECKING
 
 import pytest
 
 from levilab.report.page import write_report
 from support.browser import PHONE, watch
 from support.paths import SAMPLE_DATA
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from playwright.sync_api import Browser, Page
 
 EVIL = (
     """</script><script>window.pwned = 1</script><img src=x onerror="window.pwned = 2">${1+1}{{7*7}}"' &amp; --> ]]>"""
@@ -25,7 +16,7 @@ LONG = "x" * 3000
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def report(tmp_path_factory):
     """Of a run in which each text is hostile, or long and without a blank."""
     folder = tmp_path_factory.mktemp("report")
     run = folder / "run <b>bold<script>window.pwned = 3<"
@@ -50,19 +41,19 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def desk(browser: Browser, report: Path) -> Iterator[Page]:
+def desk(browser, report):
     with watch(browser) as page:
         page.goto(report.as_uri())
         yield page
 
 
-def test_what_a_run_contains_is_text_and_runs_nowhere(desk: Page) -> None:
+def test_what_a_run_contains_is_text_and_runs_nowhere(desk):
     assert desk.evaluate("window.pwned") is None
     assert EVIL in desk.locator("main").inner_text()
     assert desk.locator("main b, main img, main script").count() == 0
 
 
-def test_a_reading_answers_to_the_pointer_with_value_uncertainty_and_residual(desk: Page) -> None:
+def test_a_reading_answers_to_the_pointer_with_value_uncertainty_and_residual(desk):
     mark = desk.locator('[id="spindown-readings-0"] use').nth(2)
     mark.scroll_into_view_if_needed()
     box = mark.bounding_box()
@@ -75,7 +66,7 @@ def test_a_reading_answers_to_the_pointer_with_value_uncertainty_and_residual(de
     assert not tip.is_visible()
 
 
-def test_a_reading_answers_to_the_keyboard_too(desk: Page) -> None:
+def test_a_reading_answers_to_the_keyboard_too(desk):
     marks = desk.locator('[id="spindown-readings-0"] use')
     marks.first.focus()
     tip = desk.get_by_role("tooltip")
@@ -91,8 +82,8 @@ def test_a_reading_answers_to_the_keyboard_too(desk: Page) -> None:
     assert not tip.is_visible()
 
 
-def test_a_figure_is_enlarged_and_whole_again(desk: Page) -> None:
-    def width() -> float:
+def test_a_figure_is_enlarged_and_whole_again(desk):
+    def width():
         return float(desk.locator("figure svg").first.evaluate("svg => svg.viewBox.baseVal.width"))
 
     whole = width()
@@ -102,7 +93,7 @@ def test_a_figure_is_enlarged_and_whole_again(desk: Page) -> None:
     assert width() == pytest.approx(whole)
 
 
-def test_what_is_folded_is_opened_for_the_printer_and_folded_again(desk: Page) -> None:
+def test_what_is_folded_is_opened_for_the_printer_and_folded_again(desk):
     folded = desk.locator("details:not([open])")
     count = folded.count()
     assert count > 0
@@ -112,7 +103,7 @@ def test_what_is_folded_is_opened_for_the_printer_and_folded_again(desk: Page) -
     assert folded.count() == count
 
 
-def test_on_paper_a_figure_stays_on_one_page(desk: Page) -> None:
+def test_on_paper_a_figure_stays_on_one_page(desk):
     figures = desk.locator("figure")
     desk.emulate_media(media="print")
     heights = [box["height"] for figure in figures.all() if (box := figure.bounding_box())]
@@ -124,7 +115,7 @@ def test_on_paper_a_figure_stays_on_one_page(desk: Page) -> None:
 
 
 @pytest.mark.parametrize("script", [True, False])
-def test_on_a_telephone_the_page_is_not_moved_sideways(browser: Browser, report: Path, script: bool) -> None:
+def test_on_a_telephone_the_page_is_not_moved_sideways(browser, report, script):
     with watch(browser, viewport=PHONE, color_scheme="dark", java_script_enabled=script) as page:
         page.goto(report.as_uri())
         for details in page.locator("summary").all():
@@ -139,7 +130,7 @@ def test_on_a_telephone_the_page_is_not_moved_sideways(browser: Browser, report:
         assert covers.startswith("local, local, scroll, scroll")  # the shades of what goes on beyond an edge
 
 
-def test_on_a_telephone_a_figure_is_whole_and_then_as_wide_as_it_can_be_read(browser: Browser, report: Path) -> None:
+def test_on_a_telephone_a_figure_is_whole_and_then_as_wide_as_it_can_be_read(browser, report):
     with watch(browser, viewport=PHONE) as page:
         page.goto(report.as_uri())
         svg, card = page.locator(".card svg").first, page.locator(".card").first
@@ -155,13 +146,13 @@ def test_on_a_telephone_a_figure_is_whole_and_then_as_wide_as_it_can_be_read(bro
         assert widths == [(True, whole), (False, whole), (False, part), (False, whole), (True, whole)]
 
 
-def _right_edge(page: Page) -> float:
+def _right_edge(page):
     box = page.locator("main").bounding_box()
     assert box is not None
     return box["x"] + box["width"]
 
 
-def test_paper_is_light_and_holds_what_is_folded(browser: Browser, report: Path) -> None:
+def test_paper_is_light_and_holds_what_is_folded(browser, report):
     with watch(browser, color_scheme="dark") as page:
         page.goto(report.as_uri())
         page.emulate_media(media="print")

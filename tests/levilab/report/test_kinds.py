@@ -1,17 +1,14 @@
 """Simulated motions, sweeps and results of stability in a report, beside measurements or alone."""
 
-from __future__ import annotations
-
 import json
 import shutil
-from typing import TYPE_CHECKING
 
 import pytest
 
 from levilab.errors import DataError
 from levilab.motion.report import motion_section
 from levilab.motion.simulation import SimulationRequest, run_simulation
-from levilab.present.document.blocks import Banner, Code, Details, Fact, Facts, Picture, Section, Tabular, Verdict
+from levilab.present.document.blocks import Banner, Code, Details, Facts, Picture, Section, Tabular, Verdict
 from levilab.report.kinds import KINDS, MOST_IN_FULL, SWEEP
 from levilab.report.page import write_report
 from levilab.runs.run import Run
@@ -26,18 +23,12 @@ from levilab.workers import this_process
 from support.figures import without_drawing
 from support.paths import SAMPLE_DATA
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
-    from levilab.present.document.blocks import Block
-
-
-def silent(text: str) -> None: ...
+def silent(text): ...
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def place(tmp_path_factory):
     """A folder with a simulated motion, a sweep and a result of stability."""
     place = tmp_path_factory.mktemp("simulated")
     scene = with_settings(preset("undriven"), ["top.mass_kg=0.0252", "start.spin_hz=31"])
@@ -53,41 +44,41 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def folder(place: Path) -> Path:
+def folder(place):
     (folder,) = (place / "runs").iterdir()
     return folder
 
 
-def all_in(block: Block) -> Iterator[Block]:
+def all_in(block):
     yield block
     for inner in block.blocks if isinstance(block, Section | Details) else ():
         yield from all_in(inner)
 
 
-def facts_of(section: Section) -> dict[str, Fact]:
+def facts_of(section):
     return {fact.name: fact for block in all_in(section) if isinstance(block, Facts) for fact in block.facts}
 
 
-def of_kind(section: Section, kind: type) -> list[Block]:
+def of_kind(section, kind):
     return [block for block in all_in(section) if isinstance(block, kind)]
 
 
-def test_a_motion_says_how_it_ended_what_was_changed_and_how_good_it_is(folder: Path) -> None:
+def test_a_motion_says_how_it_ended_what_was_changed_and_how_good_it_is(folder):
     section = motion_section(Run.load(folder))
     facts = facts_of(section)
     assert isinstance(section.blocks[0], Banner)
     assert section.blocks[0].lead == "SYNTHETIC."
-    assert "stayed up for all of 1.2 s" in of_kind(section, Verdict)[0].text  # type: ignore[attr-defined]
+    assert "stayed up for all of 1.2 s" in of_kind(section, Verdict)[0].text
     assert facts["Changed keys"].texts == ("top.mass_kg = 0.0252", "start.spin_hz = 31.0")
     assert "drag of the air" in facts["Left out"].texts[0]
     assert "1×10⁻⁶" in facts["Asked for"].texts[0]
     assert facts["Asked for"].texts[0].endswith(": reached")
     assert facts["states.csv"].texts[0].startswith("sha256 ")
-    names = [block.name for block in of_kind(section, Tabular)]  # type: ignore[attr-defined]
+    names = [block.name for block in of_kind(section, Tabular)]
     assert names[0] == "motion"
 
 
-def test_a_motion_is_drawn_anew_only_if_it_ends_in_the_state_that_was_recorded(folder: Path, tmp_path: Path) -> None:
+def test_a_motion_is_drawn_anew_only_if_it_ends_in_the_state_that_was_recorded(folder, tmp_path):
     (picture,) = of_kind(motion_section(Run.load(folder)), Picture)
     assert isinstance(picture, Picture)
     assert not picture.raster
@@ -101,7 +92,7 @@ def test_a_motion_is_drawn_anew_only_if_it_ends_in_the_state_that_was_recorded(f
     assert of_kind(motion_section(Run.load(copy)), Picture) == []
 
 
-def test_a_scene_of_its_own_is_printed_whole(folder: Path, tmp_path: Path) -> None:
+def test_a_scene_of_its_own_is_printed_whole(folder, tmp_path):
     copy = shutil.copytree(folder, tmp_path / folder.name)
     record = json.loads((copy / "run.json").read_text(encoding="utf-8"))
     record["configuration"]["scene"]["name"] = "<b>mine"
@@ -112,11 +103,11 @@ def test_a_scene_of_its_own_is_printed_whole(folder: Path, tmp_path: Path) -> No
     (keys,) = of_kind(section, Details)
     assert isinstance(keys, Details)
     assert keys.on_paper == "whole"
-    codes = [block.text for block in of_kind(section, Code)]  # type: ignore[attr-defined]
+    codes = [block.text for block in of_kind(section, Code)]
     assert "levilab simulate 'my scene.toml'" in codes
 
 
-def test_a_motion_that_is_not_whole_is_an_error_that_names_the_folder(folder: Path, tmp_path: Path) -> None:
+def test_a_motion_that_is_not_whole_is_an_error_that_names_the_folder(folder, tmp_path):
     copy = shutil.copytree(folder, tmp_path / folder.name)
     record = json.loads((copy / "run.json").read_text(encoding="utf-8"))
     del record["simulation"]
@@ -125,17 +116,12 @@ def test_a_motion_that_is_not_whole_is_an_error_that_names_the_folder(folder: Pa
         write_report([copy], tmp_path / "x.html")
 
 
-def test_simulations_and_a_measurement_go_into_one_report(place: Path, tmp_path: Path) -> None:
-    said: list[str] = []
+def test_simulations_and_a_measurement_go_into_one_report(place, tmp_path):
+    said = []
     with without_drawing():
         paths = [place, place / "where.json", SAMPLE_DATA / "lower-limits"]
         page = write_report(paths, tmp_path / "x.html", tell=said.append, tables=True).read_text(encoding="utf-8")
-    for title in (
-        "Limits of the spin",
-        "Simulated motion: undriven",
-        "Sweep: undriven",
-        "Where the top floats",
-    ):
+    for title in ("Limits of the spin", "Simulated motion: undriven", "Sweep: undriven", "Where the top floats"):
         assert title in page
     assert not [text for text in said if "simulate run" in text], "it is in the report"
     names = {file.name for file in (tmp_path / "x.tables").iterdir()}
@@ -146,14 +132,14 @@ def test_simulations_and_a_measurement_go_into_one_report(place: Path, tmp_path:
     assert rows[1].startswith("true,18.0,0.07,")
 
 
-def test_a_report_of_simulations_alone_is_synthetic_as_a_whole(place: Path, tmp_path: Path) -> None:
+def test_a_report_of_simulations_alone_is_synthetic_as_a_whole(place, tmp_path):
     with without_drawing():
         page = write_report([place / "map.zarr"], tmp_path / "x.html").read_text(encoding="utf-8")
     assert page.count("SYNTHETIC") >= 2
     assert "levilab sweep" in page or "How to reproduce it" in page
 
 
-def test_of_many_motions_the_report_is_an_overview(folder: Path, tmp_path: Path) -> None:
+def test_of_many_motions_the_report_is_an_overview(folder, tmp_path):
     for k in range(MOST_IN_FULL + 1):
         shutil.copytree(folder, tmp_path / "runs" / f"{folder.name}-{k}")
     page = write_report([tmp_path / "runs"], tmp_path / "x.html").read_text(encoding="utf-8")
@@ -161,20 +147,20 @@ def test_of_many_motions_the_report_is_an_overview(folder: Path, tmp_path: Path)
     assert "<figure" not in page
 
 
-def test_a_folder_that_only_its_name_makes_a_store_is_an_error(tmp_path: Path) -> None:
+def test_a_folder_that_only_its_name_makes_a_store_is_an_error(tmp_path):
     (tmp_path / "x.zarr").mkdir()
     with pytest.raises(DataError, match=r"x\.zarr"):
         write_report([tmp_path / "x.zarr"], tmp_path / "x.html")
 
 
-def test_a_damaged_result_of_stability_is_an_error(place: Path, tmp_path: Path) -> None:
+def test_a_damaged_result_of_stability_is_an_error(place, tmp_path):
     found = json.loads((place / "where.json").read_text(encoding="utf-8"))
     (tmp_path / "s.json").write_text(json.dumps(found | {"windows": [{}]}), encoding="utf-8")
     with pytest.raises(DataError, match=r"s\.json"):
         write_report([tmp_path / "s.json"], tmp_path / "x.html")
 
 
-def test_the_marks_of_the_kinds_are_those_that_are_written(place: Path) -> None:
+def test_the_marks_of_the_kinds_are_those_that_are_written(place):
     found = {kind.name: kind.find(place) for kind in KINDS}
     assert SWEEP == SCHEMA
     assert [len(found["simulated motion"]), len(found["sweep"])] == [1, 1]

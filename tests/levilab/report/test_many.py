@@ -1,9 +1,6 @@
 """A report of many runs: an overview, in which nothing is said a hundred times and nothing is left out."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -14,24 +11,21 @@ from levilab.report.page import write_report
 from many_runs import make_runs
 from support.paths import SAMPLE_DATA
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 COUNT = 16
 
 
 @pytest.fixture
-def page(tmp_path: Path, undrawn_figures: None) -> str:
+def page(tmp_path, undrawn_figures):
     """Of sixteen runs, two of which are broken."""
     make_runs(tmp_path / "runs", COUNT, broken=8)
-    said: list[str] = []
+    said = []
     output = write_report([tmp_path / "runs"], tmp_path / "report.html", tell=said.append)
     assert len(said) == 1, "the broken runs are named once, not once by each analysis"
     assert re.search(r"spin-0003 and 10 more: analyzed for the page", said[0])
     return output.read_text(encoding="utf-8")
 
 
-def test_facts_that_many_runs_share_stand_there_once(page: str) -> None:
+def test_facts_that_many_runs_share_stand_there_once(page):
     assert COUNT - 2 > MOST_IN_FULL
     assert page.count("<dt>Status</dt>") == page.count("no instruments recorded") == 1
     assert len(re.findall(r"<summary><strong>[^<]*spin-[0-9a-f]+</strong>", page)) == COUNT - 2
@@ -40,7 +34,7 @@ def test_facts_that_many_runs_share_stand_there_once(page: str) -> None:
     assert all(f'id="{target}"' in page for target in re.findall(r'href="#([^"]+)"', page))
 
 
-def test_warnings_that_are_alike_stand_together(tmp_path: Path) -> None:
+def test_warnings_that_are_alike_stand_together(tmp_path):
     folders = make_runs(tmp_path / "runs", 6, broken=0)
     for folder in folders[:4]:
         with (folder / "readings.csv").open("a", encoding="utf-8") as file:
@@ -51,7 +45,7 @@ def test_warnings_that_are_alike_stand_together(tmp_path: Path) -> None:
     assert sorted(text for alike in found.grouped_warnings for text in alike) == sorted(found.all_warnings)
 
 
-def test_of_many_runs_a_legend_does_not_name_each(tmp_path: Path) -> None:
+def test_of_many_runs_a_legend_does_not_name_each(tmp_path):
     limits = (SAMPLE_DATA / "upper-limits" / "readings.csv").read_text(encoding="utf-8")
     for k in range(9):
         (tmp_path / f"{k}.csv").write_text(limits.replace(",69.26", f",69.{k}6"), encoding="utf-8")

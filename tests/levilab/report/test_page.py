@@ -1,7 +1,5 @@
 """The report: self-contained, complete, and safe against what a user typed."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json
@@ -10,14 +8,13 @@ import subprocess
 import sys
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from levilab.errors import DataError, LevilabError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
+from levilab.pipelines.spindown.analysis import METHOD
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.suits import save
 from levilab.present.document.blocks import Tabular
@@ -34,21 +31,21 @@ from support.spin_downs import spin_down_csv
 from support.waiting import HANG_GUARD_S
 
 
-def render(found: SpinDownAnalysis) -> str:
+def render(found):
     return render_found([(ANALYSES["spindown"], found)])
 
 
 @pytest.fixture(scope="module")
-def found() -> SpinDownAnalysis:
+def found():
     return METHOD.analyze([SAMPLE_DATA], SpinDownOptions())
 
 
 @pytest.fixture(scope="module")
-def page(found: SpinDownAnalysis) -> Page:
+def page(found):
     return Page(render(found))
 
 
-def column(found: SpinDownAnalysis, name: str, head: str) -> dict[str, str]:
+def column(found, name, head):
     """Return a column of a table of the report, by the first cell of each row."""
     part = spindown_part(found)
     (shown,) = (
@@ -58,7 +55,7 @@ def column(found: SpinDownAnalysis, name: str, head: str) -> dict[str, str]:
     return {row.cells[0]: row.cells[k] for row in shown.rows}
 
 
-def test_nothing_is_fetched_when_the_report_is_opened(page: Page) -> None:
+def test_nothing_is_fetched_when_the_report_is_opened(page):
     addresses = [
         value for tag, given in page.tags for name, value in given.items() if name in {"src", "href", "xlink:href"}
     ]
@@ -72,7 +69,7 @@ def test_nothing_is_fetched_when_the_report_is_opened(page: Page) -> None:
     assert {address[1:] for address in addresses if address and address[0] == "#"} <= {*ids}
 
 
-def test_no_script_runs_but_ours_which_the_policy_names_by_its_hash(page: Page) -> None:
+def test_no_script_runs_but_ours_which_the_policy_names_by_its_hash(page):
     policy = next(given["content"] for tag, given in page.tags if given.get("http-equiv") == "Content-Security-Policy")
     assert policy is not None
     assert policy.startswith(
@@ -83,7 +80,7 @@ def test_no_script_runs_but_ours_which_the_policy_names_by_its_hash(page: Page) 
     assert f"script-src 'sha256-{digest}';" in policy
 
 
-def test_each_run_has_its_own_constants_and_the_scatter_stands_beside_the_mean(found: SpinDownAnalysis) -> None:
+def test_each_run_has_its_own_constants_and_the_scatter_stands_beside_the_mean(found):
     stokes = column(found, "spindown-runs", "ln ω against t\nC₁ [s⁻¹]")
     assert stokes["spin-down-1"].startswith("3.199(")
     assert (stokes["mean"], stokes["scatter s"]) == ("3.182(31)×10⁻³", "6.1(2.5)×10⁻⁵")  # u: s/√4, and s/√6 of s
@@ -95,20 +92,20 @@ def test_each_run_has_its_own_constants_and_the_scatter_stands_beside_the_mean(f
     assert column(found, "spindown-models-compared", "order test p")["stokes"] == "2×10⁻¹¹"
 
 
-def changed(run: Path, **entries: object) -> Path:
+def changed(run, **entries):
     """The run with other entries in run.json."""
     record = json.loads((run / "run.json").read_text(encoding="utf-8"))
     (run / "run.json").write_text(json.dumps(record | entries), encoding="utf-8")
     return run
 
 
-def text_of(*paths: Path, options: SpinDownOptions | None = None) -> str:
+def text_of(*paths, options=None):
     with without_figures():
         return Page(render(METHOD.analyze(paths, options or SpinDownOptions()))).text
 
 
 @pytest.fixture
-def run(tmp_path: Path, sample_data: Path) -> Path:
+def run(tmp_path, sample_data):
     return Path(shutil.copytree(sample_data / "spin-down-1", tmp_path / "20261121T005200Z-spin-c893"))
 
 
@@ -129,7 +126,7 @@ INSTRUMENTS = {
 }  # fmt: skip
 
 
-def test_what_a_user_typed_is_escaped_wherever_it_stands(tmp_path: Path, run: Path) -> None:
+def test_what_a_user_typed_is_escaped_wherever_it_stands(tmp_path, run):
     evil = '<script>alert("x")</script>&<img src=x onerror=alert(1)>'
     settings = {evil: evil, "waveform": evil, "output": evil}
     changed(
@@ -154,7 +151,7 @@ def test_what_a_user_typed_is_escaped_wherever_it_stands(tmp_path: Path, run: Pa
     assert all("onerror" not in attributes for _, attributes in parsed.tags)
 
 
-def test_settings_read_like_a_lab_book_and_are_those_of_the_measurement(run: Path) -> None:
+def test_settings_read_like_a_lab_book_and_are_those_of_the_measurement(run):
     text = text_of(changed(run, instruments=INSTRUMENTS))
     assert "automatic level off, gate 1 s, impedance 1 MΩ, coupling DC" in text
     assert "output off; last drive 40 Hz, 10 Vpp, SIN; load high impedance" in text
@@ -162,7 +159,7 @@ def test_settings_read_like_a_lab_book_and_are_those_of_the_measurement(run: Pat
     assert "did not answer at TCPIP0::10.0.0.6::INSTR" in text
 
 
-def test_the_drive_its_limits_and_the_origin_of_u_are_told(run: Path) -> None:
+def test_the_drive_its_limits_and_the_origin_of_u_are_told(run):
     spin = {"drive_waveform": "SIN", "drive_frequency_hz": 40.0, "drive_amplitude_vpp": 10.0, "ramp_hz_per_s": 0.2}
     text = text_of(changed(run, configuration={"spin": spin, "limits": {"drive_amplitude_vpp": 12.0}}))
     assert "SIN, 40 Hz, 10 Vpp, raised by 0.2 Hz/s" in text
@@ -170,13 +167,13 @@ def test_the_drive_its_limits_and_the_origin_of_u_are_told(run: Path) -> None:
     assert "u of a reading: 0.03 Hz, standard deviation of the noise" in text
 
 
-def test_the_drive_is_that_of_the_run_s_own_experiment() -> None:
+def test_the_drive_is_that_of_the_run_s_own_experiment():
     tables = {"spin": {"drive_frequency_hz": 40.0}, "tilt": {"drive_frequency_hz": 30.0}, "scan": {"step_m": 0.01}}
     assert _drive(RunRecord(experiment="tilt", status="finished", started_utc=None, configuration=tables)) == ("30 Hz",)
     assert _drive(RunRecord(experiment="scan", status="finished", started_utc=None, configuration=tables)) == ()
 
 
-def test_times_are_to_the_second_and_what_is_not_known_is_left_out(run: Path) -> None:
+def test_times_are_to_the_second_and_what_is_not_known_is_left_out(run):
     assert "not known" not in text_of(run)
     started, ended = "2026-11-21T00:52:00.123456Z", "2026-11-21T00:55:10.5Z"
     text = text_of(changed(run, started_utc=started, ended_utc=ended))
@@ -188,7 +185,7 @@ def test_times_are_to_the_second_and_what_is_not_known_is_left_out(run: Path) ->
     assert f"{here + timedelta(seconds=190):%H:%M:%S} 190.000 21.75" in parsed  # the last reading
 
 
-def test_what_happened_tells_the_fall(run: Path) -> None:
+def test_what_happened_tells_the_fall(run):
     events = [
         {"utc": "2026-11-21T00:51:00Z", "time_s": None, "kind": "drive on", "text": "drive on at 30 Hz"},
         {"utc": "2026-11-21T00:55:00Z", "time_s": 200.0, "kind": "fell", "text": "fell between 190.0 s and 200.0 s"},
@@ -199,13 +196,13 @@ def test_what_happened_tells_the_fall(run: Path) -> None:
     assert "The fall. fell between 190.0 s and 200.0 s; last reading that was fitted 21.75 Hz at 190.0 s." in text
 
 
-def test_one_synthetic_run_says_once_how_it_was_made(run: Path) -> None:
+def test_one_synthetic_run_says_once_how_it_was_made(run):
     text = text_of(run)
     assert text.count("39.9366 Hz") == 1
     assert "SYNTHETIC. This run did not come from a real bench." in text
 
 
-def test_a_mixture_of_real_and_synthetic_runs_is_no_measurement_and_says_so(tmp_path: Path, sample_data: Path) -> None:
+def test_a_mixture_of_real_and_synthetic_runs_is_no_measurement_and_says_so(tmp_path, sample_data):
     text = text_of(sample_data / "spin-down-1", spin_down_csv(tmp_path / "real.csv"))
     assert "REAL AND SYNTHETIC RUNS MIXED. 1 of 2 runs did not come from a real bench (spin-down-1)." in text
     assert "MIXED, and so no measurement (1 of 2 inputs are SYNTHETIC): " in text, "the verdict is read alone"
@@ -213,7 +210,7 @@ def test_a_mixture_of_real_and_synthetic_runs_is_no_measurement_and_says_so(tmp_
 
 @pytest.mark.usefixtures("undrawn_figures")
 @pytest.mark.parametrize("readings", [3, 20])
-def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, readings: int) -> None:
+def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path, readings):
     analysis = METHOD.analyze([spin_down_csv(tmp_path / "a.csv", n=readings)], SpinDownOptions(tilt="none"))
     parsed = Page(render(analysis))
     marked = [attributes for tag, attributes in parsed.tags if tag == "tr" and attributes.get("class") == "best"]
@@ -221,14 +218,14 @@ def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path: Path, rea
     assert ("(best)" in parsed.text) == analysis.combined.verdict.decided
 
 
-def reported(*paths: Path, output: Path, tell: Any = None, **options: Any) -> str:
+def reported(*paths, output, tell=None, **options):
     with without_figures():
         page = write_report(paths, output, options, tell).read_text(encoding="utf-8")
     return Page(page).text
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_the_report_shows_what_analyze_found(run: Path, tmp_path: Path) -> None:
+def test_the_report_shows_what_analyze_found(run, tmp_path):
     analysis = METHOD.analyze([run], SpinDownOptions(tilt="none"))
     save(ANALYSES["spindown"], analysis)
     text = reported(run, output=tmp_path / "report.html")
@@ -237,7 +234,7 @@ def test_the_report_shows_what_analyze_found(run: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_the_report_does_not_fit_what_has_a_result(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_report_does_not_fit_what_has_a_result(run, tmp_path, monkeypatch):
     analysis = METHOD.analyze([run], SpinDownOptions(tilt="none"))
     save(ANALYSES["spindown"], analysis)
     monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", pytest.fail)
@@ -248,7 +245,7 @@ def test_the_report_does_not_fit_what_has_a_result(run: Path, tmp_path: Path, mo
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_the_report_says_what_it_had_to_analyze(run: Path, tmp_path: Path) -> None:
+def test_the_report_says_what_it_had_to_analyze(run, tmp_path):
     before = sorted(run.rglob("*"))
     assert "analyzed for this page: there was no result yet" in reported(run, output=tmp_path / "report.html")
     assert sorted(run.rglob("*")) == before
@@ -261,7 +258,7 @@ def test_the_report_says_what_it_had_to_analyze(run: Path, tmp_path: Path) -> No
     assert f"analyzed for this page: the readings are others than in {run / 'result.json'}" in text
 
 
-def test_the_page_needs_nothing_of_the_terminal() -> None:
+def test_the_page_needs_nothing_of_the_terminal():
     code = "import sys, levilab.report.page; print('rich' in sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=HANG_GUARD_S
@@ -270,14 +267,14 @@ def test_the_page_needs_nothing_of_the_terminal() -> None:
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_report_of_a_data_file_knows_no_instrument_and_says_so(tmp_path: Path) -> None:
+def test_a_report_of_a_data_file_knows_no_instrument_and_says_so(tmp_path):
     parsed = Page(render(METHOD.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))))
     assert "my.csv" in parsed.text
     assert "no instruments recorded" in parsed.text
     assert "SYNTHETIC" not in parsed.text
 
 
-def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path: Path) -> None:
+def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path):
     import numpy as np
 
     t = np.arange(20_000) * 0.01
@@ -289,15 +286,15 @@ def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path: 
     assert len(html) < 3e6
 
 
-def read(page: Path) -> Page:
+def read(page):
     return Page(page.read_text(encoding="utf-8"))
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_all_analyses_of_a_folder_are_on_the_page_in_their_order(tmp_path: Path, sample_data: Path) -> None:
+def test_all_analyses_of_a_folder_are_on_the_page_in_their_order(tmp_path, sample_data):
     for name in ("upper-limits", "spin-down-1"):
         shutil.copytree(sample_data / name, tmp_path / "runs" / name)
-    messages: list[str] = []
+    messages = []
     page = read(write_report([tmp_path / "runs"], tmp_path / "page.html", tell=messages.append))
     assert page.of_level(1) == ["Report of 2 runs"]
     assert page.of_level(2) == [
@@ -312,7 +309,7 @@ def test_all_analyses_of_a_folder_are_on_the_page_in_their_order(tmp_path: Path,
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_run_that_has_two_results_is_described_once(tmp_path: Path, sample_data: Path) -> None:
+def test_a_run_that_has_two_results_is_described_once(tmp_path, sample_data):
     run = shutil.copytree(sample_data / "precession-sweep", tmp_path / "sweep")
     options = {"reading_u": 0.1, "channel": "laser"}
     for name in ("precession", "spin"):
@@ -327,11 +324,11 @@ def test_a_run_that_has_two_results_is_described_once(tmp_path: Path, sample_dat
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_result_that_lies_elsewhere_is_found_by_its_own_path(tmp_path: Path, run: Path) -> None:
+def test_a_result_that_lies_elsewhere_is_found_by_its_own_path(tmp_path, run):
     elsewhere = tmp_path / "elsewhere"
     spindown = ANALYSES["spindown"]
     save(spindown, METHOD.analyze([run], SpinDownOptions(reading_u=0.07)), elsewhere)
-    messages: list[str] = []
+    messages = []
     text = reported(run, output=tmp_path / "page.html", tell=messages.append)
     assert "as levilab analyze found it" not in text
     assert "(`out`), give that folder or file" in messages[0]
@@ -344,7 +341,7 @@ def test_a_result_that_lies_elsewhere_is_found_by_its_own_path(tmp_path: Path, r
         reported(elsewhere, output=tmp_path / "page.html")
 
 
-def test_a_report_that_cannot_be_written_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
+def test_a_report_that_cannot_be_written_is_refused_before_anything_is_computed(tmp_path):
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     (tmp_path / "folder.html").mkdir()
     for output in (tmp_path / "file" / "report.html", tmp_path / "folder.html"):

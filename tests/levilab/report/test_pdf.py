@@ -1,12 +1,9 @@
 """A document as PDF: all of its text is data, the bytes are the same each time, and it has numbered pages."""
 
-from __future__ import annotations
-
 import json
 import re
 from datetime import UTC, datetime
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -29,11 +26,6 @@ from support.commands import command
 from support.documents import drawn, of_all_blocks
 from support.paths import ROOT
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from matplotlib.figure import Figure
-
 #: What means something in typst, what no font has, what steers, and words that fit into no line.
 HOSTILE = " ".join([
     '#panic("x") #import "@preview/x:1.0.0" $x^2$ @ref <label> [a] {b} `c` *d* _e_ \\u{41} ~ -- /* // = + \' "',
@@ -44,25 +36,25 @@ HOSTILE = " ".join([
 ])  # fmt: skip
 
 
-def said_of(document: Document, label: str) -> Any:
+def said_of(document, label):
     """What the typeset document says of itself for tests."""
     import typst
 
-    files: Any = with_places(files_of(document))
+    files = with_places(files_of(document))
     return json.loads(
         typst.query(files, f"<{label}>", field="value", one=True, font_paths=fonts(), ignore_system_fonts=True)
     )
 
 
-def pages_of(document: Document) -> int:
+def pages_of(document):
     return int(said_of(document, "pages"))
 
 
-def data_of(document: Document) -> Any:
+def data_of(document):
     return json.loads(files_of(document)["document.json"])
 
 
-def test_no_text_becomes_markup_or_ends_the_setting() -> None:
+def test_no_text_becomes_markup_or_ends_the_setting():
     pdf = as_pdf(of_all_blocks(HOSTILE))
     assert pdf.startswith(b"%PDF-1.7")
     files = files_of(Document(HOSTILE, HOSTILE, (Paragraph(HOSTILE),)))
@@ -72,13 +64,13 @@ def test_no_text_becomes_markup_or_ends_the_setting() -> None:
     assert b"eval(" not in template
 
 
-def test_the_date_is_that_of_the_data_and_never_the_present_one() -> None:
+def test_the_date_is_that_of_the_data_and_never_the_present_one():
     when = datetime(2026, 11, 20, 10, 15, 0, tzinfo=UTC)
     assert b"D:20261120101500" in as_pdf(Document("t", "", (), date=when))
     assert b"CreationDate" not in as_pdf(Document("t", "", ()))
 
 
-def test_fonts_and_title_are_inside_and_the_file_is_tagged() -> None:
+def test_fonts_and_title_are_inside_and_the_file_is_tagged():
     pdf = as_pdf(of_all_blocks("ν and 中"))
     assert b"/MarkInfo" in pdf
     assert re.search(rb"/FontFile[23]", pdf)
@@ -86,14 +78,14 @@ def test_fonts_and_title_are_inside_and_the_file_is_tagged() -> None:
         assert name in pdf
 
 
-def test_a_long_table_repeats_its_head_and_a_page_knows_how_many_there_are() -> None:
+def test_a_long_table_repeats_its_head_and_a_page_knows_how_many_there_are():
     rows = [(f"run {k}", f"{k}") for k in range(300)]
     long = Tabular("long", table("Many", ("run", "n"), rows, numbers=["n"]))
     assert pages_of(Document("t", "", (Section("Many", (long,)),))) >= 5
     assert pages_of(Document("t", "", (Paragraph("short"),))) == 1
 
 
-def test_a_heading_and_what_introduces_its_table_stand_on_the_page_of_the_table() -> None:
+def test_a_heading_and_what_introduces_its_table_stand_on_the_page_of_the_table():
     rows = [(f"run {k}", f"{k}") for k in range(10)]
     below = Section("Below", (Paragraph("It says what follows."), Tabular("t", table("Ten", ("run", "n"), rows))))
     seen = set()
@@ -106,20 +98,18 @@ def test_a_heading_and_what_introduces_its_table_stand_on_the_page_of_the_table(
 
 
 @pytest.mark.parametrize("heights", [(4.6,), (3.4,), (4.6, 3.4), (4.6, 4.6, 3.3)])
-def test_a_tall_figure_stands_between_the_heading_of_its_chapter_and_the_next_one(
-    monkeypatch: pytest.MonkeyPatch, heights: tuple[float, ...]
-) -> None:
+def test_a_tall_figure_stands_between_the_heading_of_its_chapter_and_the_next_one(monkeypatch, heights):
     monkeypatch.setattr("levilab.present.style.as_pdf", cache(as_pdf_page))  # few figures, again and again
 
     @cache
-    def of(height: float) -> Figure:
+    def of(height):
         figure = drawn()
         figure.set_size_inches(7, height)
         return figure
 
     pictures = [Picture(f"p{k}", "", "c", "a", partial(of, height)) for k, height in enumerate(heights)]
 
-    def chapter(name: str, lines: int) -> Section:
+    def chapter(name, lines):
         return Section(name, (Paragraph("x"), *pictures, *(Paragraph("x"),) * lines))
 
     pages = set()
@@ -135,7 +125,7 @@ def test_a_tall_figure_stands_between_the_heading_of_its_chapter_and_the_next_on
     assert pages >= {0, 1}
 
 
-def test_a_column_of_long_sentences_is_wider_than_one_of_short_words() -> None:
+def test_a_column_of_long_sentences_is_wider_than_one_of_short_words():
     reason = "There is no single limit: every top is up to this spin, and the last one is far above it. " * 4
     rows = [("one mass", "25.285 g, in steps of 0.005 g, which floats", "found here")]
     rows += [(f"top {k}: upper limit, all tops up to", "70.46 Hz", reason) for k in range(6)]
@@ -145,7 +135,7 @@ def test_a_column_of_long_sentences_is_wider_than_one_of_short_words() -> None:
     assert y < 500, "the long column has most of the width"
 
 
-def test_a_first_page_of_several_chapters_says_what_each_found() -> None:
+def test_a_first_page_of_several_chapters_says_what_each_found():
     chapters = tuple(
         Section(name, (Warnings((("mind",),)), Section("Result", (Verdict(f"{name} holds"),))), new_page=new)
         for name, new in (("one", False), ("two", True))  # the first one of a report follows its title where it can
@@ -161,13 +151,13 @@ def test_a_first_page_of_several_chapters_says_what_each_found() -> None:
     assert pages_of(Document("t", "", (*chapters, last))) == 4
 
 
-def test_what_is_synthetic_is_marked_on_every_page() -> None:
+def test_what_is_synthetic_is_marked_on_every_page():
     assert data_of(Document("t", "", (), Banner("SYNTHETIC.", "of a model")))["mark"] == "SYNTHETIC"
     assert data_of(Document("t", "", ()))["mark"] == ""
 
 
-def test_a_figure_that_stands_alone_below_its_heading_stays_there() -> None:
-    def tall() -> Figure:
+def test_a_figure_that_stands_alone_below_its_heading_stays_there():
+    def tall():
         figure = drawn()
         figure.set_size_inches(7, 12)
         return figure
@@ -180,7 +170,7 @@ def test_a_figure_that_stands_alone_below_its_heading_stays_there() -> None:
     assert first["blocks"][0]["width"] < 100, "it fits on a page with its caption"
 
 
-def test_without_the_extra_the_message_says_how_to_install_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_extra_the_message_says_how_to_install_it(tmp_path, monkeypatch):
     monkeypatch.setattr("levilab.report.pdf.renderer.find_spec", lambda _: None)
     with pytest.raises(NoTypst, match=r'pip install "\.\[pdf\]"'):
         write_report([tmp_path / "nothing is read before"], tmp_path / "x.pdf")
@@ -190,7 +180,7 @@ def test_without_the_extra_the_message_says_how_to_install_it(tmp_path: Path, mo
     assert not (tmp_path / "x.pdf").exists()
 
 
-def test_another_ending_is_wrong_usage_and_says_which_two_work(tmp_path: Path) -> None:
+def test_another_ending_is_wrong_usage_and_says_which_two_work(tmp_path):
     ended = command("report", ROOT / "sample_data/spin-down-1", "-o", "x.docx", cwd=tmp_path)
     assert ended.status == 2
     assert ".html or .pdf" in ended.err

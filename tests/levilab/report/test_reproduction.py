@@ -1,13 +1,10 @@
 """How to reproduce a report: commands as one types them, hashes, seeds."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import read_options
@@ -16,28 +13,28 @@ from levilab.report.reproduction import Asked, paths_in_commands, reproduction
 from support.paths import SAMPLE_DATA
 
 
-def test_columns_that_are_not_named_are_not_given() -> None:
+def test_columns_that_are_not_named_are_not_given():
     # or the names that an earlier result has would be replaced by none, and stand in the page as an option
     assert read_options({"columns": ""}) == {}
     assert read_options({"columns": "t=1,f=2"}) == {"columns": {"t": "1", "f": "2"}}
 
 
-def test_the_command_of_a_report_has_the_paths_the_options_and_the_format_that_were_asked_for() -> None:
+def test_the_command_of_a_report_has_the_paths_the_options_and_the_format_that_were_asked_for():
     given = {"columns": {"t": "1", "f": "spin, Hz"}, "rate": None, "uncertainty": "covariance", "keep_outliers": True}
     asked = Asked((Path("runs"), Path("a b.csv")), ".pdf", given, crosscheck=False)
     words = "runs 'a b.csv' --columns 't=1,f=spin, Hz' --keep-outliers --no-crosscheck -o report.pdf"
     assert asked.command([]) == f"levilab report {words}"
 
 
-def test_of_many_inputs_the_paths_are_named_that_were_typed() -> None:
+def test_of_many_inputs_the_paths_are_named_that_were_typed():
     # their folders would be "many" and ".", which holds more
-    sources: Any = [SimpleNamespace(path=Path("many") / f"{k}.csv") for k in range(14)]
+    sources = [SimpleNamespace(path=Path("many") / f"{k}.csv") for k in range(14)]
     sources.append(SimpleNamespace(path=Path("r.csv")))
     assert paths_in_commands(sources, [Path("many"), Path("r.csv"), Path("traces")]) == ["many", "r.csv"]
     assert paths_in_commands(sources[:14]) == ["many"]
 
 
-def test_options_that_no_command_can_hold_are_named_as_they_are_typed() -> None:
+def test_options_that_no_command_can_hold_are_named_as_they_are_typed():
     field = ANALYSES["field"]
     given = read_options({"device": SAMPLE_DATA / "device.toml", "height": 75.8, "free_radii": True}, typed=True)
     found = field.analyze([SAMPLE_DATA / "field-scan"], field.options_from(given))
@@ -49,7 +46,7 @@ def test_options_that_no_command_can_hold_are_named_as_they_are_typed() -> None:
     assert "field-scan --free-radii\n" in code.text
 
 
-def test_commands_hashes_seeds_and_what_recorded_it_are_there(tmp_path: Path) -> None:
+def test_commands_hashes_seeds_and_what_recorded_it_are_there(tmp_path):
     run = shutil.copytree(SAMPLE_DATA / "lower-limits", tmp_path / "a run")
     record = json.loads((run / "run.json").read_text(encoding="utf-8"))
     record |= {"seed": 7, "command_line": ["/usr/bin/levilab", "acquire", "limit", "--note", "it's"], "software": {}}
@@ -71,7 +68,7 @@ def test_commands_hashes_seeds_and_what_recorded_it_are_there(tmp_path: Path) ->
     assert facts.facts[0].texts == ("""levilab acquire limit --note 'it'"'"'s'""",)
 
 
-def test_what_recorded_all_runs_alike_is_said_once(tmp_path: Path) -> None:
+def test_what_recorded_all_runs_alike_is_said_once(tmp_path):
     for k in range(3):
         run = shutil.copytree(SAMPLE_DATA / "lower-limits", tmp_path / f"run-{k}")
         with (run / "readings.csv").open("a", encoding="utf-8") as file:
@@ -81,7 +78,7 @@ def test_what_recorded_all_runs_alike_is_said_once(tmp_path: Path) -> None:
         (run / "run.json").write_text(json.dumps(record), encoding="utf-8")
     limit = ANALYSES["limit"]
 
-    def recorded(*runs: Path) -> list[tuple[str, tuple[str, ...]]]:
+    def recorded(*runs):
         found = limit.analyze(list(runs), limit.options_from({}))
         (section,) = (
             one for one in reproduction([(limit, found)]).blocks if getattr(one, "title", "") == "Recorded by"

@@ -1,7 +1,5 @@
 """The same input gives the same bytes, in another process, with other hashes, in another zone, at another time."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -15,13 +13,13 @@ from support.paths import ROOT, SAMPLE_DATA
 from support.waiting import HANG_GUARD_S
 
 
-def write_into(folder: Path) -> None:
+def write_into(folder):
     """Write the page of a run, and a document with all kinds of blocks as PDF."""
     assert command("report", SAMPLE_DATA / "upper-limits", "-o", folder / "page.html", cwd=folder).status == 0
     (folder / "all.pdf").write_bytes(as_pdf(of_all_blocks("ν = 3.2(1)×10⁻³ s⁻¹")))
 
 
-def test_two_processes_write_the_same_page_and_the_same_pdf(tmp_path: Path) -> None:
+def test_two_processes_write_the_same_page_and_the_same_pdf(tmp_path):
     here, there = tmp_path / "here", tmp_path / "there"
     for folder in (here, there):
         folder.mkdir()

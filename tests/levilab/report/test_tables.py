@@ -1,12 +1,9 @@
 """Tables beside a report: all digits for programs, LaTeX that compiles, nothing that a spreadsheet would execute."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
 import re
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -20,12 +17,9 @@ from levilab.report.tables.latex import as_latex, to_latex, units_in_heads
 from levilab.report.tables.values import Values, as_csv, of_analysis
 from support.paths import SAMPLE_DATA
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 
 @pytest.fixture(scope="module")
-def values() -> dict[str, list[dict[str, str]]]:
+def values():
     """Name → rows of the tables of two spin-downs, and the result that they are of as `result`."""
     analysis = ANALYSES["spindown"]
     options = analysis.options_from({"tilt": "none"})
@@ -36,7 +30,7 @@ def values() -> dict[str, list[dict[str, str]]]:
     return tables | {"result": [{"json": json.dumps(analysis.document(found, SAMPLE_DATA))}]}
 
 
-def test_each_run_has_a_row_with_units_in_the_names_and_all_digits(values: dict[str, list[dict[str, str]]]) -> None:
+def test_each_run_has_a_row_with_units_in_the_names_and_all_digits(values):
     result = json.loads(values["result"][0]["json"])
     first, second = values["spindown-inputs"]
     disc = next(model for model in result["runs"][0]["models"] if model["name"] == "disc")["parameters"]["c32"]
@@ -46,7 +40,7 @@ def test_each_run_has_a_row_with_units_in_the_names_and_all_digits(values: dict[
     assert first["synthetic"] == "true"
 
 
-def test_each_quantity_has_a_row_with_u_and_unit(values: dict[str, list[dict[str, str]]]) -> None:
+def test_each_quantity_has_a_row_with_u_and_unit(values):
     result = json.loads(values["result"][0]["json"])
     rows = {(row["input"], row["model"], row["quantity"]): row for row in values["spindown-quantities"]}
     mean = rows["all together", "", "c32"]
@@ -58,7 +52,7 @@ def test_each_quantity_has_a_row_with_u_and_unit(values: dict[str, list[dict[str
 
 
 @pytest.mark.parametrize("text", ["=1+1", "+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", " =cmd|'/C calc'!A0"])
-def test_no_text_is_a_formula_to_a_spreadsheet(text: str) -> None:
+def test_no_text_is_a_formula_to_a_spreadsheet(text):
     ((head,), (cell,)) = csv.reader(io.StringIO(as_csv(Values("x", "", (text,), ((text,),)))))
     assert head.startswith("'")
     assert cell.startswith("'")
@@ -76,7 +70,7 @@ KNOWN = {
 }  # fmt: skip
 
 
-def test_what_a_person_typed_is_no_command_of_latex() -> None:
+def test_what_a_person_typed_is_no_command_of_latex():
     shown = table(HOSTILE, (HOSTILE, "[n]"), [("*", "[1pt]"), (HOSTILE, "10⁻³ (rad/s)^−½")], numbers=["[n]"])
     text = as_latex("hostile", shown, note=HOSTILE, mark="SYNTHETIC.")
     assert text.isascii()
@@ -96,12 +90,12 @@ def test_what_a_person_typed_is_no_command_of_latex() -> None:
     assert all(not re.match(r"\s*[\[*]", row) for row in rows)
 
 
-def test_numbers_are_typeset_as_in_the_report() -> None:
+def test_numbers_are_typeset_as_in_the_report():
     assert to_latex("2.34(3)×10⁻⁴") == r"2.34(3)$\times$10\textsuperscript{$-$4}"
     assert to_latex("φ̇ and χ²") == r"$\dot\varphi$ and $\chi$\textsuperscript{2}"
 
 
-def test_a_unit_stands_in_the_head_and_long_texts_are_paragraphs() -> None:
+def test_a_unit_stands_in_the_head_and_long_texts_are_paragraphs():
     heads = ("source", "where it comes from", "type", "adds to u", "share of u²")
     remark = "the standard deviation of one top from another, of eight tops and two runs"
     rows = [
@@ -117,13 +111,13 @@ def test_a_unit_stands_in_the_head_and_long_texts_are_paragraphs() -> None:
     assert text.count("{") == text.count("}"), "the box that scales a wide table is closed"
 
 
-def test_of_trials_each_cell_keeps_what_chance_leaves_to_it() -> None:
+def test_of_trials_each_cell_keeps_what_chance_leaves_to_it():
     rows = [("strength", "125", "+0.26 ± 0.09", "71 ± 4 %"), ("origin", "125", "−0.08 ± 0.09", "74 ± 4 %")]
     shown = table("", ("quantity", "pulls", "mean", "within"), rows, numbers=("pulls", "mean", "within"))
     assert units_in_heads(shown) == shown
 
 
-def test_only_units_go_to_the_head() -> None:
+def test_only_units_go_to_the_head():
     for behind in ("Hz (u not known)", "s ago", "tops", "of 120", "per"):
         shown = table("", ("x",), [(f"1.2 {behind}",), (f"3 {behind}",)], numbers=["x"])
         assert units_in_heads(shown) == shown
@@ -133,14 +127,14 @@ def test_only_units_go_to_the_head() -> None:
         assert found.heads == (f"x\n[{unit}]",)
 
 
-def document(*names: str) -> Document:
+def document(*names):
     shown = table("Laws", ("law", "c₁"), [("disc", "1"), Row(("mean", "2"), "together")], numbers=["c₁"])
     tables = tuple(Tabular(name, shown, mark="SYNTHETIC." if name == "quality" else None) for name in names)
     inner = Section("Simulated", (Banner("SYNTHETIC.", ""), Details("more", (Tabular("lines", shown),))))
     return Document("t", "", (Section("Result", tables), inner))
 
 
-def test_all_tables_are_listed_and_those_of_an_earlier_report_go(tmp_path: Path) -> None:
+def test_all_tables_are_listed_and_those_of_an_earlier_report_go(tmp_path):
     folder = folder_of(tmp_path / "report.pdf")
     write_tables(document("laws", "laws", "quality"), [Values("v", "values", ("a",), ((1.0,),))], folder)
     assert {file.name for file in folder.iterdir()} == {
@@ -158,7 +152,7 @@ def test_all_tables_are_listed_and_those_of_an_earlier_report_go(tmp_path: Path)
     assert {file.name: file.read_bytes() for file in files} == before
 
 
-def test_the_list_of_an_earlier_report_takes_nothing_else_away(tmp_path: Path) -> None:
+def test_the_list_of_an_earlier_report_takes_nothing_else_away(tmp_path):
     folder = tmp_path / "x.tables"
     folder.mkdir()
     (tmp_path / "precious.csv").write_text("1\n", encoding="utf-8")
@@ -167,7 +161,7 @@ def test_the_list_of_an_earlier_report_takes_nothing_else_away(tmp_path: Path) -
     assert (tmp_path / "precious.csv").exists()
 
 
-def test_a_folder_that_cannot_be_written_is_reported_in_one_line(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_reported_in_one_line(tmp_path):
     (tmp_path / "x.tables").write_text("a file\n", encoding="utf-8")
     with pytest.raises(LevilabError, match="the tables could not be written"):
         write_tables(document("laws"), [], tmp_path / "x.tables")

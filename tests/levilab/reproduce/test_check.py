@@ -1,23 +1,11 @@
 """A published value beside ours: verdicts, and that a wrong number, ours or theirs, is noticed."""
 
-from __future__ import annotations
-
 import json
 import math
 
 import pytest
 
-from levilab.reproduce.check import (
-    Among,
-    Because,
-    Comparison,
-    Finding,
-    Verdict,
-    Within,
-    as_document,
-    erratum,
-    statement,
-)
+from levilab.reproduce.check import Among, Because, Comparison, Verdict, Within, as_document, erratum, statement
 from levilab.reproduce.check import check as checked
 from levilab.simulator.published.printed import Printed, published, several
 from support.paths import ROOT
@@ -26,7 +14,7 @@ PUBLISHED = ROOT / "levilab/simulator/published"
 MEAN = Printed("21.86", "Hz", "ten", "a thesis")
 
 
-def check(value: float | None, way=None, u: float | None = None) -> Finding:
+def check(value, way=None, u=None):
     given = () if way is None else (way,)
     return checked("mean", MEAN, value, *given, u=u)
 
@@ -71,7 +59,7 @@ def test_a_difference_needs_a_reason_that_gives_the_published_value():
     assert check(21.86, Because("no reason is needed", explained=False)).why == ""
 
 
-def slip(truth: float, by_printed: float | None, by_corrected: float) -> Finding:
+def slip(truth, by_printed, by_corrected):
     numbers = {"truth": truth, "by_printed": by_printed, "by_corrected": by_corrected}
     return erratum("(1)", "lacks ½", "with ½", "energy", tolerance=1e-6, **numbers)
 

@@ -1,7 +1,5 @@
 """The command: chapters by name, table, JSON, report, exit status."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -16,7 +14,7 @@ from support.commands import command
 from support.paths import ROOT
 
 
-def chapter(name: str, *, holds: bool) -> run.Chapter:
+def chapter(name, *, holds):
     found = Found((statement("<b>one</b>", "there", "it is", "we see", holds=holds),), (), "Said.", "made up")
     return run.Chapter(name, f"The {name}", lambda: found)
 

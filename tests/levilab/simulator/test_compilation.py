@@ -1,7 +1,5 @@
 """What is said of the compiler, by the events that numba sends."""
 
-from __future__ import annotations
-
 import re
 from contextlib import suppress
 
@@ -13,8 +11,8 @@ from levilab.simulator.kernels.splitting import advance
 
 
 @pytest.mark.parametrize("failure", [None, KeyboardInterrupt, ValueError])
-def test_only_a_kernel_that_is_compiled_is_said_to_be(failure: type[BaseException] | None) -> None:
-    said: list[str] = []
+def test_only_a_kernel_that_is_compiled_is_said_to_be(failure):
+    said = []
     with (
         suppress(KeyboardInterrupt, ValueError),
         announce_compilation(said.append),

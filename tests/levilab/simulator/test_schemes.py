@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from levilab.simulator.scene import Scene
-from levilab.simulator.schemes import SCHEMES, Scheme
+from levilab.simulator.schemes import SCHEMES
 from levilab.simulator.single import simulate
 from order_conditions import residuals, trees
 from support.scenes import KINDS
@@ -22,7 +21,7 @@ RATES = {
 }
 
 
-def end(scene: Scene, scheme: str, rate: float) -> np.ndarray:
+def end(scene, scheme, rate):
     motion = simulate(scene, 0.6, rate=None, scheme=scheme, step=1 / rate)
     return np.concatenate([motion.position[-1] * 10, motion.axis[-1]])
 
@@ -41,7 +40,7 @@ def test_each_scheme_keeps_its_order_on_every_kind_of_scene(kind):
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
-def test_a_composition_is_symmetric_and_adds_up_to_one_step(scheme: Scheme):
+def test_a_composition_is_symmetric_and_adds_up_to_one_step(scheme):
     assert scheme.drifts == scheme.drifts[::-1]
     assert scheme.kicks == scheme.kicks[::-1]
     assert len(scheme.drifts) == scheme.stages + 1
@@ -56,7 +55,7 @@ def test_there_are_as_many_trees_of_an_order_as_the_literature_has():
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
-def test_a_composition_meets_all_conditions_of_its_order_and_not_those_of_the_next(scheme: Scheme):
+def test_a_composition_meets_all_conditions_of_its_order_and_not_those_of_the_next(scheme):
     # Hairer, Nørsett, Wanner II.14: all trees of ÿ = f(y), so no term of the error is missed that one motion hides
     drifts, kicks = np.array(scheme.drifts), np.array(scheme.kicks)
     assert np.abs(residuals(drifts, kicks, scheme.order)).max() < 5e-15
@@ -64,9 +63,9 @@ def test_a_composition_meets_all_conditions_of_its_order_and_not_those_of_the_ne
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
-def test_the_order_on_the_harmonic_oscillator_whose_step_is_a_matrix(scheme: Scheme):
+def test_the_order_on_the_harmonic_oscillator_whose_step_is_a_matrix(scheme):
     # independent of our kernels: drift and kick of ẍ = −x are shears, and a step should be a rotation
-    def error(h: float) -> float:
+    def error(h):
         step = np.eye(2)
         for a, b in zip(scheme.drifts, (*scheme.kicks, 0.0), strict=True):
             step = np.array([[1, 0], [-b * h, 1]]) @ np.array([[1, a * h], [0, 1]]) @ step

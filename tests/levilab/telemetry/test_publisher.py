@@ -148,7 +148,7 @@ def test_windows_says_that_a_far_end_is_gone_and_the_rest_is_read(bench, wall):
                 return said, (LOOPBACK, 9)
             raise said
 
-    bench._read_wishes(Resetting(), wall.time)  # type: ignore[arg-type]
+    bench._read_wishes(Resetting(), wall.time)
     assert bench.is_watched
 
 
@@ -159,7 +159,7 @@ def test_windows_says_that_a_far_end_is_gone_and_the_rest_is_read(bench, wall):
 def test_parts_are_joined_in_any_order(message, number, random):
     parts = list(split(message, number, TOKEN))
     assert all(len(part) <= 9000 for part in parts)
-    random.shuffle(parts)  # type: ignore[attr-defined]
+    random.shuffle(parts)
     joiner = Joiner(TOKEN)
     joined = [joiner.join(part) for part in parts]
     assert joined[-1] == message

@@ -1,7 +1,5 @@
 """Where a top is and how it is turned, against the simulator's trajectory and another library's rotations."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -22,13 +20,13 @@ from levilab.world.spin_world import SpinScene, SpinWorld
 SINGLE = 2e-6
 
 
-def axes(quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def axes(quaternion):
     turned = Rotation.from_quat(quaternion)
     return turned.apply([0.0, 0.0, 1.0]), turned.apply([1.0, 0.0, 0.0])
 
 
 @given(st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(lambda q: sum(x * x for x in q) > 0.01))
-def test_a_quaternion_turns_z_to_the_axis_and_x_to_the_arm(parts: list[float]) -> None:
+def test_a_quaternion_turns_z_to_the_axis_and_x_to_the_arm(parts):
     wanted = Rotation.from_quat(parts)
     found = quaternions(wanted.apply([[0.0, 0.0, 2.0]]), wanted.apply([[0.5, 0.0, 0.0]]))
     assert np.linalg.norm(found) == pytest.approx(1.0)
@@ -36,11 +34,11 @@ def test_a_quaternion_turns_z_to_the_axis_and_x_to_the_arm(parts: list[float]) -
 
 
 @pytest.fixture(scope="module")
-def world() -> MotionWorld:
+def world():
     return MotionWorld(preset("practice"), VirtualClock())
 
 
-def test_the_poses_of_a_top_in_motion_are_the_trajectory(world: MotionWorld) -> None:
+def test_the_poses_of_a_top_in_motion_are_the_trajectory(world):
     motion = simulate(preset("practice"), 2.0, tolerance=1e-7, rate=400.0)
     poses = world.poses(0.0, 1 / 400, 801)
     axis, arm = axes(poses.quaternion)
@@ -50,7 +48,7 @@ def test_the_poses_of_a_top_in_motion_are_the_trajectory(world: MotionWorld) -> 
     np.testing.assert_allclose(arm, motion.states[:, ARM], atol=1e-4)  # two errors of 1e-7 a second, of a fast turn
 
 
-def test_the_mark_points_where_the_light_sees_the_tape(world: MotionWorld) -> None:
+def test_the_mark_points_where_the_light_sees_the_tape(world):
     times = np.arange(0.1, 1.9, 1e-3)
     poses = world.poses(0.1, 1e-3, times.size)
     _, arm = axes(poses.quaternion)
@@ -61,7 +59,7 @@ def test_the_mark_points_where_the_light_sees_the_tape(world: MotionWorld) -> No
     assert np.abs((seen - turns + 0.5) % 1.0 - 0.5).max() < 1e-3
 
 
-def test_looking_changes_nothing_of_the_motion() -> None:
+def test_looking_changes_nothing_of_the_motion():
     worlds = [MotionWorld(preset("practice"), VirtualClock()) for _ in range(2)]
     for k, at in enumerate((0.0, 0.35, 0.7, 1.6)):
         for number, world in enumerate(worlds):
@@ -72,7 +70,7 @@ def test_looking_changes_nothing_of_the_motion() -> None:
     assert np.array_equal(*(world.light(0.0, 1e-4, 25_000) for world in worlds))
 
 
-def test_where_the_drive_changes_the_poses_go_on_from_there() -> None:
+def test_where_the_drive_changes_the_poses_go_on_from_there():
     world = MotionWorld(preset("practice"), VirtualClock())
     world.poses(0.0, 0.0025, 400)
     world.drive(0.5, Output("SIN", 30.0, 4e-4, 0.0))
@@ -82,7 +80,7 @@ def test_where_the_drive_changes_the_poses_go_on_from_there() -> None:
     )
 
 
-def test_a_top_that_fell_is_not_up_until_it_is_put_back() -> None:
+def test_a_top_that_fell_is_not_up_until_it_is_put_back():
     # falls after 0.2 s
     world = MotionWorld(preset("practice").changed({"start.spin_hz": 15.0}), VirtualClock(), put_back_after_s=1.0)
     poses = world.poses(0.0, 0.01, 200)
@@ -105,7 +103,7 @@ def test_a_top_that_fell_is_not_up_until_it_is_put_back() -> None:
     assert not steps[-200:].any()  # it lies
 
 
-def test_a_top_that_only_spins_stands_upright_and_turns_by_its_phase() -> None:
+def test_a_top_that_only_spins_stands_upright_and_turns_by_its_phase():
     world = SpinWorld(SpinScene(fall_hz=29.9), VirtualClock())
     poses = world.poses(0.0, 0.001, 500)
     axis, arm = axes(poses.quaternion)

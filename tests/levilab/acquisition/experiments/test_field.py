@@ -177,7 +177,7 @@ def test_a_magnetometer_that_is_reset_on_the_way_is_set_up_anew(tmp_path):
 )
 def test_heights_that_make_no_scan_are_refused(settings, says):
     with pytest.raises(ValidationError) as caught:
-        FieldSettings(**settings)  # type: ignore[arg-type]
+        FieldSettings(**settings)
     assert says in str(caught.value)
 
 
@@ -190,7 +190,7 @@ def test_heights_that_make_no_scan_are_refused(settings, says):
 )
 def test_bases_and_heights_that_cannot_be_are_refused(settings, says):
     with pytest.raises(ConfigError, match=says):
-        FieldSettings(**settings).check("field", Limits())  # type: ignore[arg-type]
+        FieldSettings(**settings).check("field", Limits())
 
 
 def test_readings_that_all_show_the_same_are_uncertain_by_their_last_digit():

@@ -1,11 +1,8 @@
 """The cross-check with a result's own parameters: right for right analyses, the same each time, kept beside the run."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -21,9 +18,6 @@ from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
 from support.paths import ROOT
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 CHEAP = (
     ("precession", "precession-sweep"),
     ("limit", "upper-limits"),
@@ -32,13 +26,13 @@ CHEAP = (
 )
 
 
-def result(name: str, *paths: Path) -> Any:
+def result(name, *paths):
     row = ANALYSES[name]
     return row.analyze(list(paths), row.options_from({}))
 
 
 @pytest.mark.parametrize(("name", "sample"), CHEAP)
-def test_estimates_and_uncertainties_are_right_for_the_samples(sample_data: Path, name: str, sample: str):
+def test_estimates_and_uncertainties_are_right_for_the_samples(sample_data, name, sample):
     found = study_result(name, result(name, sample_data / sample), {}, 150)
     assert found.holds, as_text(found)
     assert {one.n for one in found.spreads} == {150}
@@ -46,11 +40,11 @@ def test_estimates_and_uncertainties_are_right_for_the_samples(sample_data: Path
 
 
 @pytest.fixture(scope="module")
-def runs() -> Any:
+def runs():
     return result("spindown", ROOT / "sample_data/spin-down-1", ROOT / "sample_data/spin-down-2")
 
 
-def test_a_mean_of_several_runs_has_trials_that_differ_as_the_runs_do(runs: Any):
+def test_a_mean_of_several_runs_has_trials_that_differ_as_the_runs_do(runs):
     own = OWN["spindown"](runs)
     assert own.law == "disc"
     means = [own.trial(np.random.default_rng(k)) for k in range(6)]
@@ -66,19 +60,19 @@ def test_a_mean_of_several_runs_has_trials_that_differ_as_the_runs_do(runs: Any)
 @pytest.mark.parametrize(
     ("cost_s", "trials"), [(1e-4, TRIALS), (0.02, 100), (0.13, ENOUGH), (0.3, 13), (0.8, FEWEST), (0.9, 0)]
 )
-def test_a_report_makes_as_many_trials_as_it_has_time_for(cost_s: float, trials: int):
+def test_a_report_makes_as_many_trials_as_it_has_time_for(cost_s, trials):
     """Four runs of 20 readings cost 0.04 s, with the tilt 0.13 s."""
     assert trials_of_report(Own("", lambda _: Trial([]), cost_s)) == trials
 
 
-def test_the_cost_of_a_spin_down_grows_with_its_runs_and_its_tilt(runs: Any, monkeypatch: pytest.MonkeyPatch):
+def test_the_cost_of_a_spin_down_grows_with_its_runs_and_its_tilt(runs, monkeypatch):
     two = OWN["spindown"](runs)
     monkeypatch.setattr("analysis.spindown.lawfit.LawFit.has_tilt", True)
     tilted = OWN["spindown"](runs)
     assert FEWEST < trials_of_report(tilted) < trials_of_report(two) / 2
 
 
-def test_one_spin_down_and_one_scan_come_to_their_own_values(sample_data: Path):
+def test_one_spin_down_and_one_scan_come_to_their_own_values(sample_data):
     spin_down = study_result("spindown", result("spindown", sample_data / "spin-down-3"), {}, 6)
     assert [one.quantity for one in spin_down.spreads] == ["c32", "start_frequency", "exponent"]
     assert spin_down.laws.get("disc", 0) >= 3
@@ -88,13 +82,13 @@ def test_one_spin_down_and_one_scan_come_to_their_own_values(sample_data: Path):
     assert max(abs(value) for one in [*spin_down.spreads, *scan.spreads] for value in one.pulls) < 5
 
 
-def test_the_same_readings_have_the_same_trials_and_others_have_others(sample_data: Path):
+def test_the_same_readings_have_the_same_trials_and_others_have_others(sample_data):
     found = result("limit", sample_data / "lower-limits")
     assert study_result("limit", found, {}, 20) == study_result("limit", found, {}, 20)
     assert seed_of("limit", ["a"]) != seed_of("limit", ["b"])
 
 
-def spread(mean: float, deviation: float, n: int = 400) -> Spread:
+def spread(mean, deviation, n=400):
     z = np.random.default_rng(5).standard_normal(n)
     return Spread("x", tuple(mean + deviation * (z - z.mean()) / z.std(ddof=1)), 0.1)
 
@@ -107,7 +101,7 @@ def test_a_bias_and_a_u_that_is_too_small_are_noticed_and_a_u_too_large_is_named
 
 
 @pytest.mark.parametrize("freedom", [None, 12])
-def test_chance_condemns_one_right_quantity_of_a_hundred(freedom: int | None):
+def test_chance_condemns_one_right_quantity_of_a_hundred(freedom):
     random = np.random.default_rng(8)
     draws = random.standard_normal((2000, 60)) if freedom is None else random.standard_t(freedom, (2000, 60))
     verdicts = [Spread("x", tuple(pulls), freedom=freedom).verdict for pulls in draws.tolist()]
@@ -125,7 +119,7 @@ def test_pulls_of_few_pulses_are_compared_with_students_law():
     assert replace(pulls, pulls=tuple(1.1 * t)).verdict is Verdict.WRONG
 
 
-def test_a_record_of_few_pulses_says_by_how_much_pulls_scatter(sample_data: Path):
+def test_a_record_of_few_pulses_says_by_how_much_pulls_scatter(sample_data):
     checked = study_result("spin", result("spin", sample_data / "trace-laser"), {}, 150)
     # 19 pulses, four coefficients; the noise counts for nothing
     assert [one.widened for one in checked.spreads] == pytest.approx([15, 15], abs=0.3)
@@ -135,7 +129,7 @@ def test_a_record_of_few_pulses_says_by_how_much_pulls_scatter(sample_data: Path
     assert {round(one.deviation, 1) for one in checked.spreads} <= {0.9, 1.0, 1.1}
 
 
-def test_the_table_says_what_is_wanted_of_each_row(runs: Any):
+def test_the_table_says_what_is_wanted_of_each_row(runs):
     found = study_result("spindown", runs, {}, 6)
     assert [one.freedom for one in found.spreads] == [
         None,
@@ -157,8 +151,8 @@ def test_the_table_says_what_is_wanted_of_each_row(runs: Any):
     assert "not judged" not in as_text(many)
 
 
-def test_a_wrong_analysis_is_named(monkeypatch: pytest.MonkeyPatch, sample_data: Path):
-    def off(random: np.random.Generator) -> Trial:
+def test_a_wrong_analysis_is_named(monkeypatch, sample_data):
+    def off(random):
         trial = real.trial(random)
         return Trial([replace(one, u=one.u / 2) for one in trial.pulls])
 
@@ -171,7 +165,7 @@ def test_a_wrong_analysis_is_named(monkeypatch: pytest.MonkeyPatch, sample_data:
     assert crosscheck_table([checked]).rows[0].cells[-1] == "NO"
 
 
-def test_trials_are_kept_beside_the_run_and_read_for_just_this_result(sample_data: Path, tmp_path: Path):
+def test_trials_are_kept_beside_the_run_and_read_for_just_this_result(sample_data, tmp_path):
     shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
     row, found = ANALYSES["limit"], result("limit", tmp_path / "run")
     settings = row.settings_of(found)

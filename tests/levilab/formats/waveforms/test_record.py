@@ -459,7 +459,7 @@ class FakeRecord:
 
 def test_binary_files_are_read_by_rigolwfm(write, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "RigolWFM", types.ModuleType("RigolWFM"))
-    monkeypatch.setitem(sys.modules, "RigolWFM.wfm", types.SimpleNamespace(Wfm=FakeRecord))  # type: ignore[arg-type]
+    monkeypatch.setitem(sys.modules, "RigolWFM.wfm", types.SimpleNamespace(Wfm=FakeRecord))
     record = waveform(write(b"\xa5\xa5\0\0", "a.wfm"))
     assert (record.start, record.step, record.count, len(record.signals)) == (-0.01, 1e-3, 20, 1)
     assert "volts of a DS1000Z are wrong" in record.warnings[0]

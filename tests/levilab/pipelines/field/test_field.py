@@ -1,11 +1,8 @@
 """The analysis of scans: results and their recall, users' files, bad input, and what the command prints."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -14,7 +11,7 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.device import Device, DeviceError, read_device
 from levilab.formats.table import parse_columns
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.field.analysis import METHOD, NEEDS, FieldAnalysis
+from levilab.pipelines.field.analysis import METHOD, NEEDS
 from levilab.pipelines.field.device import known_of
 from levilab.pipelines.field.document import DOCUMENT
 from levilab.pipelines.field.figure import field_figure
@@ -27,10 +24,6 @@ from levilab.pipelines.top import calculate_top
 from levilab.report.page import render
 from levilab.world.base import Base
 from support.figures import faults, without_drawing
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 #: A top alone: the base is taken from the run.
 TOP_OF_THESIS = Device.model_validate({"top": {"moment_a_m2": 0.714}})
@@ -45,21 +38,21 @@ FIELD_MT = np.array([1e3 * BASE.flux_density(z / 1e3) for z in HEIGHTS_MM])
 
 
 @pytest.fixture
-def scan(tmp_path: Path, sample_data: Path) -> Path:
+def scan(tmp_path, sample_data):
     return shutil.copytree(sample_data / "field-scan", tmp_path / "scan")
 
 
 @pytest.fixture
-def device(sample_data: Path) -> Path:
+def device(sample_data):
     return sample_data / "device.toml"
 
 
-def keep(found: FieldAnalysis) -> Path:
+def keep(found):
     """Write the result, but for the figure."""
     return save(DOCUMENT.of(found, found.place), found.place, b"")[0]
 
 
-def csv(path: Path, header: str, *columns: np.ndarray) -> Path:
+def csv(path, header, *columns):
     rows = [",".join(f"{value:.6g}" for value in row) for row in zip(*columns, strict=True)]
     path.write_text("\n".join([header, *rows, ""]), encoding="utf-8")
     return path
@@ -68,7 +61,7 @@ def csv(path: Path, header: str, *columns: np.ndarray) -> Path:
 # --- the sample scan ---
 
 
-def test_the_sample_scan_gives_its_truth_back(sample_data: Path, device: Path) -> None:
+def test_the_sample_scan_gives_its_truth_back(sample_data, device):
     """As make.py prints it; 3 u, where the seed was chosen before this was seen."""
     found = METHOD.analyze([sample_data / "field-scan"], FieldOptions(device=read_device(device)))
     for name, truth in (("strength", 1.409299e-3), ("origin", 0.811e-3), ("thickness", 14.79e-3)):
@@ -78,7 +71,7 @@ def test_the_sample_scan_gives_its_truth_back(sample_data: Path, device: Path) -
         assert abs(estimate.value - truth) < 3 * estimate.u, name
 
 
-def test_a_result_holds_what_was_found(scan: Path, device: Path) -> None:
+def test_a_result_holds_what_was_found(scan, device):
     options = FieldOptions(device=read_device(device), height_m=0.0735)
     found = METHOD.analyze([scan], options)
     document = json.loads(keep(found).read_text(encoding="utf-8"))
@@ -94,7 +87,7 @@ def test_a_result_holds_what_was_found(scan: Path, device: Path) -> None:
 
 
 @pytest.mark.parametrize("said", [-0.01, "much"])
-def test_a_gain_that_no_gauss_meter_has_is_taken_for_none(scan: Path, said: object) -> None:
+def test_a_gain_that_no_gauss_meter_has_is_taken_for_none(scan, said):
     record = json.loads((scan / "run.json").read_text(encoding="utf-8"))
     record["configuration"]["field"]["gain_u"] = said
     (scan / "run.json").write_text(json.dumps(record), encoding="utf-8")
@@ -103,7 +96,7 @@ def test_a_gain_that_no_gauss_meter_has_is_taken_for_none(scan: Path, said: obje
     assert known_of(source, None).gain_u == 0
 
 
-def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp_path: Path, scan: Path) -> None:
+def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp_path, scan):
     other = shutil.copytree(scan, tmp_path / "other")
     text = (other / "readings.csv").read_text(encoding="utf-8").replace(",0.035,", ",0.0352,")
     (other / "readings.csv").write_text(text, encoding="utf-8")
@@ -124,7 +117,7 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp
     assert len(field_part(found).inputs) == 2
 
 
-def test_the_windows_of_spin_are_drawn_from_the_lightest_top_to_the_heaviest(sample_data: Path) -> None:
+def test_the_windows_of_spin_are_drawn_from_the_lightest_top_to_the_heaviest(sample_data):
     found = METHOD.analyze([sample_data / "field-scan"], FieldOptions())
     slow, fast = field_figure(found).axes[3].get_lines()[:2]
     ends = [1e3 * (found.values[name].value or 0.0) for name in ("lightest_mass", "heaviest_mass")]
@@ -147,9 +140,7 @@ def test_the_windows_of_spin_are_drawn_from_the_lightest_top_to_the_heaviest(sam
         (("a,b2", "height_m=1,flux_density_t=2"), HEIGHTS_MM / 1e3, FIELD_MT / 1e3),
     ],
 )
-def test_files_of_users_are_read_in_their_units(
-    tmp_path: Path, titles: tuple[str, str], z: np.ndarray, b: np.ndarray
-) -> None:
+def test_files_of_users_are_read_in_their_units(tmp_path, titles, z, b):
     path = csv(tmp_path / "hall.csv", titles[0], z, b)
     options = FieldOptions(columns=parse_columns(titles[1]), device=CALLIPER)
     found = METHOD.analyze([path], options)
@@ -172,7 +163,7 @@ def test_files_of_users_are_read_in_their_units(
         (HEIGHTS_MM, FIELD_MT * 1e4, "a flux density of"),
     ],
 )
-def test_bad_scans_are_refused_in_one_line(tmp_path: Path, z: np.ndarray, b: np.ndarray, says: str) -> None:
+def test_bad_scans_are_refused_in_one_line(tmp_path, z, b, says):
     path = csv(tmp_path / "hall.csv", "z [mm],B [mT]", z, b)
     with pytest.raises(DataError) as caught:
         METHOD.analyze([path], FieldOptions(device=CALLIPER))
@@ -180,13 +171,13 @@ def test_bad_scans_are_refused_in_one_line(tmp_path: Path, z: np.ndarray, b: np.
     assert str(path) in str(caught.value)
 
 
-def test_a_file_without_its_base_says_what_is_missing(tmp_path: Path) -> None:
+def test_a_file_without_its_base_says_what_is_missing(tmp_path):
     path = csv(tmp_path / "hall.csv", "z [mm],B [mT]", HEIGHTS_MM, FIELD_MT)
     with pytest.raises(DataError, match=r"the radii of the base are not known.*`device`"):
         METHOD.analyze([path], FieldOptions())
 
 
-def test_a_file_of_something_else_does_not_suit(tmp_path: Path, sample_data: Path) -> None:
+def test_a_file_of_something_else_does_not_suit(tmp_path, sample_data):
     with pytest.raises(DoesNotSuit, match="needs a field run"):
         METHOD.analyze([sample_data / "spin-down-1"], FieldOptions())
     path = csv(tmp_path / "spin.csv", "t,f", HEIGHTS_MM, FIELD_MT)
@@ -194,7 +185,7 @@ def test_a_file_of_something_else_does_not_suit(tmp_path: Path, sample_data: Pat
         METHOD.analyze([path], FieldOptions())
 
 
-def test_a_moment_needs_the_mass(scan: Path) -> None:
+def test_a_moment_needs_the_mass(scan):
     with pytest.raises(DataError, match=r"`height_m` tells the moment of a top only if its mass is known"):
         METHOD.analyze([scan], FieldOptions(height_m=0.073))
 
@@ -214,7 +205,7 @@ def test_a_moment_needs_the_mass(scan: Path) -> None:
         ("[[top.parts]]\nname = 'a'\nmass_kg = -0.1\nouter_radius_m = 0.1", "top.parts.0.mass_kg"),
     ],
 )
-def test_a_device_file_that_is_wrong_is_named_with_its_key(tmp_path: Path, text: str, says: str) -> None:
+def test_a_device_file_that_is_wrong_is_named_with_its_key(tmp_path, text, says):
     path = tmp_path / "device.toml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(DeviceError) as caught:
@@ -222,7 +213,7 @@ def test_a_device_file_that_is_wrong_is_named_with_its_key(tmp_path: Path, text:
     assert says in str(caught.value)
 
 
-def test_a_hole_larger_than_its_part_is_named(tmp_path: Path) -> None:
+def test_a_hole_larger_than_its_part_is_named(tmp_path):
     path = tmp_path / "device.toml"
     path.write_text(
         "[[top.parts]]\nname = 'ring'\nmass_kg = 0.1\nouter_radius_m = 0.01\ninner_radius_m = 0.02", encoding="utf-8"
@@ -235,9 +226,7 @@ def test_a_hole_larger_than_its_part_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_the_commands_print_and_refuse_in_one_line(
-    levilab: Callable[..., object], tmp_path: Path, scan: Path, device: Path
-) -> None:
+def test_the_commands_print_and_refuse_in_one_line(levilab, tmp_path, scan, device):
     done = levilab("analyze", "field", scan, "--device", device, "--height", "73.5", "--no-save")
     for said in ("strength ρ", "moment of the top", "mass to set", "SYNTHETIC", "1 K warmer"):
         assert said in done.stdout

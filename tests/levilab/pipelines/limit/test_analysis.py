@@ -1,11 +1,8 @@
 """Limits from runs and files: the published statistics, theory beside them, result.json and back."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -21,7 +18,6 @@ from levilab.pipelines.limit.analysis import (
     THESIS_HIGHEST,
     THESIS_LOOSE,
     UPPER_EDGE,
-    LimitAnalysis,
     LimitOptions,
 )
 from levilab.pipelines.limit.report import limit_part
@@ -33,12 +29,8 @@ from levilab.report.page import write_report
 from levilab.report.tables.values import of_analysis
 from support.spin_downs import spin_down_csv
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
 
-
-def test_the_published_limits_give_the_published_statistics(sample_data: Path) -> None:
+def test_the_published_limits_give_the_published_statistics(sample_data):
     analysis = METHOD.analyze([sample_data / "lower-limits"], LimitOptions())
     values = ANALYSES["limit"].document(analysis, sample_data)["values"]
     assert round(values["mean"]["value"], 2) == 21.86
@@ -47,7 +39,7 @@ def test_the_published_limits_give_the_published_statistics(sample_data: Path) -
     assert analysis.all_warnings == []
 
 
-def test_theory_beside_them_is_that_of_the_thesis_top(sample_data: Path, tmp_path: Path) -> None:
+def test_theory_beside_them_is_that_of_the_thesis_top(sample_data, tmp_path):
     """PHYSICS: window 21.65 to 80.6 Hz at z = 7.30 cm, computed there from the quartic; resonance 22.1 Hz."""
     file = tmp_path / "upper.csv"  # with no scene of its own
     file.write_text("61.2\n60.9\n61.0\n", encoding="utf-8")
@@ -61,7 +53,7 @@ def test_theory_beside_them_is_that_of_the_thesis_top(sample_data: Path, tmp_pat
     assert "0.21 Hz above the lower edge of the linear window" in lower.text
 
 
-def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Path) -> None:
+def test_both_kinds_together_have_values_of_both(sample_data, tmp_path):
     analysis = ANALYSES["limit"].analyze([sample_data], LimitOptions())
     document = ANALYSES["limit"].document(analysis, tmp_path)
     assert {"lower_mean", "upper_1_mean", "upper_2_standard_error"} <= document["values"].keys()
@@ -85,18 +77,18 @@ def test_both_kinds_together_have_values_of_both(sample_data: Path, tmp_path: Pa
     }  # fmt: skip
 
 
-def change(run: Path, settings: Mapping[str, float] = MappingProxyType({}), **entries: object) -> None:
+def change(run, settings=MappingProxyType({}), **entries):
     """Change settings of the experiment and entries of run.json."""
     record = json.loads((run / "run.json").read_text(encoding="utf-8"))
     record["configuration"]["limit"] |= settings
     (run / "run.json").write_text(json.dumps(record | entries), encoding="utf-8")
 
 
-def marks_of_budgets(analysis: LimitAnalysis) -> list[str]:
+def marks_of_budgets(analysis):
     return [mark_of(analysis.inputs_of(budget.group)) for budget in analysis.budget]
 
 
-def test_groups_of_the_same_mean_are_told_apart(sample_data: Path, tmp_path: Path) -> None:
+def test_groups_of_the_same_mean_are_told_apart(sample_data, tmp_path):
     limits = ["67.5,0.25", "68.5,0.25", "68,0.25", "69,0.25"]
     for name, changes, rows in (("a", {}, limits), ("b", {"drive_amplitude_vpp": 20.0}, reversed(limits))):
         folder = shutil.copytree(sample_data / "upper-limits", tmp_path / name)
@@ -119,7 +111,7 @@ def test_groups_of_the_same_mean_are_told_apart(sample_data: Path, tmp_path: Pat
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_measured_and_made_up_runs_are_never_one_mean(sample_data: Path, tmp_path: Path) -> None:
+def test_measured_and_made_up_runs_are_never_one_mean(sample_data, tmp_path):
     """Three runs of one top, of which the second is made up and lies 10 Hz higher; the third is the first, reversed."""
     for name, synthetic in (("a", False), ("b", True), ("c", False)):
         folder = shutil.copytree(sample_data / "lower-limits", tmp_path / name)
@@ -152,9 +144,7 @@ def test_measured_and_made_up_runs_are_never_one_mean(sample_data: Path, tmp_pat
     ("name", "synthetic"),
     [("upper-limits", True), ("lower-limits", False), ("my.csv", None), ("my.csv and a run", None)],
 )
-def test_what_is_made_up_is_said_of_each_run_and_group(
-    sample_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, synthetic: bool | None
-) -> None:
+def test_what_is_made_up_is_said_of_each_run_and_group(sample_data, tmp_path, monkeypatch, name, synthetic):
     """A data file does not say it."""
     monkeypatch.chdir(tmp_path)  # where the result of several inputs goes
     paths = [tmp_path / "my.csv"] if "my.csv" in name else [shutil.copytree(sample_data / name, tmp_path / name)]
@@ -174,7 +164,7 @@ def test_what_is_made_up_is_said_of_each_run_and_group(
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Path) -> None:
+def test_what_was_written_is_what_a_report_shows(sample_data, tmp_path):
     folder = shutil.copytree(sample_data / "loose-washers", tmp_path / "run")
     analysis = METHOD.analyze([folder], LimitOptions())
     assert [file.name for file in save(ANALYSES["limit"], analysis)] == ["result.json", "limit.png"]
@@ -185,7 +175,7 @@ def test_what_was_written_is_what_a_report_shows(sample_data: Path, tmp_path: Pa
     assert other.origins[0].text.startswith("analyzed for this page")
 
 
-def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path: Path) -> None:
+def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path):
     file = tmp_path / "my.csv"
     file.write_text("top,f [Hz]\n1,80.1\n2,80.3\n3,79.9\n", encoding="utf-8")
     (group,) = METHOD.analyze([file], LimitOptions()).groups
@@ -202,7 +192,7 @@ def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path: Path) -> None:
     ],
     ids=["numbers", "a title", "another unit", "rpm"],
 )
-def test_a_column_of_limits_alone_is_enough(tmp_path: Path, text: str, request: pytest.FixtureRequest) -> None:
+def test_a_column_of_limits_alone_is_enough(tmp_path, text, request):
     file = tmp_path / "my.csv"
     file.write_text(("rpm\n" if request.node.callspec.id == "rpm" else "") + text, encoding="utf-8")
     (group,) = METHOD.analyze([file], LimitOptions()).groups
@@ -211,16 +201,16 @@ def test_a_column_of_limits_alone_is_enough(tmp_path: Path, text: str, request: 
 
 
 @pytest.mark.parametrize("text", ["time [s]\n21.7\n21.4\n", "21.7\nhigh\n21.9\n", "height [mm]\n21.7\n"])
-def test_another_column_is_no_limit(tmp_path: Path, text: str) -> None:
+def test_another_column_is_no_limit(tmp_path, text):
     file = tmp_path / "my.csv"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(TableError):
         METHOD.analyze([file], LimitOptions())
 
 
-def test_runs_of_other_conditions_stand_apart(sample_data: Path, tmp_path: Path) -> None:
+def test_runs_of_other_conditions_stand_apart(sample_data, tmp_path):
     """The same drive twice is one group, with the scatter between the runs; a stronger one or another creep is not."""
-    changed: dict[str, dict[str, float]] = {"strong": {"drive_amplitude_vpp": 20.0}, "slow": {"creep_hz_per_s": 0.05}}
+    changed = {"strong": {"drive_amplitude_vpp": 20.0}, "slow": {"creep_hz_per_s": 0.05}}
     names = {"one": {}, "two": {}} | changed
     for k, (name, changes) in enumerate(names.items()):
         folder = shutil.copytree(sample_data / "upper-limits", tmp_path / name)
@@ -240,7 +230,7 @@ def test_runs_of_other_conditions_stand_apart(sample_data: Path, tmp_path: Path)
     assert {"upper_1_mean", "upper_2_mean", "upper_3_standard_error", "upper_1_between_runs"} <= values.keys()
 
 
-def test_a_repetition_far_off_is_numbered_among_all_and_the_page_shows_200(tmp_path: Path) -> None:
+def test_a_repetition_far_off_is_numbered_among_all_and_the_page_shows_200(tmp_path):
     """The 14th of 250 in all, the fourth of the second run."""
     for name, n in (("one", 10), ("two", 240)):
         limits = 21.9 + 0.1 * np.sin(1.0 + np.arange(n))
@@ -257,7 +247,7 @@ def test_a_repetition_far_off_is_numbered_among_all_and_the_page_shows_200(tmp_p
     assert two.note == "The first 200 of 240; all of them are in the data."
 
 
-def test_upper_limits_that_do_not_scatter_are_no_better_than_a_step(sample_data: Path, tmp_path: Path) -> None:
+def test_upper_limits_that_do_not_scatter_are_no_better_than_a_step(sample_data, tmp_path):
     folder = shutil.copytree(sample_data / "upper-limits", tmp_path / "run")
     header, *rows = (folder / "readings.csv").read_text(encoding="utf-8").splitlines()
     alike = [",".join([row.split(",")[0], *rows[0].split(",")[1:]]) for row in rows]
@@ -268,7 +258,7 @@ def test_upper_limits_that_do_not_scatter_are_no_better_than_a_step(sample_data:
     assert any("however often it is repeated: creep slower" in text for text in analysis.all_warnings)
 
 
-def test_a_mean_within_a_step_of_the_drive_is_not_called_better(sample_data: Path, tmp_path: Path) -> None:
+def test_a_mean_within_a_step_of_the_drive_is_not_called_better(sample_data, tmp_path):
     folder = shutil.copytree(sample_data / "upper-limits", tmp_path / "run")
     header, *rows = (folder / "readings.csv").read_text(encoding="utf-8").splitlines()
     at = header.split(",").index("spin_frequency_hz")
@@ -280,7 +270,7 @@ def test_a_mean_within_a_step_of_the_drive_is_not_called_better(sample_data: Pat
     assert "do not become less by more tops" in text
 
 
-def test_causes_of_losses_are_counted_over_runs_and_explained(sample_data: Path, tmp_path: Path) -> None:
+def test_causes_of_losses_are_counted_over_runs_and_explained(sample_data, tmp_path):
     folders = [shutil.copytree(sample_data / "upper-limits", tmp_path / name) for name in "ab"]
     for folder in folders:
         with (folder / "events.jsonl").open("a", encoding="utf-8") as file:
@@ -298,7 +288,7 @@ def test_causes_of_losses_are_counted_over_runs_and_explained(sample_data: Path,
     assert "islands" in meaning
 
 
-def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path: Path, sample_data: Path) -> None:
+def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path, sample_data):
     file = spin_down_csv(tmp_path / "my.csv")
     assert [row.name for row, _ in analyze_suiting([file], {})] == ["spindown"]
     with pytest.raises(DoesNotSuit, match="no limits of one top"):
@@ -324,7 +314,7 @@ def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path: Path
         METHOD.analyze([empty], LimitOptions())
 
 
-def test_a_scene_that_was_measured_is_the_one_compared_with(sample_data: Path, tmp_path: Path) -> None:
+def test_a_scene_that_was_measured_is_the_one_compared_with(sample_data, tmp_path):
     folder = shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
     record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     record["configuration"]["scene"] = {"name": "mine", "top": {"mass_kg": 0.025}}

@@ -1,13 +1,10 @@
 """Many runs become one table, whatever becomes of some of them; the processes are really started once."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os
 import shutil
 from functools import partial
-from typing import TYPE_CHECKING, Any
 
 import pyarrow.parquet as pq
 import pytest
@@ -23,39 +20,35 @@ from many_runs import make_runs
 from support.commands import command
 from support.paths import SAMPLE_DATA
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-    from pathlib import Path
-
 SPINDOWN = ANALYSES["spindown"]
 COUNT = 8
 
 
 @pytest.fixture
-def runs(tmp_path: Path) -> Path:
+def runs(tmp_path):
     """Eight runs of which each second one is broken, each in its way."""
     make_runs(tmp_path / "runs", COUNT, broken=2)
     return tmp_path / "runs"
 
 
-def tabulate(runs: Path, name: str = "all.csv", given: dict[str, Any] | None = None, **options: Any) -> Path:
+def tabulate(runs, name="all.csv", given=None, **options):
     """The table of a folder, made in this process unless it is said otherwise."""
     file = runs.parent / name
     write_table(SPINDOWN, [runs], given or {}, file, **({"cores": 1} | options))
     return file
 
 
-def rows_of(file: Path) -> list[dict[str, str]]:
+def rows_of(file):
     with file.open(encoding="utf-8", newline="") as stream:
         return list(csv.DictReader(stream))
 
 
-def interrupt_after(count: int, tally: Tally) -> None:
+def interrupt_after(count, tally):
     if tally.done == count:
         raise KeyboardInterrupt
 
 
-def test_a_run_is_a_row_and_a_broken_one_says_why(runs: Path) -> None:
+def test_a_run_is_a_row_and_a_broken_one_says_why(runs):
     rows = rows_of(tabulate(runs))
     assert [row["path"] for row in rows] == [f"runs/{folder.name}" for folder in sorted(runs.iterdir())]
     assert [bool(row["problem"]) for row in rows] == [False, True] * (COUNT // 2)
@@ -66,7 +59,7 @@ def test_a_run_is_a_row_and_a_broken_one_says_why(runs: Path) -> None:
     assert (rows[3]["status"], rows[3]["synthetic"]) == ("finished", "true")
 
 
-def test_a_row_has_the_values_of_the_result_of_its_run(runs: Path) -> None:
+def test_a_row_has_the_values_of_the_result_of_its_run(runs):
     row = rows_of(tabulate(runs))[0]
     folder = runs.parent / row["path"]
     printed = json.loads(command("analyze", "spindown", folder, "--no-save", "--json", cwd=runs).out)
@@ -80,11 +73,11 @@ def test_a_row_has_the_values_of_the_result_of_its_run(runs: Path) -> None:
     assert not [*runs.glob("*/*result*")]
 
 
-def test_the_table_does_not_depend_on_the_number_of_processes(runs: Path) -> None:
+def test_the_table_does_not_depend_on_the_number_of_processes(runs):
     assert tabulate(runs, "two.csv", cores=2).read_bytes() == tabulate(runs, "one.csv").read_bytes()
 
 
-def test_a_table_that_was_interrupted_goes_on(runs: Path) -> None:
+def test_a_table_that_was_interrupted_goes_on(runs):
     whole = tabulate(runs, "whole.csv").read_bytes()
     with pytest.raises(KeyboardInterrupt):
         tabulate(runs, show=partial(interrupt_after, 3))
@@ -92,13 +85,13 @@ def test_a_table_that_was_interrupted_goes_on(runs: Path) -> None:
     assert len(rows_of(part)) == 3
     with part.open("ab") as file:
         file.write(b"runs/torn,2026")  # as after a kill under way
-    seen: list[int] = []
+    seen = []
     assert tabulate(runs, resume=True, show=lambda tally: seen.append(tally.done)).read_bytes() == whole
     assert seen == [*range(2, COUNT + 1)]  # of the three, one had failed, and is tried again
     assert not part.exists()
 
 
-def test_rows_of_an_earlier_call_are_never_overwritten(runs: Path) -> None:
+def test_rows_of_an_earlier_call_are_never_overwritten(runs):
     with pytest.raises(KeyboardInterrupt):
         tabulate(runs, show=partial(interrupt_after, 3))
     with pytest.raises(UsageError, match="go on with it"):
@@ -109,12 +102,12 @@ def test_rows_of_an_earlier_call_are_never_overwritten(runs: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["all.csv", "all.parquet"])
-def test_resume_of_a_complete_table_analyzes_only_new_runs(runs: Path, name: str) -> None:
+def test_resume_of_a_complete_table_analyzes_only_new_runs(runs, name):
     last = max(runs.iterdir())
     shutil.move(last, runs.parent)
     tabulate(runs, name)
     shutil.move(runs.parent / last.name, last)
-    seen: list[int] = []
+    seen = []
     grown = tabulate(runs, name, resume=True, show=lambda tally: seen.append(tally.done))
     assert seen == [*range(COUNT // 2, COUNT + 1)]  # those that failed are tried again
     if name.endswith(".csv"):
@@ -123,13 +116,13 @@ def test_resume_of_a_complete_table_analyzes_only_new_runs(runs: Path, name: str
         assert pq.read_table(grown).equals(pq.read_table(tabulate(runs, "anew.parquet")))
 
 
-def test_of_a_whole_table_only_what_changed_is_done_again(runs: Path) -> None:
+def test_of_a_whole_table_only_what_changed_is_done_again(runs):
     tabulate(runs)
     changed, mended, *_ = sorted(runs.iterdir())
     shutil.copy(changed / "run.json", mended)
     readings = changed / "readings.csv"
     readings.write_bytes(readings.read_bytes().replace(b",0.03", b",0.06"))
-    seen: list[Tally] = []
+    seen = []
     rows = rows_of(tabulate(runs, resume=True, show=seen.append))
     assert seen[-1].kept == COUNT // 2 - 1
     assert not rows[1]["problem"]
@@ -137,7 +130,7 @@ def test_of_a_whole_table_only_what_changed_is_done_again(runs: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["all.csv", "all.parquet"])
-def test_a_table_that_is_damaged_is_refused_and_left_alone(runs: Path, name: str) -> None:
+def test_a_table_that_is_damaged_is_refused_and_left_alone(runs, name):
     table = tabulate(runs, name)
     damaged = table.read_bytes() + b"torn\n"
     table.write_bytes(damaged)
@@ -147,7 +140,7 @@ def test_a_table_that_is_damaged_is_refused_and_left_alone(runs: Path, name: str
     assert sorted(file.name for file in runs.parent.glob("*all.*")) == [name, f"{name}.json"]
 
 
-def test_two_processes_do_not_write_one_table(runs: Path) -> None:
+def test_two_processes_do_not_write_one_table(runs):
     with locked(runs.parent / "all.csv", "busy"), pytest.raises(CannotWrite, match="another process is writing it"):
         tabulate(runs)
     assert not [*runs.parent.glob("*all.csv*")]
@@ -155,7 +148,7 @@ def test_two_processes_do_not_write_one_table(runs: Path) -> None:
     assert sorted(file.name for file in runs.parent.glob("*all.csv*")) == ["all.csv", "all.csv.json"]
 
 
-def test_a_name_of_any_letters_is_a_row_and_one_alone(tmp_path: Path) -> None:
+def test_a_name_of_any_letters_is_a_row_and_one_alone(tmp_path):
     names = ["a  b", "a b", 'c,"d" é'] + ["two\nlines"] * (os.name == "posix")
     for name in names:
         shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / name)
@@ -168,7 +161,7 @@ def test_a_name_of_any_letters_is_a_row_and_one_alone(tmp_path: Path) -> None:
     assert write_table(SPINDOWN, both, {}, table, cores=1, resume=True).kept == len(names)
 
 
-def test_parquet_holds_the_same_numbers_with_their_types(runs: Path) -> None:
+def test_parquet_holds_the_same_numbers_with_their_types(runs):
     texts, table = rows_of(tabulate(runs)), pq.read_table(tabulate(runs, "all.parquet"))
     assert table.column_names == [column.name for column in columns_of(SPINDOWN)] == list(texts[0])
     exponents = table["power_exponent"].to_pylist()
@@ -182,8 +175,8 @@ def test_parquet_holds_the_same_numbers_with_their_types(runs: Path) -> None:
     assert {name: numbers[name] for name in wanted} == wanted
 
 
-def test_a_run_that_kills_its_process_has_a_row(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def results(function: Any, tasks: Iterable[Task], *_: Any) -> Iterator[Done[Task, Any]]:
+def test_a_run_that_kills_its_process_has_a_row(runs, monkeypatch):
+    def results(function, tasks, *_):
         first, *others = tasks
         yield from (Done(task, function(task)) for task in others)
         yield Done(first, error=WorkersLost("the process that does it died 3 times"))
@@ -195,10 +188,8 @@ def test_a_run_that_kills_its_process_has_a_row(runs: Path, monkeypatch: pytest.
 
 
 @pytest.mark.parametrize("raised", [MemoryError(), ZeroDivisionError("by zero")])
-def test_a_defect_of_levilab_becomes_the_problem_of_a_row(
-    runs: Path, monkeypatch: pytest.MonkeyPatch, raised: Exception
-) -> None:
-    def analyze(*_: object) -> None:
+def test_a_defect_of_levilab_becomes_the_problem_of_a_row(runs, monkeypatch, raised):
+    def analyze(*_):
         raise raised
 
     monkeypatch.setattr(type(SPINDOWN), "analyze", analyze)
@@ -211,7 +202,7 @@ def test_a_defect_of_levilab_becomes_the_problem_of_a_row(
     ("name", "sample"),
     [("spin", "trace-laser"), ("field", "field-scan"), ("limit", "upper-limits"), ("precession", "precession-sweep")],
 )
-def test_every_analysis_fills_its_columns(name: str, sample: str) -> None:
+def test_every_analysis_fills_its_columns(name, sample):
     analysis = ANALYSES[name]
     task = Task(SAMPLE_DATA / sample, True, True, name, analysis.options_from({}), SAMPLE_DATA)
     row = analyze_one(task)
@@ -224,7 +215,7 @@ def test_every_analysis_fills_its_columns(name: str, sample: str) -> None:
     }  # which the samples leave out; a sound record has no notes
 
 
-def test_inputs_of_other_analyses_are_passed_over_and_counted(tmp_path: Path) -> None:
+def test_inputs_of_other_analyses_are_passed_over_and_counted(tmp_path):
     shutil.copytree(SAMPLE_DATA / "trace-laser", tmp_path / "runs" / "trace")
     shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / "one")
     shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / "two")
@@ -237,7 +228,7 @@ def test_inputs_of_other_analyses_are_passed_over_and_counted(tmp_path: Path) ->
     }  # fmt: skip
 
 
-def test_save_writes_a_result_beside_each_run_and_no_figure(runs: Path) -> None:
+def test_save_writes_a_result_beside_each_run_and_no_figure(runs):
     ended = command("analyze", "spindown", "runs", "--table", "t.csv", "--cores", "1", "--save", cwd=runs.parent)
     assert (ended.status, ended.out.split(";")[1].strip()) == (0, "4 could not be analyzed")
     assert len([*runs.glob("*/result.json")]) == COUNT // 2
@@ -253,20 +244,20 @@ def test_save_writes_a_result_beside_each_run_and_no_figure(runs: Path) -> None:
         (["spindown", "runs", "--cores", "2"], "--cores: goes with --table alone"),
     ],
 )
-def test_wrong_options_are_errors(runs: Path, words: list[str], said: str) -> None:
+def test_wrong_options_are_errors(runs, words, said):
     ended = command("analyze", *words, cwd=runs.parent)
     assert ended.status == 2
     assert said in ended.err
 
 
-def test_a_missing_parquet_library_is_named_before_the_work(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_parquet_library_is_named_before_the_work(runs, monkeypatch):
     monkeypatch.setattr("levilab.pipelines.many.file.find_spec", lambda _: None)
     ended = command("analyze", "spindown", "runs", "--table", "t.parquet", cwd=runs.parent)
     assert ended.status == 2
     assert 'pip install ".[parquet]"' in ended.err
 
 
-def test_a_table_without_any_sound_run_ends_with_a_failure(runs: Path) -> None:
+def test_a_table_without_any_sound_run_ends_with_a_failure(runs):
     for folder in sorted(runs.iterdir())[::2]:
         shutil.rmtree(folder)
     ended = command("analyze", "spindown", "runs", "--table", "t.csv", "--cores", "1", cwd=runs.parent)
@@ -275,7 +266,7 @@ def test_a_table_without_any_sound_run_ends_with_a_failure(runs: Path) -> None:
     assert len(rows_of(runs.parent / "t.csv")) == 4
 
 
-def test_ctrl_c_says_where_the_rows_are(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_says_where_the_rows_are(runs, monkeypatch):
     monkeypatch.setattr(Tally, "count", lambda tally, _: interrupt_after(0, tally))
     ended = command("analyze", "spindown", "runs", "--table", "t.csv", "--cores", "1", cwd=runs.parent)
     assert ended.status == 130
@@ -283,7 +274,7 @@ def test_ctrl_c_says_where_the_rows_are(runs: Path, monkeypatch: pytest.MonkeyPa
     assert len(rows_of(runs.parent / "t.csv.part.csv")) == 1
 
 
-def test_a_file_without_readings_is_passed_over_silently(tmp_path: Path) -> None:
+def test_a_file_without_readings_is_passed_over_silently(tmp_path):
     (tmp_path / "notes.csv").write_text("day,who\n1,me\n2,you\n", encoding="utf-8")
     task = Task(tmp_path / "notes.csv", False, True, "spindown", SPINDOWN.options_from({}), tmp_path)
     assert analyze_one(task) == PassedOver("")

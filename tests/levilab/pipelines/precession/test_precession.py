@@ -1,9 +1,6 @@
 """Sweeps from files and runs to results, pages and figures."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -12,7 +9,7 @@ from analysis.precession.gates import Gates, rates_at_point
 from instruments.drivers.oscilloscope import Trace
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import PrecessionOptions
-from levilab.pipelines.precession.analysis import METHOD, PrecessionAnalysis
+from levilab.pipelines.precession.analysis import METHOD
 from levilab.pipelines.precession.document import DOCUMENT
 from levilab.pipelines.precession.figure import precession_figure
 from levilab.pipelines.result import save
@@ -25,14 +22,11 @@ from levilab.runs.writer import RunWriter
 from support.commands import command
 from support.figures import faults, without_drawing
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 DRIVE = np.arange(28.0, 46.0, 2.0)
 U = 0.03
 
 
-def sweep_csv(path: Path, *, slope: float = 1.0, u: bool = True, seed: int = 1, half: int | None = None) -> Path:
+def sweep_csv(path, *, slope=1.0, u=True, seed=1, half=None):
     """A file of a user's own: German titles, a comma for the point."""
     counted = slope * DRIVE + U * np.random.default_rng(seed).standard_normal(DRIVE.size)
     if half is not None:
@@ -43,11 +37,11 @@ def sweep_csv(path: Path, *, slope: float = 1.0, u: bool = True, seed: int = 1, 
     return path
 
 
-def save_without_picture(found: PrecessionAnalysis) -> Path:
+def save_without_picture(found):
     return save(DOCUMENT.of(found, found.place), found.place, b"", first=False)[0]
 
 
-def test_a_file_of_ones_own_is_analyzed_without_naming_its_columns(tmp_path: Path) -> None:
+def test_a_file_of_ones_own_is_analyzed_without_naming_its_columns(tmp_path):
     file = sweep_csv(tmp_path / "mine.csv", half=3)
     ((row, found),) = analyze_suiting([file], {})
     assert row.name == "precession"
@@ -67,13 +61,13 @@ def test_a_file_of_ones_own_is_analyzed_without_naming_its_columns(tmp_path: Pat
     assert (weighted["statistics"]["n"], robust["statistics"]["n"]) == (8, 9)
 
 
-def test_the_options_reach_the_fit(tmp_path: Path) -> None:
+def test_the_options_reach_the_fit(tmp_path):
     file = sweep_csv(tmp_path / "mine.csv", half=3)
     kept = METHOD.analyze([file], PrecessionOptions(keep_outliers=True, orthogonal=True, reading_u=0.1)).combined
     assert (kept.line.n, kept.line.orthogonal, kept.points[0].u) == (9, True, 0.1)
 
 
-def test_several_sweeps_share_a_line(tmp_path: Path) -> None:
+def test_several_sweeps_share_a_line(tmp_path):
     files = [sweep_csv(tmp_path / f"{k}.csv", seed=k) for k in (1, 2)]
     found = METHOD.analyze(files, PrecessionOptions())
     assert found.combined.line.n == 18
@@ -85,7 +79,7 @@ def test_several_sweeps_share_a_line(tmp_path: Path) -> None:
     assert "is excluded" in together.text
 
 
-def test_other_options_than_those_of_the_result_fit_again_with_the_rest_as_before(tmp_path: Path) -> None:
+def test_other_options_than_those_of_the_result_fit_again_with_the_rest_as_before(tmp_path):
     files = [sweep_csv(tmp_path / f"{k}.csv", seed=k, half=k) for k in (1, 2)]
     found = METHOD.analyze(files[:1], PrecessionOptions(orthogonal=True))
     save_without_picture(found)
@@ -105,7 +99,7 @@ def test_other_options_than_those_of_the_result_fit_again_with_the_rest_as_befor
         ("f_d,f_p\n30,30\n31,thirty\n32,32\n", "line 3"),
     ],
 )
-def test_what_is_no_sweep_costs_one_line(tmp_path: Path, content: str, said: str) -> None:
+def test_what_is_no_sweep_costs_one_line(tmp_path, content, said):
     (tmp_path / "bad.csv").write_text(content.replace("nu_d", "f_d"), encoding="utf-8")
     ended = command("analyze", "precession", "bad.csv", cwd=tmp_path)
     assert ended.status == 1
@@ -114,7 +108,7 @@ def test_what_is_no_sweep_costs_one_line(tmp_path: Path, content: str, said: str
     assert not ended.out
 
 
-def run_with_records(folder: Path, drift: float, kept_s: float = 26.0) -> Path:
+def run_with_records(folder, drift, kept_s=26.0):
     """A run of three points; the laser is recorded at the second one, at 20 s, and drifts beside the drive [Hz]."""
     names = ("time_s", "drive_frequency_hz", "precession_frequency_hz", "precession_frequency_u_hz")
     record = RunRecord(
@@ -137,7 +131,7 @@ def run_with_records(folder: Path, drift: float, kept_s: float = 26.0) -> Path:
         return writer.folder
 
 
-def test_a_record_says_whether_the_pulses_keep_to_the_drives_phase(tmp_path: Path) -> None:
+def test_a_record_says_whether_the_pulses_keep_to_the_drives_phase(tmp_path):
     found = METHOD.analyze([run_with_records(tmp_path / "locked", 0.0, kept_s=20.0)], PrecessionOptions())
     ((point, coherence),) = [(one.point, one.coherence) for one in found.runs[0].coherences]
     assert point == 1
@@ -148,7 +142,7 @@ def test_a_record_says_whether_the_pulses_keep_to_the_drives_phase(tmp_path: Pat
     assert any("do not keep to the drive's phase at point 2" in text for text in drifting.all_warnings)
 
 
-def test_figure_and_page_show_what_was_found(tmp_path: Path) -> None:
+def test_figure_and_page_show_what_was_found(tmp_path):
     analysis = ANALYSES["precession"]
     found = analysis.analyze(
         [sweep_csv(tmp_path / "mine.csv", half=3), run_with_records(tmp_path / "runs", 0.0)], PrecessionOptions()
@@ -166,7 +160,7 @@ def test_figure_and_page_show_what_was_found(tmp_path: Path) -> None:
     assert leverage.get_title("left") == "Leverage; dotted: the mean, 0.67"  # of the shortest sweep, 2 of 3 points
 
 
-def test_a_reading_that_is_not_that_of_its_gates_is_believed_itself(tmp_path: Path) -> None:
+def test_a_reading_that_is_not_that_of_its_gates_is_believed_itself(tmp_path):
     """Where readings.csv was corrected by hand, the gates in events.jsonl are of something else."""
     random = np.random.default_rng(2)
     begin = 1.3 * np.arange(10)

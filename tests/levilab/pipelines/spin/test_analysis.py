@@ -1,12 +1,10 @@
 """Records and pulse times at some paths: against closed forms, from all kinds of inputs, and what is passed over."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, get_args
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -33,26 +31,22 @@ from support.detector import C32, RELEASE_HZ, coasting_turns, coasting_wav, puls
 from support.figures import faults
 from support.paths import ROOT
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from pathlib import Path
 
-
-def true_frequency(name: str, time: float) -> float:
+def true_frequency(name, time):
     """Of the sample files, as sample_data/make.py makes them: 30 Hz at time 0 of scopes, 0.25 s into other files."""
     others = ("recording", "samples", "phone", "pulseview", "owon", "hantek", "microcontroller")
     from_middle = time - 0.25 if name.startswith(others) else time
     return 30.0 - 0.095 * from_middle
 
 
-def test_the_offset_from_a_drive_is_of_the_held_part_and_its_u_of_the_scatter() -> None:
+def test_the_offset_from_a_drive_is_of_the_held_part_and_its_u_of_the_scatter():
     series = Series(np.arange(4.0), np.array([30.1, 29.9, 25.0, 20.0]), np.full(4, 0.02), (("held", 0.0, 1.0),))
     off = drive_offset(series, 30.0)
     assert (off.value, off.u) == pytest.approx((0.0, 0.1))  # ± 0.1 of two
     assert drive_offset(replace(series, phases=()), 30.0).value == pytest.approx(-3.75)
 
 
-def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data: Path) -> None:
+def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data):
     analysis = METHOD.analyze([sample_data / "scope-files"], SpinOptions(rate=None))
     assert len(analysis.runs) == 21  # the array needs a rate
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
@@ -64,7 +58,7 @@ def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data: Pat
     assert [remark for remark in analysis.remarks if "samples-4000hz.npy" in str(remark)]
 
 
-def test_a_laser_and_a_drive_are_no_spin(sample_data: Path) -> None:
+def test_a_laser_and_a_drive_are_no_spin(sample_data):
     sweep = sample_data / "precession-sweep"
     with pytest.raises(DoesNotSuit, match="records of laser and drive, none of which shows the spin: levilab analyze"):
         METHOD.analyze([sweep], SpinOptions())
@@ -72,7 +66,7 @@ def test_a_laser_and_a_drive_are_no_spin(sample_data: Path) -> None:
     assert any("the frequency of laser is no spin, but how often" in text for text in named.all_warnings)
 
 
-def test_options_reach_the_file_and_the_method(sample_data: Path) -> None:
+def test_options_reach_the_file_and_the_method(sample_data):
     array = sample_data / "scope-files" / "samples-4000hz.npy"
     (run,) = METHOD.analyze([array], SpinOptions(rate=4000.0, method="edges")).runs
     assert run.spin.method == "edges"
@@ -86,7 +80,7 @@ def test_options_reach_the_file_and_the_method(sample_data: Path) -> None:
     )
 
 
-def test_a_long_record_is_followed_and_feeds_the_drag_laws(tmp_path: Path) -> None:
+def test_a_long_record_is_followed_and_feeds_the_drag_laws(tmp_path):
     path = coasting_wav(tmp_path / "long.wav")
     (run,) = METHOD.analyze([path], SpinOptions()).runs
     assert len(run.series) == 15  # windows of 2 s
@@ -101,7 +95,7 @@ def test_a_long_record_is_followed_and_feeds_the_drag_laws(tmp_path: Path) -> No
     assert any("frequency in a window of 2 s" in text for text in down.all_warnings)
 
 
-def test_a_top_that_is_held_has_a_spin_and_no_spin_down(tmp_path: Path) -> None:
+def test_a_top_that_is_held_has_a_spin_and_no_spin_down(tmp_path):
     held = write_wav(tmp_path / "held.wav", pulses(30.0 * np.arange(8000) / 1000), 1000)
     ((row, found),) = analyze_suiting([held], {})
     assert row.name == "spin"
@@ -110,7 +104,7 @@ def test_a_top_that_is_held_has_a_spin_and_no_spin_down(tmp_path: Path) -> None:
         SPINDOWN.analyze([held], SpinDownOptions())
 
 
-def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path: Path) -> None:
+def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path):
     t = np.linspace(0, 30, 30_001)
     times = np.interp(np.arange(1, int(coasting_turns(t)[-1])), coasting_turns(t), t)
     path = tmp_path / "pulses.csv"
@@ -120,12 +114,12 @@ def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path: Path) -> None:
     assert len(METHOD.analyze([path], SpinOptions()).runs[0].series) == 15
 
 
-def test_a_record_that_is_too_short_is_no_spin_down(sample_data: Path) -> None:
+def test_a_record_that_is_too_short_is_no_spin_down(sample_data):
     with pytest.raises(DoesNotSuit, match=r"lasts 0\.5 s, a spin-down needs 3 windows of 2 s"):
         SPINDOWN.analyze([sample_data / "scope-files" / "recording.wav"], SpinDownOptions())
 
 
-def run_of(runs: Path, records: Iterable[Trace]) -> Path:
+def run_of(runs, records):
     """A run with records of the light, 10 s apart."""
     channels = [{"name": "time_s", "unit": "s", "source": "a test"}]
     record = RunRecord(experiment="trace", status="running", started_utc=utc_now(), channels=channels)
@@ -137,15 +131,15 @@ def run_of(runs: Path, records: Iterable[Trace]) -> Path:
 
 
 @pytest.fixture
-def traced(tmp_path: Path) -> Path:
+def traced(tmp_path):
     """A run with three records of the light at 30, 29 and 28 Hz."""
     t = -0.2 + np.arange(1600) / 4000
     codes = (np.round(pulses((30 - k) * t, seed=k) / 0.01).astype(np.uint8) for k in range(3))
-    of_one: dict[str, Any] = {"dt_s": 2.5e-4, "t0_s": -0.2, "volts_per_code": 0.01, "offset_v": 0.0, "channel": 1}
+    of_one = {"dt_s": 2.5e-4, "t0_s": -0.2, "volts_per_code": 0.01, "offset_v": 0.0, "channel": 1}
     return run_of(tmp_path / "runs", (Trace(one, **of_one) for one in codes))
 
 
-def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> None:
+def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced):
     waveform = run_waveforms(Run.load(traced))[1]
     assert (waveform.start, waveform.step, waveform.count) == (pytest.approx(9.6), 2.5e-4, 1600)
     assert waveform.samples().max() == pytest.approx(1.1, abs=0.1)
@@ -168,13 +162,13 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced: Path) -> Non
     assert save_found(ANALYSES["spin"], analysis)[0] == traced / "result.json"
 
 
-def test_a_run_that_was_killed_before_its_first_record_has_nothing_to_analyze(traced: Path) -> None:
+def test_a_run_that_was_killed_before_its_first_record_has_nothing_to_analyze(traced):
     (traced / "traces.jsonl").unlink()
     with pytest.raises(DataError, match=r"holds no traces\.jsonl, so nothing was recorded; analyze another run"):
         METHOD.analyze([traced], SpinOptions())
 
 
-def test_records_of_a_run_that_are_left_out_are_counted_in_a_note(traced: Path) -> None:
+def test_records_of_a_run_that_are_left_out_are_counted_in_a_note(traced):
     first, *others = (stored.trace for stored in Run.load(traced).traces())
     dark = replace(first, codes=np.full_like(first.codes, 10))
     analysis = METHOD.analyze([run_of(traced.parent, [dark, *others])], SpinOptions())
@@ -183,7 +177,7 @@ def test_records_of_a_run_that_are_left_out_are_counted_in_a_note(traced: Path) 
     assert "1 of 3 records are left out: no pulses" in note
 
 
-def test_a_finding_in_some_records_of_a_run_names_them(traced: Path) -> None:
+def test_a_finding_in_some_records_of_a_run_names_them(traced):
     """The table shows the record in the middle alone."""
     *others, last = (stored.trace for stored in Run.load(traced).traces())
     codes = last.codes.copy()  # at 28 Hz, from -0.2 s on: its sixth turn
@@ -193,7 +187,7 @@ def test_a_finding_in_some_records_of_a_run_names_them(traced: Path) -> None:
     assert [text for text in analysis.all_warnings if text.endswith("record 3: 1 turn has no pulse (missing)")]
 
 
-def test_the_result_says_what_the_interface_promises(sample_data: Path, tmp_path: Path) -> None:
+def test_the_result_says_what_the_interface_promises(sample_data, tmp_path):
     shutil.copy(sample_data / "scope-files" / "keysight-dsox.csv", tmp_path)
     analysis = METHOD.analyze([tmp_path / "keysight-dsox.csv"], SpinOptions())
     written = save_found(ANALYSES["spin"], analysis)[0]
@@ -206,7 +200,7 @@ def test_the_result_says_what_the_interface_promises(sample_data: Path, tmp_path
     assert result["method"] == result["runs"][0]["method"] == "matched"
 
 
-def test_findings_are_notes_with_their_names(tmp_path: Path) -> None:
+def test_findings_are_notes_with_their_names(tmp_path):
     t = np.arange(4000) / 1000
     turns = 30 * t
     signal = np.where(np.isin(np.rint(turns), (20, 21, 50)), 0.1, pulses(turns))  # three turns without their pulse
@@ -215,14 +209,14 @@ def test_findings_are_notes_with_their_names(tmp_path: Path) -> None:
     assert any(text.endswith("(missing)") for text in analysis.all_warnings)
 
 
-def test_a_record_without_pulses_is_refused_in_one_line(tmp_path: Path) -> None:
+def test_a_record_without_pulses_is_refused_in_one_line(tmp_path):
     path = write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
     with pytest.raises(DataError, match=r"dark\.wav: 0 pulses in 4 s, at least 4 are needed"):
         METHOD.analyze([path], SpinOptions())
 
 
 @pytest.mark.parametrize("find", [METHOD.analyze, ANALYSES["spin"].recall])
-def test_a_record_without_pulses_among_others_is_passed_over(find: Any, tmp_path: Path) -> None:
+def test_a_record_without_pulses_among_others_is_passed_over(find, tmp_path):
     """By a report, too, which recalls."""
     write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
     write_wav(tmp_path / "spins.wav", pulses(30.0 * np.arange(4000) / 1000), 1000)
@@ -231,7 +225,7 @@ def test_a_record_without_pulses_among_others_is_passed_over(find: Any, tmp_path
     assert [text for text in found.warnings if "skipped " in text and "dark.wav: 0 pulses" in text]
 
 
-def test_each_analysis_takes_its_own_out_of_a_folder(sample_data: Path, tmp_path: Path) -> None:
+def test_each_analysis_takes_its_own_out_of_a_folder(sample_data, tmp_path):
     root = shutil.copytree(sample_data, tmp_path / "data")
     for name, text in {
         "notes.txt": "hello\n",
@@ -250,7 +244,7 @@ def test_each_analysis_takes_its_own_out_of_a_folder(sample_data: Path, tmp_path
     assert {one.kind.name for one in down.remarks if "npy" in str(one)} == {"a NumPy array"}
 
 
-def test_what_is_damaged_is_a_note_of_the_analysis_that_it_belongs_to(sample_data: Path, tmp_path: Path) -> None:
+def test_what_is_damaged_is_a_note_of_the_analysis_that_it_belongs_to(sample_data, tmp_path):
     shutil.copy(sample_data / "scope-files" / "recording.wav", tmp_path)
     cut = (sample_data / "scope-files" / "siglent-sds1202x-e.csv").read_text(encoding="utf-8")
     (tmp_path / "cut.csv").write_text(cut.replace("-0.20000000000,", "-0.20000000000,x "), encoding="utf-8")
@@ -261,10 +255,8 @@ def test_what_is_damaged_is_a_note_of_the_analysis_that_it_belongs_to(sample_dat
 
 
 @pytest.mark.parametrize("what", ["trace", "times", "long", "many"])
-def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(
-    what: str, sample_data: Path, tmp_path: Path
-) -> None:
-    files: dict[str, Any] = {
+def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(what, sample_data, tmp_path):
+    files = {
         "trace": [sample_data / "scope-files" / "recording.wav"],
         "times": [sample_data / "scope-files" / "pulse-times.txt"],
         "long": [coasting_wav(tmp_path / "long.wav", seconds=14, rate=4000)] if what == "long" else [],
@@ -286,7 +278,7 @@ def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(
 
 
 @pytest.mark.parametrize("what", ["trace", "times"])
-def test_residuals_of_a_bent_frequency_have_no_bend_left(what: str, tmp_path: Path) -> None:
+def test_residuals_of_a_bent_frequency_have_no_bend_left(what, tmp_path):
     """The slope changes by 0.6 Hz/s in a second, 1.5 turns at the ends: a parabola leaves milliseconds."""
     random, time = np.random.default_rng(5), np.arange(10_000) / 2000
     away = time - 2.5
@@ -312,7 +304,7 @@ def test_residuals_of_a_bent_frequency_have_no_bend_left(what: str, tmp_path: Pa
     assert residuals.std() < 30
 
 
-def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_path: Path) -> None:
+def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_path):
     """ν^(-1/2) falls on a straight line in time: dν/dt = -c ν^(3/2).
 
     u of a record comes from some 13 degrees of freedom of its own. So χ² is 1.16 times its degrees of freedom in the
@@ -329,7 +321,7 @@ def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_
     assert note.where == (1, 50, 50)  # a mean pulse was fitted to two, of which one was 6 u off
 
 
-def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data: Path) -> None:
+def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data):
     found = METHOD.analyze([sample_data / "trace-tape"], SpinOptions())
     (run,) = found.runs
     assert run.which == "record 3 of 5"
@@ -347,13 +339,13 @@ def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data: Pat
     )
 
 
-def test_each_finding_about_pulses_and_lines_has_a_sentence() -> None:
+def test_each_finding_about_pulses_and_lines_has_a_sentence():
     source = "".join(file.read_text(encoding="utf-8") for file in (ROOT / "analysis/pulses").glob("*.py"))
     made = set(re.findall(r'Finding\("([\w-]+)"', source)) | {"no-pulses", *get_args(Kind)}
     assert made == {name for name, _ in words._SENTENCES}
 
 
-def test_of_a_single_record_the_slope_is_its_own(sample_data: Path) -> None:
+def test_of_a_single_record_the_slope_is_its_own(sample_data):
     found = METHOD.analyze([sample_data / "scope-files"], SpinOptions())
     single = [run for run in found.runs if not run.which]
     assert single

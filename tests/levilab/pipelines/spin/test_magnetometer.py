@@ -1,9 +1,6 @@
 """A phone's record through the analyses: its spin, its drag law, its limit, and what is in doubt."""
 
-from __future__ import annotations
-
 import importlib.util
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -18,11 +15,8 @@ from levilab.pipelines.suits import analyze_suiting
 from support.figures import faults
 from support.paths import ROOT
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-
-def phone(path: Path, times: np.ndarray, field: np.ndarray) -> Path:
+def phone(path, times, field):
     """Write a record as phyphox does."""
     titles = ["Time (s)", *(f"Magnetic Field {axis} (µT)" for axis in "xyz"), "Absolute field (µT)"]
     rows = np.column_stack([times, 1e6 * field, 1e6 * np.linalg.norm(field, axis=1)])
@@ -31,19 +25,19 @@ def phone(path: Path, times: np.ndarray, field: np.ndarray) -> Path:
     return path
 
 
-def said(found) -> list[str]:
+def said(found):
     """Return all warnings."""
     return [text for group in found.grouped_warnings for text in group]
 
 
 @pytest.fixture(scope="module")
-def long(tmp_path_factory) -> Path:
+def long(tmp_path_factory):
     times, field, _ = synthetic_flight(np.random.default_rng(51), duration=170.0, up=(0.0, 163.2), start_hz=37.0)
     return phone(tmp_path_factory.mktemp("phone") / "long.csv", times, field)
 
 
 @pytest.fixture(scope="module")
-def short(tmp_path_factory) -> Path:
+def short(tmp_path_factory):
     return phone(tmp_path_factory.mktemp("phone") / "short.csv", *synthetic_field(np.random.default_rng(52)))
 
 

@@ -26,32 +26,24 @@ from levilab.runs.run import Run
 from support.spin_downs import spin_down_csv
 
 #: The thesis's constants, as printed: C₁ [1/s], |C₂| [1/rad].
-PUBLISHED = (
-    ("0.003199", "1.760e-05"),
-    ("0.003134", "1.707e-05"),
-    ("0.003133", "1.669e-05"),
-    ("0.003261", "1.772e-05"),
-)
+PUBLISHED = (("0.003199", "1.760e-05"), ("0.003134", "1.707e-05"), ("0.003133", "1.669e-05"), ("0.003261", "1.772e-05"))
 
 
-def test_the_straight_lines_give_the_published_constants_to_every_printed_digit(sample_data: Path) -> None:
+def test_the_straight_lines_give_the_published_constants_to_every_printed_digit(sample_data):
     analysis = METHOD.analyze([sample_data], SpinDownOptions())
     constants = [
-        (run.fit("stokes").linearised["c1"].value, run.fit("newton").linearised["c2"].value)  # type: ignore[index]
-        for run in analysis.runs
+        (run.fit("stokes").linearised["c1"].value, run.fit("newton").linearised["c2"].value) for run in analysis.runs
     ]
     assert tuple((f"{c1:.6f}", f"{c2:.3e}") for c1, c2 in constants) == PUBLISHED
     assert f"{np.mean([c1 for c1, _ in constants]):.8f}" in {"0.00318175", "0.00318176", "0.00318174"}
 
 
-def _words(path: Path) -> list[bytes]:
+def _words(path):
     """Return what stands between separators, whatever git does to line ends."""
     return re.split(rb"[\s,\[\]{}]+", path.read_bytes())
 
 
-def test_the_sample_data_are_what_their_script_makes(
-    sample_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_sample_data_are_what_their_script_makes(sample_data, tmp_path, monkeypatch):
     import runpy
 
     script = tmp_path / "make.py"
@@ -69,7 +61,7 @@ def test_the_sample_data_are_what_their_script_makes(
         assert np.abs(one.trace.codes.astype(int) - other.trace.codes.astype(int)).max() <= 1
 
 
-def test_the_sample_traces_are_small_and_labelled_synthetic(sample_data: Path) -> None:
+def test_the_sample_traces_are_small_and_labelled_synthetic(sample_data):
     for name in ("trace-tape", "trace-laser"):
         run = Run.load(sample_data / name)
         assert run.record.synthetic
@@ -78,7 +70,7 @@ def test_the_sample_traces_are_small_and_labelled_synthetic(sample_data: Path) -
         assert sum(path.stat().st_size for path in (sample_data / name).rglob("*") if path.is_file()) < 200_000
 
 
-def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data: Path) -> None:
+def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data):
     analysis = METHOD.analyze([sample_data], SpinDownOptions())
     combined = analysis.combined
     lines = spindown_tables(analysis)[-1]
@@ -96,7 +88,7 @@ def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data
     assert disc.u == pytest.approx(disc.scatter / 2, rel=1e-9)
 
 
-def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path: Path) -> None:
+def test_the_result_is_written_as_the_interface_says(sample_data, tmp_path):
     save(ANALYSES["spindown"], METHOD.analyze([sample_data], SpinDownOptions()), tmp_path)
     text = (tmp_path / "result.json").read_text(encoding="utf-8")
     result = json.loads(text, parse_constant=pytest.fail)
@@ -118,7 +110,7 @@ def test_the_result_is_written_as_the_interface_says(sample_data: Path, tmp_path
     assert (tmp_path / "spindown.png").stat().st_size > 10_000
 
 
-def test_one_run_has_its_start_and_covariance_at_the_top(sample_data: Path) -> None:
+def test_one_run_has_its_start_and_covariance_at_the_top(sample_data):
     analysis = METHOD.analyze([sample_data / "spin-down-1"], SpinDownOptions())
     result = ANALYSES["spindown"].document(analysis, analysis.output_folder)
     disc = next(model for model in result["models"] if model["name"] == "disc")
@@ -128,7 +120,7 @@ def test_one_run_has_its_start_and_covariance_at_the_top(sample_data: Path) -> N
     assert result["inputs"][0]["path"] == "readings.csv"
 
 
-def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path: Path) -> None:
+def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path):
     analysis = METHOD.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))
     result = ANALYSES["spindown"].document(analysis, analysis.output_folder)
     assert analysis.output_folder == tmp_path
@@ -136,7 +128,7 @@ def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path: Path) 
     assert result["values"]["c32"]["value"] == pytest.approx(2.34e-4, abs=4 * result["values"]["c32"]["u"])
 
 
-def test_the_same_run_given_twice_counts_once(sample_data: Path, tmp_path: Path) -> None:
+def test_the_same_run_given_twice_counts_once(sample_data, tmp_path):
     analysis = METHOD.analyze([sample_data, sample_data / "spin-down-1"], SpinDownOptions())
     assert len(analysis.sources) == 4
     shutil.copytree(sample_data / "spin-down-1", tmp_path / "copy")
@@ -145,7 +137,7 @@ def test_the_same_run_given_twice_counts_once(sample_data: Path, tmp_path: Path)
     assert "counted once" in analysis.warnings[0]
 
 
-def test_the_readings_of_a_run_are_that_run_and_as_synthetic(sample_data: Path, tmp_path: Path) -> None:
+def test_the_readings_of_a_run_are_that_run_and_as_synthetic(sample_data, tmp_path):
     (source,) = METHOD.analyze([sample_data / "spin-down-1" / "readings.csv"], SpinDownOptions()).sources
     assert source.synthetic
     shutil.copytree(sample_data / "spin-down-1", tmp_path / "broken")
@@ -154,14 +146,14 @@ def test_the_readings_of_a_run_are_that_run_and_as_synthetic(sample_data: Path, 
     assert any("whether it is SYNTHETIC is not known" in warning for warning in source.warnings)
 
 
-def test_real_and_synthetic_inputs_together_are_warned_of(sample_data: Path, tmp_path: Path) -> None:
+def test_real_and_synthetic_inputs_together_are_warned_of(sample_data, tmp_path):
     path = spin_down_csv(tmp_path / "my.csv")
     analysis = METHOD.analyze([path, sample_data / "spin-down-1"], SpinDownOptions())
     assert "1 of 2 inputs are SYNTHETIC" in analysis.warnings[0]
     assert analysis.output_folder == Path()
 
 
-def test_inputs_of_the_same_name_are_told_apart(tmp_path: Path) -> None:
+def test_inputs_of_the_same_name_are_told_apart(tmp_path):
     for k, folder in enumerate(("monday", "tuesday")):
         (tmp_path / folder).mkdir()
         spin_down_csv(tmp_path / folder / "run.csv", seed=k)
@@ -170,14 +162,14 @@ def test_inputs_of_the_same_name_are_told_apart(tmp_path: Path) -> None:
     assert [source.name for source in analysis.sources] == ["monday/run.csv", "tuesday/run.csv"]
 
 
-def test_the_hash_in_the_result_is_that_of_the_file(sample_data: Path, tmp_path: Path) -> None:
+def test_the_hash_in_the_result_is_that_of_the_file(sample_data, tmp_path):
     result = ANALYSES["spindown"].document(METHOD.analyze([sample_data], SpinDownOptions()), tmp_path)
     for given in result["inputs"]:
         assert hashlib.sha256((tmp_path / given["path"]).read_bytes()).hexdigest() == given["sha256"]
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("rpm", 60), ("rad/s", 2 * np.pi), ("°/s", 360)])
-def test_another_unit_taken_for_hertz_is_doubted(tmp_path: Path, unit: str, factor: float) -> None:
+def test_another_unit_taken_for_hertz_is_doubted(tmp_path, unit, factor):
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
     np.savetxt(path, np.c_[t, factor * nu], delimiter=",", header="t,f", comments="")
@@ -193,7 +185,7 @@ def test_another_unit_taken_for_hertz_is_doubted(tmp_path: Path, unit: str, fact
     assert not stated.sources[0].readings.doubtful
 
 
-def test_hertz_taken_for_another_unit_are_doubted(tmp_path: Path) -> None:
+def test_hertz_taken_for_another_unit_are_doubted(tmp_path):
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     path.write_text(path.read_text("utf-8").replace(path.read_text("utf-8").split("\n", 1)[0], "time,speed"), "utf-8")
     for unit in ("rpm", "rad/s", "°/s"):
@@ -204,7 +196,7 @@ def test_hertz_taken_for_another_unit_are_doubted(tmp_path: Path) -> None:
     assert not right.warnings
 
 
-def test_a_run_whose_unit_is_in_doubt_stays_out_of_the_means(sample_data: Path, tmp_path: Path) -> None:
+def test_a_run_whose_unit_is_in_doubt_stays_out_of_the_means(sample_data, tmp_path):
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
     np.savetxt(path, np.c_[t, 360 * nu], delimiter=",", header="t,f [Hz]", comments="")
@@ -215,26 +207,26 @@ def test_a_run_whose_unit_is_in_doubt_stays_out_of_the_means(sample_data: Path, 
     assert any("my" in warning for warning in both.about_all())
 
 
-def test_a_speed_without_unit_may_be_in_hertz_or_turns_per_minute(tmp_path: Path) -> None:
+def test_a_speed_without_unit_may_be_in_hertz_or_turns_per_minute(tmp_path):
     path = tmp_path / "speed.csv"
     path.write_text("time,speed\n0,39.9\n10,38\n20,36\n30,34\n", "utf-8")
     with pytest.raises(DataError, match=r"'speed' has the values 39.9 to 34 and no unit: Hz .* or rpm\? say"):
         METHOD.analyze([path], SpinDownOptions())
 
 
-def test_a_stated_reading_uncertainty_takes_the_place_of_the_scatter(tmp_path: Path) -> None:
+def test_a_stated_reading_uncertainty_takes_the_place_of_the_scatter(tmp_path):
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     without = METHOD.analyze([path], SpinDownOptions(tilt="none")).runs[0].fit("disc")
     with_u = METHOD.analyze([path], SpinDownOptions(reading_u=0.03, tilt="none")).runs[0].fit("disc")
     assert without.statistics.reduced_chi_square is None
     assert with_u.statistics.reduced_chi_square == pytest.approx(1, abs=1)
-    ratio = without.parameters["c32"].u / with_u.parameters["c32"].u  # type: ignore[operator]
+    ratio = without.parameters["c32"].u / with_u.parameters["c32"].u
     # what is stated counts as 8 readings beside the 18 that scatter; 0.15: u tells more of the correlation
-    expected = with_u.statistics.reduced_chi_square / with_u.statistics.variance_factor  # type: ignore[operator]
+    expected = with_u.statistics.reduced_chi_square / with_u.statistics.variance_factor
     assert ratio**2 == pytest.approx(expected, rel=0.15)
 
 
-def test_in_a_searched_folder_what_is_broken_is_passed_over_and_told(sample_data: Path, tmp_path: Path) -> None:
+def test_in_a_searched_folder_what_is_broken_is_passed_over_and_told(sample_data, tmp_path):
     for name in ("spin-down-1", "spin-down-2", "lower-limits"):
         shutil.copytree(sample_data / name, tmp_path / name)
     (tmp_path / "spin-down-2" / "run.json").write_text("{", encoding="utf-8")
@@ -243,12 +235,12 @@ def test_in_a_searched_folder_what_is_broken_is_passed_over_and_told(sample_data
     assert any("spin-down-2" in warning for warning in analysis.warnings)
 
 
-def test_a_run_of_another_experiment_is_refused_by_name(sample_data: Path) -> None:
+def test_a_run_of_another_experiment_is_refused_by_name(sample_data):
     with pytest.raises(DataError, match="holds a limit run, spindown needs a spin run"):
         METHOD.analyze([sample_data / "lower-limits"], SpinDownOptions())
 
 
-def test_a_folder_without_runs_says_what_it_found(sample_data: Path, tmp_path: Path) -> None:
+def test_a_folder_without_runs_says_what_it_found(sample_data, tmp_path):
     with pytest.raises(DataError, match="holds no run and no data file"):
         METHOD.analyze([tmp_path], SpinDownOptions())
     shutil.copytree(sample_data / "lower-limits", tmp_path / "limits")
@@ -257,7 +249,7 @@ def test_a_folder_without_runs_says_what_it_found(sample_data: Path, tmp_path: P
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_folder_that_cannot_be_written_is_reported_in_one_line(sample_data: Path, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_reported_in_one_line(sample_data, tmp_path):
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     analysis = METHOD.analyze([sample_data], SpinDownOptions())
     with pytest.raises(CannotWrite, match="`out`") as caught:
@@ -267,7 +259,7 @@ def test_a_folder_that_cannot_be_written_is_reported_in_one_line(sample_data: Pa
 
 
 @pytest.mark.parametrize("n", [3, 4, 5, 7])
-def test_few_readings_give_a_result_without_nan_that_says_what_it_cannot_tell(tmp_path: Path, n: int) -> None:
+def test_few_readings_give_a_result_without_nan_that_says_what_it_cannot_tell(tmp_path, n):
     analysis = METHOD.analyze([spin_down_csv(tmp_path / "my.csv", n=n)], SpinDownOptions())
     text = json.dumps(ANALYSES["spindown"].document(analysis, tmp_path), allow_nan=False)
     assert json.loads(text)["warnings"]

@@ -1,9 +1,5 @@
 """The figure: what its axes say, that nothing hides what the text points at, and that it is the same each time."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
@@ -11,7 +7,7 @@ from matplotlib.colors import to_hex
 
 from analysis.spindown.drag import LAWS
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
+from levilab.pipelines.spindown.analysis import METHOD
 from levilab.pipelines.spindown.figure import MOST_POINTS, spindown_figure
 from levilab.present.looks import LOOKS
 from levilab.present.style import as_svg
@@ -20,59 +16,52 @@ from support.spin_downs import spin_down_csv
 
 COLOURS = {name: LOOKS[name].colour for name in LAWS}
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-
-def analysis_of(*paths: Path, u: float | None = None) -> SpinDownAnalysis:
+def analysis_of(*paths, u=None):
     return METHOD.analyze(paths, SpinDownOptions(reading_u=u, tilt="none"))
 
 
 @pytest.fixture(scope="module")
-def analysis(tmp_path_factory: pytest.TempPathFactory) -> SpinDownAnalysis:
+def analysis(tmp_path_factory):
     """Of a run of twenty readings with their u."""
     return analysis_of(spin_down_csv(tmp_path_factory.mktemp("run") / "a.csv"))
 
 
 @pytest.fixture(scope="module")
-def figure(analysis: SpinDownAnalysis) -> Figure:
+def figure(analysis):
     """Its figure, which no test changes."""
     return spindown_figure(analysis)
 
 
 @pytest.fixture(scope="module")
-def page(figure: Figure) -> str:
+def page(figure):
     """The same for a page."""
     return as_svg(figure, "x")
 
 
-def panels(figure: Figure) -> tuple[Axes, list[Axes], list[Axes], list[Axes]]:
+def panels(figure):
     """The spin, the residuals, the straight lines and the strips below them."""
     spin, _, _, *others = figure.axes
     laws, lines = len(COLOURS), others[len(COLOURS) :]
     return spin, others[:laws], lines[::2], lines[1::2]
 
 
-def differences(figure: Figure) -> Axes:
+def differences(figure):
     return figure.axes[2]
 
 
-def curves(axes: Axes) -> list[str]:
+def curves(axes):
     """The colours of the drawn lines, without the readings' marks."""
     return [to_hex(line.get_color()).upper() for line in axes.get_lines() if line.get_linestyle() != "None"]
 
 
-def legend(axes: Axes) -> list[str]:
+def legend(axes):
     shown = axes.get_legend()
     assert shown
     return [text.get_text() for text in shown.get_texts()]
 
 
-def with_readings(path: Path, rows: Sequence[tuple[int, str]]) -> Path:
+def with_readings(path, rows):
     lines = path.read_text(encoding="utf-8").split("\n")
     for line, text in rows:
         lines[line] = text
@@ -81,7 +70,7 @@ def with_readings(path: Path, rows: Sequence[tuple[int, str]]) -> Path:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_residuals_lie_inside_their_panels_in_units_that_are_not_seconds(tmp_path: Path, seed: int) -> None:
+def test_residuals_lie_inside_their_panels_in_units_that_are_not_seconds(tmp_path, seed):
     path = spin_down_csv(tmp_path / "a.csv", u=False, seed=seed)
     figure = spindown_figure(analysis_of(path))
     _, residuals, _, _ = panels(figure)
@@ -94,7 +83,7 @@ def test_residuals_lie_inside_their_panels_in_units_that_are_not_seconds(tmp_pat
         assert max(abs(shown)) * 1.1 < high
 
 
-def test_every_axis_says_quantity_and_unit(figure: Figure) -> None:
+def test_every_axis_says_quantity_and_unit(figure):
     spin, residuals, lines, strips = panels(figure)
     assert "Hz" in spin.get_ylabel()
     assert "[s]" in spin.get_xlabel()
@@ -104,15 +93,13 @@ def test_every_axis_says_quantity_and_unit(figure: Figure) -> None:
     assert all("[s]" in axes.get_xlabel() for axes in (*residuals, *strips))
 
 
-def test_straight_line_panels_show_angular_frequency_as_the_tables_do(
-    analysis: SpinDownAnalysis, figure: Figure
-) -> None:
+def test_straight_line_panels_show_angular_frequency_as_the_tables_do(analysis, figure):
     lines = panels(figure)[2]
     drawn = next(line for line in lines[0].get_lines() if line.get_linestyle() == "None")
     assert np.asarray(drawn.get_ydata()) == pytest.approx(np.log(2 * np.pi * analysis.runs[0].frequency))
 
 
-def test_good_laws_share_a_scale_and_a_bad_one_says_that_it_has_its_own(figure: Figure) -> None:
+def test_good_laws_share_a_scale_and_a_bad_one_says_that_it_has_its_own(figure):
     residuals = panels(figure)[1]
     tops = {axes.get_title(loc="left"): axes.get_ylim()[1] for axes in residuals}
     assert tops["disc"] == tops["mixed"] == tops["power"]
@@ -123,7 +110,7 @@ def test_good_laws_share_a_scale_and_a_bad_one_says_that_it_has_its_own(figure: 
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_residuals_are_in_units_of_u_or_of_the_scatter_with_bands(tmp_path: Path, known: bool) -> None:
+def test_residuals_are_in_units_of_u_or_of_the_scatter_with_bands(tmp_path, known):
     analysis = analysis_of(spin_down_csv(tmp_path / "a.csv", u=known))
     best = analysis.runs[0].fit(analysis.combined.best)
     residuals = panels(spindown_figure(analysis))[1]
@@ -138,12 +125,12 @@ def test_residuals_are_in_units_of_u_or_of_the_scatter_with_bands(tmp_path: Path
     assert np.asarray(drawn.get_ydata()) == pytest.approx(fit.residuals / u)
 
 
-def test_bars_are_drawn_on_the_readings_where_one_can_see_them(tmp_path: Path) -> None:
+def test_bars_are_drawn_on_the_readings_where_one_can_see_them(tmp_path):
     small, large = (spin_down_csv(tmp_path / f"{noise}.csv", noise=noise) for noise in (0.03, 0.5))
     assert [len(panels(spindown_figure(analysis_of(path)))[0].collections) for path in (small, large)] == [0, 1]
 
 
-def test_an_outlier_squeezes_nothing_and_stands_at_the_edge_with_its_value(tmp_path: Path) -> None:
+def test_an_outlier_squeezes_nothing_and_stands_at_the_edge_with_its_value(tmp_path):
     path = with_readings(spin_down_csv(tmp_path / "a.csv"), [(6, "50.0,62.0,0.03"), (13, "120.0,3.5,0.03")])
     spin = panels(spindown_figure(analysis_of(path)))[0]
     low, high = spin.get_ylim()
@@ -156,7 +143,7 @@ def test_an_outlier_squeezes_nothing_and_stands_at_the_edge_with_its_value(tmp_p
     assert legend(spin).count("left out") == 1
 
 
-def test_every_law_is_drawn_against_the_best_one_and_named_with_the_verdict(figure: Figure) -> None:
+def test_every_law_is_drawn_against_the_best_one_and_named_with_the_verdict(figure):
     assert curves(panels(figure)[0]) == [COLOURS["disc"]]
     axes = differences(figure)
     lines = [np.asarray(line.get_ydata()) for line in axes.get_lines() if line.get_linestyle() != "None"]
@@ -172,7 +159,7 @@ def test_every_law_is_drawn_against_the_best_one_and_named_with_the_verdict(figu
     assert float(names["stokes"].split()[-2].lstrip("+−")) == pytest.approx(farthest, rel=0.05)
 
 
-def test_the_band_of_the_best_law_is_twice_its_u(analysis: SpinDownAnalysis, figure: Figure) -> None:
+def test_the_band_of_the_best_law_is_twice_its_u(analysis, figure):
     run = analysis.runs[0]
     (band,) = [one for one in differences(figure).collections if isinstance(one, PolyCollection)]
     u = run.fit("disc").u_spin_frequency(run.time[[0]])
@@ -181,7 +168,7 @@ def test_the_band_of_the_best_law_is_twice_its_u(analysis: SpinDownAnalysis, fig
     assert at_start.max() == pytest.approx(2 * u[0])
 
 
-def test_many_runs_are_one_mark_and_one_law_each(tmp_path: Path) -> None:
+def test_many_runs_are_one_mark_and_one_law_each(tmp_path):
     analysis = analysis_of(*(spin_down_csv(tmp_path / f"{k}.csv", seed=k, n=10) for k in range(12)))
     figure = spindown_figure(analysis)
     spin = panels(figure)[0]
@@ -194,20 +181,20 @@ def test_many_runs_are_one_mark_and_one_law_each(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rows", [3, 20])
-def test_nothing_that_is_written_lies_over_anything_else(tmp_path: Path, rows: int) -> None:
+def test_nothing_that_is_written_lies_over_anything_else(tmp_path, rows):
     path = spin_down_csv(tmp_path / "a.csv", n=rows)
     if rows > 12:
         with_readings(path, [(6, "50.0,62.0,0.03"), (13, "120.0,3.5,0.03")])
     assert faults(spindown_figure(analysis_of(path))) == []
 
 
-def test_readings_answer_to_the_pointer_where_each_is_a_point(page: str) -> None:
+def test_readings_answer_to_the_pointer_where_each_is_a_point(page):
     for name in ("readings-0", "residuals-best-0", "residuals-disc-0"):
         group = page[page.index(f'<g id="x-{name}">') :]
         assert group[: group.index("</g>\n   </g>")].count("<use") == 20
 
 
-def test_the_legend_shows_short_names_and_takes_them_literally(tmp_path: Path) -> None:
+def test_the_legend_shows_short_names_and_takes_them_literally(tmp_path):
     names = ["20261120T101500Z-spin-7f3a.csv", "_hidden.csv", "$a_{b$.csv", "中.csv"]
     paths = [spin_down_csv(tmp_path / name, seed=k) for k, name in enumerate(names)]
     figure = spindown_figure(analysis_of(*paths))
@@ -221,7 +208,7 @@ def test_the_legend_shows_short_names_and_takes_them_literally(tmp_path: Path) -
     assert "mixed: needless constants" in legend(differences(figure))
 
 
-def test_many_readings_are_thinned_out_and_means_show_the_shape(tmp_path: Path) -> None:
+def test_many_readings_are_thinned_out_and_means_show_the_shape(tmp_path):
     path = spin_down_csv(tmp_path / "a.csv", n=300, u=False)
     residuals = panels(spindown_figure(analysis_of(path, u=0.03)))[1]
     for axes in residuals:
@@ -230,5 +217,5 @@ def test_many_readings_are_thinned_out_and_means_show_the_shape(tmp_path: Path) 
         assert 40 in points
 
 
-def test_the_same_results_are_drawn_as_the_same_bytes(analysis: SpinDownAnalysis, page: str) -> None:
+def test_the_same_results_are_drawn_as_the_same_bytes(analysis, page):
     assert as_svg(spindown_figure(analysis), "x") == page

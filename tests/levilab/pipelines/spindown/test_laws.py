@@ -1,11 +1,8 @@
 """A law is one row of one table: everything else is made from it."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -15,9 +12,6 @@ from analysis.spindown.tilt import PARAMETERS
 from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
 from levilab.present.looks import LOOKS
 from support.paths import ROOT, SAMPLE_DATA
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 #: A row more, in a process of its own: what is made from the rows is made when modules are imported.
 TURBULENT = """
@@ -49,13 +43,13 @@ print(spin_down({"time_s": time, "spin_frequency_hz": drag.spin("turbulent", tim
 """
 
 
-def test_every_constant_has_a_symbol_and_every_law_a_colour() -> None:
+def test_every_constant_has_a_symbol_and_every_law_a_colour():
     assert set(SYMBOLS) == {name for law in LAWS.values() for name in law.parameters} | set(PARAMETERS)
     assert len({LOOKS[name].colour for name in LAWS}) == len(LAWS)
 
 
 @pytest.mark.parametrize("law", STRAIGHT_LINES)
-def test_what_is_said_to_be_straight_is_straight(law: str) -> None:
+def test_what_is_said_to_be_straight_is_straight(law):
     exponent = LAWS[law].exponent
     assert exponent is not None
     t = np.linspace(0, 200, 9)
@@ -64,7 +58,7 @@ def test_what_is_said_to_be_straight_is_straight(law: str) -> None:
     assert np.diff(drawn, 2) == pytest.approx(0, abs=1e-12)  # rounding of numbers of order one
 
 
-def with_turbulent_law(program: str, *words: str) -> str:
+def with_turbulent_law(program, *words):
     """Return what a program prints where the table of laws has a row more."""
     command = [sys.executable, "-W", "error", "-c", TURBULENT + program, *words]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
@@ -72,7 +66,7 @@ def with_turbulent_law(program: str, *words: str) -> str:
     return done.stdout
 
 
-def test_a_new_law_is_one_row_from_the_fit_to_every_page(tmp_path: Path) -> None:
+def test_a_new_law_is_one_row_from_the_fit_to_every_page(tmp_path):
     t = np.linspace(0.0, 200.0, 101)
     noise = np.random.default_rng(1).normal(0, 0.01, len(t))
     frequency = spin("power", t, 40.0, 4e-5, 1.8) + noise
@@ -99,5 +93,5 @@ def test_a_new_law_is_one_row_from_the_fit_to_every_page(tmp_path: Path) -> None
     assert "turbulent_c95_u_per_rad_s_4_5_per_s" in many.read_text()
 
 
-def test_the_live_page_has_the_equation_of_a_new_law() -> None:
+def test_the_live_page_has_the_equation_of_a_new_law():
     assert "ω̇ = −C₉/₅ω^(9/5)" in with_turbulent_law(LIVE)

@@ -1,7 +1,6 @@
 """What the fits mean: no sentence contradicts another."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from matplotlib.text import Text
@@ -9,27 +8,27 @@ from matplotlib.text import Text
 from analysis.spindown.drag import LAWS
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
+from levilab.pipelines.spindown.analysis import METHOD
 from levilab.pipelines.spindown.figure import spindown_figure
 from levilab.pipelines.spindown.laws import SYMBOLS
 from levilab.pipelines.spindown.meaning import answer, meaning
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.spindown.table import spindown_tables
-from levilab.present.document.blocks import Block, Section, Verdict
+from levilab.present.document.blocks import Section, Verdict
 from levilab.present.numbers import with_uncertainty
 from levilab.report.document import blocks_of_part
 
 U = 0.027
 
 
-def test_runs_whose_drag_differs_are_not_said_to_agree(tmp_path: Path) -> None:
+def test_runs_whose_drag_differs_are_not_said_to_agree(tmp_path):
     analysis = undecided(tmp_path)
     scatter = meaning(analysis)[-1]
     assert SYMBOLS["c32"] in scatter
     assert "agree" not in scatter
 
 
-def test_text_figure_and_tables_have_one_verdict(tmp_path: Path) -> None:
+def test_text_figure_and_tables_have_one_verdict(tmp_path):
     """Also where the power law, of more constants, has the smallest criterion."""
     analysis = undecided(tmp_path)
     first = min(analysis.combined.fits, key=lambda fit: fit.statistics.difference or 0.0)
@@ -46,7 +45,7 @@ def test_text_figure_and_tables_have_one_verdict(tmp_path: Path) -> None:
     assert "the fit of the disc law" in shown
 
 
-def test_the_report_begins_with_the_constant_and_its_u(tmp_path: Path) -> None:
+def test_the_report_begins_with_the_constant_and_its_u(tmp_path):
     analysis = undecided(tmp_path)
     c32 = analysis.combined.fit("disc").constants["c32"]
     assert answer(analysis) == f"{SYMBOLS['c32']} = {with_uncertainty(c32)} if the disc law holds."
@@ -60,13 +59,13 @@ def test_the_report_begins_with_the_constant_and_its_u(tmp_path: Path) -> None:
     assert answer(replace(analysis, combined=none)) == ""
 
 
-def result_of(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
+def result_of(analysis):
     section = blocks_of_part(ANALYSES["spindown"], analysis, spindown_part(analysis))[0]
     assert isinstance(section, Section)
     return section.blocks
 
 
-def undecided(tmp_path: Path) -> SpinDownAnalysis:
+def undecided(tmp_path):
     t, random = np.arange(0, 190, 10.0), np.random.default_rng(3)
     for c in (2.28e-4, 2.34e-4, 2.40e-4):
         f = (250**-0.5 + c * t / 2) ** -2 / (2 * np.pi) + random.normal(0, U, t.size)

@@ -1,7 +1,5 @@
 """Films of simulated tops, through a codec: place and spin against the simulator, and what is refused."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from importlib import util

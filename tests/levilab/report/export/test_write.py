@@ -1,12 +1,9 @@
 """Exports hold the numbers that were measured and found, with units, as independent readers see them."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json
 import zipfile
-from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
@@ -20,17 +17,14 @@ from levilab.report.export.contents import contents_of
 from levilab.report.export.write import FORMATS, export
 from support.paths import SAMPLE_DATA
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 RUN, TRACES = SAMPLE_DATA / "spin-down-1", SAMPLE_DATA / "trace-tape"
 
 
-def written(source: Path, out: Path, **options: str) -> list[Path]:
+def written(source, out, **options):
     return export(lambda: contents_of(source), out, **options)
 
 
-def test_netcdf_has_readings_and_result_with_units_and_uncertainties(tmp_path: Path) -> None:
+def test_netcdf_has_readings_and_result_with_units_and_uncertainties(tmp_path):
     written(RUN, tmp_path / "run.nc", creator="Group 7", licence="CC-BY-4.0")
     readings = np.genfromtxt(RUN / "readings.csv", delimiter=",", names=True)
     found = door.analyze(RUN)
@@ -48,7 +42,7 @@ def test_netcdf_has_readings_and_result_with_units_and_uncertainties(tmp_path: P
         assert data["spindown_stokes_c1"].units == "1/s"
 
 
-def test_traces_are_in_volts_and_seconds(tmp_path: Path) -> None:
+def test_traces_are_in_volts_and_seconds(tmp_path):
     head = json.loads((TRACES / "traces.jsonl").read_text(encoding="utf-8").splitlines()[1])
     volts = np.load(TRACES / head["path"]) * head["volts_per_code"] + head["offset_v"]
     written(TRACES, tmp_path / "run.nc")
@@ -60,7 +54,7 @@ def test_traces_are_in_volts_and_seconds(tmp_path: Path) -> None:
         assert float(data["trace_000002_time_s"][-1]) == pytest.approx(head["time_s"], abs=2 * head["dt_s"])
 
 
-def test_hdf5_has_the_same_variables_over_scales(tmp_path: Path) -> None:
+def test_hdf5_has_the_same_variables_over_scales(tmp_path):
     for ending in ("nc", "h5"):
         written(RUN, tmp_path / f"run.{ending}")
     with xarray.open_dataset(tmp_path / "run.nc", mask_and_scale=False) as data, h5py.File(tmp_path / "run.h5") as file:
@@ -70,7 +64,7 @@ def test_hdf5_has_the_same_variables_over_scales(tmp_path: Path) -> None:
         assert file["spin_frequency_hz"].attrs["units"] == "Hz"
 
 
-def test_csv_is_a_file_for_each_table(tmp_path: Path) -> None:
+def test_csv_is_a_file_for_each_table(tmp_path):
     files = written(RUN, tmp_path / "run.csv")
     assert [path.name for path in files] == ["run.csv", "run.spindown.csv", "run.result.csv"]
     assert pd.read_csv(files[0]).equals(pd.read_csv(RUN / "readings.csv", dtype=float))
@@ -78,7 +72,7 @@ def test_csv_is_a_file_for_each_table(tmp_path: Path) -> None:
     assert result.loc["disc", "c32"][["value", "u"]].tolist() == [*door.analyze(RUN)["c32"].__dict__.values()][:2]
 
 
-def test_a_package_describes_its_files_with_units_and_hashes(tmp_path: Path) -> None:
+def test_a_package_describes_its_files_with_units_and_hashes(tmp_path):
     written(TRACES, tmp_path / "run.zip", creator="Group 7", licence="CC0-1.0")
     with zipfile.ZipFile(tmp_path / "run.zip") as archive:
         package = json.loads(archive.read("datapackage.json"))
@@ -94,7 +88,7 @@ def test_a_package_describes_its_files_with_units_and_hashes(tmp_path: Path) -> 
     assert list(trace.columns) == ["time_s", "tape_v"]
 
 
-def test_a_file_without_a_run_is_exported_with_its_samples(tmp_path: Path) -> None:
+def test_a_file_without_a_run_is_exported_with_its_samples(tmp_path):
     written(SAMPLE_DATA / "scope-files" / "recording.wav", tmp_path / "sound.nc")
     with xarray.open_dataset(tmp_path / "sound.nc") as data:
         assert data["spin_frequency"].units == "Hz"
@@ -111,7 +105,7 @@ def test_a_file_without_a_run_is_exported_with_its_samples(tmp_path: Path) -> No
         ("README.md", "run.zip", "README.md"),
     ],
 )
-def test_what_cannot_be_exported_says_what_to_do(source: str, name: str, said: str, tmp_path: Path) -> None:
+def test_what_cannot_be_exported_says_what_to_do(source, name, said, tmp_path):
     (tmp_path / "there.zip").write_bytes(b"kept")
     with pytest.raises(LevilabError) as refused:
         written(SAMPLE_DATA / source, tmp_path / name)
@@ -120,20 +114,20 @@ def test_what_cannot_be_exported_says_what_to_do(source: str, name: str, said: s
     assert (tmp_path / "there.zip").read_bytes() == b"kept"
 
 
-def test_no_table_of_a_csv_replaces_a_file(tmp_path: Path) -> None:
+def test_no_table_of_a_csv_replaces_a_file(tmp_path):
     (tmp_path / "run.result.csv").write_text("kept", encoding="utf-8")
     with pytest.raises(LevilabError, match=r"run\.result\.csv is there already"):
         written(RUN, tmp_path / "run.csv")
     assert not (tmp_path / "run.csv").exists()
 
 
-def test_a_missing_library_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_library_is_named_with_its_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
     with pytest.raises(LevilabError, match=r'pip install "\.\[hdf5\]"'):
         written(RUN, tmp_path / "run.h5")
 
 
-def test_a_map_is_over_its_axes_in_every_format(tmp_path: Path) -> None:
+def test_a_map_is_over_its_axes_in_every_format(tmp_path):
     swept = door.sweep(
         "undriven", spin_hz=[18, 29, 40], mass_kg=["25 g", "25.2 g"], duration=0.3, out=tmp_path / "map.zarr"
     )
@@ -155,7 +149,7 @@ def test_a_map_is_over_its_axes_in_every_format(tmp_path: Path) -> None:
     assert pd.read_csv(tmp_path / "map.csv").equals(swept.to_dataframe())
 
 
-def test_the_command_names_its_file(levilab, tmp_path: Path) -> None:
+def test_the_command_names_its_file(levilab, tmp_path):
     done = levilab("export", str(RUN), "--licence", "CC-BY-4.0")
     assert done.stdout == "wrote spin-down-1.zip\n"
     refused = levilab("export", str(RUN), check=1)

@@ -1,11 +1,8 @@
 """The groups of a class beside each other: page, PDF and spreadsheet, and on a virtual bench the truth."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from html import escape
-from typing import TYPE_CHECKING, Any
 
 import pytest
 from python_calamine import CalamineWorkbook
@@ -22,15 +19,11 @@ from levilab.world.spin_world import SpinScene, random_scene
 from support.acquisitions import RAISED_QUICKLY, Silent
 from support.paths import SAMPLE_DATA
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
 #: What a spreadsheet, a page or a terminal could take for something else.
 HOSTILE = "=1+1 <b>&$x_1$"
 
 
-def measured(root: Path, groups: Sequence[str], experiment: str = "spin", *settings: str) -> Path:
+def measured(root, groups, experiment="spin", *settings):
     """Let groups measure on virtual benches; the k-th has the seed k."""
     settings = settings or RAISED_QUICKLY
     for seed, group in enumerate(groups, start=1):
@@ -39,17 +32,17 @@ def measured(root: Path, groups: Sequence[str], experiment: str = "spin", *setti
     return root
 
 
-def compared(root: Path, analysis: str = "spindown") -> Any:
+def compared(root, analysis="spindown"):
     row = ANALYSES[analysis]
     return class_of(row, row.analyze([root], row.options_from({})))
 
 
 @pytest.fixture(scope="module")
-def of_three(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def of_three(tmp_path_factory):
     return measured(tmp_path_factory.mktemp("class"), ["Group 10", "Group 2", HOSTILE])
 
 
-def test_each_group_is_beside_the_truth_of_its_seed(of_three: Path) -> None:
+def test_each_group_is_beside_the_truth_of_its_seed(of_three):
     of = compared(of_three)
     assert [group.source.name for group in of.groups] == [HOSTILE, "Group 2", "Group 10"]
     (c32,) = of.quantities
@@ -58,13 +51,13 @@ def test_each_group_is_beside_the_truth_of_its_seed(of_three: Path) -> None:
     assert all(0 < group.statistics["rms_residual"] < 0.06 for group in of.groups)  # u of a reading is 0.03 Hz
 
 
-def test_twenty_groups_lie_within_two_u_of_their_truths(tmp_path: Path) -> None:
+def test_twenty_groups_lie_within_two_u_of_their_truths(tmp_path):
     (c32,) = compared(measured(tmp_path, [f"Group {k}" for k in range(1, 21)])).quantities
     assert sum(abs(one) <= 2 for one in c32.from_truth) >= 17  # 19 are expected; fewer than 17 in one of 77 classes
     assert max(map(abs, c32.from_truth)) < 3.5
 
 
-def with_changes(root: Path, into: Path, group: str, changes: dict[str, Any]) -> Path:
+def with_changes(root, into, group, changes):
     """Copy runs, and change the record of one group's."""
     for folder in root.glob("2*"):
         shutil.copytree(folder, into / folder.name)
@@ -74,14 +67,14 @@ def with_changes(root: Path, into: Path, group: str, changes: dict[str, Any]) ->
     return into
 
 
-def test_a_real_run_has_no_truth(of_three: Path, tmp_path: Path) -> None:
+def test_a_real_run_has_no_truth(of_three, tmp_path):
     of = compared(with_changes(of_three, tmp_path, "Group 10", {"synthetic": False}))
     assert of.quantities[0].truths.count(None) == 1
     assert not of.others
 
 
 @pytest.mark.parametrize("group", [HOSTILE, "Group 10"])
-def test_the_page_names_groups_whose_seed_has_another_law(of_three: Path, tmp_path: Path, group: str) -> None:
+def test_the_page_names_groups_whose_seed_has_another_law(of_three, tmp_path, group):
     scene = {"drag": {"law": "stokes", "coefficient": 0.003}}
     root = with_changes(of_three, tmp_path, group, {"world": None, "configuration": {"scene": scene}})
     of = compared(root)
@@ -93,7 +86,7 @@ def test_the_page_names_groups_whose_seed_has_another_law(of_three: Path, tmp_pa
 
 
 @pytest.mark.parametrize(("value", "u"), [(1.0, float("nan")), (1.0, 0.0), (1.0, None), (float("nan"), 1.0)])
-def test_a_value_without_a_finite_u_is_not_compared(value: float, u: float | None) -> None:
+def test_a_value_without_a_finite_u_is_not_compared(value, u):
     parts = [{"values": {"mean": {"value": one, "u": of, "unit": "Hz"}}} for one, of in [(1.0, 0.1), (value, u)]]
     quantity = _quantity("mean", ANALYSES["limit"], "", parts, [Truth(), Truth()])
     assert [one is None for one in quantity.estimates] == [False, True]
@@ -102,7 +95,7 @@ def test_a_value_without_a_finite_u_is_not_compared(value: float, u: float | Non
 
 
 @pytest.mark.parametrize(("experiment", "names"), [("field", ["strength", "origin", "thickness"]), ("limit", ["mean"])])
-def test_other_experiments_have_their_truths_too(experiment: str, names: list[str], tmp_path: Path) -> None:
+def test_other_experiments_have_their_truths_too(experiment, names, tmp_path):
     settings = {"field": ("field.settle_s=0",), "limit": ("limit.repetitions=5", "limit.hold_s=0")}
     of = compared(measured(tmp_path, ["A", "B"], experiment, *settings[experiment]), experiment)
     assert [one.name for one in of.quantities] == names
@@ -112,7 +105,7 @@ def test_other_experiments_have_their_truths_too(experiment: str, names: list[st
     assert all(abs(one) < 3.5 for quantity in of.quantities for one in quantity.from_truth)
 
 
-def test_page_and_pdf_begin_with_the_result(of_three: Path, tmp_path: Path) -> None:
+def test_page_and_pdf_begin_with_the_result(of_three, tmp_path):
     page = write_class([of_three], tmp_path / "new" / "class.html").read_text(encoding="utf-8")
     places = [page.index(f">{title}<") for title in ("Result", "Figure")]
     assert places == sorted(places)
@@ -124,13 +117,13 @@ def test_page_and_pdf_begin_with_the_result(of_three: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("sample", ["hold", "sway", "trace-tape", "precession-sweep", "upper-limits"])
-def test_every_analysis_can_be_compared(sample: str, tmp_path: Path) -> None:
+def test_every_analysis_can_be_compared(sample, tmp_path):
     page = write_class([SAMPLE_DATA / sample], tmp_path / "class.html").read_text(encoding="utf-8")
     assert ">Result<" in page
     assert ">Figure<" in page
 
 
-def test_the_spreadsheet_has_numbers_texts_and_each_reading(of_three: Path, tmp_path: Path) -> None:
+def test_the_spreadsheet_has_numbers_texts_and_each_reading(of_three, tmp_path):
     file = write_class([of_three], tmp_path / "class.xlsx")
     book = CalamineWorkbook.from_path(file)
     assert book.sheet_names == ["spindown groups", "spindown class", "spindown readings"]
@@ -145,6 +138,6 @@ def test_the_spreadsheet_has_numbers_texts_and_each_reading(of_three: Path, tmp_
     assert file.read_bytes() == write_class([of_three], tmp_path / "again.xlsx").read_bytes()
 
 
-def test_another_ending_is_refused_with_those_that_are_known(of_three: Path, tmp_path: Path) -> None:
+def test_another_ending_is_refused_with_those_that_are_known(of_three, tmp_path):
     with pytest.raises(UsageError, match=r"\.html, \.pdf or \.xlsx"):
         write_class([of_three], tmp_path / "class.ods")

@@ -1,11 +1,8 @@
 """Worksheets and keys: each language is complete, the commands work, and students find the numbers of the key."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex
-from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -18,19 +15,16 @@ from levilab.report.worksheets.catalog import SHEETS, languages, read_language
 from levilab.report.worksheets.write import measure, write_worksheets
 from support.pages import Page
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 LANGUAGES = languages()
 #: The sweep of a top in full motion takes 8 s.
 BY_TIME = [pytest.param(name, marks=pytest.mark.slow) if name == "precession" else name for name in SHEETS]
 
 
-def table_of(code: str) -> dict[str, Any]:
+def table_of(code):
     return parse_toml((catalog._TEXTS / f"{code}.toml").read_text(encoding="utf-8"))
 
 
-def shape(value: Any) -> Any:
+def shape(value):
     """The keys, the lengths of lists, and the names in braces of a table of texts."""
     if isinstance(value, dict):
         return {key: shape(one) for key, one in value.items()}
@@ -40,18 +34,18 @@ def shape(value: Any) -> Any:
     return sorted(re.findall(r"\{\w+\}", value))
 
 
-def test_english_and_german_are_there() -> None:
+def test_english_and_german_are_there():
     assert {"de", "en"} <= {*LANGUAGES}
 
 
 @pytest.mark.parametrize("code", LANGUAGES)
-def test_a_language_has_every_text(code: str) -> None:
+def test_a_language_has_every_text(code):
     assert shape(table_of(code)) == shape(table_of("en"))
     assert all(len(texts.tasks) == len(texts.answers) for texts in read_language(code).sheets.values())
 
 
 @pytest.mark.parametrize("code", LANGUAGES)
-def test_every_text_is_used(code: str, tmp_path: Path) -> None:
+def test_every_text_is_used(code, tmp_path):
     files = write_worksheets(["field"], tmp_path, {"A": 1}, language=code)
     page = " ".join(Page(file.read_text(encoding="utf-8")).text for file in files)
     language = read_language(code)
@@ -64,10 +58,10 @@ def test_every_text_is_used(code: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("experiment", BY_TIME)
 @pytest.mark.usefixtures("undrawn_figures")
-def test_the_commands_of_a_worksheet_find_the_numbers_of_its_key(experiment: str, tmp_path: Path, levilab: Any) -> None:
+def test_the_commands_of_a_worksheet_find_the_numbers_of_its_key(experiment, tmp_path, levilab):
     sheet, seeds = SHEETS[experiment], {"Group 1": 41}
     (file,) = write_worksheets([experiment], tmp_path, seeds, keys=False)
-    commands = re.findall(r"levilab [^\n<]+", re.search(r"<pre>.*?</pre>", file.read_text("utf-8"), re.DOTALL)[0])  # type: ignore[index]
+    commands = re.findall(r"levilab [^\n<]+", re.search(r"<pre>.*?</pre>", file.read_text("utf-8"), re.DOTALL)[0])
     assert len(commands) == len(sheet.commands("", 0))
     for command in commands:
         levilab(*shlex.split(command.replace("&quot;", '"'))[1:])
@@ -80,7 +74,7 @@ def test_the_commands_of_a_worksheet_find_the_numbers_of_its_key(experiment: str
     assert json.loads(next((tmp_path / "class").glob("2*/run.json")).read_text(encoding="utf-8"))["seed"] == 41
 
 
-def test_a_key_has_the_values_and_truths_of_each_seed_and_the_worksheet_none(tmp_path: Path) -> None:
+def test_a_key_has_the_values_and_truths_of_each_seed_and_the_worksheet_none(tmp_path):
     seeds = {"Gruppe 1": 7, "Gruppe 2": 8}
     sheet, key = write_worksheets(["spin"], tmp_path, seeds, language="de")
     assert (sheet.name, key.name) == ("spin-de.html", "spin-key-de.html")
@@ -93,6 +87,6 @@ def test_a_key_has_the_values_and_truths_of_each_seed_and_the_worksheet_none(tmp
 
 
 @pytest.mark.parametrize(("experiment", "language"), [("orbit", "en"), ("spin", "xx"), ("precesion", "en")])
-def test_what_is_unknown_is_refused_with_what_there_is(experiment: str, language: str, tmp_path: Path) -> None:
+def test_what_is_unknown_is_refused_with_what_there_is(experiment, language, tmp_path):
     with pytest.raises(UsageError, match=r"precession|de, en"):
         write_worksheets([experiment], tmp_path, {"A": 1}, language=language)
