@@ -40,7 +40,8 @@ quick: setup  ## within a minute: style and types, and the tests that are not sl
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -m 'not slow' && tests=0 || tests=$$?; wait $$types && exit $$tests
 
-explore: setup  ## the property tests with new random examples
+explore: setup  ## simulated laboratories for SECONDS (600), and the property tests with new random examples
+	$(BIN)/levilab fuzz --seed $(or $(SEED),$(shell date +%s)) --seconds $(or $(SECONDS),600)
 	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest tests/levilab/formats tests/analysis tests/instruments
 
 fuzz: setup  ## what a fuzzer guided by coverage finds, SECONDS for each target (60); see docs/fuzzing.md

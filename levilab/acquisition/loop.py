@@ -6,6 +6,7 @@ Whatever ends it, the outputs are off, the run is kept and says how it ended.
 from __future__ import annotations
 
 import contextlib
+import math
 import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -184,7 +185,10 @@ def _earlier(request: AcquisitionRequest) -> Earlier | None:
     if request.resume is None:
         return None
     columns = request.resume.readings().columns
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*(c.tolist() for c in columns.values()), strict=True)]
+    rows = [
+        {name: value for name, value in zip(columns, row, strict=True) if not math.isnan(value)}
+        for row in zip(*(c.tolist() for c in columns.values()), strict=True)
+    ]
     return Earlier(request.resume, rows, replay=request.synthetic_how is not None)
 
 

@@ -99,6 +99,7 @@ class Row(NamedTuple):
     made_of: str
     help: str
     example: str = ""
+    is_hidden: bool = False
 
 
 #: The commands by their names; what each is made of is imported by its call.
@@ -213,13 +214,24 @@ COMMANDS = {
         "levilab live --mock",
     ),
     "benchmark": Row("simulate.benchmark_app", "Compare speed and error with other programs."),
+    "fuzz": Row(
+        "fuzz.fuzz",
+        """Carry out simulated laboratories, one a seed: acquire, kill, resume, analyze, and judge what is left.
+
+        For people who work on levilab.  Where something is wrong it prints the shortest story that still fails, and
+        ends with 1.""",
+        "levilab fuzz --number 1000",
+        is_hidden=True,
+    ),
 }
 
 
 def _add(name: str, row: Row) -> None:
     module, _, made = row.made_of.partition(".")
 
-    @app.command(name, cls=Later, help=row.help, epilog=f"Example: {row.example}" if row.example else None)
+    epilog = f"Example: {row.example}" if row.example else None
+
+    @app.command(name, cls=Later, help=row.help, epilog=epilog, hidden=row.is_hidden)
     def command() -> Any:
         return getattr(import_module(f"levilab.cli.{module}"), made)
 

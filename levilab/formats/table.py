@@ -35,9 +35,10 @@ LONGEST_HEADER = 1 << 16  # bytes
 class Table:
     """A table of readings.
 
-    `columns` are canonical (`time_s`, `spin_frequency_hz`, …): SI, float64, shape (rows,), all finite; `lines`, shape
-    (rows,), is the 1-based line of `path` that each row stands in; `header` are the titles in the file; `factors` are
-    those to SI that the file's numbers were multiplied by.
+    `columns` are canonical (`time_s`, `spin_frequency_hz`, …): SI, float64, shape (rows,), all finite but for a run's
+    other channels, where NaN is a value that was not known; `lines`, shape (rows,), is the 1-based line of `path` that
+    each row stands in; `header` are the titles in the file; `factors` are those to SI that the file's numbers were
+    multiplied by.
     """
 
     path: Path
@@ -144,7 +145,7 @@ def read_run_readings(path: Path, channels: Collection[str] = ()) -> Table:
         cut = (f"line 1: '{shorten(title)}' was cut off and is left out",) if title else ()
         nothing = Rows((), np.zeros(0, np.int64), cut)
         rows = read_rows(Text(path), layout, chosen, drop_unended=True) if header else nothing
-    return _table(path, header, chosen, rows, ())
+    return _table(path, header, chosen, rows, (), gaps=set(channels) - set(CANONICAL))
 
 
 class ColumnsError(UsageError):
@@ -198,14 +199,23 @@ def _of_run(rows: Rows, plan: Plan) -> Rows:
 
 
 def _table(
-    path: Path, header: tuple[str, ...], chosen: Sequence[Column], rows: Rows, warnings: tuple[str, ...]
+    path: Path,
+    header: tuple[str, ...],
+    chosen: Sequence[Column],
+    rows: Rows,
+    warnings: tuple[str, ...],
+    *,
+    gaps: Collection[str] = (),
 ) -> Table:
-    """Leave out missed readings, and columns of uncertainties with gaps; then convert to SI."""
+    """Leave out missed readings, and columns of uncertainties with gaps; then convert to SI.
+
+    gaps: names of columns that may have some, at no cost of a row.
+    """
     name = shorten(str(path), 200)
     notes = [*warnings, *(f"{name}: {note}" for note in rows.notes)]
     numbers = dict(zip(chosen, rows.values, strict=False))
     # The comparison is false for NaN, too.
-    present = {column: np.abs(values) < NO_READING for column, values in numbers.items()}
+    present = {column: np.abs(values) < NO_READING for column, values in numbers.items() if column.name not in gaps}
     present = {column: there & (numbers[column] != 0) if column.inverse else there for column, there in present.items()}
     companions = {companion(column.name) for column in chosen} | COMPANIONS.keys()
     quantity = [p for c, p in present.items() if c.name not in companions]
@@ -218,7 +228,8 @@ def _table(
                 "is not used"
             )
     good = np.logical_and.reduce(list(present.values())) if present else np.ones(rows.lines.size, bool)
-    lines, kept = rows.lines, {column: numbers[column] for column in present}
+    kept = {column: values for column, values in numbers.items() if column in present or column.name in gaps}
+    lines = rows.lines
     if not good.all():
         notes.append(_missed_warning(name, lines[~good], good.size, periods=any(column.inverse for column in present)))
         lines, kept = lines[good], {column: values[good] for column, values in kept.items()}

@@ -467,6 +467,15 @@ def test_a_run_without_readings_is_an_empty_table(text, table_file):
     assert len(table.warnings) == (text != "" and not text.endswith("\n"))
 
 
+def test_a_channel_of_a_run_that_was_not_known_costs_no_row(table_file):
+    """As of an oscilloscope's record without a frequency, which a resumed run would take again."""
+    path = table_file(f"{T},record,tape_frequency_hz\n0,1,\n1,2,30.5\n2,3,\n")
+    table = read_run_readings(path, (T, "record", "tape_frequency_hz"))
+    assert table.column("record").tolist() == [1, 2, 3]
+    assert np.isnan(table.column("tape_frequency_hz")).tolist() == [True, False, True]
+    assert table.warnings == ()
+
+
 @BOTH_WAYS
 @pytest.mark.parametrize("last", ["1.5,60.5", "1.5,60.", "1.5", "1", "\0\0\0"])
 def test_a_runs_last_line_without_end_is_torn_even_if_it_parses(last, table_file):

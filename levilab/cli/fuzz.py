@@ -1,0 +1,41 @@
+"""The simulated laboratory, for people who work on levilab."""
+
+from typing import Annotated
+
+import typer
+
+from levilab.cli import exit_codes
+from levilab.cli.output import message, result
+
+
+def fuzz(
+    seed: Annotated[int, typer.Option(min=0, help="Of the laboratory, or of the first one.")] = 0,
+    number: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="That many laboratories.", show_default="1, or no end")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(min=0, metavar="S", help="Begin no more after this time.")] = None,
+    cores: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="all cores")] = None,
+    trace: Annotated[bool, typer.Option("--trace", help="Print each step of one laboratory.")] = False,
+) -> None:
+    """Carry out laboratories, and end with 1 where something is wrong."""
+    from levilab.laboratory.explore import explore
+    from levilab.laboratory.plan import draw
+    from levilab.laboratory.shrink import shrink
+    from levilab.laboratory.visit import Told, visit
+
+    def tell(told: Told) -> None:
+        small = shrink(told, exit_codes.exit_status)
+        message("\n".join([*small.story, *(f"{one.oracle.upper()}: {one.text}" for one in small.findings), ""]))
+
+    if number is None and seconds is None:
+        told = visit(draw(seed), exit_codes.exit_status)
+        result("\n".join([*(told.trace if trace else ()), *told.story, f"trace {told.digest}"]))
+        failed = [told] if told.findings else []
+        for one in failed:
+            tell(one)
+    else:
+        explored = explore(seed, exit_codes.exit_status, number=number, seconds=seconds, cores=cores, tell=tell)
+        result(explored.text)
+        failed = explored.failed
+    if failed:
+        raise typer.Exit(exit_codes.FAILED)

@@ -1,0 +1,227 @@
+"""What must hold in each laboratory."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from levilab.errors import LevilabError
+from levilab.laboratory.life import Compared
+from levilab.runs.run import Run
+from levilab.simulator.laws import LAWS
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Sequence
+    from pathlib import Path
+
+    from levilab.acquisition.session import Row, Session
+    from levilab.laboratory.bench import LaboratoryBench
+    from levilab.laboratory.life import Life
+    from levilab.laboratory.plan import Plan
+    from levilab.world.spin_world import SpinWorld
+
+#: An analysed value further from the truth than this [u] needs a warning; a single reading may be a little further,
+#: since there are a thousand times as many of them.
+_MOST_U, _MOST_U_OF_READING = 5.0, 7.0
+#: Readings that are compared with those of a run that was not broken off, and the columns of their u.
+_U = {"spin_frequency_hz": "spin_frequency_u_hz", "flux_density_t": "flux_density_u_t"}
+#: Readings from which on a scatter of them is known well enough for 5 u to be far off: Student's law with 8 degrees of
+#: freedom has one value in 1000 beyond, in laboratories whose counter states no u.
+_FEW = 10
+#: What no message may hold: Python's own words.
+_PYTHON = re.compile(r"Traceback|<[a-z_.]+ object at|\bNone\b|\bNaN\b|Error\(|\{\}|errno")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that must not be.
+
+    Attributes:
+        oracle: what was broken.
+        text: what was seen.
+    """
+
+    oracle: str
+    text: str
+
+
+def compare(session: Session[Any], world: SpinWorld, plan: Plan, first: int) -> list[Compared]:
+    """Return the spins that a process has read beside those of the world; none for other experiments."""
+    if plan.experiment != "spin" or session.zero is None:
+        return []
+    rows = session.rows[first:]
+    gate = float(session.bench.counter.last_set.get("gate_s", session.settings.gate_s))  # a multimeter has three
+    found = []
+    for row in rows:
+        at = session.zero + row["time_s"]
+        spin, _ = world.motion(np.linspace(at - gate / 2, at + gate / 2, 9))
+        truth = float(np.mean(spin)) / (2 * math.pi)
+        u = math.hypot(row.get("spin_frequency_u_hz", 0.0), math.sqrt(2) * plan.scene.jitter / gate)
+        found.append(Compared(row, truth, u))
+    return found
+
+
+def drives(bench: LaboratoryBench) -> bool:
+    """Return whether a generator of the bench has its output on."""
+    outputs = [device.signal() for device in bench.instruments.values() if hasattr(device, "signal")]
+    return any(output.amplitude or output.offset or output.triggered for output in outputs)
+
+
+# --- the processes ---
+
+
+def lives(plan: Plan, processes: Sequence[Life], folders: Sequence[Path]) -> Iterator[Finding]:
+    """Yield what is wrong with what the processes have shown, said and left."""
+    for life in processes:
+        yield from _ended_well(life)
+        yield from _outputs(life)
+        yield from _readings_are_true(life)
+    yield from _files_are_whole(plan, processes, folders)
+
+
+def _ended_well(life: Life) -> Iterator[Finding]:
+    if life.ended == "broken":
+        yield Finding("traceback", life.text)
+        return
+    if life.error is not None:
+        yield from message(life.text, f"process {life.number + 1}")
+    if life.ended == "failed" and life.left == "finished":
+        yield Finding("status", f"the process failed ({life.text}), and the run says finished")
+    if life.ended == "killed" and life.left not in {"", "interrupted", "finished"}:
+        yield Finding("status", f"the process was killed, and the run says {life.left}")
+    if life.ended in {"finished", "interrupted"} and life.left != life.ended:
+        yield Finding("status", f"the process {life.ended}, and the run says {life.left}")
+
+
+def message(text: str, whose: str) -> Iterator[Finding]:
+    """Yield what is wrong with the text of a failure: it is one line, in words, and says what to do."""
+    if not text.strip() or "\n" in text or _PYTHON.search(text):
+        yield Finding("message", f"{whose}: {text!r}")
+
+
+def _outputs(life: Life) -> Iterator[Finding]:
+    if life.output_on and life.ended != "killed" and "MAY STILL BE ON" not in life.text:
+        yield Finding("output", f"process {life.number + 1} {life.ended}, and the drive is on: {life.text}")
+
+
+def _readings_are_true(life: Life) -> Iterator[Finding]:
+    for one in life.truth:
+        off = (one.row["spin_frequency_hz"] - one.truth) / one.u
+        if abs(off) > _MOST_U_OF_READING:
+            text = f"{one.row} is {off:+.1f} u from the truth, {one.truth:.4f} Hz"
+            yield Finding("wrong reading", f"process {life.number + 1}: {text}")
+
+
+# --- the files ---
+
+
+def _files_are_whole(plan: Plan, processes: Sequence[Life], folders: Sequence[Path]) -> Iterator[Finding]:
+    runs = [run for folder in folders if (run := _loaded(folder))]
+    rows = [_rows_of(run) for run in runs]
+    events = {event["text"] for run in runs for event in run.events()}
+    for life in processes:
+        if "readings again that were removed" not in life.text:  # by the person, and the disk failed: it was said
+            yield from _nothing_lost(life, rows, events)
+    for run, stored in zip(runs, rows, strict=True):
+        times = [row.get("time_s", math.nan) for row in stored]
+        if any(not after > before for before, after in pairwise(times)):
+            yield Finding("doubled", f"{run.folder}: times {times}")
+        if plan.experiment == "spin":
+            yield from _nothing_skipped(run, times)
+
+
+def _nothing_lost(life: Life, rows: Sequence[list[Row]], events: Collection[str]) -> Iterator[Finding]:
+    """Yield the readings and events that were shown and are nowhere."""
+    shown = [_rounded(row) for row in life.shown]
+    if shown and not any(_follow(shown, stored) for stored in rows):
+        missing = [row for row in shown if not any(row in stored for stored in rows)]
+        yield Finding("lost", f"process {life.number + 1} has shown {len(shown)} readings; missing: {missing[:3]}")
+    for text in life.events:
+        if text not in events:
+            yield Finding("lost", f"process {life.number + 1} has shown the event {text!r}, which is in no run")
+
+
+def _nothing_skipped(run: Run, times: list[float]) -> Iterator[Finding]:
+    """Yield gaps between readings that no event explains."""
+    interval = run.record.configuration["spin"]["interval_s"]
+    said = [event["time_s"] for event in run.events() if event["time_s"] is not None]
+    for before, after in pairwise(times):
+        if after - before > 1.5 * interval and not any(before <= time <= after for time in said):
+            yield Finding("skipped", f"{run.folder}: no reading between {before:g} s and {after:g} s, and no event")
+
+
+def _follow(shown: list[Row], stored: list[Row]) -> bool:
+    """Return whether the rows that were shown stand in a run one after the other, with none between them."""
+    starts = [k for k, row in enumerate(stored) if row == shown[0]]
+    return any(stored[k : k + len(shown)] == shown for k in starts)
+
+
+def _rows_of(run: Run) -> list[Row]:
+    try:
+        columns = run.readings().columns
+    except LevilabError:
+        return []
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return [_rounded(dict(zip(columns, row, strict=True))) for row in rows]
+
+
+def _rounded(row: Row) -> Row:
+    """Return a row without what is not known; numbers are read to the last bit but one."""
+    return {name: float(f"{value:.14g}") for name, value in row.items() if not math.isnan(value)}
+
+
+def _loaded(folder: Path | None) -> Run | None:
+    try:
+        return Run.load(folder) if folder is not None else None
+    except LevilabError:
+        return None
+
+
+def rows_in(folder: Path | None) -> list[Row]:
+    """Return the rows of the run in a folder."""
+    run = _loaded(folder)
+    return _rows_of(run) if run else []
+
+
+def same_rows(first: list[Row], second: list[Row]) -> Iterator[Finding]:
+    """Yield where a run that was broken off and resumed differs from one that was not, which is the second one."""
+    if len(first) != len(second):
+        yield Finding("resumed", f"{len(first)} readings, and {len(second)} of a run that was not broken off")
+        return
+    for one, other in zip(first, second, strict=True):
+        for name, u_name in _U.items():
+            if name in one and abs(one[name] - other[name]) > _MOST_U_OF_READING * math.hypot(
+                one[u_name], other[u_name]
+            ):
+                yield Finding("resumed", f"{one}, and in a run that was not broken off {other}")
+
+
+# --- the analyses ---
+
+
+def values(plan: Plan, analysis: str, result: Any) -> Iterator[Finding]:
+    """Yield the values of an analysis that are wrong, without a warning."""
+    if result.all_warnings and not plan.is_calm:
+        return
+    scene = plan.scene
+    if analysis == "spindown":
+        (run,) = result.runs
+        fit = next((fit for fit in run.fits if fit.name == scene.drag), None)
+        for name, truth in zip(LAWS[scene.drag].names, scene.constants, strict=True):
+            yield from _value(
+                fit.parameters.get(name) if fit and len(run.time) >= _FEW else None, truth, f"{scene.drag} {name}"
+            )
+    elif analysis == "field":
+        for name, of_base in {"strength": "strength_t_m", "origin": "origin_m"}.items():
+            yield from _value(result.values.get(name), getattr(scene.base, of_base), name)
+
+
+def _value(found: Any, truth: float, name: str) -> Iterator[Finding]:
+    if found is not None and found.u and abs(found.value - truth) > _MOST_U * found.u:
+        off = (found.value - truth) / found.u
+        yield Finding("wrong value", f"{name} = {found.value:.6g}, {off:+.1f} u from the truth {truth:.6g}")

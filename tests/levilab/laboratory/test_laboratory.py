@@ -1,0 +1,123 @@
+"""The simulated laboratory: the same for the same seed, nothing is wrong in it, and it notices what would be."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from levilab.bench.bench import Bench
+from levilab.cli.exit_codes import exit_status
+from levilab.laboratory.disk import SimulatedComputer
+from levilab.laboratory.fate import Event
+from levilab.laboratory.plan import Plan, draw
+from levilab.laboratory.shrink import shrink
+from levilab.laboratory.visit import Told, visit
+from levilab.runs.writer import RunWriter
+
+if TYPE_CHECKING:
+    import subprocess
+    from collections.abc import Callable
+
+#: Each of these once failed: a loss of power took events (15, 87, 133), records without a frequency were no rows (1058,
+#: 1095), a computer that stood still gave a reading a wrong time (1218).
+FAILED_ONCE = (15, 87, 133, 1058, 1095, 1218)
+
+
+@pytest.mark.parametrize("seed", [*FAILED_ONCE, *range(6)])
+def test_nothing_is_wrong_in_a_laboratory(seed: int) -> None:
+    told = visit(draw(seed), exit_status)
+    assert told.findings == (), "\n".join(told.story)
+
+
+def test_a_seed_gives_the_same_trace_in_another_process(
+    levilab_process: Callable[..., subprocess.CompletedProcess[str]],
+) -> None:
+    """Python orders sets differently there."""
+    told = visit(draw(87), exit_status)
+    assert len(told.trace) > 500
+    assert levilab_process("fuzz", "--seed", "87").stdout.splitlines()[-1] == f"trace {told.digest}"
+
+
+# --- what it would notice ---
+
+
+def spin_down(*events: Event) -> Plan:
+    """A spin-down of a top that was spun by hand, with these events and no others."""
+    settings = ("spin.drive_waveform=NONE", "spin.interval_s=5")
+    return replace(draw(0), experiment="spin", settings=settings, mock=False, models={}, typed={}, events=events)
+
+
+def oracles(told: Told) -> set[str]:
+    return {finding.oracle for finding in told.findings}
+
+
+def without_sync(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(SimulatedComputer, "sync", lambda *_: None)
+
+
+def shown_before_written(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(RunWriter, "reading", lambda *_: None)
+
+
+def written_twice(patch: pytest.MonkeyPatch) -> None:
+    once = RunWriter.reading
+    patch.setattr(RunWriter, "reading", lambda *given: [once(*given), once(*given)])
+
+
+def left_on(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Bench, "outputs_off", lambda _: None)
+
+
+def with_a_defect(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Bench, "changed_settings", lambda *_: {}["of no such name"])
+
+
+def off_by_a_turn(patch: pytest.MonkeyPatch) -> None:
+    once = RunWriter.reading
+
+    def reading(writer: RunWriter, row: dict[str, Any]) -> None:
+        row["spin_frequency_hz"] += 0.5
+        once(writer, row)
+
+    patch.setattr(RunWriter, "reading", reading)
+
+
+@pytest.mark.parametrize(
+    ("mistake", "oracle", "plan"),
+    [
+        (without_sync, "lost", spin_down(Event("power", 0, 150))),
+        (shown_before_written, "lost", spin_down()),
+        (written_twice, "doubled", spin_down()),
+        (with_a_defect, "traceback", spin_down()),
+        (off_by_a_turn, "wrong reading", spin_down()),
+        (left_on, "output", replace(draw(8), events=(Event("ctrl-c", 0, 300),))),
+    ],
+)
+def test_a_mistake_in_the_program_is_noticed(
+    mistake: Callable[[pytest.MonkeyPatch], None], oracle: str, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert visit(plan, exit_status).findings == ()
+    mistake(monkeypatch)
+    assert oracle in oracles(visit(plan, exit_status))
+
+
+def test_a_failure_is_shrunk_to_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    without_sync(monkeypatch)
+    events = [Event("slow disk", 0, 20, 0.01), Event("clock", 0, 40), Event("power", 0, 150), Event("lid", 1, 30)]
+    plan = replace(spin_down(*events), typed={"group": "Group 7"}, models={"counter": "CNT-91"})
+    small = shrink(visit(plan, exit_status), exit_status)
+    assert [event.what for event in small.plan.events] == ["power"]
+    assert not small.plan.typed
+    assert not small.plan.models
+    story = "\n".join(small.story)
+    assert re.search(r"step 150: the computer loses its power\nprocess 1: [1-9]\d* readings shown; killed", story)
+
+
+def test_laboratories_are_carried_out_in_processes(
+    levilab: Callable[..., subprocess.CompletedProcess[str]],
+) -> None:
+    told = levilab("fuzz", "--number", "3", "--cores", "1").stdout
+    assert re.fullmatch(r"3 laboratories, \d+ a minute: 0 failed\n", told)
