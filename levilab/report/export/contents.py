@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -230,7 +231,7 @@ def _facts(run: Run | None, path: Path, results: Results) -> dict[str, str]:
     warnings = dict.fromkeys(unquote(text) for _, found in results for text in found.all_warnings)
     facts = {"warnings": "; ".join(warnings)}
     if run is None:
-        return facts | {"source": f"the file {path.name}"}
+        return facts | {"source": f"the file {path.name}", "history": f"read by levilab {version('levilab')}"}
     record = run.record
     models = [str(about.get("identity", "")) for about in record.instruments.values()]
     return facts | {

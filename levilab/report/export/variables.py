@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levilab.present.units import split
+from levilab.present.units import UNITS, split
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from levilab.report.export.contents import Column, Contents, Table, Value
 
 CONVENTIONS = "CF-1.8"
+_SI = {one.si for one in UNITS}
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,8 @@ def units_of(si: str) -> dict[str, str]:
     >>> units_of("T m"), units_of("Vpp"), units_of("(rad/s)^-1/2/s")
     ({'units': 'T m'}, {'units': 'V'}, {'unit': '(rad/s)^-1/2/s'})
     """
-    if si.startswith("(") or si == "dB":  # a power that is no whole number; a logarithm
+    # a power that is no whole number, a logarithm, a unit of a file's own
+    if si not in _SI or si.startswith("(") or si == "dB":
         return {"unit": si}
     return {"units": {"Vpp": "V", "turns": "turn"}.get(si, si)}
 
