@@ -1,15 +1,18 @@
 """Export.  Heavy imports happen inside the command."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from levilab.cli.analyze import takes_options
 from levilab.cli.options import existing_path, place, writable
 from levilab.cli.output import interruptible, message, result
 from levilab.cli.quantities import with_options
+from levilab.pipelines.options import OF_REPORT, read_options
 
 
+@takes_options(OF_REPORT)
 def export_data(
     context: typer.Context,
     path: Annotated[
@@ -22,7 +25,7 @@ def export_data(
         ),
     ],
     file: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", readable=False, help="The same as --out.", callback=writable)
+        Path | None, typer.Argument(metavar="FILE", readable=False, help="The same as --out.", callback=writable)
     ] = None,
     out: Annotated[
         Path | None,
@@ -38,18 +41,21 @@ def export_data(
         str, typer.Option(metavar="NAME", help="Under which others may use the data, as CC-BY-4.0 or CC0-1.0.")
     ] = "",
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
+    **given: Any,
 ) -> None:
     """Export."""
     from levilab.report.export.contents import contents_of
     from levilab.report.export.write import export
 
-    app = context.find_root().command
+    app, options = context.find_root().command, read_options(given, typed=True)
 
     def tell(text: str) -> None:
         message(with_options(text, app))
 
     target = out or file or Path(f"{path.stem if path.is_file() or path.suffix == '.zarr' else path.name}.zip")
     with interruptible("nothing is written"):
-        written = export(lambda: contents_of(path, tell), target, creator=creator, licence=licence, force=force)
+        written = export(
+            lambda: contents_of(path, tell, options), target, creator=creator, licence=licence, force=force
+        )
     for one in written:
         result(f"wrote {one}")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass, field
 from importlib.metadata import version
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -114,12 +116,15 @@ class Contents:
         return Table("result", tuple(Column(name, values, "1", text) for name, values, text in described), "a quantity")
 
 
-def contents_of(place: Path | Store, tell: Callable[[str], None] = lambda _: None) -> Contents:
+def contents_of(
+    place: Path | Store, tell: Callable[[str], None] = lambda _: None, given: Mapping[str, Any] | None = None
+) -> Contents:
     """Return what is exported of a run folder, a data file or a sweep.
 
     Args:
         place: a path, or the store of a sweep.
         tell: called with the reason why there is no result.
+        given: options of analyses by their names.
 
     Raises:
         DataError: there is nothing, or several runs.
@@ -135,7 +140,7 @@ def contents_of(place: Path | Store, tell: Callable[[str], None] = lambda _: Non
         raise _several(path, len(runs))
     run = Run.load(path) if (path / RECORD).exists() else None
     try:
-        results = recall_suiting([path], {}, tell)
+        results = recall_suiting([path], given or {}, tell)
     except (DataError, AnalysisError) as error:
         if run is None:
             raise
@@ -196,12 +201,13 @@ def _of_analysis(result: tuple[Analysis[Any], Any]) -> Table:
 def _of_waveform(numbered: tuple[int, Waveform]) -> Table:
     """Return a record of an oscilloscope in seconds and volts."""
     number, waveform = numbered
-    about = f"a sample of {waveform.format}"
+    about, taken = f"a sample of {waveform.format}", {"time_s"}
     columns = [Column("time_s", waveform.times_of(0, waveform.count), "s", "time of the sample")]
     for k, signal in enumerate(waveform.signals):
         # a code has 16 bits at most, and a float of 32 bits 24
         samples = np.concatenate([*waveform.read(k)]).astype(np.float32)
-        columns.append(Column(f"{signal.name}_{signal.unit.lower()}", samples, signal.unit, signal.name))
+        name = free_name(f"{signal.name}_{re.sub(r'[^a-z]+', '_', signal.unit.lower())}", taken)
+        columns.append(Column(name, samples, signal.unit, signal.name))
     return Table(f"trace-{number:06d}", tuple(columns), about)
 
 
@@ -267,6 +273,19 @@ def _of_sweep(store: Store) -> Contents:
     }
     table = Table("points", tuple(rows), "a point of the map")
     return Contents(name, headline(summarise(store)), (table,), about, axes=grid, arrays=arrays)
+
+
+def free_name(name: str, taken: set[str]) -> str:
+    """Return the name, with a number behind it where it is taken; it is taken from then on.
+
+    >>> taken = {"CH1_v"}
+    >>> free_name("CH1_v", taken), free_name("CH1_v", taken), free_name("CH2_v", taken)
+    ('CH1_v_2', 'CH1_v_3', 'CH2_v')
+    """
+    names = chain([name], (f"{name}_{number}" for number in count(2)))
+    free = next(one for one in names if one not in taken)
+    taken.add(free)
+    return free
 
 
 def unit_of_name(name: str) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.present.units import UNITS, split
+from levilab.report.export.contents import free_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -45,15 +46,16 @@ class Variable:
 def variables_of(contents: Contents) -> list[Variable]:
     """Return the variables of what is exported: a map's over its axes, else the columns of its tables and the result.
 
-    Variables of all tables but the first begin with the table's name, those of a result with that of the analysis.
+    Variables of all tables but the first begin with the table's name, those of a result with it and the analysis.
     """
     if contents.axes:
         keys = tuple(plain_name(axis.name) for axis in contents.axes)
         axes = [_variable(axis, key, (key,)) for axis, key in zip(contents.axes, keys, strict=True)]
         return [*axes, *(_variable(one, plain_name(one.name), keys) for one in contents.arrays)]
+    taken: set[str] = set()
     tables = enumerate(contents.tables)
-    found = [one for k, table in tables for one in _of_table(table, f"{table.name}_" if k else "")]
-    return [*found, *(one for value in contents.values for one in _of_value(value))]
+    found = [one for k, table in tables for one in _of_table(table, f"{table.name}_" if k else "", taken)]
+    return [*found, *(one for value in contents.values for one in _of_value(value, taken))]
 
 
 def attributes_of(contents: Contents) -> dict[str, str]:
@@ -84,7 +86,7 @@ def units_of(si: str) -> dict[str, str]:
     return {"units": {"Vpp": "V", "turns": "turn"}.get(si, si)}
 
 
-def _of_table(table: Table, prefix: str) -> Iterator[Variable]:
+def _of_table(table: Table, prefix: str, taken: set[str]) -> Iterator[Variable]:
     """Yield the columns of a table over the first one where that increases, else over the number of the row."""
     first, names = table.columns[0], {column.name for column in table.columns}
     increases = first.values.dtype.kind == "f" and bool(np.isfinite(first.values).all())
@@ -92,6 +94,7 @@ def _of_table(table: Table, prefix: str) -> Iterator[Variable]:
     dimension = plain_name(f"{prefix}{first.name if increases else 'row'}")
     if not increases:
         rows = np.arange(1, len(first.values) + 1, dtype=np.int32)
+        taken.add(dimension)
         yield Variable(dimension, (dimension,), rows, {"long_name": f"number of {table.about}", "units": "1"})
     for column in table.columns:
         more = {}
@@ -100,7 +103,7 @@ def _of_table(table: Table, prefix: str) -> Iterator[Variable]:
         quantity, unit = split(column.name)
         if unit and (of_u := f"{quantity}_u_{unit.ending}") in names:
             more["ancillary_variables"] = plain_name(f"{prefix}{of_u}")
-        yield _variable(column, plain_name(f"{prefix}{column.name}"), (dimension,), more)
+        yield _variable(column, free_name(plain_name(f"{prefix}{column.name}"), taken), (dimension,), more)
 
 
 def _variable(
@@ -122,9 +125,9 @@ def _variable(
     return Variable(name, dimensions, values, attributes | units_of(column.unit) | missing)
 
 
-def _of_value(value: Value) -> Iterator[Variable]:
+def _of_value(value: Value, taken: set[str]) -> Iterator[Variable]:
     """Yield a quantity of a result, and its standard uncertainty."""
-    name = plain_name("_".join(filter(None, (value.analysis, value.model, value.name))))
+    name = free_name(plain_name(f"result_{value.analysis}_{value.model}_{value.name}"), taken)
     words = f"{value.name.replace('_', ' ')}{f' of the {value.model} model' * bool(value.model)}"
     missing = {"_FillValue": np.array(np.nan)}
     more = {"ancillary_variables": f"{name}_u"} if value.u is not None else {}

@@ -14,6 +14,7 @@ import xarray
 import levilab as door
 from levilab.errors import LevilabError
 from levilab.report.export.contents import contents_of
+from levilab.report.export.variables import variables_of
 from levilab.report.export.write import FORMATS, export
 from support.paths import SAMPLE_DATA
 
@@ -36,10 +37,10 @@ def test_netcdf_has_readings_and_result_with_units_and_uncertainties(tmp_path):
         assert np.array_equal(spin, readings["spin_frequency_hz"])
         assert np.array_equal(data["time_s"], readings["time_s"])
         assert np.array_equal(data["spindown_residual_hz"], found.residuals)
-        c, u = data["spindown_disc_c32"], data["spindown_disc_c32_u"]
+        c, u = data["result_spindown_disc_c32"], data["result_spindown_disc_c32_u"]
         assert (float(c), float(u)) == (found["c32"].value, found["c32"].u)
         assert (c.attrs["unit"], "units" in c.attrs) == ("(rad/s)^-1/2/s", False)  # no unit of UDUNITS
-        assert data["spindown_stokes_c1"].units == "1/s"
+        assert data["result_spindown_stokes_c1"].units == "1/s"
 
 
 def test_traces_are_in_volts_and_seconds(tmp_path):
@@ -88,11 +89,20 @@ def test_a_package_describes_its_files_with_units_and_hashes(tmp_path):
     assert list(trace.columns) == ["time_s", "tape_v"]
 
 
+@pytest.mark.parametrize("source", ["hold/26-hz", "precession-sweep"])
+def test_no_two_variables_have_one_name(source):
+    """A column and a value, or a value and a parameter of a model, may be called alike."""
+    contents = contents_of(SAMPLE_DATA / source)
+    names = [one.name for one in variables_of(contents)]
+    assert len(set(names)) == len(names)
+    assert len(contents.values) == sum(one.startswith("result_") and not one.endswith("_u") for one in names)
+
+
 def test_a_file_without_a_run_is_exported_with_its_samples(tmp_path):
     written(SAMPLE_DATA / "scope-files" / "recording.wav", tmp_path / "sound.nc")
     with xarray.open_dataset(tmp_path / "sound.nc") as data:
-        assert data["spin_frequency"].units == "Hz"
-        assert float(data["spin_frequency"]) == pytest.approx(30.0, abs=0.01)  # sample_data/README.md
+        assert data["result_spin_frequency"].units == "Hz"
+        assert float(data["result_spin_frequency"]) == pytest.approx(30.0, abs=0.01)  # sample_data/README.md
         assert any(name.startswith("trace_000001_") and one.size > 1000 for name, one in data.variables.items())
 
 
