@@ -168,7 +168,7 @@ def _typed(name: str, text: str | None, read: Callable[[str], T]) -> T | None:
     try:
         return None if text is None else read(text)
     except ValueError as error:
-        raise UsageError(name, str(error), value=text) from error
+        raise UsageError(name, str(error), value=text or None) from error
 
 
 def _group(typed: str | None) -> str:

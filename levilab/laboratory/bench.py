@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from levilab.bench.wiring import Wiring
     from levilab.laboratory.disk import SimulatedComputer
     from levilab.laboratory.fate import Fate
-    from levilab.world.spin_world import SpinWorld
+    from levilab.world.spin_world import World
 
 #: Time that a person takes for a task [s].
 _TASK_S = (4.0, 40.0)
@@ -117,7 +117,7 @@ class LaboratoryPerson:
     def __init__(self, fate: Fate, clock: LaboratoryClock, random: Random) -> None:
         self._fate, self._clock, self._random = fate, clock, random
         self.slip, self.missed = "", 0
-        self.world: SpinWorld | None = None
+        self.world: World | None = None
 
     def __call__(self, task: Task) -> str:
         """Carry out a task."""
@@ -145,7 +145,7 @@ class LaboratoryPerson:
 
 
 def laboratory_wiring(
-    world: SpinWorld,
+    world: World,
     fate: Fate,
     models: Mapping[str, str],
     person: LaboratoryPerson,
@@ -155,4 +155,4 @@ def laboratory_wiring(
     bench = LaboratoryBench.around(virtual_bus(world, models), fate)
     person.world = world
     wiring: Any = virtual_wiring(world, limits, models)
-    return bench, replace(wiring, library=library_for(bench), person=person, poses=None, camera=None, signals={})
+    return bench, replace(wiring, library=library_for(bench), person=person, poses=None, signals={})

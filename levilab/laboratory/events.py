@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from levilab.laboratory.bench import LaboratoryBench, LaboratoryClock, LaboratoryPerson
     from levilab.laboratory.disk import SimulatedComputer
     from levilab.laboratory.fate import Fate
-    from levilab.world.spin_world import SpinWorld
+    from levilab.world.spin_world import World
 
 T = TypeVar("T")
 
@@ -44,7 +44,7 @@ class Place(Protocol):
     clock: LaboratoryClock
     person: LaboratoryPerson
     bench: LaboratoryBench
-    world: SpinWorld
+    world: World
 
     def remove_folder(self) -> None:
         """Remove the folder of the present run, as a person does with a file manager."""
@@ -79,6 +79,11 @@ def _pull(place: Place, value: float, *, plug: bool) -> None:
     pull(bench.device(value), _choose(_OUT_S, value * 7 % 1))
 
 
+def _interrupt_twice(*_: object) -> None:
+    for _press in range(2):
+        signal.raise_signal(signal.SIGINT)
+
+
 def _slip(name: str) -> Callable[[Place, float], None]:
     def act(place: Place, _: float) -> None:
         place.person.slip = name
@@ -102,6 +107,7 @@ EVENTS: dict[str, What] = {
     "kill": What("the process is killed", lambda place, _: place.fate.die(), of_bench=False),
     "power": What("the computer loses its power", lambda place, _: place.fate.die(power=True), of_bench=False),
     "ctrl-c": What("the person presses Ctrl-C", lambda *_: signal.raise_signal(signal.SIGINT), of_bench=False),
+    "ctrl-c twice": What("the person presses Ctrl-C twice", _interrupt_twice, of_bench=False),
     "disk full": What("the disk has room for {} bytes more", _fill_disk, lambda v: int(v * _ROOM), of_bench=False),
     "disk error": What(
         "the disk answers {}", _fail_disk, lambda v: errno.errorcode[_choose(_ERRORS, v)], of_bench=False

@@ -14,6 +14,7 @@ from levilab.errors import LevilabError
 from levilab.laboratory.life import Compared
 from levilab.runs.run import Run
 from levilab.simulator.laws import LAWS
+from levilab.world.spin_world import SpinWorld
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -23,11 +24,13 @@ if TYPE_CHECKING:
     from levilab.laboratory.bench import LaboratoryBench
     from levilab.laboratory.life import Life
     from levilab.laboratory.plan import Plan
-    from levilab.world.spin_world import SpinWorld
+    from levilab.world.spin_world import World
 
 #: An analysed value further from the truth than this [u] needs a warning; a single reading may be a little further,
 #: since there are a thousand times as many of them.
 _MOST_U, _MOST_U_OF_READING = 5.0, 7.0
+#: Events after which a reading comes late, at the time that it says.
+_LATE = {"slow disk", "lid"}
 #: Readings that are compared with those of a run that was not broken off, and the columns of their u.
 _U = {"spin_frequency_hz": "spin_frequency_u_hz", "flux_density_t": "flux_density_u_t"}
 #: Readings from which on a scatter of them is known well enough for 5 u to be far off: Student's law with 8 degrees of
@@ -50,9 +53,9 @@ class Finding:
     text: str
 
 
-def compare(session: Session[Any], world: SpinWorld, plan: Plan, first: int) -> list[Compared]:
+def compare(session: Session[Any], world: World, plan: Plan, first: int) -> list[Compared]:
     """Return the spins that a process has read beside those of the world; none for other experiments."""
-    if plan.experiment != "spin" or session.zero is None:
+    if plan.experiment != "spin" or session.zero is None or not isinstance(world, SpinWorld):
         return []
     rows = session.rows[first:]
     gate = float(session.bench.counter.last_set.get("gate_s", session.settings.gate_s))  # a multimeter has three
@@ -105,7 +108,8 @@ def message(text: str, whose: str) -> Iterator[Finding]:
 
 
 def _outputs(life: Life) -> Iterator[Finding]:
-    if life.output_on and life.ended != "killed" and "MAY STILL BE ON" not in life.text:
+    said = "MAY STILL BE ON" in life.text or ("generator" in life.text and "cannot be opened" in life.text)
+    if life.output_on and life.ended != "killed" and not said:
         yield Finding("output", f"process {life.number + 1} {life.ended}, and the drive is on: {life.text}")
 
 
@@ -131,7 +135,7 @@ def _files_are_whole(plan: Plan, processes: Sequence[Life], folders: Sequence[Pa
         times = [row.get("time_s", math.nan) for row in stored]
         if any(not after > before for before, after in pairwise(times)):
             yield Finding("doubled", f"{run.folder}: times {times}")
-        if plan.experiment == "spin":
+        if plan.experiment == "spin" and not any(event.what in _LATE for event in plan.events):
             yield from _nothing_skipped(run, times)
 
 

@@ -51,13 +51,20 @@ WORK: Mapping[str, Work] = {
     "field": Work(30, (("step_m=0.01", "readings=4"), ("step_m=0.02", "readings=2")), 300, 8, ("magnetometer",)),
     "limit": Work(8, (("repetitions=2", "drive_waveform=NONE"), ("repetitions=1", *_QUICK)), 1500, 2),
     "trace": Work(6, (("records=3", "points=1000"), ("records=2",)), 200, 0, ("oscilloscope",)),
-    "hold": Work(4, (("longest_s=40", "drive_frequency_hz=32", "hold_s=0"),), 2500),
+    "hold": Work(3.3, (("longest_s=40", "drive_frequency_hz=32", "hold_s=0"),), 2500),
+    # a motion takes seconds
+    "precession": Work(
+        0.4,
+        (("drive_frequency_hz=34", "frequencies_hz=[34, 33, 32]", "counts=3", "hold_s=2", "ramp_hz_per_s=0.2"),),
+        900,
+    ),
+    "sway": Work(0.3, ((),), 300),
 }
 #: Models that estimate a frequency from samples, which takes ten times as long: a few laboratories have one.
 _SLOW_MODELS = {"phyphox", "sound"}
 #: What a person may type beside: option → texts, of which the last ones are slips.
 _TYPED = {
-    "group": ("", "Group 7", " ", "Gruppe\t1", "x" * 30),
+    "group": ("Group 7", "", " ", "Gruppe\t1", "x" * 30),
     "temperature": ("21.5 C", "294.6 K", "twenty", "21,5 °C", ""),
     "washers": ("0.06+0.1 g", "0", "0,06 g", "-1 g", "0.06 + g"),
     "settings": ("gate_s=0.5", "gate_s=0,5", "gate=1", "=3", "longest_s=nan", "interval_s=1e400"),
@@ -130,7 +137,7 @@ def _draw_scene(seed: int, random: Random) -> SpinScene:
 
 def _draw_model(kind: str, random: Random) -> str:
     names = [model.name for model in CATALOGUE[kind]]
-    return random.choices(names, [0.2 if name in _SLOW_MODELS else 1.0 for name in names])[0]
+    return random.choices(names, [0.05 if name in _SLOW_MODELS else 1.0 for name in names])[0]
 
 
 def _draw_events(work: Work, random: Random) -> list[Event]:

@@ -19,6 +19,7 @@ from analysis.errors import AnalysisError
 from instruments.errors import InstrumentError
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.acquisition.table import EXPERIMENTS
 from levilab.bench.config import Limits
 from levilab.computer import at_another_computer
 from levilab.errors import LevilabError
@@ -32,8 +33,10 @@ from levilab.laboratory.plan import MOST_LIVES
 from levilab.pipelines.suits import analyze_suiting
 from levilab.present.progress import Display
 from levilab.runs.find import find_runs
+from levilab.runs.listing import list_runs
 from levilab.runs.run import Run
-from levilab.world.bench import virtual_instruments
+from levilab.simulator.scene import read_scene
+from levilab.world.bench import scene_world, virtual_instruments
 from levilab.world.spin_world import SpinWorld
 
 if TYPE_CHECKING:
@@ -45,6 +48,7 @@ if TYPE_CHECKING:
     from levilab.laboratory.bench import LaboratoryBench
     from levilab.laboratory.fate import Event
     from levilab.laboratory.plan import Plan
+    from levilab.world.spin_world import World
 
 #: Where the runs are, the bench file of a bench that goes on between processes, and the command of each run.
 _RUNS, _BENCH, _COMMAND = Path("runs"), Path("bench.toml"), ["levilab", "acquire"]
@@ -89,7 +93,7 @@ class Visit:
     clock: LaboratoryClock = field(init=False)
     person: LaboratoryPerson = field(init=False)
     bench: LaboratoryBench = field(init=False)
-    world: SpinWorld = field(init=False)
+    world: World = field(init=False)
     wiring: Wiring | None = None
     session: Session[Any] | None = None
     lives: list[Life] = field(default_factory=list)
@@ -206,9 +210,16 @@ class Visit:
             if self.plan.mock:
                 self.clock = LaboratoryClock(self.fate, self.computer)
             self.person = LaboratoryPerson(self.fate, self.clock, Random(f"person {self.plan.seed}"))
-            self.world = SpinWorld(self.plan.scene, self.clock)
+            self.world = self._make_world()
             self.bench, self.wiring = laboratory_wiring(self.world, self.fate, self.plan.models, self.person, Limits())
         return self.wiring
+
+    def _make_world(self) -> World:
+        """Return the top of the plan, or the full motion of an experiment that needs it."""
+        scene = EXPERIMENTS[self.plan.experiment].mock_scene
+        if scene is None:
+            return SpinWorld(self.plan.scene, self.clock)
+        return scene_world(read_scene(scene), lambda: self.clock, lambda _: None, seed=self.plan.seed)
 
     def _watch(self, life: Life) -> Any:
         @contextlib.contextmanager
@@ -230,6 +241,7 @@ class Visit:
         with self._at_the_place():
             folders = sorted(find_runs(_RUNS)) if _RUNS.exists() else []
             found = [*judge.lives(self.plan, self.lives, folders)]
+            self.fate.trace += [f"~ {one}" for one in list_runs(_RUNS)] if folders else []
             for folder in folders:
                 try:
                     for analysis, result in analyze_suiting([folder], {}):
