@@ -120,12 +120,14 @@ class Doubt:
         text: for people, with the values that were seen.
         column: 0-based index of the column that it is about; None where it is about several.
         choices: the answers, the likeliest first.
+        open: whether more than the first answer is likely.
     """
 
     kind: Literal["unit", "column", "titles"]
     text: str
     column: int | None
     choices: tuple[Choice, ...]
+    open: bool = False
 
 
 def shorten(text: str, most: int = 40) -> str:
@@ -338,9 +340,10 @@ def _wanted_columns(
 
 def _stated_unit(path: Path, name: str, unit: str) -> str:
     kind = dimension(name)
-    of_a_turn = kind == "frequency" and name in QUANTITIES and unit_factor(unit, "time")
-    if not (_is_unit_of(unit, name) or of_a_turn):
-        raise TableError(path, f"`columns`: '{shorten(unit)}' is no unit of {kind}; known are {', '.join(UNITS[kind])}")
+    turns = kind == "frequency" and name in QUANTITIES
+    if not (_is_unit_of(unit, name) or (turns and unit_factor(unit, "time"))):
+        known = ", ".join(UNITS[kind]) + (", s and ms of a turn, turns in 10 s" if turns else "")
+        raise TableError(path, f"`columns`: '{shorten(unit)}' is no unit of {kind}; known are {known}")
     return unit
 
 

@@ -246,8 +246,9 @@ def plain_name(text: str) -> str:
     return symbol if symbol in ANGULAR else word
 
 
+_A_TURN = r"1|U|umdr\.?|umdrehungen|turns?|rev|revolutions?|rotations?|tr|tours?|r|varv|vueltas?"
 _TURNS_IN = re.compile(
-    r"(1|U|umdr\.?|umdrehungen|turns?|rev|revolutions?|rotations?|tr|tours?|r|varv|vueltas?)?/(?P<number>\d+([.,]\d+)?)?(?P<unit>[a-zμ]+)",
+    rf"(?:(?:{_A_TURN})?/|(?:{_A_TURN})(?:in|per|pro|en)(?=\d))(?P<number>\d+([.,]\d+)?)?(?P<unit>[a-zμ]+)",
     re.IGNORECASE,
 )
 _UNIT_FORMS = tuple(

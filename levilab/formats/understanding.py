@@ -4,6 +4,7 @@
 analyzed.
 """
 
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -223,7 +224,11 @@ def _question(
     """Return the question in which unit a column is, None where it can be in none or, if not always, in Hz alone."""
     numbers = _numbers(layout, index)
     spins = possible_spins(median(numbers)) if numbers else {}
-    if not spins or (list(spins) == ["Hz"] and not always):
+    if not always and list(spins) == ["Hz"]:
+        return None
+    if numbers and (per_reading := _turns_per_reading(layout, numbers, time)):
+        spins = {per_reading: 0.0} | spins
+    if not spins:
         return None
     first, last = numbers[0], numbers[-1]
     at = {"t": str(time.index + 1)} if time else {}
@@ -235,12 +240,24 @@ def _question(
     title = f" '{shorten(layout.header[index])}'" if index < len(layout.header) else ""
     *others, end = (choice.text for choice in choices)
     seen = f"column {index + 1}{title} has the values {first:.4g} to {last:.4g} and {what}"
-    return Doubt("unit", f"{seen}: {', '.join(others)} or {end}?", index, tuple(choices))
+    return Doubt("unit", f"{seen}: {', '.join(others)} or {end}?", index, tuple(choices), open=len(spins) > 1)
+
+
+def _turns_per_reading(layout: Layout, numbers: Sequence[float], time: Column | None) -> str:
+    """Return the unit of turns between two readings, where whole numbers at even times can be such; else nothing."""
+    times = [time.factor * number for number in _numbers(layout, time.index)] if time else []
+    steps = {round(after - before, 6) for before, after in pairwise(times)}
+    if len(steps) != 1 or not all(number.is_integer() for number in numbers):
+        return ""
+    (step,) = steps
+    return f"turns in {step:g} s" if step > 0 and is_possible_spin(median(numbers) / step) else ""
 
 
 def _unanswered(path: Path, doubt: Doubt) -> NoSuchColumn:
     """Return the error for a spin whose unit is asked for."""
     example = ",".join(f"{key}={to}" for key, to in doubt.choices[0].columns.items())
+    if doubt.open:
+        example = re.sub(r"\[.*\]$", "[UNIT]", example)
     return NoSuchColumn(path, f'{doubt.text} say `columns` = "{example}"', doubt=doubt)
 
 

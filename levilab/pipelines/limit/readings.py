@@ -38,9 +38,9 @@ QUANTITIES = ("spin_frequency_hz", "spin_frequency_u_hz")
 _TIME = "time_s"
 #: Limits that differ by more than this part of their mean are none of one top: most likely a spin-down.
 _MOST_SPREAD = 0.25
-#: Rank correlation with the time above which a spin is that of one top, and the number of rows from which chance
-#: seldom makes it.
-_TREND, _FEWEST = 0.9, 5
+#: Rank correlation with the time above which a spin is that of one top, and the number of rows from which it counts:
+#: chance orders three limits in one file of three, whose times are then left out; a spin-down's are never limits.
+_TREND, _FEWEST = 0.9, 3
 #: A number on a line of its own, with a decimal point or comma, and what is read of a file that holds nothing else.
 _NUMBER, _MOST_BYTES = re.compile(r"[+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?"), 1 << 20
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping  # noqa: TC003 - pydantic reads the types of a result when it runs
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -145,6 +146,15 @@ class SpinRun:
         Records far apart show a slope that is far too small for one of them.  A record in which a drive was switched
         has several slopes.  Where they scatter about the line by more than their u, u grows by as much.
         """
+        return self._line[0] if self._line else None
+
+    @property
+    def swing(self) -> tuple[float, float] | None:
+        """How far several records scatter about that line [Hz], and in units of their u; None where there is none."""
+        return self._line[1:] if self._line and len(self.series) > 2 else None
+
+    @cached_property
+    def _line(self) -> tuple[Estimate, float, float] | None:
         series = self.series
         if len(series) < 2 or len(series.phases) > 1 or not np.all(series.u > 0):
             return None
@@ -153,8 +163,9 @@ class SpinRun:
         u = float(np.sum(weight * late**2)) ** -0.5
         slope = float(np.sum(weight * late * series.frequency)) * u**2
         left = series.frequency - np.average(series.frequency, weights=weight) - slope * late
-        scatter = math.sqrt(float(np.sum(weight * left**2)) / max(len(series) - 2, 1))
-        return Estimate(slope, u * max(1.0, scatter), "Hz/s")
+        freedom = max(len(series) - 2, 1)
+        units = math.sqrt(float(np.sum(weight * left**2)) / freedom)
+        return Estimate(slope, u * max(1.0, units), "Hz/s"), math.sqrt(float(np.sum(left**2)) / freedom), units
 
 
 class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):

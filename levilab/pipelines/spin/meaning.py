@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from levilab.pipelines.spin.analysis import SpinAnalysis, SpinRun
 
-#: A slope of so many u is one.
+#: A slope, or a scatter of records, is seen beyond this multiple of u.
 _SEEN = 3.0
 #: What air takes of the spin of a free top at 20 to 45 Hz, a second: 0.3 %, and twice or half of it for other tops.
 _AIR = (1.5e-3, 6e-3)
@@ -68,6 +68,12 @@ def _sentences(run: SpinRun) -> Iterator[str]:
         return
     at = f" at {spin.reference_time:.3g} s" if len(run.series) > 1 else ""
     yield f"The top turns with {with_uncertainty(frequency)}{at}, {60 * frequency.value:.0f} times a minute."
+    if run.swing and run.swing[1] > _SEEN:
+        far, units = run.swing
+        yield (
+            f"That is one {run.series.of} of {len(run.series)}: they scatter about a line by {digits(far)} Hz, "
+            f"{digits(units)} times their uncertainties, so the spin itself swings, as that of a driven top does."
+        )
     yield from _about_line(run)
     if (change := _change(run)) is None:
         return

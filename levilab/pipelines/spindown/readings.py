@@ -263,8 +263,15 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
     if isinstance(error, TimesNotIncreasing):
         before, after = (int(line) for line in table.lines[error.index - 1 : error.index + 1])
         what = "is repeated" if error.before == error.after else "comes"
-        text = f"the time {error.after:.16g} s {what} after {error.before:.16g} s in line {before}"
-        return TableError(table.path, f"{text}, times must increase: sort the readings, or correct one", line=after)
+        text = f"the time {error.after:.16g} s {what} after {error.before:.16g} s in line {before}, times must increase"
+        frequency = table.column("spin_frequency_hz")
+        swapped = np.all(np.diff(table.column("time_s")) < 0) and np.all(np.diff(frequency) > 0)
+        advice = (
+            "name the columns the other way round with `columns`, since the frequencies increase and the times fall"
+            if swapped
+            else "sort the readings, or correct one"
+        )
+        return TableError(table.path, f"{text}: {advice}", line=after)
     if isinstance(error, NotPositive):
         what, advice = _ABOVE_0[error.quantity]
         return TableError(table.path, f"{what} is {error.value:.9g} {advice}", line=int(table.lines[error.index]))

@@ -391,6 +391,23 @@ def test_what_is_nearly_a_reading_is_reported_with_what_to_do(text, columns, say
 
 
 @pytest.mark.parametrize(
+    ("columns", "says"),
+    [
+        ({}, "no unit: turns in 10 s (40 to 38 Hz), rad/s (63.7 to 60.5 Hz), rpm or Hz?"),
+        ({}, '`columns` = "t=1,f=2 [UNIT]"'),
+        ({"t": "1", "f": "2 [foo]"}, "grad/s, s and ms of a turn, turns in 10 s"),
+    ],
+)
+def test_counts_between_readings_are_turns_in_that_time_if_so_told(columns, says, table_file):
+    file = table_file("time,counts\n0,400\n10,391\n20,380\n")
+    with pytest.raises(TableError) as error:
+        read_table(file, columns=columns, quantities=("time_s", F), needed=[F])
+    assert says in str(error.value)
+    table = read_table(file, columns={"t": "1", "f": "2 [turns in 10 s]"}, quantities=("time_s", F), needed=[F])
+    assert table.column(F).tolist() == [40.0, 39.1, 38.0]
+
+
+@pytest.mark.parametrize(
     ("title", "values"),
     [
         ("T [ms]", (25.0, 20.0, 0.0, 40.0)),

@@ -304,6 +304,16 @@ def test_residuals_of_a_bent_frequency_have_no_bend_left(what, tmp_path):
     assert residuals.std() < 30
 
 
+def test_records_that_scatter_by_more_than_their_u_are_of_a_spin_that_swings(sample_data):
+    """A driven top of the sample swings by 0.3 Hz; one that coasts loses its spin along a line."""
+    swings, coasts = (
+        ANALYSES["spin"].analyze([sample_data / name], SpinOptions()) for name in ("trace-laser", "trace-tape")
+    )
+    assert swings.runs[0].swing[0] == pytest.approx(np.std(swings.runs[0].series.frequency), rel=0.5)
+    assert "they scatter about a line by 0.35 Hz, 180 times their uncertainties" in meaning(swings)[0]
+    assert "scatter" not in meaning(coasts)[0]
+
+
 def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_path):
     """ν^(-1/2) falls on a straight line in time: dν/dt = -c ν^(3/2).
 
