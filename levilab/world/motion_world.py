@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
+from levilab.world.base import Stand
 from levilab.world.bursts import TriggerWire
 from levilab.world.coil import Coil
 from levilab.world.flight import Flight
@@ -67,8 +68,8 @@ class MotionWorld:
         tape: the tape and its lamp.
         laser: the beam and its amplifier.
         put_back_after_s: see Flight.
-        seed: of the light's noise, and of the tape's place on the rim; with 0 the tape is where the transverse part of
-            the moment points, so a drive that is switched on at a pulse finds the moment there.
+        seed: of the light's noise, the probe's place, and the tape's place on the rim; with 0 the tape is where the
+            transverse part of the moment points, so a drive that is switched on at a pulse finds the moment there.
 
     Raises:
         SceneError: the scene has no motion.
@@ -240,7 +241,8 @@ class MotionWorld:
         return field_beside(place, ring, position, moment, up)
 
     def place_probe(self, height_m: float | None) -> None:
-        """Put the probe at a height, exactly; see World."""
+        """Put the probe at a height, with a seed to 0.2 mm; see World."""
         self._probe_m = height_m
-        place = np.array([[0.0, 0.0, height_m or 0.0]])
+        stand = Stand(scatter_m=2e-4 if self.seed else 0.0, seed=self.seed).at(height_m)
+        place = np.array([[0.0, 0.0, stand.height_m or 0.0]])
         self._probe_t = 0.0 if height_m is None else float(flux_density(base_field(self._scene), place)[0, 2])

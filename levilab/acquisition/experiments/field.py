@@ -68,6 +68,10 @@ class FieldSettings(ExperimentSettings):
     base_thickness_u_m: NonNegativeFloat = 2e-4
     base_origin_m: float = Field(default=0.0, description="its middle, where heights are counted from")
     base_origin_u_m: NonNegativeFloat = 1e-3
+    top_moment_a_m2: PositiveFloat | None = Field(
+        default=None, description="the top that is to float, where its moment is known: the mass to set goes with it"
+    )
+    top_moment_u_a_m2: NonNegativeFloat = 0.0
 
     @property
     def heights_m(self) -> list[float]:

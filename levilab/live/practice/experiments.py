@@ -83,6 +83,7 @@ PRACTICE: dict[str, PracticeExperiment] = {
     ),
     "field": PracticeExperiment(
         "field of the base", "What holds the top up? A Hall probe on the axis, with the top taken off.", "field",
-        (), 68.0,
+        # the base and the top of the practice scene: a thin ring, and what of the moment lies along the axis
+        _prefixed("field", "base_thickness_m=0", "top_moment_a_m2=0.7", "top_moment_u_a_m2=0.004"), 68.0,
     ),
 }  # fmt: skip

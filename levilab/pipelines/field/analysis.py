@@ -98,7 +98,7 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
     readings = source.readings
     known = known_of(source, options.device)
     try:
-        top, warnings = known_top(options, usual(readings.height_u))
+        top, warnings = known_top(source, options, usual(readings.height_u))
         scan = fit_scan(
             readings.height,
             readings.flux_density,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from pydantic import ValidationError
@@ -13,20 +13,21 @@ from analysis.field.magnet import Disc
 from analysis.top import Cylinder, top_of
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
-from levilab.formats.device import BaseTable, Device
+from levilab.formats.device import BaseTable, Device, TopTable
 from levilab.settings import in_one_line
 
 if TYPE_CHECKING:
-    from levilab.formats.device import TopTable
     from levilab.pipelines.field.readings import FieldReadings
     from levilab.pipelines.options import FieldOptions
     from levilab.pipelines.sources import Source
 
 
+Table = TypeVar("Table", BaseTable, TopTable)
+
 #: The thesis's top: what is taken where nothing is known, with a warning.
 THESIS = {"transverse": (1.04e-6, "kg m^2"), "axial": (1.731314e-6, "kg m^2"), "moment": (0.714, "A m^2")}
-#: What a run says of the base begins with this in the settings of its experiment.
-_OF_BASE = "base_"
+#: What a run says of the base and of the top begins with these in the settings of its experiment.
+_OF_BASE, _OF_TOP = "base_", "top_"
 
 
 def known_of(source: Source[FieldReadings], device: Device | None) -> Known:
@@ -56,13 +57,18 @@ def known_of(source: Source[FieldReadings], device: Device | None) -> Known:
 
 
 def _base(source: Source[FieldReadings], of_run: dict[str, Any], device: Device | None) -> BaseTable:
+    return _merged(source, BaseTable, _OF_BASE, of_run, device.base if device else None)
+
+
+def _merged(
+    source: Source[FieldReadings], table: type[Table], prefix: str, of_run: dict[str, Any], given: Table | None
+) -> Table:
     """Return the run's, and over it what the file sets."""
-    table = {key.removeprefix(_OF_BASE): value for key, value in of_run.items() if key.startswith(_OF_BASE)}
-    given = device.base.model_dump(exclude_unset=True) if device else {}
+    own = {key.removeprefix(prefix): value for key, value in of_run.items() if key.startswith(prefix)}
     try:
-        return BaseTable.model_validate(table | given)
+        return table.model_validate(own | (given.model_dump(exclude_unset=True) if given else {}))
     except ValidationError as error:
-        raise DataError(f"{source.path}: configuration.field in run.json: base_{in_one_line(error)}") from error
+        raise DataError(f"{source.path}: configuration.field in run.json: {prefix}{in_one_line(error)}") from error
 
 
 def _number(table: dict[str, Any], key: str, default: float) -> float:
@@ -93,10 +99,13 @@ def parts_of(top: TopTable) -> list[Cylinder]:
     ]
 
 
-def known_top(options: FieldOptions, height_u: float | None) -> tuple[KnownTop, list[str]]:
+def known_top(
+    source: Source[FieldReadings], options: FieldOptions, height_u: float | None
+) -> tuple[KnownTop, list[str]]:
     """Return what is known of the top, the thesis's where nothing is, and what to know of that.
 
     Args:
+        source: a scan, whose run may say something of the top.
         options: with what calliper and data sheet say.
         height_u: standard uncertainty of the scan's heights [m].
 
@@ -104,7 +113,8 @@ def known_top(options: FieldOptions, height_u: float | None) -> tuple[KnownTop, 
         ImpossibleCylinder: a part of the top has no such size.
     """
     device = options.device or Device()
-    table, warnings = device.top, []
+    table = _merged(source, TopTable, _OF_TOP, source.settings("field"), options.device.top if options.device else None)
+    warnings = []
     made = top_of(parts_of(table)) if table.parts else None
     moment = _estimate(table.moment_a_m2, table.moment_u_a_m2, "A m^2")
     mass = made.mass if made else _estimate(table.mass_kg, table.mass_u_kg, "kg")
