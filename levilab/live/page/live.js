@@ -6,10 +6,10 @@ import {drawHistory, openHistory} from "./history.js";
 import {drawReadings, drawRecords, saidOf, sheet, tableOf} from "./plot.js";
 import {openPractice, watchPractice} from "./practice.js";
 import {openSound} from "./sound.js";
-import {between, by, fixed, lapse, make, option, phrase, short, turnLanguage, typeset, write} from "./words.js";
+import {between, by, fixed, lapse, make, option, phrase, put, short, turnLanguage, typeset, write} from "./words.js";
 
-/** Least time between spoken news [ms]. */
-const NEWS_EVERY_MS = 6000;
+/** Least time between two spoken readings; an event is spoken at once, if it is not older [ms]. */
+const SPOKEN_EVERY_MS = 30_000, NEWS_MS = 10_000;
 /** Events in the list. */
 const MOST_EVENTS = 200;
 const STATES = {
@@ -40,7 +40,7 @@ const history = openHistory(), sound = openSound();
 let fellAt = NaN;  // a fall whose poses are not kept yet
 let isReady = false;  // whether the bench for practice has measured something yet
 let paused = false, drawn = null, pointed = -1, space = null, topOf = "", wanted = "", practice = null, reachable = true;
-let spoken = 0, close = null, dirty = {plot: true, trace: true};
+let news = [], spoken = 0, spokenState = "", close = null, dirty = {plot: true, trace: true};
 window.levilab = {frames: 0, drawn: 0, seen, data, history};  // what tests and benchmarks read
 
 // --- frames ---
@@ -89,7 +89,7 @@ function turnTo(run) {
   Object.assign(seen, {run, readings: -1, events: 0, fit: -1});
   Object.assign(data, {readings: null, fit: null, about: null, ended: "", end: null, last: {}, count: 0, trend: NaN});
   by("event-list").replaceChildren();
-  by("events-key").hidden = true;
+  put(by("events-key"), {hidden: true});
   if (by("drawn").value === "minutes") by("drawn").value = "all";
   pointed = -1;
   dirty = {plot: true, trace: true};
@@ -126,6 +126,7 @@ function takeEvents(events) {
 /** The latest stands first, each with the time of this computer's clock, and that of the run in brackets. */
 function listEvent({time_s, utc}, text, loud) {
   const list = by("event-list"), item = make("li", "", loud), moment = new Date(utc || NaN);
+  if (Date.now() - moment < NEWS_MS) news.push(text);
   const ofRun = typeof time_s === "number" ? `(${lapse(time_s).replace(" min", "")})` : "";
   const clock = Number.isNaN(moment.valueOf()) ? "" : moment.toLocaleTimeString("en-GB");
   const when = make("time", [clock, ofRun].filter(Boolean).join(" "));
@@ -169,7 +170,7 @@ function takePoses(pieces) {
 /** Mark the fall in the last minutes, with the spin that was counted last. */
 function markFall() {
   fellAt = data.lastUp;
-  by("replay").hidden = true;
+  put(by("replay"), {hidden: true});
   const spin = history.counts.at(-1)?.[1];
   history.mark(data.lastUp, spin ? phrase("fell at {spin} Hz", {spin: fixed(spin, 1)}) : phrase("fell"));
   dirty.plot = true;
@@ -182,7 +183,7 @@ const partsNow = async () => (await fetch(`parts?run=${encodeURIComponent(seen.r
 async function openTop() {
   const early = [];
   space = {add: (...pieces) => early.length < 50 && early.push(pieces)};
-  by("no-space").hidden = true;
+  put(by("no-space"), {hidden: true});
   document.body.classList.remove("no-top");
   try {
     const parts = await partsNow();
@@ -194,7 +195,7 @@ async function openTop() {
     for (const set of [lookAtTop, leanTop, strobe]) set();
   } catch (error) {
     space = {add: () => {}};
-    by("no-space").hidden = false;
+    put(by("no-space"), {hidden: false});
     write("no-space", phrase("This browser draws no three dimensions: {why}", {why: error.message}));
   }
   dirty = {plot: true, trace: true};
@@ -219,17 +220,17 @@ function show() {
   isReady ||= Boolean(bench) && (bench.busy || Object.keys(bench.last).length > 0);
   const state = stateOf();
   if (practice && !space) {
-    by("no-space").hidden = state !== "setup";
+    put(by("no-space"), {hidden: state !== "setup"});
     write("no-space", SET_UP);
   }
-  document.body.dataset.state = state;
+  put(document.body.dataset, {state});
   write("state-word", STATES[state] || state);
   const lost = bench?.lost?.length ? phrase("the {instruments} does not answer", {instruments: bench.lost.map((kind) => phrase(kind)).join(phrase(" and the "))}) : "";
   const running = about?.status === "running" || practice;
   const down = Boolean(practice) && data.up === false && Boolean(bench) && !bench.silent && !bench.folder;
   const advice = !down ? "" : [bench.text || phrase("the top is down"), ...practice.guest ? [] : [data.count ? phrase("“Analyze” the run, or “Top back”") : phrase("“Top back” floats it again")]].join("; ");
   write("state-text", lost || LONGER[state] || advice || about?.problem || ended(about) || (running && !bench?.silent && bench?.text) || "");
-  by("synthetic").hidden = !(about?.synthetic || (!about && bench?.virtual));
+  put(by("synthetic"), {hidden: !(about?.synthetic || (!about && bench?.virtual))});
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
   write("elapsed", Number.isFinite(elapsed) ? lapse(elapsed) : "");
   const left = leftOf(about, bench, elapsed);
@@ -242,20 +243,20 @@ function show() {
   showFacts(about);
   document.body.classList.toggle("no-scope", !data.records.size && !practice && Boolean(about) && about.status !== "running");
   write("count", isOfMinutes() ? phrase("the spin as it is counted, and the drive") : data.count ? `${data.count.toLocaleString("en").replaceAll(",", "\u202f")}${data.readings?.single === false ? phrase(", each stroke from the lowest to the highest of many") : ""}` : "");
-  by("fit-head").parentElement.hidden = !data.count || !by("fit-head").textContent || isOfMinutes();
+  put(by("fit-head").parentElement, {hidden: !data.count || !by("fit-head").textContent || isOfMinutes()});
   const minutes = isOfMinutes();
-  by("empty").hidden = data.count > 0 || minutes;
-  by("drawn").parentElement.hidden = !data.count;
-  by("csv").parentElement.hidden = !data.readings && !minutes;
+  put(by("empty"), {hidden: data.count > 0 || minutes});
+  put(by("drawn").parentElement, {hidden: !data.count});
+  put(by("csv").parentElement, {hidden: !data.readings && !minutes});
   write("readings-title", minutes ? phrase("The last minutes") : phrase("Readings"));
   write("empty", {
     none: phrase("No run yet: levilab acquire starts one, here or in another terminal, and it appears."),
     idle: practice?.guest ? phrase("No run yet: it appears here once one is recorded.") : phrase("No run yet: the guide says how to record one."),
     setup: " ",
   }[state] || (about?.status === "running" ? phrase("No reading yet: the top is being driven up.") : phrase("This run has no readings.")));
-  document.title = `${state === "running" && data.count ? `${phrase("{count} readings", {count: data.count})} · ` : ""}levilab live`;
+  put(document, {title: `${state === "running" && data.count ? `${phrase("{count} readings", {count: data.count})} · ` : ""}levilab live`});
   if (isReady) practice?.show(bench, about, data.count, down);
-  by("own").hidden = !practice || wanted === OWN_BENCH || !seen.run || (isOwn(seen.run) ?? !wanted);  // a run that begins is listed in a moment
+  put(by("own"), {hidden: !practice || wanted === OWN_BENCH || !seen.run || (isOwn(seen.run) ?? !wanted)});  // a run that begins is listed in a moment
   space?.setSpeed?.(bench?.speed, bench?.paused || bench?.silent);
   showTop(bench);
   showAge(bench);
@@ -276,10 +277,10 @@ function ended(about) {
 
 function showBar(about, bench) {
   const share = about?.status === "running" || practice ? bench?.share : null;
-  by("bar").hidden = !Number.isFinite(share);
+  put(by("bar"), {hidden: !Number.isFinite(share)});
   if (!Number.isFinite(share)) return;
   by("bar").firstElementChild.style.width = `${100 * share}%`;
-  by("bar").setAttribute("aria-valuenow", String(Math.round(100 * share)));
+  put(by("bar"), {ariaValueNow: String(Math.round(100 * share))});
 }
 
 const stale = (id, is) => by(id).closest(".display").classList.toggle("stale", is);
@@ -351,16 +352,16 @@ function showFacts(about) {
 
 function showTop(bench) {
   const pose = space?.state;
-  by("strobe-of").hidden = by("sound-of").hidden = !bench?.drive;
+  for (const one of ["strobe-of", "sound-of"]) put(by(one), {hidden: !bench?.drive});
   if (Number.isFinite(fellAt) && space?.keepFall?.(fellAt)) {
     fellAt = NaN;
-    by("replay").hidden = false;
+    put(by("replay"), {hidden: false});
   }
   sound.follow(bench);
   if (!pose) return;
   const said = space.replays ? phrase("falls, 20 times slower") : pose.up ? phrase("floats at {height} mm", {height: fixed(pose.place[2] * 1000, 1)}) : pose.there ? phrase("lies where it fell") : phrase("is taken away");
   write("top-text", said);
-  by("space").setAttribute("aria-label", phrase("the top over its base in three dimensions: it {said}", {said}));
+  put(by("space"), {ariaLabel: phrase("the top over its base in three dimensions: it {said}", {said})});
 }
 
 /** Say beside the oscilloscope that no top is up, that no instrument is read, and of each record how old it is, where it is old. */
@@ -370,7 +371,7 @@ function showAge(bench) {
   const still = runs && used.length && !used.includes("oscilloscope") ? phrase("a {experiment} run does not read it", {experiment: data.about.experiment}) : "";
   const why = still && drawn ? `${still}: ${phrase("the simulated signals")}` : still;
   write("scope-key", [data.up === false ? phrase("the top is down") : "", why].filter(Boolean).join("; "));
-  by("trigger-of").hidden = !drawn;
+  put(by("trigger-of"), {hidden: !drawn});
   for (const one of data.records.values()) {
     const said = ageOf(one, bench);
     if (one.said === said) continue;
@@ -386,10 +387,16 @@ function ageOf(record, bench) {
   return age > OLD_S * Math.max(1, bench?.speed || 1) ? phrase("{time} ago", {time: lapse(age)}) : "";
 }
 
-/** Say the last reading to those who listen, at most every few seconds. */
+/** Say to those who listen what has happened, else a new state, and now and then the last reading. */
 function speak(state, left) {
-  const now = performance.now();
-  if (now - spoken < NEWS_EVERY_MS) return;
+  const now = performance.now(), events = news.splice(0);
+  if (events.length) {
+    spoken = now;
+    write("news", events.join("; "));
+    return;
+  }
+  if (now - spoken < SPOKEN_EVERY_MS && state === spokenState) return;
+  spokenState = state;
   const spin = data.last.spin_frequency_hz;
   const parts = [phrase("reading {number}", {number: data.count}), Number.isFinite(spin) ? `${fixed(spin, 2)} hertz` : "", left ? phrase("{time} left", {time: left}) : ""];
   const text = (STATES[state] || state) + (data.count ? `: ${parts.filter(Boolean).join(", ")}` : "");
@@ -408,12 +415,12 @@ function draw() {
   if (dirty.plot) {
     dirty.plot = false;
     if (isOfMinutes()) {
-      by("plot").setAttribute("aria-label", drawHistory(papers.plot, history));
+      put(by("plot"), {ariaLabel: drawHistory(papers.plot, history)});
       drawn = null;
     } else if (data.readings) {
       drawn = drawReadings(papers.plot, {...data.readings, fit: data.fit}, pointed);
       const said = phrase("{count} readings of the {y} against {x}", {count: data.count, y: phrase(data.readings.yAxis[0]), x: phrase(data.readings.xAxis[0])});
-      by("plot").setAttribute("aria-label", pointed >= 0 ? `${said}: ${saidOf({...data.readings, fit: data.fit}, drawn, pointed)}` : phrase("{said}; the arrow keys go from one to the next", {said}));
+      put(by("plot"), {ariaLabel: pointed >= 0 ? `${said}: ${saidOf({...data.readings, fit: data.fit}, drawn, pointed)}` : phrase("{said}; the arrow keys go from one to the next", {said})});
       window.levilab.drawn += 1;
     } else papers.plot.fit();
     showPointer();
@@ -423,7 +430,7 @@ function draw() {
     const place = ({channel}) => CHANNELS.indexOf(channel);  // they may come in any order
     const records = [...data.records.values()].sort((one, two) => place(one) - place(two));
     const said = [drawRecords(papers.trace, records, by("source").value), by("scope-key").textContent];
-    by("trace").setAttribute("aria-label", said.filter(Boolean).join("; "));
+    put(by("trace"), {ariaLabel: said.filter(Boolean).join("; ")});
   }
 }
 
@@ -463,7 +470,7 @@ by("plot").addEventListener("keydown", (event) => {
 
 function pause() {
   paused = !paused;
-  by("pause").setAttribute("aria-pressed", String(paused));
+  put(by("pause"), {ariaPressed: String(paused)});
   write("pause", paused ? phrase("Go on") : phrase("Pause view"));
   space?.pause?.(paused);
   if (!paused && by("said").textContent === PAUSED) write("said", "");
@@ -586,7 +593,7 @@ by("run").addEventListener("focus", () => listRuns(by("run").value));
 async function begin() {
   const asked = new URLSearchParams(location.search).get("run");
   const {practice: bench, first, opens} = await listRuns(asked || "");
-  by("open").hidden = !(opens && token);
+  put(by("open"), {hidden: !(opens && token)});
   if (opens && token) takeDrops(token, (file) => { location.href = `open?file=${file}`; }, (wrong) => write("dropped", wrong));
   document.body.classList.add("no-top");
   if (bench) {

@@ -1,7 +1,7 @@
 // The bench for practice: controls that send commands, and the guide that shows how far one is.
 
 import {showResult} from "./result.js";
-import {by, fixed, lapse, local, make, numberIn, option, phrase, short, write} from "./words.js";
+import {by, fixed, lapse, local, make, numberIn, option, phrase, put, short, write} from "./words.js";
 
 /** Least time between two messages of a slider [ms]. */
 const SENDS_EVERY_MS = 120;
@@ -24,7 +24,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
   for (const {name, title} of about.experiments) by("experiment").append(option(phrase(title), name));
   const now = {drive: false, busy: false, paused: false, analyzed: "", ended: false, elsewhere: null, bench: null};
 
-  by("controls").disabled = true;  // until the bench is there
+  put(by("controls"), {disabled: true});  // until the bench is there
   if (!allowed) write("said", phrase("This page may only look: open the address that the terminal shows."));
 
   async function send(what, values = {}) {
@@ -100,6 +100,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
   // what if
   const knobs = Object.entries(about.what_if).map(([name, row]) => {
     const label = make("label", "", "quantity"), value = make("output"), input = make("input"), small = make("small", phrase(row.shows)), title = phrase(row.title);
+    value.ariaLive = "off";  // what the slider is at, its own text says
     Object.assign(input, {type: "range", min: row.low, max: row.high, step: row.step, value: row.usual});
     input.setAttribute("aria-label", `${title}, ${row.unit || phrase("as a part of the moment")}`);
     label.append(make("span", title), value, input, small);
@@ -114,8 +115,8 @@ export function openPractice(about, command, run, isOwn, allowed) {
       }, SENDS_EVERY_MS);
     });
     function say(there) {
-      value.textContent = `${fixed(there, decimals)} ${row.unit}`;
-      input.setAttribute("aria-valuetext", value.textContent);
+      put(value, {textContent: `${fixed(there, decimals)} ${row.unit}`});
+      put(input, {ariaValueText: value.textContent});
       label.classList.toggle("changed", there !== row.usual);
     }
     return {
@@ -141,19 +142,19 @@ export function openPractice(about, command, run, isOwn, allowed) {
   let shownTask = "";
   function showTask(bench) {
     const row = tasks[bench.task];
-    by("task").hidden = !row;
-    by("guide").hidden = Boolean(row);
-    by("task").inert = !allowed;
-    by("task-share").value = bench.task_share;
+    put(by("task"), {hidden: !row});
+    put(by("guide"), {hidden: Boolean(row)});
+    put(by("task"), {inert: !allowed});
+    put(by("task-share"), {value: bench.task_share});
     write("tasks-done", bench.tasks_done.length ? phrase("{done} of {all} done", {done: bench.tasks_done.length, all: about.tasks.length}) : "");
-    for (const [name, {item}] of Object.entries(tasks)) item.className = bench.tasks_done.includes(name) ? "done" : "";
+    for (const [name, {item}] of Object.entries(tasks)) put(item, {className: bench.tasks_done.includes(name) ? "done" : ""});
     if (bench.task === shownTask) return;
     shownTask = bench.task;
     if (!row) return;
     write("task-title", phrase(row.title));
     write("task-does", phrase(row.does));
     const answers = Object.entries(row.answers);
-    by("task-share").hidden = answers.length > 0;
+    put(by("task-share"), {hidden: answers.length > 0});
     by("answers").replaceChildren(...answers.map(([text, value]) => {
       const button = make("button", text);
       button.addEventListener("click", () => send("answer", {value}));
@@ -186,7 +187,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
   }
 
   function press(id, on, text) {
-    by(id).setAttribute("aria-pressed", String(on));
+    put(by(id), {ariaPressed: String(on)});
     write(id, text);
   }
 
@@ -195,7 +196,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     if (!bench) return;
     const elsewhere = Boolean(bench.folder) && !bench.busy;  // another program's bench records the run that is shown
     if (elsewhere !== now.elsewhere) {
-      by("controls").disabled = !allowed || elsewhere;
+      put(by("controls"), {disabled: !allowed || elsewhere});
       if (allowed && (elsewhere || now.elsewhere)) write("said", elsewhere ? phrase("Another program records this run: the practice bench rests until it ends, or until you go back to it.") : "");
       now.elsewhere = elsewhere;
     }
@@ -209,12 +210,12 @@ export function openPractice(about, command, run, isOwn, allowed) {
     press("hold", now.paused, now.paused ? phrase("Let time go on") : phrase("Stop time"));
     write("record", now.busy ? phrase("End run") : phrase("Record"));
     for (const id of ["drive", "match", "back", "frequency", "frequency-slider", "amplitude", "amplitude-slider", "experiment"]) {
-      by(id).disabled = now.busy;
+      put(by(id), {disabled: now.busy});
     }
     names.forEach((name, k) => knobs[k].show(bench.what_if[name]));
     showTask(bench);
-    for (const part of ["what-if", "tasks"]) by(part).inert = now.busy;
-    by("analyze").disabled = now.busy || !readings || about_run?.status === "running";
+    for (const part of ["what-if", "tasks"]) put(by(part), {inert: now.busy});
+    put(by("analyze"), {disabled: now.busy || !readings || about_run?.status === "running"});
     if (drive && !timer && document.activeElement !== by("frequency") && document.activeElement !== by("frequency-slider")) {
       follow("frequency", drive.frequency_hz, 2);
     }
@@ -229,7 +230,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     if (!(value > 0) || by(id).getAttribute("aria-invalid") === "true") return;  // what is wrong stays beside its message
     const text = String(Number(value.toFixed(decimals)));
     if (by(id).value === local(text)) return;
-    by(id).value = local(text);
+    put(by(id), {value: local(text)});
     by(`${id}-slider`).value = text;
   }
 
@@ -240,9 +241,8 @@ export function openPractice(about, command, run, isOwn, allowed) {
     };
     const items = [...by("guide").children], last = items.map((item) => Boolean(done[item.dataset.step])).lastIndexOf(true);
     items.forEach((item, k) => {  // a run drives the top itself: it has done the steps before it
-      item.className = k <= last ? "done" : k === last + 1 ? "now" : "";
-      if (item.className === "now") item.setAttribute("aria-current", "step");
-      else item.removeAttribute("aria-current");
+      put(item, {className: k <= last ? "done" : k === last + 1 ? "now" : ""});
+      put(item, {ariaCurrent: item.className === "now" ? "step" : null});
     });
   }
 

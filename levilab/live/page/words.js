@@ -19,11 +19,13 @@ export function turnLanguage({target}) {
 /** Numbers in a text with the decimal sign of the language. */
 export const local = (text) => text.replace(/(?<=\d)\.(?=\d)/g, TABLE.decimal);
 
-/** Write a text into an element, and touch the page only where it changes. */
-export function write(id, text) {
-  const element = by(id);
-  if (element.textContent !== text) element.textContent = text;
+/** Change properties of an element, and touch the page only where they change: a reader of the screen looks each time. */
+export function put(element, properties) {
+  for (const [name, value] of Object.entries(properties)) if (element[name] !== value) element[name] = value;
 }
+
+/** Write a text into an element. */
+export const write = (id, text) => put(by(id), {textContent: text});
 
 /** Return a number with these decimals; a dash where there is none. */
 export const fixed = (value, decimals) =>

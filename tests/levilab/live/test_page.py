@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -260,6 +262,39 @@ def test_what_the_bench_publishes_is_drawn(served: Hall, page: Page, tmp_path: P
     assert until(page, f"{SAID}.match(/fall/g)?.length") == 2
     publish(served.watches[run.folder.name], Record(2, "tape", 13.9, -0.1, 2e-4, 0 * wave, 0 * wave))
     assert until(page, f"{SAID}.includes('tape from 0 to 0 volts, laser from') && {SAID}").count("before the fall") == 1
+
+
+#: Parts of a page that are written while it shows a number of frames.
+WRITTEN = """(frames) => new Promise((done) => {
+  const written = new Set(), end = levilab.frames + frames;
+  const watch = new MutationObserver((all) => all.forEach(({target}) => written.add(target.id || target.nodeName)));
+  watch.observe(document, {subtree: true, childList: true, attributes: true, characterData: true});
+  const look = () => levilab.frames < end ? setTimeout(look, 20) : done([...written]);
+  look();
+})"""
+
+
+def test_who_hears_the_page_hears_events_and_not_each_number(served: Hall, page: Page, tmp_path: Path) -> None:
+    run = GrowingRun(tmp_path)
+    watch = served.watches
+    with run.running():
+        page.goto(address(served, run.folder.name))
+        until(page, "levilab.frames > 0")
+        now = [datetime.now(UTC) - timedelta(seconds=late) for late in (60, 0)]
+        for text, when in zip(("it was set up", "the top follows the drive"), now, strict=True):
+            run.event(text, utc=when.isoformat())
+        until(page, "document.getElementById('news').textContent === 'the top follows the drive'")  # the old is no news
+        state = State(1.0, last={"spin_frequency_hz": 31.0}, virtual=True, speed=1.0)
+        publish(watch[run.folder.name], state)
+        until(page, "document.getElementById('spin-value').textContent === '31.0000'")
+        page.evaluate(f"void ({WRITTEN})(3).then((written) => {{ window.written = written; }})")
+        for k in range(1, 100):
+            publish(watch[run.folder.name], replace(state, time_s=1.0 + 0.001 * k))
+            if page.evaluate("window.written"):
+                break
+            page.wait_for_timeout(60)
+        assert page.evaluate("window.written") == []
+    assert page.evaluate("[...document.querySelectorAll('output')].every((one) => one.ariaLive === 'off')")
 
 
 def test_the_last_minutes_of_the_bench_are_drawn_before_the_first_reading(
