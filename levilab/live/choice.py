@@ -9,16 +9,25 @@ from typing import TYPE_CHECKING
 
 from levilab.errors import DataError
 from levilab.runs.find import RECORD
-from levilab.runs.run import Run
+from levilab.runs.run import LONGEST_GROUP, Run
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
     from pathlib import Path
 
+    from levilab.runs.run import RunRecord
+
 #: Runs to choose from.
 MOST_RUNS = 50
 #: Of the newest runs, how many are looked at for one that is being recorded.
 _LOOKED_AT = 5
+#: Experiment, its setting "which" or "drive" if that makes it another one, and what it is called then.
+_TITLES = (
+    ("limit", "upper", "upper limit"),
+    ("limit", "", "lower limit"),
+    ("spin", "triggered", "spin-down, triggered drive"),
+    ("spin", "", "spin-down"),
+)
 
 
 @dataclass(frozen=True)
@@ -28,11 +37,14 @@ class Choice:
     Attributes:
         name: of its folder.
         status: as of the run; "unreadable" where its record cannot be read.
+        title: its experiment, with the setting that makes it another one.
+        group: who measured.
     """
 
     name: str
     status: str
-    experiment: str = ""
+    title: str = ""
+    group: str = ""
     started_utc: str = ""
     note: str = ""
 
@@ -63,7 +75,19 @@ def _choice(folder: Path) -> Choice:
     except DataError:
         return Choice(folder.name, "unreadable")
     record = run.record
-    return Choice(folder.name, run.status, record.experiment, record.started_utc or "", record.note[:200])
+    started, group = record.started_utc or "", record.group[:LONGEST_GROUP]
+    return Choice(folder.name, run.status, _title(record), group, started, record.note[:200])
+
+
+def _title(record: RunRecord) -> str:
+    """Return the name of what was measured."""
+    settings = record.configuration.get(record.experiment)
+    settings = settings if isinstance(settings, dict) else {}
+    how = (settings.get("which"), settings.get("drive"))
+    return next(
+        (title for name, one, title in _TITLES if name == record.experiment and (not one or one in how)),
+        record.experiment,
+    )
 
 
 def running_run(root: Path, but: Collection[Path] = ()) -> Path | None:

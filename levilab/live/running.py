@@ -166,7 +166,7 @@ def locked_line(columns: Mapping[str, Array], size: int, *_: object) -> Running:
     p = "" if fit.p_locked is None else Text("p = {p:n} for b = 1, a = 0", p=plain(fit.p_locked, 2))
     return Running(
         "line so far   ν_p = a + b ν_d",
-        (Text("b = {b:n}, a = {a:n}", b=b, a=a), p),
+        (Text("b = {b:n}, a = {a:n}", b=b, a=a), p, "preliminary: “Analyze” takes the u of all gates together"),
         Curve(x, line.at(x), np.nan_to_num(line.confidence_band(x))),
         final="line   ν_p = a + b ν_d",
     )

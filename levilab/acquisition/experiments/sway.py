@@ -71,7 +71,7 @@ def run(session: Session[SwaySettings]) -> None:
 
 
 def _float_top(session: Session[SwaySettings]) -> None:
-    session.ask(FloatTop("Spin the top to 35 Hz or more, let it float, and push it sideways by half a millimetre."))
+    session.ask(FloatTop("the virtual bench spins the top, lets it float, and pushes it sideways by half a millimetre"))
 
 
 def _frames_kept(session: Session[SwaySettings]) -> int:

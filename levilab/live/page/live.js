@@ -69,6 +69,7 @@ function take(head) {
   if (head.about) {
     if (data.about && data.about.status !== head.about.status) listRuns(seen.run);
     data.about = head.about;
+    showChoices();
   }
   if (head.readings) takeReadings(head.readings);
   if (head.events) takeEvents(head.events);
@@ -162,6 +163,7 @@ function takePoses(pieces) {
     const before = data.up;
     data.up = last === up.length - 1;
     if (before && !data.up) markFall();
+    else if (!before && data.up) forgetFall();
     if (last >= 0) data.lastUp = piece.start_s + last * piece.step_s;
     space.add(piece.start_s, piece.step_s, piece.position, piece.quaternion, up);
   }
@@ -174,6 +176,12 @@ function markFall() {
   const spin = history.counts.at(-1)?.[1];
   history.mark(data.lastUp, spin ? phrase("fell at {spin} Hz", {spin: fixed(spin, 1)}) : phrase("fell"));
   dirty.plot = true;
+}
+
+/** Another top floats: what is kept of a fall is not of it. */
+function forgetFall() {
+  fellAt = NaN;
+  put(by("replay"), {hidden: true});
 }
 
 /** What is drawn of the top that is shown. */
@@ -575,10 +583,8 @@ async function listRuns(chosen) {
   if (!answer) return listed;  // the server is gone: the list stays
   listed = answer;
   const select = by("run");
-  select.replaceChildren(...listed.runs.map((run) => {
-    const when = run.started_utc.slice(0, 16).replace("T", " ");
-    return option(`${when} ${run.experiment || run.name}${run.status === "finished" ? "" : `, ${STATES[run.status] || run.status}`}`, run.name);
-  }));
+  select.replaceChildren(...listed.runs.map((run) => option("", run.name)));
+  showChoices();
   if (listed.practice && !listed.practice.runs.length && listed.runs.length) {  // the runs are older than this bench
     select.prepend(option(phrase("no run of this bench yet"), OWN_BENCH));
     select.value = OWN_BENCH;
@@ -586,6 +592,16 @@ async function listRuns(chosen) {
   if (!listed.runs.length) select.append(option(phrase("none yet")));
   select.value = chosen || select.value;
   return listed;
+}
+
+/** Name each run that can be chosen; the state of the one that is shown comes with its frames. */
+function showChoices() {
+  for (const run of listed.runs) {
+    if (run.name === seen.run && data.about) run.status = data.about.status;
+    const text = [`${run.started_utc.slice(0, 16).replace("T", " ")} ${run.title ? phrase(run.title) : run.name}`, run.group, run.status === "finished" ? "" : STATES[run.status] || run.status];
+    const row = [...by("run").options].find(({value}) => value === run.name);
+    if (row) put(row, {textContent: text.filter(Boolean).join(", ")});
+  }
 }
 by("language").addEventListener("change", turnLanguage);
 by("run").addEventListener("focus", () => listRuns(by("run").value));

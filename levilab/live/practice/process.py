@@ -339,11 +339,12 @@ class PracticeProcess:
             if self._hold is not None:
                 self._hold.is_lost = True
             hides = self._task is not None
-            text = cause_of_fall(self.scene, self._last_spin, after, driven=driven, hides=hides)
-            if self._session is None:
-                self._say(text)
+            runs = self._session is not None
+            text = cause_of_fall(self.scene, self._last_spin, None if runs else after, driven=driven, hides=hides)
+            if runs:
+                self._fell = text  # the run says in its own words when that was
             else:
-                self._fell = text  # the run says in its own words that it ended
+                self._say(text)
 
     def _look_at_task(self, answer: float | None = None) -> None:
         """See whether the goal of the task under way is reached."""
@@ -841,6 +842,8 @@ class PracticeProcess:
             self.world, self.scene, self._wiring = usual
             if (plan.scene or plan.experiment in MOVE_THE_PROBE) and not self._over:
                 self._put_back()
+                if plan.scene:
+                    self._report("message", "the run had a top of its own; the usual one floats again")
 
     @contextlib.contextmanager
     def _watching(self, session: Session[Any], wiring: Wiring) -> Iterator[Callable[[], None]]:

@@ -162,7 +162,7 @@ def served(tmp_path: Path) -> Iterator[Hall]:
 def test_a_run_grows_is_torn_reloaded_and_ends(served: Hall, page: Page, tmp_path: Path) -> None:
     page.goto(address(served))
     until(page, "document.body.dataset.state === 'none'")
-    run = GrowingRun(tmp_path)
+    run = GrowingRun(tmp_path, group="Group 7")
     with run.running():
         run.readings(spin_down(3))
         run.add("30.0,37.")
@@ -184,8 +184,11 @@ def test_a_run_grows_is_torn_reloaded_and_ends(served: Hall, page: Page, tmp_pat
         )  # the line ends where the head says
         for limits, said in (("-3, 21", "at most 25 s"), ("-9, -1", ""), ("80, 140", "about 80 s to 2:20 min")):
             assert page.evaluate(f"import('/page/words.js').then(({{between}}) => between({limits}))") == said
+    chosen = "document.querySelector('#run option:checked').textContent"
+    until(page, f"{chosen}.endsWith(' spin-down, Group 7, running')")
+    page.evaluate("void (window.fetch = () => new Promise(() => {}))")  # the list needs no second answer of the server
     run.say(status="finished")
-    until(page, "document.body.dataset.state === 'finished'")
+    until(page, f"{chosen}.endsWith(' spin-down, Group 7') && document.body.dataset.state === 'finished'")
 
 
 def test_two_views_of_a_run_one_closed_and_opened_again_and_the_folder_deleted(

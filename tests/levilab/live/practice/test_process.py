@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import pytest
 
-from instruments.clock import PacedClock
+from instruments.clock import PacedClock, VirtualClock
+from levilab.bench.config import Limits
 from levilab.interruption import End
 from levilab.live.practice.commands import (
     AnswerTask,
@@ -34,7 +35,7 @@ from levilab.live.practice.tasks import TASKS, Look, Progress, exponent_of
 from levilab.runs.run import Run
 from levilab.simulator.scene import read_scene
 from levilab.telemetry.publisher import Publisher
-from levilab.world.bench import scene_world
+from levilab.world.bench import scene_world, virtual_wiring
 
 if TYPE_CHECKING:
     from levilab.telemetry.messages import State
@@ -254,15 +255,16 @@ def test_a_top_falls_near_the_edge_and_is_put_back(tmp_path: Path) -> None:
     early = [(33.0, RecordRun(experiment=name)) for name in ("spin", "precession", "trace")]
     script = carry_out(tmp_path, *early, (33.0, PutBack()), (39.0, None), start_hz=25.0)
     counted = [spin for _, _, spin in script.spins(0.0, 33.0) if spin > 0]
-    # the light of a top that leans passes the counter's lens by; it leaves its place at 22.3 Hz
-    assert 22.3 < counted[-1] < 24.5
+    # it stands, leaning by 10°, down to 23.3 Hz; the light of a top that leans passes the counter's lens by
+    assert 23.2 < counted[-1] < 24.5
     assert math.isnan(script.spins(30.0, 33.0)[-1][2])
     assert [text.partition(", ")[0] for text in script.said("refused")] == 3 * ["the top is down"]
     assert script.said("done") == ["the top floats again"]
     low = 20.94  # levilab stability practice
     (said,) = script.said("message")
     assert said.startswith(
-        f"below {low:.1f} Hz the spin cannot hold the top, and one that wobbles falls sooner: it fell"
+        f"below {low:.1f} Hz the spin cannot hold an upright top, and this one, whose moment is tilted by 1.2°, leans "
+        "more and more before: it fell"
     )
     seen, after = (float(number) for number in re.findall(r"at ([\d.]+) Hz after (\d+) s$", said)[0])
     assert seen == pytest.approx(counted[-1], abs=0.06)
@@ -281,7 +283,7 @@ def test_a_held_top_that_falls_for_want_of_spin_is_not_said_to_be_lost_by_the_dr
     )
     follows, fell = script.said("message")[-2:]
     assert follows.startswith("the top follows the drive at ")
-    assert fell.startswith("below 20.9 Hz the spin cannot hold the top")
+    assert fell.startswith("below 20.9 Hz the spin cannot hold an upright top")
     assert fell.endswith(", held down there by its drive")
 
 
@@ -290,7 +292,7 @@ def test_a_held_top_that_falls_for_want_of_spin_is_not_said_to_be_lost_by_the_dr
     [
         ({}, 82.0, "near 83.7 Hz the top is too stiff for its axis to follow the field"),
         ({}, 40.0, "the spin could hold it, from 20.9 to 83.7 Hz, so it swung too far: it fell at 40.0 Hz after 7 s"),
-        ({"base.tilt_rad": 0.02}, 22.0, "below 20.9 Hz the spin cannot hold the top"),
+        ({"base.tilt_rad": 0.02}, 22.0, "below 20.9 Hz the spin cannot hold an upright top, and this one"),
         (
             {"top.mass_kg": 0.0252},
             30.0,
@@ -307,6 +309,18 @@ def test_a_held_top_that_falls_for_want_of_spin_is_not_said_to_be_lost_by_the_dr
 def test_a_fall_is_told_with_its_cause(changes: dict[str, float], spin: float | None, said: str) -> None:
     scene = read_scene("practice").changed(changes)
     assert cause_of_fall(scene, spin, 7.0, driven=False).startswith(said)
+
+
+@pytest.mark.parametrize(("tilt", "stands"), [(0.02, False), (0.0, True)])
+def test_the_tilt_of_the_moment_is_why_this_top_falls_before_an_upright_one(tilt: float, stands: bool) -> None:
+    """From 21.8 Hz, in 6 s to 21.4 Hz: above the limit of the theory, which knows of no tilt."""
+    scene = read_scene("practice").changed({"start.spin_hz": 21.8, "top.moment_tilt": [tilt, 0.98]})
+    world = scene_world(scene, VirtualClock, lambda _: None)
+    poses = virtual_wiring(world, Limits()).poses
+    world.float_top(1)
+    world.clock.sleep(6.0)
+    assert poses
+    assert bool(poses(6.0, 0.1, 1).up[0]) is stands
 
 
 def test_what_a_person_changes_has_immediate_effect(tmp_path: Path) -> None:
