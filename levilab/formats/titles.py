@@ -201,6 +201,9 @@ OTHER_SENSORS: Mapping[str, str] = {
 }  # fmt: skip
 
 
+_FOLDED_UNITS = frozenset(name.casefold() for units in UNITS.values() for name in units)
+
+
 def plain_unit(text: str) -> str:
     """Return a unit as the table spells it: µ as μ, ⁻¹ as -1, without blanks, dots, carets and brackets."""
     return re.sub(r"[\s^·*()\[\]]", "", unicodedata.normalize("NFKC", text).replace("−", "-"))
@@ -230,6 +233,9 @@ def unit_factor(text: str, kind: str) -> float | None:
 
 def is_unit(text: str) -> bool:
     """Return whether a field is the unit of anything we know, as in a row of units beneath a header."""
+    unit = plain_unit(text)
+    if unit.casefold() not in _FOLDED_UNITS and not _TURNS_IN.fullmatch(unit):
+        return False  # nearly every field: one look instead of one for each unit
     return any(unit_factor(text, kind) is not None for kind in UNITS)
 
 
