@@ -103,7 +103,7 @@ def test_the_result_is_written_as_the_interface_says(sample_data, tmp_path):
         assert set(model["parameters"]) >= {"start_frequency"}
         assert set(model["statistics"]) == {
             "n", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson", "runs_test_p",
-            "difference",
+            "difference", "degrees_of_freedom",
         }  # fmt: skip
     assert run["models"][0]["linearised"]["c1"]["unit"] == "1/s"
     assert set(result["models"][2]["parameters"]) == {"c32"}
