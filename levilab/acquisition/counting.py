@@ -11,6 +11,7 @@ from instruments.errors import InstrumentError
 from levilab.acquisition.experiment import CounterSettings
 from levilab.acquisition.session import ExperimentFailed
 from levilab.runs.events import RunEvent
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,9 +58,14 @@ class AnotherTop(ExperimentFailed):
     def __init__(self, last: Row, seen: Row) -> None:
         self.last, self.seen = last, seen
         super().__init__(
-            f"the counter sees {seen['spin_frequency_hz']:.4g} Hz, {seen['time_s'] - last['time_s']:.0f} s after "
-            f"{last['spin_frequency_hz']:.4g} Hz, and it stays so: a top that coasts gains no spin, so this one was "
-            "set spinning meanwhile; begin a new run with it"
+            Text(
+                "the counter sees {now:.4g} Hz, {later:.0f} s after "
+                "{before:.4g} Hz, and it stays so: a top that coasts gains no spin, so this "
+                "one was set spinning meanwhile; begin a new run with it",
+                now=seen["spin_frequency_hz"],
+                later=seen["time_s"] - last["time_s"],
+                before=last["spin_frequency_hz"],
+            )
         )
 
 
@@ -155,25 +161,34 @@ class FreeTop(Generic[S]):
         last = self.last["time_s"] if self.last else 0.0
         if self.missed and self.missed[-1] is Missed.DARK:
             signal = self.session.bench.counter.SIGNAL.name
-            return f"no {signal} any more: the top fell between {last:.1f} s and {asked:.1f} s"
+            return Text(
+                "no {signal} any more: the top fell between {last:.1f} s and {asked:.1f} s",
+                signal=signal,
+                last=last,
+                asked=asked,
+            )
         seen = [why for why in self.missed if why in NO_TOP]
         if len(seen) >= _MOST_MISSED:
-            return f"no steady pulses at {len(seen)} times in a row: the top fell after {last:.1f} s"
+            return Text(
+                "no steady pulses at {times} times in a row: the top fell after {last:.1f} s",
+                times=len(seen),
+                last=last,
+            )
         return ""
 
     def _read_or_ask_again(self) -> Row | Missed:
         first = self._count()
         if first and self._is_plausible(first):
             return first
-        what = "no reading" if first is None else f"{first['spin_frequency_hz']:.4g} Hz does not follow"
-        self.session.event(RunEvent.ASKED_AGAIN, f"{what}, asking once more", **_spin_of(first))
+        what = "no reading" if first is None else Text("{spin:.4g} Hz does not follow", spin=first["spin_frequency_hz"])
+        self.session.event(RunEvent.ASKED_AGAIN, Text("{what}, asking once more", what=what), **_spin_of(first))
         second = self._count()
         if second and self._is_plausible(second):
             return second
         if first and second and abs(second["spin_frequency_hz"] / first["spin_frequency_hz"] - 1) < _SAME_SHARE:
             return self._judge_pair(second)
         if second:
-            text = f"{second['spin_frequency_hz']:.4g} Hz is not credible either"
+            text = Text("{spin:.4g} Hz is not credible either", spin=second["spin_frequency_hz"])
             self.session.event(RunEvent.NOT_TAKEN, text, **_spin_of(second))
         return Missed.UNSTEADY if first or second else Missed.DARK
 
@@ -183,21 +198,30 @@ class FreeTop(Generic[S]):
         if reading["spin_frequency_hz"] < last["spin_frequency_hz"]:
             return reading
         if any(_is_drop(row, last) and is_plausible(row, reading) for row in self.before[:-1]):
-            text = f"the reading before, {last['spin_frequency_hz']:.4g} Hz, was a miscount"
+            text = Text("the reading before, {spin:.4g} Hz, was a miscount", spin=last["spin_frequency_hz"])
             self.session.event(RunEvent.MISCOUNTED, text, **_spin_of(last))
             return reading
         times = next((k for k in (2, 3) if _coasts(last, reading, k)), None)
         seen, before = reading["spin_frequency_hz"], last["spin_frequency_hz"]
         if times is None:
             self._faster = reading
-            text = f"{seen:.4g} Hz after {before:.4g} Hz: a top that coasts gains no spin; no reading"
+            text = Text(
+                "{seen:.4g} Hz after {before:.4g} Hz: a top that coasts gains no spin; no reading",
+                seen=seen,
+                before=before,
+            )
             self.session.event(RunEvent.NOT_TAKEN, text, **_spin_of(reading))
             return Missed.FASTER
         if not self._warned:
             self._warned = True
             self.session.warn(
-                f"the counter sees {seen:.4g} Hz after {before:.4g} Hz, {times} times what follows: such counts are no "
-                "readings; is there a second bright mark, or is the trigger level too low?"
+                Text(
+                    "the counter sees {seen:.4g} Hz after {before:.4g} Hz, {times} times what follows: such "
+                    "counts are no readings; is there a second bright mark, or is the trigger level too low?",
+                    seen=seen,
+                    before=before,
+                    times=times,
+                )
             )
         return Missed.MULTIPLE
 
@@ -213,13 +237,21 @@ class FreeTop(Generic[S]):
         if found is not None:
             time, u = found.time - (session.zero or 0.0), found.u
             if found.gaps:
-                text = f"the samples of this count have gaps of {', '.join(f'{gap:.2g}' for gap in found.gaps)} s"
+                text = Text(
+                    "the samples of this count have gaps of {gaps} s",
+                    gaps=", ".join(f"{gap:.2g}" for gap in found.gaps),
+                )
                 session.event(RunEvent.GAPS, text, gaps_s=list(found.gaps))
             if found.folds and not self._in_doubt:
                 self._in_doubt = True
                 others = " or ".join(f"{fold:.1f} Hz" for fold in found.folds)
                 session.warn(
-                    f"the spin of {spin:.2f} Hz may be {others}: samples at this rate cannot tell; a longer gate_s may"
+                    Text(
+                        "the spin of {spin:.2f} Hz may be {others}: samples at this rate cannot tell; a longer "
+                        "gate_s may",
+                        spin=spin,
+                        others=others,
+                    )
                 )
         session.check_settings("counter")
         return {"time_s": time, "spin_frequency_hz": spin} | ({"spin_frequency_u_hz": u} if u else {})

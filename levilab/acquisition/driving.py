@@ -25,6 +25,7 @@ from levilab.bench.person import FloatTop
 from levilab.present.numbers import with_sign
 from levilab.present.panel import clock
 from levilab.runs.events import RunEvent
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -96,9 +97,13 @@ class DriveSettings(CounterSettings):
         """Raise ConfigError for a drive that the bench does not allow."""
         if self.drive_waveform == "NONE":
             if not self.by_hand:
-                raise ConfigError(f"{table}.drive_waveform = NONE: this experiment needs a drive, SIN, SQU or TRI")
+                raise ConfigError(
+                    Text("{table}.drive_waveform = NONE: this experiment needs a drive, SIN, SQU or TRI", table=table)
+                )
             if self.drive == "triggered":
-                raise ConfigError(f"{table}.drive_waveform = NONE: a triggered drive has cycles of SIN, SQU or TRI")
+                raise ConfigError(
+                    Text("{table}.drive_waveform = NONE: a triggered drive has cycles of SIN, SQU or TRI", table=table)
+                )
             return
         if self.drive == "triggered":
             self._check_triggered(table, limits)
@@ -106,18 +111,33 @@ class DriveSettings(CounterSettings):
         slowest = self.drive_frequency_hz / _LONGEST_RAMP_S
         if self.ramp_hz_per_s < slowest:
             raise ConfigError(
-                f"{table}.ramp_hz_per_s = {self.ramp_hz_per_s:g} would raise the top for hours to "
-                f"{table}.drive_frequency_hz = {self.drive_frequency_hz:g}: at least {slowest:.2g} is expected"
+                Text(
+                    "{table}.ramp_hz_per_s = {ramp_hz_per_s:g} would raise the top for hours to "
+                    "{table}.drive_frequency_hz = {drive_frequency_hz:g}: at least {slowest:.2g} is expected",
+                    table=table,
+                    ramp_hz_per_s=self.ramp_hz_per_s,
+                    drive_frequency_hz=self.drive_frequency_hz,
+                    slowest=slowest,
+                )
             )
 
     def _check_triggered(self, table: str, limits: Limits) -> None:
         if not self.by_trigger:
-            raise ConfigError(f"{table}.drive = triggered: the drive sets the frequency here, so ramp is expected")
+            raise ConfigError(
+                Text("{table}.drive = triggered: the drive sets the frequency here, so ramp is expected", table=table)
+            )
         fastest = limits.of_the_drive().beyond(frequency_hz=CYCLE * self.drive_frequency_hz)
         if fastest and fastest.is_highest:
             raise ConfigError(
-                f"{table}.drive_frequency_hz = {self.drive_frequency_hz:g}: the cycles of a triggered drive are "
-                f"{CYCLE:g} times as fast, more than this bench allows, limits.{fastest.name} = {fastest.limit:g}"
+                Text(
+                    "{table}.drive_frequency_hz = {drive_frequency_hz:g}: the cycles of a triggered drive are"
+                    " {cycle:g} times as fast, more than this bench allows, limits.{name} = {limit:g}",
+                    table=table,
+                    drive_frequency_hz=self.drive_frequency_hz,
+                    cycle=CYCLE,
+                    name=fastest.name,
+                    limit=fastest.limit,
+                )
             )
 
 
@@ -141,8 +161,15 @@ def check_drive(table: str, limits: Limits, amplitude_vpp: float, frequencies: I
     for name, wanted, found in asked:
         if found:
             raise ConfigError(
-                f"{table}.{name} = {wanted:g} is {'more' if found.is_highest else 'less'} than this bench allows, "
-                f"limits.{found.name} = {found.limit:g}"
+                Text(
+                    "{table}.{name} = {wanted:g} is {more} than this bench allows, limits.{limit_name} = {limit:g}",
+                    table=table,
+                    name=name,
+                    wanted=wanted,
+                    more="more" if found.is_highest else "less",
+                    limit_name=found.name,
+                    limit=found.limit,
+                )
             )
 
 
@@ -219,7 +246,11 @@ def drive_up(session: Session[D], to: float | None = None) -> Motor | None:
     for tries in range(1, _TRIES_TO_HOLD + 1):
         spin = spin_now(session)
         if spin is None:
-            raise _did_not_follow(session, target, f"{seen}; then it fell") if seen else _no_light(session)
+            raise (
+                _did_not_follow(session, target, Text("{seen}; then it fell", seen=seen))
+                if seen
+                else _no_light(session)
+            )
         session.stop.check()  # the drive does not go on once the end was asked for
         try:
             return _bring_up(session, spin, target)
@@ -230,7 +261,13 @@ def drive_up(session: Session[D], to: float | None = None) -> Motor | None:
             session.bench.outputs_off()
             seen = str(lost)
             session.event(
-                RunEvent.NOT_HELD, f"try {tries} of {_TRIES_TO_HOLD}: the drive does not hold the top, {seen}"
+                RunEvent.NOT_HELD,
+                Text(
+                    "try {tries} of {most}: the drive does not hold the top, {seen}",
+                    tries=tries,
+                    most=_TRIES_TO_HOLD,
+                    seen=seen,
+                ),
             )
     raise _did_not_follow(session, target, seen)
 
@@ -243,10 +280,10 @@ def _bring_up(session: Session[D], spin: float, target: float) -> Motor | None:
     session.bench.generator.prepare(
         waveform=settings.drive_waveform, frequency_hz=spin, amplitude_vpp=settings.drive_amplitude_vpp
     )
-    session.event(RunEvent.DRIVE_ON, f"drive on at the top's spin, {spin:.2f} Hz", frequency_hz=spin)
+    session.event(RunEvent.DRIVE_ON, Text("drive on at the top's spin, {spin:.2f} Hz", spin=spin), frequency_hz=spin)
     session.bench.generator.output = True
     held = _ramp(session, _take_hold(session, spin), target)
-    text = f"the top follows the drive at {target:.2f} Hz: {held:.2f} Hz counted"
+    text = Text("the top follows the drive at {target:.2f} Hz: {held:.2f} Hz counted", target=target, held=held)
     session.event(RunEvent.LOCKED, text, frequency_hz=held)
     _hold(session, target)
     return None
@@ -254,24 +291,36 @@ def _bring_up(session: Session[D], spin: float, target: float) -> Motor | None:
 
 def _did_not_follow(session: Session[D], target: float, seen: str) -> DidNotFollow:
     name = session.writer.record.experiment
-    observed = f"the top did not follow the drive to {target:g} Hz ({seen})"
+    observed = Text("the top did not follow the drive to {target:g} Hz ({seen})", target=target, seen=seen)
     lowest, highest = _USUAL_WINDOW_HZ
     if not lowest <= target <= highest:
         return DidNotFollow(
-            f"{observed}; a Levitron of the usual kind floats only between {lowest:.2f} and {highest:.2f} Hz",
-            f"ask for a spin between these ({name}.drive_frequency_hz); levilab stability computes them for a top",
+            Text(
+                "{observed}; a Levitron of the usual kind floats only between {lowest:.2f} and {highest:.2f} Hz",
+                observed=observed,
+                lowest=lowest,
+                highest=highest,
+            ),
+            Text(
+                "ask for a spin between these ({name}.drive_frequency_hz); levilab stability computes them for a top",
+                name=name,
+            ),
         )
     return DidNotFollow(
         observed,
-        f"ramp slower ({name}.ramp_hz_per_s) or drive harder ({name}.drive_amplitude_vpp)",
+        Text("ramp slower ({name}.ramp_hz_per_s) or drive harder ({name}.drive_amplitude_vpp)", name=name),
     )
 
 
 def _no_light(session: Session[D]) -> NoLight:
     name, signal = session.writer.record.experiment, session.bench.counter.SIGNAL
+    level, where = "", ""
+    if signal.has_level:
+        level = Text(" at {level:g} V", level=session.settings.trigger_level_v)
+        where = Text(" ({name}.trigger_level_v in the bench file)", name=name)
     return NoLight(
-        f"the counter sees no {signal.name}" + f" at {session.settings.trigger_level_v:g} V" * signal.has_level,
-        signal.advice + f" ({name}.trigger_level_v in the bench file)" * signal.has_level + "?",
+        Text("the counter sees no {signal}{level}", signal=signal.name, level=level),
+        Text("{advice}{where}?", advice=signal.advice, where=where),
     )
 
 
@@ -289,7 +338,13 @@ def _take_hold(session: Session[D], spin: float) -> float:
         seen = spin_now(session, GRIP_GATE_S)
         session.bench.generator.frequency = grip.follow(seen)
         session.progress(
-            f"the drive takes hold: count {grip.counts} of {COUNTS}, {grip.drive:.2f} Hz", grip.counts / COUNTS
+            Text(
+                "the drive takes hold: count {count} of {counts}, {drive:.2f} Hz",
+                count=grip.counts,
+                counts=COUNTS,
+                drive=grip.drive,
+            ),
+            grip.counts / COUNTS,
         )
     prepare_counter_again(session)
     if grip.is_lost:
@@ -304,7 +359,12 @@ def _ramp(session: Session[D], start: float, target: float) -> float:
         session.stop.check()
         drive = start + (target - start) * k / steps
         session.bench.generator.frequency = drive
-        session.progress(f"drive at {drive:.2f} Hz{_ramp_end(session, target, (steps - k) * RAMP_STEP_S)}", k / steps)
+        session.progress(
+            Text(
+                "drive at {drive:.2f} Hz{end}", drive=drive, end=_ramp_end(session, target, (steps - k) * RAMP_STEP_S)
+            ),
+            k / steps,
+        )
         session.wait(RAMP_STEP_S)
         if k % round(_LOOK_EVERY_S / RAMP_STEP_S) == 0 and k < steps:
             held_spin(session, drive)
@@ -315,7 +375,7 @@ def _ramp_end(session: Session[D], target: float, left_s: float) -> str:
     """Return the end of a ramp as text; empty at the end, and on a clock that does not keep to the wall's."""
     if left_s <= 0 or not math.isfinite(session.bench.clock.speed):
         return ""
-    return f", {target:.2f} Hz in {clock(left_s)}"
+    return Text(", {target:.2f} Hz in {time}", target=target, time=clock(left_s))
 
 
 def held_spin(session: Session[D], drive: float) -> float:
@@ -333,7 +393,7 @@ def _hold(session: Session[D], drive: float) -> None:
     for k in range(n):
         session.stop.check()
         counts.append(held_spin(session, drive))
-        session.progress(f"held at {drive:.2f} Hz", (k + 1) / n)
+        session.progress(Text("held at {drive:.2f} Hz", drive=drive), (k + 1) / n)
     if n > 1:
         slip = slip_of(counts, drive)
         if has_drifted(counts):  # a top that is lost is taken for held until it is HELD_WITHIN_HZ behind
@@ -360,7 +420,12 @@ def has_drifted(counts: Sequence[float]) -> bool:
 def compare_with_drive(session: Session[D], slip: Slip) -> None:
     """Record the difference of a held top's counted spin from its drive; warn of a tape that slips."""
     difference = with_sign(slip.difference, 3)
-    text = f"held at {slip.drive:.2f} Hz: counted {slip.spin:.3f} Hz, {difference} Hz beside the drive"
+    text = Text(
+        "held at {drive:.2f} Hz: counted {spin:.3f} Hz, {difference:n} Hz beside the drive",
+        drive=slip.drive,
+        spin=slip.spin,
+        difference=difference,
+    )
     session.event(RunEvent.HELD, text, spin_frequency_hz=slip.spin, drive_frequency_hz=slip.drive, u_hz=slip.u)
     if slip.significant:
         session.warn(slip_as_text(slip))
@@ -369,12 +434,21 @@ def compare_with_drive(session: Session[D], slip: Slip) -> None:
 def slip_as_text(slip: Slip) -> str:
     """Return the meaning of a tape that does not turn with the drive."""
     counted = f"{slip.spin:.2f}({max(round(100 * slip.u), 1)})"
-    seen = f"the drive holds the top at {slip.drive:.2f} Hz, but the counter sees {counted} Hz"
+    seen = Text(
+        "the drive holds the top at {drive:.2f} Hz, but the counter sees {counted:n} Hz",
+        drive=slip.drive,
+        counted=counted,
+    )
     if slip.difference > 0:
-        return f"{seen}: no tape overtakes the drive; is there a second bright mark, or is the trigger level too low?"
-    return (
-        f"{seen}: LOOSE WASHERS, the tape slips by {-slip.difference:.2f} Hz; fix the washers to the top, for the "
-        "readings are of the tape and not of the top"
+        return Text(
+            "{seen}: no tape overtakes the drive; is there a second bright mark, or is the trigger level too low?",
+            seen=seen,
+        )
+    return Text(
+        "{seen}: LOOSE WASHERS, the tape slips by {slip:.2f} Hz; fix the washers to the top, for"
+        " the readings are of the tape and not of the top",
+        seen=seen,
+        slip=-slip.difference,
     )
 
 
@@ -409,7 +483,14 @@ def is_over(session: Session[D]) -> bool:
     longest = session.settings.longest_s
     if session.time_spent() <= longest:
         return False
-    session.event(RunEvent.LONGEST, f"{longest:g} s are over ({session.writer.record.experiment}.longest_s)")
+    session.event(
+        RunEvent.LONGEST,
+        Text(
+            "{longest:g} s are over ({experiment}.longest_s)",
+            longest=longest,
+            experiment=session.writer.record.experiment,
+        ),
+    )
     return True
 
 
@@ -438,7 +519,11 @@ def sweep_drive(session: Session[D], points: Sequence[float], measure: Callable[
     for k, drive in enumerate(points):
         if in_a_row == MOST_FAILED:
             left = ", ".join(f"{drive:g}" for drive in points[k:])
-            text = f"{MOST_FAILED} points one after the other failed: the sweep ends here; not tried: {left} Hz"
+            text = Text(
+                "{points} points one after the other failed: the sweep ends here; not tried: {left} Hz",
+                points=MOST_FAILED,
+                left=left,
+            )
             session.event(RunEvent.ENDED, text)
             break
         reason = sweep.carry_out(drive)
@@ -446,7 +531,7 @@ def sweep_drive(session: Session[D], points: Sequence[float], measure: Callable[
             break
         in_a_row = in_a_row + 1 if reason else 0
         if reason:
-            text = f"the point of {drive:g} Hz is left out: {reason}"
+            text = Text("the point of {drive:g} Hz is left out: {reason}", drive=drive, reason=reason)
             session.event(RunEvent.LEFT_OUT, text, drive_frequency_hz=drive)
     drive_off(session)
 
@@ -476,8 +561,16 @@ class _Sweep:
                 self.measure(drive)
             except (NotHeld, DidNotFollow) as lost:
                 self.at, tries, reason = None, tries + 1, str(lost)
-                text = f"the top was lost at the point of {drive:g} Hz, or on the way to it: {reason}"
-                session.event(RunEvent.LOCK_LOST, f"{text}; try {tries} of {TRIES}", drive_frequency_hz=drive)
+                text = Text(
+                    "the top was lost at the point of {drive:g} Hz, or on the way to it: {reason}",
+                    drive=drive,
+                    reason=reason,
+                )
+                session.event(
+                    RunEvent.LOCK_LOST,
+                    Text("{lost}; try {tries} of {most}", lost=text, tries=tries, most=TRIES),
+                    drive_frequency_hz=drive,
+                )
                 drive_off(session)
             except InstrumentError as error:
                 self.at = None

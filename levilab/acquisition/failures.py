@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from levilab.acquisition.session import ExperimentFailed
+from levilab.texts.text import Text
 
 
 class DidNotFollow(ExperimentFailed):
@@ -23,5 +24,5 @@ class NotHeld(Exception):
 
     def __init__(self, spin: float | None, drive: float) -> None:
         self.spin, self.drive = spin, drive
-        seen = "no top seen" if spin is None else f"a spin of {spin:.2f} Hz"
-        super().__init__(f"{seen} under a drive of {drive:.2f} Hz")
+        seen = "no top seen" if spin is None else Text("a spin of {spin:.2f} Hz", spin=spin)
+        super().__init__(Text("{seen} under a drive of {drive:.2f} Hz", seen=seen, drive=drive))

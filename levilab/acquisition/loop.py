@@ -25,6 +25,7 @@ from levilab.runs.events import RunEvent
 from levilab.runs.run import Run, RunRecord, utc_now
 from levilab.runs.writer import RunWriter
 from levilab.software import software_versions
+from levilab.texts.text import Text, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -100,7 +101,7 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
                 _at_the_bench(experiment, request, writer, show, stop, watch=watch)
             status: Status = "finished"
         except Interrupted as interruption:
-            text = f"interrupted by {interruption.by}, outputs are off"
+            text = Text("interrupted by {by}, outputs are off", by=interruption.by)
             writer.event(None, RunEvent.INTERRUPTED, text)
             show.close()  # its picture of the bench is from before the outputs went off
             show.message(text)
@@ -120,7 +121,10 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
 def _reason_of(error: Exception) -> str:
     """Return the reason that ended a run: the text of a known failure, with the class of an unexpected one."""
     known = isinstance(error, LevilabError | InstrumentError)
-    return unquote(str(error) if known else f"{type(error).__name__}: {error}")
+    if not known:
+        return f"{type(error).__name__}: {error}"
+    said = text_of(error)
+    return said if isinstance(said, Text) else unquote(said)
 
 
 def _writer(request: AcquisitionRequest, show: Display) -> RunWriter:

@@ -25,6 +25,7 @@ from levilab.runs.run import LONGEST_GROUP, Run
 from levilab.settings import in_one_line
 from levilab.simulator.keys import parse_setting
 from levilab.simulator.scene import SceneError, read_scene, scene_of
+from levilab.texts.text import Text, text_of
 from levilab.world.bench import VIRTUAL, scene_world, virtual_instruments, virtual_settings, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 
@@ -156,10 +157,10 @@ def chosen_settings(experiment: str, options: AcquisitionOptions) -> BenchConfig
 def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> None:
     for name in ("seed", "scene"):
         if getattr(options, name) is not None and (run or not options.mock):
-            raise UsageError(name, f"goes with `mock`, and not with `resume`: a run keeps its {name}")
+            raise UsageError(name, Text("goes with `mock`, and not with `resume`: a run keeps its {name}", name=name))
     for name in ("settings", "group", "temperature", "washers"):
         if getattr(options, name) not in {None, ()} and run:
-            raise UsageError(name, f"goes with a new run: a resumed run keeps its {name}")
+            raise UsageError(name, Text("goes with a new run: a resumed run keeps its {name}", name=name))
     if options.realtime and not virtual:
         raise UsageError("realtime", "goes with `mock`: a real bench always keeps to the wall clock")
 
@@ -168,7 +169,7 @@ def _typed(name: str, text: str | None, read: Callable[[str], T]) -> T | None:
     try:
         return None if text is None else read(text)
     except ValueError as error:
-        raise UsageError(name, str(error), value=text or None) from error
+        raise UsageError(name, text_of(error), value=text or None) from error
 
 
 def _group(typed: str | None) -> str:
@@ -178,7 +179,9 @@ def _group(typed: str | None) -> str:
     group = " ".join(typed.split())
     if not 0 < len(group) <= LONGEST_GROUP or not group.isprintable():
         raise UsageError(
-            "group", f"a name of 1 to {LONGEST_GROUP} letters is expected, as Group 7", value=typed or None
+            "group",
+            Text("a name of 1 to {most} letters is expected, as Group 7", most=LONGEST_GROUP),
+            value=typed or None,
         )
     return group
 
@@ -207,7 +210,9 @@ def named_instruments(options: AcquisitionOptions, run: Run | None = None) -> di
     """
     begun = run.record.configuration.get("named", {}) if run else {}
     if run and not (isinstance(begun, dict) and all(kind in NAMING and isinstance(begun[kind], str) for kind in begun)):
-        raise DataError(f"{run.folder}/run.json: configuration.named: kind and model or address are expected")
+        raise DataError(
+            Text("{folder}/run.json: configuration.named: kind and model or address are expected", folder=run.folder)
+        )
     given = {kind: getattr(options, option) for kind, option in NAMING.items()}
     return {**begun, **{kind: text for kind, text in given.items() if text is not None}}
 
@@ -231,7 +236,7 @@ def _with_named_instruments(
             described = getattr(config, kind)
             changes[kind] = virtual_settings(kind, text) if virtual else KINDS[kind].named(text, described)
         except ConfigError as error:
-            raise UsageError(NAMING[kind], str(error), value=text) from error
+            raise UsageError(NAMING[kind], text_of(error), value=text) from error
     return config.model_copy(update=changes)
 
 
@@ -242,7 +247,13 @@ def _refuse_unused(options: AcquisitionOptions, config: BenchConfig, experiment:
     for kind, option in NAMING.items():
         if (text := getattr(options, option)) is not None and kind not in used:
             why = ": the counter counts; leave out one of the two" if options.counter and options.scope else ""
-            raise UsageError(option, f"is not used by these settings of levilab acquire {experiment}{why}", value=text)
+            raise UsageError(
+                option,
+                Text(
+                    "is not used by these settings of levilab acquire {experiment}{why}", experiment=experiment, why=why
+                ),
+                value=text,
+            )
 
 
 def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequence[str]) -> BenchConfig:
@@ -272,14 +283,22 @@ def _key_and_text(config: BenchConfig, experiment: str, setting: str) -> tuple[s
     if not equals or name not in EXPERIMENTS:
         raise _wrong_form(experiment, setting)
     if name != experiment:
-        expected = f"is a setting of levilab acquire {name}, this is levilab acquire {experiment}"
+        expected = Text(
+            "is a setting of levilab acquire {name}, this is levilab acquire {experiment}",
+            name=name,
+            experiment=experiment,
+        )
         raise UsageError("settings", expected, value=setting)
     refuse_unknown(config, experiment, field)
     return field, text
 
 
 def _wrong_form(experiment: str, setting: str, why: str = "") -> UsageError:
-    what = f"{why}{experiment}.KEY=VALUE is expected; levilab acquire {experiment} --settings lists all"
+    what = Text(
+        "{why}{experiment}.KEY=VALUE is expected; levilab acquire {experiment} --settings lists all",
+        why=why,
+        experiment=experiment,
+    )
     return UsageError("settings", what, value=setting)
 
 
@@ -299,7 +318,7 @@ def _check_given(config: BenchConfig, without: BenchConfig, experiment: str) -> 
         _check_settings(config, experiment)
     except ConfigError as refused:
         _check_settings(without, experiment)
-        raise UsageError("settings", str(refused)) from refused
+        raise UsageError("settings", text_of(refused)) from refused
 
 
 def _check_settings(config: BenchConfig, experiment: str) -> None:
@@ -313,23 +332,41 @@ def _original_configuration(run: Run) -> BenchConfig:
     try:
         return Configuration.model_validate(bench)
     except ValidationError as error:
-        raise ConfigError(f"{run.folder}/run.json: configuration: {in_one_line(error)}") from error
+        raise ConfigError(
+            Text("{folder}/run.json: configuration: {why}", folder=run.folder, why=in_one_line(error))
+        ) from error
 
 
 def _resumable(folder: Path, experiment: str) -> Run:
     run = Run.load(folder)
     if run.record.experiment != experiment:
         raise CannotResume(
-            f"{folder}: holds a {run.record.experiment} run, levilab acquire {experiment} resumes {experiment} runs"
+            Text(
+                "{folder}: holds a {its} run, levilab acquire {experiment} resumes {experiment} runs",
+                folder=folder,
+                its=run.record.experiment,
+                experiment=experiment,
+            )
         )
     if run.status in {"running", "finished"}:
-        raise CannotResume(f"{folder}: is {run.status}, only an interrupted or failed run can be resumed")
+        raise CannotResume(
+            Text(
+                "{folder}: is {status}, only an interrupted or failed run can be resumed",
+                folder=folder,
+                status=run.status,
+            )
+        )
     if not run.count():
-        raise CannotResume(f"{folder}: ended before its first reading, there is nothing to go on with: start again")
+        raise CannotResume(
+            Text("{folder}: ended before its first reading, there is nothing to go on with: start again", folder=folder)
+        )
     if run.record.time_zero_utc is None:
         raise CannotResume(
-            f"{folder}/run.json: has no time_zero_utc, so it is not known at which time its readings go on; they are "
-            "kept and can be analyzed"
+            Text(
+                "{folder}/run.json: has no time_zero_utc, so it is not known at which time its readings "
+                "go on; they are kept and can be analyzed",
+                folder=folder,
+            )
         )
     return run
 
@@ -341,18 +378,45 @@ def _check_readings(run: Run, request: AcquisitionRequest) -> None:
     channels = request.columns
     names = [channel.name for channel in channels]
     if [channel.get("name") for channel in run.record.channels] != names:
-        raise CannotResume(f"{run.folder}/run.json: channels: {', '.join(names)} are expected here; {_ADVICE}")
+        raise CannotResume(
+            Text(
+                "{folder}/run.json: channels: {names} are expected here; {advice}",
+                folder=run.folder,
+                names=", ".join(names),
+                advice=_ADVICE,
+            )
+        )
     readings = run.readings()
     if list(readings.header) != names:
-        raise CannotResume(f"{readings.path}: the columns {', '.join(names)} are expected; {_ADVICE}")
+        raise CannotResume(
+            Text(
+                "{path}: the columns {names} are expected; {advice}",
+                path=readings.path,
+                names=", ".join(names),
+                advice=_ADVICE,
+            )
+        )
     for channel in channels:
         if channel.unit == "Hz" and channel.name in readings.columns and not (readings.column(channel.name) > 0).all():
-            raise CannotResume(f"{readings.path}: {channel.name}: only numbers above 0 are expected; {_ADVICE}")
+            raise CannotResume(
+                Text(
+                    "{path}: {name}: only numbers above 0 are expected; {advice}",
+                    path=readings.path,
+                    name=channel.name,
+                    advice=_ADVICE,
+                )
+            )
     last = float(readings.column("time_s")[-1])
     if isinstance(settings, CounterSettings) and settings.one_top and last > settings.longest_s:
         raise CannotResume(
-            f"{run.folder}: its last reading is of {last:g} s, and it was to end after {settings.longest_s:g} s "
-            f"({experiment.name}.longest_s): there is nothing to go on with; start again"
+            Text(
+                "{folder}: its last reading is of {last:g} s, and it was to end after {longest_s:g} s "
+                "({name}.longest_s): there is nothing to go on with; start again",
+                folder=run.folder,
+                last=last,
+                longest_s=settings.longest_s,
+                name=experiment.name,
+            )
         )
 
 
@@ -412,7 +476,9 @@ def request_at(wiring: Wiring, scene: Scene, experiment: str, options: Acquisiti
         UsageError: there is no such experiment, or no such setting.
     """
     if experiment not in EXPERIMENTS:
-        raise UsageError("experiment", f"one of {', '.join(EXPERIMENTS)} is expected", value=experiment)
+        raise UsageError(
+            "experiment", Text("one of {known} is expected", known=", ".join(EXPERIMENTS)), value=experiment
+        )
     config = chosen_settings(experiment, options)
     config = config.model_copy(update={"visa_library": "@levilab", "limits": wiring.limits, **VIRTUAL})
     config = _for_scene(config, experiment, scene)
@@ -466,11 +532,21 @@ def _scene(name: str | None, run: Run | None) -> Scene | None:
     if name is None and begun is None:
         return None
     if begun is not None and not isinstance(begun, dict):
-        raise CannotResume(f"{run.folder if run else ''}/run.json: configuration.scene: a table is expected; {_ADVICE}")
+        raise CannotResume(
+            Text(
+                "{folder}/run.json: configuration.scene: a table is expected; {advice}",
+                folder=run.folder if run else "",
+                advice=_ADVICE,
+            )
+        )
     scene = scene_of(begun) if begun is not None else read_scene(str(name))
     if scene.top.aligned:
         raise SceneError(
-            f"scene {scene.name}: no drive can hold a top whose moment lies along its axis (top.moment_tilt.0 = 0): "
-            "take spindown, or give it a part across, such as top.moment_tilt = [0.03, 0.97]"
+            Text(
+                "scene {name}: no drive can hold a top whose moment lies along its axis "
+                "(top.moment_tilt.0 = 0): take spindown, or give it a part across, such as "
+                "top.moment_tilt = [0.03, 0.97]",
+                name=scene.name,
+            )
         )
     return scene

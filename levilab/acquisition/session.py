@@ -15,6 +15,7 @@ from levilab.runs.events import RunEvent
 from levilab.runs.run import utc_now
 from levilab.settings import Settings
 from levilab.telemetry.messages import Count
+from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -52,7 +53,7 @@ class ExperimentFailed(LevilabError):
 
     def __init__(self, observed: str, advice: str = "") -> None:
         self.observed, self.advice = observed, advice
-        super().__init__(f"{observed}: {advice}" if advice else observed)
+        super().__init__(Text("{observed}: {advice}", observed=observed, advice=advice) if advice else observed)
 
 
 @dataclass(frozen=True)
@@ -185,7 +186,11 @@ class Session(Generic[S]):
             self.zero = self.bench.clock.now() - self.earlier.run.elapsed()
         self.began = self.now()
         count = len(self.rows)
-        self.event(RunEvent.RESUMED, f"resumed after {count} {self.called}{'s' * (count != 1)}, {resumed}")
+        called = self.called + "s" * (count != 1)
+        self.event(
+            RunEvent.RESUMED,
+            Text("resumed after {count} {called}, {resumed}", count=count, called=called, resumed=resumed),
+        )
 
     @contextlib.contextmanager
     def _replay(self) -> Iterator[None]:
@@ -208,7 +213,10 @@ class Session(Generic[S]):
             k = max(k + 1, math.ceil(self.now() / interval_s)) if self._lost else k + 1
             if self.now() > longest_s:
                 name = self.writer.record.experiment
-                self.event(RunEvent.LONGEST, f"{longest_s:g} s are over ({name}.longest_s)")
+                self.event(
+                    RunEvent.LONGEST,
+                    Text("{longest_s:g} s are over ({name}.longest_s)", longest_s=longest_s, name=name),
+                )
                 return
 
     # --- display and record ---
@@ -278,7 +286,9 @@ class Session(Generic[S]):
             ExperimentFailed: its time does not come after the last one's.
         """
         if self.rows and not row["time_s"] > self.rows[-1]["time_s"]:
-            raise ExperimentFailed(f"the clock went back: {row['time_s']} s after {self.rows[-1]['time_s']} s")
+            raise ExperimentFailed(
+                Text("the clock went back: {now} s after {before} s", now=row["time_s"], before=self.rows[-1]["time_s"])
+            )
         self.writer.reading(row)
         self.rows.append(row)
         self._losses = 0
@@ -290,7 +300,7 @@ class Session(Generic[S]):
         if not self._headed:
             self._headed = True
             self.show.message("  ".join(f"{_head(one):>{_width(one)}}" for one in self._shown))
-        self.show.reading(self._format_values(row), row["time_s"], (least, most))
+        self.show.reading(Text("{values:n}", values=self._format_values(row)), row["time_s"], (least, most))
         self.look()
 
     def keep_trace(self, input_: int, channel: str, time_s: float) -> Trace:
@@ -347,7 +357,7 @@ class Session(Generic[S]):
         """
         self._losses, self._lost = self._losses + 1, True
         self.doing.lost.add(kind)
-        self.event(RunEvent.INSTRUMENT_LOST, f"{kind}: {error}")
+        self.event(RunEvent.INSTRUMENT_LOST, Text("{kind}: {why}", kind=kind, why=error))
         if self._losses > MOST_LOSSES:
             raise error
         for tries, pause in enumerate(REOPENING_S, 1):
@@ -356,10 +366,15 @@ class Session(Generic[S]):
                 self.bench.reopen(kind)
                 set_up()
             except InstrumentError as again:
-                self.event(RunEvent.NOT_REACHED, f"{kind}, try {tries} of {len(REOPENING_S)}: {again}")
+                self.event(
+                    RunEvent.NOT_REACHED,
+                    Text(
+                        "{kind}, try {tries} of {most}: {why}", kind=kind, tries=tries, most=len(REOPENING_S), why=again
+                    ),
+                )
             else:
                 self.doing.lost.discard(kind)
-                self.event(RunEvent.FOUND_AGAIN, f"{kind} answers again and is set up as before")
+                self.event(RunEvent.FOUND_AGAIN, Text("{kind} answers again and is set up as before", kind=kind))
                 return
         raise error
 
@@ -378,7 +393,7 @@ class Session(Generic[S]):
 def _head(channel: Channel) -> str:
     """Return the heading of a channel's values: its name without the unit, which stands beside each value."""
     name = channel.name.removesuffix(f"_{channel.unit.lower()}")
-    return name.removesuffix("_frequency").replace("_", " ")
+    return in_language(name.removesuffix("_frequency").replace("_", " "))
 
 
 def _width(channel: Channel) -> int:

@@ -19,6 +19,7 @@ from levilab.acquisition.counting import prepare_counter_again, spin_now
 from levilab.acquisition.failures import DidNotFollow, NotHeld
 from levilab.acquisition.session import ExperimentFailed
 from levilab.runs.events import RunEvent
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -164,7 +165,7 @@ class Motor:
             phase_deg=self.phase,
             rising=session.bench.trigger == "rising",
         )
-        text = f"drive on, triggered by the top, {self.spin:.2f} Hz"
+        text = Text("drive on, triggered by the top, {spin:.2f} Hz", spin=self.spin)
         session.event(RunEvent.DRIVE_ON, text, frequency_hz=self.spin)
         session.bench.generator.output = True
 
@@ -198,7 +199,7 @@ class Motor:
         prepare_counter_again(session, GATE_S)
         lines, means = [], []
         for k, phase in enumerate(_PHASES):
-            session.progress(f"start phase {phase:g}°: how the spin answers", k / len(_PHASES))
+            session.progress(Text("start phase {phase:g}°: how the spin answers", phase=phase), k / len(_PHASES))
             self._turn_to(phase)
             times: list[float] = []
             spins: list[float] = []
@@ -216,7 +217,11 @@ class Motor:
         if found.pull < _CLEAR * found.u:
             raise _no_pull(session, found)
         self._turn_to(self.phase)
-        text = f"a start phase of {found.phase:.0f}° speeds the top up most, by {found.pull:.2f} Hz/s less drag"
+        text = Text(
+            "a start phase of {phase:.0f}° speeds the top up most, by {pull:.2f} Hz/s less drag",
+            phase=found.phase,
+            pull=found.pull,
+        )
         session.event(RunEvent.PHASE_FOUND, text, phase_deg=found.phase, pull_hz_per_s=found.pull, u_hz_per_s=found.u)
 
     # --- to a spin, and there ---
@@ -243,7 +248,9 @@ class Motor:
             times.append(self.session.now())
         self.gains.append((times, spins))
         slope, _, _ = slope_of(times, spins)
-        text = f"gains {slope:.3f} Hz/s at the full amplitude, about {np.mean(spins):.2f} Hz"
+        text = Text(
+            "gains {slope:.3f} Hz/s at the full amplitude, about {mean:.2f} Hz", slope=slope, mean=np.mean(spins)
+        )
         self.session.event(RunEvent.GAIN, text, times_s=times, spins_hz=spins)
         self.pull = max(slope / (1 - share), self.pull / _MOST_CHANGE)
         self._trend = 0.0
@@ -269,12 +276,22 @@ class Motor:
                 gain, _, _ = slope_of(times[recent], spins[recent])
             self._trend = gain
             share = min((self.spin - start) / (target - start), 1.0)
-            session.progress(f"{'brakes' if brakes else 'speeds up'}, {self.spin:.2f} Hz", max(share, 0.0))
+            session.progress(
+                Text("{does}, {spin:.2f} Hz", does="brakes" if brakes else "speeds up", spin=self.spin), max(share, 0.0)
+            )
             if len(spins) > _GAINING and abs(spins[-1] - spins[-_GAINING]) < _LEAST_GAIN_HZ:
                 raise DidNotFollow(
-                    f"the top spins at {self.spin:.2f} Hz and gets no {'slower' if brakes else 'faster'}: pull and "
-                    f"drag are equal there, {target:g} Hz were asked for",
-                    f"drive harder ({session.writer.record.experiment}.drive_amplitude_vpp), or ask for less",
+                    Text(
+                        "the top spins at {spin:.2f} Hz and gets no {other}: pull and drag are equal there, "
+                        "{target:g} Hz were asked for",
+                        spin=self.spin,
+                        other="slower" if brakes else "faster",
+                        target=target,
+                    ),
+                    Text(
+                        "drive harder ({experiment}.drive_amplitude_vpp), or ask for less",
+                        experiment=session.writer.record.experiment,
+                    ),
                 )
         self._trend = 0.0
         if brakes:
@@ -318,7 +335,7 @@ class Motor:
             lasts = times[-1] - asked
             if self.spin > highest:
                 raise _too_fast(session, highest)
-            session.progress(f"speeds up, {self.spin:.2f} Hz", (self.spin - start) / (highest - start))
+            session.progress(Text("speeds up, {spin:.2f} Hz", spin=self.spin), (self.spin - start) / (highest - start))
             recent = slice(-_GAINING, None)
             if len(spins) < _GAINING:
                 continue
@@ -327,7 +344,11 @@ class Motor:
             gained = gain * (times[-1] - times[-_GAINING])
             if gained < -_LEAST_GAIN_HZ:
                 raise DidNotFollow(
-                    f"the top gets slower under the drive, {self.spin:.2f} Hz after {max(spins):.2f} Hz",
+                    Text(
+                        "the top gets slower under the drive, {spin:.2f} Hz after {before:.2f} Hz",
+                        spin=self.spin,
+                        before=max(spins),
+                    ),
                     "does the cable lead from the phototransistor to the generator's trigger input, and to the coil?",
                 )
             level = level + 1 if gained < _LEAST_GAIN_HZ else 0
@@ -347,7 +368,7 @@ class Motor:
             missed = self._missed
             self.count()
             now = session.now()
-            session.progress(f"held at {target:.2f} Hz", min((now - begin) / duration, 1.0))
+            session.progress(Text("held at {target:.2f} Hz", target=target), min((now - begin) / duration, 1.0))
             if self._missed > missed:
                 last = now
                 continue
@@ -363,18 +384,31 @@ class Motor:
 def _too_fast(session: Session[Any], highest: float) -> ExperimentFailed:
     name = session.writer.record.experiment
     return ExperimentFailed(
-        f"the top still gets faster at {highest:.1f} Hz ({name}.highest_hz, and limits.drive_frequency_hz over "
-        f"{CYCLE:g}, for the cycles are so much faster than the top): allow more there, or weaken the drive"
+        Text(
+            "the top still gets faster at {highest:.1f} Hz ({name}.highest_hz, and "
+            "limits.drive_frequency_hz over {cycle:g}, for the cycles are so much faster than the "
+            "top): allow more there, or weaken the drive",
+            highest=highest,
+            name=name,
+            cycle=CYCLE,
+        )
     )
 
 
 def _no_pull(session: Session[Any], found: Response) -> DidNotFollow:
     name = session.writer.record.experiment
     return DidNotFollow(
-        f"the bursts do not turn the top: at each start phase its spin changes by {-found.drag:.2f} Hz/s, as without "
-        "a drive",
-        "does the cable lead from the phototransistor to the generator's trigger input, does its pulse reach TTL "
-        f"levels there, once a turn, and is the drive strong enough ({name}.drive_amplitude_vpp)?",
+        Text(
+            "the bursts do not turn the top: at each start phase its spin changes by {slower:.2f} "
+            "Hz/s, as without a drive",
+            slower=-found.drag,
+        ),
+        Text(
+            "does the cable lead from the phototransistor to the generator's trigger input, does its "
+            "pulse reach TTL levels there, once a turn, and is the drive strong enough "
+            "({name}.drive_amplitude_vpp)?",
+            name=name,
+        ),
     )
 
 
@@ -396,7 +430,7 @@ def spin_up(session: Session[Any], spin: float, target: float) -> Motor:
     if settings.drive_phase_deg is None:
         motor.find_phase()
     motor.go_to(target)
-    text = f"the top triggers its drive at {motor.spin:.2f} Hz"
+    text = Text("the top triggers its drive at {spin:.2f} Hz", spin=motor.spin)
     session.event(RunEvent.LOCKED, text, frequency_hz=motor.spin)
     motor.hold(target, settings.hold_s)
     return motor

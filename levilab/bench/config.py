@@ -16,6 +16,7 @@ from instruments.drivers.generator import Limits as DriveLimits
 from levilab.errors import LevilabError
 from levilab.files import parse_toml
 from levilab.settings import Settings, in_one_line
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -109,11 +110,17 @@ def read_table(path: Path, *, instead: str = ", or try `mock`") -> dict[str, Any
         return parse_toml(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise ConfigError(
-            f"{path}: there is no such file: describe your bench in it (docs/bench.md){instead}"
+            Text(
+                "{path}: there is no such file: describe your bench in it (docs/bench.md){instead}",
+                path=path,
+                instead=instead,
+            )
         ) from None
     except OSError as error:
         if path.is_dir():
-            raise ConfigError(f"{path}: is a folder; a TOML file is expected") from None
-        raise ConfigError(f"{path}: cannot be read ({error.strerror}): a TOML file is expected") from error
+            raise ConfigError(Text("{path}: is a folder; a TOML file is expected", path=path)) from None
+        raise ConfigError(
+            Text("{path}: cannot be read ({why}): a TOML file is expected", path=path, why=error.strerror)
+        ) from error
     except ValueError as error:
-        raise ConfigError(f"{path}: not readable as TOML: {error}") from error
+        raise ConfigError(Text("{path}: not readable as TOML: {why}", path=path, why=error)) from error

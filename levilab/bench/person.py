@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from levilab.texts.text import Text
+
 
 @dataclass(frozen=True)
 class Task:
@@ -27,7 +29,9 @@ class PlaceProbe(Task):
     @property
     def prompt(self) -> str:
         """With what can be typed."""
-        return f"{self.text} Put the probe there, on the axis, or type the height in mm at which it stands."
+        return Text(
+            "{text} Put the probe there, on the axis, or type the height in mm at which it stands.", text=self.text
+        )
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from instruments.clock import Clock, WallClock
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits
 from levilab.bench.kinds import COUNTER, GENERATOR, KINDS
 from levilab.bench.person import Person, ask_no_person
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -55,8 +56,13 @@ class Wiring:
         kind = self.count_with if kind == COUNTER.name else kind
         if kind not in self.instruments:
             instead = _INSTEAD.get(kind, "")
-            what = f"the bench file describes no {kind}: add a table [{kind}] with model and address"
-            raise ConfigError(what + instead)
+            raise ConfigError(
+                Text(
+                    "the bench file describes no {kind}: add a table [{kind}] with model and address{instead}",
+                    kind=kind,
+                    instead=instead,
+                )
+            )
         settings = self.instruments[kind]
         KINDS[kind].model(settings.model)
         return settings

@@ -12,8 +12,9 @@ import typer
 from levilab.cli import exit_codes
 from levilab.cli.importing import importing
 from levilab.cli.later import Later, NamedLast
-from levilab.cli.options import Json, number, place
+from levilab.cli.options import Json, Language, number, place
 from levilab.cli.output import message, print_json, result
+from levilab.texts.text import Text, in_language, speak
 
 if TYPE_CHECKING:
     from levilab.bench.config import BenchConfig
@@ -126,9 +127,11 @@ def acquire_experiment(
     list_settings: Annotated[
         bool, typer.Option("--settings", help="List the settings that --set changes, with units and ranges, and exit.")
     ] = False,
+    language: Language = "en",
     as_json: Json = False,
 ) -> None:
     """Carry out the experiment that the command is named after."""
+    speak(language)
     if not list_settings:
         look_at_files(bench, resume, out, virtual=mock, named=bool(counter or scope))
     with importing():
@@ -171,11 +174,22 @@ def acquire_experiment(
         if as_json:
             print_json({"run": str(run.folder), "status": run.status, "readings": readings}, indent=None)
         else:
-            called = EXPERIMENTS[experiment].called
-            result(f"{run.status}: {readings} {called}{'s' * (readings != 1)} in {run.folder}")
+            called = EXPERIMENTS[experiment].called + "s" * (readings != 1)
+            result(
+                in_language(
+                    Text(
+                        "{status}: {count} {called} in {folder}",
+                        status=run.status,
+                        count=readings,
+                        called=called,
+                        folder=str(run.folder),
+                    )
+                )
+            )
         if run.status == "interrupted":
             if readings:
-                message(f"go on with it: levilab acquire {experiment} --resume {run.folder}")
+                command = f"levilab acquire {experiment} --resume {run.folder}"
+                message(Text("go on with it: {command}", command=command))
             raise typer.Exit(exit_codes.INTERRUPTED)
 
 
@@ -235,10 +249,15 @@ def _ask(task: "Task") -> str:
     """Ask the person at the bench, on the terminal."""
     from levilab.acquisition.session import ExperimentFailed
 
-    message(f"{task.prompt}  [Enter]")
+    message(Text("{prompt}  [Enter]", prompt=task.prompt))
     answer = sys.stdin.readline()
     if not answer:
         raise ExperimentFailed(
-            f"{task.text!r} cannot be answered: standard input is closed; start it at a terminal, or with --yes"
+            Text(
+                "{quote}{task}{quote} cannot be answered: standard input is closed; start it at a terminal, "
+                "or with --yes",
+                quote=repr(task.text)[0],
+                task=task.text,
+            )
         )
     return answer

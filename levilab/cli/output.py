@@ -11,6 +11,7 @@ import typer
 
 from levilab.cli import exit_codes
 from levilab.present.characters import printable
+from levilab.texts.text import in_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -30,9 +31,9 @@ def result(text: str) -> None:
 
 
 def message(text: str) -> None:
-    """Print a line on standard error; a closed one, as with its terminal, ends nothing."""
+    """Print a line on standard error in the person's language; a closed one, as with its terminal, ends nothing."""
     try:
-        typer.echo(printable(text), err=True)
+        typer.echo(printable(in_language(text)), err=True)
     except OSError:
         silence(sys.stderr)
 

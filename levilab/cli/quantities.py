@@ -10,6 +10,7 @@ import typer
 
 from levilab.cli.later import Later
 from levilab.errors import UsageError
+from levilab.texts.text import in_language, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,10 +46,10 @@ def _parameters(command: Any) -> Iterator[Any]:
 def in_options(error: Exception, app: Any) -> str:
     """Return the text of an error with options in the place of quantities: "duration = -1: …" is "--duration -1: …"."""
     if not isinstance(error, UsageError):
-        return with_options(str(error), app)
+        return with_options(in_language(text_of(error)), app)
     head = option_names(app).get(error.name, (error.name, ""))[0]
     given = head if error.value is None else f"{head} {error.value}"
-    return f"{given}: {with_options(error.text, app)}"
+    return f"{given}: {with_options(in_language(error.text), app)}"
 
 
 def with_options(text: str, app: Any) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from analysis.numbers import digits, with_minus
 from levilab.present.units import unit
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -109,8 +110,9 @@ def pulses_too_many(pulses: int) -> str:
     >>> pulses_too_many(1), pulses_too_many(-2)
     ('1 pulse too many', '2 pulses too few')
     """
-    size = abs(pulses)
-    return f"{size} pulse{'s' * (size > 1)} too {'many' if pulses > 0 else 'few'}"
+    if abs(pulses) == 1:
+        return Text("{size} pulse too many" if pulses > 0 else "{size} pulse too few", size=1)
+    return Text("{size} pulses too many" if pulses > 0 else "{size} pulses too few", size=abs(pulses))
 
 
 def list_in_words(names: Sequence[str]) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from levilab.present.characters import printable
 from levilab.present.numbers import with_decimals, with_sign
+from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -121,30 +122,33 @@ def _readings(state: State, trend: Trend, *, plain: bool) -> Iterator[Piece]:
         yield Piece("nothing counted yet" if state.share is not None else "no light, no value", "off")
     for name, word, unit, decimals, factor in shown:
         style = "strong" if name == trend.channel else "plain"
-        yield Piece(f"{word} {with_decimals(state.last[name] * factor, decimals)} {unit}", style)
+        value = with_decimals(state.last[name] * factor, decimals)
+        yield Piece(Text("{quantity} {value:n} {unit}", quantity=word, value=value, unit=unit), style)
         if name == trend.channel and (age := state.time_s - trend.changed_s) > _FRESH_S:
-            yield Piece(f"{clock(age)} ago", "off")
+            yield Piece(Text("{time} ago", time=clock(age)), "off")
         if name == trend.channel and trend.rate is not None:
-            yield Piece(f"{_rate(trend.rate * factor)} {unit}/s")
+            yield Piece(Text("{rate:n} {unit}/s", rate=_rate(trend.rate * factor), unit=unit))
             if not plain:
                 yield Piece(trend.spark)
     if state.readings:
-        yield Piece(f"{state.readings} reading{'s' * (state.readings != 1)}")
+        called = "reading" if state.readings == 1 else "readings"
+        yield Piece(Text("{count} {called}", count=state.readings, called=called))
 
 
 def _instruments(state: State) -> Iterator[Piece]:
-    yield from (Piece(f"{kind} LOST", "alarm") for kind in state.lost)
+    yield from (Piece(Text("{instrument} LOST", instrument=kind), "alarm") for kind in state.lost)
     if state.drive is not None and "generator" not in state.lost:
         drive = state.drive
         if drive.output:
             yield Piece("drive ON", "on")
-            yield Piece(f"{drive.frequency_hz:.2f} Hz")
-            yield Piece(f"{drive.amplitude_vpp:g} Vpp {printable(drive.waveform)}")
+            yield Piece(Text("{frequency:.2f} Hz", frequency=drive.frequency_hz))
+            amplitude, waveform = drive.amplitude_vpp, printable(drive.waveform)
+            yield Piece(Text("{amplitude:g} Vpp {waveform}", amplitude=amplitude, waveform=waveform))
         else:
             yield Piece("drive off", "off")
     if state.counting is not None and "counter" not in state.lost:
-        yield Piece(f"gate {state.counting.gate_s:g} s", "off")
-        yield Piece(f"level {state.counting.trigger_level_v:g} V", "off")
+        yield Piece(Text("gate {seconds:g} s", seconds=state.counting.gate_s), "off")
+        yield Piece(Text("level {volts:g} V", volts=state.counting.trigger_level_v), "off")
 
 
 def _bar(state: State, width: int, *, plain: bool) -> Line:
@@ -160,14 +164,15 @@ def _bar(state: State, width: int, *, plain: bool) -> Line:
 
 def _progress(state: State) -> tuple[float, str]:
     if state.share is not None:
-        return state.share, printable(state.text)
+        return state.share, printable(in_language(state.text))
     elapsed, left = state.elapsed_s or 0.0, state.time_left_s
     if left is None:
-        return 0.0, f"{clock(elapsed)} so far"
+        return 0.0, in_language(Text("{time} so far", time=clock(elapsed)))
     share = elapsed / (elapsed + left) if elapsed + left > 0 else 0.0
     least = left if state.least_left_s is None else state.least_left_s
     jumps = state.virtual and state.speed is None
-    return share, f"{clock(elapsed)} done, {time_left_in_words(least, left, bench_time=jumps)}"
+    time_left = time_left_in_words(least, left, bench_time=jumps)
+    return share, in_language(Text("{time} done, {left}", time=clock(elapsed), left=time_left))
 
 
 def time_left_in_words(least: float, most: float, *, bench_time: bool = False) -> str:
@@ -184,20 +189,22 @@ def time_left_in_words(least: float, most: float, *, bench_time: bool = False) -
     'about 1:35 min of bench time left'
     """
     first, last = clock(least), clock(most)
-    left = "of bench time left" if bench_time else "left"
     if first == last:
-        return f"about {last} {left}"
-    if least < 0.5:
-        return f"at most {last} {left}"
-    number, unit = first.split()
-    return f"about {number if last.endswith(f' {unit}') else first} to {last} {left}"
+        left = Text("about {time}", time=last)
+    elif least < 0.5:
+        left = Text("at most {time}", time=last)
+    else:
+        number, unit = first.split()
+        left = Text("about {first} to {last}", first=number if last.endswith(f" {unit}") else first, last=last)
+    return Text("{time} of bench time left" if bench_time else "{time} left", time=left)
 
 
 def _flow(pieces: Sequence[Piece], width: int) -> Iterator[Line]:
     """Yield lines of pieces with two columns between them; one that is wider than the terminal is cut."""
     line: list[Piece] = []
     used = 0
-    for text, style in pieces:
+    for english, style in pieces:
+        text = in_language(english)
         size = min(len(text), width)
         if line and used + 2 + size > width:
             yield tuple(line)

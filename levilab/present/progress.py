@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 
 from levilab.present.characters import for_encoding, printable
 from levilab.present.panel import Trend, bench_lines, time_left_in_words
+from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rich.console import Console
     from rich.progress import Progress
-    from rich.text import Text
+    from rich.text import Text as Styled
 
     from levilab.telemetry.messages import State
 
@@ -76,14 +77,14 @@ class LineDisplay(Display):
     def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
         """Print a line."""
         left = time_left_in_words(*remaining, bench_time=self._bench_time)
-        self.message(f"{text}   {left}" if remaining[1] >= 0.5 else text)
+        self.message(Text("{reading}   {left}", reading=text, left=left) if remaining[1] >= 0.5 else text)
 
     def message(self, text: str) -> None:
         """Print a line.  A closed standard error does not end a measurement."""
         if self._gone:
             return
         try:
-            print(printable(text), file=sys.stderr, flush=True)  # noqa: T201 - this is where it is shown
+            print(printable(in_language(text)), file=sys.stderr, flush=True)  # noqa: T201 - this is where it is shown
         except OSError:
             self._gone = True
 
@@ -127,16 +128,16 @@ class BarDisplay(Display):
         except OSError:
             self._gone = True
 
-    def _panel(self) -> Text:
-        from rich.text import Text
+    def _panel(self) -> Styled:
+        from rich.text import Text as Styled
 
         if self._shown is None:
-            return Text("connecting")
+            return Styled(in_language("connecting"))
         console = self._console
         plain = bool(for_encoding("▁━", console.encoding) != "▁━")
         width = max(console.width - 1, 10)  # a full line would begin another one
         lines = bench_lines(self._shown, self._trend, width, plain=plain)
-        text = Text(no_wrap=True)
+        text = Styled(no_wrap=True)
         for k, line in enumerate(lines):
             text.append("\n" * bool(k))
             for piece in line:
@@ -150,7 +151,7 @@ class BarDisplay(Display):
 
     def message(self, text: str) -> None:
         """Print a line above."""
-        self._draw(lambda: self._console.print(printable(text), markup=False, highlight=False))
+        self._draw(lambda: self._console.print(printable(in_language(text)), markup=False, highlight=False))
 
     def is_due(self) -> bool:
         """Return whether the last drawing is long enough ago, or a reading came since."""

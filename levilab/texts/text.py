@@ -78,7 +78,7 @@ class Text(str):
 
     def __new__(cls, template: str, /, **values: Any) -> Self:
         """Make the English sentence; the value of an error is its text."""
-        values = {name: text_of(one) if isinstance(one, BaseException) else one for name, one in values.items()}
+        values = {name: _known(one) for name, one in values.items()}
         self = super().__new__(cls, _fill(template, values, ENGLISH))
         self.template, self.values = template, MappingProxyType(values)
         return self
@@ -116,6 +116,8 @@ def in_language(text: str, code: str | None = None) -> str:
         code: of the language; None: that of this process.
     """
     code = code or _of_process
+    if code == ENGLISH:  # no file is needed, which may not be opened where everything fails
+        return str(text)
     if isinstance(text, Text):
         return _fill(language_of(code).texts.get(text.template, text.template), text.values, code)
     return language_of(code).texts.get(text, text)
@@ -143,6 +145,13 @@ def _write(value: Any, how: str, code: str) -> str:
         said = in_language(value, code)
         return _POINT.sub(decimal, said) if how == "n" else said
     return format(value, how).replace(".", decimal)
+
+
+def _known(value: Any) -> Any:
+    """Return a value that a `Text` can have: of an error its text, of a path its name."""
+    if isinstance(value, BaseException):
+        return text_of(value)
+    return str(value) if isinstance(value, Path) else value
 
 
 def _plain(value: Any) -> Any:

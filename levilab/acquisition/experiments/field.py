@@ -16,6 +16,7 @@ from levilab.bench.config import ConfigError
 from levilab.bench.person import PlaceProbe, ShieldProbe
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from typing import Self
@@ -105,14 +106,26 @@ class FieldSettings(ExperimentSettings):
         """Raise ConfigError for radii that no ring has, and heights that no stand reaches."""
         if self.base_inner_radius_m >= self.base_outer_radius_m:
             raise ConfigError(
-                f"{table}.base_inner_radius_m = {self.base_inner_radius_m:g} must be less than "
-                f"{table}.base_outer_radius_m = {self.base_outer_radius_m:g}"
+                Text(
+                    "{table}.base_inner_radius_m = {base_inner_radius_m:g} must be less than "
+                    "{table}.base_outer_radius_m = {base_outer_radius_m:g}",
+                    table=table,
+                    base_inner_radius_m=self.base_inner_radius_m,
+                    base_outer_radius_m=self.base_outer_radius_m,
+                )
             )
         for name in ("lowest_m", "highest_m"):
             if not _LOWEST_M <= getattr(self, name) <= _HIGHEST_M:
                 raise ConfigError(
-                    f"{table}.{name} = {getattr(self, name):g}: heights from {_LOWEST_M:g} to {_HIGHEST_M:g} m are "
-                    "expected; is it in metres?"
+                    Text(
+                        "{table}.{name} = {height:g}: heights from {low:g} to {high:g} m are expected;"
+                        " is it in metres?",
+                        table=table,
+                        name=name,
+                        height=getattr(self, name),
+                        low=_LOWEST_M,
+                        high=_HIGHEST_M,
+                    )
                 )
 
 
@@ -136,12 +149,12 @@ def run(session: Session[FieldSettings]) -> None:
     session.begin(lambda: session.progress("probe zeroed", 1.0), resumed="the probe was zeroed again")
     done, since = len(session.rows), session.now()
     for k in range(done, len(heights)):
-        height = _place(session, heights[k], f"{k + 1} of {len(heights)}")
+        height = _place(session, heights[k], Text("{number} of {all}", number=k + 1, all=len(heights)))
         row = _measure(session, height)
         each = (session.now() - since) / (k + 1 - done) or _USUAL_S
         session.keep(row, time_left_s=each * (len(heights) - k))
     _read_again(session)
-    session.event(RunEvent.SCANNED, f"{len(session.rows)} heights are measured")
+    session.event(RunEvent.SCANNED, Text("{count} heights are measured", count=len(session.rows)))
 
 
 def _read_again(session: Session[FieldSettings]) -> None:
@@ -154,18 +167,22 @@ def _read_again(session: Session[FieldSettings]) -> None:
     rows = session.rows
     k = max(range((len(rows) + 1) // 2), key=lambda k: abs(rows[k]["flux_density_t"]) / _u_of_setting(session, k))
     before = rows[k]
-    height = _place(session, before["height_m"], f"{k + 1} again, as the last")
+    height = _place(session, before["height_m"], Text("{number} again, as the last", number=k + 1))
     row = _measure(session, height)
     drift = row["flux_density_t"] - before["flux_density_t"] - _slope(session, k) * (height - before["height_m"])
     u = math.hypot(row["flux_density_mean_u_t"], _u_of_setting(session, k))
-    size = f"{1e6 * drift:+.1f} µT at the end of the scan, {abs(drift) / u:.1f} u"
-    text = f"the field at {1e3 * height:.1f} mm changed by {size}"
+    size = Text("{drift:+.1f} µT at the end of the scan, {in_u:.1f} u", drift=1e6 * drift, in_u=abs(drift) / u)
+    text = Text("the field at {height:.1f} mm changed by {size}", height=1e3 * height, size=size)
     session.event(RunEvent.HEIGHT_READ_AGAIN, text, drift_t=drift, u_t=u)
     if abs(drift) > _MOST_DRIFT_U * u:
         session.warn(
-            f"base or probe drifted: {text}, at most {_MOST_DRIFT_U:g} u "
-            f"are expected; let both come to one temperature, and scan again in less than "
-            f"{math.ceil(session.now() / 60)} min"
+            Text(
+                "base or probe drifted: {drift}, at most {most:g} u are expected; let both come to"
+                " one temperature, and scan again in less than {minutes} min",
+                drift=text,
+                most=_MOST_DRIFT_U,
+                minutes=math.ceil(session.now() / 60),
+            )
         )
 
 
@@ -201,16 +218,21 @@ def _zero(session: Session[FieldSettings]) -> None:
 
 def _place(session: Session[FieldSettings], height: float, which: str) -> float:
     """Have the probe put at a height; returns the one at which it stands [m]."""
-    text = f"Height {which}: {1e3 * height:.1f} mm."
+    text = Text("Height {which}: {height:.1f} mm.", which=which, height=1e3 * height)
     while True:
         answer = session.ask(PlaceProbe(text, height))
         if not answer:
             return height
         typed = parse_height(answer)
         if typed is not None:
-            session.event(RunEvent.ANOTHER_HEIGHT, f"the probe stands at {1e3 * typed:.2f} mm", height_m=typed)
+            session.event(
+                RunEvent.ANOTHER_HEIGHT, Text("the probe stands at {height:.2f} mm", height=1e3 * typed), height_m=typed
+            )
             return typed
-        session.event(RunEvent.NOT_UNDERSTOOD, f"{answer[:40]!r} is no height: a number in mm is expected, as 61.5")
+        session.event(
+            RunEvent.NOT_UNDERSTOOD,
+            Text("{typed} is no height: a number in mm is expected, as 61.5", typed=repr(answer[:40])),
+        )
 
 
 def parse_height(answer: str) -> float | None:
@@ -248,10 +270,18 @@ def _read(session: Session[FieldSettings], height: float) -> float:
     flux_density = session.bench.magnetometer.flux_density()
     if flux_density is None:
         limit = session.settings.range_t
-        seen = f"beyond the range of {1e3 * limit:g} mT" if limit else "beyond what the probe can measure"
+        seen = (
+            Text("beyond the range of {range:g} mT", range=1e3 * limit)
+            if limit
+            else "beyond what the probe can measure"
+        )
         raise ExperimentFailed(
-            f"the flux density at {1e3 * height:.1f} mm is {seen}: choose a larger one (field.range_t in the bench "
-            "file), or begin higher up (field.lowest_m)"
+            Text(
+                "the flux density at {height:.1f} mm is {seen}: choose a larger one (field.range_t in the "
+                "bench file), or begin higher up (field.lowest_m)",
+                height=1e3 * height,
+                seen=seen,
+            )
         )
     session.saw("flux_density_t", flux_density)
     return flux_density

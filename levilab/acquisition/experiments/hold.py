@@ -20,6 +20,7 @@ from levilab.formats.table import FEWEST
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,7 +48,13 @@ class HoldSettings(DriveSettings):
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for a drive that the bench does not allow."""
         if self.drive != "triggered":
-            raise ConfigError(f"{table}.drive = {self.drive}: triggered is expected, no other drive has a loop")
+            raise ConfigError(
+                Text(
+                    "{table}.drive = {drive}: triggered is expected, no other drive has a loop",
+                    table=table,
+                    drive=self.drive,
+                )
+            )
         super().check(table, limits)
 
 
@@ -96,7 +103,7 @@ def _let_go(session: Session[HoldSettings], lost: NotHeld | InstrumentError) -> 
     if isinstance(lost, InstrumentError):
         reach_generator_again(session, lost)
     else:
-        session.event(RunEvent.NOT_HELD, f"the top was lost: {lost}")
+        session.event(RunEvent.NOT_HELD, Text("the top was lost: {lost}", lost=lost))
         drive_off(session)
 
 
@@ -129,8 +136,15 @@ def _report_drag(session: Session[HoldSettings], motors: Sequence[Motor]) -> Non
     """Record the scatter of the held spin, and the drag that the amplitude balanced, as `levilab analyze hold` does."""
     rows = session.rows
     if len(rows) < FEWEST:
-        text = f"{len(rows)} readings show neither a scatter nor a drag, {FEWEST} are needed: hold the spin longer"
-        session.event(RunEvent.ENDED, f"{text} ({session.writer.record.experiment}.longest_s)")
+        text = Text(
+            "{count} readings show neither a scatter nor a drag, {fewest} are needed: hold the spin longer",
+            count=len(rows),
+            fewest=FEWEST,
+        )
+        session.event(
+            RunEvent.ENDED,
+            Text("{why} ({experiment}.longest_s)", why=text, experiment=session.writer.record.experiment),
+        )
         return
     time, spin, u, volts = (np.array([row[one.name] for row in rows]) for one in channels(session.settings))
     gains = [(np.array(times), np.array(spins)) for motor in motors for times, spins in motor.gains]
@@ -138,9 +152,13 @@ def _report_drag(session: Session[HoldSettings], motors: Sequence[Motor]) -> Non
     drag = found.drag
     data = {"drag_hz_per_s": drag.value, "drag_u_hz_per_s": drag.u} if drag else {}
     size = with_uncertainty(drag) if drag else "of unknown size, as no gain was measured: drive harder"
-    text = (
-        f"held at {found.spin.value:.3f} Hz, s.d. of a reading {found.scatter.value:.3f} Hz; "
-        f"{100 * found.share:.1f} % of the amplitude balanced the drag, {size}"
+    text = Text(
+        "held at {spin:.3f} Hz, s.d. of a reading {scatter:.3f} Hz; {share:.1f} % of the "
+        "amplitude balanced the drag, {size:n}",
+        spin=found.spin.value,
+        scatter=found.scatter.value,
+        share=100 * found.share,
+        size=size,
     )
     more = {"spin_frequency_hz": found.spin.value, "scatter_hz": found.scatter.value}
     session.event(RunEvent.HELD, text, **more, **data)

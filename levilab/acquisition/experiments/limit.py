@@ -33,6 +33,7 @@ from levilab.bench.config import ConfigError
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -71,13 +72,20 @@ class LimitSettings(DriveSettings):
         """Raise ConfigError for a drive that the bench does not allow."""
         super().check(table, limits)
         if self.which == "upper" and self.drive_waveform == "NONE":
-            raise ConfigError(f"{table}.drive_waveform = NONE: the upper limit needs a drive, SIN, SQU or TRI")
+            raise ConfigError(
+                Text("{table}.drive_waveform = NONE: the upper limit needs a drive, SIN, SQU or TRI", table=table)
+            )
         if self.which == "upper":
             check_drive(table, limits, self.drive_amplitude_vpp, [("highest_hz", self.highest_hz)])
         if self.which == "upper" and self.highest_hz <= self.drive_frequency_hz:
             raise ConfigError(
-                f"{table}.highest_hz = {self.highest_hz:g}: more than {table}.drive_frequency_hz = "
-                f"{self.drive_frequency_hz:g} is expected, from where the drive creeps up"
+                Text(
+                    "{table}.highest_hz = {highest_hz:g}: more than {table}.drive_frequency_hz = "
+                    "{drive_frequency_hz:g} is expected, from where the drive creeps up",
+                    table=table,
+                    highest_hz=self.highest_hz,
+                    drive_frequency_hz=self.drive_frequency_hz,
+                )
             )
 
 
@@ -135,18 +143,23 @@ def _with_a_top(
             falls += fell
             if falls >= _MOST_FALLS:
                 raise
-            session.event(RunEvent.ONCE_MORE, f"{failed}; it {'fell' if fell else 'is still up'}, once more")
+            session.event(
+                RunEvent.ONCE_MORE,
+                Text("{failed}; it {does}, once more", failed=failed, does="fell" if fell else "is still up"),
+            )
     return False
 
 
 def _have_the_next_top(session: Session[LimitSettings]) -> bool:
     """See that the next top floats; where none does, ask for one, and return True.  Raises ExperimentFailed."""
     settings, number = session.settings, len(session.rows)
-    session.progress(f"top {number + 1} of {settings.repetitions}", number / settings.repetitions)
+    session.progress(
+        Text("top {number} of {all}", number=number + 1, all=settings.repetitions), number / settings.repetitions
+    )
     spin = spin_now(session) if number else None
     if spin is not None and spin > settings.drive_frequency_hz:  # the last one only lost its lock
         _coast_down(session)
-    text = f"Top {number + 1} of {settings.repetitions}: spin the top and let it float."
+    text = Text("Top {number} of {all}: spin the top and let it float.", number=number + 1, all=settings.repetitions)
     return have_a_top(session, text, number, within_s=settings.float_s)
 
 
@@ -157,7 +170,7 @@ def _coast_down(session: Session[LimitSettings]) -> None:
     while (spin := spin_now(session)) is not None and spin > settings.drive_frequency_hz:
         if session.time_spent() > settings.longest_s:
             return
-        session.progress(f"coasts down, {spin:.2f} Hz", 1.0)
+        session.progress(Text("coasts down, {spin:.2f} Hz", spin=spin), 1.0)
         session.wait(settings.interval_s)
 
 
@@ -176,7 +189,7 @@ def _lower(session: Session[LimitSettings], keep: Callable[[Row], None]) -> bool
         if reading := top.read():
             seen.append(reading)
             missed_since = None
-            session.progress(f"free at {reading['spin_frequency_hz']:.2f} Hz", 1.0)
+            session.progress(Text("free at {spin:.2f} Hz", spin=reading["spin_frequency_hz"]), 1.0)
         else:
             # a counter that was lost saw nothing of the top, which may have been up all that time
             if top.missed[-1] in NO_TOP and missed_since is None:
@@ -193,8 +206,13 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_sinc
     settings = session.settings
     if len(seen) < _FEWEST:
         raise ExperimentFailed(
-            f"the top fell {len(seen)} readings after the drive went off, {_FEWEST} are needed: drive it higher first "
-            f"({session.writer.record.experiment}.drive_frequency_hz)"
+            Text(
+                "the top fell {count} readings after the drive went off, {fewest} are needed: drive it "
+                "higher first ({experiment}.drive_frequency_hz)",
+                count=len(seen),
+                fewest=_FEWEST,
+                experiment=session.writer.record.experiment,
+            )
         )
     times, spins = (np.array([row[name] for row in seen]) for name in ("time_s", "spin_frequency_hz"))
     between = (float(times[-1]) + settings.gate_s / 2, missed_since + settings.gate_s)
@@ -203,10 +221,14 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_sinc
     assert limit.value is not None
     assert limit.u is not None
     lowest = float(spins.min())
-    words = f"a line through the last counts gives {with_uncertainty(limit)}; the lowest count is {lowest:.2f} Hz"
+    words = Text(
+        "a line through the last counts gives {limit:n}; the lowest count is {lowest:.2f} Hz",
+        limit=with_uncertainty(limit),
+        lowest=lowest,
+    )
     if lowest < limit.value:  # not the bound that it seems to be
-        words += ", below the line by its scatter"
-    session.event(RunEvent.FELL, f"{text}; {words}", spin_frequency_hz=limit.value)
+        words = Text("{line}, below the line by its scatter", line=words)
+    session.event(RunEvent.FELL, Text("{text}; {words}", text=text, words=words), spin_frequency_hz=limit.value)
     row: Row = {
         "time_s": session.now(),
         "spin_frequency_hz": limit.value,
@@ -255,7 +277,9 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
                 spin = held_spin(session, drive)
             except NotHeld as lost:
                 if not counts:  # no spin at which it was held to begin with
-                    raise DidNotFollow(f"{lost}, as the creep began", "float it again, or drive harder") from lost
+                    raise DidNotFollow(
+                        Text("{lost}, as the creep began", lost=lost), "float it again, or drive harder"
+                    ) from lost
                 limit = _limit_of_loss(settings, (held, drive), counts[-1][1])
                 keep({"time_s": session.now()} | limit)
                 if lost.spin is not None:
@@ -272,11 +296,15 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
         if drive > settings.highest_hz:
             name = session.writer.record.experiment
             raise ExperimentFailed(
-                f"the top still follows at {settings.highest_hz:g} Hz ({name}.highest_hz): allow a higher drive there "
-                "and in limits.drive_frequency_hz, or weaken it"
+                Text(
+                    "the top still follows at {highest_hz:g} Hz ({name}.highest_hz): allow a higher drive "
+                    "there and in limits.drive_frequency_hz, or weaken it",
+                    highest_hz=settings.highest_hz,
+                    name=name,
+                )
             )
         session.bench.generator.frequency = drive
-        session.progress(f"drive at {drive:.2f} Hz", (drive - start) / (settings.highest_hz - start))
+        session.progress(Text("drive at {drive:.2f} Hz", drive=drive), (drive - start) / (settings.highest_hz - start))
 
 
 def _climb(session: Session[LimitSettings], motor: Motor, keep: Callable[[Row], None]) -> None:
@@ -291,7 +319,9 @@ def _climb(session: Session[LimitSettings], motor: Motor, keep: Callable[[Row], 
     spin, lost = climb.levels_off_at, climb.lost
     if spin is None:
         if climb.spins.size < FEWEST_ON_PARABOLA:
-            raise DidNotFollow(f"the top was lost {climb.spins.size} counts after the way up began", "float it again")
+            raise DidNotFollow(
+                Text("the top was lost {size} counts after the way up began", size=climb.spins.size), "float it again"
+            )
         between = (float(climb.times[-1]), climb.first_missed)
         spin = spin_at_loss(climb.times - settings.gate_s / 2, climb.spins, between)
     assert spin.value is not None
@@ -306,8 +336,10 @@ def _climb(session: Session[LimitSettings], motor: Motor, keep: Callable[[Row], 
     else:
         kind, what = _end_of(session, lost)
         cause = cause_of_loss(0.0, fell=kind is RunEvent.TOP_LOST)  # no lag where the top itself triggers the drive
+    how = Text(": {lost}", lost=lost) if lost else ""
+    text = Text("{what} at {spin:n}{how}; {cause}", what=what, spin=with_uncertainty(spin), how=how, cause=cause)
     session.event(
-        kind, f"{what} at {with_uncertainty(spin)}{f': {lost}' if lost else ''}; {cause}",
+        kind, text,
         spin_frequency_hz=spin.value, top=len(session.rows), cause=cause,
     )  # fmt: skip
 
@@ -350,9 +382,12 @@ def _say_how_it_was_lost(
     lag = lag_before_loss(*zip(*counts, strict=True)) if counts else math.nan
     cause = cause_of_loss(lag, fell=kind is RunEvent.TOP_LOST)
     known = {} if math.isnan(lag) else {"lag_turns": lag}
-    behind = f", the lag behind the drive grew by {lag:.2f} turns in the end" if known else ""
+    behind = Text(", the lag behind the drive grew by {lag:.2f} turns in the end", lag=lag) if known else ""
+    text = Text(
+        "{what} at {spin:.2f} Hz: {lost}; {cause}{behind}", what=what, spin=spin, lost=lost, cause=cause, behind=behind
+    )
     session.event(
-        kind, f"{what} at {spin:.2f} Hz: {lost}; {cause}{behind}",
+        kind, text,
         spin_frequency_hz=spin, drive_frequency_hz=lost.drive, top=len(session.rows), cause=cause, **known,
     )  # fmt: skip
     safely_held = [(spin, drive) for spin, drive in seen if drive < held - _BELOW_HZ][-_COMPARED:]

@@ -25,6 +25,7 @@ from levilab.present.numbers import pulses_too_many
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.runs.gates import gates_event
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from typing import Self
@@ -100,14 +101,21 @@ class PrecessionSettings(DriveSettings):
         model = COUNTER.model(config.counter.model)
         if model.driver.SIGNAL is not LIGHT:
             raise ConfigError(
-                f"{model.name} cannot count a laser beam: the precession needs another counter, one of pulses of light"
+                Text(
+                    "{model} cannot count a laser beam: the precession needs another counter, one of pulses of light",
+                    model=model.name,
+                )
             )
         if self.laser_input <= model.inputs:
             return self
         if "laser_input" in self.model_fields_set:
             raise ConfigError(
-                f"precession.laser_input = {self.laser_input}: the {model.name} has one input; take 1, and change the "
-                "cable when you are asked to"
+                Text(
+                    "precession.laser_input = {input}: the {model} has one input; take 1, and change the"
+                    " cable when you are asked to",
+                    input=self.laser_input,
+                    model=model.name,
+                )
             )
         return self.model_copy(update={"laser_input": 1})
 
@@ -183,7 +191,10 @@ def run(session: Session[PrecessionSettings]) -> None:
     session.begin(lambda: None, resumed="the top is driven up again")
     left = settings.sweep[_points_done(session.rows, settings.sweep) :]
     sweep_drive(session, left, lambda drive: _point(session, drive))
-    session.event(RunEvent.DRIVE_OFF, f"drive off, {len(session.rows)} of {len(settings.sweep)} points were measured")
+    session.event(
+        RunEvent.DRIVE_OFF,
+        Text("drive off, {some} of {all} points were measured", some=len(session.rows), all=len(settings.sweep)),
+    )
 
 
 def _points_done(rows: list[Row], sweep: tuple[float, ...]) -> int:
@@ -213,7 +224,7 @@ def _point(session: Session[PrecessionSettings], drive: float) -> None:
     settings = session.settings
     _wait_for_lock(session, drive)
     row, counts = _measure(session, drive)
-    text = f"spin and laser were counted at {drive:g} Hz"
+    text = Text("spin and laser were counted at {drive:g} Hz", drive=drive)
     session.writer.event(session.now(), RunEvent.COUNTED, text, drive_frequency_hz=drive, **counts)
     left = _time_left(settings, _points_done([*session.rows, row], settings.sweep))
     session.keep(row | {"time_s": session.now()}, left)
@@ -231,7 +242,12 @@ def _wait_for_lock(session: Session[PrecessionSettings], drive: float) -> None:
         seen.append(held_spin(session, drive))
         mean = math.fsum(seen[-_LOOKS:]) / _LOOKS
         if len(seen) >= _LOOKS and abs(mean - drive) < _LOCKED_WITHIN_HZ:
-            session.event(RunEvent.LOCKED, f"locked at {drive:g} Hz", drive_frequency_hz=drive, spin_frequency_hz=mean)
+            session.event(
+                RunEvent.LOCKED,
+                Text("locked at {drive:g} Hz", drive=drive),
+                drive_frequency_hz=drive,
+                spin_frequency_hz=mean,
+            )
             return
         session.wait(settings.interval_s - (session.now() - asked))
     raise NotHeld(seen[-1], drive)
@@ -282,7 +298,8 @@ def _calm(session: Session[PrecessionSettings], drive: float, swing: Swing | Non
     session.wait(_STEP_S)
     session.bench.generator.frequency = drive
     session.event(
-        RunEvent.CALMED, f"the top swung {swing.size:.2f} turns about the drive: the drive was moved by as much"
+        RunEvent.CALMED,
+        Text("the top swung {size:.2f} turns about the drive: the drive was moved by as much", size=swing.size),
     )
 
 
@@ -366,25 +383,38 @@ def _check_pulses(session: Session[PrecessionSettings], laser: Gates) -> None:
     settings, counted = session.settings, int(np.isfinite(laser.frequency).sum())
     if counted >= _FEWEST_COUNTS:
         return
-    where = f"at {settings.laser_trigger_level_v:g} V, input {settings.laser_input}"
+    where = Text("at {level:g} V, input {input}", level=settings.laser_trigger_level_v, input=settings.laser_input)
     if session.rows:
         raise PointFailed(
-            f"the laser was counted in {counted} of {len(laser)} gates {where}, {_FEWEST_COUNTS} are needed: move the "
-            "beam until the stem cuts it once a turn of its wobble again, while the sweep goes on"
+            Text(
+                "the laser was counted in {counted} of {all} gates {where}, {fewest} are needed: "
+                "move the beam until the stem cuts it once a turn of its wobble again, while the sweep "
+                "goes on",
+                counted=counted,
+                all=len(laser),
+                where=where,
+                fewest=_FEWEST_COUNTS,
+            )
         )
     raise ExperimentFailed(
-        f"the counter sees no laser pulses {where}: does the stem cut the beam, and is the trigger level between free "
-        "and cut (precession.laser_trigger_level_v)?"
+        Text(
+            "the counter sees no laser pulses {where}: does the stem cut the beam, and is the trigger"
+            " level between free and cut (precession.laser_trigger_level_v)?",
+            where=where,
+        )
     )
 
 
 def _say_what_was_miscounted(session: Session[PrecessionSettings], laser: Gates, found: Rate, drive: float) -> None:
     """Note an event where gates of the laser were left out, or had no count."""
-    said = [f"gate {gate + 1} has {pulses_too_many(pulses)}" for gate, pulses in found.wrong]
+    said = [
+        Text("gate {number} has {pulses}", number=gate + 1, pulses=pulses_too_many(pulses))
+        for gate, pulses in found.wrong
+    ]
     if found.missing:
-        said.append(f"{found.missing} of {len(laser)} gates have no count")
+        said.append(Text("{missing} of {all} gates have no count", missing=found.missing, all=len(laser)))
     if said:
-        text = f"the laser's gates at {drive:g} Hz: {', '.join(said)}; left out"
+        text = Text("the laser's gates at {drive:g} Hz: {wrong}; left out", drive=drive, wrong=tuple(said))
         session.event(RunEvent.MISCOUNTED, text, drive_frequency_hz=drive)
 
 
@@ -413,7 +443,11 @@ def _record(session: Session[PrecessionSettings], drive: float) -> None:
         for what, channel in shown.items():
             session.keep_trace(channel, what, now)
     except InstrumentError as error:
-        session.event(RunEvent.NO_RECORD, f"no record at {drive:g} Hz: {error}", drive_frequency_hz=drive)
+        session.event(
+            RunEvent.NO_RECORD,
+            Text("no record at {drive:g} Hz: {why}", drive=drive, why=error),
+            drive_frequency_hz=drive,
+        )
 
 
 EXPERIMENT = Experiment(

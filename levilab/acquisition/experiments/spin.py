@@ -11,6 +11,7 @@ from levilab.acquisition.driving import DriveSettings, drive_up_and_let_go, driv
 from levilab.acquisition.experiment import Experiment
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from levilab.acquisition.session import Row, Session
@@ -78,14 +79,18 @@ def keeps_its_spin(first: Row, last: Row) -> bool:
 
 def _why_it_keeps_its_spin(session: Session[SpinSettings], first: Row, last: Row) -> str:
     """Return a description of a top that keeps its spin, with a likely reason."""
-    seen = (
-        f"the spin does not fall: {first['spin_frequency_hz']:.2f} Hz, and {last['spin_frequency_hz']:.2f} Hz "
-        f"{last['time_s'] - first['time_s']:.0f} s later"
+    seen = Text(
+        "the spin does not fall: {first:.2f} Hz, and {last:.2f} Hz {later:.0f} s later",
+        first=first["spin_frequency_hz"],
+        last=last["spin_frequency_hz"],
+        later=last["time_s"] - first["time_s"],
     )
     scene = session.writer.record.configuration.get("scene") or {}
     if scene.get("drag", {}).get("law") == "none":
-        return f"{seen}: the scene has no drag (drag.law); take one with drag, such as spindown, or end the run"
-    return f"{seen}: is the drive still on, or does something else drive the top?"
+        return Text(
+            "{seen}: the scene has no drag (drag.law); take one with drag, such as spindown, or end the run", seen=seen
+        )
+    return Text("{seen}: is the drive still on, or does something else drive the top?", seen=seen)
 
 
 def time_left(first: Row, middle: Row, last: Row, longest_s: float) -> tuple[float, float]:

@@ -22,6 +22,7 @@ from levilab.bench.kinds import OSCILLOSCOPE
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.runs.traces import INDEX, described_times, undescribed_codes
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from instruments.drivers.oscilloscope import Trace
@@ -98,8 +99,14 @@ class TraceSettings(ExperimentSettings):
         low, high = (self.offset_v + k * self.volts_per_division for k in (-_HALF_SCREEN, _HALF_SCREEN))
         if self.trigger_source in self.channels and not low <= self.trigger_level_v <= high:
             raise ConfigError(
-                f"{table}.trigger_level_v = {self.trigger_level_v:g} is beyond what the oscilloscope records, {low:g} "
-                f"to {high:g} V: change it, {table}.offset_v or {table}.volts_per_division"
+                Text(
+                    "{table}.trigger_level_v = {trigger_level_v:g} is beyond what the oscilloscope records, "
+                    "{low:g} to {high:g} V: change it, {table}.offset_v or {table}.volts_per_division",
+                    table=table,
+                    trigger_level_v=self.trigger_level_v,
+                    low=low,
+                    high=high,
+                )
             )
         if self.drive_frequency_hz is not None:
             check_drive(table, limits, self.drive_amplitude_vpp, [("drive_frequency_hz", self.drive_frequency_hz)])
@@ -156,7 +163,7 @@ def run(session: Session[TraceSettings]) -> None:
     settings = session.settings
     _prepare_scope(session)
     _drive(session)
-    session.begin(lambda: None, resumed=f"the next record is number {len(session.rows) + 1}")
+    session.begin(lambda: None, resumed=Text("the next record is number {number}", number=len(session.rows) + 1))
     if session.earlier:
         _note_what_was_cut_short(session)
     if len(session.rows) >= settings.records:
@@ -173,14 +180,23 @@ def _note_what_was_cut_short(session: Session[TraceSettings]) -> None:
     """Note codes without a line, or channels without a row, left by a process killed in the middle of a record."""
     folder = session.writer.folder
     if left := undescribed_codes(folder):
-        text = f"{', '.join(left)}: the run was cut short before {INDEX} said how to read it; it stays, and is left out"
+        text = Text(
+            "{names}: the run was cut short before {file} said how to read it; it stays, and is left out",
+            names=", ".join(left),
+            file=INDEX,
+        )
         session.event(RunEvent.CUT_SHORT, text)
     number, channels = len(session.rows) + 1, len(session.settings.channels)
     last = session.rows[-1]["time_s"] if session.rows else -math.inf
     # the channels of a record are kept after its time was noted, and before its row
     more = sum(time >= last for time in described_times(folder)) - (channels if session.rows else 0)
     if more > 0:
-        text = f"record {number} was cut short after {more} of {channels} channels; it is taken again"
+        text = Text(
+            "record {number} was cut short after {some} of {all} channels; it is taken again",
+            number=number,
+            some=more,
+            all=channels,
+        )
         session.event(RunEvent.CUT_SHORT, text, record=number)
 
 
@@ -215,7 +231,9 @@ def _drive(session: Session[TraceSettings]) -> None:
     session.bench.generator.prepare(
         waveform="SIN", frequency_hz=settings.drive_frequency_hz, amplitude_vpp=settings.drive_amplitude_vpp
     )
-    session.event(RunEvent.DRIVE_ON, f"drive on at {settings.drive_frequency_hz:g} Hz")
+    session.event(
+        RunEvent.DRIVE_ON, Text("drive on at {drive_frequency_hz:g} Hz", drive_frequency_hz=settings.drive_frequency_hz)
+    )
     session.bench.generator.output = True
     session.bench.record_settings("generator")
 
@@ -242,17 +260,35 @@ class _Watch:
         try:
             session.check_settings("generator")
         except InstrumentError as error:
-            session.warn(f"record {number} may be of another drive: the generator was changed, or failed ({error})")
+            session.warn(
+                Text(
+                    "record {number} may be of another drive: the generator was changed, or failed ({why})",
+                    number=number,
+                    why=error,
+                )
+            )
             session.reconnect("generator", error, lambda: _drive(session))
             return
         tape = next((one for one in traces if session.settings.label(one.channel) == TAPE), None)
         spin = None if tape is None else spin_of_record(tape, session.settings.trigger_level_v)
         lost = spin is not None and abs(spin - drive) > HELD_WITHIN_HZ
         if spin is not None and lost and not self.lost:
-            session.warn(f"record {number} shows a tape of {spin:.2f} Hz: the drive of {drive:g} Hz lost the top")
+            session.warn(
+                Text(
+                    "record {number} shows a tape of {spin:.2f} Hz: the drive of {drive:g} Hz lost the top",
+                    number=number,
+                    spin=spin,
+                    drive=drive,
+                )
+            )
         elif spin is not None and self.lost and not lost:
             session.event(
-                RunEvent.LOCKED, f"record {number} shows a tape of {spin:.2f} Hz: the top follows the drive again"
+                RunEvent.LOCKED,
+                Text(
+                    "record {number} shows a tape of {spin:.2f} Hz: the top follows the drive again",
+                    number=number,
+                    spin=spin,
+                ),
             )
         self.lost = lost
 
@@ -290,7 +326,10 @@ def _take(session: Session[TraceSettings]) -> list[Trace]:
             traces.append(trace)
             if problem := _problem(trace, settings):
                 session.event(
-                    RunEvent.LOOK_AT_THE_SCALE, f"record {number}: {problem}", record=number, channel=trace.channel
+                    RunEvent.LOOK_AT_THE_SCALE,
+                    Text("record {number}: {problem}", number=number, problem=problem),
+                    record=number,
+                    channel=trace.channel,
                 )
     except SilentInput:
         raise
@@ -300,8 +339,13 @@ def _take(session: Session[TraceSettings]) -> list[Trace]:
         raise
     except InstrumentError as error:
         if traces:
-            text = f"record {number} was cut short after {len(traces)} of {len(settings.channels)} channels"
-            session.event(RunEvent.CUT_SHORT, f"{text}; it is taken again", record=number)
+            text = Text(
+                "record {number} was cut short after {some} of {all} channels",
+                number=number,
+                some=len(traces),
+                all=len(settings.channels),
+            )
+            session.event(RunEvent.CUT_SHORT, Text("{said}; it is taken again", said=text), record=number)
         session.reconnect("oscilloscope", error, lambda: _prepare_scope(session))
         return []
     _keep(session, traces, now)
@@ -311,8 +355,14 @@ def _take(session: Session[TraceSettings]) -> list[Trace]:
 def _why_no_trigger(session: Session[TraceSettings]) -> str:
     """Return a description of the signal, by a record without a trigger."""
     settings, count = session.settings, len(session.rows)
-    where = f"at {settings.trigger_level_v:g} V on channel {settings.trigger_source}"
-    said = f"no trigger {where} within {settings.trigger_patience_s:g} s, after {count} of {settings.records} records"
+    where = Text("at {level:g} V on channel {channel}", level=settings.trigger_level_v, channel=settings.trigger_source)
+    said = Text(
+        "no trigger {where} within {seconds:g} s, after {count} of {records} records",
+        where=where,
+        seconds=settings.trigger_patience_s,
+        count=count,
+        records=settings.records,
+    )
     try:
         _prepare_scope(session, sweep="auto")
         session.bench.oscilloscope.acquire(timeout_s=settings.trigger_patience_s)
@@ -320,12 +370,20 @@ def _why_no_trigger(session: Session[TraceSettings]) -> str:
     except InstrumentError:
         low = high = math.nan
     if math.isnan(low):
-        return f"{said}, and no record without one: is the signal there?"
+        return Text("{said}, and no record without one: is the signal there?", said=said)
     level = settings.trigger_level_v
     if settings.trigger_source not in settings.channels:
-        return f"{said}: is the signal plugged in there, and does it cross this level (trace.trigger_level_v)?"
+        return Text(
+            "{said}: is the signal plugged in there, and does it cross this level (trace.trigger_level_v)?", said=said
+        )
     advice = "is the top up and lit?" if low < level < high or high - low < 0.1 else "set trace.trigger_level_v between"
-    return f"{said}: the signal there lies between {low:.2f} and {high:.2f} V; {advice}"
+    return Text(
+        "{said}: the signal there lies between {low:.2f} and {high:.2f} V; {advice}",
+        said=said,
+        low=low,
+        high=high,
+        advice=advice,
+    )
 
 
 def _channel_in_message(settings: TraceSettings) -> int:
@@ -364,12 +422,16 @@ def _frequency(tape: Trace) -> Row:
 def _problem(trace: Trace, settings: TraceSettings) -> str:
     """Return the fault of a trace's scale, empty if it has none."""
     codes = trace.codes if trace.none is None else trace.codes[trace.codes != trace.none]
-    what = f"channel {trace.channel} ({settings.label(trace.channel)})"
+    what = Text("channel {channel} ({label})", channel=trace.channel, label=settings.label(trace.channel))
     if not codes.size or int(codes.max()) - int(codes.min()) < _FEWEST_CODES:
-        return f"{what} shows nothing: is it plugged in, and on?"
+        return Text("{what} shows nothing: is it plugged in, and on?", what=what)
     clipped = float(trace.clipped.mean())
     if clipped > _CLIPPED_SHARE:
-        return f"{what} is beyond the screen for {100 * clipped:.2g} % of it: raise trace.volts_per_division"
+        return Text(
+            "{what} is beyond the screen for {percent:.2g} % of it: raise trace.volts_per_division",
+            what=what,
+            percent=100 * clipped,
+        )
     return ""
 
 

@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 
 import pytest
 from typer.testing import CliRunner
@@ -9,11 +10,12 @@ from typer.testing import CliRunner
 from levilab.acquisition import loop
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import EXPERIMENTS
-from levilab.bench.person import Task, ask_no_person
+from levilab.bench.person import PlaceProbe, Task, ask_no_person
 from levilab.cli.acquire import _ask
 from levilab.cli.main import app
 from levilab.pipelines.tune.owner import read_scan
 from levilab.runs.run import Run
+from levilab.texts.text import Text
 from support.commands import command
 from support.figures import without_drawing
 from support.paths import ROOT
@@ -93,3 +95,41 @@ def test_a_run_keeps_temperature_and_washers_and_its_report_shows_them(tmp_path)
 def test_a_wrong_condition_is_refused_before_a_run_is_made(tmp_path, words, says):
     ended = command("acquire", "spin", "--mock", *words, cwd=tmp_path)
     assert (ended.status, ended.err, list(tmp_path.iterdir())) == (2, f"{says}\n", [])
+
+
+def said_at_the_bench(tmp_path, name, *words):
+    ended = command("acquire", "limit", "--mock", "--seed", "5", "--out", name, *words, cwd=tmp_path)
+    events = [
+        json.loads(line) for line in next((tmp_path / name).glob("*/events.jsonl")).read_text("utf-8").splitlines()
+    ]
+    return ended.err.splitlines(), [(one["kind"], one["text"]) for one in events], ended.out
+
+
+def test_a_run_is_the_same_in_german_and_its_files_are_english(tmp_path, monkeypatch):
+    monkeypatch.setattr("levilab.texts.text._of_process", "en")
+    words = ("--set", "limit.repetitions=1")
+    english, events, _ = said_at_the_bench(tmp_path, "english", *words)
+    monkeypatch.setenv("LEVILAB_LANGUAGE", "de")
+    german, events_of_german, result = said_at_the_bench(tmp_path, "german", *words)
+    assert events_of_german == events
+    assert events[-1][1].startswith("no light pulses any more: the top fell between ")
+    said = {text.partition(",")[0] for text in english}
+    assert {"drive off", "drive on at the top's spin", "the drive takes hold: count 6 of 27", "no reading"} <= said
+    assert [line for line in german if line in english and re.search("[A-Za-z]{3}", line)] == []
+    numbers = [re.findall(r"\d+(?:[.,]\d+)?", line) for line in german]
+    assert [[one.replace(",", ".") for one in line] for line in numbers] == [
+        re.findall(r"\d+(?:\.\d+)?", line) for line in english
+    ]
+    assert german[-3].startswith("keine Lichtpulse mehr: der Kreisel fiel zwischen ")
+    assert result.startswith("beendet: 1 Messwert in german")
+
+
+def test_an_error_and_a_question_are_in_the_language_of_the_person(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("levilab.texts.text._of_process", "en")
+    words = ("acquire", "spin", "--mock", "--set", "spin.drive_frequency_hz=1e5", "--language", "de")
+    assert "mehr, als dieser Versuchsstand erlaubt" in command(*words, cwd=tmp_path).err
+    unknown = command("acquire", "spin", "--mock", "--language", "xx", cwd=tmp_path)
+    assert (unknown.status, unknown.err) == (2, "levilab: --language xx: one of de, en is expected\n")
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
+    _ask(PlaceProbe(Text("Height {which}: {height:.1f} mm.", which="1", height=61.5), 0.0615))
+    assert capsys.readouterr().err.startswith("Höhe 1: 61,5 mm. Die Sonde dorthin auf die Achse stellen")
