@@ -266,8 +266,12 @@ class FreeTop(Generic[S]):
             self._took = session.now() - asked
             if spin is None or counter.last is not None or self._took < usual + _STALLED_S or tries == 2:
                 break
-            text = f"a count took {self._took:.1f} s, {usual:.1f} s at most are usual: the computer stood still"
-            session.event(RunEvent.LEFT_OUT, f"{text}, counting again", **_spin_of({"spin_frequency_hz": spin}))
+            text = Text(
+                "a count took {took:.1f} s, {usual:.1f} s at most are usual: the computer stood still, counting again",
+                took=self._took,
+                usual=usual,
+            )
+            session.event(RunEvent.LEFT_OUT, text, **_spin_of({"spin_frequency_hz": spin}))
         return spin
 
     def _is_plausible(self, reading: Row) -> bool:
