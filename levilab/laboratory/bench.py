@@ -13,7 +13,7 @@ from levilab.bench.person import FloatTop, PlaceProbe, ShieldProbe
 from levilab.world.bench import virtual_bus, virtual_wiring
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
     from random import Random
 
     from instruments.virtual.bench.session import Session
@@ -54,9 +54,16 @@ class LaboratoryClock(VirtualClock):
 
 
 class LaboratoryBench(VirtualBench):
-    """The instruments of a laboratory."""
+    """The instruments of a laboratory.
+
+    Attributes:
+        fate: of the process.
+        sessions: that are open.
+        at_next_message: called before an instrument gets the next message.
+    """
 
     fate: Fate
+    at_next_message: Callable[[], None] | None = None
     sessions: list[Session]
 
     @classmethod
@@ -73,6 +80,9 @@ class LaboratoryBench(VirtualBench):
 
         def write(data: bytes, *, end: bool = True) -> None:
             self.fate.step(f"{name} > {data!r:.120}")
+            if self.at_next_message is not None:
+                act, self.at_next_message = self.at_next_message, None
+                act()
             sound(data, end=end)
 
         session.write = write  # type: ignore[method-assign]

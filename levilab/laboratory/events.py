@@ -84,6 +84,10 @@ def _interrupt_twice(*_: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
 
+def _take_top(place: Place, _: float) -> None:
+    place.bench.at_next_message = place.world.take_top  # a count under way is worked out ahead, to its end
+
+
 def _slip(name: str) -> Callable[[Place, float], None]:
     def act(place: Place, _: float) -> None:
         place.person.slip = name
@@ -125,7 +129,7 @@ EVENTS: dict[str, What] = {
         lambda place, v: _pull(place, v, plug=True),
         lambda v: _choose(_OUT_S, v * 7 % 1),
     ),
-    "top taken": What("the person takes the top out of the air", lambda place, _: place.world.take_top()),
+    "top taken": What("the person takes the top out of the air", _take_top),
     "mistypes": What("the person mistypes", _slip("mistypes"), kind="task"),
     "types a height": What("the person types another height", _slip("types a height"), kind="task"),
     "misses": What("the person puts the probe 3 mm too high", _slip("misses"), kind="task"),
