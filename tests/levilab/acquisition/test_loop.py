@@ -6,7 +6,7 @@ import dataclasses
 import itertools
 import json
 import signal
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
@@ -516,7 +516,7 @@ def test_a_wire_log_that_cannot_be_written_does_not_keep_the_output_on(tmp_path,
     assert (run.record.model_extra or {})["wire_log_ended"] == "No space left on device"
 
 
-def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path, monkeypatch):
+def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path):
     """As without a world: instruments from the configuration, and a top that has gone on since its time zero."""
     clock = VirtualClock()
     library = library_for(virtual_bus(SpinWorld(SpinScene(), clock)))
@@ -528,14 +528,13 @@ def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path, monkeypatc
     assert half.record.synthetic  # the instruments say so themselves
     zero = datetime(2026, 7, 1, 12, tzinfo=UTC)
 
-    class Then(datetime):
-        @classmethod
-        def now(cls, tz=None):
-            return cls.fromtimestamp(zero.timestamp() + 72.5, tz)
+    class Later(Computer):
+        def utc(self):
+            return zero + timedelta(seconds=72.5)
 
-    monkeypatch.setattr("levilab.runs.run.datetime", Then)
     left = dataclasses.replace(half, record=half.record.model_copy(update={"time_zero_utc": zero.isoformat()}))
-    run = acquire(dataclasses.replace(request, resume=left), Silent())
+    with at_another_computer(Later()):
+        run = acquire(dataclasses.replace(request, resume=left), Silent())
     times = run.readings().frame["time_s"].to_numpy()
     assert len(times) > 6
     assert 80 <= times[4] < 81  # the next whole ten seconds, and half a gate
