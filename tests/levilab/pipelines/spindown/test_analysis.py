@@ -102,8 +102,8 @@ def test_the_result_is_written_as_the_interface_says(sample_data, tmp_path):
     for model in run["models"]:
         assert set(model["parameters"]) >= {"start_frequency"}
         assert set(model["statistics"]) == {
-            "n", "degrees_of_freedom", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson", "runs_test_p",
-            "difference",
+            "n", "degrees_of_freedom", "rms_residual", "reduced_chi_square", "aicc", "bic", "weight", "durbin_watson",
+            "runs_test_p", "difference",
         }  # fmt: skip
     assert run["models"][0]["linearised"]["c1"]["unit"] == "1/s"
     assert set(result["models"][2]["parameters"]) == {"c32"}
