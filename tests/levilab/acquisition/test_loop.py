@@ -23,10 +23,10 @@ from levilab.acquisition.experiments.spin import SpinSettings, time_left
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
-from levilab.computer import Computer, at_another_computer
 from levilab.acquisition.table import Configuration
 from levilab.bench.config import InstrumentSettings
 from levilab.bench.wiring import Wiring
+from levilab.computer import Computer, at_another_computer
 from levilab.files import CannotWrite
 from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
