@@ -33,6 +33,7 @@ def test_a_question_has_its_answers_as_commands(doubtful):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("undrawn_figures")
 def test_an_answer_is_kept_analyzed_and_reported(doubtful):
     words = ("--columns", "t=1,f=2 [rad/s]", "--keep", "-o", "my.html")
     ended = command("open", "my.csv", *words, cwd=doubtful.parent)

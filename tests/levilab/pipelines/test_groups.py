@@ -56,6 +56,7 @@ def test_a_groups_only_run_needs_no_other_name(tmp_path, others, shown):
     assert analyzed(tmp_path).sources[0].name == shown
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_tables_report_files_and_list_name_group_and_note(of_class, tmp_path):
     in_terminal = [cell for table in SPINDOWN.tables(of_class) for row in table.rows for cell in row.cells]
     assert {"Group 10", "Group 2, spin-7f3a"} <= set(in_terminal)

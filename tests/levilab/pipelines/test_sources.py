@@ -148,6 +148,7 @@ def folder_of_a_student(folder, sample_data):
         (folder / name).write_bytes(content)
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_folder_names_every_file_that_it_leaves_out_by_kind_and_number(tmp_path, sample_data):
     folder_of_a_student(tmp_path, sample_data)
     for _ in range(2):  # the second time with results and figures beside the files

@@ -1,5 +1,7 @@
 """The order of a report, its short form, and what a person writes above it."""
 
+import pytest
+
 from levilab.report.heading import Heading
 from levilab.report.page import write_report
 from support.pages import Page
@@ -8,6 +10,7 @@ from support.paths import SAMPLE_DATA
 RUNS = [SAMPLE_DATA / "spin-down-1", SAMPLE_DATA / "spin-down-2"]
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_report_begins_with_the_result_and_notes_follow_the_figure(tmp_path):
     page = Page(write_report(RUNS, tmp_path / "report.html").read_text(encoding="utf-8"))
     found = page.of_level(2)
@@ -15,6 +18,7 @@ def test_a_report_begins_with_the_result_and_notes_follow_the_figure(tmp_path):
     assert {"Uncertainty budget", "What was measured, and with what", "How to reproduce this"} <= set(found)
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_a_short_one_has_no_more_and_names_the_command_that_makes_it(tmp_path):
     heading = Heading("It's <7>", "Physics lab 2", "A. Kim", "28 November")
     text = write_report(RUNS, tmp_path / "report.html", short=True, heading=heading).read_text(encoding="utf-8")
