@@ -115,6 +115,8 @@ def follow(steps, place):
 def test_the_readme_and_the_tutorial_show_commands():
     assert len(steps()["README.md"]) >= 5
     assert len(steps()["docs/tutorial.md"]) >= 8
+    german = [re.sub(" --language de| --note .*", "", line) for line in steps()["docs/tutorial-de.md"]]
+    assert german == [re.sub(" --note .*", "", line) for line in steps()["docs/tutorial.md"]]
 
 
 @pytest.mark.parametrize(("shown", "matches"), [

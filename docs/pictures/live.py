@@ -1,4 +1,4 @@
-"""Make two pictures of the bench for practice, 1280 × 800: the locked top (locked.png), and a spin-down (live.png).
+"""Make pictures of the bench for practice, 1280 × 800: the locked top (locked.png), also in German, and a spin-down.
 
 python docs/pictures/live.py
 """
@@ -42,6 +42,13 @@ def take_picture(page: Page, name: str) -> None:
     small.save(path, optimize=True)
 
 
+def turn_to(page: Page, language: str) -> None:
+    """Let the page speak a language."""
+    with page.expect_navigation():
+        page.select_option("#language", language)
+    until(page, "levilab.data.bench?.last.spin_frequency_hz && levilab.space?.frames")
+
+
 def main() -> None:
     """Start the bench, lock the top, record, and take a picture of each."""
     from playwright.sync_api import sync_playwright
@@ -62,6 +69,10 @@ def main() -> None:
             until(page, "document.getElementById('event-list').textContent.includes('the top follows the drive')")
             page.wait_for_timeout(2500)
             take_picture(page, "locked")
+            turn_to(page, "de")
+            page.wait_for_timeout(4000)  # 40 s of the bench
+            take_picture(page, "locked-de")
+            turn_to(page, "en")
             page.click("#record")
             until(page, "levilab.data.count >= 24")
             page.select_option("#speed", "1")

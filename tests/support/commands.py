@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from levilab.cli.main import main
+from levilab.texts.text import speak
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,6 +38,7 @@ def command(*words: str | Path, cwd: Path, encoding: str = "utf-8") -> Ended:
     except SystemExit as end:
         status = end.code if isinstance(end.code, int) else int(end.code is not None)
     finally:
+        speak("en")  # this process goes on
         sys.argv = argv
         os.chdir(here)
     texts = []
