@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import HEADING, Paths, place, writable
+from levilab.cli.options import HEADING, Language, Paths, place, writable
 from levilab.cli.output import interruptible, message, result
 from levilab.cli.quantities import with_options
 from levilab.pipelines.options import OF_REPORT, read_options
@@ -45,7 +45,7 @@ def worksheet(
     out: Annotated[Path, place("DIR", "Where the files are written.")] = Path("worksheets"),
     groups: Annotated[int, typer.Option(min=1, max=500, metavar="N", help="How many, each with its seed.")] = 20,
     seed: Annotated[int, typer.Option(min=0, metavar="N", help="Of the first group; the next ones count up.")] = 1,
-    language: Annotated[str, typer.Option(metavar="CODE", help="en or de.")] = "en",
+    language: Language = "en",
     pdf: Annotated[bool, typer.Option("--pdf", help=r"PDF instead of HTML; needs levilab\[pdf].")] = False,
     keys: Annotated[bool, typer.Option("--key/--no-key", help="Keys for the teacher, beside the worksheets.")] = True,
 ) -> None:

@@ -1,19 +1,19 @@
-"""The texts of worksheets, a file for each language in `texts`."""
+"""The texts of worksheets: in English in texts.toml, in other languages by `levilab.texts`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.resources import files
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from levilab.errors import UsageError
 from levilab.files import parse_toml
+from levilab.texts.text import in_language, language_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-_TEXTS = files("levilab.report.worksheets") / "texts"
+_TEXTS = Path(__file__).parent / "texts.toml"
 
 
 @dataclass(frozen=True)
@@ -67,31 +67,23 @@ class Language:
     """A language.
 
     Attributes:
-        code: of the file, such as "de".
-        name: in the language itself.
+        code: of the language, such as "de".
         words: of all worksheets, by their keys.
         sheets: experiment → its texts.
     """
 
     code: str
-    name: str
     words: Mapping[str, str]
     sheets: Mapping[str, Texts]
 
 
-def languages() -> tuple[str, ...]:
-    """Return the codes of the languages that there are."""
-    return tuple(sorted(one.name.removesuffix(".toml") for one in _TEXTS.iterdir() if one.name.endswith(".toml")))
-
-
 def read_language(code: str) -> Language:
     """Return a language.  Raises UsageError."""
-    if code not in languages():
-        raise UsageError("language", f"one of {', '.join(languages())} is expected", value=code)
-    table = parse_toml((_TEXTS / f"{code}.toml").read_text(encoding="utf-8"))
-    sheets = {
-        name: Texts(own["title"], own["aim"].replace("{tops}", str(TOPS)), tuple(own["tasks"]), tuple(own["answers"]))
-        for name in SHEETS
-        for own in (table[name],)
-    }
-    return Language(code, table["language"], table["words"], sheets)
+    language_of(code)
+    table = parse_toml(_TEXTS.read_text(encoding="utf-8"))
+    sheets = {}
+    for name in SHEETS:
+        title, aim = in_language(table[name]["title"], code), in_language(table[name]["aim"], code)
+        tasks, answers = (tuple(in_language(text, code) for text in table[name][part]) for part in ("tasks", "answers"))
+        sheets[name] = Texts(title, aim.replace("{tops}", str(TOPS)), tasks, answers)
+    return Language(code, {key: in_language(text, code) for key, text in table["words"].items()}, sheets)

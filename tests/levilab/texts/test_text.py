@@ -18,6 +18,7 @@ from levilab.live.server import PAGE
 from levilab.live.views import VIEWS
 from levilab.live.words import change_texts
 from levilab.pipelines.look import QUANTITIES
+from levilab.report.worksheets.catalog import TOPS, read_language
 from levilab.texts.text import Text, in_language, language_of, languages, speak, text_from
 from support.sources import sources
 
@@ -71,6 +72,15 @@ def of_pages() -> set[str]:
     return found | {words for words, _ in QUANTITIES.values()}
 
 
+def of_worksheets():
+    """What worksheets say."""
+    sheets = read_language("en")
+    texts = {*sheets.words.values()}
+    for sheet in sheets.sheets.values():
+        texts |= {sheet.title, sheet.aim, *sheet.tasks, *sheet.answers}
+    return {text.replace(f"{TOPS} tops", "{tops} tops") for text in texts}
+
+
 def of_program() -> set[str]:
     """What the program says in sentences: each `Text`, and what the functions of SAYING are given."""
     found: set[str] = set()
@@ -89,7 +99,12 @@ def of_program() -> set[str]:
 @pytest.mark.parametrize("code", LANGUAGES)
 def test_a_language_has_every_text(code: str) -> None:
     assert sorted(text for text in of_pages() if is_worded(text) and text not in language_of(code).page) == []
-    assert sorted(text for text in of_program() if is_worded(text) and text not in language_of(code).texts) == []
+    assert (
+        sorted(
+            text for text in of_program() | of_worksheets() if is_worded(text) and text not in language_of(code).texts
+        )
+        == []
+    )
 
 
 @pytest.mark.parametrize("code", LANGUAGES)
@@ -101,7 +116,11 @@ def test_a_text_has_the_values_of_the_english_one(code: str) -> None:
 @pytest.mark.parametrize("code", LANGUAGES)
 def test_no_text_is_of_a_sentence_that_is_said_no_more(code: str) -> None:
     nodes = (node for tree in sources().values() for node in ast.walk(tree))
-    said = of_pages() | {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    said = (
+        of_pages()
+        | of_worksheets()
+        | {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    )
     said |= {re.sub(r"(_frequency)?_(hz|v|t|m|s)$", "", text).replace("_", " ") for text in said}  # heads of columns
     said |= {text for module in PAGE.glob("*.js") for text in re.findall(_LITERAL, module.read_text("utf-8"))}
     assert sorted(text for text in language_of(code).texts if text not in said) == []
