@@ -15,7 +15,7 @@ from levilab.cli.acquire import _ask
 from levilab.cli.main import app
 from levilab.pipelines.tune.owner import read_scan
 from levilab.runs.run import Run
-from levilab.texts.text import Text
+from levilab.texts.text import Text, speak
 from support.commands import command
 from support.figures import without_drawing
 from support.paths import ROOT
@@ -131,5 +131,6 @@ def test_an_error_and_a_question_are_in_the_language_of_the_person(tmp_path, mon
     unknown = command("acquire", "spin", "--mock", "--language", "xx", cwd=tmp_path)
     assert (unknown.status, unknown.err) == (2, "levilab: --language xx: one of de, en is expected\n")
     monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
+    speak("de")
     _ask(PlaceProbe(Text("Height {which}: {height:.1f} mm.", which="1", height=61.5), 0.0615))
     assert capsys.readouterr().err.startswith("Höhe 1: 61,5 mm. Die Sonde dorthin auf die Achse stellen")
