@@ -182,6 +182,7 @@ def analyze(
     *,
     time: ArrayLike | None = None,
     frequency: ArrayLike | None = None,
+    light: ArrayLike | None = None,
     columns: Mapping[str, str | int] | str | None = None,
     channel: str | None = None,
     rate: float | None = None,
@@ -216,14 +217,16 @@ def analyze(
     """Analyze runs, data files or DataFrames.  Nothing is written; `save(folder)` of the result does.
 
     Args:
-        data: a run, the path of a run folder, of a data file or of a folder to search, a DataFrame with columns as in
-            data files (`time_s`, `spin_frequency_hz`, …, or titles that files may have, with their units), or several;
-            a dictionary of such columns; or arrays: (times [s], spin frequencies [Hz]) and, third, their standard
-            uncertainties; of other kinds (times, light), (heights [m], flux densities [T]), (drive, precession [Hz]),
-            or limits alone [Hz].
+        data: a run, the path of a run folder, of a data file or of a folder to search, a pattern of paths, a DataFrame
+            with columns as in data files (`time_s`, `spin_frequency_hz`, …, or titles that files may have, with their
+            units), or several; a dictionary of such columns, a Series with its index in seconds, an object of xarray;
+            or arrays: (times [s], spin frequencies [Hz]) and, third, their standard uncertainties, one or an array; of
+            other kinds (times, light), (heights [m], flux densities [T]), (drive, precession [Hz]), or limits alone
+            [Hz].  Arrays of `uncertainties` have their u with them.
         kind: the analysis; None for the one that is made for the data.
         time: times of readings [s], which with frequency take the place of data.
         frequency: spin frequencies at these times [Hz].
+        light: signal of a detector at these times, in the place of frequency; its kind is "spin".
         columns: of a file or a DataFrame, where titles are not known: {"t": "Zeit", "f": "Drehzahl [rpm]"}, or as text
             "t=Zeit,f=Drehzahl [rpm]"; numbers count columns from 1.
         channel: of a record with several (spindown, spin).
@@ -265,9 +268,12 @@ def analyze(
         UsageError: an argument is wrong, or the data suit several analyses equally.
         DataError: the data suit none, or cannot be used; the text names file and line.
     """
-    options = {name: value for name, value in locals().items() if name not in {"data", "kind", "time", "frequency"}}
+    data_names = {"data", "kind", "time", "frequency", "light", "data_names"}
+    options = {name: value for name, value in locals().items() if name not in data_names}
     from levilab.notebook.analysis import analyze_data
 
+    if light is not None:
+        return analyze_data((time, light), kind or "spin", options)
     return analyze_data(data if time is None and frequency is None else (time, frequency), kind, options)
 
 

@@ -8,17 +8,20 @@ import weakref
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from functools import partial
+from glob import glob
 from os import PathLike
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import DoesNotSuit, LevilabError, UsageError
+from levilab.errors import DataError, DoesNotSuit, LevilabError, UsageError
 from levilab.notebook.frame import (
+    are_arrays,
     frame_of,
     has_numbers_for_titles,
     in_rows,
     is_frame,
+    kind_of,
     write_frame,
 )
 from levilab.notebook.result import AnalysisResult
@@ -26,6 +29,7 @@ from levilab.pipelines.analyzed import refuse_columns_of_runs
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import read_options
 from levilab.pipelines.suits import suiting
+from levilab.present.numbers import list_in_words
 from levilab.runs.find import find_run
 from levilab.runs.run import Run
 
@@ -33,6 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.sources import Source
     from levilab.pipelines.suits import Suiting
 
 
@@ -57,8 +62,13 @@ def analyze_data(data: Any, kind: str | None, given: Mapping[str, Any]) -> Analy
     options = read_options(given)
     if data is None or (isinstance(data, tuple) and any(item is None for item in data)):
         raise UsageError("data", "data, or `time` and `frequency` together, are expected", value="nothing")
+    called = _name_type(data)
     data = frame_of(data, kind)
+    kind = kind_of(data, kind)
     items: list[Any] = [data] if _is_one(data) else list(data)
+    items = [path for item in items for path in _expand(item)]
+    if kind and all(isinstance(item, Run) for item in items):  # as of a folder
+        items = [run for run in items if ANALYSES[kind].needs.take(run)] or items
     if not items:
         raise UsageError("data", "a run, a path or a DataFrame is expected", value="nothing")
     frames = [item for item in items if is_frame(item)]
@@ -68,7 +78,9 @@ def analyze_data(data: Any, kind: str | None, given: Mapping[str, Any]) -> Analy
     in_words = partial(_in_rows, folder=folder, titles=0 if any(map(has_numbers_for_titles, frames)) else 1)
     try:
         paths = [_path(item, folder, str(k) * (len(items) > 1)) for k, item in enumerate(items, 1)]
-        result = _analyze_paths(paths, kind, options, in_words, folder)
+        result = _analyze_paths(
+            paths, kind, options, in_words, folder=folder, called=called if len(items) == 1 else _FRAME
+        )
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -81,11 +93,13 @@ def _analyze_paths(
     kind: str | None,
     options: Mapping[str, Any],
     in_words: Callable[[str], str],
+    *,
     folder: Path | None = None,
+    called: str = "",
 ) -> AnalysisResult:
     """Analyze paths by a kind of analysis, or by the one that suits them all.
 
-    in_words: a message as the caller reads it; folder: of the files written from DataFrames.
+    in_words: a message as the caller reads it; folder: of the files written from DataFrames; called: their name.
     """
     with _errors(in_words):
         if kind:
@@ -100,7 +114,14 @@ def _analyze_paths(
             refuse_columns_of_runs(one.found, chosen)
             found = analysis.result.method.analyze_found(one.paths, one.found, chosen)
     copies = tuple(path for path in paths if path.parent == folder)
+    found = replace(found, sources=tuple(_renamed(one, called) if one.path in copies else one for one in found.sources))
     return AnalysisResult(analysis, _translate_warnings(found, in_words), copies)
+
+
+def _renamed(source: Source[Any], called: str) -> Source[Any]:
+    """Return a source that was no file, by its type, and its number among several."""
+    number = source.path.stem.removeprefix(_FRAME)
+    return replace(source, name=f"{called} {number}".strip())
 
 
 def _check_kind(kind: object) -> None:
@@ -113,6 +134,16 @@ def _check_kind(kind: object) -> None:
 
 def _is_one(data: object) -> bool:
     return isinstance(data, str | PathLike | Run) or not hasattr(data, "__iter__") or is_frame(data)
+
+
+def _expand(item: Any) -> list[Any]:
+    """Return the paths that a pattern such as "runs/*-spin-*" stands for, and all else as it is.  Raises DataError."""
+    if not isinstance(item, str) or not set(item) & set("*?[") or Path(item).exists():
+        return [item]
+    found = sorted(glob(item, recursive=True))  # noqa: PTH207 - of a whole path, which may begin anywhere
+    if not found:
+        raise DataError(f"{item}: no file or folder in {Path.cwd()} has such a name")
+    return found
 
 
 def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
@@ -129,7 +160,9 @@ def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
 
 
 def _name_type(item: object) -> str:
-    return f"the module {item.__name__}" if isinstance(item, ModuleType) else type(item).__name__
+    if isinstance(item, ModuleType):
+        return f"the module {item.__name__}"
+    return "arrays" if are_arrays(item) else type(item).__name__
 
 
 # --- options -------------------------------------------------------------------------------------------
@@ -168,9 +201,11 @@ def _only_suiting(paths: Sequence[Path], options: Mapping[str, Any]) -> Suiting:
     if names:
         instead = ", or name a single run" if paths[0].is_dir() else ""
         raise UsageError("kind", f"{paths[0]} suits {', '.join(names)}: say which, as kind={names[0]!r}{instead}")
-    of_each = {path: [one.analysis.name for one in taken if path in one.paths] for path in paths}
-    kinds = "; ".join(f"{path.name} suits {' and '.join(names)}" for path, names in of_each.items())
-    raise DoesNotSuit(f"no analysis takes all of these together ({kinds}): analyze them one after the other")
+    together: dict[str, list[str]] = {}
+    for path in paths:
+        together.setdefault(" and ".join(one.analysis.name for one in taken if path in one.paths), []).append(path.name)
+    seen = [f"{names}: {list_in_words(inputs)}" for names, inputs in together.items()]
+    raise DoesNotSuit(f"no analysis takes all of these together ({'; '.join(seen)}): analyze each kind by itself")
 
 
 # --- messages ------------------------------------------------------------------------------------------

@@ -8,20 +8,24 @@ from dataclasses import dataclass, fields
 from functools import partial
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
 
 from levilab.animation.request import AnimationRequest, animate, check_request
 from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation
 from levilab.motion.summary import as_document
 from levilab.motion.table import headline, print_motion
 from levilab.notebook.labels import as_dataset
+from levilab.notebook.names import Helpful, bare
+from levilab.notebook.quantity import Named
 from levilab.present.html import facts_as_html
 from levilab.simulator.trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from os import PathLike
 
-    import numpy as np
     import pandas as pd
     import xarray
 
@@ -31,8 +35,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class SimulatedMotion(Trajectory):
-    """A trajectory with what `levilab simulate` says of it.
+class SimulatedMotion(Helpful, Trajectory):
+    """A trajectory with what `levilab simulate` says of it; the columns of its table are attributes, too.
 
     Attributes:
         found: the motion in numbers, with all samples that its spectrum needed.
@@ -41,6 +45,27 @@ class SimulatedMotion(Trajectory):
 
     found: Summary | None = None
     folder: Path | None = None
+
+    also: ClassVar[Mapping[str, Any]] = {
+        "t": "time",
+        "height": "z",
+        "energy": "energies",
+        "spin": "spin_hz",
+        "spin_frequency": "spin_hz",
+        "omega": lambda motion: 2 * np.pi * motion.spin_hz,
+        "df": "to_dataframe()",
+        "data": "to_dataframe()",
+        "notes": "warnings",
+    }
+
+    @property
+    def _contents(self) -> Mapping[str, Any]:
+        return {name: values(self) for name, _, _, values in COLUMNS}
+
+    @bare
+    def __getitem__(self, name: str) -> np.ndarray:
+        columns: Mapping[str, np.ndarray] = Named(self._contents, "the columns of this motion")
+        return columns[name]
 
     @property
     def _found(self) -> Summary:

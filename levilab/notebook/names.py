@@ -31,7 +31,7 @@ def meant(name: str, known: Iterable[str]) -> str:
     ('known are model, input', 'did you mean model?')
     """
     names = [*known]
-    near = get_close_matches(name, names, n=3, cutoff=_ALIKE)
+    near = [one for one in names if name in one.split("_")] or get_close_matches(name, names, n=3, cutoff=_ALIKE)
     return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(names)}"
 
 

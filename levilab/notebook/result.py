@@ -271,6 +271,7 @@ class AnalysisResult(Helpful):
         return "\n".join(
             [
                 f"<{self.kind} of {of}{', SYNTHETIC' if self.synthetic else ''}",
+                *(f"  {unquote(text)}" for text in self.found.doubts),
                 *shown,
                 f"  {'; '.join([*ends, 'summary() says all'])}>",
             ]
@@ -283,7 +284,9 @@ class AnalysisResult(Helpful):
         """
         of = self.inputs[0] if len(self.inputs) == 1 else f"{len(self.inputs)} inputs"
         title = f"{self.kind} of {of}{' (SYNTHETIC)' * self.synthetic}"
-        return facts_as_html(title, [], paragraphs([self.verdict]) + "".join(_parts(self)))
+        return facts_as_html(
+            title, [], paragraphs([*map(unquote, self.found.doubts), self.verdict]) + "".join(_parts(self))
+        )
 
     def to_html(self) -> str:
         """Return the whole report as HTML for another page, with its figure: some hundred kB."""

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from levilab.notebook.analysis import analyze_data
 from levilab.notebook.labels import as_dataset
+from levilab.notebook.names import Helpful, bare, meant
+from levilab.notebook.quantity import NoSuchName
 from levilab.runs.run import Run
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     import pandas as pd
@@ -20,8 +22,27 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class RecordedRun(Run):
-    """A run folder whose readings are columns by their names, as those of a DataFrame."""
+class RecordedRun(Helpful, Run):
+    """A run folder whose readings are columns by their names, as those of a DataFrame; each is an attribute, too."""
+
+    also: ClassVar[Mapping[str, Any]] = {
+        "time": lambda run: run["time_s"],
+        "data": "df",
+        "columns": "df.columns",
+        "keys": "df.keys",
+        "head": "df.head",
+        "describe": "df.describe",
+        "iloc": "df.iloc",
+        "metadata": "record",
+        "experiment": "record.experiment",
+        "note": "record.note",
+        "name": "folder.name",
+    }
+
+    @property
+    def _contents(self) -> Mapping[str, Any]:
+        frame, _ = self._frame_or_problem()
+        return {} if frame is None else dict(frame)
 
     @classmethod
     def of(cls, run: Run) -> Self:
@@ -38,8 +59,16 @@ class RecordedRun(Run):
         """Its readings, as `to_dataframe` returns them."""
         return self.to_dataframe()
 
-    def __getitem__(self, column: str) -> pd.Series[Any]:
-        return self.df[column]
+    @bare
+    def __getitem__(self, column: object) -> pd.Series[Any]:
+        frame = self.df
+        if column not in frame:
+            advice = (
+                meant(column, map(str, frame.columns)) if isinstance(column, str) else "df.iloc[0] is the first reading"
+            )
+            raise NoSuchName(str(column), f"is no column of {self.folder.name}; {advice}")
+        series: pd.Series[Any] = frame[column]
+        return series
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.df.columns)
@@ -57,6 +86,7 @@ class RecordedRun(Run):
         """Return the readings as a Dataset with units; needs xarray.  Raises DataError, MissingXarray."""
         return as_dataset(self.df, "reading")
 
+    @bare
     def analyze(self, kind: str | None = None, **options: Any) -> AnalysisResult:
         """Analyze it; the same as `levilab.analyze(run, kind, …)`."""
         return analyze_data(self, kind, options)

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from levilab.notebook.names import Helpful
 from levilab.present.html import facts_as_html, paragraphs
 from levilab.simulator.equilibrium import stability_of
 from levilab.stability.table import as_document, headline, print_stability, remarks
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pandas as pd
+
     from levilab.simulator.equilibrium import Stability
     from levilab.simulator.scene import Scene
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FloatingTop:
+class FloatingTop(Helpful):
     """Where the top of a scene floats.
 
     Attributes:
@@ -23,6 +29,24 @@ class FloatingTop:
     """
 
     found: Stability
+
+    also: ClassVar[Mapping[str, str]] = {"df": "to_dataframe()", "z": "height", "stable": "floats", "spin": "spins"}
+
+    @property
+    def _contents(self) -> Mapping[str, Any]:
+        return self.values
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return where field and weight balance, a row for each window of the spin; NaN: no spin holds it."""
+        import pandas as pd
+
+        columns = ["height_m", "stable", "spin_from_hz", "spin_to_hz"]
+        rows = [
+            (one["height_m"], one["stable"], *window)
+            for one in self.values["equilibria"]
+            for window in one["spins_hz"] or [(math.nan, math.nan)]
+        ]
+        return pd.DataFrame(rows, columns=columns)
 
     @property
     def floats(self) -> bool:

@@ -102,15 +102,25 @@ class Analyzed(Generic[S, R, T, Opt]):
         raise NotImplementedError
 
     @property
+    def doubts(self) -> list[str]:
+        """Warnings that make the numbers worthless where they are right, as of a wrong unit."""
+        return [
+            text if len(self.sources) == 1 else _with_name(source, text)
+            for source in self.sources
+            for text in source.warnings[: getattr(source.readings, "doubts", 0)]
+        ]
+
+    @property
     def all_warnings(self) -> list[str]:
-        """Every warning once; an input's with its name, unless it says it or is of every input."""
-        texts = [*self.warnings, *self.about_all()]
+        """Every warning once, doubts first; an input's with its name, unless it says it or is of every input."""
+        texts = [*self.doubts, *self.warnings, *self.about_all()]
         of_runs = [
             [*source.warnings, *self.about_run(run)] for source, run in zip(self.sources, self.runs, strict=True)
         ]
         of_every = set.intersection(*map(set, of_runs))
         for source, said in zip(self.sources, of_runs, strict=True):
-            texts += [text if text in of_every else _with_name(source, text) for text in said]
+            own = said[getattr(source.readings, "doubts", 0) :]
+            texts += [text if text in of_every else _with_name(source, text) for text in own]
         return list(dict.fromkeys(texts))
 
     @property

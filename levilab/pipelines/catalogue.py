@@ -248,6 +248,8 @@ def print_analysis(
     from levilab.present.terminal import draw, terminal  # with rich
 
     console = console or terminal()
+    for doubt in found.doubts:
+        console.print(f"[bold yellow]Before you use the numbers.[/bold yellow] {escape(in_words(doubt))}")
     for table in analysis.tables(found) if tables else ():
         console.print(draw(table))
     starts = [f"{short_name(one.name)} {moment(one.start)}" for one in found.sources if one.start]
@@ -255,7 +257,7 @@ def print_analysis(
         more = f"; and {len(starts) - MOST_STARTS} more" if len(starts) > MOST_STARTS else ""
         console.print(f"[bold]Start, local time.[/bold] {escape('; '.join(starts[:MOST_STARTS]))}{more}")
     console.print(f"[bold]What the data say.[/bold] {escape(found.text)}")
-    for first, *others in found.grouped_warnings:
+    for first, *others in (group for group in found.grouped_warnings if group[0] not in found.doubts):
         many = len(others) >= MANY_ALIKE
         more = f" (and {len(others)} more like this one)" if many else ""
         for warning in [first] if many else [first, *others]:

@@ -255,7 +255,7 @@ def test_messages_about_a_dataframe_name_its_rows() -> None:
 
 def test_several_dataframes_are_told_apart_by_their_place() -> None:
     frames = [spin_down(), spin_down() * 1.01]
-    assert levilab.analyze(frames, reading_u=0.03).inputs == ("DataFrame1.csv", "DataFrame2.csv")
+    assert levilab.analyze(frames, reading_u=0.03).inputs == ("DataFrame 1", "DataFrame 2")
     frames[1].loc[2, "spin_frequency_hz"] = -1.0
     with pytest.raises(DataError, match=r"^DataFrame 2, row 2: the frequency is -1"):
         levilab.analyze(frames)
@@ -352,7 +352,7 @@ def test_every_option_is_a_keyword_with_its_default() -> None:
     given = inspect.signature(levilab.analyze).parameters
     options = {one.name: one.default for row in ANALYSES.values() for one in fields(row.result.method.options)}
     options.pop("guess")  # whether titles are guessed is for those who name a single file
-    data = {"data", "kind", "time", "frequency"}
+    data = {"data", "kind", "time", "frequency", "light"}
     assert {name: one.default for name, one in given.items() if name not in data} == options
     assert all(f"'{name}'" in str(given["kind"].annotation).replace('"', "'") for name in ANALYSES)
     of_acquire = set(inspect.signature(levilab.acquire).parameters) - {"experiment"}

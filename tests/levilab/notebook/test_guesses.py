@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 import pytest
+import xarray
+from uncertainties import unumpy
 
 import levilab
 from support.paths import SAMPLE_DATA
@@ -37,6 +39,11 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "run.path": lambda path: path == SAMPLE_DATA / "spin-down-1",
     "len(run)": lambda count: count == 20,
     "run.plot()": lambda figure: len(figure.axes) == 1,
+    "run.time.iloc[-1], run.spin_frequency_hz.iloc[0]": lambda pair: pair == (190.0, 39.93),
+    "list(run.columns) == list(run) == list(dict(run))": bool,
+    "run.metadata.experiment == run.experiment == 'spin'": bool,
+    "run.head(3)": lambda frame: len(frame) == 3,
+    "'time_s' in dir(run) and 'to_xarray' in dir(run)": bool,
     "run.analyze()": lambda result: result.kind == "spindown",
     # a result
     "result._repr_html_()": lambda html: "spin-down-1" in html,
@@ -116,6 +123,13 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "motion.to_dataframe().plot(x='time_s', y='z_m')": lambda axes: len(axes.lines) == 1,
     "motion.position": lambda position: position.shape == (101, 3),
     "motion.z": lambda height: 0.07 < height.min() < height.max() < 0.075,
+    "motion.t[-1], motion.height[0], motion.z_m[0]": lambda three: three == (1.0, 0.071, 0.071),
+    "motion.energy.shape == motion.spin.shape == motion.omega.shape": bool,
+    "motion.omega[0] / motion.spin[0]": lambda ratio: ratio == pytest.approx(2 * np.pi),
+    "motion['z_m'].max() < 0.075": bool,
+    "motion.df.shape": lambda shape: shape == (101, 12),
+    "levilab.stability('undriven').to_dataframe()": lambda frame: frame["spin_to_hz"].iloc[-1] > 80,
+    "levilab.stability('undriven').windows[0]": lambda window: window["low_m"] < 0.02,
     "motion.to_xarray()": lambda data: data["z_m"].sel(time_s=0.0).item() == pytest.approx(0.071),
     "levilab.simulate('undriven', 0.1, settings={'start.spin_hz': 20}).spin_hz[0]": lambda f: f == pytest.approx(20),
     "levilab.simulate('undriven', 0.1, spin_hz=20).spin_hz[0]": lambda f: f == pytest.approx(20),
@@ -126,6 +140,28 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "levilab.analyze([folder / 'spin-down-1', folder / 'spin-down-2'])": lambda result: len(result.inputs) == 2,
     "levilab.analyze((t, f))": lambda result: "c32" in result.models["disc"],
     "levilab.analyze(time=t, frequency=f)": lambda result: result.best_model in {"disc", "power"},
+    "levilab.analyze((t, f, 0.03)).data['spin_frequency_u_hz'].unique().tolist()": lambda u: u == [0.03],
+    "levilab.analyze((t, unumpy.uarray(f, 0.03))).c32 == levilab.analyze((t, f, 0.03)).c32": bool,
+    "levilab.analyze(pd.Series(f, index=t)).c32 == levilab.analyze((t, f)).c32": bool,
+    "levilab.analyze(pd.Series(f, index=pd.to_timedelta(t, unit='s'))).c32 == levilab.analyze((t, f)).c32": bool,
+    "levilab.analyze(xr.DataArray(f, coords={'time': t}, dims='time')).c32 == levilab.analyze((t, f)).c32": bool,
+    "levilab.analyze(xr.Dataset({'frequency': ('time', f)}, coords={'time': t})).kind": lambda kind: kind == "spindown",
+    "levilab.analyze(xr.DataArray(f, coords={'time': ('time', 1e3 * t, {'units': 'ms'})}, dims='time')).time[-1]": (
+        lambda last: last == 190.0
+    ),
+    "levilab.analyze(run.to_xarray()).ndata": lambda n: n == 20,
+    "levilab.analyze(list(zip(t, f))).ndata": lambda n: n == 20,
+    "levilab.analyze(np.column_stack([t, f])).ndata": lambda n: n == 20,
+    "levilab.analyze({'t': t, 'f': f}).ndata": lambda n: n == 20,
+    "levilab.analyze([21.8, 21.9, 22.0, 21.7])['mean'].n": lambda mean: mean == pytest.approx(21.85),
+    "levilab.analyze(time=seconds, light=light)['frequency'].n": lambda f: f == pytest.approx(25.0, abs=0.01),
+    "levilab.analyze((seconds, light), 'spin').inputs": lambda names: names == ("arrays",),
+    "levilab.analyze(frame).inputs": lambda names: names == ("DataFrame",),
+    "levilab.analyze(str(folder / 'spin-down-[12]')).inputs": lambda names: names == ("spin-down-1", "spin-down-2"),
+    "levilab.analyze(levilab.runs(folder), 'limit').inputs": lambda names: "lower-limits" in names,
+    "repr(levilab.analyze((1000 * t, f))).splitlines()[1]": lambda line: "if the times are not in seconds" in line,
+    "levilab.analyze((1000 * t, f)).warnings[0]": lambda text: "if the times are not in seconds" in text,
+    "levilab.analyze((1000 * t, f)).summary()": lambda text: text.startswith("Before you use the numbers."),
     # the other commands
     "levilab.__version__": lambda text: text[0].isdigit(),
     "levilab.runs(folder)": lambda runs: len(runs) > 10 and "spin-down-1" in runs._repr_html_(),
@@ -166,6 +202,17 @@ REFUSED = {
     "result.predict(None)": "a number or an array of numbers in SI",
     "result.predict(['a'])": "a number or an array of numbers in SI",
     "result.predict(0.0, law='stokes')": "is no option of predict; known are x, model, input",
+    "run[0]": "df.iloc[0] is the first reading",
+    "run['spin_hz']": "did you mean spin_frequency_hz?",
+    "run.spin": "did you mean spin_frequency_hz",
+    "motion.hight": "did you mean height",
+    "levilab.analyze((seconds, light))": "kind='spin', or light=",
+    "levilab.analyze(np.array([]))": "an empty array: at least 3 readings are expected",
+    "levilab.analyze(np.array(['a', 'b', 'c']))": "an array of a, …: numbers are expected",
+    "levilab.analyze((t, f, 'u'))": "an array of u, …: numbers are expected",
+    "levilab.analyze('none/*.csv')": "no file or folder in",
+    "levilab.analyze(levilab.runs(folder))": "analyze each kind by itself",
+    "levilab.analyze(time=t, frequency=f, u=0.03)": "did you mean reading_u",
     "levilab.analyze(run, foo=3)": "is no option of analyze; known are data, kind",
     "levilab.analyze(run, tild='none')": "did you mean tilt",
     "result.predict(0.0, 'disk')": "known are stokes, newton, disc",
@@ -193,6 +240,11 @@ def names() -> dict[str, Any]:
         "frame": run.to_dataframe(),
         "folder": SAMPLE_DATA,
         "t": T,
+        "pd": pd,
+        "unumpy": unumpy,
+        "xr": xarray,
+        "seconds": (seconds := np.arange(6000) / 3000.0),
+        "light": (np.abs((25.0 * seconds) % 1 - 0.5) < 0.03) + np.random.default_rng(1).normal(0, 0.01, 6000),
         "f": _disc(T) + np.random.default_rng(1).normal(0.0, 0.03, T.size),
     }
 
@@ -282,7 +334,7 @@ def test_rooms_are_found_where_a_function_has_their_name() -> None:
 
     assert callable(levilab.runs)
     assert callable(levilab.report)
-    assert levilab.runs.run.Run is levilab.load(SAMPLE_DATA / "spin-down-1").__class__.__mro__[1]
+    assert isinstance(levilab.load(SAMPLE_DATA / "spin-down-1"), levilab.runs.run.Run)
     assert levilab.report.page.write_report.__name__ == "write_report"
 
 
