@@ -13,13 +13,14 @@ from PIL import Image
 from levilab.notebook.fit import axes_of
 from levilab.present.drawing import headline, panel, run_look, synthetic_mark
 from levilab.present.looks import BLACK
-from levilab.present.style import STYLE, WIDE
+from levilab.present.style import STYLE, WIDE, for_notebooks
 from levilab.present.units import split
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     import pandas as pd
+    from matplotlib.axes import Axes
 
     Curve = Callable[[np.ndarray], np.ndarray]
 
@@ -41,27 +42,70 @@ def residuals_figure(
         made_up: whether each input is synthetic.
         curves: input → its fitted curve, None where there is none.
     """
-    x, y = axes_of(frame, residual)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, _HEIGHT))
         headline(figure, title, synthetic_mark(made_up))
         left = panel(figure, _LEFT, _TOP, _WIDTH, _PANEL)
         right = panel(figure, _RIGHT, _TOP, _WIDTH, _PANEL, sharex=left)
-        for k, (name, curve) in enumerate(curves.items()):
-            own, look = frame[frame["input"] == name], run_look(k, len(curves))
-            style: Any = {"linestyle": "none", "marker": ".", "color": look.colour}
-            at, readings, residuals = (
-                own[column].to_numpy(dtype=float) * _factor(column) for column in (x, y, residual)
-            )
-            left.plot(at, readings, **style)
-            right.errorbar(at, residuals, yerr=_bars(own, y), elinewidth=0.8, **style)
-            if curve and len(at):
-                fine = np.linspace(own[x].min(), own[x].max(), _POINTS)
-                left.plot(fine * _factor(x), curve(fine) * _factor(y), color=look.colour, linewidth=1.0)
-        right.axhline(0.0, color=BLACK, linewidth=0.7)
-        for axes, column in ((left, y), (right, residual)):
-            axes.set(xlabel=_label(x), ylabel=_label(column))
+        for axes, kind in ((left, "fit"), (right, "residuals")):
+            draw_fit(axes, kind, frame, residual, curves)
     return figure
+
+
+def draw_fit(axes: Axes, kind: str, frame: pd.DataFrame, residual: str, curves: Mapping[str, Curve | None]) -> None:
+    """Draw one panel: "fit", the readings of each input with its curve, or "residuals"; see `residuals_figure`."""
+    x, y = axes_of(frame, residual)
+    column = residual if kind == "residuals" else y
+    for k, (name, curve) in enumerate(curves.items()):
+        own, look = frame[frame["input"] == name], run_look(k, len(curves))
+        style: Any = {"linestyle": "none", "marker": ".", "color": look.colour}
+        at, readings = (own[one].to_numpy(dtype=float) * _factor(one) for one in (x, column))
+        if kind == "residuals":
+            axes.errorbar(at, readings, yerr=_bars(own, y), elinewidth=0.8, **style)
+            continue
+        axes.plot(at, readings, **style)
+        if curve and len(at):
+            fine = np.linspace(own[x].min(), own[x].max(), _POINTS)
+            axes.plot(fine * _factor(x), curve(fine) * _factor(y), color=look.colour, linewidth=1.0)
+    if kind == "residuals":
+        axes.axhline(0.0, color=BLACK, linewidth=0.7)
+    axes.set(xlabel=_label(x), ylabel=_label(column))
+
+
+def draw_column(axes: Axes, x: str, y: str, frame: pd.DataFrame, style: str = "-") -> None:
+    """Draw a column against another one, in the units of axes, with bars where its u is known."""
+    at, values = (frame[one].to_numpy(dtype=float) * _factor(one) for one in (x, y))
+    axes.errorbar(at, values, yerr=_bars(frame, y), fmt=style, elinewidth=0.8)
+    axes.set(xlabel=_label(x), ylabel=_label(y))
+
+
+def draw_windows(axes: Axes, frame: pd.DataFrame) -> None:
+    """Draw the spins that hold a top at each height where field and weight balance; dashed: it is not stable."""
+    for height, stable, low, high in frame.to_numpy().tolist():
+        axes.plot([low, high], [100 * height] * 2, "-" if stable else "--", linewidth=3, color=BLACK)
+    axes.set(xlabel="spin  [Hz]", ylabel="height  [cm]")
+
+
+def drawn(
+    draw: Callable[[Axes], None], ax: Axes | None, *, title: str | None = None, logy: bool = False
+) -> Figure | Axes:
+    """Draw one panel into the given axes, which are returned, or into a figure of its own.
+
+    Args:
+        draw: the panel.
+        ax: a person's axes, whose style stays as it is; None: there are none.
+        title: above it.
+        logy: whether the ordinate is logarithmic.
+    """
+    with mpl.rc_context({} if ax else STYLE):
+        figure = Figure(figsize=(WIDE, _HEIGHT + 0.6))
+        axes = ax or panel(figure, _LEFT, _TOP, WIDE - 1.2 * _LEFT, _PANEL + 0.6)
+        draw(axes)
+        if title is not None:
+            axes.set_title(title)
+        if logy:
+            axes.set_yscale("log")
+    return ax or for_notebooks(figure)
 
 
 def _bars(frame: pd.DataFrame, column: str) -> np.ndarray | None:

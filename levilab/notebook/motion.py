@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import sys
 import tempfile
 from dataclasses import dataclass, fields
 from functools import partial
@@ -13,11 +14,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from levilab.animation.request import AnimationRequest, animate, check_request
+from levilab.errors import UsageError
 from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation
 from levilab.motion.summary import as_document
 from levilab.motion.table import headline, print_motion
 from levilab.notebook.labels import as_dataset
-from levilab.notebook.names import Helpful, bare
+from levilab.notebook.names import Helpful, bare, meant
 from levilab.notebook.quantity import Named
 from levilab.present.html import facts_as_html
 from levilab.simulator.trajectory import Trajectory
@@ -28,10 +30,24 @@ if TYPE_CHECKING:
 
     import pandas as pd
     import xarray
+    from matplotlib.axes import Axes
 
     from levilab.motion.summary import Summary
     from levilab.present.style import Figure
     from levilab.simulator.scene import Scene
+
+
+#: What people call a quantity that is drawn → its column.
+_COLUMNS = {
+    "x": "x_m",
+    "y": "y_m",
+    "z": "z_m",
+    "height": "z_m",
+    "spin": "spin_frequency_hz",
+    "spin_hz": "spin_frequency_hz",
+    "energy": "energy_j",
+    "tilt": "tilt_rad",
+}
 
 
 @dataclass(frozen=True, repr=False)
@@ -126,8 +142,30 @@ class SimulatedMotion(Helpful, Trajectory):
         """Return the states as a Dataset over time_s, with units; needs xarray.  Raises MissingXarray."""
         return as_dataset(self.to_dataframe(), "time_s")
 
-    def plot(self) -> Figure:
-        """Draw path, height, spin, tilt and energy in time, and the spectrum of the axis; it needs no display."""
+    @bare
+    def plot(
+        self, what: str | None = None, *, ax: Axes | None = None, title: str | None = None, logy: bool = False
+    ) -> Figure | Axes:
+        """Draw path, height, spin, tilt and energy in time, and the spectrum of the axis; it needs no display.
+
+        Args:
+            what: one quantity alone, in time: a column of the table, "z", "spin", "energy" or "tilt"; by default the
+                height where another argument is given.
+            ax: axes into which it is drawn, and which are returned.
+            title: of the panel.
+            logy: whether the ordinate is logarithmic.
+
+        Raises:
+            UsageError: there is no such quantity.
+        """
+        if what is not None or ax is not None or title is not None or logy:
+            from levilab.notebook.figure import draw_column, drawn  # with matplotlib
+
+            column = _COLUMNS.get(what or "z", what or "z")
+            frame = self.to_dataframe().assign(tilt_rad=self.tilt)
+            if column not in frame:
+                raise UsageError("what", meant(column, [*_COLUMNS, *map(str, frame.columns)]), value=what)
+            return drawn(lambda axes: draw_column(axes, "time_s", column, frame), ax, title=title, logy=logy)
         from levilab.motion.figure import motion_figure  # with matplotlib
         from levilab.present.style import for_notebooks
 
@@ -158,6 +196,7 @@ class SimulatedMotion(Helpful, Trajectory):
             file = Path(folder, "animation.html") if path is None else Path(path)
             request = AnimationRequest(file, start, stop, speed)
             check_request(request, self.scene, self._found.duration)
+            print(f"animating {self._found.duration:.3g} s …", file=sys.stderr)  # noqa: T201 - it takes seconds
             shown = animate(request, self._found, lambda _: None)
             return Animation(file.read_bytes(), file.suffix.lower(), shown, None if path is None else file)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import fields
 from os import PathLike
 from pathlib import Path
@@ -26,6 +27,7 @@ def report_on(data: Any, output: str | PathLike[str], *, tables: bool, crosschec
         UsageError: an argument is wrong, or results were made with unlike options.
         DataError: there is nothing to report.
     """
+    output = Path(output)
     several = isinstance(data, list | tuple | set)
     items = [*data] if several else [data]
     if not items:
@@ -36,7 +38,9 @@ def report_on(data: Any, output: str | PathLike[str], *, tables: bool, crosschec
         for name, value in _options(item).items():
             if given.setdefault(name, value) != value:
                 raise UsageError("data", f"results with unlike options ({name}) need a report each")
-    return write_report(paths, Path(output), given, tables=tables, crosscheck=crosscheck)
+    folder = "" if output.parent.is_dir() else ", in a new folder"
+    print(f"writing {output}{folder} …", file=sys.stderr)  # noqa: T201 - a cross-check takes seconds
+    return write_report(paths, output, given, tables=tables, crosscheck=crosscheck)
 
 
 def _paths(item: Reported) -> list[Path]:

@@ -13,10 +13,12 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
+import numpy as np
+
 import levilab
 from levilab.errors import UsageError, unquote
 from levilab.files import CannotWrite, replace_atomically
-from levilab.notebook.fit import FIT, METHODS, FittedModel
+from levilab.notebook.fit import FIT, METHODS, FittedModel, axes_of
 from levilab.notebook.labels import as_dataset, head_as_html
 from levilab.notebook.names import Helpful, bare
 from levilab.notebook.quantity import Named, Quantity, correlate
@@ -33,9 +35,9 @@ if TYPE_CHECKING:
     from collections.abc import ItemsView, Iterator, KeysView, Mapping
     from os import PathLike
 
-    import numpy as np
     import pandas as pd
     import xarray
+    from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
     from levilab.pipelines.catalogue import Analysis
@@ -200,7 +202,10 @@ class AnalysisResult(Helpful):
 
         Constants are those of the best law; `models` has all laws.
         """
-        return self._values_of(self._written, self.models, "models", "the values of this result")
+        values = self._values_of(self._written, self.models, "models", "the values of this result")
+        of_fit: Mapping[str, Quantity] = self.models.get(self.best_model, {}) if len(self.inputs) == 1 else {}
+        values.update({name: one for name, one in of_fit.items() if name not in values})  # as the start
+        return values
 
     @cached_property
     def by_input(self) -> Mapping[str, Mapping[str, Quantity]]:
@@ -431,29 +436,66 @@ class AnalysisResult(Helpful):
         lines += [f"  correlation of {one} and {other} = {r:+.3f}" for one, other, r in _correlations(fitted)]
         return "\n".join(lines).strip()
 
-    def plot(self, what: Literal["all", "residuals"] = "all") -> Figure:
+    @bare
+    def plot(
+        self,
+        what: Literal["all", "fit", "residuals"] | None = None,
+        *,
+        ax: Axes | None = None,
+        title: str | None = None,
+        model: str | None = None,
+        logy: bool = False,
+    ) -> Figure | Axes:
         """Draw the figure; it needs no display, a notebook shows it, and `savefig` writes it.
 
         Args:
-            what: "all", as `levilab analyze` draws it; "residuals", a small one: the readings and their residuals.
+            what: "all", as `levilab analyze` draws it, by default; "residuals", a small one: the readings and their
+                residuals; "fit": the readings with the curve, by default where another argument is given.
+            ax: axes into which one panel is drawn, and which are returned.
+            title: of the panel.
+            model: whose curve and residuals; None: the best one.
+            logy: whether the ordinate is logarithmic.
 
         Raises:
             UsageError: there is no such figure.
         """
-        from levilab.present.style import for_notebooks  # with matplotlib
+        from levilab.notebook.figure import draw_fit, drawn  # with matplotlib
+        from levilab.present.style import for_notebooks
 
-        if what not in {"all", "residuals"}:
-            raise UsageError("what", "all or residuals is expected", value=what)
-        return for_notebooks(self._residuals_figure() if what == "residuals" else self.analysis.figure(self.found))
+        of_panel = ax is not None or title is not None or model is not None or logy
+        what = what or ("fit" if of_panel else "all")
+        if what not in {"all", "fit", "residuals"}:
+            raise UsageError("what", "all, fit or residuals is expected", value=what)
+        if what == "all":
+            if of_panel:
+                raise UsageError("what", "ax, title, model and logy go with one panel: fit or residuals", value=what)
+            return for_notebooks(self.analysis.figure(self.found))
+        if not of_panel and what == "residuals":
+            return for_notebooks(self._residuals_figure())
+        panel = self._panel(model)
+        return drawn(lambda axes: draw_fit(axes, what, *panel), ax, title=title, logy=logy)
+
+    def _panel(self, model: str | None) -> tuple[pd.DataFrame, str, dict[str, Any]]:
+        """Return the readings with a model's residuals, their column, and its curves.  Raises UsageError."""
+        frame, curve, chosen = self.data, self.analysis.curve, model or self.best_model
+        residual = self.residual_column(frame)
+        if model is not None and (curve is None or model not in self.models):
+            raise UsageError("model", f"known are {', '.join(self.models) or 'none'}", value=model)
+        curves = {name: curve(self.found, k, chosen) if curve else None for k, name in enumerate(self.inputs)}
+        if model is not None:
+            x, y = axes_of(frame, residual)
+            parts = [(frame[frame["input"] == name], of) for name, of in curves.items() if of]
+            left = np.concatenate([own[y].to_numpy(float) - of(own[x].to_numpy(float)) for own, of in parts])
+            frame[residual] = np.where(frame[residual].notna(), left, np.nan)
+        return frame, residual, curves
 
     def _residuals_figure(self) -> Figure:
         from levilab.notebook.figure import residuals_figure  # with matplotlib
 
-        frame, curve, best = self.to_dataframe("readings"), self.analysis.curve, self.best_model
-        curves = {name: curve(self.found, k, best) if curve else None for k, name in enumerate(self.inputs)}
+        best = self.best_model
         title = f"{self.kind}{f', {best}' * bool(best)}: readings, and residuals"
-        made_up = [source.synthetic for source in self.found.sources]
-        return residuals_figure(frame, self.residual_column(frame), title, made_up, curves)
+        frame, residual, curves = self._panel(None)
+        return residuals_figure(frame, residual, title, [source.synthetic for source in self.found.sources], curves)
 
     def save(self, folder: str | PathLike[str]) -> list[Path]:
         """Write result.json and the figure into a folder, and beside them the DataFrames that were analyzed.
@@ -542,7 +584,7 @@ def _picture(result: AnalysisResult) -> str:
     from levilab.notebook.figure import small_png  # with matplotlib
 
     try:
-        picture = base64.b64encode(small_png(result.plot("residuals"))).decode("ascii")
+        picture = base64.b64encode(small_png(result._residuals_figure())).decode("ascii")
     except UsageError:  # a result without residuals
         return ""
     return f'<img alt="readings and residuals" style="max-width: 100%" src="data:image/png;base64,{picture}">'

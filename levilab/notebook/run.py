@@ -17,8 +17,10 @@ if TYPE_CHECKING:
 
     import pandas as pd
     import xarray
+    from matplotlib.axes import Axes
 
     from levilab.notebook.result import AnalysisResult
+    from levilab.present.style import Figure
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,6 +83,32 @@ class RecordedRun(Helpful, Run):
 
     def _ipython_key_completions_(self) -> list[str]:
         return [*self]
+
+    @bare
+    def plot(  # type: ignore[override]
+        self, what: str | None = None, *, ax: Axes | None = None, title: str | None = None, logy: bool = False
+    ) -> Figure | Axes:
+        """Return the readings as they are, a panel for each channel; or one column in a panel.
+
+        Args:
+            what: the column, by default the first one where another argument is given.
+            ax: axes into which it is drawn, and which are returned.
+            title: of the panel.
+            logy: whether the ordinate is logarithmic.
+
+        Raises:
+            UsageError: there is no such column.
+            DataError: the readings cannot be read.
+        """
+        if what is None and ax is None and title is None and not logy:
+            return super().plot()
+        from levilab.notebook.figure import draw_column, drawn  # with matplotlib
+
+        frame = self.df
+        x = next((name for name in ("height_m", "time_s") if name in frame), str(frame.columns[0]))
+        y = what or next(str(name) for name in frame.columns if name != x)
+        self[y]
+        return drawn(lambda axes: draw_column(axes, x, y, frame, "."), ax, title=title, logy=logy)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the readings as a Dataset with units; needs xarray.  Raises DataError, MissingXarray."""

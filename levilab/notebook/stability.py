@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from levilab.notebook.names import Helpful
+from levilab.notebook.names import Helpful, bare
 from levilab.present.html import facts_as_html, paragraphs
 from levilab.simulator.equilibrium import stability_of
 from levilab.stability.table import as_document, headline, print_stability, remarks
@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import pandas as pd
+    from matplotlib.axes import Axes
 
+    from levilab.present.style import Figure
     from levilab.simulator.equilibrium import Stability
     from levilab.simulator.scene import Scene
 
@@ -67,6 +69,19 @@ class FloatingTop(Helpful):
     def values(self) -> dict[str, Any]:
         """All of it by names with units, as `levilab stability` gives it as JSON."""
         return as_document(self.found)
+
+    @bare
+    def plot(self, *, ax: Axes | None = None, title: str | None = None) -> Figure | Axes:
+        """Draw the spins that hold the top, at each height where field and weight balance.
+
+        Args:
+            ax: axes into which they are drawn, and which are returned.
+            title: of the panel.
+        """
+        from levilab.notebook.figure import draw_windows, drawn  # with matplotlib
+
+        frame = self.to_dataframe()
+        return drawn(lambda axes: draw_windows(axes, frame), ax, title=title or headline(self.found))
 
     def __repr__(self) -> str:
         return f"<FloatingTop: {headline(self.found)}>"

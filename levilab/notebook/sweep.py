@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from levilab.errors import UsageError
 from levilab.notebook.labels import dataset_of, head_as_html
+from levilab.notebook.names import Helpful, bare
+from levilab.notebook.quantity import Named
 from levilab.notebook.scene import chosen_scene, in_seconds, whole_key
 from levilab.present.html import facts_as_html, fold
 from levilab.report.export.contents import contents_of
@@ -39,14 +41,27 @@ _MOST_ROWS = 10
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SimulatedMap:
-    """What a sweep found at each point.
+class SimulatedMap(Helpful):
+    """What a sweep found at each point; what was observed, and the axes, are attributes, too.
 
     Attributes:
         store: that holds it, in a folder or in memory.
     """
 
     store: Store
+
+    also: ClassVar[Mapping[str, Any]] = {
+        "sel": lambda found: found.to_xarray().sel,
+        "isel": lambda found: found.to_xarray().isel,
+        "df": "to_dataframe()",
+        "data": "to_xarray()",
+        "coords": "axes",
+        "keys": "values.keys",
+    }
+
+    @property
+    def _contents(self) -> Mapping[str, Any]:
+        return self.values
 
     @property
     def path(self) -> Path | None:
@@ -63,8 +78,10 @@ class SimulatedMap:
         """Key → its values."""
         return {axis.key: axis.values for axis in self.store.plan.axes}
 
+    @bare
     def __getitem__(self, name: str) -> np.ndarray:
-        return self.axes[name] if name in self.axes else self.values[name]
+        found: Mapping[str, np.ndarray] = Named({**self.values, **self.axes}, "what was observed")
+        return found[name]
 
     def __repr__(self) -> str:
         return f"<SimulatedMap: {headline(summarise(self.store))}>"

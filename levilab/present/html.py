@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,9 @@ if TYPE_CHECKING:
 
 #: Texts stand on the left and numbers on the right, with room between columns, whatever a page does with tables.
 _LEFT, _RIGHT = "text-align: left; padding: 0 1em 0 0", "text-align: right; padding: 0 1em 0 0"
+
+#: The power in the units of drag laws, (rad/s)^−½/s, for which there are no raised characters.
+_POWER = re.compile(r"(?<=\(rad/s\))\^([−-]?[\d½]+(?:/\d+)?|\([^)]*\))")
 
 
 def facts_as_html(title: str, facts: Iterable[tuple[str, str]], after: str = "") -> str:
@@ -44,7 +48,9 @@ def table_as_html(heads: Sequence[str], rows: Iterable[Sequence[str]], texts: in
     """
 
     def line(cells: Iterable[str], tag: str) -> str:
-        styled = ((_LEFT if k < texts else _RIGHT, escape(cell)) for k, cell in enumerate(cells))
+        styled = (
+            (_LEFT if k < texts else _RIGHT, _POWER.sub(r"<sup>\1</sup>", escape(cell))) for k, cell in enumerate(cells)
+        )
         return "<tr>" + "".join(f'<{tag} style="{style}">{cell}</{tag}>' for style, cell in styled) + "</tr>"
 
     head = f"<thead>{line(heads, 'th')}</thead>" if heads else ""

@@ -50,7 +50,8 @@ def in_one_line(estimate: Estimate) -> str:
 
     if estimate.value is None:
         return "not determined"
-    number = f"{ufloat(estimate.value, estimate.u):S}" if estimate.u else f"{estimate.value:.6g}"
+    few = f"{estimate.value:.4g}" if abs(estimate.value) < 1e4 else f"{estimate.value:.6g}"  # no more is claimed
+    number = f"{ufloat(estimate.value, estimate.u):S}" if estimate.u else few
     return number if estimate.unit == "1" else f"{number} {estimate.unit}"
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray
+from matplotlib.figure import Figure
 from uncertainties import unumpy
 
 import levilab
@@ -100,6 +101,18 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "{'redchi', 'c32', 'eval'} <= set(dir(result))": bool,
     "hasattr(result, 'foo'), hasattr(result, 'c32')": lambda pair: pair == (False, True),
     "copy.deepcopy(result).c32 == result.c32": bool,
+    "result.plot('fit', ax=ax) is ax and len(ax.lines)": lambda lines: lines == 2,
+    "result.plot(ax=ax, model='stokes', title='Stokes', logy=True).get_yscale() + ax.get_title()": (
+        lambda text: text == "logStokes"
+    ),
+    "result.plot('residuals', ax=ax, model='stokes').lines[0].get_ydata().max()": lambda most: most > 0.2,
+    "result.plot(model='newton').axes": lambda axes: len(axes) == 1,
+    "run.plot('spin_frequency_hz', ax=ax).get_ylabel()": lambda label: label == "spin frequency  [Hz]",
+    "result.start_frequency.n, result['start_frequency'].unit": (
+        lambda pair: pair == (pytest.approx(39.94, abs=0.01), "Hz")
+    ),
+    "repr(result)": lambda text: "start_frequency = 39.941(20) Hz" in text,
+    "result._repr_html_()  # the unit": lambda html: "(rad/s)<sup>−½</sup>/s" in html and "^−" not in html,
     # a quantity
     "float(result['c32'])": lambda value: value == pytest.approx(2.3686e-4, abs=1e-8),
     "result['c32'].n, result['c32'].s": lambda pair: pair[0] > 600 * pair[1] > 0,
@@ -127,6 +140,9 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "motion.energy.shape == motion.spin.shape == motion.omega.shape": bool,
     "motion.omega[0] / motion.spin[0]": lambda ratio: ratio == pytest.approx(2 * np.pi),
     "motion['z_m'].max() < 0.075": bool,
+    "motion.plot('z', ax=ax) is ax and ax.get_ylabel()": lambda label: label == "z  [cm]",
+    "motion.plot('tilt', title='tilt').axes": lambda axes: len(axes) == 1,
+    "levilab.stability('undriven').plot(ax=ax) is ax": bool,
     "motion.df.shape": lambda shape: shape == (101, 12),
     "levilab.stability('undriven').to_dataframe()": lambda frame: frame["spin_to_hz"].iloc[-1] > 80,
     "levilab.stability('undriven').windows[0]": lambda window: window["low_m"] < 0.02,
@@ -213,6 +229,11 @@ REFUSED = {
     "levilab.analyze('none/*.csv')": "no file or folder in",
     "levilab.analyze(levilab.runs(folder))": "analyze each kind by itself",
     "levilab.analyze(time=t, frequency=f, u=0.03)": "did you mean reading_u",
+    "result.plot('resid')": "all, fit or residuals is expected",
+    "result.plot('fit', model='disk')": "known are stokes, newton, disc",
+    "result.plot('all', ax=ax)": "go with one panel",
+    "motion.plot('hight')": "did you mean height",
+    "run.plot('spin')": "did you mean spin_frequency_hz",
     "levilab.analyze(run, foo=3)": "is no option of analyze; known are data, kind",
     "levilab.analyze(run, tild='none')": "did you mean tilt",
     "result.predict(0.0, 'disk')": "known are stokes, newton, disc",
@@ -251,13 +272,13 @@ def names() -> dict[str, Any]:
 
 @pytest.mark.parametrize("typed", GUESSES)
 def test_a_natural_guess_works(typed: str, names: dict[str, Any], tmp_path: Path) -> None:
-    assert GUESSES[typed](eval(typed, names | {"new": tmp_path}))
+    assert GUESSES[typed](eval(typed, names | {"new": tmp_path, "ax": Figure().subplots()}))
 
 
 @pytest.mark.parametrize("typed", REFUSED)
 def test_a_wrong_guess_is_told_the_right_one(typed: str, names: dict[str, Any]) -> None:
     with pytest.raises(levilab.LevilabError) as raised:
-        eval(typed, names)
+        eval(typed, names | {"ax": Figure().subplots()})
     assert REFUSED[typed] in str(raised.value)
 
 
@@ -314,7 +335,7 @@ def test_a_pickle_of_a_dataframes_result_can_be_saved_and_drawn(tmp_path: Path) 
 @pytest.mark.parametrize("typed", REFUSED)
 def test_a_traceback_ends_at_the_border(typed: str, names: dict[str, Any]) -> None:
     with pytest.raises(levilab.LevilabError) as raised:
-        eval(typed, names)
+        eval(typed, names | {"ax": Figure().subplots()})
     error = raised.value
     assert error.__cause__ is None
     assert error.__context__ is None or error.__suppress_context__
@@ -347,6 +368,10 @@ def test_a_sweep_is_a_table_a_dataset_and_a_figure(tmp_path: Path) -> None:
     assert data["survived"].sel({"start.spin_hz": 26.0}).all()
     assert not data["survived"].sel({"start.spin_hz": 18.0}).any()
     assert swept.plot().axes
+    assert np.array_equal(swept.survived, swept["survived"])
+    assert swept.sel({"start.spin_hz": 26.0})["survived"].all()
+    with pytest.raises(levilab.LevilabError, match="did you mean survived"):
+        _ = swept.survive
     with pytest.raises(levilab.LevilabError, match="known are survived"):
         swept.plot("lifetime_s")
     again = levilab.sweep("undriven", axes, observe="survived", duration=0.3, out=tmp_path / "map.zarr", resume=True)
