@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     import pandas as pd
-    from matplotlib.axes import Axes
+    from matplotlib.axes import Axes as Axes  # noqa: PLC0414 - for others, who may not name matplotlib
 
     Curve = Callable[[np.ndarray], np.ndarray]
 
@@ -87,7 +87,12 @@ def draw_windows(axes: Axes, frame: pd.DataFrame) -> None:
 
 
 def drawn(
-    draw: Callable[[Axes], None], ax: Axes | None, *, title: str | None = None, logy: bool = False
+    draw: Callable[[Axes], None],
+    ax: Axes | None,
+    *,
+    title: str | None = None,
+    logy: bool = False,
+    made_up: Sequence[bool] = (True,),
 ) -> Figure | Axes:
     """Draw one panel into the given axes, which are returned, or into a figure of its own.
 
@@ -96,13 +101,16 @@ def drawn(
         ax: a person's axes, whose style stays as it is; None: there are none.
         title: above it.
         logy: whether the ordinate is logarithmic.
+        made_up: whether each input is synthetic, which a figure of its own says.
     """
     with mpl.rc_context({} if ax else STYLE):
         figure = Figure(figsize=(WIDE, _HEIGHT + 0.6))
         axes = ax or panel(figure, _LEFT, _TOP, WIDE - 1.2 * _LEFT, _PANEL + 0.6)
         draw(axes)
-        if title is not None:
-            axes.set_title(title)
+        if ax is None:
+            headline(figure, title or "", synthetic_mark(made_up))
+        elif title is not None:
+            ax.set_title(title)
         if logy:
             axes.set_yscale("log")
     return ax or for_notebooks(figure)

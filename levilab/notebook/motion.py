@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
     import pandas as pd
     import xarray
-    from matplotlib.axes import Axes
 
     from levilab.motion.summary import Summary
+    from levilab.notebook.figure import Axes
     from levilab.present.style import Figure
     from levilab.simulator.scene import Scene
 

@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 
     import pandas as pd
     import xarray
-    from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
+    from levilab.notebook.figure import Axes
     from levilab.pipelines.catalogue import Analysis
     from levilab.pipelines.result import Result, Value
     from levilab.present.style import Figure
@@ -473,7 +473,7 @@ class AnalysisResult(Helpful):
         if not of_panel and what == "residuals":
             return for_notebooks(self._residuals_figure())
         panel = self._panel(model)
-        return drawn(lambda axes: draw_fit(axes, what, *panel), ax, title=title, logy=logy)
+        return drawn(lambda axes: draw_fit(axes, what, *panel), ax, title=title, logy=logy, made_up=self._made_up)
 
     def _panel(self, model: str | None) -> tuple[pd.DataFrame, str, dict[str, Any]]:
         """Return the readings with a model's residuals, their column, and its curves.  Raises UsageError."""
@@ -495,7 +495,11 @@ class AnalysisResult(Helpful):
         best = self.best_model
         title = f"{self.kind}{f', {best}' * bool(best)}: readings, and residuals"
         frame, residual, curves = self._panel(None)
-        return residuals_figure(frame, residual, title, [source.synthetic for source in self.found.sources], curves)
+        return residuals_figure(frame, residual, title, self._made_up, curves)
+
+    @property
+    def _made_up(self) -> list[bool]:
+        return [source.synthetic for source in self.found.sources]
 
     def save(self, folder: str | PathLike[str]) -> list[Path]:
         """Write result.json and the figure into a folder, and beside them the DataFrames that were analyzed.

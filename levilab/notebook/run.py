@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
     import xarray
-    from matplotlib.axes import Axes
 
+    from levilab.notebook.figure import Axes
     from levilab.notebook.result import AnalysisResult
     from levilab.present.style import Figure
 
@@ -108,7 +108,13 @@ class RecordedRun(Helpful, Run):
         x = next((name for name in ("height_m", "time_s") if name in frame), str(frame.columns[0]))
         y = what or next(str(name) for name in frame.columns if name != x)
         self[y]
-        return drawn(lambda axes: draw_column(axes, x, y, frame, "."), ax, title=title, logy=logy)
+        return drawn(
+            lambda axes: draw_column(axes, x, y, frame, "."),
+            ax,
+            title=title,
+            logy=logy,
+            made_up=[self.record.synthetic],
+        )
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the readings as a Dataset with units; needs xarray.  Raises DataError, MissingXarray."""

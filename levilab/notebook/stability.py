@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import pandas as pd
-    from matplotlib.axes import Axes
 
+    from levilab.notebook.figure import Axes
     from levilab.present.style import Figure
     from levilab.simulator.equilibrium import Stability
     from levilab.simulator.scene import Scene
