@@ -138,7 +138,7 @@ def test_a_signal_ends_the_process_with_130_and_the_run_kept(tmp_path: Path, nam
     assert "Traceback" not in err
     (listed,) = list_runs(tmp_path)
     assert listed.status == "interrupted"
-    assert f"interrupted: {listed.readings} readings" in out
+    assert f"interrupted: {listed.readings} reading" in out
     record = Run.load(Path(listed.path)).record
     assert record.instruments["generator"]["settings_end"]["output"] is False
 
