@@ -200,7 +200,7 @@ def limiting(fd):
     global count
     sync(fd)
     count += 1
-    if count == 12:
+    if count == 14:
         resource.setrlimit(resource.RLIMIT_FSIZE, ({room}, {room}))
 os.fsync = limiting
 """
