@@ -10,6 +10,7 @@ from levilab.cli import exit_codes
 from levilab.cli.importing import importing
 from levilab.cli.options import Language, place
 from levilab.cli.output import message, result
+from levilab.errors import UsageError
 
 
 def live(
@@ -20,6 +21,10 @@ def live(
         ),
     ] = None,
     mock: Annotated[bool, typer.Option("--mock", help="A virtual bench to play with, and to record runs on.")] = False,
+    seed: Annotated[
+        int,
+        typer.Option(metavar="N", min=0, help="With --mock, draws the top; of Group 1, as in levilab worksheet."),
+    ] = 0,
     out: Annotated[Path, place("DIR", "The folder with the runs.")] = Path("runs"),
     port: Annotated[
         int, typer.Option(metavar="N", min=0, max=65535, help="Of the loopback address; 0: any that is free.")
@@ -32,13 +37,15 @@ def live(
     no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser: print the address only.")] = False,
 ) -> None:
     """Serve the view until Ctrl-C."""
+    if seed and not mock:
+        raise UsageError("seed", "goes with `mock`: it draws the top of the virtual bench")
     if run is not None:  # before what takes long to import
         from levilab.runs.find import run_or_folder
 
         run_or_folder(run, out)
     bench = " and the bench for practice, whose time stands still while no page is open"
     said = f"Ctrl-C ends the view{bench if mock else '; a run goes on without it'}"
-    serve(said, opens=not no_open, run=run, out=out, mock=mock, port=port, share=share, language=language)
+    serve(said, opens=not no_open, run=run, out=out, mock=mock, seed=seed, port=port, share=share, language=language)
 
 
 def serve(said: str, *, opens: bool, **options: Any) -> NoReturn:

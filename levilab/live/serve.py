@@ -48,7 +48,7 @@ class LiveOptions:
         out: the folder with the runs.
         mock: a bench for practice, which records into `out`.
         port: of the loopback address; 0: any that is free.
-        seed: of the light's noise on the bench for practice.
+        seed: of the top on the bench for practice; of the first group, where groups have numbers.
         share: whether phones in the network may look, too.
         language: of pages at which none was chosen.
         files: data files to open, with the options by which they are read; None: the view is of runs.

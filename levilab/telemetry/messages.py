@@ -130,6 +130,7 @@ class State:
         took_hold, tuned_up: there, whether a top was seen to follow the drive yet, and to follow it up.
         what_if: there, name → value of what a person can change of the top and its surroundings.
         task, task_share: there, the task under way, and the part of the way to its goal.
+        seed: there, which draws the top, the base and the noise of the light.
         tasks_done: there, the tasks whose goals were reached.
     """
 
@@ -160,6 +161,7 @@ class State:
     what_if: dict[str, float] = field(default_factory=dict)
     task: str = ""
     task_share: float = 0.0
+    seed: int = 0
     tasks_done: tuple[str, ...] = ()
 
 

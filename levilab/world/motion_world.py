@@ -97,7 +97,7 @@ class MotionWorld:
         self._scene = scene
         self._wire, self._coil = TriggerWire(), Coil(self._trigger_edges)
         self._flight = Flight(scene, put_back_after_s, start=clock.now(), stem_height_m=self._laser.height_m)
-        self._tape_place = float(np.random.default_rng(seed).uniform()) if seed else 0.0
+        self._tape_place = _place_of_tape(seed)
         self._last_change = 0.0  # the time of the last change of the drive [s]
         self._lens_height_m = self._flight.first_lift()  # where the lens looks
         self.place_probe(PROBE_M)
@@ -124,6 +124,10 @@ class MotionWorld:
         self._scene = self._scene.changed(values)
         self._flight.change_scene(self.clock.now(), values)
         self.place_probe(self._probe_m)
+
+    def take_seed(self, seed: int) -> None:
+        """Let another seed make the light's noise and the place of the tape, as of the next top."""
+        self.seed, self._tape_place = seed, _place_of_tape(seed)
 
     def float_top(self, number: int) -> None:
         """Put the top back to where the scene starts; see World."""
@@ -246,3 +250,8 @@ class MotionWorld:
         stand = Stand(scatter_m=2e-4 if self.seed else 0.0, seed=self.seed).at(height_m)
         place = np.array([[0.0, 0.0, stand.height_m or 0.0]])
         self._probe_t = 0.0 if height_m is None else float(flux_density(base_field(self._scene), place)[0, 2])
+
+
+def _place_of_tape(seed: int) -> float:
+    """Return where the tape stands on the rim, in turns from the transverse part of the moment."""
+    return float(np.random.default_rng(seed).uniform()) if seed else 0.0

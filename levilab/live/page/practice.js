@@ -97,6 +97,9 @@ export function openPractice(about, command, run, isOwn, allowed) {
   }
   by("speed").addEventListener("change", () => send("set the speed", {speed: Number(by("speed").value)}));
 
+  by("group").addEventListener("change", () => send("take a seed", {group: by("group").value}));
+  by("seed").addEventListener("change", () => send("take a seed", {seed: numberIn(by("seed").value)}));
+
   // what if
   const knobs = Object.entries(about.what_if).map(([name, row]) => {
     const label = make("label", "", "quantity"), value = make("output"), input = make("input"), small = make("small", phrase(row.shows)), title = phrase(row.title);
@@ -209,9 +212,10 @@ export function openPractice(about, command, run, isOwn, allowed) {
     press("drive", now.drive, now.drive ? phrase("Drive off") : phrase("Drive on"));
     press("hold", now.paused, now.paused ? phrase("Let time go on") : phrase("Stop time"));
     write("record", now.busy ? phrase("End run") : phrase("Record"));
-    for (const id of ["drive", "match", "back", "frequency", "frequency-slider", "amplitude", "amplitude-slider", "experiment"]) {
+    for (const id of ["drive", "match", "back", "frequency", "frequency-slider", "amplitude", "amplitude-slider", "experiment", "group", "seed"]) {
       put(by(id), {disabled: now.busy});
     }
+    if (document.activeElement !== by("seed")) put(by("seed"), {value: String(bench.seed)});
     names.forEach((name, k) => knobs[k].show(bench.what_if[name]));
     showTask(bench);
     for (const part of ["what-if", "tasks"]) put(by(part), {inert: now.busy});

@@ -48,7 +48,7 @@ class PracticeBench:
     Args:
         out: where run folders are made.
         scene: name or file of the scene of the top.
-        seed: of the light's noise.
+        seed: see PracticeOptions.
     """
 
     def __init__(self, out: Path = Path("runs"), *, scene: str = "practice", seed: int = 0) -> None:

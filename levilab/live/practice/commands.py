@@ -71,6 +71,19 @@ class ChangeBench(Settings):
     values: dict[str, Annotated[float, Field(strict=True, allow_inf_nan=False)]] = Field(default={}, max_length=20)
 
 
+class TakeSeed(Settings):
+    """Put a top of one's own over a base of one's own.
+
+    Attributes:
+        seed: which draws them; None: that of the group.
+        group: by the number in its name, as a worksheet lists it; one without a number changes nothing.
+    """
+
+    do: Literal["take a seed"] = "take a seed"
+    seed: Annotated[int, Field(strict=True, ge=0, lt=1 << 31)] | None = None
+    group: str = Field(default="", max_length=LONGEST_GROUP)
+
+
 class BeginTask(Settings):
     """Begin a task.  task: its name in TASKS; empty: leave the one under way."""
 
@@ -129,7 +142,7 @@ class StopRun(Settings):
 
 
 Command = (
-    SwitchDrive | TuneDrive | MatchDrive | PutBack | ChangeBench | BeginTask | AnswerTask
+    SwitchDrive | TuneDrive | MatchDrive | PutBack | ChangeBench | TakeSeed | BeginTask | AnswerTask
     | SetSpeed | Pause | PlaceProbe | RecordRun | StopRun
 )  # fmt: skip
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="do")])

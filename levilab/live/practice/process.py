@@ -41,10 +41,12 @@ from levilab.live.practice.commands import (
     SetSpeed,
     StopRun,
     SwitchDrive,
+    TakeSeed,
     TuneDrive,
 )
 from levilab.live.practice.experiments import PRACTICE, PracticeExperiment
 from levilab.live.practice.fall import cause_of_fall
+from levilab.live.practice.seeds import keys_of_seed, seed_of_group
 from levilab.live.practice.tasks import TASKS, Look, Progress, exponent_of
 from levilab.live.practice.what_if import USUAL, WHAT_IF, keys_of
 from levilab.present.progress import Display
@@ -97,7 +99,7 @@ class PracticeOptions:
     Attributes:
         out: where run folders are made.
         scene: name or file of the scene of the top.
-        seed: of the light's noise.
+        seed: draws the top, the base and the noise of the light; of the first group, where groups have numbers.
         speed: seconds of the bench in one of the wall; infinite: it does not wait, for tests.
         rests: whether its time stands still while no view looks and no run is recorded.
     """
@@ -190,7 +192,8 @@ def work(options: PracticeOptions, pipe: Connection) -> None:
         try:
             scene = read_scene(options.scene)
             clock = PacedClock(options.speed)
-            world = scene_world(scene, lambda: clock, partial(_report, pipe, "message"))
+            scene = scene.changed(keys_of_seed(scene, options.seed))
+            world = scene_world(scene, lambda: clock, partial(_report, pipe, "message"), seed=options.seed)
             with Publisher() as publisher:
                 PracticeProcess(options, scene, world, pipe, publisher=publisher, end=end).run()
         except (LevilabError, InstrumentError) as error:
@@ -243,6 +246,7 @@ class PracticeProcess:
     ) -> None:
         assert isinstance(world.clock, PacedClock)
         self.world, self.clock = world, world.clock
+        self._seed = options.seed
         self.scene = self._usual_scene = scene  # as it is now, and as it was at first or by a task
         self._what_if = dict(USUAL)
         self._task: Progress | None = None
@@ -367,8 +371,13 @@ class PracticeProcess:
         hid = TASKS[self._task.name].hidden(self._task.chance)
         self._task, self._task_share = None, 0.0
         if hid:
-            self._usual_scene = read_scene(self._options.scene)
+            self._usual_scene = self._scene_of_seed(self._options.scene)
             self._change(dict(USUAL))
+
+    def _scene_of_seed(self, name: str) -> Scene:
+        """Return a scene with what the seed makes of it."""
+        scene = read_scene(name)
+        return scene.changed(keys_of_seed(scene, self._seed))
 
     def _change(self, values: dict[str, float]) -> None:
         """Give the top and its surroundings these values.  Raises CommandRefused, SceneError."""
@@ -451,7 +460,7 @@ class PracticeProcess:
         speed = self.clock.speed if math.isfinite(self.clock.speed) else None
         here: dict[str, Any] = {"virtual": True, "speed": speed, "paused": self._paused, "probe_m": self._probe_m}
         here |= {"took_hold": self._took_hold, "tuned_up": self._tuned_up, "what_if": dict(self._what_if)}
-        here |= {"task_share": self._task_share, "tasks_done": tuple(self._tasks_done)}
+        here |= {"seed": self._seed, "task_share": self._task_share, "tasks_done": tuple(self._tasks_done)}
         here["task"] = self._task.name if self._task else ""
         if self._session is not None:
             if self._session.writer.record.experiment in MOVE_THE_PROBE:
@@ -523,6 +532,24 @@ class PracticeProcess:
             ", ".join(f"{WHAT_IF[name].title} {value:g} {WHAT_IF[name].unit}" for name, value in changed.items())
             or "all as usual"
         )
+
+    @_carry_out.register
+    def _(self, command: TakeSeed) -> str:
+        self._free_bench()
+        seed = seed_of_group(command.group, self._options.seed or 1) if command.seed is None else command.seed
+        if seed is None or seed == self._seed:
+            return Text("the top is that of seed {seed}", seed=self._seed)
+        self._leave_task()
+        self._seed = seed
+        self._usual_scene = self._scene_of_seed(self._options.scene)
+        self.world.take_top()
+        self.world.take_seed(seed)
+        self.world.change_scene(keys_of_seed(read_scene(self._options.scene), seed))
+        self._change(dict(USUAL))
+        self._put_back()
+        text = Text("seed {seed} has drawn another top and another base: the top floats", seed=seed)
+        self._report("message", text)
+        return text
 
     @_carry_out.register
     def _(self, command: BeginTask) -> str:
@@ -784,12 +811,12 @@ class PracticeProcess:
         options = AcquisitionOptions(
             mock=True,
             out=Path(self._options.out),
-            seed=self._options.seed,
+            seed=self._seed,
             group=command.group.strip() or None,
             note=command.note,
             settings=plan.settings,
         )
-        scene = read_scene(plan.scene) if plan.scene else self.scene
+        scene = self._scene_of_seed(plan.scene) if plan.scene else self.scene
         return request_at(self._wiring, scene, plan.experiment, options)
 
     def _record(self, command: RecordRun) -> None:
@@ -832,8 +859,9 @@ class PracticeProcess:
             self._report("message", "the top is taken off: the probe goes where it floats")
         usual = self.world, self.scene, self._wiring
         if plan.scene:
-            self.scene = read_scene(plan.scene)
-            self.world = scene_world(self.scene, lambda: self.clock, partial(self._report, "message"))
+            self.scene = self._scene_of_seed(plan.scene)
+            tell = partial(self._report, "message")
+            self.world = scene_world(self.scene, lambda: self.clock, tell, seed=self._seed)
             self._wiring = virtual_wiring(self.world, Limits())
             self._up_since = self.clock.now()
         try:

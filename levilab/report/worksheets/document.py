@@ -52,6 +52,7 @@ def worksheet(sheet: Sheet, language: Language, seeds: Mapping[str, int]) -> Doc
         blocks=(
             Section(words["aim"], (Paragraph(texts.aim),)),
             Section(words["commands"], (Code("\n".join(sheet.commands(group, seed))),)),
+            Section(words["clicks"], (Paragraph(words["with_clicks"]),)),
             Section(words["seeds"], (Paragraph(told), Listing("seeds", listed, rows_in_a_piece=5))),
             Section(words["tasks"], (Tabular("tasks", asked, wraps=asked.heads, first_column_wraps=True),)),
         ),

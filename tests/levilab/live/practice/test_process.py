@@ -13,6 +13,7 @@ import pytest
 
 from instruments.clock import PacedClock, VirtualClock
 from levilab.bench.config import Limits
+from levilab.crosscheck.truth import truth_of
 from levilab.interruption import End
 from levilab.live.practice.commands import (
     AnswerTask,
@@ -26,16 +27,19 @@ from levilab.live.practice.commands import (
     RecordRun,
     StopRun,
     SwitchDrive,
+    TakeSeed,
     TuneDrive,
 )
 from levilab.live.practice.experiments import PRACTICE
 from levilab.live.practice.fall import cause_of_fall
 from levilab.live.practice.process import PracticeOptions, PracticeProcess
+from levilab.live.practice.seeds import keys_of_seed
 from levilab.live.practice.tasks import TASKS, Look, Progress, exponent_of
 from levilab.runs.run import Run
 from levilab.simulator.scene import read_scene
 from levilab.telemetry.publisher import Publisher
 from levilab.world.bench import scene_world, virtual_wiring
+from levilab.world.spin_world import random_scene
 
 if TYPE_CHECKING:
     from levilab.telemetry.messages import State
@@ -90,14 +94,16 @@ def carry_out(
     start_hz: float = 30.0,
     script: type[Script] = Script,
     clock: PacedClock | None = None,
+    seed: int = 0,
     **options: Any,
 ) -> Script:
     """Carry out a script at a bench that does not wait."""
     scene = read_scene("practice").changed({"start.spin_hz": start_hz})
+    scene = scene.changed(keys_of_seed(scene, seed))
     clock = clock or PacedClock(math.inf)
     far_end = script(clock, [*commands])
     world = scene_world(scene, lambda: clock, lambda _: None)
-    how = PracticeOptions(str(out), "practice", 1, **options)
+    how = PracticeOptions(str(out), "practice", seed, **options)
     with Publisher() as publisher:
         far_end.process = PracticeProcess(how, scene, world, far_end, publisher=publisher, end=End())  # type: ignore[arg-type]
         far_end.process.run()
@@ -321,6 +327,28 @@ def test_the_tilt_of_the_moment_is_why_this_top_falls_before_an_upright_one(tilt
     world.clock.sleep(6.0)
     assert poses
     assert bool(poses(6.0, 0.1, 1).up[0]) is stands
+
+
+def test_each_group_has_a_top_of_its_own_with_its_truth(tmp_path: Path) -> None:
+    """As on the bench of `levilab acquire --mock`; what floats does so over each base, and no group sees another's."""
+    short = ("spin.drive_frequency_hz=31", "spin.hold_s=2", "spin.interval_s=2", "spin.gate_s=0.5", "spin.longest_s=8")
+    constants, levels = [], []
+    for seed, group in ((100, ""), (100, "Group 7")):
+        commands = (1.0, TakeSeed(group=group)), (3.0, RecordRun(experiment="spin", settings=short, group=group))
+        script = carry_out(tmp_path, *commands, (4.0, None), script=Timed, seed=seed)
+        run = Run.load(Path(next(event["folder"] for event in script.events if event["kind"] == "recorded")))
+        assert run.status == "finished"
+        assert run.record.seed == (106 if group else 100)
+        scene = run.record.configuration["scene"]
+        constant = scene["drag"]["coefficient"]
+        assert constant in truth_of(run, "spindown").values.values()
+        assert constant == pytest.approx(random_scene(run.record.seed).constants[0])  # as of `levilab acquire --mock`
+        constants.append(constant)
+        levels.append(scene["base"]["strength_t_m"] * scene["top"]["moment_a_m2"])
+    assert constants[0] != constants[1]
+    assert constants == pytest.approx([2.34e-4] * 2, rel=0.08)  # four times the scatter of 2 %
+    assert levels == pytest.approx([-0.0014 * 0.714] * 2)  # what lifts
+    assert script.states[-1].seed == 106
 
 
 def test_what_a_person_changes_has_immediate_effect(tmp_path: Path) -> None:
