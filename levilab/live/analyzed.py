@@ -165,12 +165,11 @@ def _result(path: Path) -> dict[str, Any]:
         found = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(found, dict):
         return {}
-    runs = found.get("runs")
-    verdicts = [one.get("verdict") for one in runs if isinstance(one, dict)] if isinstance(runs, list) else []
+    text = found.get("text")
     warnings = found.get("warnings")
     return {
         "analysis": str(found.get("analysis", ""))[:40],
-        "verdict": [str(text)[:_LONGEST_TEXT] for text in verdicts if text] or _values(found.get("values")),
+        "verdict": [text[:_LONGEST_TEXT]] if isinstance(text, str) and text else _values(found.get("values")),
         "warnings": [str(text)[:600] for text in warnings][:10] if isinstance(warnings, list) else [],
     }
 

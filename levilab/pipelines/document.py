@@ -107,6 +107,7 @@ class Document(Generic[S, R, Opt, A, D]):
             "synthetic": any(source.synthetic for source in found.sources),
             "software": software_versions(),
             "settings": self.settings(found.options),
+            "text": found.text,
             "models": [],
             "runs": [
                 {

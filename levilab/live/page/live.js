@@ -238,6 +238,7 @@ function show() {
   const down = Boolean(practice) && data.up === false && Boolean(bench) && !bench.silent && !bench.folder;
   const advice = !down ? "" : [bench.text || phrase("the top is down"), ...practice.guest ? [] : [data.count ? phrase("“Analyze” the run, or “Top back”") : phrase("“Top back” floats it again")]].join("; ");
   write("state-text", lost || LONGER[state] || advice || about?.problem || ended(about) || (running && !bench?.silent && bench?.text) || "");
+  put(by("state-text"), {title: by("state-text").textContent});
   put(by("synthetic"), {hidden: !(about?.synthetic || (!about && bench?.virtual))});
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
   write("elapsed", Number.isFinite(elapsed) ? lapse(elapsed) : "");

@@ -215,7 +215,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     for (const id of ["drive", "match", "back", "frequency", "frequency-slider", "amplitude", "amplitude-slider", "experiment", "group", "seed"]) {
       put(by(id), {disabled: now.busy});
     }
-    if (document.activeElement !== by("seed")) put(by("seed"), {value: String(bench.seed)});
+    if (bench.seed !== now.seed) put(by("seed"), {value: String(now.seed = bench.seed)});  // else a person may be typing
     names.forEach((name, k) => knobs[k].show(bench.what_if[name]));
     showTask(bench);
     for (const part of ["what-if", "tasks"]) put(by(part), {inert: now.busy});

@@ -14,6 +14,7 @@ from levilab.pipelines.document import Document, number, result_model, statistic
 from levilab.pipelines.row import find_all
 from levilab.pipelines.spindown.analysis import METHOD, SpinDownAnalysis
 from levilab.pipelines.spindown.budget import budget_of_all, budget_of_run
+from levilab.pipelines.spindown.meaning import answer
 from levilab.pipelines.spindown.quantities import CORRELATION, QUANTITIES
 from levilab.pipelines.spindown.words import remark, verdict_of_run
 
@@ -28,6 +29,7 @@ def _entries(analysis: SpinDownAnalysis) -> dict[str, Any]:
     combined = analysis.combined
     several = len(analysis.runs) > 1
     return {
+        "text": f"{answer(analysis)} {analysis.text}".lstrip(),
         "values": _combined_values(combined),
         "models": [_combined_model(fit) for fit in combined.fits] if several else _models(analysis.runs[0]),
     } | _verdict(combined.best, combined.verdict, analysis.text)

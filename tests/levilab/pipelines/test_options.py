@@ -20,7 +20,7 @@ DEFAULTS = {one.name: one.default for kind in KINDS.values() for one in fields(k
 def test_the_notebook_has_each_option_with_its_default_and_a_sentence() -> None:
     parameters = inspect.signature(levilab.analyze).parameters
     assert {
-        name: one.default for name, one in parameters.items() if name not in {"data", "kind", "time", "frequency"}
+        name: one.default for name, one in parameters.items() if name not in {"data", "kind", "time", "frequency", "light"}
     } == DEFAULTS
     lines = (inspect.getdoc(levilab.analyze) or "").splitlines()  # Python 3.13 takes the indentation off itself
     assert all(any(line.startswith(f"    {name}: ") for line in lines) for name in OPTIONS)
